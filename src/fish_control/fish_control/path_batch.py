@@ -1,0 +1,176 @@
+"""Many robots on many paths: progress, cross-track error and lookahead points, vectorised.
+
+The one implementation of path following: `PathTracker` is a batch of one, training and evaluation use it whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fish_control.reference_path import SAMPLE_SPACING, PathError, ReferencePath
+
+Array = NDArray[np.float64]
+LookaheadMode = Literal["distance", "along"]
+EXTENSION = 1.5  # m, straight continuation of an open path beyond its end, for lookahead points
+
+
+@dataclass(frozen=True)
+class TrackerConfig:
+    """How progress is kept and the target chosen."""
+
+    lookahead: float = 0.4  # m, the paper's distance from the robot to the target point
+    lookahead_mode: LookaheadMode = "distance"  # from the robot (as in the paper), or along the path
+    search_window: float = 0.3  # m ahead of the progress in which the nearest point is searched
+    capture_distance: float = 0.25  # m, progress starts when the robot first comes this close to the path
+
+    def __post_init__(self) -> None:
+        for name in ("lookahead", "search_window", "capture_distance"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and SAMPLE_SPACING < value <= 2.0):
+                raise ValueError(f"{name} is {value!r} m, expected {SAMPLE_SPACING} < {name} <= 2.0")
+        if self.lookahead_mode not in get_args(LookaheadMode):
+            raise ValueError(f"lookahead_mode is {self.lookahead_mode!r}; known: {', '.join(get_args(LookaheadMode))}")
+
+
+@dataclass(frozen=True)
+class PathState:
+    """Where a batch of B robots is relative to its paths.
+
+    Attributes:
+        progress: (B,) arc length along the path [m]; on a closed looping path it keeps growing with each lap, on an open
+            looping one it starts at 0 again.
+        cross_track_error: (B,) signed distance to the path at `progress` [m], positive when the robot is left of it.
+        heading: (B,) course of the path there [rad]. curvature: (B,) [1/m].
+        target: (B, 2) lookahead point [m].
+        finished: (B,) whether the end of a path that stops has been passed.
+    """
+
+    progress: Array
+    cross_track_error: Array
+    heading: Array
+    curvature: Array
+    target: Array
+    finished: NDArray[np.bool_]
+
+
+class PathBatch:
+    """Follows B paths in order: the nearest point is searched only in a window ahead of the progress so far."""
+
+    def __init__(self, paths: Sequence[ReferencePath], config: TrackerConfig | None = None) -> None:
+        self.config = config or TrackerConfig()
+        self.paths = tuple(paths)
+        tables = [_table(path) for path in self.paths]
+        rows = max(len(table) for table in tables)
+        self._table = np.stack([np.pad(table, ((0, rows - len(table)), (0, 0)), mode="edge") for table in tables])
+        self._count = np.array([len(path.points) for path in self.paths])
+        self._last = np.array([len(table) - 1 for table in tables])
+        self._ds = np.array([path.spacing for path in self.paths])
+        self._length = np.array([path.length for path in self.paths])
+        self._closed = np.array([path.closed for path in self.paths])
+        loops = np.array([path.end == "loop" for path in self.paths])
+        self._lap_end = np.where(self._closed & loops, np.inf, self._length)
+        self._restarts = ~self._closed & loops
+        self._row = np.arange(len(self.paths))
+        self.progress = np.zeros(len(self.paths))
+        self._captured = np.zeros(len(self.paths), dtype=bool)
+
+    def reset(self, progress: ArrayLike = 0.0) -> None:
+        """Forget the robots; the paths are to be followed from `progress` [m] on (a number or one for each path)."""
+        progress = np.broadcast_to(np.asarray(progress, dtype=float), self.progress.shape)
+        if not np.all(np.isfinite(progress) & (progress >= 0.0)):
+            raise PathError(f"progress is {progress}, expected finite numbers >= 0")
+        self.progress = progress.copy()
+        self._captured[:] = False
+
+    def nearest(self, position: ArrayLike, start: ArrayLike = 0.0) -> Array:
+        """Progress [m] of the globally nearest point not before `start`: (B, 2) positions -> (B,).
+
+        For starting on a closed path or resuming only; following uses `update`.
+        """
+        position = np.asarray(position, dtype=float)
+        squared = np.sum((self._table[:, :, :2] - position[:, None, :]) ** 2, axis=-1)
+        index = np.arange(squared.shape[1])
+        usable = (index < self._count[:, None]) & (index * self._ds[:, None] >= np.broadcast_to(start, self._row.shape)[:, None])
+        return np.argmin(np.where(usable, squared, np.inf), axis=1) * self._ds
+
+    def update(self, position: ArrayLike) -> PathState:
+        """Advance the progress to robots at `position` (B, 2) [m] and give errors and targets."""
+        position = np.asarray(position, dtype=float)
+        self._advance(position)
+        at, heading, curvature = self._evaluate(self.progress)
+        offset = position - at
+        e = -np.sin(heading) * offset[:, 0] + np.cos(heading) * offset[:, 1]
+        arrived = self.progress >= self._lap_end - 1e-6
+        return PathState(self.progress.copy(), e, heading, curvature, self._target(position), arrived & ~self._restarts)
+
+    def _advance(self, position: Array) -> None:
+        """Move the progress to the nearest point of the window ahead of it, once the robot has reached the path."""
+        again = self._restarts & (self.progress >= self._lap_end - 1e-6)
+        s0 = np.where(again, 0.0, self.progress)
+        self._captured &= ~again
+        offsets = np.arange(int(np.ceil(self.config.search_window / self._ds.min())) + 1)
+        s = np.minimum(s0[:, None] + offsets * self._ds[:, None], self._lap_end[:, None])
+        k = self._index(s)
+        sample = self._table[self._row[:, None], k]
+        squared = np.sum((sample[..., :2] - position[:, None, :]) ** 2, axis=-1)
+        best = np.argmin(squared, axis=1)
+        distance = np.sqrt(squared[self._row, best])
+        self._captured |= distance <= self.config.capture_distance
+        chosen = s[self._row, best]
+        chosen = np.clip(chosen + self._along_offset(chosen, position), s0, self._lap_end)
+        self.progress = np.where(self._captured, chosen, s0)
+
+    def _along_offset(self, s: Array, position: Array) -> Array:
+        """Distance [m] along the tangent at s to the foot of the perpendicular, at most one sample."""
+        at, heading, _ = self._evaluate(s)
+        offset = position - at
+        along = np.cos(heading) * offset[:, 0] + np.sin(heading) * offset[:, 1]
+        return np.clip(along, -self._ds, self._ds)
+
+    def _target(self, position: Array) -> Array:
+        """Lookahead point: where the path ahead leaves a circle about the robot, or a fixed arc length ahead.
+
+        A robot farther from the path than the lookahead aims at the path point at its progress. A path that stays within
+        the circle (curved tighter than it) gives its farthest point on the next 2.5 lookaheads.
+        """
+        L = self.config.lookahead
+        if self.config.lookahead_mode == "along":
+            return self._evaluate(self.progress + L)[0]
+        offsets = np.arange(int(np.ceil(2.5 * L / self._ds.min())) + 1)
+        k = self._index(self.progress[:, None] + offsets * self._ds[:, None])
+        sample = self._table[self._row[:, None], k, :2]
+        distance = np.linalg.norm(sample - position[:, None, :], axis=-1)
+        leaves = distance >= L
+        first = np.where(leaves.any(axis=1), np.argmax(leaves, axis=1), np.argmax(distance, axis=1))
+        before = np.maximum(first - 1, 0)
+        d0, d1 = distance[self._row, before], distance[self._row, first]
+        share = np.clip(np.divide(L - d0, d1 - d0, out=np.ones_like(d0), where=d1 > d0), 0.0, 1.0)
+        a, b = sample[self._row, before], sample[self._row, first]
+        return a + share[:, None] * (b - a)
+
+    def _index(self, s: Array) -> NDArray[np.int64]:
+        """Table rows next to arc lengths s (B, K) [m]."""
+        k = np.rint(s / self._ds[:, None]).astype(np.int64)
+        return np.where(self._closed[:, None], k % self._count[:, None], np.minimum(k, self._last[:, None]))
+
+    def _evaluate(self, s: Array) -> tuple[Array, Array, Array]:
+        """Point (B, 2) [m], heading (B,) [rad] and curvature (B,) [1/m] at arc lengths s (B,)."""
+        k = self._index(s[:, None])[:, 0]
+        row = self._table[self._row, k]
+        delta = s - np.rint(s / self._ds) * self._ds
+        heading = row[:, 2] + row[:, 3] * delta
+        mean = row[:, 2] + 0.5 * row[:, 3] * delta
+        return row[:, :2] + delta[:, None] * np.column_stack([np.cos(mean), np.sin(mean)]), heading, row[:, 3]
+
+
+def _table(path: ReferencePath) -> Array:
+    """(M, 4) rows x, y, heading, curvature of a path; an open one with its straight continuation."""
+    s = np.arange(len(path.points)) * path.spacing
+    if not path.closed:
+        s = np.r_[s, path.length + path.spacing * np.arange(1, int(EXTENSION / path.spacing) + 1)]
+    return np.column_stack([path.point(s), path.heading_at(s), path.curvature_at(s)])

@@ -1,0 +1,56 @@
+"""One robot on one path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fish_control.path_batch import PathBatch, TrackerConfig
+from fish_control.reference_path import ReferencePath
+
+
+@dataclass(frozen=True)
+class PathPoint:
+    """Where the robot is relative to its path; fields as in PathState, without the batch axis."""
+
+    progress: float  # m
+    cross_track_error: float  # m, positive: robot left of the path
+    heading: float  # rad, course of the path
+    curvature: float  # 1/m
+    target: NDArray[np.float64]  # (2,) m
+    finished: bool
+
+
+class PathTracker:
+    """Keeps one robot's progress along one path; a batch of one."""
+
+    def __init__(self, path: ReferencePath, config: TrackerConfig | None = None) -> None:
+        self.path = path
+        self._batch = PathBatch([path], config)
+
+    @property
+    def progress(self) -> float:
+        """Arc length reached so far [m]."""
+        return float(self._batch.progress[0])
+
+    def reset(self, progress: float = 0.0) -> None:
+        """Follow the path from `progress` [m] on."""
+        self._batch.reset(progress)
+
+    def nearest(self, position: ArrayLike, start: float = 0.0) -> float:
+        """Progress [m] of the globally nearest point not before `start`, for starting and resuming only."""
+        return float(self._batch.nearest(np.reshape(position, (1, 2)), start)[0])
+
+    def update(self, position: ArrayLike) -> PathPoint:
+        """Advance to the robot's position (2,) [m]."""
+        state = self._batch.update(np.reshape(position, (1, 2)))
+        return PathPoint(
+            float(state.progress[0]),
+            float(state.cross_track_error[0]),
+            float(state.heading[0]),
+            float(state.curvature[0]),
+            state.target[0],
+            bool(state.finished[0]),
+        )

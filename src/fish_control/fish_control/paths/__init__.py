@@ -1,0 +1,48 @@
+"""Reference paths by name: one family a file, one line a family here."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+
+from fish_control.paths.circle import circle
+from fish_control.paths.figure_eight import figure_eight
+from fish_control.paths.letter import letter
+from fish_control.paths.polyline import polyline
+from fish_control.paths.sinusoid import sinusoid
+from fish_control.paths.square_wave import square_wave
+from fish_control.paths.straight import straight
+from fish_control.reference_path import PathError, ReferencePath
+
+PATHS: dict[str, Callable[..., ReferencePath]] = {
+    "circle": circle,
+    "figure_eight": figure_eight,
+    "letter": letter,
+    "polyline": polyline,
+    "sinusoid": sinusoid,
+    "square_wave": square_wave,
+    "straight": straight,
+}
+
+
+def make_path(name: str, **arguments: object) -> ReferencePath:
+    """Build a path by family name; a single letter means that letter.
+
+    Raises:
+        PathError: unknown family, unknown argument or bad value; lists what is known.
+    """
+    if len(name) == 1:
+        name, arguments = "letter", {"letter": name, **arguments}
+    if name not in PATHS:
+        raise PathError(f"unknown path {name!r}; known: {', '.join(PATHS)}, or a single letter A to Z")
+    known = inspect.signature(PATHS[name]).parameters
+    unknown = sorted(set(arguments) - set(known))
+    if unknown:
+        raise PathError(f"path '{name}' has no argument {', '.join(map(repr, unknown))}; known: {', '.join(known)}")
+    try:
+        return PATHS[name](**arguments)
+    except TypeError as error:
+        raise PathError(f"path '{name}': an argument has the wrong type ({error})") from error
+
+
+__all__ = ["PATHS", "make_path"]
