@@ -1,0 +1,1 @@
+"""Hardware drivers: rotor (Vertiq), rudder servo, IMU (BNO085) and USB camera."""

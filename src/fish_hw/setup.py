@@ -1,0 +1,33 @@
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "fish_hw"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/" + NAME]),
+        ("share/" + NAME, ["package.xml"]),
+        ("share/" + NAME + "/config", glob("config/*")),
+        ("share/" + NAME + "/launch", glob("launch/*")),
+    ],
+    package_data={NAME: ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=False,
+    maintainer="Robot fish maintainers",
+    maintainer_email="maintainers@robot-fish.org",
+    description="Hardware drivers: rotor (Vertiq), rudder servo, IMU (BNO085) and USB camera.",
+    license="Apache-2.0",
+    tests_require=["pytest"],
+    entry_points={
+        "console_scripts": [
+            "rotor = fish_hw.nodes.rotor:main",
+            "rudder = fish_hw.nodes.rudder:main",
+            "imu = fish_hw.nodes.imu:main",
+            "camera = fish_hw.nodes.camera:main",
+        ],
+    },
+)

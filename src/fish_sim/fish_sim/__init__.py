@@ -1,0 +1,1 @@
+"""The differentiable simulator of a rotor-driven robot fish, its sensors and the rendered pool."""

@@ -1,0 +1,114 @@
+"""What an effect may add to the nominal model, and what it may look at.
+
+An effect is one class: parameters, optional states and only those methods in which it differs from the nominal
+model. All methods are written on generic scalars (`xp` of `fish_sim.ops`). With zero strength an effect is exactly
+the nominal model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+from fish_sim.ops import Scalar
+from fish_sim.parameter import Parameter
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """One rigid body (head, link_1.., fin) as the forces see it."""
+
+    name: str
+    x: Scalar  # m, centre of mass in the pool frame
+    y: Scalar  # m
+    cos: Scalar  # of its direction in the pool frame
+    sin: Scalar
+    u: Scalar  # m/s, surge relative to the water, body frame
+    v: Scalar  # m/s, sway relative to the water, body frame
+    w: Scalar  # rad/s, rate of turn
+    drag_surge: Scalar  # N s/m, nominal Rayleigh coefficients
+    drag_sway: Scalar  # N s/m
+    drag_yaw: Scalar  # N m s/rad
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The inputs inside one step: both piecewise linear in time."""
+
+    alpha: Scalar  # rad, rudder angle, > 0 steers left
+    alpha_dot: Scalar  # rad/s
+    rotor_speed: Scalar  # rad/s, phi_dot
+    rotor_acceleration: Scalar  # rad/s^2, phi_ddot
+
+
+@dataclass(frozen=True)
+class Grip:
+    """How the tail's tip holds the water: force = -(1/mobility) (slip (1 - share) + wake share).
+
+    mobility 0 is the no-slip constraint of the nominal model.
+    """
+
+    mobility: Scalar = 0.0  # m/(N s)
+    share: Scalar = 0.0  # part of the grip that follows the slip late
+    wake: Scalar = 0.0  # m/s, the late slip
+
+
+class Effect:
+    """Base of all effects: everything nominal. Subclasses override what they change."""
+
+    name: ClassVar[str]
+    kind: ClassVar[str]  # physics, actuator
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    parameters: ClassVar[Mapping[str, Parameter]]
+    strength: ClassVar[tuple[str, ...]]  # the parameters whose zero (or neutral value) means: effect off
+    states: ClassVar[tuple[str, ...]] = ()  # continuous, integrated with the motion; start at 0
+    memory: ClassVar[tuple[str, ...]] = ()  # discrete, updated once per command; start at 0
+    dissipative: ClassVar[bool] = False  # its wrench never adds energy in still water
+
+    @staticmethod
+    def wrench(p: SimpleNamespace, body: BodyMotion, z: SimpleNamespace, drive: Drive, xp: Any) -> Any:
+        """(X, Y, N) on a body in its own frame [N, N, N m]."""
+        return None
+
+    @staticmethod
+    def joint_torque(p: SimpleNamespace, joint: int, angle: Scalar, rate: Scalar, xp: Any) -> Scalar:
+        """Torque that opposes the joint's deflection [N m], added to the spring's; joint 1 is at the head."""
+        return 0.0
+
+    @staticmethod
+    def water(p: SimpleNamespace, x: Scalar, y: Scalar, z: SimpleNamespace, xp: Any) -> Any:
+        """Water velocity (V_x, V_y) and its gradient ((dVx/dx, dVx/dy), (dVy/dx, dVy/dy)) in the pool frame."""
+        return None
+
+    @staticmethod
+    def point_masses(p: SimpleNamespace) -> Any:
+        """[(mass, forward, left)] rigid on the head, relative to its centre of mass [kg, m, m]."""
+        return ()
+
+    @staticmethod
+    def grip(p: SimpleNamespace, z: SimpleNamespace, xp: Any) -> Grip | None:
+        """Finite grip of the tip, or None."""
+        return None
+
+    @staticmethod
+    def tip_share(p: SimpleNamespace) -> Scalar:
+        """Part of alpha that turns the fin at the tip instead of the root of the tail."""
+        return 0.0
+
+    @staticmethod
+    def derivative(p: SimpleNamespace, z: SimpleNamespace, slip: Scalar, drive: Drive, xp: Any) -> tuple[Scalar, ...]:
+        """Time derivatives of `states`; slip is the tip's lateral velocity through the water [m/s]."""
+        return ()
+
+    @staticmethod
+    def rudder(p: SimpleNamespace, m: SimpleNamespace, command: Scalar, dt: float, xp: Any) -> tuple[Scalar, dict]:
+        """(commanded alpha as the servo follows it [rad], updated memory)."""
+        return command, {}
+
+    @staticmethod
+    def rotor(p: SimpleNamespace, m: SimpleNamespace, command: Scalar, dt: float, xp: Any) -> tuple[Scalar, dict]:
+        """(commanded rotor speed as the motor follows it [rad/s], updated memory)."""
+        return command, {}

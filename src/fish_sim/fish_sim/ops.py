@@ -1,0 +1,79 @@
+"""The few elementary functions the equations need, for every carrier of numbers they run on.
+
+The equations of `dynamics.py` and of the effects take one of these tables as `xp` and therefore work on NumPy
+arrays, CasADi symbols (which become compiled kernels) and torch tensors on any device alike.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import casadi
+import numpy as np
+
+Scalar = Any  # float, numpy array, casadi.SX or torch tensor: whatever xp works on
+
+NUMPY = SimpleNamespace(
+    sin=np.sin,
+    cos=np.cos,
+    exp=np.exp,
+    sqrt=np.sqrt,
+    tanh=np.tanh,
+    fabs=np.abs,
+    sign=np.sign,
+    floor=np.floor,
+    fmin=np.minimum,
+    fmax=np.maximum,
+    arctan2=np.arctan2,
+    where=np.where,
+)
+
+CASADI = SimpleNamespace(
+    sin=casadi.sin,
+    cos=casadi.cos,
+    exp=casadi.exp,
+    sqrt=casadi.sqrt,
+    tanh=casadi.tanh,
+    fabs=casadi.fabs,
+    sign=casadi.sign,
+    floor=casadi.floor,
+    fmin=casadi.fmin,
+    fmax=casadi.fmax,
+    arctan2=casadi.atan2,
+    where=casadi.if_else,
+)
+
+
+def torch_ops() -> SimpleNamespace:
+    """The table for torch tensors; torch is imported only when somebody asks for it."""
+    import torch
+
+    def tensor(value: Scalar, like: torch.Tensor) -> torch.Tensor:
+        return torch.as_tensor(value, dtype=like.dtype, device=like.device)
+
+    def pairwise(function: Any) -> Any:
+        def apply(a: Scalar, b: Scalar) -> torch.Tensor:
+            like = a if isinstance(a, torch.Tensor) else b
+            return function(tensor(a, like), tensor(b, like))
+
+        return apply
+
+    def elementwise(function: Any) -> Any:
+        def apply(a: Scalar) -> torch.Tensor:
+            return function(a if isinstance(a, torch.Tensor) else torch.tensor(a, dtype=torch.float64))
+
+        return apply
+
+    names = {"fabs": "abs", "arctan2": "atan2", "fmin": "minimum", "fmax": "maximum"}
+    one = {k: elementwise(getattr(torch, names.get(k, k))) for k in ONE_ARGUMENT}
+    two = {k: pairwise(getattr(torch, names.get(k, k))) for k in ("fmin", "fmax", "arctan2")}
+
+    def where(condition: torch.Tensor, a: Scalar, b: Scalar) -> torch.Tensor:
+        like = a if isinstance(a, torch.Tensor) else b if isinstance(b, torch.Tensor) else torch.zeros(())
+        return torch.where(condition, tensor(a, like), tensor(b, like))
+
+    return SimpleNamespace(**one, **two, where=where)
+
+
+ONE_ARGUMENT = ("sin", "cos", "exp", "sqrt", "tanh", "fabs", "sign", "floor")

@@ -1,0 +1,229 @@
+"""robot.yaml <-> the robot's parameters and the effects that are switched on.
+
+Names, units and nominal values are those of the model description; every value in a file is checked and an error
+names file, field, value and what was expected.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fish_sim.effects import EFFECTS
+from fish_sim.parameter import Parameter
+from fish_sim.sensor_effects import SENSOR_EFFECTS
+
+FORMAT = 1
+STRIP_ADDED_MASS = 1000.0 * math.pi / 4.0 * 0.075**2  # kg/m, slender body strip rho pi/4 h^2, height h = 0.075 m
+MAX_LINKS = 12  # beyond this the fastest tail mode needs steps far below 1 ms
+
+
+class RobotError(ValueError):
+    """A robot description that cannot be used; the message names field, value and expectation."""
+
+
+def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
+    """The nominal fish with `links` equal tail links, in the order of the kernels' parameter vector.
+
+    Lengths and masses: measured or published (head 150 mm, tail 100 mm, 535 g); coefficients: assumptions that
+    reproduce the published range of speeds and turning radii.
+    """
+    _check_links(links)
+    n = links
+    measured, assumed = "measured (weighed, ruler)", "assumption; reproduces 0.1 to 0.5 m/s and 0.3 body lengths"
+    strip = "slender-body strip, rho pi/4 h^2 per length, h = 0.075 m"
+
+    def p(value: float, unit: str, source: str, lowest: float = 0.0, highest: float = math.inf) -> Parameter:
+        return Parameter(value=value, unit=unit, lowest=lowest, highest=highest, source=source)
+
+    return {
+        "head_mass": p(0.465, "kg", measured, 1e-6),
+        "head_added_mass_surge": p(0.05, "kg", assumed),
+        "head_added_mass_sway": p(0.55, "kg", assumed),
+        "head_inertia": p(2.4e-3, "kg m^2", assumed + "; includes the added inertia", 1e-9),
+        "hinge_offset": p(0.075, "m", measured),
+        "link_length": p(0.07 / n, "m", measured, 1e-6),
+        "link_mass": p(0.05 / n, "kg", measured, 1e-9),
+        "link_added_mass_sway": p(STRIP_ADDED_MASS * 0.07 / n, "kg", strip),
+        "fin_length": p(0.03, "m", measured, 1e-6),
+        "fin_mass": p(0.02, "kg", measured, 1e-9),
+        "fin_added_mass_sway": p(STRIP_ADDED_MASS * 0.03, "kg", strip),
+        "tail_stiffness": p(0.10 * n / 3, "N m/rad", assumed),
+        "rotor_inertia": p(1.0e-4, "kg m^2", assumed),
+        "head_drag_surge": p(0.20, "N s/m", assumed),
+        "head_drag_sway": p(1.5, "N s/m", assumed),
+        "head_drag_yaw": p(3.0e-3, "N m s/rad", assumed),
+        "link_drag_surge": p(0.06 / n, "N s/m", assumed),
+        "link_drag_sway": p(0.9 / n, "N s/m", assumed),
+        "fin_drag_surge": p(0.03, "N s/m", assumed),
+        "fin_drag_sway": p(0.4, "N s/m", assumed),
+        "servo_rate_limit": p(6.0, "rad/s", "assumption; hobby servo under load", 1e-3),
+        "rudder_range": p(0.8, "rad", "measured", 1e-3, math.pi / 2),
+    }
+
+
+def _check_links(links: int) -> None:
+    if isinstance(links, bool) or not isinstance(links, int) or not 1 <= links <= MAX_LINKS:
+        raise RobotError(f"links: got {links!r}; expected a whole number from 1 to {MAX_LINKS}")
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A fish: number of tail links, parameter values and enabled effects with their parameter values."""
+
+    links: int = 3
+    parameters: Mapping[str, float] = field(default_factory=dict)  # missing names take the nominal value
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # EFFECTS name -> parameter -> value
+    sensors: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # SENSOR_EFFECTS name -> ...
+    name: str = "fish"
+
+    def __post_init__(self) -> None:
+        nominal = nominal_parameters(self.links)
+        values = _check_table("parameters", nominal, self.parameters)
+        object.__setattr__(self, "parameters", values)
+        object.__setattr__(self, "effects", _check_effects("effects", EFFECTS, self.effects))
+        object.__setattr__(self, "sensors", _check_effects("sensors", SENSOR_EFFECTS, self.sensors))
+
+    @property
+    def structure(self) -> tuple[int, tuple[str, ...]]:
+        """What decides the compiled kernel: number of links and names of the effects, in table order."""
+        return self.links, tuple(name for name in EFFECTS if name in self.effects)
+
+    def vector(self) -> list[float]:
+        """All parameter values in the order of `parameter_names(self.structure)`."""
+        names = self.structure[1]
+        return [*self.parameters.values(), *(v for name in names for v in self.effects[name].values())]
+
+    def with_parameters(self, **values: float) -> Robot:
+        """The same robot with some parameters changed."""
+        return replace(self, parameters={**self.parameters, **values})
+
+    def with_effect(self, name: str, **values: float) -> Robot:
+        """The same robot with one more effect (or other values for one it has)."""
+        if name in SENSOR_EFFECTS:
+            return replace(self, sensors={**self.sensors, name: values})
+        return replace(self, effects={**self.effects, name: values})
+
+    def digest(self) -> str:
+        """Hash of everything that changes its motion; weights files carry it."""
+        content = {"links": self.links, "parameters": dict(self.parameters), "effects": self.effects}
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def parameter_names(structure: tuple[int, tuple[str, ...]]) -> tuple[str, ...]:
+    """Names in a kernel's parameter vector: robot parameters, then `effect.parameter`."""
+    links, effects = structure
+    own = [f"{name}.{key}" for name in effects for key in EFFECTS[name].parameters]
+    return (*nominal_parameters(links), *own)
+
+
+def _check_table(where: str, specification: Mapping[str, Parameter], given: Mapping[str, Any]) -> dict[str, float]:
+    if not isinstance(given, Mapping):
+        raise RobotError(f"{where}: got {given!r}; expected a table of name: value")
+    for name in given:
+        if name not in specification:
+            raise RobotError(f"{where}.{name}: unknown name; known: {', '.join(specification)}")
+    return {
+        name: _check_value(f"{where}.{name}", parameter, given.get(name, parameter.value))
+        for name, parameter in specification.items()
+    }
+
+
+def _check_value(where: str, parameter: Parameter, value: Any) -> float:
+    expected = f"a number in [{parameter.lowest:g}, {parameter.highest:g}] {parameter.unit}"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise RobotError(f"{where}: got {value!r}; expected {expected}")
+    if not math.isfinite(value) or not parameter.lowest <= value <= parameter.highest:
+        raise RobotError(f"{where}: got {value!r} {parameter.unit}; expected {expected}")
+    return float(value)
+
+
+def _check_effects(where: str, table: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    for name in given:
+        if name not in table:
+            raise RobotError(f"{where}: unknown effect {name!r}; known: {', '.join(table)}")
+    return {
+        name: _check_table(f"{where}.{name}", table[name].parameters, given[name] or {})
+        for name in table
+        if name in given
+    }
+
+
+def load_robot(path: str | Path) -> Robot:
+    """Read robot.yaml (or a model.yaml written by the diagnosis). Raises RobotError with file and field."""
+    path = Path(path)
+    try:
+        content = yaml.safe_load(path.read_text())
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise RobotError(f"{path}: cannot be read as YAML: {error}") from error
+    try:
+        return _from_content(content)
+    except RobotError as error:
+        raise RobotError(f"{path}: {error}") from error
+
+
+def _from_content(content: Any) -> Robot:
+    if not isinstance(content, dict):
+        raise RobotError(f"got {type(content).__name__}; expected a table with format, links, parameters")
+    known = {"format", "name", "links", "parameters", "effects", "sensors", "notes"}
+    if unknown := sorted(set(content) - known):
+        raise RobotError(f"{unknown[0]}: unknown field; known: {', '.join(sorted(known))}")
+    if content.get("format") != FORMAT:
+        raise RobotError(f"format: got {content.get('format')!r}; expected {FORMAT}")
+    links = content.get("links", 3)
+    _check_links(links)
+    return Robot(
+        links=links,
+        parameters=_values("parameters", content.get("parameters") or {}, nominal_parameters(links)),
+        effects={k: _values(f"effects.{k}", v or {}) for k, v in (content.get("effects") or {}).items()},
+        sensors={k: _values(f"sensors.{k}", v or {}) for k, v in (content.get("sensors") or {}).items()},
+        name=str(content.get("name", "fish")),
+    )
+
+
+def _values(where: str, table: Any, units: Mapping[str, Parameter] | None = None) -> dict[str, Any]:
+    """Entries are plain numbers or {value, unit, std, source}; a unit, where given, must be the model's."""
+    if not isinstance(table, dict):
+        raise RobotError(f"{where}: got {table!r}; expected a table of name: value")
+    result = {}
+    for name, entry in table.items():
+        if isinstance(entry, dict):
+            if "value" not in entry:
+                raise RobotError(f"{where}.{name}: got {entry!r}; expected a number or a table with 'value'")
+            if units and name in units and entry.get("unit", units[name].unit) != units[name].unit:
+                raise RobotError(f"{where}.{name}.unit: got {entry['unit']!r}; expected {units[name].unit!r}")
+            entry = entry["value"]
+        result[name] = entry
+    return result
+
+
+def save_robot(robot: Robot, path: str | Path, std: Mapping[str, float] | None = None, notes: str = "") -> None:
+    """Write robot.yaml with names, units and sources; `std` maps `name` or `effect.name` to a standard error."""
+    std = std or {}
+
+    def rows(values: Mapping[str, float], specification: Mapping[str, Parameter], prefix: str = "") -> dict[str, Any]:
+        table = {}
+        for name, value in values.items():
+            parameter = specification[name]
+            row: dict[str, Any] = {"value": float(value), "unit": parameter.unit}
+            if prefix + name in std:
+                row["std"] = float(std[prefix + name])
+            row["source"] = parameter.source if value == parameter.value else "identified or set by the user"
+            table[name] = row
+        return table
+
+    content: dict[str, Any] = {"format": FORMAT, "name": robot.name, "links": robot.links}
+    content["parameters"] = rows(robot.parameters, nominal_parameters(robot.links))
+    for key, table in (("effects", EFFECTS), ("sensors", SENSOR_EFFECTS)):
+        enabled = getattr(robot, key)
+        content[key] = {name: rows(v, table[name].parameters, f"{name}.") for name, v in enabled.items()}
+    if notes:
+        content["notes"] = notes
+    Path(path).write_text(yaml.safe_dump(content, sort_keys=False, width=110))

@@ -1,0 +1,1 @@
+"""Offline package: recordings, identification, diagnosis, training, evaluation, reports."""

@@ -1,0 +1,1 @@
+"""Overhead-camera tracker: calibration, HSV segmentation, markers to pose."""

@@ -1,0 +1,30 @@
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "fish_vision"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/" + NAME]),
+        ("share/" + NAME, ["package.xml"]),
+        ("share/" + NAME + "/config", glob("config/*")),
+        ("share/" + NAME + "/launch", glob("launch/*")),
+    ],
+    package_data={NAME: ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=False,
+    maintainer="Robot fish maintainers",
+    maintainer_email="maintainers@robot-fish.org",
+    description="Overhead-camera tracker: calibration, HSV segmentation, markers to pose.",
+    license="Apache-2.0",
+    tests_require=["pytest"],
+    entry_points={
+        "console_scripts": [
+            "tracker = fish_vision.nodes.tracker:main",
+        ],
+    },
+)
