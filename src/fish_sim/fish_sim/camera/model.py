@@ -1,0 +1,89 @@
+"""The overhead camera as geometry: pool coordinates to pixels and back."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+R_DOWN = np.diag([1.0, -1.0, -1.0])  # optical axes of an untilted camera: right = pool x, down = pool -y
+
+
+@dataclass(frozen=True)
+class CameraModel:
+    """Pinhole camera with plumb_bob lens, looking down at the pool.
+
+        p_cam = R p_pool + t,  R = exp([tilt]x) diag(1, -1, -1),  t = -R position
+        pixel = K distort(p_cam / z_cam)
+
+    Pixel (0, 0) is the centre of the first pixel. Frame: pool (m) and optical (x right, y down, z ahead).
+    Source: pinhole and plumb_bob as in OpenCV and sensor_msgs/CameraInfo.
+    """
+
+    size: tuple[int, int]  # width, height, pixels
+    focal: tuple[float, float]  # fx, fy, pixels
+    centre: tuple[float, float]  # cx, cy, pixels
+    distortion: tuple[float, ...]  # k1, k2, p1, p2, k3
+    position: tuple[float, float, float]  # of the optical centre in the pool frame, m
+    tilt: tuple[float, float, float]  # rotation vector about the optical axes, rad; 0 = straight down
+
+    @property
+    def K(self) -> Array:
+        """(3, 3) camera matrix."""
+        (fx, fy), (cx, cy) = self.focal, self.centre
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def D(self) -> Array:
+        """(5,) plumb_bob coefficients."""
+        return np.asarray(self.distortion, float)
+
+    @property
+    def R(self) -> Array:
+        """(3, 3) turns pool vectors into optical ones."""
+        return cv2.Rodrigues(np.asarray(self.tilt, float))[0] @ R_DOWN
+
+    @property
+    def t(self) -> Array:
+        """(3,) pool origin in optical coordinates, m."""
+        return -self.R @ np.asarray(self.position, float)
+
+    def project(self, points: ArrayLike) -> Array:
+        """(N, 3) points in the pool frame, m -> (N, 2) pixels."""
+        points = np.asarray(points, float).reshape(-1, 3)
+        rotation, _ = cv2.Rodrigues(self.R)
+        return cv2.projectPoints(points, rotation, self.t, self.K, self.D)[0].reshape(-1, 2)
+
+    def rays(self, pixels: ArrayLike) -> Array:
+        """(N, 2) pixels -> (N, 3) directions in the pool frame (not normalised, optical depth 1)."""
+        pixels = np.asarray(pixels, float).reshape(-1, 2)
+        flat = undistort((pixels - np.array(self.centre)) / np.array(self.focal), self.distortion)
+        return np.column_stack([flat, np.ones(len(flat))]) @ self.R
+
+    def unproject(self, pixels: ArrayLike, height: float = 0.0) -> Array:
+        """(N, 2) pixels -> (N, 2) points x, y in the plane z = height of the pool frame, m."""
+        rays = self.rays(pixels)
+        x, y, z = self.position
+        return np.array([x, y]) + rays[:, :2] * ((height - z) / rays[:, 2])[:, None]
+
+
+def undistort(distorted: Array, distortion: tuple[float, ...], steps: int = 25) -> Array:
+    """Inverse of the plumb_bob lens: (N, 2) distorted -> (N, 2) ideal normalised image points.
+
+        x <- (x_d - tangential(x)) / radial(x),  radial = 1 + k1 r^2 + k2 r^4 + k3 r^6
+
+    Error after 25 steps below 1e-9 where the radial part stays above about 0.7. cv2.undistortPoints stops after five
+    steps, a tenth of a pixel short at the edge of a wide lens.
+    Source: fixed-point iteration, Heikkila and Silven (1997), as in OpenCV.
+    """
+    k1, k2, p1, p2, k3 = distortion
+    x, y = distorted[:, 0].copy(), distorted[:, 1].copy()
+    for _ in range(steps):
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        x, y = (distorted[:, 0] - dx) / radial, (distorted[:, 1] - dy) / radial
+    return np.column_stack([x, y])

@@ -1,0 +1,147 @@
+"""The picture that the overhead camera takes of the pool with the fish in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.camera.fish import FishPose, FishShape, patches, silhouette
+from fish_sim.camera.model import CameraModel
+from fish_sim.camera.water import DEPTH, MovingLight, moving_light, still_pool, vignette
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+FINE = 4  # subpixels per pixel and direction when the fish is drawn
+SHIFT = 4  # fractional bits of polygon corners
+SHADOW = 0.30  # share of light that the fish takes from the floor below it
+MARGIN = 4  # pixels around the fish's patch
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the sensor and the compression do to the picture."""
+
+    noise_std: float = 3.0  # grey levels
+    glare: float = 1.0  # strength of lamp reflections
+    jpeg_quality: int = 90
+    seed: int = 1
+
+
+class PoolRenderer:
+    """Draws frames: still background + caustics, shadow, fish, glare, noise.
+
+    Everything that does not depend on the fish is made once; a frame costs a few full-image additions and a small
+    patch drawn at FINE x FINE subpixels. The noise is one tile shown at random offsets. Seeded: the same calls in the
+    same order give the same pictures.
+    """
+
+    def __init__(self, camera: CameraModel, shape: FishShape, look: Look) -> None:
+        self.camera = camera
+        self._shape, self._look = shape, look
+        self._pool = still_pool(camera, look.seed)
+        self._light_share = vignette(camera)
+        self._moving: MovingLight = moving_light(camera, look.glare, look.seed)
+        self._random = np.random.default_rng(look.seed)
+        self._noise, self._noise_mean = _noise_tile(camera.size, look.noise_std, self._random)
+
+    def render(self, poses: Sequence[FishPose], time: float) -> Image:
+        """(height, width, 3) picture, blue green red.
+
+        Args:
+            poses: the fish at equal parts of the exposure (one pose = no motion blur, none = empty pool).
+            time: s, moves the light on the water.
+        """
+        caustics, glare = self._moving.at(time, self.camera.size)
+        picture = cv2.add(self._pool, cv2.cvtColor(caustics, cv2.COLOR_GRAY2BGR))
+        if poses:
+            self._draw_fish(picture, poses)
+        cv2.add(picture, cv2.cvtColor(glare, cv2.COLOR_GRAY2BGR), dst=picture)
+        return self._with_noise(picture)
+
+    def jpeg(self, picture: Image) -> bytes:
+        """The picture as JPEG with 4:2:2 colour, as webcams send it."""
+        options = [cv2.IMWRITE_JPEG_QUALITY, self._look.jpeg_quality]
+        options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_422]
+        return cv2.imencode(".jpg", picture, options)[1].tobytes()
+
+    def _draw_fish(self, picture: Image, poses: Sequence[FishPose]) -> None:
+        """Shadow, then the mean of all poses, into the patch of the picture that holds them."""
+        shapes = [[(self._pixels(p.outline, 0.0), p.colour) for p in patches(pose, self._shape)] for pose in poses]
+        shadows = [self._pixels(s, -DEPTH) for s in silhouette(poses[len(poses) // 2], self._shape)]
+        corners = np.vstack([outline for fish in shapes for outline, _ in fish] + shadows)
+        box = _box(corners, self.camera.size)
+        if box is None:
+            return
+        left, top, right, bottom = box
+        view = picture[top:bottom, left:right].astype(np.float32)
+        view *= 1.0 - SHADOW * _shade(shadows, box)[..., None]
+        colour, cover = np.zeros_like(view), np.zeros(view.shape[:2], np.float32)
+        for fish in shapes:
+            one_colour, one_cover = _fill(fish, box)
+            colour += one_colour / len(shapes)
+            cover += one_cover / len(shapes)
+        light = self._light_share[top:bottom, left:right, None]
+        view = view * (1.0 - cover[..., None]) + colour * light
+        picture[top:bottom, left:right] = np.clip(view + 0.5, 0, 255).astype(np.uint8)
+
+    def _pixels(self, outline: Array, height: float) -> Array:
+        return self.camera.project(np.column_stack([outline, np.full(len(outline), height)]))
+
+    def _with_noise(self, picture: Image) -> Image:
+        rows, columns = self._noise.shape[0] - picture.shape[0], self._noise.shape[1] - picture.shape[1]
+        i, j = self._random.integers(0, rows + 1), self._random.integers(0, columns + 1)
+        tile = self._noise[i : i + picture.shape[0], j : j + picture.shape[1]]
+        return cv2.addWeighted(picture, 1.0, tile, 1.0, -self._noise_mean)
+
+
+def _noise_tile(size: tuple[int, int], std: float, random: np.random.Generator) -> tuple[Image, float]:
+    """Noise with its mean raised so that it fits unsigned bytes, larger than the image for random offsets."""
+    mean = float(np.ceil(4.0 * std))
+    shape = (size[1] + 61, size[0] + 127, 3)
+    return np.clip(np.round(random.normal(mean, std, shape)), 0, 255).astype(np.uint8), mean
+
+
+def _box(corners: Array, size: tuple[int, int]) -> tuple[int, int, int, int] | None:
+    """left, top, right, bottom of the patch inside the image, or None if nothing of it is inside."""
+    low = np.floor(corners.min(axis=0)).astype(int) - MARGIN
+    high = np.ceil(corners.max(axis=0)).astype(int) + MARGIN + 1
+    left, top = max(low[0], 0), max(low[1], 0)
+    right, bottom = min(high[0], size[0]), min(high[1], size[1])
+    return (left, top, right, bottom) if left < right and top < bottom else None
+
+
+def _subpixels(outline: Array, box: tuple[int, int, int, int]) -> NDArray[np.int32]:
+    """Fixed-point corners in the enlarged patch; subpixel centres: (u - left + 1/2) FINE - 1/2."""
+    place = (outline - np.array(box[:2]) + 0.5) * FINE - 0.5
+    return np.round(place * (1 << SHIFT)).astype(np.int32)
+
+
+def _shrink(canvas: NDArray[np.uint8], box: tuple[int, int, int, int]) -> NDArray[np.uint8]:
+    return cv2.resize(canvas, (box[2] - box[0], box[3] - box[1]), interpolation=cv2.INTER_AREA)
+
+
+def _canvas(box: tuple[int, int, int, int], *channels: int) -> NDArray[np.uint8]:
+    return np.zeros(((box[3] - box[1]) * FINE, (box[2] - box[0]) * FINE, *channels), np.uint8)
+
+
+def _fill(
+    fish: list[tuple[Array, tuple[int, int, int]]], box: tuple[int, int, int, int]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Colour times cover (h, w, 3) and cover (h, w) of the fish in the patch, antialiased."""
+    colour, cover = _canvas(box, 3), _canvas(box)
+    for outline, fill in fish:
+        corners = [_subpixels(outline, box)]
+        cv2.fillPoly(colour, corners, fill, shift=SHIFT)
+        cv2.fillPoly(cover, corners, 255, shift=SHIFT)
+    return _shrink(colour, box).astype(np.float32), _shrink(cover, box).astype(np.float32) / 255.0
+
+
+def _shade(outlines: Sequence[Array], box: tuple[int, int, int, int]) -> NDArray[np.float32]:
+    """(h, w) cover of the shadow, softened by the depth of the water."""
+    cover = _canvas(box)
+    for outline in outlines:
+        cv2.fillPoly(cover, [_subpixels(outline, box)], 255, shift=SHIFT)
+    return cv2.GaussianBlur(_shrink(cover, box).astype(np.float32) / 255.0, (9, 9), 2.5)

@@ -1,0 +1,178 @@
+"""Pixels to metres in the pool's plane: lens, camera pose, and the files that hold them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+R_DOWN = np.diag([1.0, -1.0, -1.0])  # optical axes of an untilted camera: right = pool x, down = pool -y
+MODELS = {"plumb_bob": 5, "rational_polynomial": 8}  # distortion model -> number of coefficients
+POOL = (4.27, 2.13)  # m, along pool x and y
+
+
+class CalibrationError(ValueError):
+    """A calibration that cannot be used; the message says what came and what was expected."""
+
+
+@dataclass(frozen=True)
+class Lens:
+    """What sensor_msgs/CameraInfo says of a camera: image size (pixels), camera matrix (3, 3), distortion."""
+
+    size: tuple[int, int]  # width, height
+    K: Array
+    D: Array
+
+    @classmethod
+    def from_camera_info(
+        cls, width: int, height: int, model: str, k: Sequence[float], d: Sequence[float]
+    ) -> "Lens":
+        """Check and take over the fields of a CameraInfo message (k has 9 numbers, row by row).
+
+        Raises:
+            CalibrationError: sizes, model or numbers that no calibrated camera has.
+        """
+        if width <= 0 or height <= 0:
+            raise CalibrationError(f"camera_info has image size {width} x {height}: expected positive numbers")
+        if len(k) != 9 or not all(isfinite(v) for v in [*k, *d]):
+            raise CalibrationError("camera_info has numbers missing or not finite in k or d")
+        if k[0] <= 0.0 or k[4] <= 0.0:
+            raise CalibrationError(
+                f"camera_info has focal lengths {k[0]}, {k[4]}: the camera is not calibrated; run calibrate"
+            )
+        if len(d) and (model not in MODELS or len(d) > MODELS[model]):
+            raise CalibrationError(
+                f"camera_info has distortion model {model!r} with {len(d)} coefficients: expected one of {MODELS}"
+            )
+        D = np.zeros(5 if len(d) <= 5 else 8)
+        D[: len(d)] = d
+        return cls((width, height), np.array(k, float).reshape(3, 3), D)
+
+
+@dataclass(frozen=True)
+class Mount:
+    """Where the camera hangs: optical centre in the pool frame (m) and tilt (rotation vector about the optical axes,
+    rad; zero looks straight down with pool x to the right of the image).
+
+        p_cam = R (p_pool - position),  R = exp([tilt]x) diag(1, -1, -1)
+    """
+
+    position: tuple[float, float, float]
+    tilt: tuple[float, float, float]
+
+    @property
+    def R(self) -> Array:
+        """(3, 3) turns pool vectors into optical ones."""
+        return cv2.Rodrigues(np.asarray(self.tilt, float))[0] @ R_DOWN
+
+
+class Calibration:
+    """Maps pixels to the plane z = plane_height of the pool frame and back.
+
+    plane_height is that of the markers above the pool frame's origin (the water's surface), m. Without lens
+    distortion the map would be one homography; it is kept as `H` (pool plane -> ideal pixels).
+    """
+
+    def __init__(self, lens: Lens, mount: Mount, plane_height: float = 0.0) -> None:
+        self.lens, self.plane_height = lens, plane_height
+        R = mount.R
+        t = -R @ np.asarray(mount.position, float)
+        self._rotation = cv2.Rodrigues(R)[0]
+        self._t = t
+        self._plane = np.column_stack([R[:, 0], R[:, 1], R[:, 2] * plane_height + t])  # pool plane -> ideal image
+        self._plane_inverse = np.linalg.inv(self._plane)
+        self.H = lens.K @ self._plane
+        self._check_pool_visible()
+
+    def _check_pool_visible(self) -> None:
+        """The pool's centre must be in the image, or lens and mount belong to different cameras."""
+        (u, v), (width, height) = self.pool_to_pixel([[0.0, 0.0]])[0], self.lens.size
+        ahead = self._plane[2, 2] > 0
+        if not (ahead and 0 <= u < width and 0 <= v < height):
+            raise CalibrationError(
+                f"the pool's centre falls on pixel ({u:.0f}, {v:.0f}) of a {width} x {height} image: camera_info and "
+                "camera_position / camera_tilt do not belong together; run calibrate"
+            )
+
+    def pool_to_pixel(self, points: ArrayLike) -> Array:
+        """(N, 2) x, y in the markers' plane, m -> (N, 2) pixels."""
+        points = np.asarray(points, float).reshape(-1, 2)
+        solid = np.column_stack([points, np.full(len(points), self.plane_height)])
+        return cv2.projectPoints(solid, self._rotation, self._t, self.lens.K, self.lens.D)[0].reshape(-1, 2)
+
+    def pixel_to_pool(self, pixels: ArrayLike) -> Array:
+        """(N, 2) pixels -> (N, 2) x, y in the markers' plane, m."""
+        flat = undistort(np.asarray(pixels, float).reshape(-1, 2), self.lens)
+        plane = np.column_stack([flat, np.ones(len(flat))]) @ self._plane_inverse.T
+        return plane[:, :2] / plane[:, 2:]
+
+    def metres_per_pixel(self, pixels: ArrayLike) -> Array:
+        """(N, 2) pixels -> (N, 2, 2) derivative of pixel_to_pool, m/pixel; columns along u and v."""
+        pixels = np.asarray(pixels, float).reshape(-1, 2)
+        step = np.array([[0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
+        around = self.pixel_to_pool((pixels[:, None] + step).reshape(-1, 2)).reshape(-1, 4, 2)
+        return np.stack([around[:, 0] - around[:, 1], around[:, 2] - around[:, 3]], axis=-1)
+
+
+def undistort(pixels: Array, lens: Lens) -> Array:
+    """(N, 2) pixels -> (N, 2) ideal image points x/z, y/z.
+
+    OpenCV's five fixed-point steps leave up to a tenth of a pixel at the edge of a wide lens; two Newton steps with a
+    numerical derivative of OpenCV's own forward model bring it below 1e-6.
+    """
+    if len(pixels) == 0:
+        return np.zeros((0, 2))
+    flat = cv2.undistortPoints(pixels.reshape(-1, 1, 2), lens.K, lens.D).reshape(-1, 2)
+    h = 1e-6
+    for _ in range(2):
+        at, du, dv = (_distort(flat + shift, lens) for shift in ([0.0, 0.0], [h, 0.0], [0.0, h]))
+        J = np.stack([du - at, dv - at], axis=-1) / h
+        flat = flat - np.linalg.solve(J, (at - pixels)[..., None])[..., 0]
+    return flat
+
+
+def _distort(flat: Array, lens: Lens) -> Array:
+    solid = np.column_stack([flat, np.ones(len(flat))])
+    return cv2.projectPoints(solid, np.zeros(3), np.zeros(3), lens.K, lens.D)[0].reshape(-1, 2)
+
+
+def read_lens(path: Path) -> Lens:
+    """Lens from a camera calibration file (the YAML of camera_info_manager, usb_cam and `calibrate lens`)."""
+    try:
+        content: Any = yaml.safe_load(path.read_text())
+        return Lens.from_camera_info(
+            int(content["image_width"]),
+            int(content["image_height"]),
+            str(content["distortion_model"]),
+            [float(v) for v in content["camera_matrix"]["data"]],
+            [float(v) for v in content["distortion_coefficients"]["data"]],
+        )
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise CalibrationError(f"{path}: not a camera calibration file ({type(error).__name__}: {error})") from error
+
+
+def lens_document(lens: Lens, camera_name: str) -> Mapping[str, Any]:
+    """The lens in the form that `read_lens` and camera_info_manager read."""
+    P = np.column_stack([lens.K, np.zeros(3)])
+    return {
+        "image_width": lens.size[0],
+        "image_height": lens.size[1],
+        "camera_name": camera_name,
+        "camera_matrix": _matrix(lens.K),
+        "distortion_model": "plumb_bob" if len(lens.D) == 5 else "rational_polynomial",
+        "distortion_coefficients": _matrix(lens.D.reshape(1, -1)),
+        "rectification_matrix": _matrix(np.eye(3)),
+        "projection_matrix": _matrix(P),
+    }
+
+
+def _matrix(values: Array) -> dict[str, Any]:
+    rows, cols = values.shape
+    return {"rows": rows, "cols": cols, "data": [float(v) for v in values.ravel()]}

@@ -1,0 +1,106 @@
+"""Parameters of the tracker."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+from fish_vision.calibration import Mount
+from fish_vision.pose import MarkerLayout
+from fish_vision.segmentation import HUES, ColourRange
+
+
+@dataclass(frozen=True)
+class TrackerConfig:
+    """ROS parameters of the tracker node; tuples because ROS parameters are lists.
+
+    Colours are [hue low, hue high, least saturation, least value]: hue 0 to 179 (half degrees; low > high wraps through
+    red), the others 0 to 255.
+    """
+
+    frame_id: str = "pool"  # of the published poses
+    use_raw: bool = False  # take camera/image_raw instead of camera/image_raw/compressed
+    debug_image: bool = False  # publish camera/debug/compressed, the annotated picture
+    camera_position: tuple[float, ...] = (0.05, -0.08, 3.2)  # optical centre in the pool frame, m
+    camera_tilt: tuple[float, ...] = (-0.022, 0.018, 0.010)  # about the optical axes, rad; 0 = straight down
+    marker_height: float = 0.0  # of the markers above the pool frame's origin, m
+    front_colour: tuple[int, ...] = (20, 36, 110, 90)  # yellow
+    rear_colour: tuple[int, ...] = (136, 166, 90, 80)  # magenta
+    tail_odd_colour: tuple[int, ...] = (172, 12, 110, 80)  # red: links 1, 3, ...
+    tail_even_colour: tuple[int, ...] = (46, 76, 90, 70)  # green: links 2, 4, ...
+    front_marker: tuple[float, ...] = (0.045, 0.0)  # base_link x, y, m
+    rear_marker: tuple[float, ...] = (-0.045, 0.0)  # base_link x, y, m
+    marker_diameter: float = 0.030  # of the head's markers, m
+    tail_marker_diameter: float = 0.016  # m
+    tail_links: int = 3  # marked links; 0 = no tail markers
+    hinge_offset: float = 0.075  # head's centre of mass to the tail's hinge, m
+    link_length: float = 0.07 / 3  # hinge to the marker at the far end of a link, m
+    area_min: float = 0.35  # least area of a blob, share of the marker's
+    area_max: float = 2.0  # greatest area of a blob, share of the marker's
+    spacing_tolerance: float = 0.15  # misfit of the head markers' distance, share
+    tail_tolerance: float = 0.008  # misfit of a tail marker's distance from its hinge, m
+    roi_radius: float = 0.25  # half side of the part of the image searched around the last pose, m
+    max_speed: float = 1.5  # m/s, faster is a jump
+    max_yaw_rate: float = 15.0  # rad/s, faster is a jump
+    reacquire_s: float = 0.5  # a jump that lasts so long is believed, s
+    pixel_std: float = 0.10  # standard deviation of a whole marker's middle, pixels
+    pool_margin: float = 0.10  # a pose so far outside the walls is refused, m
+
+    def __post_init__(self) -> None:
+        for name, count in _LISTS:
+            value = getattr(self, name)
+            if len(value) != count or not all(isfinite(v) for v in value):
+                raise ValueError(f"{name} = {list(value)}: expected {count} finite numbers")
+        for name, low, high in _RANGES:
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} = {value}: expected {low} to {high}")
+        for name in ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour"):
+            value = getattr(self, name)
+            if not (all(0 <= h < HUES for h in value[:2]) and all(0 <= v <= 255 for v in value[2:])):
+                raise ValueError(f"{name} = {list(value)}: expected two hues 0 to 179 and two levels 0 to 255")
+        if self.layout().spacing < self.marker_diameter:
+            raise ValueError(
+                f"front_marker = {list(self.front_marker)}, rear_marker = {list(self.rear_marker)}: "
+                f"expected to be more than marker_diameter = {self.marker_diameter} m apart"
+            )
+
+    def mount(self) -> Mount:
+        """Where the camera hangs."""
+        return Mount(tuple(self.camera_position), tuple(self.camera_tilt))
+
+    def layout(self) -> MarkerLayout:
+        """Where the markers sit on the fish."""
+        return MarkerLayout(tuple(self.front_marker), tuple(self.rear_marker), self.hinge_offset, self.link_length)
+
+    def colour(self, marker: str) -> ColourRange:
+        """The range of marker `front`, `rear`, `tail_odd` or `tail_even`."""
+        return ColourRange(*getattr(self, f"{marker}_colour"))
+
+
+_LISTS = (
+    ("camera_position", 3),
+    ("camera_tilt", 3),
+    ("front_colour", 4),
+    ("rear_colour", 4),
+    ("tail_odd_colour", 4),
+    ("tail_even_colour", 4),
+    ("front_marker", 2),
+    ("rear_marker", 2),
+)
+_RANGES = (  # field, lowest, highest
+    ("marker_height", -1.0, 1.0),
+    ("marker_diameter", 0.002, 0.5),
+    ("tail_marker_diameter", 0.002, 0.5),
+    ("tail_links", 0, 10),
+    ("hinge_offset", 0.0, 1.0),
+    ("link_length", 0.002, 1.0),
+    ("area_min", 0.01, 1.0),
+    ("area_max", 1.0, 100.0),
+    ("spacing_tolerance", 0.01, 0.5),
+    ("tail_tolerance", 0.0005, 0.1),
+    ("roi_radius", 0.05, 5.0),
+    ("max_speed", 0.01, 20.0),
+    ("max_yaw_rate", 0.1, 200.0),
+    ("reacquire_s", 0.0, 10.0),
+    ("pixel_std", 0.001, 5.0),
+    ("pool_margin", 0.0, 5.0),
+)

@@ -1,0 +1,109 @@
+"""Colour segmentation: which pixels have a marker's colour, and where the middle of each blob is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+Box = tuple[int, int, int, int]  # left, top, right, bottom; pixels, right and bottom excluded
+
+PAD = 2  # pixels around a blob that may still hold some of its colour
+HUES = 180  # OpenCV's hue counts half degrees
+HUE_SLACK = 8  # half degrees by which the hue at a blob's edge may leave its range
+FAINT = 0.25  # share of a blob's colourfulness below which a pixel counts as none of it
+
+
+@dataclass(frozen=True)
+class ColourRange:
+    """Hue range (0 to 179, half degrees, low > high wraps through red), least saturation and value (0 to 255)."""
+
+    hue_low: int
+    hue_high: int
+    saturation_min: int
+    value_min: int
+
+    def mask(self, hsv: Image) -> Image:
+        """255 where the pixel is in the range."""
+        s, v = self.saturation_min, self.value_min
+        if self.hue_low <= self.hue_high:
+            return cv2.inRange(hsv, (self.hue_low, s, v), (self.hue_high, 255, 255))
+        low = cv2.inRange(hsv, (0, s, v), (self.hue_high, 255, 255))
+        return cv2.bitwise_or(low, cv2.inRange(hsv, (self.hue_low, s, v), (HUES - 1, 255, 255)))
+
+    def near(self, hue: Image) -> NDArray[np.bool_]:
+        """Where the hue is in the range or within HUE_SLACK of it."""
+        width = (self.hue_high - self.hue_low) % HUES + 2 * HUE_SLACK
+        return (hue.astype(np.int16) - self.hue_low + HUE_SLACK) % HUES <= width
+
+
+@dataclass(frozen=True)
+class Blob:
+    """One coloured spot: middle and area, in pixels; partly covered pixels count in part."""
+
+    u: float
+    v: float
+    area: float
+
+
+def hsv_of(image: Image, box: Box) -> Image:
+    """Hue, saturation, value of a part of the image."""
+    left, top, right, bottom = box
+    return cv2.cvtColor(image[top:bottom, left:right], cv2.COLOR_BGR2HSV)
+
+
+def find_blobs(
+    hsv: Image, colour: ColourRange, area_range: tuple[float, float]
+) -> list[Blob]:
+    """Blobs of a colour with areas in the range, largest first.
+
+    A contour around the pixels in range gives the place; the middle is the mean of all pixels in and around it weighted with
+    their colourfulness S V (linear in how much of the pixel the marker covers, when the fish under it is grey), so that it
+    is far finer than a pixel. Glare is white: it has no colourfulness and falls out.
+
+    Args:
+        hsv: (h, w, 3) part of an image.
+        area_range: least and greatest area, pixels.
+    """
+    mask = colour.mask(hsv)
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    largest_side = 4.0 * np.sqrt(area_range[1])
+    blobs = []
+    for contour in contours:
+        x, y, w, h = cv2.boundingRect(contour)
+        if max(w, h) > largest_side or 2.0 * w * h < area_range[0]:
+            continue
+        blob = _measure(hsv, mask, colour, (x, y, x + w, y + h))
+        if area_range[0] <= blob.area <= area_range[1]:
+            blobs.append(blob)
+    return sorted(blobs, key=lambda blob: -blob.area)
+
+
+def _measure(hsv: Image, mask: Image, colour: ColourRange, box: Box) -> Blob:
+    """Weighted middle of one blob, see find_blobs."""
+    left, top = max(box[0] - PAD, 0), max(box[1] - PAD, 0)
+    right, bottom = min(box[2] + PAD, hsv.shape[1]), min(box[3] + PAD, hsv.shape[0])
+    part = hsv[top:bottom, left:right]
+    inside = mask[top:bottom, left:right] > 0
+    colourful = part[..., 1].astype(np.float32) * part[..., 2]
+    full = float(np.median(colourful[inside]))
+    weight = np.clip(colourful / full, 0.0, 1.0) * colour.near(part[..., 0])
+    weight[weight < FAINT] = 0.0
+    area = float(weight.sum())
+    u = float(weight.sum(axis=0) @ np.arange(left, right)) / area
+    v = float(weight.sum(axis=1) @ np.arange(top, bottom)) / area
+    return Blob(u, v, area)
+
+
+def around(points: NDArray[np.float64], size: Sequence[int]) -> Box:
+    """Smallest box inside an image of size (width, height) that holds all points (N, 2), pixels."""
+    low, high = np.floor(points.min(axis=0)).astype(int), np.ceil(points.max(axis=0)).astype(int) + 1
+    width, height = size
+    return (
+        int(np.clip(low[0], 0, width)),
+        int(np.clip(low[1], 0, height)),
+        int(np.clip(high[0], 0, width)),
+        int(np.clip(high[1], 0, height)),
+    )
