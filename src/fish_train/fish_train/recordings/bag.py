@@ -1,0 +1,160 @@
+"""Raw contents of a recording file or directory, through rosbags: bytes and arrival times per topic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from rosbags import rosbag1, rosbag2
+from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.interfaces.typing import Typesdict
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.base import TypesysError
+
+from .problem import RecordingError
+
+STAMP_PREFIX = 16  # bytes kept of messages nobody decodes: enough for the stamp of a header
+SUFFIXES = (".mcap", ".db3", ".bag")
+
+
+@dataclass
+class RawTopic:
+    """Messages of one topic in order of arrival."""
+
+    topic: str
+    type: str
+    arrival_ns: np.ndarray  # (N,) int64
+    raws: list[bytes]  # whole messages, or the first STAMP_PREFIX bytes where `whole` is False
+    whole: bool
+
+
+@dataclass
+class RawBag:
+    """Everything the reader needs of one recording."""
+
+    path: Path
+    ros1: bool
+    types: Typesdict
+    topics: list[RawTopic]
+    metadata: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        return sum(len(topic.raws) for topic in self.topics)
+
+
+def is_recording(path: Path) -> bool:
+    """Whether `path` looks like one recording (not: is readable)."""
+    if path.is_dir():
+        return (path / "metadata.yaml").exists() or any(path.glob("*.mcap")) or any(path.glob("*.db3"))
+    return path.suffix in SUFFIXES
+
+
+def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
+    """Read one recording.
+
+    Args:
+        path: rosbag2 directory, bare .mcap or .db3 file, or ROS 1 .bag file.
+        wanted: (topic, type) -> whether its messages are kept whole.
+
+    Raises:
+        RecordingError: nothing there, empty, truncated or not a recording; the text says what to do.
+    """
+    source = _source(path)
+    ros1 = source.suffix == ".bag"
+    try:
+        with (rosbag1.Reader if ros1 else rosbag2.Reader)(source) as reader:
+            topics = _collect(reader, wanted)
+            types = _types(reader.connections, ros1)
+            metadata = {} if ros1 else dict(reader.storage.metadata.custom or {})
+    except (rosbag1.ReaderError, rosbag2.ReaderError, SerdeError, TypesysError) as error:
+        raise RecordingError(f"{path}: {_advice(source, str(error))}") from error
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
+    bag = RawBag(path, ros1, types, topics, {str(k): str(v) for k, v in metadata.items()})
+    if not bag.count:
+        raise RecordingError(f"{path}: the recording holds no messages; was anything published while it ran?")
+    return bag
+
+
+def _source(path: Path) -> Path:
+    """The path rosbags can open: the directory, or the only storage file of one without metadata.yaml."""
+    if not path.exists():
+        raise RecordingError(f"{path}: does not exist")
+    if path.is_file():
+        if path.suffix not in SUFFIXES:
+            raise RecordingError(
+                f"{path}: not a recording; expected a rosbag2 directory or a file {', '.join(SUFFIXES)}"
+            )
+        if not path.stat().st_size:
+            raise RecordingError(f"{path}: the file is empty (0 bytes)")
+        return path
+    if (path / "metadata.yaml").exists():
+        return path
+    files = sorted(p for p in path.iterdir() if p.suffix in SUFFIXES)
+    if len(files) == 1:
+        return files[0]
+    raise RecordingError(
+        f"{path}: no metadata.yaml and {len(files)} storage files; expected a rosbag2 directory. "
+        "'fish_train recover' writes a new metadata.yaml"
+    )
+
+
+def _collect(reader: rosbag1.Reader | rosbag2.Reader, wanted: Callable[[str, str], bool]) -> list[RawTopic]:
+    """All messages by topic and type (a topic with two types gives two entries)."""
+    keep: dict[int, bool] = {}
+    raws: dict[tuple[str, str], list[bytes]] = {}
+    times: dict[tuple[str, str], list[int]] = {}
+    slots: dict[int, tuple[list[bytes], list[int]]] = {}
+    for c in reader.connections:
+        key = (c.topic, c.msgtype)
+        slots[c.id] = (raws.setdefault(key, []), times.setdefault(key, []))
+        keep[c.id] = wanted(*key)
+    for connection, arrival, raw in reader.messages():
+        bucket, stamps = slots[connection.id]
+        bucket.append(raw if keep[connection.id] else raw[:STAMP_PREFIX])
+        stamps.append(arrival)
+    return [
+        RawTopic(topic, msgtype, np.array(times[topic, msgtype], np.int64), raw, wanted(topic, msgtype))
+        for (topic, msgtype), raw in raws.items()
+    ]
+
+
+def _types(connections: list[Connection], ros1: bool) -> Typesdict:
+    """Definitions stored with the recording, on top of the usual ones of ROS 2 Jazzy."""
+    types: Typesdict = {} if ros1 else dict(_jazzy())
+    for connection in connections:
+        if connection.msgdef.format != MessageDefinitionFormat.NONE:
+            types.update(_definition(connection.msgtype, connection.msgdef.format, connection.msgdef.data))
+    return types
+
+
+@lru_cache(maxsize=1)
+def _jazzy() -> Typesdict:
+    return get_typestore(Stores.ROS2_JAZZY).fielddefs
+
+
+@lru_cache(maxsize=256)
+def _definition(msgtype: str, form: MessageDefinitionFormat, text: str) -> Typesdict:
+    """Parsed definition; the same texts come again with every trial of a data set."""
+    if form == MessageDefinitionFormat.MSG:
+        return get_types_from_msg(text, msgtype)
+    types: Typesdict = {}
+    for part in text.split("=" * 80 + "\n"):
+        idl = part.split("\n", 1)[1] if part.startswith("IDL: ") else part
+        if idl.strip():
+            types.update(get_types_from_idl(idl))
+    return types
+
+
+def _advice(source: Path, error: str) -> str:
+    """What the reader said, and what can be done about it."""
+    if "empty" in error:
+        return "the file is empty"
+    if source.suffix == ".bag":
+        return f"not a complete ROS 1 bag ({error.rstrip('.')}); mend it with 'rosbag reindex'"
+    return f"truncated or damaged ({error.rstrip('.')}); 'fish_train recover {source}' saves what is left"
