@@ -1,8 +1,11 @@
 from glob import glob
+from pathlib import Path
+from runpy import run_path
 
 from setuptools import find_packages, setup
 
 NAME = "fish_train"
+VERBS = run_path(str(Path(__file__).parent / NAME / "commands" / "verbs.py"))["VERBS"]
 
 setup(
     name=NAME,
@@ -27,6 +30,7 @@ setup(
             "fish_train = fish_train.commands.main:main",
             "recorder = fish_train.nodes.recorder:main",
             "replayer = fish_train.nodes.replayer:main",
+            *(f"{verb} = fish_train.commands.main:{verb}" for verb in VERBS),
         ],
     },
 )

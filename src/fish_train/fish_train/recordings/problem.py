@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..errors import UserError
+
 SEVERITIES = ("info", "warning", "error")
 
 
-class RecordingError(Exception):
+class RecordingError(UserError):
     """A recording or data set cannot be used at all; the text says what came and what to do."""
 
 

@@ -1,0 +1,63 @@
+"""The `fish_train` command: `fish_train VERB ...`, or every verb as an executable of its own."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+
+from ..errors import UserError
+from .verbs import VERBS
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one verb; its module is imported only now, so that help is fast."""
+    arguments = sys.argv[1:] if argv is None else argv
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(usage())
+        return 0 if arguments else 2
+    verb, *rest = arguments
+    if verb not in VERBS:
+        print(f"fish_train: unknown verb {verb!r}; known: {', '.join(VERBS)}", file=sys.stderr)
+        return 2
+    return run_verb(verb, rest)
+
+
+def usage() -> str:
+    """The table of verbs."""
+    width = max(map(len, VERBS))
+    lines = [f"  {verb:<{width}}  {text}" for verb, text in VERBS.items()]
+    return "\n".join(["usage: fish_train VERB ...   (fish_train VERB --help says more)", "", *lines])
+
+
+def run_verb(verb: str, argv: list[str] | None = None) -> int:
+    """Parse the arguments of one verb and run it; errors the user can mend become one line and status 1."""
+    module = import_module(f"{__package__}.{verb}")
+    parser = argparse.ArgumentParser(prog=f"fish_train {verb}", description=module.__doc__)
+    module.add_arguments(parser)
+    args = parser.parse_args(argv)
+    try:
+        return module.run(args)
+    except UserError as error:
+        print(f"fish_train {verb}: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"fish_train {verb}: {where}{error.strerror or error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"fish_train {verb}: interrupted", file=sys.stderr)
+        return 130
+
+
+def __getattr__(name: str) -> Callable[[], int]:
+    """`from fish_train.commands.main import inspect`: the entry point of a verb's own executable."""
+    if name in VERBS:
+        return partial(run_verb, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,11 @@
+"""The verbs of `fish_train`, for the command line and for the installed executables.
+
+Each is a module of this folder with `add_arguments(parser)` and `run(args) -> int` (exit status). A new verb is one file
+and one line here; setup.py reads this table, so that `ros2 run fish_train VERB` works as well. Nothing is imported here.
+"""
+
+VERBS = {
+    "inspect": "print and plot what is in a recording",
+    "recover": "mend a truncated recording and say what was lost",
+    "import_pool": "convert the real robot's ROS 1 bags to recordings in the project's format",
+}
