@@ -133,7 +133,12 @@ class Solution:
 
 
 def build_chain(
-    q: Sequence[Scalar], qd: Sequence[Scalar], drive: Drive, r: SimpleNamespace, effects: Sequence[EnabledEffect], xp: Any
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    drive: Drive,
+    r: SimpleNamespace,
+    effects: Sequence[EnabledEffect],
+    xp: Any,
 ) -> Chain:
     """Place head, links, fin and what the effects fix to the head."""
     n = len(q) - 3
@@ -158,7 +163,17 @@ def build_chain(
     fin_inertia = (r.fin_mass + r.fin_added_mass_sway) * r.fin_length**2 / 12
     centre = Point({**arms, n + 1: -r.fin_length / 2}, {})
     bodies.append(
-        Body("fin", n + 1, centre, r.fin_mass, 0.0, r.fin_added_mass_sway, fin_inertia, r.fin_drag_surge, r.fin_drag_sway)
+        Body(
+            "fin",
+            n + 1,
+            centre,
+            r.fin_mass,
+            0.0,
+            r.fin_added_mass_sway,
+            fin_inertia,
+            r.fin_drag_surge,
+            r.fin_drag_sway,
+        )
     )
     for e in effects:
         for mass, forward, left in e.effect.point_masses(e.p):
@@ -186,7 +201,13 @@ def water_at(chain: Chain, point: Point, effects: Sequence[EnabledEffect], xp: A
 
 
 def add_body(
-    M: list[list[Scalar]], h: list[Scalar], chain: Chain, body: Body, drive: Drive, effects: Sequence[EnabledEffect], xp: Any
+    M: list[list[Scalar]],
+    h: list[Scalar],
+    chain: Chain,
+    body: Body,
+    drive: Drive,
+    effects: Sequence[EnabledEffect],
+    xp: Any,
 ) -> None:
     """Add one body's inertia to M and its inertial bias minus its fluid wrench to h.
 
@@ -210,7 +231,16 @@ def add_body(
     Y = Y + body.added_sway * a_v + anisotropy * w * u + body.drag_sway * v
     N = -anisotropy * u * v + body.drag_yaw * w
     motion = BodyMotion(
-        body.name, *chain.position(body.point), cos, sin, u, v, w, body.drag_surge, body.drag_sway, body.drag_yaw
+        body.name,
+        *chain.position(body.point),
+        cos,
+        sin,
+        u,
+        v,
+        w,
+        body.drag_surge,
+        body.drag_sway,
+        body.drag_yaw,
     )
     for e in effects:
         extra = e.effect.wrench(e.p, motion, e.z, drive, xp)

@@ -21,7 +21,9 @@ from fish_sim.parameter import Parameter
 from fish_sim.sensor_effects import SENSOR_EFFECTS
 
 FORMAT = 1
-STRIP_ADDED_MASS = 1000.0 * math.pi / 4.0 * 0.075**2  # kg/m, slender body strip rho pi/4 h^2, height h = 0.075 m
+STRIP_ADDED_MASS = (
+    1000.0 * math.pi / 4.0 * 0.075**2
+)  # kg/m, slender body strip rho pi/4 h^2, height h = 0.075 m
 MAX_LINKS = 12  # beyond this the fastest tail mode needs steps far below 1 ms
 
 
@@ -37,7 +39,10 @@ def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
     """
     _check_links(links)
     n = links
-    measured, assumed = "measured (weighed, ruler)", "assumption; reproduces 0.1 to 0.5 m/s and 0.3 body lengths"
+    measured, assumed = (
+        "measured (weighed, ruler)",
+        "assumption; reproduces 0.1 to 0.5 m/s and 0.3 body lengths",
+    )
     strip = "slender-body strip, rho pi/4 h^2 per length, h = 0.075 m"
 
     def p(value: float, unit: str, source: str, lowest: float = 0.0, highest: float = math.inf) -> Parameter:
@@ -80,7 +85,9 @@ class Robot:
 
     links: int = 3
     parameters: Mapping[str, float] = field(default_factory=dict)  # missing names take the nominal value
-    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # EFFECTS name -> parameter -> value
+    effects: Mapping[str, Mapping[str, float]] = field(
+        default_factory=dict
+    )  # EFFECTS name -> parameter -> value
     sensors: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # SENSOR_EFFECTS name -> ...
     name: str = "fish"
 
@@ -124,7 +131,9 @@ def parameter_names(structure: tuple[int, tuple[str, ...]]) -> tuple[str, ...]:
     return (*nominal_parameters(links), *own)
 
 
-def _check_table(where: str, specification: Mapping[str, Parameter], given: Mapping[str, Any]) -> dict[str, float]:
+def _check_table(
+    where: str, specification: Mapping[str, Parameter], given: Mapping[str, Any]
+) -> dict[str, float]:
     if not isinstance(given, Mapping):
         raise RobotError(f"{where}: got {given!r}; expected a table of name: value")
     for name in given:
@@ -145,7 +154,9 @@ def _check_value(where: str, parameter: Parameter, value: Any) -> float:
     return float(value)
 
 
-def _check_effects(where: str, table: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+def _check_effects(
+    where: str, table: Mapping[str, Any], given: Mapping[str, Any]
+) -> dict[str, dict[str, float]]:
     for name in given:
         if name not in table:
             raise RobotError(f"{where}: unknown effect {name!r}; known: {', '.join(table)}")
@@ -204,11 +215,15 @@ def _values(where: str, table: Any, units: Mapping[str, Parameter] | None = None
     return result
 
 
-def save_robot(robot: Robot, path: str | Path, std: Mapping[str, float] | None = None, notes: str = "") -> None:
+def save_robot(
+    robot: Robot, path: str | Path, std: Mapping[str, float] | None = None, notes: str = ""
+) -> None:
     """Write robot.yaml with names, units and sources; `std` maps `name` or `effect.name` to a standard error."""
     std = std or {}
 
-    def rows(values: Mapping[str, float], specification: Mapping[str, Parameter], prefix: str = "") -> dict[str, Any]:
+    def rows(
+        values: Mapping[str, float], specification: Mapping[str, Parameter], prefix: str = ""
+    ) -> dict[str, Any]:
         table = {}
         for name, value in values.items():
             parameter = specification[name]

@@ -1,4 +1,4 @@
-"""The overhead camera: geometry, picture, and the timing of its frames. Pure; the node is fish_sim.nodes.camera."""
+"""The overhead camera: geometry, picture, timing of its frames. Pure; the node is fish_sim.nodes.camera."""
 
 from fish_sim.camera.config import CameraConfig as CameraConfig
 from fish_sim.camera.fish import FishPose as FishPose

@@ -77,7 +77,9 @@ class CameraConfig:
 
     def look(self) -> Look:
         """Noise, glare and compression of the picture."""
-        return Look(noise_std=self.noise_std, glare=self.glare, jpeg_quality=self.jpeg_quality, seed=self.seed)
+        return Look(
+            noise_std=self.noise_std, glare=self.glare, jpeg_quality=self.jpeg_quality, seed=self.seed
+        )
 
 
 _RANGES = (  # field, lowest, highest

@@ -35,7 +35,7 @@ class FishPose:
 
 @dataclass(frozen=True)
 class FishShape:
-    """Lengths in metres, along and across the fish. Source: MODEL.md; widths and markers: this project's choice."""
+    """Lengths in metres. Source: MODEL.md of the project's specification; widths and markers: own choice."""
 
     head_length: float = 0.15
     head_width: float = 0.072
@@ -75,7 +75,7 @@ def joints(pose: FishPose, shape: FishShape) -> tuple[Array, Array]:
 
 
 def markers(pose: FishPose, shape: FishShape) -> list[tuple[Array, float, Colour]]:
-    """Centre (2,) in the pool frame, m, diameter, m, and colour: front, rear, then one at the far end of each link."""
+    """Centre (2,) in the pool frame, m, diameter, m, colour: front, rear, then the far end of each link."""
     origin, ahead = np.array([pose.x, pose.y]), np.array([cos(pose.heading), sin(pose.heading)])
     head = [
         (origin + shape.front_marker * ahead, shape.marker_diameter, FRONT),

@@ -74,8 +74,8 @@ def undistort(distorted: Array, distortion: tuple[float, ...], steps: int = 25) 
 
         x <- (x_d - tangential(x)) / radial(x),  radial = 1 + k1 r^2 + k2 r^4 + k3 r^6
 
-    Error after 25 steps below 1e-9 where the radial part stays above about 0.7. cv2.undistortPoints stops after five
-    steps, a tenth of a pixel short at the edge of a wide lens.
+    Error after 25 steps below 1e-9 where the radial part stays above about 0.7. cv2.undistortPoints stops
+    after five steps, a tenth of a pixel short at the edge of a wide lens.
     Source: fixed-point iteration, Heikkila and Silven (1997), as in OpenCV.
     """
     k1, k2, p1, p2, k3 = distortion

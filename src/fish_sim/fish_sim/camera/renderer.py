@@ -33,9 +33,9 @@ class Look:
 class PoolRenderer:
     """Draws frames: still background + caustics, shadow, fish, glare, noise.
 
-    Everything that does not depend on the fish is made once; a frame costs a few full-image additions and a small
-    patch drawn at FINE x FINE subpixels. The noise is one tile shown at random offsets. Seeded: the same calls in the
-    same order give the same pictures.
+    Everything that does not depend on the fish is made once; a frame costs a few full-image additions and a
+    small patch drawn at FINE x FINE subpixels. The noise is one tile shown at random offsets. Seeded: the
+    same calls in the same order give the same pictures.
     """
 
     def __init__(self, camera: CameraModel, shape: FishShape, look: Look) -> None:
@@ -69,7 +69,9 @@ class PoolRenderer:
 
     def _draw_fish(self, picture: Image, poses: Sequence[FishPose]) -> None:
         """Shadow, then the mean of all poses, into the patch of the picture that holds them."""
-        shapes = [[(self._pixels(p.outline, 0.0), p.colour) for p in patches(pose, self._shape)] for pose in poses]
+        shapes = [
+            [(self._pixels(p.outline, 0.0), p.colour) for p in patches(pose, self._shape)] for pose in poses
+        ]
         shadows = [self._pixels(s, -DEPTH) for s in silhouette(poses[len(poses) // 2], self._shape)]
         corners = np.vstack([outline for fish in shapes for outline, _ in fish] + shadows)
         box = _box(corners, self.camera.size)

@@ -22,7 +22,7 @@ TOP, DECK, LANE = (205, 205, 200), (112, 116, 118), (150, 112, 42)
 
 
 def still_pool(camera: CameraModel, seed: int) -> Image:
-    """(height, width, 3) picture of the pool at rest, without noise: rim, walls, tiled floor seen through the water."""
+    """(height, width, 3) picture of the pool at rest: rim, walls, tiled floor seen through the water."""
     width, height = camera.size
     pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
     rays = camera.rays(pixels)
@@ -44,7 +44,7 @@ def vignette(camera: CameraModel) -> Array:
 
 
 def _through_water(surface: Array, rays: Array) -> Array:
-    """(N, 3) points on floor or wall where refracted rays end; Snell: tan(after) from sin(after) = sin(before) / n."""
+    """(N, 3) points on floor or wall where refracted rays end; Snell: sin(after) = sin(before) / n."""
     flat = np.linalg.norm(rays[:, :2], axis=1)
     sine = flat / np.linalg.norm(rays, axis=1) / REFRACTION
     slope = sine / np.sqrt(1.0 - sine**2)
@@ -96,14 +96,24 @@ class MovingLight:
 
 
 COARSE = 4  # pixels of the image per coarse pixel
-LAMPS = ((-1.35, 0.55), (0.15, 0.62), (1.55, 0.50), (-0.60, -0.70), (0.95, -0.62))  # mirrored lamps, pool frame, m
+LAMPS = (
+    (-1.35, 0.55),
+    (0.15, 0.62),
+    (1.55, 0.50),
+    (-0.60, -0.70),
+    (0.95, -0.62),
+)  # mirrored lamps, pool frame, m
 
 
-def moving_light(camera: CameraModel, strength: float, seed: int, frames: int = 40, period: float = 4.0) -> MovingLight:
+def moving_light(
+    camera: CameraModel, strength: float, seed: int, frames: int = 40, period: float = 4.0
+) -> MovingLight:
     """Make the loop: ripples are sums of travelling waves whose frequencies are multiples of 1 / period."""
     width, height = camera.size
     pixels = np.stack(np.meshgrid(np.arange(0, width, COARSE), np.arange(0, height, COARSE)), axis=-1)
-    place = camera.unproject(pixels.reshape(-1, 2) + (COARSE - 1) / 2).reshape(*pixels.shape).astype(np.float32)
+    place = (
+        camera.unproject(pixels.reshape(-1, 2) + (COARSE - 1) / 2).reshape(*pixels.shape).astype(np.float32)
+    )
     inside = np.all(np.abs(place) < np.array(POOL, np.float32) / 2, axis=-1)
     lamps = sum(np.exp(-((place - np.array(p, np.float32)) ** 2).sum(-1) / (2 * 0.16**2)) for p in LAMPS)
     random = np.random.default_rng(seed)
@@ -122,7 +132,9 @@ def _waves(random: np.random.Generator, count: int, wavenumber: float) -> Array:
     angle = random.uniform(0, 2 * np.pi, count)
     k = wavenumber * random.uniform(0.6, 1.4, count)
     cycles = random.integers(2, 6, count) * random.choice([-1, 1], count)
-    return np.column_stack([k * np.cos(angle), k * np.sin(angle), cycles, random.uniform(0, 2 * np.pi, count)])
+    return np.column_stack(
+        [k * np.cos(angle), k * np.sin(angle), cycles, random.uniform(0, 2 * np.pi, count)]
+    )
 
 
 def _ripple(place: NDArray[np.float32], waves: Array, part: float) -> NDArray[np.float32]:

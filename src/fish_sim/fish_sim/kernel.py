@@ -1,0 +1,58 @@
+"""The compiled kernel: NumPy arrays in, NumPy arrays out, through ctypes (which releases the interpreter lock)."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class CompiledKernel:
+    """Calls into c/rollout.c. All arrays C-contiguous float64; layouts as documented there."""
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        self._library = library
+
+    def rollout(self, states: Array, commands: Array, parameters: Array) -> None:
+        """Fill states[1:] from states[0]."""
+        self._library.rollout(*_sizes(states), _at(states), *_shared(commands, 1), *_shared(parameters, 0))
+
+    def rollout_jvp(
+        self,
+        states: Array,
+        tangents: Array,
+        commands: Array,
+        d_commands: Array,
+        parameters: Array,
+        d_parameters: Array,
+    ) -> None:
+        """Fill states[1:] and tangents[1:]."""
+        self._library.rollout_jvp(
+            *_sizes(states), _at(states), _at(tangents), *_shared(commands, 1), *_shared(d_commands, 1),
+            *_shared(parameters, 0), *_shared(d_parameters, 0),
+        )  # fmt: skip
+
+    def rollout_vjp(
+        self, states: Array, commands: Array, parameters: Array, g_states: Array,
+        g_start: Array, g_commands: Array, g_parameters: Array,
+    ) -> None:  # fmt: skip
+        """Fill g_start, g_commands and g_parameters."""
+        self._library.rollout_vjp(
+            *_sizes(states), _at(states), *_shared(commands, 1), *_shared(parameters, 0),
+            *(_at(a) for a in (g_states, g_start, g_commands, g_parameters)),
+        )  # fmt: skip
+
+
+def _at(array: Array) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def _sizes(states: Array) -> tuple[ctypes.c_long, ctypes.c_long]:
+    return ctypes.c_long(states.shape[1]), ctypes.c_long(states.shape[0] - 1)
+
+
+def _shared(array: Array, axis: int) -> tuple[ctypes.c_void_p, ctypes.c_long]:
+    return _at(array), ctypes.c_long(array.shape[axis])

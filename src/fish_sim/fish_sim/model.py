@@ -1,0 +1,183 @@
+"""The equations as CasADi functions for one structure: number of links and enabled effects.
+
+Layout of the state vector of a step:
+    q (n+3), q' (n+3), continuous states of the effects, alpha, rotor_speed, discrete memory of the effects
+Command: rotor_speed [rad/s], rudder [rad]. A command is followed over one period of DT: rotor speed and alpha move
+linearly towards it within the period, alpha at most at the servo's rate limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from types import SimpleNamespace
+from typing import Any
+
+import casadi
+
+from fish_sim.dynamics import EnabledEffect, Solution, solve
+from fish_sim.effects import EFFECTS
+from fish_sim.effects.effect import Drive
+from fish_sim.ops import CASADI, Scalar
+from fish_sim.robot import nominal_parameters, parameter_names
+
+DT = 0.01  # s, period of the commands
+COMMAND_NAMES = ("rotor_speed", "rudder")  # rad/s, rad
+DRIVE_NAMES = ("alpha", "alpha_dot", "rotor_speed", "rotor_acceleration")
+
+Structure = tuple[int, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Names and places of everything in the vectors of a structure."""
+
+    structure: Structure
+
+    @property
+    def links(self) -> int:
+        return self.structure[0]
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return self.structure[1]
+
+    @cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        return ("x", "y", "theta_head", *(f"theta_{i}" for i in range(1, self.links + 1)))
+
+    @cached_property
+    def motion(self) -> tuple[str, ...]:
+        """What the integrator moves: q, q' and the continuous states of the effects."""
+        rates = tuple(f"{name}_dot" for name in self.coordinates)
+        return (*self.coordinates, *rates, *self._own("states"))
+
+    @cached_property
+    def memory(self) -> tuple[str, ...]:
+        """What a command updates once: servo and motor, then the memory of the effects."""
+        return ("alpha", "rotor_speed", *self._own("memory"))
+
+    @cached_property
+    def state(self) -> tuple[str, ...]:
+        return (*self.motion, *self.memory)
+
+    @cached_property
+    def parameters(self) -> tuple[str, ...]:
+        return parameter_names(self.structure)
+
+    def _own(self, kind: str) -> tuple[str, ...]:
+        return tuple(f"{name}.{key}" for name in self.effects for key in getattr(EFFECTS[name], kind))
+
+
+def unpack_effects(
+    layout: Layout, p: Sequence[Scalar], states: Sequence[Scalar], kind: str
+) -> tuple[SimpleNamespace, list[EnabledEffect]]:
+    """(nominal parameters by name, enabled effects with parameters and their own `kind` of states)."""
+    nominal = list(nominal_parameters(layout.links))
+    r = SimpleNamespace(**dict(zip(nominal, p, strict=False)))
+    at_p, at_z, enabled = len(nominal), 0, []
+    for name in layout.effects:
+        effect = EFFECTS[name]
+        keys, own = list(effect.parameters), list(getattr(effect, kind))
+        values = SimpleNamespace(**dict(zip(keys, p[at_p : at_p + len(keys)], strict=True)))
+        z = SimpleNamespace(**dict(zip(own, states[at_z : at_z + len(own)], strict=True)))
+        enabled.append(EnabledEffect(effect, values, z))
+        at_p, at_z = at_p + len(keys), at_z + len(own)
+    return r, enabled
+
+
+def motion_solution(
+    layout: Layout,
+    x: Sequence[Scalar],
+    drive: Sequence[Scalar],
+    p: Sequence[Scalar],
+    xp: Any,
+    constrained: bool = True,
+) -> Solution:
+    """Solve the equations for a motion vector (`layout.motion`), DRIVE_NAMES and parameters."""
+    size = layout.links + 3
+    r, effects = unpack_effects(layout, p, x[2 * size :], "states")
+    return solve(x[:size], x[size : 2 * size], Drive(*drive), r, effects, xp, constrained)
+
+
+def motion_rate(
+    layout: Layout, x: Sequence[Scalar], drive: Sequence[Scalar], p: Sequence[Scalar], xp: Any
+) -> list[Scalar]:
+    """Time derivative of the motion vector."""
+    size = layout.links + 3
+    solution = motion_solution(layout, x, drive, p, xp)
+    return [*x[size : 2 * size], *solution.acceleration, *solution.state_rates]
+
+
+def follow_command(
+    layout: Layout, m: Sequence[Scalar], command: Sequence[Scalar], p: Sequence[Scalar], dt: float, xp: Any
+) -> list[Scalar]:
+    """Memory at the end of a command's period: what servo, motor and the actuator effects make of it."""
+    r, effects = unpack_effects(layout, p, m[2:], "memory")
+    rotor, rudder = command
+    memory: list[Scalar] = []
+    for e in effects:
+        rudder, kept = e.effect.rudder(e.p, e.z, rudder, dt, xp)
+        rotor, turned = e.effect.rotor(e.p, e.z, rotor, dt, xp)
+        kept = {**kept, **turned}
+        memory += [kept[key] for key in e.effect.memory]
+    rudder = xp.fmax(xp.fmin(rudder, r.rudder_range), -r.rudder_range)
+    limit = r.servo_rate_limit * dt
+    alpha = m[0] + xp.fmax(xp.fmin(rudder - m[0], limit), -limit)
+    return [alpha, rotor, *memory]
+
+
+@dataclass(frozen=True)
+class Functions:
+    """CasADi functions of a structure; arguments are columns, a matrix argument maps over its columns.
+
+    rate(x, w, p) -> x'; rate_jvp(x, w, p, dx, dw, dp) -> (x', dx'); rate_vjp(x, w, p, g) -> (gx, gw, gp);
+    follow, follow_jvp, follow_vjp likewise of (m, c, p) -> m'; outputs(x, w, p) -> (q'', tip_force, slip).
+    """
+
+    rate: casadi.Function
+    rate_jvp: casadi.Function
+    rate_vjp: casadi.Function
+    follow: casadi.Function
+    follow_jvp: casadi.Function
+    follow_vjp: casadi.Function
+    outputs: casadi.Function
+
+
+@lru_cache(maxsize=64)
+def functions(structure: Structure, dt: float = DT) -> Functions:
+    """Build (once) the symbolic functions of a structure."""
+    layout = Layout(structure)
+    x = casadi.SX.sym("x", len(layout.motion))
+    w = casadi.SX.sym("w", len(DRIVE_NAMES))
+    p = casadi.SX.sym("p", len(layout.parameters))
+    m = casadi.SX.sym("m", len(layout.memory))
+    c = casadi.SX.sym("c", len(COMMAND_NAMES))
+    xs, ws, ps, ms, cs = (casadi.vertsplit(v) for v in (x, w, p, m, c))
+    rate = casadi.vertcat(*motion_rate(layout, xs, ws, ps, CASADI))
+    follow = casadi.vertcat(*follow_command(layout, ms, cs, ps, dt, CASADI))
+    solution = motion_solution(layout, xs, ws, ps, CASADI)
+    outputs = [casadi.vertcat(*solution.acceleration), solution.tip_force, solution.slip]
+    return Functions(
+        *derivatives("rate", [x, w, p], rate),
+        *derivatives("follow", [m, c, p], follow),
+        casadi.Function("outputs", [x, w, p], casadi.cse(outputs)),
+    )
+
+
+def derivatives(name: str, inputs: list[casadi.SX], value: casadi.SX) -> tuple[casadi.Function, ...]:
+    """(function, JVP, VJP) of an expression."""
+    together = casadi.vertcat(*inputs)
+    tangents = [casadi.SX.sym(f"d{i}", *v.shape) for i, v in enumerate(inputs)]
+    adjoint = casadi.SX.sym("g", *value.shape)
+    forward = casadi.jtimes(value, together, casadi.vertcat(*tangents))
+    reverse = casadi.jtimes(value, together, adjoint, True)
+    cuts = [0]
+    for v in inputs:
+        cuts.append(cuts[-1] + v.shape[0])
+    return (
+        casadi.Function(name, inputs, casadi.cse([value])),
+        casadi.Function(f"{name}_jvp", [*inputs, *tangents], casadi.cse([value, forward])),
+        casadi.Function(f"{name}_vjp", [*inputs, adjoint], casadi.cse(casadi.vertsplit(reverse, cuts))),
+    )

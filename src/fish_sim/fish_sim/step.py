@@ -1,0 +1,238 @@
+"""Advance the fish: `Stepper` for NumPy arrays, compiled where a C compiler exists, interpreted otherwise.
+
+One step is one command period of 10 ms. Shapes: state (..., NS), command (..., 2), parameters (NP,) or (..., NP).
+Values, tangents (JVP) and adjoints (VJP) come from the same expressions.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.compiled import compiler, has_libmvec, lanes, library
+from fish_sim.emit import emit
+from fish_sim.interpreted import InterpretedKernel
+from fish_sim.kernel import CompiledKernel
+from fish_sim.methods import METHODS
+from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, Structure, functions
+from fish_sim.robot import Robot
+
+Array = NDArray[np.float64]
+
+DEFAULT_METHOD = "dop853"
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """How a period of 10 ms is integrated: a method of `methods.METHODS` and its number of steps in the period."""
+
+    method: str = DEFAULT_METHOD
+    substeps: int = 1
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise ValueError(f"method: got {self.method!r}; expected one of {', '.join(METHODS)}")
+        if (
+            isinstance(self.substeps, bool)
+            or not isinstance(self.substeps, int)
+            or not 1 <= self.substeps <= 100
+        ):
+            raise ValueError(f"substeps: got {self.substeps!r}; expected a whole number from 1 to 100")
+
+
+def default_scheme(links: int) -> Scheme:
+    """Steps fine enough for the tail's fastest mode, which grows with the number of links."""
+    return Scheme(DEFAULT_METHOD, 1 if links <= 3 else 4 if links <= 5 else 12)
+
+
+class Stepper:
+    """The motion of one structure of robot (links, effects) under one integration scheme."""
+
+    def __init__(self, structure: Structure, scheme: Scheme | None = None, compiled: bool = True) -> None:
+        self.layout = Layout(structure)
+        self.scheme = scheme or default_scheme(structure[0])
+        self._compiled = compiled and compiler() is not None
+
+    @classmethod
+    def of(cls, robot: Robot, scheme: Scheme | None = None) -> Stepper:
+        """The stepper of a robot; its parameters are `parameters(robot)`."""
+        return cls(robot.structure, scheme)
+
+    def parameters(self, robot: Robot) -> Array:
+        """The robot's parameter vector (NP,)."""
+        if robot.structure != self.layout.structure:
+            raise ValueError(
+                f"robot: got structure {robot.structure}; this stepper is for {self.layout.structure}"
+            )
+        return np.array(robot.vector())
+
+    def rest(self, pose: tuple[float, float, float] = (0.0, 0.0, 0.0), rudder: float = 0.0) -> Array:
+        """State (NS,) at rest at a pose (x, y, heading) [m, m, rad] with a straight tail."""
+        state = np.zeros(len(self.layout.state))
+        state[:2] = pose[:2]
+        state[2 : 3 + self.layout.links] = pose[2]
+        state[len(self.layout.motion)] = rudder
+        return state
+
+    def step(self, state: Array, command: Array, parameters: Array) -> Array:
+        """The state 10 ms later."""
+        return self.rollout(state, np.asarray(command)[None], parameters)[1]
+
+    def rollout(self, start: Array, commands: Array, parameters: Array) -> Array:
+        """States (T + 1, ..., NS) from start (..., NS) under commands (T, ..., 2)."""
+        start, commands, parameters, shape = self._arrange(start, commands, parameters)
+        states = np.empty((len(commands) + 1, *start.shape))
+        states[0] = start
+        self._kernel(len(start)).rollout(states, commands, parameters)
+        return states.reshape(len(states), *shape, -1)
+
+    def rollout_jvp(
+        self,
+        start: Array,
+        commands: Array,
+        parameters: Array,
+        d_start: Array,
+        d_commands: Array,
+        d_parameters: Array,
+    ) -> tuple[Array, Array]:
+        """States and their derivative along (d_start, d_commands, d_parameters), shapes as the values or broadcast."""
+        lead = np.broadcast_shapes(
+            np.shape(start)[:-1],
+            np.shape(d_start)[:-1],
+            np.shape(d_parameters)[:-1],
+            np.shape(d_commands)[1:-1],
+        )
+        start = np.broadcast_to(start, (*lead, np.shape(start)[-1]))
+        start, commands, parameters, shape = self._arrange(start, commands, parameters)
+        ds, dc, dp, _ = self._arrange(
+            np.broadcast_to(d_start, (*shape, start.shape[-1])), d_commands, d_parameters
+        )
+        states, tangents = (np.empty((len(commands) + 1, *start.shape)) for _ in range(2))
+        states[0], tangents[0] = start, ds
+        self._kernel(len(start)).rollout_jvp(states, tangents, commands, dc, parameters, dp)
+        return tuple(a.reshape(len(a), *shape, -1) for a in (states, tangents))  # type: ignore[return-value]
+
+    def rollout_vjp(
+        self, states: Array, commands: Array, parameters: Array, g_states: Array
+    ) -> tuple[Array, Array, Array]:
+        """Adjoints of (start, commands, parameters), per batch element, from adjoints of all states of a rollout."""
+        start, commands, parameters, shape = self._arrange(states[0], commands, parameters)
+        flat = [np.ascontiguousarray(a, float).reshape(len(states), *start.shape) for a in (states, g_states)]
+        batch = len(start)
+        g_start, g_commands = np.empty_like(start), np.empty((len(commands), batch, commands.shape[-1]))
+        g_parameters = np.empty((batch, parameters.shape[-1]))
+        self._kernel(batch).rollout_vjp(
+            flat[0], commands, parameters, flat[1], g_start, g_commands, g_parameters
+        )
+        return (
+            g_start.reshape(*shape, -1),
+            g_commands.reshape(len(commands), *shape, -1),
+            g_parameters.reshape(*shape, -1),
+        )
+
+    def outputs(self, state: Array, drive_end: Array, parameters: Array) -> dict[str, Array]:
+        """Accelerations q'', tip force [N] and slip [m/s] of states (..., NS) at rest inputs.
+
+        drive_end: (..., 2) rates of alpha [rad/s] and rotor speed [rad/s^2] acting at that instant.
+        """
+        state = np.asarray(state, float)
+        lead = state.shape[:-1]
+        flat = state.reshape(-1, state.shape[-1])
+        rates = np.broadcast_to(drive_end, (*lead, 2)).reshape(-1, 2)
+        motion = flat[:, : len(self.layout.motion)]
+        alpha, speed = flat[:, motion.shape[1]], flat[:, motion.shape[1] + 1]
+        w = np.stack([alpha, rates[:, 0], speed, rates[:, 1]])
+        p = np.broadcast_to(parameters, (*lead, np.shape(parameters)[-1])).reshape(len(flat), -1)
+        values = functions(self.layout.structure).outputs(motion.T, w, p.T)
+        acceleration, force, slip = (v.full().T for v in values)
+        return {
+            "acceleration": acceleration.reshape(*lead, -1),
+            "tip_force": force.reshape(lead),
+            "slip": slip.reshape(lead),
+        }
+
+    def _arrange(
+        self, start: Array, commands: Array, parameters: Array
+    ) -> tuple[Array, Array, Array, tuple[int, ...]]:
+        """Flatten batch axes: (B, NS), (T, B or 1, 2), (B or 1, NP), and the batch shape."""
+        start, commands, parameters = (np.asarray(a, dtype=float) for a in (start, commands, parameters))
+        self._check_width("state", start, len(self.layout.state))
+        self._check_width("commands", commands, len(COMMAND_NAMES))
+        self._check_width("parameters", parameters, len(self.layout.parameters))
+        shape = np.broadcast_shapes(start.shape[:-1], commands.shape[1:-1], parameters.shape[:-1])
+        batch = int(np.prod(shape, dtype=int))
+        flat_start = np.broadcast_to(start, (*shape, start.shape[-1])).reshape(batch, -1)
+        if commands.ndim == 2:
+            flat_commands = commands[:, None]
+        else:
+            flat_commands = np.broadcast_to(commands, (len(commands), *shape, 2)).reshape(
+                len(commands), batch, 2
+            )
+        if parameters.ndim == 1:
+            flat_parameters = parameters[None]
+        else:
+            flat_parameters = np.broadcast_to(parameters, (*shape, parameters.shape[-1])).reshape(batch, -1)
+        arrays = (np.ascontiguousarray(a) for a in (flat_start, flat_commands, flat_parameters))
+        return (*arrays, shape)  # type: ignore[return-value]
+
+    def _check_width(self, name: str, array: Array, width: int) -> None:
+        if array.ndim == 0 or array.shape[-1] != width:
+            raise ValueError(
+                f"{name}: got shape {array.shape}; expected (..., {width}) for {self.layout.structure}"
+            )
+
+    def _kernel(self, batch: int) -> CompiledKernel | InterpretedKernel:
+        return kernel(self.layout.structure, self.scheme, 1 if batch == 1 else lanes(), self._compiled)
+
+
+@functools.lru_cache(maxsize=256)
+def kernel(
+    structure: Structure, scheme: Scheme, width: int, compiled: bool
+) -> CompiledKernel | InterpretedKernel:
+    """The kernel of a structure: compiled for `width` lanes, or interpreted."""
+    loaded = library(kernel_source(structure, scheme, width)) if compiled else None
+    if loaded is None:
+        return InterpretedKernel(structure, METHODS[scheme.method], scheme.substeps)
+    return CompiledKernel(loaded)
+
+
+def kernel_source(structure: Structure, scheme: Scheme, width: int) -> str:
+    """Complete C text of the kernel of a structure."""
+    layout, table, method = Layout(structure), functions(structure), METHODS[scheme.method]
+    sizes = {
+        "LANES": width,
+        "NX": len(layout.motion),
+        "NM": len(layout.memory),
+        "NS": len(layout.state),
+        "NP": len(layout.parameters),
+        "NC": len(COMMAND_NAMES),
+        "NW": len(DRIVE_NAMES),
+        "STAGES": len(method.B),
+        "SUBSTEPS": scheme.substeps,
+        "DT": repr(DT),
+    }
+    if has_libmvec():
+        sizes["LIBMVEC"] = 1
+    lines = [f"#define {name} {value}" for name, value in sizes.items()]
+    rows = ["{" + ", ".join(map(repr, row)) + "}" for row in method.A]
+    lines.append("static const double A[STAGES][STAGES] = {" + ", ".join(rows) + "};")
+    lines += [
+        f"static const double {k}[STAGES] = {{{', '.join(map(repr, getattr(method, k)))}}};" for k in "BC"
+    ]
+    c = files("fish_sim") / "c"
+    emitted = [
+        emit(f)
+        for f in (
+            table.rate,
+            table.rate_jvp,
+            table.rate_vjp,
+            table.follow,
+            table.follow_jvp,
+            table.follow_vjp,
+        )
+    ]
+    return "\n".join([*lines, (c / "vector.h").read_text(), *emitted, (c / "rollout.c").read_text()])
