@@ -40,7 +40,9 @@ class Lens:
             CalibrationError: sizes, model or numbers that no calibrated camera has.
         """
         if width <= 0 or height <= 0:
-            raise CalibrationError(f"camera_info has image size {width} x {height}: expected positive numbers")
+            raise CalibrationError(
+                f"camera_info has image size {width} x {height}: expected positive numbers"
+            )
         if len(k) != 9 or not all(isfinite(v) for v in [*k, *d]):
             raise CalibrationError("camera_info has numbers missing or not finite in k or d")
         if k[0] <= 0.0 or k[4] <= 0.0:
@@ -49,7 +51,7 @@ class Lens:
             )
         if len(d) and (model not in MODELS or len(d) > MODELS[model]):
             raise CalibrationError(
-                f"camera_info has distortion model {model!r} with {len(d)} coefficients: expected one of {MODELS}"
+                f"camera_info has distortion model {model!r} with {len(d)} coefficients: expected {MODELS}"
             )
         D = np.zeros(5 if len(d) <= 5 else 8)
         D[: len(d)] = d
@@ -58,7 +60,8 @@ class Lens:
 
 @dataclass(frozen=True)
 class Mount:
-    """Where the camera hangs: optical centre in the pool frame (m) and tilt (rotation vector about the optical axes,
+    """Where the camera hangs: optical centre in the pool frame (m) and tilt (rotation vector about the
+    optical axes,
     rad; zero looks straight down with pool x to the right of the image).
 
         p_cam = R (p_pool - position),  R = exp([tilt]x) diag(1, -1, -1)
@@ -86,7 +89,9 @@ class Calibration:
         t = -R @ np.asarray(mount.position, float)
         self._rotation = cv2.Rodrigues(R)[0]
         self._t = t
-        self._plane = np.column_stack([R[:, 0], R[:, 1], R[:, 2] * plane_height + t])  # pool plane -> ideal image
+        self._plane = np.column_stack(
+            [R[:, 0], R[:, 1], R[:, 2] * plane_height + t]
+        )  # pool plane -> ideal image
         self._plane_inverse = np.linalg.inv(self._plane)
         self.H = lens.K @ self._plane
         self._check_pool_visible()
@@ -97,8 +102,8 @@ class Calibration:
         ahead = self._plane[2, 2] > 0
         if not (ahead and 0 <= u < width and 0 <= v < height):
             raise CalibrationError(
-                f"the pool's centre falls on pixel ({u:.0f}, {v:.0f}) of a {width} x {height} image: camera_info and "
-                "camera_position / camera_tilt do not belong together; run calibrate"
+                f"the pool's centre falls on pixel ({u:.0f}, {v:.0f}) of a {width} x {height} image: "
+                "camera_info and camera_position / camera_tilt do not belong together; run calibrate"
             )
 
     def pool_to_pixel(self, points: ArrayLike) -> Array:
@@ -113,26 +118,27 @@ class Calibration:
         plane = np.column_stack([flat, np.ones(len(flat))]) @ self._plane_inverse.T
         return plane[:, :2] / plane[:, 2:]
 
-    def metres_per_pixel(self, pixels: ArrayLike) -> Array:
-        """(N, 2) pixels -> (N, 2, 2) derivative of pixel_to_pool, m/pixel; columns along u and v."""
+    def place_and_scale(self, pixels: ArrayLike) -> tuple[Array, Array]:
+        """(N, 2) pixels -> (N, 2) x, y, m, and (N, 2, 2) derivative by u (first column) and v, m/pixel."""
         pixels = np.asarray(pixels, float).reshape(-1, 2)
-        step = np.array([[0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
-        around = self.pixel_to_pool((pixels[:, None] + step).reshape(-1, 2)).reshape(-1, 4, 2)
-        return np.stack([around[:, 0] - around[:, 1], around[:, 2] - around[:, 3]], axis=-1)
+        cross = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
+        points = self.pixel_to_pool((pixels[:, None] + cross).reshape(-1, 2)).reshape(-1, 5, 2)
+        return points[:, 0], np.stack([points[:, 1] - points[:, 2], points[:, 3] - points[:, 4]], axis=-1)
 
 
 def undistort(pixels: Array, lens: Lens) -> Array:
     """(N, 2) pixels -> (N, 2) ideal image points x/z, y/z.
 
-    OpenCV's five fixed-point steps leave up to a tenth of a pixel at the edge of a wide lens; two Newton steps with a
-    numerical derivative of OpenCV's own forward model bring it below 1e-6.
+    OpenCV's five fixed-point steps leave up to a tenth of a pixel at the edge of a wide lens; two Newton
+    steps with a numerical derivative of OpenCV's own forward model bring it below 1e-6.
     """
     if len(pixels) == 0:
         return np.zeros((0, 2))
     flat = cv2.undistortPoints(pixels.reshape(-1, 1, 2), lens.K, lens.D).reshape(-1, 2)
     h = 1e-6
+    shifts = np.array([[0.0, 0.0], [h, 0.0], [0.0, h]])[:, None]
     for _ in range(2):
-        at, du, dv = (_distort(flat + shift, lens) for shift in ([0.0, 0.0], [h, 0.0], [0.0, h]))
+        at, du, dv = _distort((flat + shifts).reshape(-1, 2), lens).reshape(3, -1, 2)
         J = np.stack([du - at, dv - at], axis=-1) / h
         flat = flat - np.linalg.solve(J, (at - pixels)[..., None])[..., 0]
     return flat
@@ -155,7 +161,9 @@ def read_lens(path: Path) -> Lens:
             [float(v) for v in content["distortion_coefficients"]["data"]],
         )
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise CalibrationError(f"{path}: not a camera calibration file ({type(error).__name__}: {error})") from error
+        raise CalibrationError(
+            f"{path}: not a camera calibration file ({type(error).__name__}: {error})"
+        ) from error
 
 
 def lens_document(lens: Lens, camera_name: str) -> Mapping[str, Any]:

@@ -12,8 +12,8 @@ from fish_vision.segmentation import HUES, ColourRange
 class TrackerConfig:
     """ROS parameters of the tracker node; tuples because ROS parameters are lists.
 
-    Colours are [hue low, hue high, least saturation, least value]: hue 0 to 179 (half degrees; low > high wraps through
-    red), the others 0 to 255.
+    Colours are [hue low, hue high, least saturation, least value]: hue 0 to 179 (half degrees; low > high
+    wraps through red), the others 0 to 255.
     """
 
     frame_id: str = "pool"  # of the published poses
@@ -41,7 +41,7 @@ class TrackerConfig:
     max_speed: float = 1.5  # m/s, faster is a jump
     max_yaw_rate: float = 15.0  # rad/s, faster is a jump
     reacquire_s: float = 0.5  # a jump that lasts so long is believed, s
-    pixel_std: float = 0.10  # standard deviation of a whole marker's middle, pixels
+    pixel_std: float = 0.06  # standard deviation of a whole marker's middle, pixels
     pool_margin: float = 0.10  # a pose so far outside the walls is refused, m
 
     def __post_init__(self) -> None:
@@ -56,7 +56,9 @@ class TrackerConfig:
         for name in ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour"):
             value = getattr(self, name)
             if not (all(0 <= h < HUES for h in value[:2]) and all(0 <= v <= 255 for v in value[2:])):
-                raise ValueError(f"{name} = {list(value)}: expected two hues 0 to 179 and two levels 0 to 255")
+                raise ValueError(
+                    f"{name} = {list(value)}: expected two hues 0 to 179 and two levels 0 to 255"
+                )
         if self.layout().spacing < self.marker_diameter:
             raise ValueError(
                 f"front_marker = {list(self.front_marker)}, rear_marker = {list(self.rear_marker)}: "
@@ -69,7 +71,9 @@ class TrackerConfig:
 
     def layout(self) -> MarkerLayout:
         """Where the markers sit on the fish."""
-        return MarkerLayout(tuple(self.front_marker), tuple(self.rear_marker), self.hinge_offset, self.link_length)
+        return MarkerLayout(
+            tuple(self.front_marker), tuple(self.rear_marker), self.hinge_offset, self.link_length
+        )
 
     def colour(self, marker: str) -> ColourRange:
         """The range of marker `front`, `rear`, `tail_odd` or `tail_even`."""

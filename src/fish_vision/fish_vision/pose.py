@@ -1,4 +1,4 @@
-"""Markers to pose: which spots are the head's, where it is and points, how the tail bends, and how sure that is."""
+"""Markers to pose: which spots are the head's, where it is and points, how the tail bends, how surely."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MarkerLayout:
-    """Where the markers sit. Head markers in base_link axes (x ahead, y left, from the head's centre of mass), m."""
+    """Where the markers sit: head markers in base_link axes (x ahead, y left of the centre of mass), m."""
 
     front: tuple[float, float]
     rear: tuple[float, float]
@@ -35,7 +35,7 @@ class Spot:
 
 @dataclass(frozen=True)
 class HeadPose:
-    """Head's centre of mass (pool frame, m), heading (rad, counter-clockwise), covariance (3, 3) of x, y, heading."""
+    """Head's centre of mass (pool frame, m), heading (rad, counter-clockwise), their covariance (3, 3)."""
 
     x: float
     y: float
@@ -51,7 +51,7 @@ def wrap(angle: float) -> float:
 def pick_head(
     front: Sequence[Spot], rear: Sequence[Spot], spacing: float, tolerance: float
 ) -> tuple[Spot, Spot] | None:
-    """The pair whose distance fits the head's best, or None if no pair fits within tolerance (share of spacing)."""
+    """The pair whose distance fits best, or None if none fits within tolerance (share of spacing)."""
     pairs = [
         (abs(float(np.hypot(*(f.position - r.position))) / spacing - 1.0), i, j)
         for i, f in enumerate(front)
@@ -68,7 +68,8 @@ def head_pose(front: Spot, rear: Spot, layout: MarkerLayout) -> HeadPose:
 
         heading = angle(p_f - p_r) - angle(m_f - m_r),  p = (p_f + p_r) / 2 - R(heading) (m_f + m_r) / 2
 
-    p: markers in the pool, m: in base_link. The covariance follows by the chain rule from those of the two spots.
+    p: markers in the pool, m: in base_link. The covariance follows by the chain rule from those of the two
+    spots.
     """
     m_f, m_r = np.array(layout.front), np.array(layout.rear)
     line, mounted = front.position - rear.position, m_f - m_r
@@ -97,9 +98,12 @@ def tail_angles(
         spots: candidates for each link, in order.
         tolerance: greatest misfit of the distance, m.
     Returns:
-        One angle per link, or None if a link's marker is missing (a chain with a hole has no angles after it).
+        One angle per link, or None if a link's marker is missing (a chain with a hole has no angles after
+        it).
     """
-    hinge = np.array([head.x, head.y]) - layout.hinge_offset * np.array([cos(head.heading), sin(head.heading)])
+    hinge = np.array([head.x, head.y]) - layout.hinge_offset * np.array(
+        [cos(head.heading), sin(head.heading)]
+    )
     before, result = head.heading, []
     for candidates in spots:
         marker = _fitting(hinge, before, candidates, layout.link_length, tolerance)
@@ -135,6 +139,7 @@ def tail_is_ahead(head: HeadPose, tail: Sequence[Spot], layout: MarkerLayout, re
     ahead = layout.hinge_offset * np.array([cos(head.heading), sin(head.heading)])
     centre = np.array([head.x, head.y])
     near = [
-        sum(float(np.hypot(*(s.position - end))) < reach for s in tail) for end in (centre - ahead, centre + ahead)
+        sum(float(np.hypot(*(s.position - end))) < reach for s in tail)
+        for end in (centre - ahead, centre + ahead)
     ]
     return near[1] > near[0]

@@ -18,7 +18,7 @@ FAINT = 0.25  # share of a blob's colourfulness below which a pixel counts as no
 
 @dataclass(frozen=True)
 class ColourRange:
-    """Hue range (0 to 179, half degrees, low > high wraps through red), least saturation and value (0 to 255)."""
+    """Hue range (0 to 179, half degrees; low > high wraps), least saturation and value (0 to 255)."""
 
     hue_low: int
     hue_high: int
@@ -54,14 +54,13 @@ def hsv_of(image: Image, box: Box) -> Image:
     return cv2.cvtColor(image[top:bottom, left:right], cv2.COLOR_BGR2HSV)
 
 
-def find_blobs(
-    hsv: Image, colour: ColourRange, area_range: tuple[float, float]
-) -> list[Blob]:
+def find_blobs(hsv: Image, colour: ColourRange, area_range: tuple[float, float]) -> list[Blob]:
     """Blobs of a colour with areas in the range, largest first.
 
-    A contour around the pixels in range gives the place; the middle is the mean of all pixels in and around it weighted with
-    their colourfulness S V (linear in how much of the pixel the marker covers, when the fish under it is grey), so that it
-    is far finer than a pixel. Glare is white: it has no colourfulness and falls out.
+    A contour around the pixels in range gives the place; the middle is the mean of all pixels in and around
+    it weighted with their colourfulness S V (linear in how much of the pixel the marker covers, when the fish
+    under it is grey), so that it is far finer than a pixel. Glare is white: it has no colourfulness and falls
+    out.
 
     Args:
         hsv: (h, w, 3) part of an image.

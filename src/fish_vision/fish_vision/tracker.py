@@ -15,7 +15,9 @@ from fish_vision.segmentation import Blob, Box, Image, around, find_blobs, hsv_o
 
 Array = NDArray[np.float64]
 
-COARSE = 2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
+COARSE = (
+    2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
+)
 CANDIDATES = 6  # blobs of a colour that are considered, largest first
 JUMP_DISTANCE = 0.03  # m, never counted as a jump
 JUMP_TURN = 0.3  # rad, never counted as a jump
@@ -55,13 +57,16 @@ class Lost:
 class Tracker:
     """Follows one fish: looks around the last pose first, in the whole image if that fails.
 
-    A pose is believed if the head's two colours are the right distance apart, the tail is behind, the place is in the
-    pool, and it can be reached from the last pose. After `reacquire_s` without a believed pose the last one is forgotten.
+    A pose is believed if the head's two colours are the right distance apart, the tail is behind, the place
+    is in the pool, and it can be reached from the last pose. After `reacquire_s` without a believed pose the
+    last one is forgotten.
     """
 
     def __init__(self, config: TrackerConfig, calibration: Calibration) -> None:
         self._config, self._calibration = config, calibration
         self._layout = config.layout()
+        _, scale = calibration.place_and_scale(calibration.pool_to_pixel([[0.0, 0.0]]))
+        self._pixel = float(abs(np.linalg.det(scale[0])))  # m^2 of water that a pixel shows in the middle
         self._last: Detection | None = None
 
     def track(self, image: Image, stamp: float) -> Detection | Lost:
@@ -99,7 +104,11 @@ class Tracker:
         if isinstance(pair, Reason):
             return Lost(stamp, pair)
         head = head_pose(*pair, self._layout)
-        tail = [self._spots(hsv, m, box[:2]) for m in ("tail_odd", "tail_even")] if self._config.tail_links else []
+        tail = (
+            [self._spots(hsv, m, box[:2]) for m in ("tail_odd", "tail_even")]
+            if self._config.tail_links
+            else []
+        )
         refused = self._refuse(head, [spot for spots in tail for spot in spots], stamp)
         if refused is not None:
             return Lost(stamp, refused)
@@ -116,8 +125,7 @@ class Tracker:
         config = self._config
         diameter = config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
         disc = pi / 4 * diameter**2
-        width, height = self._calibration.lens.size
-        pixel = abs(np.linalg.det(self._calibration.metres_per_pixel([[width / 2, height / 2]])[0])) * step**2  # m^2
+        pixel = self._pixel * step**2
         limits = (0.5 * config.area_min * disc / pixel, 2.0 * config.area_max * disc / pixel)
         blobs = find_blobs(hsv, config.colour(marker), limits)[:CANDIDATES]
         return self._spots_of_size(_enlarged(blobs, origin, step), disc)
@@ -125,19 +133,18 @@ class Tracker:
     def _spots_of_size(self, blobs: Sequence[Blob], disc: float) -> list[Spot]:
         """Blobs as spots in the pool, without those whose area does not fit a disc (m^2) at their place.
 
-            std = pixel_std / sqrt(share) + diameter |1 - share| / 8,  share = area / area of the disc, at most 1
+            std = pixel_std / sqrt(share) + diameter (1 - share) / 8,  share = area / disc area, at most 1
 
         in pixels: the second term is what a partly hidden disc's middle moves.
         """
         if not blobs:
             return []
         pixels = np.array([[b.u, b.v] for b in blobs])
-        J = self._calibration.metres_per_pixel(pixels)
+        places, J = self._calibration.place_and_scale(pixels)
         shares = np.array([b.area for b in blobs]) * np.abs(np.linalg.det(J)) / disc
         diameters = np.sqrt([4 / pi * b.area for b in blobs])
         hidden = np.maximum(1.0 - shares, 0.0)
         std = self._config.pixel_std / np.sqrt(np.minimum(shares, 1.0)) + diameters * hidden / 8
-        places = self._calibration.pixel_to_pool(pixels)
         return [
             Spot(places[i], std[i] ** 2 * J[i] @ J[i].T)
             for i in range(len(blobs))

@@ -1,0 +1,66 @@
+"""The picture with what the tracker saw in it, for people."""
+
+from math import cos, sin
+
+import cv2
+import numpy as np
+
+from fish_vision.calibration import POOL, Calibration
+from fish_vision.config import TrackerConfig
+from fish_vision.segmentation import Image
+from fish_vision.tracker import Detection, Lost
+
+GREEN, RED, WHITE = (60, 230, 60), (50, 50, 255), (255, 255, 255)  # blue, green, red
+ARROW = 0.25  # m, length of the drawn heading
+
+
+def annotated(
+    image: Image, found: Detection | Lost, config: TrackerConfig, calibration: Calibration
+) -> Image:
+    """Copy of an image with the pool's outline, box, head, heading, tail, numbers (or the reason)."""
+    picture = image.copy()
+    _line(picture, calibration, _outline(), WHITE, closed=True)
+    if isinstance(found, Lost):
+        return _text(picture, f"lost: {found.reason.value}", RED)
+    head = found.head
+    cv2.rectangle(picture, found.box[:2], found.box[2:], GREEN, 1)
+    centre, ahead = np.array([head.x, head.y]), np.array([cos(head.heading), sin(head.heading)])
+    _line(picture, calibration, np.array([centre, centre + ARROW * ahead]), GREEN)
+    _line(picture, calibration, tail_points(found, config), GREEN)
+    numbers = (
+        f"x {head.x:+.3f} m  y {head.y:+.3f} m  heading {head.heading:+.3f} rad  spacing {found.spacing:.3f}"
+    )
+    if found.tail is not None:
+        numbers += "  tail " + " ".join(f"{angle:+.2f}" for angle in found.tail)
+    return _text(picture, numbers, WHITE)
+
+
+def tail_points(found: Detection, config: TrackerConfig) -> np.ndarray:
+    """(N, 2) head's centre of mass, hinge and far ends of the links in the pool, m."""
+    angle, place = found.head.heading, np.array([found.head.x, found.head.y])
+    points = [place, place - config.hinge_offset * np.array([cos(angle), sin(angle)])]
+    for relative in found.tail or ():
+        angle += relative
+        points.append(points[-1] - config.link_length * np.array([cos(angle), sin(angle)]))
+    return np.array(points)
+
+
+def _outline(points: int = 20) -> np.ndarray:
+    """(N, 2) points along the pool's walls, m: many, because the lens bends them."""
+    x, y = POOL[0] / 2, POOL[1] / 2
+    corners = np.array([[x, y], [-x, y], [-x, -y], [x, -y], [x, y]])
+    sides = zip(corners[:-1], corners[1:], strict=True)
+    return np.vstack([np.linspace(a, b, points, endpoint=False) for a, b in sides])
+
+
+def _line(
+    picture: Image, calibration: Calibration, points: np.ndarray, colour: tuple, closed: bool = False
+) -> None:
+    pixels = np.round(calibration.pool_to_pixel(points) * 16).astype(np.int32)
+    cv2.polylines(picture, [pixels], closed, colour, 1, cv2.LINE_AA, shift=4)
+
+
+def _text(picture: Image, text: str, colour: tuple[int, int, int]) -> Image:
+    cv2.putText(picture, text, (12, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (0, 0, 0), 4, cv2.LINE_AA)
+    cv2.putText(picture, text, (12, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, 1, cv2.LINE_AA)
+    return picture

@@ -1,0 +1,60 @@
+"""What every node of this package does to start and to stop: parameters from a dataclass, a clean end."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any, TypeVar
+
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+Config = TypeVar("Config")
+
+
+def read_parameters(node: Node, kind: type[Config]) -> Config:
+    """Declare every field of a dataclass as ROS parameter and read them; the defaults are those of the
+    dataclass.
+
+    Raises:
+        ValueError: a value of the wrong type or out of range, naming parameter, value and what was expected.
+    """
+    default = kind()
+    values = {}
+    for field in fields(kind):  # type: ignore[arg-type]
+        like = getattr(default, field.name)
+        start = list(like) if isinstance(like, tuple) else like
+        given = node.declare_parameter(field.name, start, ParameterDescriptor(dynamic_typing=True)).value
+        values[field.name] = _as(field.name, given, like)
+    return kind(**values)
+
+
+def _as(name: str, given: Any, like: Any) -> Any:
+    """given in the type of like: whole numbers may stand for floats, lists for tuples."""
+    if isinstance(like, tuple) and not isinstance(given, str | bytes) and hasattr(given, "__iter__"):
+        return tuple(_as(name, item, like[0]) for item in given)
+    if isinstance(like, float) and isinstance(given, int) and not isinstance(given, bool):
+        return float(given)
+    if type(given) is not type(like):
+        raise ValueError(f"{name} = {given!r}: expected {type(like).__name__} as in {like!r}")
+    return given
+
+
+def run(make_node: Callable[[], Node], name: str) -> int:
+    """Spin a node until SIGINT or SIGTERM: 0; or 1 and one line on stderr if its parameters are refused."""
+    rclpy.init()
+    node = None
+    try:
+        node = make_node()
+        rclpy.spin(node)
+    except ValueError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 0
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0

@@ -1,0 +1,157 @@
+"""The tracker node: overhead image to pose of the head and angles of the tail.
+
+In: camera/image_raw/compressed (sensor_msgs/CompressedImage) or, with use_raw, camera/image_raw
+(sensor_msgs/Image); camera/camera_info (sensor_msgs/CameraInfo). Out: camera/pose
+(geometry_msgs/PoseWithCovarianceStamped, frame pool), camera/tail (sensor_msgs/JointState, tail_1 .. relative
+angles, rad), both stamped as the image; with debug_image camera/debug/compressed; /diagnostics. Bad images
+and calibrations are counted and said in the diagnostics.
+"""
+
+from math import cos, sin
+from time import perf_counter
+
+import cv2
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
+from std_msgs.msg import Header
+
+from fish_vision.annotate import annotated
+from fish_vision.calibration import Calibration, CalibrationError, Lens
+from fish_vision.config import TrackerConfig
+from fish_vision.nodes.start import read_parameters, run
+from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
+from fish_vision.statistics import Statistics
+from fish_vision.tracker import Detection, Tracker
+
+QUEUE = 10
+UNKNOWN = 1e6  # variance of what an overhead camera does not see: z, roll, pitch
+
+
+class TrackerNode(Node):
+    """Messages in and out; the work is in Tracker."""
+
+    def __init__(self) -> None:
+        super().__init__("tracker", namespace="fish")
+        cv2.setNumThreads(1)  # one small region per image: more threads only take time from other nodes
+        self._config = read_parameters(self, TrackerConfig)
+        self._info: tuple | None = None  # fields of the camera_info in use
+        self._calibration: Calibration | None = None
+        self._calibration_error = "no camera/camera_info yet"
+        self._tracker: Tracker | None = None
+        self._statistics = Statistics()
+        self._images_before = self._tracked_before = 0
+        self._pose = self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
+        self._tail = self.create_publisher(JointState, "camera/tail", QUEUE)
+        self._debug = None
+        if self._config.debug_image:
+            self._debug = self.create_publisher(CompressedImage, "camera/debug/compressed", QUEUE)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
+        self.create_subscription(CameraInfo, "camera/camera_info", self._on_info, qos_profile_sensor_data)
+        kind, topic = (
+            (Image, "camera/image_raw")
+            if self._config.use_raw
+            else (CompressedImage, "camera/image_raw/compressed")
+        )
+        self.create_subscription(kind, topic, self._on_image, qos_profile_sensor_data)
+        self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _on_info(self, msg: CameraInfo) -> None:
+        """Take over a calibration when it changes."""
+        info = (msg.width, msg.height, msg.distortion_model, tuple(msg.k), tuple(msg.d))
+        if info == self._info:
+            return
+        self._info, self._calibration, self._tracker = info, None, None
+        try:
+            self._calibration = Calibration(
+                Lens.from_camera_info(*info), self._config.mount(), self._config.marker_height
+            )
+            self._tracker = Tracker(self._config, self._calibration)
+        except CalibrationError as error:
+            self._calibration_error = str(error)
+
+    def _on_image(self, msg: CompressedImage | Image) -> None:
+        start = perf_counter()
+        if self._tracker is None or self._calibration is None:
+            self._statistics.refuse("no calibration", self._calibration_error)
+            return
+        try:
+            picture = self._picture(msg, self._calibration.lens.size)
+        except PictureError as error:
+            self._statistics.refuse("bad image", str(error))
+            return
+        stamp = msg.header.stamp.sec + msg.header.stamp.nanosec * 1e-9
+        found = self._tracker.track(picture, stamp)
+        if isinstance(found, Detection):
+            self._publish(found, msg.header)
+        age = self.get_clock().now().nanoseconds * 1e-9 - stamp
+        self._statistics.add(found, perf_counter() - start, age)
+        if self._debug is not None:
+            drawn = annotated(picture, found, self._config, self._calibration)
+            self._debug.publish(CompressedImage(header=msg.header, format="jpeg", data=to_jpeg(drawn)))
+
+    def _picture(self, msg: CompressedImage | Image, size: tuple[int, int]) -> np.ndarray:
+        if isinstance(msg, CompressedImage):
+            return from_compressed(msg.data, size)
+        return from_raw(msg.data, msg.encoding, msg.width, msg.height, msg.step, size)
+
+    def _publish(self, found: Detection, header: Header) -> None:
+        head, own = found.head, Header(stamp=header.stamp, frame_id=self._config.frame_id)
+        msg = PoseWithCovarianceStamped(header=own)
+        msg.pose.pose.position.x, msg.pose.pose.position.y = head.x, head.y
+        msg.pose.pose.orientation.z = sin(head.heading / 2)
+        msg.pose.pose.orientation.w = cos(head.heading / 2)
+        covariance = np.diag([0.0, 0.0, UNKNOWN, UNKNOWN, UNKNOWN, 0.0])
+        seen = np.ix_([0, 1, 5], [0, 1, 5])  # x, y, yaw
+        covariance[seen] = head.covariance
+        msg.pose.covariance = covariance.ravel()
+        self._pose.publish(msg)
+        if found.tail is not None:
+            names = [f"tail_{i + 1}" for i in range(len(found.tail))]
+            self._tail.publish(JointState(header=own, name=names, position=list(found.tail)))
+
+    def _report(self) -> None:
+        """Diagnostics, once a second."""
+        level, message = self._state()
+        status = DiagnosticStatus(name=self.get_fully_qualified_name(), level=level, message=message)
+        status.hardware_id = "overhead camera"
+        status.values = [KeyValue(key=key, value=value) for key, value in self._statistics.values().items()]
+        stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
+
+    def _state(self) -> tuple[bytes, str]:
+        """Level and message for what came since the last report."""
+        statistics = self._statistics
+        images, tracked = statistics.images - self._images_before, statistics.tracked - self._tracked_before
+        self._images_before, self._tracked_before = statistics.images, statistics.tracked
+        refused, statistics.last_error = statistics.last_error, ""
+        if self._calibration is None:
+            return DiagnosticStatus.ERROR, self._calibration_error
+        if refused:
+            return DiagnosticStatus.ERROR, refused
+        if images == 0:
+            return DiagnosticStatus.WARN, "no image in the last second"
+        if (error := statistics.spacing_error()) is not None:
+            return (
+                DiagnosticStatus.WARN,
+                f"head markers seem {100 * error:+.1f} % too far apart: check calibration and marker places",
+            )
+        if tracked < images:
+            return (
+                DiagnosticStatus.WARN,
+                f"fish seen in {tracked} of {images} images: {statistics.last_reason}",
+            )
+        return DiagnosticStatus.OK, f"fish seen in all {images} images"
+
+
+def main() -> int:
+    """Entry point."""
+    return run(TrackerNode, "tracker")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,65 @@
+"""Bytes of image messages to pictures (h, w, 3; blue, green, red) and back."""
+
+import cv2
+import numpy as np
+
+from fish_vision.segmentation import Image
+
+CONVERSIONS = {  # encoding -> channels, conversion to bgr8
+    "bgr8": (3, None),
+    "rgb8": (3, cv2.COLOR_RGB2BGR),
+    "bgra8": (4, cv2.COLOR_BGRA2BGR),
+    "rgba8": (4, cv2.COLOR_RGBA2BGR),
+    "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
+}
+
+
+class PictureError(ValueError):
+    """Bytes that are no usable picture; the message says what came and what was expected."""
+
+
+def from_compressed(data: bytes, size: tuple[int, int]) -> Image:
+    """Picture from JPEG or PNG bytes.
+
+    Raises:
+        PictureError: not an image, or not of the expected size (width, height).
+    """
+    packed = np.frombuffer(data, np.uint8)
+    try:
+        picture = cv2.imdecode(packed, cv2.IMREAD_COLOR) if packed.size else None
+    except cv2.error as error:
+        raise PictureError(f"{packed.size} bytes that cannot be decoded: {error.err}") from error
+    if picture is None:
+        raise PictureError(f"{packed.size} bytes that are no JPEG or PNG picture, or a broken one")
+    return _of_size(picture, size)
+
+
+def from_raw(data: bytes, encoding: str, width: int, height: int, step: int, size: tuple[int, int]) -> Image:
+    """Picture from the fields of sensor_msgs/Image (rows of `step` bytes).
+
+    Raises:
+        PictureError: unknown encoding, too few bytes, or not of the expected size (width, height).
+    """
+    if encoding not in CONVERSIONS:
+        raise PictureError(f"encoding {encoding!r}: expected one of {', '.join(CONVERSIONS)}")
+    channels, conversion = CONVERSIONS[encoding]
+    if width <= 0 or height <= 0 or step < width * channels or len(data) < step * height:
+        raise PictureError(
+            f"{len(data)} bytes in rows of {step} for a {width} x {height} {encoding} image: "
+            f"expected at least {width * channels * height} bytes in rows of at least {width * channels}"
+        )
+    rows = np.frombuffer(data, np.uint8, step * height).reshape(height, step)[:, : width * channels]
+    picture = np.ascontiguousarray(rows).reshape(height, width, channels)
+    return _of_size(picture if conversion is None else cv2.cvtColor(picture, conversion), size)
+
+
+def to_jpeg(picture: Image, quality: int = 80) -> bytes:
+    """The picture as JPEG."""
+    return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+
+
+def _of_size(picture: Image, size: tuple[int, int]) -> Image:
+    height, width = picture.shape[:2]
+    if (width, height) != size:
+        raise PictureError(f"image of {width} x {height}, but camera_info says {size[0]} x {size[1]}")
+    return picture
