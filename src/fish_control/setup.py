@@ -21,7 +21,7 @@ setup(
     maintainer_email="maintainers@robot-fish.org",
     description="Kalman fusion, reference paths, line-of-sight planner and PID with learned gains.",
     license="Apache-2.0",
-    tests_require=["pytest"],
+    extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
             "fusion = fish_control.nodes.fusion:main",

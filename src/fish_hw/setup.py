@@ -21,7 +21,7 @@ setup(
     maintainer_email="maintainers@robot-fish.org",
     description="Hardware drivers: rotor (Vertiq), rudder servo, IMU (BNO085) and USB camera.",
     license="Apache-2.0",
-    tests_require=["pytest"],
+    extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
             "rotor = fish_hw.nodes.rotor:main",

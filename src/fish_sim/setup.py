@@ -21,7 +21,7 @@ setup(
     maintainer_email="maintainers@robot-fish.org",
     description="The differentiable simulator of a rotor-driven robot fish, its sensors and the rendered pool.",
     license="Apache-2.0",
-    tests_require=["pytest"],
+    extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
             "simulator = fish_sim.nodes.simulator:main",

@@ -24,7 +24,7 @@ setup(
     maintainer_email="maintainers@robot-fish.org",
     description="Offline package: recordings, identification, diagnosis, training, evaluation, reports.",
     license="Apache-2.0",
-    tests_require=["pytest"],
+    extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
             "fish_train = fish_train.commands.main:main",

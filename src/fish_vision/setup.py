@@ -21,7 +21,7 @@ setup(
     maintainer_email="maintainers@robot-fish.org",
     description="Overhead-camera tracker: calibration, HSV segmentation, markers to pose.",
     license="Apache-2.0",
-    tests_require=["pytest"],
+    extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
             "tracker = fish_vision.nodes.tracker:main",

@@ -1,0 +1,87 @@
+# Everything a fresh Debian or Ubuntu with Python 3.11 or 3.12 needs: `make demo`, `make test`.
+# Only `setup` (pip) uses the network; every step is skipped when its stamp is newer than what it depends on.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-print-directory
+
+# A full ROS 2 in the calling shell would shadow the wheels; bytecode must be written while colcon builds.
+unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
+unexport AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH ROS_DISTRO
+
+VENV := .venv
+PIP := $(VENV)/bin/python -m pip --disable-pip-version-check install --quiet $(PIP_ARGS) --constraint constraints.txt
+ACTIVATE := source $(VENV)/bin/activate
+WORKSPACE := $(ACTIVATE); source install/setup.bash
+FISH_TRAIN := $(WORKSPACE); exec install/fish_train/lib/fish_train/fish_train
+SOURCES := $(shell find src -not -path '*/test*' -not -path '*/__pycache__*' -not -name '* *')
+
+# The first interpreter that really is 3.11 or 3.12 (a pyenv shim may exist and still not run).
+PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
+
+.PHONY: help setup build demo test lint identify diagnose predict train evaluate prove paper clean distclean
+
+help:
+	@echo "make demo [LETTER=R] [SPEED=0.2] [DURATION=s] [DOMAIN=n] [OUT=dir]   the whole robot swims, is recorded and scored"
+	@echo "make test                                                            build and all tests"
+	@echo "make identify|diagnose|predict|train|evaluate ARGS='...'             the offline tools (ARGS=--help says more)"
+	@echo "make prove, make paper                                               the blind study, short; the paper's figures"
+	@echo "make setup, build, lint, clean, distclean                            the single steps"
+
+# --- set-up: virtual environment and wheels -----------------------------------------------------------------------------
+$(VENV)/.created:
+	@[ -n "$(PYTHON)" ] || { echo "error: no Python 3.11 or 3.12 found; install one (apt install python3 python3-venv) or say make PYTHON=/path/to/python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if v in ((3, 11), (3, 12)) else f"error: $(PYTHON) is Python {v[0]}.{v[1]}; this project needs 3.11 or 3.12")'
+	@[ "$$(uname -sm)" = "Linux x86_64" ] || { echo "error: the ROS 2 wheels exist for Linux x86_64 only, this is $$(uname -sm); use the full ROS 2 Jazzy here (README)" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "error: $(PYTHON) has no venv module; install it: apt install python3-venv" >&2; exit 1; }
+	@$(VENV)/bin/python -c '' 2>/dev/null || $(PYTHON) -m venv --clear $(VENV)
+	@touch $@
+
+$(VENV)/.run: requirements.txt constraints.txt $(VENV)/.created
+	@echo "setup: wheels of requirements.txt"
+	@$(PIP) -r requirements.txt
+	@touch $@
+
+$(VENV)/.train: requirements-train.txt constraints.txt $(VENV)/.run
+	@echo "setup: wheels of requirements-train.txt"
+	@$(PIP) -r requirements-train.txt
+	@touch $@
+
+$(VENV)/.dev: requirements-dev.txt constraints.txt $(VENV)/.train
+	@echo "setup: wheels of requirements-dev.txt"
+	@$(PIP) -r requirements-dev.txt
+	@touch $@
+
+setup: $(VENV)/.dev
+
+# --- build ----------------------------------------------------------------------------------------------------------------
+install/.built: $(VENV)/.run colcon.meta $(SOURCES)
+	@$(ACTIVATE); colcon build
+	@touch $@
+
+build: install/.built
+
+# --- the robot and the tools ----------------------------------------------------------------------------------------------
+demo: build
+	@$(FISH_TRAIN) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(SPEED),--speed '$(SPEED)') \
+		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
+
+identify diagnose predict train evaluate prove paper: build $(VENV)/.train
+	@$(FISH_TRAIN) $@ $(ARGS)
+
+# --- tests ----------------------------------------------------------------------------------------------------------------
+test: setup build
+	@$(WORKSPACE); status=0; colcon test --return-code-on-test-failure || status=1; \
+		colcon test-result --all --verbose || status=1; \
+		python -m pytest test || status=1; exit $$status
+
+lint: setup
+	@$(ACTIVATE); ruff format --check .; ruff check .
+
+clean:
+	rm -rf build install log
+
+distclean: clean
+	rm -rf $(VENV)
