@@ -1,8 +1,8 @@
 """What an effect may add to the nominal model, and what it may look at.
 
-An effect is one class: parameters, optional states and only those methods in which it differs from the nominal
-model. All methods are written on generic scalars (`xp` of `fish_sim.ops`). With zero strength an effect is exactly
-the nominal model.
+An effect is one class: parameters, optional states and only those methods in which it differs from the
+nominal model. All methods are written on generic scalars (`xp` of `fish_sim.ops`). With zero strength an
+effect is exactly the nominal model.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Effect:
     equation: ClassVar[str]
     source: ClassVar[str]
     parameters: ClassVar[Mapping[str, Parameter]]
-    strength: ClassVar[tuple[str, ...]]  # the parameters whose zero (or neutral value) means: effect off
+    strength: ClassVar[tuple[str, ...]]  # parameters whose default (zero or neutral) value means: effect off
     states: ClassVar[tuple[str, ...]] = ()  # continuous, integrated with the motion; start at 0
     memory: ClassVar[tuple[str, ...]] = ()  # discrete, updated once per command; start at 0
     dissipative: ClassVar[bool] = False  # its wrench never adds energy in still water
@@ -80,7 +80,7 @@ class Effect:
 
     @staticmethod
     def water(p: SimpleNamespace, x: Scalar, y: Scalar, z: SimpleNamespace, xp: Any) -> Any:
-        """Water velocity (V_x, V_y) and its gradient ((dVx/dx, dVx/dy), (dVy/dx, dVy/dy)) in the pool frame."""
+        """Water velocity (V_x, V_y) and gradient ((dVx/dx, dVx/dy), (dVy/dx, dVy/dy)), pool frame."""
         return None
 
     @staticmethod
@@ -99,16 +99,27 @@ class Effect:
         return 0.0
 
     @staticmethod
-    def derivative(p: SimpleNamespace, z: SimpleNamespace, slip: Scalar, drive: Drive, xp: Any) -> tuple[Scalar, ...]:
+    def derivative(
+        p: SimpleNamespace, z: SimpleNamespace, slip: Scalar, drive: Drive, xp: Any
+    ) -> tuple[Scalar, ...]:
         """Time derivatives of `states`; slip is the tip's lateral velocity through the water [m/s]."""
         return ()
 
     @staticmethod
-    def rudder(p: SimpleNamespace, m: SimpleNamespace, command: Scalar, dt: float, xp: Any) -> tuple[Scalar, dict]:
+    def rudder(
+        p: SimpleNamespace, m: SimpleNamespace, command: Scalar, dt: float, xp: Any
+    ) -> tuple[Scalar, dict]:
         """(commanded alpha as the servo follows it [rad], updated memory)."""
         return command, {}
 
     @staticmethod
-    def rotor(p: SimpleNamespace, m: SimpleNamespace, command: Scalar, dt: float, xp: Any) -> tuple[Scalar, dict]:
+    def rotor(
+        p: SimpleNamespace, m: SimpleNamespace, command: Scalar, dt: float, xp: Any
+    ) -> tuple[Scalar, dict]:
         """(commanded rotor speed as the motor follows it [rad/s], updated memory)."""
         return command, {}
+
+    @staticmethod
+    def derived(p: SimpleNamespace) -> Mapping[str, tuple[float, str]]:
+        """Numbers people know better than the parameters: name -> (value, unit). For reports only."""
+        return {}

@@ -1,0 +1,27 @@
+"""Steady uniform flow through the pool."""
+
+from fish_sim.effects.effect import Effect
+from fish_sim.parameter import Parameter
+
+SOURCE = "Fossen 2021, sect. 10.3: irrotational constant current; strength is an assumption"
+
+
+class Current(Effect):
+    """The water moves as a whole: V = (x, y), constant in time and place.
+
+    Frame: pool [m/s]. Enters added mass, drag and tip constraint, which see velocities relative to the water.
+    """
+
+    name = "current"
+    kind = "physics"
+    equation = "V_water = (x, y) in the pool frame"
+    source = SOURCE
+    parameters = {
+        "x": Parameter(0.0, "m/s", -0.5, 0.5, SOURCE, typical=0.03),
+        "y": Parameter(0.0, "m/s", -0.5, 0.5, SOURCE, typical=-0.02),
+    }
+    strength = ("x", "y")
+
+    @staticmethod
+    def water(p, x, y, z, xp):
+        return (p.x, p.y), ((0.0, 0.0), (0.0, 0.0))

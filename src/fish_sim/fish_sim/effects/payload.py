@@ -1,0 +1,25 @@
+"""Something heavy tied to the head."""
+
+from fish_sim.effects.effect import Effect
+from fish_sim.parameter import Parameter
+
+SOURCE = "point mass; strength is an assumption"
+
+
+class Payload(Effect):
+    """A point mass on the head at (forward, left) of its centre of mass; without added mass or drag."""
+
+    name = "payload"
+    kind = "physics"
+    equation = "point mass at (forward, left) on the head"
+    source = SOURCE
+    parameters = {
+        "mass": Parameter(0.0, "kg", 0.0, 2.0, SOURCE, typical=0.06),
+        "forward": Parameter(0.04, "m", -0.15, 0.15, SOURCE),
+        "left": Parameter(0.02, "m", -0.15, 0.15, SOURCE),
+    }
+    strength = ("mass",)
+
+    @staticmethod
+    def point_masses(p):
+        return ((p.mass, p.forward, p.left),)

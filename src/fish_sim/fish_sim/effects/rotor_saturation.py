@@ -1,0 +1,22 @@
+"""A motor with a top speed."""
+
+from fish_sim.effects.effect import Effect
+from fish_sim.parameter import Parameter
+
+SOURCE = "no-load speed at the given voltage; strength is an assumption"
+NO_LIMIT = 1000.0  # rad/s, far above every commanded speed (nominal maximum 151 rad/s)
+
+
+class RotorSaturation(Effect):
+    """The rotor does not exceed a speed: speed = clip(command, -limit, limit)."""
+
+    name = "rotor_saturation"
+    kind = "actuator"
+    equation = "speed = clip(command, -limit, limit)"
+    source = SOURCE
+    parameters = {"limit": Parameter(NO_LIMIT, "rad/s", 0.0, NO_LIMIT, SOURCE, typical=70.0)}
+    strength = ("limit",)
+
+    @staticmethod
+    def rotor(p, m, command, dt, xp):
+        return xp.fmax(-p.limit, xp.fmin(command, p.limit)), {}

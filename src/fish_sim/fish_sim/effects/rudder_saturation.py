@@ -1,0 +1,25 @@
+"""A servo that does not reach its full range."""
+
+from fish_sim.effects.effect import Effect
+from fish_sim.parameter import Parameter
+
+SOURCE = "end stop or pulse width limit; strength is an assumption"
+NO_LIMIT = 1.6  # rad, beyond every admissible rudder range
+
+
+class RudderSaturation(Effect):
+    """The rudder stops at +-limit inside its nominal range: target = clip(command, -limit, limit).
+
+    At and above the robot's rudder_range the limit does nothing.
+    """
+
+    name = "rudder_saturation"
+    kind = "actuator"
+    equation = "target = clip(command, -limit, limit)"
+    source = SOURCE
+    parameters = {"limit": Parameter(NO_LIMIT, "rad", 0.0, NO_LIMIT, SOURCE, typical=0.25)}
+    strength = ("limit",)
+
+    @staticmethod
+    def rudder(p, m, command, dt, xp):
+        return xp.fmax(-p.limit, xp.fmin(command, p.limit)), {}

@@ -1,0 +1,24 @@
+"""A tail that stiffens as it bends."""
+
+from fish_sim.effects.effect import Effect
+from fish_sim.parameter import Parameter
+
+SOURCE = "Duffing spring; strength is an assumption"
+
+
+class TailHardening(Effect):
+    """Cubic term of the stiffness at every joint: torque = k3 phi^3.
+
+    phi [rad]: deflection of the joint from its rest (joint 1 rests at -alpha).
+    """
+
+    name = "tail_hardening"
+    kind = "physics"
+    equation = "torque = k3 phi^3 at every tail joint, beside tail_stiffness phi"
+    source = SOURCE
+    parameters = {"k3": Parameter(0.0, "N m/rad^3", 0.0, 20.0, SOURCE, typical=0.3)}
+    strength = ("k3",)
+
+    @staticmethod
+    def joint_torque(p, joint, angle, rate, xp):
+        return p.k3 * angle**3

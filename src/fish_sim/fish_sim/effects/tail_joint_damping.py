@@ -1,0 +1,25 @@
+"""Losses in the tail's material."""
+
+from fish_sim.effects.effect import Effect
+from fish_sim.parameter import Parameter
+
+SOURCE = "Kelvin-Voigt material; strength is an assumption"
+
+
+class TailJointDamping(Effect):
+    """Moment against the rate of every joint: torque = c phi'.
+
+    phi' [rad/s]: rate of the joint's deflection from its rest.
+    """
+
+    name = "tail_joint_damping"
+    kind = "physics"
+    equation = "torque = c phi' at every tail joint"
+    source = SOURCE
+    parameters = {"c": Parameter(0.0, "N m s/rad", 0.0, 0.1, SOURCE, typical=2e-3)}
+    strength = ("c",)
+    dissipative = True
+
+    @staticmethod
+    def joint_torque(p, joint, angle, rate, xp):
+        return p.c * rate

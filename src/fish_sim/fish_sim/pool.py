@@ -1,0 +1,4 @@
+"""The pool's walls: origin at the centre, x along the long side."""
+
+LENGTH = 4.27  # m, along x; measured
+WIDTH = 2.13  # m, along y; measured
