@@ -60,6 +60,21 @@ class InterpretedKernel:
             g_commands[t] = gc.T
         g_start[:], g_parameters[:] = g.T, gp.T
 
+    def rates_jvp(
+        self,
+        x: Array,
+        dx: Array,
+        w: Array,
+        dw: Array,
+        parameters: Array,
+        d_parameters: Array,
+        out: Array,
+        d_out: Array,
+    ) -> None:
+        """Fill out and d_out (batch, NX) with rates of motion and their tangents."""
+        p, dp = _columns(parameters, len(x)), _columns(d_parameters, len(x))
+        out[:], d_out[:] = (v.full().T for v in self._functions.rate_jvp(x.T, w.T, p, dx.T, dw.T, dp))
+
     def _step(self, s: Array, c: Array, p: Array) -> tuple[Array, list[Array]]:
         """(state after the step, the state at every stage of every substep)."""
         x, m0 = s[: self._nx], s[self._nx :]

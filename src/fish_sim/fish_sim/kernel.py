@@ -45,6 +45,23 @@ class CompiledKernel:
             *(_at(a) for a in (g_states, g_start, g_commands, g_parameters)),
         )  # fmt: skip
 
+    def rates_jvp(
+        self,
+        x: Array,
+        dx: Array,
+        w: Array,
+        dw: Array,
+        parameters: Array,
+        d_parameters: Array,
+        out: Array,
+        d_out: Array,
+    ) -> None:
+        """Fill out and d_out (batch, NX) with rates of motion and their tangents."""
+        self._library.rates_jvp(
+            ctypes.c_long(len(x)), *(_at(a) for a in (x, dx, w, dw)),
+            *_shared(parameters, 0), *_shared(d_parameters, 0), _at(out), _at(d_out),
+        )  # fmt: skip
+
 
 def _at(array: Array) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)

@@ -134,6 +134,28 @@ class Stepper:
             g_parameters.reshape(*shape, -1),
         )
 
+    def rates_jvp(
+        self,
+        motion: Array,
+        drive: Array,
+        parameters: Array,
+        d_motion: Array,
+        d_drive: Array,
+        d_parameters: Array,
+    ) -> tuple[Array, Array]:
+        """Rates of motion at single instants and their derivative along a direction.
+
+        motion (B, NX), drive (B, 4) as DRIVE_NAMES, parameters (NP,) or (B, NP); tangents likewise.
+        """
+        arrays = [np.ascontiguousarray(a, dtype=float) for a in (motion, d_motion, drive, d_drive)]
+        p, dp = (np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters))
+        self._check_width("motion", arrays[0], len(self.layout.motion))
+        self._check_width("drive", arrays[2], len(DRIVE_NAMES))
+        self._check_width("parameters", p, len(self.layout.parameters))
+        rate, tangent = np.empty_like(arrays[0]), np.empty_like(arrays[0])
+        self._kernel(len(rate)).rates_jvp(*arrays, p, dp, rate, tangent)
+        return rate, tangent
+
     def outputs(self, state: Array, drive_end: Array, parameters: Array) -> dict[str, Array]:
         """Accelerations q'', tip force [N] and slip [m/s] of states (..., NS) at rest inputs.
 

@@ -195,3 +195,22 @@ void rollout_vjp(long batch, long steps, const double *states, const double *com
     scatter(gp, NP, b, batch, g_parameters);
   }
 }
+
+/* rates of motion at given instants: x (batch, NX), w (batch, NW), p as above, with tangents; into out and d_out */
+void rates_jvp(long batch, const double *x, const double *dx, const double *w, const double *dw,
+               const double *parameters, long parameters_batch, const double *d_parameters, long d_parameters_batch,
+               double *out, double *d_out)
+{
+  V X[NX], dX[NX], W[NW], dW[NW], p[NP], dp[NP], K[NX], dK[NX];
+  for (long b = 0; b < batch; b += LANES) {
+    gather(x, NX, NX, b, batch, X);
+    gather(dx, NX, NX, b, batch, dX);
+    gather(w, NW, NW, b, batch, W);
+    gather(dw, NW, NW, b, batch, dW);
+    gather(parameters, NP, parameters_batch > 1 ? NP : 0, b, batch, p);
+    gather(d_parameters, NP, d_parameters_batch > 1 ? NP : 0, b, batch, dp);
+    rate_jvp(X, W, p, dX, dW, dp, K, dK);
+    scatter(K, NX, b, batch, out);
+    scatter(dK, NX, b, batch, d_out);
+  }
+}

@@ -6,6 +6,7 @@ on its way: enabled effects act in this order.
 
 from fish_sim.effects.battery_sag import BatterySag
 from fish_sim.effects.current import Current
+from fish_sim.effects.disturbance import Disturbance
 from fish_sim.effects.dry_friction import DryFriction
 from fish_sim.effects.effect import Effect
 from fish_sim.effects.hull_asymmetry import HullAsymmetry
@@ -47,6 +48,7 @@ EFFECTS: dict[str, type[Effect]] = {
     "tether": Tether,
     "payload": Payload,
     "rotor_imbalance": RotorImbalance,
+    "disturbance": Disturbance,
     "rudder_gain": RudderGain,
     "rudder_offset": RudderOffset,
     "rudder_saturation": RudderSaturation,
