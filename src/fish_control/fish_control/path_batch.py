@@ -16,6 +16,7 @@ from fish_control.reference_path import SAMPLE_SPACING, PathError, ReferencePath
 
 Array = NDArray[np.float64]
 LookaheadMode = Literal["distance", "along"]
+LOOKAHEAD_SEARCH = 2.5  # lookaheads of arc length in which the target point is searched
 EXTENSION = 1.5  # m, straight continuation of an open path beyond its end, for lookahead points
 
 
@@ -45,16 +46,20 @@ class PathState:
         progress: (B,) arc length along the path [m]; on a closed looping path it keeps growing with each lap, on an open
             looping one it starts at 0 again.
         cross_track_error: (B,) signed distance to the path at `progress` [m], positive when the robot is left of it.
-        heading: (B,) course of the path there [rad]. curvature: (B,) [1/m].
+        point: (B, 2) the path there [m]. heading: (B,) course of the path there [rad]. curvature: (B,) [1/m].
         target: (B, 2) lookahead point [m].
+        chord: (B,) direction of the lookahead point of a robot that is exactly on the path, relative to `heading` [rad]:
+            what the path's own curvature contributes to the direction of `target`.
         finished: (B,) whether the end of a path that stops has been passed.
     """
 
     progress: Array
     cross_track_error: Array
+    point: Array
     heading: Array
     curvature: Array
     target: Array
+    chord: Array
     finished: NDArray[np.bool_]
 
 
@@ -64,7 +69,7 @@ class PathBatch:
     def __init__(self, paths: Sequence[ReferencePath], config: TrackerConfig | None = None) -> None:
         self.config = config or TrackerConfig()
         self.paths = tuple(paths)
-        tables = [_table(path) for path in self.paths]
+        tables = [_table(path, self.config) for path in self.paths]
         rows = max(len(table) for table in tables)
         self._table = np.stack([np.pad(table, ((0, rows - len(table)), (0, 0)), mode="edge") for table in tables])
         self._count = np.array([len(path.points) for path in self.paths])
@@ -102,11 +107,12 @@ class PathBatch:
         """Advance the progress to robots at `position` (B, 2) [m] and give errors and targets."""
         position = np.asarray(position, dtype=float)
         self._advance(position)
-        at, heading, curvature = self._evaluate(self.progress)
-        offset = position - at
-        e = -np.sin(heading) * offset[:, 0] + np.cos(heading) * offset[:, 1]
-        arrived = self.progress >= self._lap_end - 1e-6
-        return PathState(self.progress.copy(), e, heading, curvature, self._target(position), arrived & ~self._restarts)
+        at = self._evaluate(self.progress)
+        offset = position - at.point
+        e = -np.sin(at.heading) * offset[:, 0] + np.cos(at.heading) * offset[:, 1]
+        finished = (self.progress >= self._lap_end - 1e-6) & ~self._restarts
+        target = self._target(position)
+        return PathState(self.progress.copy(), e, at.point, at.heading, at.curvature, target, at.chord, finished)
 
     def _advance(self, position: Array) -> None:
         """Move the progress to the nearest point of the window ahead of it, once the robot has reached the path."""
@@ -127,9 +133,9 @@ class PathBatch:
 
     def _along_offset(self, s: Array, position: Array) -> Array:
         """Distance [m] along the tangent at s to the foot of the perpendicular, at most one sample."""
-        at, heading, _ = self._evaluate(s)
-        offset = position - at
-        along = np.cos(heading) * offset[:, 0] + np.sin(heading) * offset[:, 1]
+        at = self._evaluate(s)
+        offset = position - at.point
+        along = np.cos(at.heading) * offset[:, 0] + np.sin(at.heading) * offset[:, 1]
         return np.clip(along, -self._ds, self._ds)
 
     def _target(self, position: Array) -> Array:
@@ -140,37 +146,64 @@ class PathBatch:
         """
         L = self.config.lookahead
         if self.config.lookahead_mode == "along":
-            return self._evaluate(self.progress + L)[0]
-        offsets = np.arange(int(np.ceil(2.5 * L / self._ds.min())) + 1)
+            return self._evaluate(self.progress + L).point
+        offsets = np.arange(int(np.ceil(LOOKAHEAD_SEARCH * L / self._ds.min())) + 1)
         k = self._index(self.progress[:, None] + offsets * self._ds[:, None])
-        sample = self._table[self._row[:, None], k, :2]
-        distance = np.linalg.norm(sample - position[:, None, :], axis=-1)
-        leaves = distance >= L
-        first = np.where(leaves.any(axis=1), np.argmax(leaves, axis=1), np.argmax(distance, axis=1))
-        before = np.maximum(first - 1, 0)
-        d0, d1 = distance[self._row, before], distance[self._row, first]
-        share = np.clip(np.divide(L - d0, d1 - d0, out=np.ones_like(d0), where=d1 > d0), 0.0, 1.0)
-        a, b = sample[self._row, before], sample[self._row, first]
-        return a + share[:, None] * (b - a)
+        return leave_circle(self._table[self._row[:, None], k, :2], position, L)
 
     def _index(self, s: Array) -> NDArray[np.int64]:
         """Table rows next to arc lengths s (B, K) [m]."""
         k = np.rint(s / self._ds[:, None]).astype(np.int64)
         return np.where(self._closed[:, None], k % self._count[:, None], np.minimum(k, self._last[:, None]))
 
-    def _evaluate(self, s: Array) -> tuple[Array, Array, Array]:
-        """Point (B, 2) [m], heading (B,) [rad] and curvature (B,) [1/m] at arc lengths s (B,)."""
-        k = self._index(s[:, None])[:, 0]
-        row = self._table[self._row, k]
+    def _evaluate(self, s: Array) -> _PathSample:
+        """The path at arc lengths s (B,)."""
+        row = self._table[self._row, self._index(s[:, None])[:, 0]]
         delta = s - np.rint(s / self._ds) * self._ds
-        heading = row[:, 2] + row[:, 3] * delta
         mean = row[:, 2] + 0.5 * row[:, 3] * delta
-        return row[:, :2] + delta[:, None] * np.column_stack([np.cos(mean), np.sin(mean)]), heading, row[:, 3]
+        point = row[:, :2] + delta[:, None] * np.column_stack([np.cos(mean), np.sin(mean)])
+        return _PathSample(point, row[:, 2] + row[:, 3] * delta, row[:, 3], row[:, 4])
 
 
-def _table(path: ReferencePath) -> Array:
-    """(M, 4) rows x, y, heading, curvature of a path; an open one with its straight continuation."""
+@dataclass(frozen=True)
+class _PathSample:
+    point: Array  # (B, 2) m
+    heading: Array  # (B,) rad
+    curvature: Array  # (B,) 1/m
+    chord: Array  # (B,) rad
+
+
+def leave_circle(ahead: Array, centre: Array, radius: float) -> Array:
+    """First point where polylines leave circles; the farthest point of one that does not.
+
+    Args:
+        ahead: (B, K, 2) points along each path [m]; centre: (B, 2) [m]; radius [m].
+    Returns:
+        (B, 2) [m]; the first point where the polyline starts outside.
+    """
+    distance = np.linalg.norm(ahead - centre[:, None, :], axis=-1)
+    leaves = distance >= radius
+    first = np.where(leaves.any(axis=1), np.argmax(leaves, axis=1), np.argmax(distance, axis=1))
+    before = np.maximum(first - 1, 0)
+    row = np.arange(len(ahead))
+    d0, d1 = distance[row, before], distance[row, first]
+    share = np.clip(np.divide(radius - d0, d1 - d0, out=np.ones_like(d0), where=d1 > d0), 0.0, 1.0)
+    a, b = ahead[row, before], ahead[row, first]
+    return a + share[:, None] * (b - a)
+
+
+def _table(path: ReferencePath, config: TrackerConfig) -> Array:
+    """(M, 5) rows x, y, heading, curvature, chord of a path; an open one with its straight continuation."""
     s = np.arange(len(path.points)) * path.spacing
     if not path.closed:
         s = np.r_[s, path.length + path.spacing * np.arange(1, int(EXTENSION / path.spacing) + 1)]
-    return np.column_stack([path.point(s), path.heading_at(s), path.curvature_at(s)])
+    points = path.point(s)
+    if config.lookahead_mode == "along":
+        target = path.point(s + config.lookahead)
+    else:
+        window = np.arange(0.0, LOOKAHEAD_SEARCH * config.lookahead + path.spacing, path.spacing)
+        target = leave_circle(path.point(s[:, None] + window), points, config.lookahead)
+    heading = path.heading_at(s)
+    direction = np.arctan2(target[:, 1] - points[:, 1], target[:, 0] - points[:, 0])
+    chord = np.angle(np.exp(1j * (direction - heading)))
+    return np.column_stack([points, heading, path.curvature_at(s), chord])

@@ -20,6 +20,7 @@ class PathPoint:
     heading: float  # rad, course of the path
     curvature: float  # 1/m
     target: NDArray[np.float64]  # (2,) m
+    chord: float  # rad
     finished: bool
 
 
@@ -52,5 +53,6 @@ class PathTracker:
             float(state.heading[0]),
             float(state.curvature[0]),
             state.target[0],
+            float(state.chord[0]),
             bool(state.finished[0]),
         )

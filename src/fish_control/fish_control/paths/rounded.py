@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter1d
 
 ARC_STEP = 5e-4  # m between points on an arc; leaves a heading error of ARC_STEP / (8 radius) ~ 3e-4 rad
+EASED_STEP = 2e-3  # m between points of an eased curve
 HAIRPIN = np.deg2rad(175.0)  # a corner sharper than this has no useful fillet
 
 
@@ -14,7 +16,7 @@ def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) 
 
         tangent length = r tan(delta / 2), delta = deflection of the corner
 
-    A radius that does not fit is reduced to what half of the shorter side allows.
+    Radii whose tangents do not fit on a side are reduced in proportion.
 
     Args:
         vertices: (V, 2) corners [m]; the ends of an open polyline stay where they are.
@@ -23,35 +25,53 @@ def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) 
         (M, 2) dense points [m]; the first is not repeated when closed.
     """
     corners = np.asarray(vertices, dtype=float)
-    count = len(corners)
-    radii = np.broadcast_to(np.asarray(radius, dtype=float), count)
-    rounded = []
-    for i in range(count):
-        if not closed and i in (0, count - 1):
-            rounded.append(corners[i : i + 1])
-            continue
-        ends_before = not closed and i == 1
-        ends_after = not closed and i == count - 2
-        rounded.append(
-            _fillet(corners[i - 1], corners[i], corners[(i + 1) % count], radii[i], ends_before, ends_after)
-        )
-    return np.vstack(rounded)
+    sides = np.roll(corners, -1, axis=0) - corners  # side i leads from corner i to the next
+    length = np.hypot(sides[:, 0], sides[:, 1])
+    angle = np.arctan2(sides[:, 1], sides[:, 0])
+    turn = np.angle(np.exp(1j * (angle - np.roll(angle, 1))))
+    tangent = np.where(np.abs(turn) < HAIRPIN, np.asarray(radius) * np.tan(np.abs(turn) / 2.0), 0.0)
+    if not closed:
+        tangent[[0, -1]] = 0.0
+    fits = np.minimum(1.0, length / np.maximum(tangent + np.roll(tangent, -1), 1e-12))
+    tangent = tangent * np.minimum(fits, np.roll(fits, 1))
+    return np.vstack([_fillet(corners[i], angle[i - 1], turn[i], tangent[i]) for i in range(len(corners))])
 
 
-def _fillet(
-    before: NDArray, corner: NDArray, after: NDArray, radius: float, ends_before: bool, ends_after: bool
-) -> NDArray[np.float64]:
-    """Arc at one corner; a side that ends the polyline may be used whole, others by half."""
-    side_in, side_out = corner - before, after - corner
-    length_in, length_out = np.hypot(*side_in), np.hypot(*side_out)
-    t_in, t_out = side_in / length_in, side_out / length_out
-    turn = np.arctan2(t_in[0] * t_out[1] - t_in[1] * t_out[0], t_in @ t_out)
-    if radius <= 0.0 or abs(turn) < 1e-6 or abs(turn) > HAIRPIN:
+def _fillet(corner: NDArray, heading: float, turn: float, tangent: float) -> NDArray[np.float64]:
+    """Points of the arc that starts `tangent` [m] before the corner on `heading` and turns by `turn` [rad]."""
+    if tangent < ARC_STEP or abs(turn) < 1e-6:
         return corner[None]
-    room = min(length_in * (1.0 if ends_before else 0.5), length_out * (1.0 if ends_after else 0.5))
-    tangent_length = min(radius * np.tan(abs(turn) / 2.0), room)
-    r = tangent_length / np.tan(abs(turn) / 2.0)
-    centre = corner - tangent_length * t_in + np.sign(turn) * r * np.array([-t_in[1], t_in[0]])
-    start = np.arctan2(t_in[1], t_in[0]) - np.sign(turn) * np.pi / 2.0
-    angles = start + np.linspace(0.0, turn, max(int(np.ceil(r * abs(turn) / ARC_STEP)), 4) + 1)
-    return centre + r * np.column_stack([np.cos(angles), np.sin(angles)])
+    radius = tangent / np.tan(abs(turn) / 2.0)
+    normal = heading + np.sign(turn) * np.pi / 2.0
+    centre = corner - tangent * _unit(heading) + radius * _unit(normal)
+    polar = normal + np.pi + np.linspace(0.0, turn, max(int(np.ceil(radius * abs(turn) / ARC_STEP)), 4) + 1)
+    return centre + radius * np.column_stack([np.cos(polar), np.sin(polar)])
+
+
+def _unit(angle: float) -> NDArray[np.float64]:
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def ease(points: ArrayLike, width: float, closed: bool = False) -> NDArray[np.float64]:
+    """Smooth along the arc length, so that curvature swells and fades where a straight meets an arc.
+
+    Gaussian of standard deviation `width` [m] on even samples; the ends of an open curve stay where they are. An arc
+    of radius r moves inwards by width^2 / (2 r).
+
+    Args:
+        points: (M, 2) [m].
+    Returns:
+        (N, 2) points every 2 mm.
+    """
+    vertices = np.asarray(points, dtype=float)
+    if closed:
+        vertices = np.vstack([vertices, vertices[:1]])
+    s = np.r_[0.0, np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))]
+    even = np.linspace(0.0, s[-1], int(np.ceil(s[-1] / EASED_STEP)) + 1)
+    samples = np.column_stack([np.interp(even, s, vertices[:, k]) for k in range(2)])
+    sigma = width / (even[1] - even[0])
+    if closed:
+        return gaussian_filter1d(samples[:-1], sigma, axis=0, mode="wrap")
+    reach = min(int(np.ceil(4.0 * sigma)), len(samples) - 1)
+    before, after = 2.0 * samples[0] - samples[reach:0:-1], 2.0 * samples[-1] - samples[-2 : -reach - 2 : -1]
+    return gaussian_filter1d(np.vstack([before, samples, after]), sigma, axis=0)[reach : reach + len(samples)]

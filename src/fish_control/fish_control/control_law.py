@@ -1,0 +1,176 @@
+"""From errors and gains to rudder angle and rotor speed: two PIDs, feed-forward, throttle map, actuator limits.
+
+Everything is written on generic scalars: `xp` is numpy or casadi (anything with fmin, fmax, sin, sqrt), without a
+branch on a value, so that training differentiates exactly what the controller node runs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+STROKE_FREQUENCY = 2.0  # Hz, MODEL: f fixed, A carries the throttle
+AMPLITUDE_AT_FULL_THROTTLE = 12.0  # rad, MODEL: S_max = (12 rad (2 pi 2 Hz)^2)^2
+
+
+@dataclass(frozen=True)
+class ControlLimits:
+    """Constants of the control law; they are part of a weights file's contract."""
+
+    steering_scale: float = 2.0  # rad of rudder for a steering PID output of 1
+    throttle_scale: float = 4.0  # throttle for a speed PID output of 1
+    curvature_gain: float = 0.21  # m, rudder for a path curvature: alpha = gain kappa (steady turns of the nominal fish)
+    throttle_linear: float = 1.333  # s/m, throttle for a speed u: linear u + quadratic u^2 (nominal fish, straight)
+    throttle_quadratic: float = 2.13  # s^2/m^2
+    turn_linear: float = 1.2  # s/(m rad^2), more throttle in turns: alpha^2 (linear u + quadratic u^2)
+    turn_quadratic: float = 10.0  # s^2/(m^2 rad^2)
+    derivative_time: float = 0.15  # s, first-order filter of both derivatives
+    integral_limit: float = 0.25  # of the PID output, both integrals
+    unwinding_rate: float = 2.0  # 1/s, how fast an integral gives way to a saturated output
+    rudder_range: float = 0.8  # rad, MODEL
+    rudder_rate: float = 6.0  # rad/s, MODEL: the servo's limit
+    amplitude_rate: float = 24.0  # rad/s, of the rotor's oscillation; full stop within 0.5 s
+    frequency: float = STROKE_FREQUENCY  # Hz
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{field.name} is {value!r}, expected a finite number >= 0")
+
+
+class Gains(NamedTuple):
+    """[Kp, Ki, Kd] of steering (error in rad, output in steering_scale rad) and speed (error in m/s)."""
+
+    steering_kp: Any
+    steering_ki: Any
+    steering_kd: Any
+    speed_kp: Any
+    speed_ki: Any
+    speed_kd: Any
+
+
+class Errors(NamedTuple):
+    """What the planner says."""
+
+    heading: Any  # rad, wanted minus actual course, within +-pi
+    speed: Any  # m/s, wanted minus actual surge
+    curvature: Any  # 1/m, of the path where the rudder will act
+    speed_wanted: Any  # m/s
+
+
+class ControlState(NamedTuple):
+    """Memory of both PIDs; errors start unknown, so the first derivative is taken as zero through `primed`."""
+
+    steering_integral: Any = 0.0
+    heading_error: Any = 0.0
+    heading_error_rate: Any = 0.0
+    speed_integral: Any = 0.0
+    speed_error: Any = 0.0
+    speed_error_rate: Any = 0.0
+    primed: Any = 0.0
+
+
+class Setpoint(NamedTuple):
+    """What the actuators are to reach."""
+
+    alpha: Any  # rad, > 0 steers left
+    throttle: Any  # s in [0, 1]
+
+
+class ActuatorState(NamedTuple):
+    """What was last commanded."""
+
+    alpha: Any = 0.0  # rad
+    amplitude: Any = 0.0  # rad, A of the rotor's oscillation
+    phase: Any = 0.0  # rad
+
+
+def control_step(
+    state: ControlState, errors: Errors, gains: Gains, dt: Any, limits: ControlLimits, xp: Any
+) -> tuple[ControlState, Setpoint]:
+    """One period of both PIDs, dt [s].
+
+        alpha    = sat[ k_kappa kappa + c_a (Kp e + I + Kd e') ],  I' = Ki e + k_w (sat - unsat) / c_a
+        throttle = sat[ ff(u_wanted, alpha) + c_s (Kp e_u + I_u + Kd e_u') ]
+    """
+    rate, d_heading = _derivative(state.heading_error_rate, state.heading_error, errors.heading, state.primed, dt, limits, xp)
+    speed_rate, d_speed = _derivative(state.speed_error_rate, state.speed_error, errors.speed, state.primed, dt, limits, xp)
+    alpha, steering_integral = _pid(
+        limits.curvature_gain * errors.curvature,
+        (errors.heading, state.steering_integral, d_heading),
+        (gains.steering_kp, gains.steering_ki, gains.steering_kd),
+        limits.steering_scale,
+        (-limits.rudder_range, limits.rudder_range),
+        dt,
+        limits,
+        xp,
+    )
+    throttle, speed_integral = _pid(
+        feedforward_throttle(errors.speed_wanted, alpha, limits),
+        (errors.speed, state.speed_integral, d_speed),
+        (gains.speed_kp, gains.speed_ki, gains.speed_kd),
+        limits.throttle_scale,
+        (0.0, 1.0),
+        dt,
+        limits,
+        xp,
+    )
+    new = ControlState(steering_integral, errors.heading, rate, speed_integral, errors.speed, speed_rate, 1.0)
+    return new, Setpoint(alpha, throttle)
+
+
+def feedforward_throttle(speed: Any, alpha: Any, limits: ControlLimits) -> Any:
+    """Throttle that holds `speed` [m/s] with the rudder at alpha [rad]; fitted to the nominal fish's steady swimming."""
+    straight = limits.throttle_linear * speed + limits.throttle_quadratic * speed**2
+    return straight + alpha**2 * (limits.turn_linear * speed + limits.turn_quadratic * speed**2)
+
+
+def amplitude_of_throttle(throttle: Any, limits: ControlLimits, xp: Any) -> Any:
+    """A [rad] from A^2 w^4 = s S_max, S_max = (12 w_0^2)^2; smooth at s = 0, where the root has no derivative."""
+    ratio = (STROKE_FREQUENCY / limits.frequency) ** 2 if limits.frequency > 0.0 else 0.0
+    tiny = 1e-6
+    return AMPLITUDE_AT_FULL_THROTTLE * ratio * (xp.sqrt(throttle + tiny) - math.sqrt(tiny))
+
+
+def actuator_step(
+    state: ActuatorState, setpoint: Setpoint, dt: Any, limits: ControlLimits, xp: Any
+) -> tuple[ActuatorState, Any]:
+    """Move the commands towards the set-point for dt [s]: new state and phi_dot = A w sin(phase) [rad/s].
+
+    The phase always advances by w dt; a change of throttle changes the amplitude only, at a bounded rate.
+    """
+    w = 2.0 * math.pi * limits.frequency
+    alpha = _towards(state.alpha, setpoint.alpha, limits.rudder_rate * dt, xp)
+    wanted = amplitude_of_throttle(setpoint.throttle, limits, xp)
+    amplitude = _towards(state.amplitude, wanted, limits.amplitude_rate * dt, xp)
+    phase = state.phase + w * dt
+    return ActuatorState(alpha, amplitude, phase), amplitude * w * xp.sin(phase)
+
+
+def _towards(value: Any, goal: Any, step: Any, xp: Any) -> Any:
+    return value + xp.fmin(xp.fmax(goal - value, -step), step)
+
+
+def _derivative(
+    filtered: Any, before: Any, now: Any, primed: Any, dt: Any, limits: ControlLimits, xp: Any
+) -> tuple[Any, Any]:
+    """Filtered rate of an error; an angle that wraps is differenced the short way round by the caller's wrapping."""
+    raw = primed * (now - before) / dt
+    rate = filtered + (raw - filtered) * dt / (limits.derivative_time + dt)
+    return rate, rate
+
+
+def _pid(
+    feedforward: Any, terms: tuple[Any, Any, Any], gains: tuple[Any, Any, Any], scale: float,
+    span: tuple[float, float], dt: Any, limits: ControlLimits, xp: Any,
+) -> tuple[Any, Any]:  # fmt: skip
+    """Saturated output and new integral (in output units, so that a change of gain does not jolt)."""
+    error, integral, rate = terms
+    kp, ki, kd = gains
+    integral = integral + dt * ki * error
+    wanted = feedforward + scale * (kp * error + integral + kd * rate)
+    output = xp.fmin(xp.fmax(wanted, span[0]), span[1])
+    integral = integral + dt * limits.unwinding_rate * (output - wanted) / scale
+    return output, xp.fmin(xp.fmax(integral, -limits.integral_limit), limits.integral_limit)
