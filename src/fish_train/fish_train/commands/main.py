@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 
-from ..errors import UserError
+from fish_train.errors import UserError
 from .verbs import VERBS
 
 

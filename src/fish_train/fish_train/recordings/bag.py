@@ -12,9 +12,10 @@ from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.interfaces.typing import Typesdict
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys import get_types_from_idl, get_types_from_msg
 from rosbags.typesys.base import TypesysError
 
+from .message_types import typestore
 from .problem import RecordingError
 
 STAMP_PREFIX = 16  # bytes kept of messages nobody decodes: enough for the stamp of a header
@@ -126,16 +127,11 @@ def _collect(reader: rosbag1.Reader | rosbag2.Reader, wanted: Callable[[str, str
 
 def _types(connections: list[Connection], ros1: bool) -> Typesdict:
     """Definitions stored with the recording, on top of the usual ones of ROS 2 Jazzy."""
-    types: Typesdict = {} if ros1 else dict(_jazzy())
+    types: Typesdict = {} if ros1 else dict(typestore().fielddefs)
     for connection in connections:
         if connection.msgdef.format != MessageDefinitionFormat.NONE:
             types.update(_definition(connection.msgtype, connection.msgdef.format, connection.msgdef.data))
     return types
-
-
-@lru_cache(maxsize=1)
-def _jazzy() -> Typesdict:
-    return get_typestore(Stores.ROS2_JAZZY).fielddefs
 
 
 @lru_cache(maxsize=256)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import UserError
+from fish_train.errors import UserError
 
 SEVERITIES = ("info", "warning", "error")
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from functools import lru_cache
 
 import numpy as np
 from rosbags.interfaces.typing import Typesdict
-from rosbags.typesys import Stores, get_typestore
 
 from .bag import RawTopic
 from .decode import PATH_TYPE, Role
 from .layout import Block, decode_blocks
+from .message_types import typestore
 from .problem import Problem
 
 NS_PER_S = 1_000_000_000
@@ -66,7 +65,7 @@ def stamps_of_prefixes(raw: RawTopic, types: Typesdict, ros1: bool) -> np.ndarra
 
 def decode_paths(raw: RawTopic, ros1: bool) -> list[tuple[np.ndarray, str]]:
     """Points (P, 2) and frame of every nav_msgs/Path; through rosbags, since lengths vary and paths are rare."""
-    store = _store(ros1)
+    store = typestore(ros1)
     read = store.deserialize_ros1 if ros1 else store.deserialize_cdr
     paths = []
     for message in raw.raws:
@@ -74,11 +73,6 @@ def decode_paths(raw: RawTopic, ros1: bool) -> list[tuple[np.ndarray, str]]:
         points = [(p.pose.position.x, p.pose.position.y) for p in path.poses]
         paths.append((np.array(points, float).reshape(-1, 2), path.header.frame_id))
     return paths
-
-
-@lru_cache(maxsize=2)
-def _store(ros1: bool):
-    return get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_JAZZY)
 
 
 def _headers(blocks: list[Block], count: int, raw: RawTopic) -> tuple[np.ndarray | None, np.ndarray | None]:

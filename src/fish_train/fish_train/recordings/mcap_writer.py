@@ -1,0 +1,288 @@
+"""A rosbag2 recording in MCAP that survives a kill: finished chunks are on disk, the rest is at most `chunk_s` old.
+
+    magic | Header | Schema, Channel ... | Chunk, MessageIndex ... | DataEnd | summary | Footer | magic
+
+Schemas and channels are written when a topic appears, chunks when they are full or old enough, and every write goes
+to the operating system at once, so that a killed process loses the open chunk only. When the disk is full the file is
+cut back to the last whole record and closed with what space is left; a reserve file keeps a little for that.
+Source: MCAP specification (mcap.dev/spec); records are those of the mcap package.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Message,
+    MessageIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap.writer import MCAP0_MAGIC
+
+from .bag_metadata import write_metadata
+from .message_types import message_type
+from .problem import RecordingError
+from .qos import Qos
+
+CHUNK_BYTES = 1 << 20
+RESERVE_BYTES = 128 * 1024  # given back when the disk is full, to close the recording with
+RESERVE_NAME = ".reserve"
+
+
+class DiskFullError(RecordingError):
+    """Nothing more can be written; what was written before is closed and valid."""
+
+
+@dataclass
+class Topic:
+    """One topic of a recording."""
+
+    channel: Channel
+    type: str
+    qos: Qos
+    count: int = 0
+
+    @property
+    def name(self) -> str:
+        return self.channel.topic
+
+
+@dataclass
+class _OpenChunk:
+    """Messages not yet on disk."""
+
+    records: RecordBuilder = field(default_factory=RecordBuilder)
+    times: list[int] = field(default_factory=list)
+    index: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # channel -> (time, offset)
+
+
+class McapRecording:
+    """Writes one recording directory: `<directory>/<name>.mcap` and metadata.yaml."""
+
+    def __init__(self, directory: Path, custom: dict[str, str] | None = None, chunk_s: float = 0.5) -> None:
+        """Create the directory, which must not exist yet.
+
+        Args:
+            custom: stored with the recording ("robot" names the robot).
+            chunk_s: age at which an open chunk is written [s], by the times given to `write`.
+        """
+        if directory.exists():
+            raise RecordingError(f"{directory}: exists already; recordings are never overwritten")
+        directory.mkdir(parents=True)
+        self.directory, self.custom = directory, custom or {}
+        self.path = directory / f"{directory.name}.mcap"
+        self.topics: dict[tuple[str, str], Topic] = {}
+        self._schemas: dict[str, Schema] = {}
+        self._chunk_ns = int(chunk_s * 1e9)
+        self._chunk = _OpenChunk()
+        self._chunks: list[ChunkIndex] = []
+        self._range: tuple[int, int] | None = None
+        self._closed = False
+        self._file = self.path.open("xb", buffering=0)
+        self._good = 0  # bytes up to the end of the last whole record
+        self._keep_reserve()
+        self._append(MCAP0_MAGIC + _records(Header("ros2", "fish_train")))
+
+    def __enter__(self) -> McapRecording:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def message_count(self) -> int:
+        """Messages taken so far, those of the open chunk included."""
+        return sum(topic.count for topic in self.topics.values())
+
+    @property
+    def size(self) -> int:
+        """Bytes on disk."""
+        return self._good
+
+    def add_topic(self, name: str, msgtype: str, qos: Qos | None = None) -> Topic:
+        """Announce a topic; the same name and type again give the same topic.
+
+        Raises:
+            RecordingError: the type is unknown.
+        """
+        known = self.topics.get((name, msgtype))
+        if known is not None:
+            return known
+        schema = self._schemas.get(msgtype)
+        new: list[McapRecord] = []
+        if schema is None:
+            text = message_type(msgtype).definition.encode()
+            schema = Schema(id=len(self._schemas) + 1, name=msgtype, encoding="ros2msg", data=text)
+            new.append(schema)
+        qos = qos or Qos()
+        channel = Channel(
+            id=len(self.topics) + 1,
+            topic=name,
+            schema_id=schema.id,
+            message_encoding="cdr",
+            metadata={"offered_qos_profiles": yaml.safe_dump(qos.profiles(), sort_keys=False)},
+        )
+        self._append_or_close(_records(*new, channel))
+        self._schemas[msgtype] = schema
+        topic = self.topics[name, msgtype] = Topic(channel, msgtype, qos)
+        return topic
+
+    def write(self, topic: Topic, time_ns: int, data: bytes) -> None:
+        """Add one message that arrived at time_ns.
+
+        Raises:
+            DiskFullError: the chunk could not be written; the recording has been closed.
+        """
+        chunk, channel = self._chunk, topic.channel.id
+        chunk.index.setdefault(channel, []).append((time_ns, chunk.records.count))
+        chunk.times.append(time_ns)
+        Message(channel, time_ns, data, time_ns, topic.count & 0xFFFFFFFF).write(chunk.records)
+        topic.count += 1
+        if chunk.records.count >= CHUNK_BYTES or time_ns - chunk.times[0] >= self._chunk_ns:
+            self.flush()
+
+    def flush_old(self, now_ns: int) -> None:
+        """Write the open chunk if its first message is older than chunk_s (for quiet topics)."""
+        if self._chunk.times and now_ns - self._chunk.times[0] >= self._chunk_ns:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the open chunk and its index."""
+        if not self._chunk.times:
+            return
+        chunk, self._chunk = self._chunk, _OpenChunk()
+        first, last, data = min(chunk.times), max(chunk.times), chunk.records.end()
+        body = _records(
+            Chunk(
+                compression="", data=data, uncompressed_size=len(data), uncompressed_crc=zlib.crc32(data),
+                message_start_time=first, message_end_time=last,
+            )
+        )  # fmt: skip
+        offsets, index = {}, b""
+        for channel, entries in chunk.index.items():
+            offsets[channel] = self._good + len(body) + len(index)
+            index += _records(MessageIndex(channel_id=channel, records=entries))
+        entry = ChunkIndex(
+            chunk_start_offset=self._good, chunk_length=len(body), compression="",
+            compressed_size=len(data), uncompressed_size=len(data),
+            message_index_offsets=offsets, message_index_length=len(index),
+            message_start_time=first, message_end_time=last,
+        )  # fmt: skip
+        self._append_or_close(body + index, lost=chunk)
+        self._chunks.append(entry)
+        self._range = (
+            (min(first, self._range[0]), max(last, self._range[1])) if self._range else (first, last)
+        )
+
+    def close(self) -> None:
+        """Write the open chunk, the summary and metadata.yaml. A second call does nothing."""
+        if self._closed:
+            return
+        self.flush()
+        self._append_or_close(self._ending())
+        self._finish()
+
+    def _append_or_close(self, data: bytes, lost: _OpenChunk | None = None) -> None:
+        """Write whole records; on a full disk end the recording without them and say so."""
+        try:
+            self._append(data)
+        except DiskFullError:
+            for topic in self.topics.values() if lost else ():
+                topic.count -= len(lost.index.get(topic.channel.id, []))
+            self._close_full()
+            raise
+
+    def _append(self, data: bytes) -> None:
+        """Write whole records, or leave the file as it was and raise DiskFullError."""
+        try:
+            view = memoryview(data)
+            while view:
+                view = view[self._file.write(view) :]
+        except OSError as error:
+            self._file.truncate(self._good)
+            self._file.seek(self._good)
+            raise DiskFullError(
+                f"{self.path}: writing failed: {error.strerror}; {self._good} bytes written before are kept"
+            ) from error
+        self._good += len(data)
+
+    def _keep_reserve(self) -> None:
+        try:
+            (self.directory / RESERVE_NAME).write_bytes(bytes(RESERVE_BYTES))
+        except OSError as error:
+            self._file.close()
+            raise DiskFullError(f"{self.directory}: no room for a recording: {error.strerror}") from error
+
+    def _close_full(self) -> None:
+        """End the file on a full disk: with the summary if it fits into the reserve, else with the bare footer."""
+        (self.directory / RESERVE_NAME).unlink(missing_ok=True)
+        try:
+            self._append(self._ending())
+        except DiskFullError:
+            self._append(_records(DataEnd(0), Footer(0, 0, 0)) + MCAP0_MAGIC)
+        self._finish()
+
+    def _finish(self) -> None:
+        self._closed = True
+        (self.directory / RESERVE_NAME).unlink(missing_ok=True)
+        os.fsync(self._file.fileno())
+        self._file.close()
+        write_metadata(self.directory, self.path.name, list(self.topics.values()), self._range, self.custom)
+
+    def _ending(self) -> bytes:
+        """DataEnd, summary section with its offsets, footer and magic."""
+        end = _records(DataEnd(0))
+        start = self._good + len(end)
+        channels = [topic.channel for topic in self.topics.values()]
+        first, last = self._range or (0, 0)
+        statistics = Statistics(
+            attachment_count=0, channel_count=len(channels), chunk_count=len(self._chunks), metadata_count=0,
+            channel_message_counts={topic.channel.id: topic.count for topic in self.topics.values()},
+            message_count=self.message_count, message_start_time=first, message_end_time=last,
+            schema_count=len(self._schemas),
+        )  # fmt: skip
+        groups: list[tuple[Opcode, list[McapRecord]]] = [
+            (Opcode.SCHEMA, list(self._schemas.values())),
+            (Opcode.CHANNEL, list(channels)),
+            (Opcode.STATISTICS, [statistics]),
+            (Opcode.CHUNK_INDEX, list(self._chunks)),
+        ]
+        summary, offsets = b"", b""
+        for opcode, records in groups:
+            group = _records(*records)
+            if group:
+                offsets += _records(
+                    SummaryOffset(
+                        group_opcode=opcode, group_start=start + len(summary), group_length=len(group)
+                    )
+                )
+            summary += group
+        return end + summary + offsets + _footer(start, start + len(summary), summary + offsets) + MCAP0_MAGIC
+
+
+def _records(*records: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return builder.end()
+
+
+def _footer(summary_start: int, offset_start: int, summary: bytes) -> bytes:
+    """Footer whose checksum covers the summary and the footer up to the checksum itself."""
+    bare = _records(Footer(summary_start, offset_start, 0))
+    return _records(Footer(summary_start, offset_start, zlib.crc32(summary + bare[:-4])))
