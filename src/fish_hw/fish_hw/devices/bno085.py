@@ -1,0 +1,214 @@
+"""BNO085 on I2C: acceleration, angular velocity and game rotation vector as one sample.
+
+The bus carries no checksum and the hub stretches the clock, so packets arrive damaged: what is not plausible
+is dropped and counted, and a bus error while reading counts as "no data". The game rotation vector is used
+because the rotor's magnets disturb the compass.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.imu_sample import ImuSample
+from fish_hw.devices.rotation import norm
+from fish_hw.protocol import sh2, shtp
+from fish_hw.protocol.sh2 import ProductId, Report
+from fish_hw.protocol.shtp import Cargo, Header
+from fish_hw.transport.errors import TransportError
+from fish_hw.transport.interfaces import I2cBus
+
+FEATURES = (sh2.ACCELEROMETER, sh2.GYROSCOPE, sh2.GAME_ROTATION_VECTOR)
+RESET_WAIT_S = 0.3
+START_READS = 40
+START_READ_WAIT_S = 0.01
+MAX_READS = 8  # packets per poll; one holds all three reports, or three hold one each
+LONGEST_READ = 512  # bytes; longer cargoes come in pieces
+MAX_ACCELERATION = 136.0  # m/s^2, magnitude; the sensor ends at 8 g per axis
+MAX_RATE = 60.5  # rad/s, magnitude; the sensor ends at 2000 deg/s per axis
+UNIT_TOLERANCE = 0.02
+HINT = "check power, wiring, PS0/PS1 = 00, the address (0x4a or 0x4b) and the bus speed (400 kHz)"
+
+
+@dataclass
+class BnoCounters:
+    """What went wrong since the start."""
+
+    bus_errors: int = 0
+    bad_packets: int = 0
+    implausible: int = 0
+    resets: int = 0
+
+
+class Bno085:
+    """One hub at an address.
+
+    start() resets it and switches the reports on; poll() returns the samples that have come since.
+    """
+
+    def __init__(
+        self,
+        bus: I2cBus,
+        address: int,
+        interval_us: int,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.counters = BnoCounters()
+        self.drops = sh2.Drops()
+        self.reassembler = shtp.Reassembler()
+        self.intervals_us: dict[int, int] = {}  # as the hub really runs them
+        self._bus = bus
+        self._address = address
+        self._interval_us = interval_us
+        self._clock = clock
+        self._sleep = sleep
+        self._writer = shtp.Writer()
+        self._newest: dict[int, Report] = {}
+        self._product: ProductId | None = None
+        self._restarted = False
+
+    def start(self) -> ProductId:
+        """Reset, identify, switch the reports on; DeviceError if no BNO085 answers."""
+        try:
+            self._send(shtp.EXECUTABLE, sh2.RESET_COMMAND)
+            self._sleep(RESET_WAIT_S)
+            self.reassembler.reset()
+            self._drain()
+            self._send(shtp.CONTROL, sh2.product_id_request())
+        except TransportError as error:
+            raise DeviceError(f"no BNO085 at 0x{self._address:02x}: {error}; {HINT}") from error
+        product = self._wait_for_product()
+        self._request_features()
+        self._restarted = False
+        return product
+
+    def poll(self) -> list[ImuSample]:
+        """Samples that are complete now; stops at the first, since a read too many stretches the clock."""
+        for _ in range(MAX_READS):
+            cargo = self._read_cargo()
+            if cargo is None:
+                return []
+            samples = self._take(cargo)
+            if self._restarted:
+                self._restarted = False
+                self._request_features()
+            if samples:
+                return samples
+        return []
+
+    def _wait_for_product(self) -> ProductId:
+        for _ in range(START_READS):
+            cargo = self._read_cargo()
+            if cargo is not None:
+                self._take(cargo)
+            if self._product is not None:
+                return self._product
+            self._sleep(START_READ_WAIT_S)
+        raise DeviceError(
+            f"no BNO085 answers at 0x{self._address:02x} ({self.counters.bus_errors} bus errors,"
+            f" {self.counters.bad_packets} bad packets); {HINT}"
+        )
+
+    def _drain(self) -> None:
+        """Read what the hub says about its reset."""
+        for _ in range(START_READS):
+            cargo = self._read_cargo()
+            if cargo is None:
+                return
+            self._take(cargo)
+
+    def _request_features(self) -> None:
+        self._newest.clear()
+        for report_id in FEATURES:
+            self._send(shtp.CONTROL, sh2.set_feature(report_id, self._interval_us))
+
+    def _send(self, channel: int, payload: bytes) -> None:
+        self._bus.write(self._address, self._writer.frame(channel, payload))
+
+    def _take(self, cargo: Cargo) -> list[ImuSample]:
+        if cargo.channel in (shtp.REPORTS, shtp.WAKE_REPORTS):
+            return self._take_reports(cargo.payload)
+        if cargo.channel == shtp.EXECUTABLE and cargo.payload == sh2.RESET_COMPLETE:
+            self._restarted = True  # after start() this means a brown-out: the reports are off now
+            self.counters.resets += 1
+            self.reassembler.reset()
+        if cargo.channel == shtp.CONTROL:
+            self._product = sh2.parse_product_id(cargo.payload) or self._product
+            self._note_feature(cargo.payload)
+        return []
+
+    def _note_feature(self, payload: bytes) -> None:
+        feature = sh2.parse_feature_response(payload)
+        if feature is not None:
+            self.intervals_us[feature[0]] = feature[1]
+
+    def _take_reports(self, payload: bytes) -> list[ImuSample]:
+        samples = []
+        for report in sh2.parse_reports(payload, self._clock(), self.drops):
+            if report.id not in FEATURES:
+                continue
+            if not plausible(report):
+                self.counters.implausible += 1
+                continue
+            self._newest[report.id] = report
+            if len(self._newest) == len(FEATURES):
+                samples.append(self._assemble())
+        return samples
+
+    def _assemble(self) -> ImuSample:
+        """One sample of the three newest reports, stamped as the gyroscope's; each report is used once."""
+        gyro = self._newest[sh2.GYROSCOPE]
+        x, y, z, w = self._newest[sh2.GAME_ROTATION_VECTOR].values
+        ax, ay, az = self._newest[sh2.ACCELEROMETER].values
+        accuracy = min(report.accuracy for report in self._newest.values())
+        self._newest.clear()
+        gx, gy, gz = gyro.values
+        return ImuSample(gyro.time_s, (x, y, z, w), (gx, gy, gz), (ax, ay, az), accuracy)
+
+    def _read_cargo(self) -> Cargo | None:
+        """Next complete cargo, or None if the hub has none, or sent something unreadable."""
+        header = self._read_header()
+        while header is not None and not header.empty:
+            body = self._read_body(header)
+            cargo = None if body is None else self.reassembler.feed(header, body)
+            if cargo is not None or body is None:
+                return cargo
+            header = self._read_header()
+        return None
+
+    def _read_header(self) -> Header | None:
+        data = self._read(shtp.HEADER_BYTES)
+        if data is None:
+            return None
+        header = shtp.parse_header(data)
+        self.counters.bad_packets += header is None
+        return header
+
+    def _read_body(self, header: Header) -> bytes | None:
+        """Payload of a packet; the hub repeats the header, which must agree with the one read before."""
+        data = self._read(min(header.length, LONGEST_READ))
+        if data is None:
+            return None
+        repeated = shtp.parse_header(data)
+        if repeated is None or (repeated.length, repeated.channel) != (header.length, header.channel):
+            self.counters.bad_packets += 1
+            return None
+        return data[shtp.HEADER_BYTES :]
+
+    def _read(self, count: int) -> bytes | None:
+        try:
+            return self._bus.read(self._address, count)
+        except TransportError:
+            self.counters.bus_errors += 1
+            return None
+
+
+def plausible(report: Report) -> bool:
+    """Whether a report can be a measurement: unit quaternion, values within the sensor's range."""
+    if report.id == sh2.GAME_ROTATION_VECTOR:
+        x, y, z, w = report.values
+        return abs(norm((x, y, z, w)) - 1.0) <= UNIT_TOLERANCE
+    limit = MAX_ACCELERATION if report.id == sh2.ACCELEROMETER else MAX_RATE
+    return math.hypot(*report.values) <= limit

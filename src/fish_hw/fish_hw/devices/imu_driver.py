@@ -1,0 +1,197 @@
+"""The IMU as a whole: sensor by I2C or serial, mounting, watchdog, and finding it again after it was lost."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from fish_hw.devices.bno085 import Bno085
+from fish_hw.devices.bno085_rvc import Bno085Rvc
+from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.imu_sample import ImuSample, Mounting
+from fish_hw.devices.reconnect import Backoff
+from fish_hw.devices.status import ERROR, OK, WARN, Status
+from fish_hw.settings.imu import ImuSettings
+from fish_hw.transport.errors import TransportError
+from fish_hw.transport.interfaces import ByteStream, I2cBus
+
+UNRELIABLE = 0
+SLOWEST_RATE, FASTEST_RATE = 0.9, 2.1  # of the asked rate, SH-2 manual
+
+
+@dataclass
+class ImuCycle:
+    """What one step brought."""
+
+    samples: list[ImuSample] = field(default_factory=list)
+    events: list[str] = field(default_factory=list)
+
+
+class I2cSensor:
+    """A Bno085 with the bus it opens and closes."""
+
+    def __init__(
+        self,
+        settings: ImuSettings,
+        open_bus: Callable[[], I2cBus],
+        clock: Callable[[], float],
+        sleep: Callable[[float], None],
+    ) -> None:
+        self._settings = settings
+        self._bus = open_bus()
+        interval_us = round(1e6 / settings.rate_hz)
+        self._bno = Bno085(self._bus, settings.address, interval_us, clock, sleep)
+        try:
+            self.name = str(self._bno.start())
+        except (TransportError, DeviceError):
+            self._bus.close()
+            raise
+
+    def poll(self, timeout_s: float) -> list[ImuSample]:  # noqa: ARG002 (the bus answers at once)
+        """Samples since the last call."""
+        return self._bno.poll()
+
+    def close(self) -> None:
+        """Give the bus back."""
+        self._bus.close()
+
+    def counters(self) -> dict[str, object]:
+        """What went wrong since the start, and the real rates."""
+        bno = self._bno
+        return {
+            **vars(bno.counters),
+            **vars(bno.drops),
+            "sequence gaps": bno.reassembler.sequence_gaps,
+            "orphan fragments": bno.reassembler.orphans,
+            "intervals [us]": dict(bno.intervals_us),
+        }
+
+
+class SerialSensor:
+    """A Bno085Rvc with the port it opens and closes."""
+
+    name = "UART-RVC"
+
+    def __init__(self, open_stream: Callable[[], ByteStream], clock: Callable[[], float]) -> None:
+        self._stream = open_stream()
+        self._bno = Bno085Rvc(self._stream, clock)
+
+    def poll(self, timeout_s: float) -> list[ImuSample]:
+        """Samples that arrive within timeout_s."""
+        return self._bno.poll(timeout_s)
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._stream.close()
+
+    def counters(self) -> dict[str, object]:
+        """What went wrong since the start."""
+        parser = self._bno.parser
+        return {
+            "lost frames": self._bno.lost_frames,
+            "checksum errors": parser.checksum_errors,
+            "skipped bytes": parser.skipped_bytes,
+        }
+
+
+class ImuDriver:
+    """Delivers samples in base_link axes; starts the sensor again when it is silent or its values stand
+    still."""
+
+    def __init__(
+        self,
+        settings: ImuSettings,
+        open_bus: Callable[[], I2cBus],
+        open_stream: Callable[[], ByteStream],
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.samples = 0
+        self._settings = settings
+        self._open_bus, self._open_stream = open_bus, open_stream
+        self._clock, self._sleep = clock, sleep
+        self._mounting = Mounting(settings)
+        self._sensor: I2cSensor | SerialSensor | None = None
+        self._backoff = Backoff()
+        self._trouble = "not connected yet"
+        self._last: ImuSample | None = None
+        self._changed_time = 0.0
+        self._rated = (0, clock())
+
+    @property
+    def connected(self) -> bool:
+        """Whether the device is open."""
+        return self._sensor is not None
+
+    def connect(self) -> None:
+        """Start the sensor; PortUnavailable, TransportError or DeviceError if it cannot."""
+        if self._settings.interface == "i2c":
+            self._sensor = I2cSensor(self._settings, self._open_bus, self._clock, self._sleep)
+        else:
+            self._sensor = SerialSensor(self._open_stream, self._clock)
+        self._changed_time = self._clock()
+        self._last = None
+        self._backoff.succeeded()
+
+    def step(self, timeout_s: float) -> ImuCycle:
+        """Read once; rvc waits for bytes up to timeout_s."""
+        now = self._clock()
+        try:
+            if self._sensor is None:
+                return self._reconnect(now)
+            samples = [self._mounting.to_base(s) for s in self._sensor.poll(timeout_s)]
+            self._watch(samples)
+        except (TransportError, DeviceError) as error:
+            return ImuCycle(events=self._lose(str(error), now))
+        return ImuCycle(samples)
+
+    def close(self) -> None:
+        """Give the port back."""
+        if self._sensor is not None:
+            self._sensor.close()
+        self._sensor = None
+
+    def status(self) -> Status:
+        """State in one line with counters and the rate since the last call."""
+        rate = self._rate()
+        values: dict[str, object] = {"samples": self.samples, "reconnect attempts": self._backoff.attempts}
+        sensor = self._sensor
+        if sensor is None:
+            return Status(ERROR, self._trouble, values)
+        values |= {"sensor": sensor.name, "rate [Hz]": round(rate, 1), **sensor.counters()}
+        if rate == 0.0:
+            return Status(ERROR, "no samples", values)
+        if self._last is not None and self._last.accuracy == UNRELIABLE:
+            return Status(WARN, "the sensor calls its values unreliable", values)
+        if not SLOWEST_RATE * self._settings.rate_hz <= rate <= FASTEST_RATE * self._settings.rate_hz:
+            return Status(WARN, f"{rate:.0f} samples/s instead of {self._settings.rate_hz:.0f}", values)
+        return Status(OK, f"{rate:.0f} samples/s", values)
+
+    def _rate(self) -> float:
+        """Samples per second since the last call."""
+        now, (samples, since) = self._clock(), self._rated
+        self._rated = (self.samples, now)
+        return (self.samples - samples) / max(now - since, 1e-3)
+
+    def _watch(self, samples: list[ImuSample]) -> None:
+        for sample in samples:
+            last, self._last = self._last, sample
+            values = (sample.orientation, sample.angular_velocity, sample.acceleration)
+            if last is None or values != (last.orientation, last.angular_velocity, last.acceleration):
+                self._changed_time = self._clock()
+        self.samples += len(samples)
+        silence = self._clock() - self._changed_time
+        if silence > self._settings.watchdog_s:
+            what = "values stand still" if samples else "no samples"
+            raise DeviceError(f"IMU: {what} for {self._settings.watchdog_s} s")
+
+    def _reconnect(self, now: float) -> ImuCycle:
+        if not self._backoff.due(now):
+            return ImuCycle()
+        self.connect()
+        return ImuCycle(events=["IMU connected again"])
+
+    def _lose(self, reason: str, now: float) -> list[str]:
+        self.close()
+        self._backoff.failed(now)
+        said, self._trouble = self._trouble, reason
+        return [reason] if reason != said else []

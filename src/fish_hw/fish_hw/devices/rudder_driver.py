@@ -1,0 +1,164 @@
+"""The rudder as a whole: PWM output, servo, and finding the output again after it was lost.
+
+One thread calls step() and owns the output; commands may come from another thread.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from fish_hw.devices.reconnect import Backoff
+from fish_hw.devices.rudder_servo import RudderServo
+from fish_hw.devices.status import ERROR, OK, WARN, Status
+from fish_hw.settings.rudder import RudderSettings
+from fish_hw.transport.errors import TransportError
+
+CHECK_S = 1.0  # how often the output is asked whether it still works
+SETTLE_S = 0.1  # beyond the time that the slew limit gives
+
+
+class PwmOutput(Protocol):
+    """What a servo hangs on: sysfs PWM or PCA9685."""
+
+    def start(self, pulse_ns: int) -> None:
+        """Set the rate and begin with this pulse."""
+        ...
+
+    def set_pulse_ns(self, pulse_ns: int) -> None:
+        """Change the pulse."""
+        ...
+
+    def stop(self) -> None:
+        """Pulses off."""
+        ...
+
+    def is_running(self) -> bool:
+        """Whether pulses are on at the right rate."""
+        ...
+
+    def close(self) -> None:
+        """Give the port back; pulses go on as they are."""
+        ...
+
+
+class RudderDriver:
+    """Follows commands; centres when they stop, at the start and at the end."""
+
+    def __init__(
+        self,
+        settings: RudderSettings,
+        open_output: Callable[[], PwmOutput],
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.servo = RudderServo(settings)
+        self._settings = settings
+        self._open_output = open_output
+        self._clock = clock
+        self._sleep = sleep
+        self._lock = threading.Lock()  # of the servo: commands arrive on another thread
+        self._output: PwmOutput | None = None
+        self._backoff = Backoff()
+        self._trouble = "not connected yet"
+        self._pulse_ns = 0
+        self._checked = 0.0
+        self._stale = True
+
+    @property
+    def connected(self) -> bool:
+        """Whether the device is open."""
+        return self._output is not None
+
+    def connect(self) -> None:
+        """Open the output and centre; PortUnavailable or TransportError if it cannot."""
+        output = self._open_output()
+        self._pulse_ns = self.servo.centre_ns()
+        try:
+            output.start(self._pulse_ns)
+        except TransportError:
+            output.close()
+            raise
+        self._output = output
+        self._checked = self._clock()
+        self._backoff.succeeded()
+
+    def command(self, alpha: float) -> None:
+        """Take a commanded angle [rad]."""
+        with self._lock:
+            self.servo.command(alpha, self._clock())
+
+    def step(self) -> list[str]:
+        """One cycle; returns events worth a line in the log."""
+        now = self._clock()
+        try:
+            if self._output is None:
+                return self._reconnect(now)
+            return self._cycle(self._output, now)
+        except TransportError as error:
+            return self._lose(str(error), now)
+
+    def close(self) -> None:
+        """Centre, then pulses off if the settings say so, but not before the servo has had time to get
+        there."""
+        if self._output is None:
+            return
+        travel_s = abs(self.servo.alpha) / self._settings.max_rate + SETTLE_S
+        try:
+            self._output.set_pulse_ns(self.servo.centre_ns())
+            if self._settings.off_at_exit:
+                self._sleep(travel_s)
+                self._output.stop()
+        except TransportError as error:
+            self._trouble = f"rudder not centred: {error}"
+        self._output.close()
+        self._output = None
+
+    def status(self) -> Status:
+        """State in one line with counters."""
+        values: dict[str, object] = {
+            "alpha sent [rad]": round(self.servo.alpha, 4),
+            "pulse [us]": self._pulse_ns / 1000,
+            "rejected commands": self.servo.counters.rejected,
+            "clamped commands": self.servo.counters.clamped,
+            "reconnect attempts": self._backoff.attempts,
+        }
+        if self._output is None:
+            return Status(ERROR, self._trouble, values)
+        if self._stale:
+            return Status(WARN, f"no command for {self._settings.stale_s} s: centred", values)
+        return Status(OK, "following commands", values)
+
+    def _cycle(self, output: PwmOutput, now: float) -> list[str]:
+        with self._lock:
+            pulse_ns = self.servo.step(now)
+            stale = self.servo.stale(now)
+        if pulse_ns != self._pulse_ns:
+            output.set_pulse_ns(pulse_ns)
+            self._pulse_ns = pulse_ns
+        if now - self._checked >= CHECK_S:
+            self._check(output, now)
+        changed, self._stale = stale != self._stale, stale
+        return [] if not changed else ["rudder centred: no command" if stale else "rudder follows commands"]
+
+    def _check(self, output: PwmOutput, now: float) -> None:
+        self._checked = now
+        if not output.is_running():
+            raise TransportError(
+                "the PWM output stopped by itself (supply lost, or another program switched it off)"
+            )
+
+    def _reconnect(self, now: float) -> list[str]:
+        if not self._backoff.due(now):
+            return []
+        self.connect()
+        return ["rudder output connected again"]
+
+    def _lose(self, reason: str, now: float) -> list[str]:
+        events = [reason] if reason != self._trouble else []
+        if self._output is not None:
+            self._output.close()
+        self._output = None
+        self._trouble = reason
+        self._backoff.failed(now)
+        return events

@@ -1,0 +1,188 @@
+"""The overhead camera as a whole: frames as JPEG with the middle of their exposure, found again after it was
+lost."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.reconnect import Backoff
+from fish_hw.devices.status import ERROR, OK, WARN, Status
+from fish_hw.settings.camera import CameraSettings
+from fish_hw.transport.errors import PortUnavailable
+from fish_hw.transport.video_capture import Frame
+
+SLOW = 0.8  # share of the asked rate below which the operator should know (dark picture, USB bandwidth)
+
+
+class FrameSource(Protocol):
+    """A camera, a file or a test picture."""
+
+    def read(self) -> Frame | None:
+        """The next frame, waiting for it; None if there was none."""
+        ...
+
+    def close(self) -> None:
+        """Give it back."""
+        ...
+
+
+@dataclass(frozen=True)
+class Picture:
+    """JPEG bytes of one frame with the time [s, monotonic clock] of its exposure; size in px."""
+
+    time_s: float
+    jpeg: bytes
+    width: int
+    height: int
+
+
+@dataclass
+class CameraCycle:
+    """What one step brought."""
+
+    picture: Picture | None = None
+    events: list[str] = field(default_factory=list)
+
+
+class UsbCamera:
+    """Reads one frame per step."""
+
+    def __init__(
+        self,
+        settings: CameraSettings,
+        open_source: Callable[[], FrameSource],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.frames = 0
+        self.missed = 0
+        self._settings = settings
+        self._open_source = open_source
+        self._clock = clock
+        self._source: FrameSource | None = None
+        self._backoff = Backoff()
+        self._trouble = "not connected yet"
+        self._last_frame = clock()
+        self._rated = (0, clock())
+        self._size = (settings.width, settings.height)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the device is open."""
+        return self._source is not None
+
+    def connect(self) -> None:
+        """Open the camera; PortUnavailable if it cannot."""
+        self._source = self._open_source()
+        self._last_frame = self._clock()
+        self._backoff.succeeded()
+
+    def step(self) -> CameraCycle:
+        """Wait for a frame; the camera is opened again when none came for reopen_s."""
+        now = self._clock()
+        try:
+            if self._source is None:
+                return self._reconnect(now)
+            frame = self._source.read()
+            if frame is None:
+                self._miss()
+                return CameraCycle()
+            self._last_frame = self._clock()
+            return CameraCycle(self._picture(frame))
+        except (PortUnavailable, DeviceError) as error:
+            return CameraCycle(events=self._lose(str(error), now))
+
+    def close(self) -> None:
+        """Give the camera back."""
+        if self._source is not None:
+            self._source.close()
+        self._source = None
+
+    def status(self) -> Status:
+        """State in one line with counters and the rate since the last call."""
+        rate = self._rate()
+        values: dict[str, object] = {
+            "frames": self.frames,
+            "missed frames": self.missed,
+            "rate [Hz]": round(rate, 1),
+            "size [px]": f"{self._size[0]}x{self._size[1]}",
+            "reconnect attempts": self._backoff.attempts,
+        }
+        if self._source is None:
+            return Status(ERROR, self._trouble, values)
+        if rate == 0.0:
+            return Status(ERROR, "no frames", values)
+        if self._size != (self._settings.width, self._settings.height):
+            wanted = f"{self._settings.width}x{self._settings.height}"
+            return Status(WARN, f"frames are {self._size[0]}x{self._size[1]} px instead of {wanted}", values)
+        if rate < SLOW * self._settings.rate_hz:
+            return Status(WARN, f"{rate:.0f} frames/s instead of {self._settings.rate_hz:.0f}", values)
+        return Status(OK, f"{rate:.0f} frames/s", values)
+
+    def _picture(self, frame: Frame) -> Picture | None:
+        time_s = frame.time_s - self._settings.exposure_delay_s
+        if frame.image is not None:
+            jpeg = encode_jpeg(frame.image, self._settings.jpeg_quality)
+            height, width = frame.image.shape[:2]
+        elif frame.jpeg is not None and (size := jpeg_size(frame.jpeg)) is not None:
+            jpeg, (width, height) = frame.jpeg, size
+        else:
+            self.missed += 1
+            return None
+        self.frames += 1
+        self._size = (width, height)
+        return Picture(time_s, jpeg, width, height)
+
+    def _miss(self) -> None:
+        self.missed += 1
+        if self._clock() - self._last_frame > self._settings.reopen_s:
+            raise DeviceError(f"camera {self._settings.device}: no frames for {self._settings.reopen_s} s")
+
+    def _rate(self) -> float:
+        now, (frames, since) = self._clock(), self._rated
+        self._rated = (self.frames, now)
+        return (self.frames - frames) / max(now - since, 1e-3)
+
+    def _reconnect(self, now: float) -> CameraCycle:
+        if not self._backoff.due(now):
+            return CameraCycle()
+        self.connect()
+        return CameraCycle(events=["camera connected again"])
+
+    def _lose(self, reason: str, now: float) -> list[str]:
+        self.close()
+        self._backoff.failed(now)
+        said, self._trouble = self._trouble, reason
+        return [reason] if reason != said else []
+
+
+def encode_jpeg(image: np.ndarray, quality: int) -> bytes:
+    """JPEG of a BGR image (height, width, 3)."""
+    ok, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not ok:
+        raise ValueError(f"an image of shape {image.shape} and type {image.dtype} cannot be encoded as JPEG")
+    return bytes(data)
+
+
+def decode_jpeg(jpeg: bytes) -> np.ndarray | None:
+    """BGR image (height, width, 3) of a JPEG, None if it is damaged beyond reading."""
+    return cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+
+
+def jpeg_size(jpeg: bytes) -> tuple[int, int] | None:
+    """Width and height in px from the start-of-frame segment, None if there is none.
+
+    Source: ITU-T T.81, annex B.
+    """
+    at = 2
+    while at + 9 <= len(jpeg) and jpeg[at] == 0xFF:
+        marker = jpeg[at + 1]
+        if marker in (0xC0, 0xC1, 0xC2):
+            height = int.from_bytes(jpeg[at + 5 : at + 7], "big")
+            return int.from_bytes(jpeg[at + 7 : at + 9], "big"), height
+        at += 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")
+    return None

@@ -1,0 +1,1 @@
+"""Devices made of software, for tests and for trying the nodes with no hardware."""

@@ -1,0 +1,39 @@
+"""A PCA9685 at the level of its I2C registers."""
+
+SLEEP = 0x10
+PRESCALE = 0xFE
+
+
+class Pca9685Emulator:
+    """Register file with auto-increment; the divider is writable only asleep, as in the chip."""
+
+    def __init__(self) -> None:
+        self.registers = bytearray(256)
+        self.log: list[bytes] = []
+        self._pointer = 0
+        self.power_cycle()
+
+    def power_cycle(self) -> None:
+        """Back to the values after power-on."""
+        self.registers[:] = bytes(256)
+        self.registers[0x00] = SLEEP | 0x01
+        self.registers[PRESCALE] = 0x1E
+
+    def write(self, data: bytes) -> None:
+        """Register number and values."""
+        self.log.append(bytes(data))
+        self._pointer = data[0]
+        for offset, value in enumerate(data[1:]):
+            register = data[0] + offset
+            if register != PRESCALE or self.registers[0x00] & SLEEP:
+                self.registers[register] = value
+
+    def read(self, count: int) -> bytes:
+        """Values from the register written last."""
+        return bytes(self.registers[self._pointer : self._pointer + count])
+
+    def pulse_counts(self, channel: int) -> tuple[int, int]:
+        """(on, off) counts of an output."""
+        start = 0x06 + 4 * channel
+        on = int.from_bytes(self.registers[start : start + 2], "little")
+        return on, int.from_bytes(self.registers[start + 2 : start + 4], "little")

@@ -1,0 +1,175 @@
+"""What the four driver nodes share: parameters, the thread that owns the device, diagnostics, the way to
+end."""
+
+import signal
+import sys
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import rclpy
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.duration import Duration
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+from fish_hw.devices.camera_calibration import CalibrationError
+from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.status import WARN, Status
+from fish_hw.nodes.parameters import read_settings
+from fish_hw.nodes.worker import Worker
+from fish_hw.transport.errors import TransportError
+
+NAMESPACE = "fish"
+END_TIMEOUT_S = 2.0
+EXPECTED = (TransportError, DeviceError, CalibrationError, ValueError)
+
+
+class Device(Protocol):
+    """A driver as this node sees it."""
+
+    @property
+    def connected(self) -> bool:
+        """Whether the device answers."""
+        ...
+
+    def connect(self) -> None:
+        """Find it or raise."""
+        ...
+
+    def close(self) -> None:
+        """Make it safe and give it back."""
+        ...
+
+    def status(self) -> Status:
+        """For diagnostics."""
+        ...
+
+
+class DeviceNode(Node):
+    """A node around one device.
+
+    Args:
+        name: of the node, relative to the namespace.
+        settings_class: dataclass whose fields are the parameters.
+    """
+
+    def __init__(self, name: str, settings_class: type[Any]) -> None:
+        super().__init__(name, namespace=NAMESPACE)
+        self.settings = read_settings(self, settings_class)
+        self.failure = ""
+        self._device: Device | None = None
+        self._emulated = False
+        self._worker: Worker | None = None
+        self._give_up_s = time.monotonic() + self.settings.startup_timeout_s
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_timer(1.0, self._on_diagnostics)
+
+    def start(self, device: Device, step: Callable[[], None], period_s: float, emulated: bool) -> None:
+        """Connect and begin to repeat step; a device that is absent is waited for as the settings say."""
+        self._emulated = emulated
+        self._device = device
+        try:
+            device.connect()
+        except (TransportError, DeviceError) as error:
+            if self.settings.startup_timeout_s == 0.0:
+                raise
+            self.get_logger().error(f"{error}; trying for {self.settings.startup_timeout_s} s")
+
+        self._worker = Worker(lambda: self._step(device, step), period_s, self._on_worker_end)
+        self._worker.start()
+
+    def close(self) -> None:
+        """Stop the thread and leave the device safe."""
+        if self._worker is not None:
+            self._worker.stop(END_TIMEOUT_S)
+        if self._device is not None:
+            self._device.close()
+
+    def stamp(self, time_s: float) -> Time:
+        """ROS time of a moment on the monotonic clock."""
+        return (self.get_clock().now() - Duration(seconds=time.monotonic() - time_s)).to_msg()
+
+    def publish(self, publisher: Any, message: Any) -> None:
+        """Publish, unless the node is about to end (the device's thread lives a little longer than the
+        context)."""
+        try:
+            publisher.publish(message)
+        except RCLError:
+            if self.context.ok():
+                raise
+
+    def log_events(self, events: list[str]) -> None:
+        """One line per event."""
+        for event in events:
+            self.get_logger().info(event)
+
+    def _step(self, device: Device, step: Callable[[], None]) -> None:
+        if device.connected:
+            self._give_up_s = float("inf")  # from now on it is waited for without end
+        elif time.monotonic() > self._give_up_s:
+            self.failure = device.status().message
+            self.context.try_shutdown()
+            return
+        step()
+
+    def _on_worker_end(self) -> None:
+        """The thread ended: by stop(), or by an error that must not leave the device as it is."""
+        if self._device is not None:
+            self._device.close()
+        if self.context.ok():
+            self.failure = self.failure or "the device's thread ended unexpectedly"
+            self.context.try_shutdown()
+
+    def _on_diagnostics(self) -> None:
+        if self._device is None:
+            return
+        status = self._device.status()
+        if self._emulated:  # nobody should go to the pool with it
+            status = Status(max(status.level, WARN), f"{status.message} (emulated device)", status.values)
+        message = DiagnosticArray()
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.status = [
+            DiagnosticStatus(
+                level=bytes([status.level]),
+                name=self.get_fully_qualified_name().lstrip("/"),
+                message=status.message,
+                hardware_id=self.get_name(),
+                values=[KeyValue(key=key, value=str(value)) for key, value in status.values.items()],
+            )
+        ]
+        self._diagnostics.publish(message)
+
+
+def run(make_node: Callable[[], DeviceNode], name: str) -> None:
+    """Run a node until SIGINT or SIGTERM (exit code 0), or until it cannot go on (one line, exit code 1)."""
+    try:
+        rclpy.init()
+    except (RCLError, ValueError) as error:
+        sys.exit(f"{name}: {one_line(error)}")
+    failure = ""
+    node: DeviceNode | None = None
+    try:
+        node = make_node()
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except EXPECTED as error:
+        failure = one_line(error)
+    finally:
+        for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not interrupt the way to safety
+            signal.signal(number, signal.SIG_IGN)
+        if node is not None:
+            node.close()
+            failure = failure or node.failure
+            node.destroy_node()
+        rclpy.try_shutdown()
+    if failure:
+        sys.exit(f"{name}: {failure}")
+
+
+def one_line(error: Exception) -> str:
+    """The error's text without line breaks."""
+    return " ".join(str(error).split())

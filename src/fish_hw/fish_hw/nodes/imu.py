@@ -1,0 +1,77 @@
+"""Node `imu`: BNO085.
+
+Out: imu/data (orientation without absolute heading, angular velocity [rad/s], specific force [m/s^2];
+     base_link axes, stamped when measured), /diagnostics
+"""
+
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import Imu
+
+from fish_hw.devices.bno085_rvc import BAUD
+from fish_hw.devices.imu_driver import ImuDriver
+from fish_hw.devices.imu_sample import ImuSample
+from fish_hw.emulators.bno085 import Bno085Emulator
+from fish_hw.emulators.i2c_bus import I2cBusEmulator
+from fish_hw.nodes.device_node import DeviceNode, run
+from fish_hw.settings.imu import ImuSettings
+from fish_hw.transport.i2c_bus import KernelI2c
+from fish_hw.transport.interfaces import I2cBus
+from fish_hw.transport.serial_port import SerialPort
+
+
+class ImuNode(DeviceNode):
+    """Samples out; reading and judging them is in ImuDriver."""
+
+    def __init__(self) -> None:
+        super().__init__("imu", ImuSettings)
+        settings = self.settings
+        self._data = self.create_publisher(Imu, "imu/data", QoSProfile(depth=10))
+        self._period_s = 1.0 / settings.rate_hz
+        self._driver = ImuDriver(settings, self._open_bus, lambda: SerialPort(settings.port, BAUD))
+        self._template = self._message_template()
+        emulated = settings.interface == "i2c" and settings.bus == "emulator"
+        self.start(self._driver, self._cycle, self._period_s, emulated)
+
+    def _open_bus(self) -> I2cBus:
+        if self.settings.bus == "emulator":
+            return I2cBusEmulator({self.settings.address: Bno085Emulator()})
+        return KernelI2c(self.settings.bus)
+
+    def _cycle(self) -> None:
+        cycle = self._driver.step(self._period_s)
+        self.log_events(cycle.events)
+        for sample in cycle.samples:
+            self.publish(self._data, self._message(sample))
+
+    def _message_template(self) -> Imu:
+        """What is the same in every message: frame and covariances (REP 145)."""
+        message = Imu()
+        message.header.frame_id = self.settings.frame_id
+        message.orientation_covariance = diagonal(self.settings.orientation_stddev)
+        message.angular_velocity_covariance = diagonal(self.settings.gyro_stddev)
+        message.linear_acceleration_covariance = diagonal(self.settings.accel_stddev)
+        return message
+
+    def _message(self, sample: ImuSample) -> Imu:
+        message = self._template
+        message.header.stamp = self.stamp(sample.time_s)
+        q, w, a = message.orientation, message.angular_velocity, message.linear_acceleration
+        q.x, q.y, q.z, q.w = sample.orientation
+        w.x, w.y, w.z = sample.angular_velocity
+        a.x, a.y, a.z = sample.acceleration
+        return message
+
+
+def diagonal(stddev: float) -> list[float]:
+    """Covariance (9, row-major) of three independent axes."""
+    v = stddev**2
+    return [v, 0.0, 0.0, 0.0, v, 0.0, 0.0, 0.0, v]
+
+
+def main() -> None:
+    """Entry point."""
+    run(ImuNode, "imu")
+
+
+if __name__ == "__main__":
+    main()

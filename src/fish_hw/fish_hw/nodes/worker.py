@@ -1,0 +1,36 @@
+"""A thread that repeats one step at a fixed rate: rclpy timers above 30 Hz are dear on a small computer."""
+
+import threading
+import time
+from collections.abc import Callable
+
+
+class Worker:
+    """Calls step() every period_s until stop(); calls on_end() in any case, a failing step included."""
+
+    def __init__(self, step: Callable[[], None], period_s: float, on_end: Callable[[], None]) -> None:
+        self._step = step
+        self._period_s = period_s
+        self._on_end = on_end
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="device", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float) -> None:
+        """Ask for the end and wait for it."""
+        self._stop.set()
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        try:
+            while not self._stop.is_set():
+                self._step()
+                now = time.monotonic()
+                due = max(due + self._period_s, now)  # late cycles are not made up for
+                self._stop.wait(due - now)
+        finally:
+            self._on_end()

@@ -1,0 +1,43 @@
+"""Parameters of the IMU node."""
+
+import math
+from dataclasses import dataclass
+
+from fish_hw.settings.checks import require_choice, require_range
+
+INTERFACES = ("i2c", "rvc")
+
+
+@dataclass(frozen=True)
+class ImuSettings:
+    """BNO085: how it is wired, how it sits in the hull, how well it measures.
+
+    The mounting angles turn sensor axes into base_link axes: yaw, then pitch, then roll (z, y, x),
+    right-handed.
+    """
+
+    interface: str = "i2c"  # i2c | rvc (serial, attitude only: rates are differences)
+    bus: str = "/dev/i2c-1"  # i2c: bus, or "emulator"
+    address: int = 0x4A  # i2c: 0x4A or 0x4B
+    port: str = "/dev/ttyUSB0"  # rvc: serial device
+    startup_timeout_s: float = 0.0  # s to wait for the sensor at start; then the node ends with an error
+    rate_hz: float = 100.0  # Hz, asked of the sensor (rvc: 100 always)
+    watchdog_s: float = 1.0  # s without a sample, or with frozen values, until the sensor is started again
+    mount_roll: float = 0.0  # rad
+    mount_pitch: float = 0.0  # rad
+    mount_yaw: float = 0.0  # rad
+    orientation_stddev: float = 0.044  # rad, game rotation vector: 2.5 deg
+    gyro_stddev: float = 0.054  # rad/s, 3.1 deg/s worst case
+    accel_stddev: float = 0.3  # m/s^2
+    frame_id: str = "imu_link"
+
+    def __post_init__(self) -> None:
+        require_choice("interface", self.interface, INTERFACES)
+        require_choice("address", self.address, (0x4A, 0x4B))
+        require_range("startup_timeout_s", self.startup_timeout_s, 0.0, 3600.0)
+        require_range("rate_hz", self.rate_hz, 10.0, 200.0)
+        require_range("watchdog_s", self.watchdog_s, 0.1, 60.0)
+        for name in ("mount_roll", "mount_pitch", "mount_yaw"):
+            require_range(name, getattr(self, name), -math.pi, math.pi)
+        for name in ("orientation_stddev", "gyro_stddev", "accel_stddev"):
+            require_range(name, getattr(self, name), 1e-6, 10.0)

@@ -1,0 +1,35 @@
+"""The two kinds of port that devices are written against."""
+
+from typing import Protocol
+
+
+class ByteStream(Protocol):
+    """A serial port, a pseudo-terminal or recorded bytes."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of data or raise TransportError."""
+        ...
+
+    def read(self, timeout_s: float) -> bytes:
+        """Whatever arrives first within timeout_s; empty on time-out; TransportError if the peer is gone."""
+        ...
+
+    def close(self) -> None:
+        """Give the port back; may be called twice."""
+        ...
+
+
+class I2cBus(Protocol):
+    """An I2C bus with plain writes and plain reads, one message each (no repeated start)."""
+
+    def write(self, address: int, data: bytes) -> None:
+        """Send data to the device at the 7-bit address or raise TransportError."""
+        ...
+
+    def read(self, address: int, count: int) -> bytes:
+        """Read exactly count bytes or raise TransportError."""
+        ...
+
+    def close(self) -> None:
+        """Give the bus back; may be called twice."""
+        ...

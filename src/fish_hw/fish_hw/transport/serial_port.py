@@ -1,0 +1,85 @@
+"""A serial port by pyserial, opened exclusively, with every failure turned into a TransportError."""
+
+import errno
+import select
+import termios
+from typing import Any
+
+from fish_hw.transport.errors import PortUnavailable, TransportError, unavailable
+
+WRITE_TIMEOUT_S = 0.1  # 1000 bytes at 115200 baud take 87 ms
+READ_BYTES = 4096
+
+REASONS = {
+    errno.ENOENT: "there is no such port",
+    errno.EACCES: "no permission (add the user to group dialout)",
+    errno.EAGAIN: "another program holds it",
+    errno.EBUSY: "another program holds it",
+}
+
+
+def import_pyserial() -> Any:
+    """The serial module, or PortUnavailable that says how to install it."""
+    try:
+        import serial
+        import serial.tools.list_ports
+    except ImportError as error:
+        raise PortUnavailable(
+            "serial ports need pyserial: pip install pyserial==3.5, or apt install python3-serial"
+        ) from error
+    return serial
+
+
+class SerialPort:
+    """ByteStream on a serial device, 8N1.
+
+    pyserial raises SerialException, bare OSError and termios.error (no OSError) for one and the same
+    unplugged cable; all become TransportError here.
+    """
+
+    def __init__(self, port: str, baud: int) -> None:
+        serial = import_pyserial()
+        self.port = port
+        self._failures = (serial.SerialException, OSError, termios.error)
+        try:
+            self._serial: Any = serial.Serial(
+                port, baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True
+            )
+        except (*self._failures, ValueError) as error:
+            reason = REASONS.get(getattr(error, "errno", None) or 0, str(error))
+            raise unavailable(f"serial port {port}", reason, other_ports(serial, port)) from error
+        self._ask_for_low_latency()
+
+    def write(self, data: bytes) -> None:
+        """Send all of data; a write that takes longer than WRITE_TIMEOUT_S raises TransportError."""
+        try:
+            self._serial.write(data)
+        except self._failures as error:
+            raise TransportError(f"serial port {self.port}: write failed: {error}") from error
+
+    def read(self, timeout_s: float) -> bytes:
+        """Bytes that arrived, waiting at most timeout_s for the first; empty if none came."""
+        try:
+            readable, _, _ = select.select([self._serial.fileno()], [], [], timeout_s)
+            return bytes(self._serial.read(READ_BYTES)) if readable else b""
+        except (*self._failures, ValueError) as error:  # ValueError: select on a closed descriptor
+            raise TransportError(f"serial port {self.port}: read failed: {error}") from error
+
+    def close(self) -> None:
+        """Close the port; errors of a port that is gone already do not matter."""
+        try:
+            self._serial.close()
+        except self._failures:
+            return
+
+    def _ask_for_low_latency(self) -> None:
+        """USB adapters hold replies back for 16 ms unless asked not to; pseudo-terminals cannot be asked."""
+        try:
+            self._serial.set_low_latency_mode(True)
+        except (*self._failures, ValueError):
+            return
+
+
+def other_ports(serial: Any, port: str) -> list[str]:
+    """Serial ports of this machine other than the one asked for."""
+    return sorted(p.device for p in serial.tools.list_ports.comports() if p.device != port)

@@ -1,0 +1,107 @@
+"""One PWM channel of the kernel through /sys/class/pwm, no dependency."""
+
+import errno
+import time
+from collections.abc import Callable
+from glob import glob
+from pathlib import Path
+
+from fish_hw.transport.errors import TransportError, unavailable
+
+EXPORT_WAIT_S = 0.5  # udev needs some tenths of a second to hand the new files to the group
+RETRY_S = 0.01
+HINT = "enable it: dtoverlay=pwm-2chan"
+
+
+class SysfsPwm:
+    """A PWM channel: period once, then pulse lengths in nanoseconds.
+
+    Args:
+        chip: folder of the PWM chip, /sys/class/pwm/pwmchip0.
+        channel: channel number on that chip.
+        period_ns: repetition time.
+    Raises:
+        PortUnavailable: chip absent, channel refused or files not writable.
+    """
+
+    def __init__(
+        self, chip: str, channel: int, period_ns: int, sleep: Callable[[float], None] = time.sleep
+    ) -> None:
+        self._chip = Path(chip)
+        self._pwm = self._chip / f"pwm{channel}"
+        self._channel = channel
+        self._period_ns = period_ns
+        self._sleep = sleep
+        if not self._chip.is_dir():
+            others = sorted(glob(str(self._chip.parent / "pwmchip*")))
+            raise unavailable(f"PWM chip {chip}", f"there is no such chip ({HINT})", others)
+        try:
+            self._export()
+            self._wait_until_writable()
+        except OSError as error:
+            raise unavailable(f"PWM channel {self._pwm}", str(error), self._exported()) from error
+
+    def start(self, pulse_ns: int) -> None:
+        """Set period and pulse, then switch the pulses on.
+
+        The kernel refuses a period shorter than the present duty cycle, so the duty cycle is cleared first.
+        """
+        self._write("duty_cycle", 0)
+        self._write("period", self._period_ns)
+        self._write("duty_cycle", pulse_ns)
+        self._write("enable", 1)
+
+    def set_pulse_ns(self, pulse_ns: int) -> None:
+        """Change the length of the pulses."""
+        self._write("duty_cycle", pulse_ns)
+
+    def stop(self) -> None:
+        """Switch the pulses off."""
+        self._write("enable", 0)
+
+    def is_running(self) -> bool:
+        """Whether pulses are on, as the kernel says."""
+        try:
+            return (self._pwm / "enable").read_text().strip() == "1"
+        except OSError as error:
+            raise TransportError(f"PWM {self._pwm}: cannot read enable: {error}") from error
+
+    def close(self) -> None:
+        """Nothing to give back: the channel stays exported and keeps its pulses."""
+
+    def _export(self) -> None:
+        if self._pwm.is_dir():
+            return
+        try:
+            (self._chip / "export").write_text(f"{self._channel}\n")
+        except OSError as error:
+            if error.errno != errno.EBUSY:  # EBUSY: somebody exported it between the two lines
+                raise
+
+    def _wait_until_writable(self) -> None:
+        """Wait for udev: right after the export the files belong to root only."""
+        for _ in range(round(EXPORT_WAIT_S / RETRY_S)):
+            if self._writable():
+                return
+            self._sleep(RETRY_S)
+        raise OSError(
+            errno.EACCES, "period, duty_cycle and enable did not become writable (udev rule for group gpio?)"
+        )
+
+    def _writable(self) -> bool:
+        try:
+            for name in ("period", "duty_cycle", "enable"):
+                with open(self._pwm / name, "r+"):
+                    pass
+        except OSError:
+            return False
+        return True
+
+    def _exported(self) -> list[str]:
+        return sorted(path.name for path in self._chip.glob("pwm[0-9]*"))
+
+    def _write(self, name: str, value: int) -> None:
+        try:
+            (self._pwm / name).write_text(f"{value}\n")
+        except OSError as error:
+            raise TransportError(f"PWM {self._pwm}: cannot write {value} to {name}: {error}") from error
