@@ -1,0 +1,105 @@
+"""The one table of the robot's nodes, and how each is started.
+
+The pip-only starter (`processes.py`, used by `fish_train demo` and the tests) and launch/fish.launch.py read it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
+
+from .errors import UserError
+
+NAMESPACE = "/fish"
+Parameters = Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """An installed executable and the parameter file it is started with.
+
+    Attributes:
+        parameter_file: in config/ of the package's share directory.
+    """
+
+    package: str
+    executable: str
+    parameter_file: str
+
+    @property
+    def name(self) -> str:
+        """For people and log files: package/executable."""
+        return f"{self.package}/{self.executable}"
+
+
+SIMULATED = (
+    NodeSpec("fish_sim", "simulator", "simulator.yaml"),
+    NodeSpec("fish_sim", "camera", "camera.yaml"),
+)
+REAL = (
+    NodeSpec("fish_hw", "rotor", "rotor.yaml"),
+    NodeSpec("fish_hw", "rudder", "rudder.yaml"),
+    NodeSpec("fish_hw", "imu", "imu.yaml"),
+    NodeSpec("fish_hw", "camera", "camera.yaml"),
+)
+CONTROL = (
+    NodeSpec("fish_vision", "tracker", "tracker.yaml"),
+    NodeSpec("fish_control", "fusion", "fusion.yaml"),
+    NodeSpec("fish_control", "planner", "planner.yaml"),
+    NodeSpec("fish_control", "controller", "controller.yaml"),
+)
+RECORDER = NodeSpec("fish_train", "recorder", "recorder.yaml")
+REPLAYER = NodeSpec("fish_train", "replayer", "replayer.yaml")
+
+ROBOTS = {"sim": (*SIMULATED, *CONTROL, RECORDER), "real": (*REAL, *CONTROL, RECORDER)}
+
+
+def executable_path(spec: NodeSpec) -> Path:
+    """install/<package>/lib/<package>/<executable>, what `ros2 run` starts.
+
+    Raises:
+        UserError: not built, or the workspace is not sourced.
+    """
+    try:
+        path = Path(get_package_prefix(spec.package)) / "lib" / spec.package / spec.executable
+    except PackageNotFoundError:
+        raise UserError(
+            f"package {spec.package} is not in this shell's workspace; "
+            "build it (make build) and source install/setup.bash"
+        ) from None
+    if not path.exists():
+        raise UserError(f"{path} does not exist; build the workspace again (make build)")
+    return path
+
+
+def parameter_path(spec: NodeSpec) -> Path:
+    """The installed parameter file."""
+    return Path(get_package_share_directory(spec.package)) / "config" / spec.parameter_file
+
+
+def command(spec: NodeSpec, parameters: Parameters | None = None, namespace: str = NAMESPACE) -> list[str]:
+    """Command line of a node: its parameter file, then single parameters that override it."""
+    line = [str(executable_path(spec)), "--ros-args", "-r", f"__ns:={namespace}"]
+    line += ["--params-file", str(parameter_path(spec))]
+    for name, value in (parameters or {}).items():
+        line += ["-p", f"{name}:={json.dumps(value)}"]  # JSON is YAML, and keeps "N" a string and 1.0 a float
+    return line
+
+
+def environment(domain: int) -> dict[str, str]:
+    """The environment of every node: an own DDS domain on this machine only, one thread for small matrices.
+
+    The ROS wheels start Python a second time with LD_LIBRARY_PATH set and leave a guard variable behind; a child
+    gets both (inherited) or, where a caller dropped the path, neither.
+    """
+    env = dict(os.environ)
+    env.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", PYTHONUNBUFFERED="1")
+    env.setdefault("OMP_NUM_THREADS", "1")
+    if not env.get("LD_LIBRARY_PATH"):
+        env.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
+    return env

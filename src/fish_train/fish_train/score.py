@@ -1,0 +1,168 @@
+"""How well a recorded run followed its path: errors over time and their summary, from poses, speeds and the path alone.
+
+    e_y   = n(s) . (p - p(s))             cross-track [m], positive: head left of the path; s: progress along the path, in order
+    e_psi = wrap(chi(s) - <psi>)          heading [rad]; <psi>: mean over one stroke of the rotor, 0.5 s, centred
+    e_u   = u_ref - u                     speed [m/s], the head's surge speed as it is, stroke by stroke ripple included
+
+The approach phase lasts from the start until the head is for the first time within 0.05 m of the path and the surge speed,
+averaged over a stroke, within 20 % of the commanded one. A run on an open path ends where its path ends.
+Frame: pool. Errors are wanted minus actual, the cross-track error apart. Source: this project.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_control.path_tracker import PathTracker
+from fish_control.reference_path import ReferencePath
+
+from .errors import UserError
+from .recordings.trial import Odometry, Trial
+
+Array = NDArray[np.float64]
+
+STROKE = 0.5  # s, one rotor period at 2 Hz
+NEAR_PATH = 0.05  # m
+NEAR_SPEED = 0.2  # share of the commanded speed
+CLOSED_GAP = 3.0  # a path whose ends are nearer than so many sample distances is closed
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Size of an error over a run."""
+
+    rmse: float
+    p95: float  # 95th percentile of the absolute value
+    maximum: float  # of the absolute value
+
+    @classmethod
+    def of(cls, error: Array) -> Summary:
+        """Of the samples of an error; nan where there is none."""
+        if not len(error):
+            return cls(float("nan"), float("nan"), float("nan"))
+        size = np.abs(error)
+        return cls(float(np.sqrt(np.mean(error**2))), float(np.percentile(size, 95)), float(size.max()))
+
+
+@dataclass(frozen=True)
+class RunScore:
+    """Errors of one run, (N,) samples from the start of the run to its end.
+
+    Attributes:
+        source: "truth" (the simulator's own pose) or "estimate" (odometry/filtered).
+        t: [s] on the recording's axis. progress: [m] along the path.
+        head_angle: heading error of the head as it swings [rad]. heading: of its mean over a stroke [rad].
+        settled: first sample after the approach phase, N if the run never got there.
+        finished: whether the end of an open path was reached.
+    """
+
+    source: str
+    path: ReferencePath
+    reference_speed: float  # m/s
+    t: Array
+    position: Array  # (N, 2) m
+    speed: Array  # (N,) m/s, surge
+    progress: Array
+    cross_track: Array
+    heading: Array
+    head_angle: Array
+    speed_error: Array
+    settled: int
+    finished: bool
+
+    @property
+    def approach_s(self) -> float:
+        """Length of the approach phase [s]; nan if it never ended."""
+        return float(self.t[self.settled] - self.t[0]) if self.settled < len(self.t) else float("nan")
+
+    def summaries(self, *, with_approach: bool) -> dict[str, Summary]:
+        """Error name -> size, over the whole run or what follows the approach phase."""
+        first = 0 if with_approach else self.settled
+        errors = {
+            "cross-track [m]": self.cross_track,
+            "heading, stroke mean [rad]": self.heading,
+            "heading, head angle [rad]": self.head_angle,
+            "speed [m/s]": self.speed_error,
+        }
+        return {name: Summary.of(error[first:]) for name, error in errors.items()}
+
+
+def score_trial(trial: Trial) -> RunScore:
+    """Score a recording: against the simulator's truth where it was recorded, else the robot's own estimate.
+
+    Raises:
+        UserError: path, speed or odometry is missing.
+    """
+    trial = trial.clean()
+    motion, source = (trial.truth, "truth") if trial.truth is not None else (trial.odometry, "estimate")
+    if motion is None:
+        raise UserError(
+            f"{trial.name}: neither sim/odometry nor odometry/filtered was recorded; there is nothing to score"
+        )
+    if not trial.reference_paths:
+        raise UserError(f"{trial.name}: reference/path was not recorded; there is nothing to score against")
+    if trial.reference_speed is None:
+        raise UserError(f"{trial.name}: reference/speed was not recorded; there is nothing to score against")
+    given = trial.reference_paths[-1]
+    return score_motion(
+        motion, path_from_points(given.points), float(trial.reference_speed.speed[-1]), given.t, source
+    )
+
+
+def path_from_points(points: Array) -> ReferencePath:
+    """The path of a reference/path message, closed if its ends meet."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    closed = bool(np.linalg.norm(points[-1] - points[0]) < CLOSED_GAP * np.median(steps))
+    return ReferencePath.from_points(points, name="recorded", closed=closed)
+
+
+def score_motion(
+    motion: Odometry, path: ReferencePath, reference_speed: float, start: float, source: str
+) -> RunScore:
+    """Errors of a motion against a path followed in order, from time `start` [s] to the end of path or motion."""
+    motion = motion.take(motion.t >= start)
+    if not len(motion):
+        raise UserError("no pose was recorded after the path was given; there is nothing to score")
+    tracker = PathTracker(path)
+    if path.closed:
+        tracker.reset(tracker.nearest(motion.pose[0, :2]))
+    points = [tracker.update(position) for position in motion.pose[:, :2]]
+    n = next((k + 1 for k, point in enumerate(points) if point.finished), len(points))
+    motion, points = motion.take(np.arange(n)), points[:n]
+    chi = np.array([point.heading for point in points])
+    psi = np.unwrap(motion.psi)
+    cross_track = np.array([point.cross_track_error for point in points])
+    speed_error = reference_speed - motion.u
+    mean_speed_error = stroke_mean(motion.t, speed_error)
+    near = (np.abs(cross_track) < NEAR_PATH) & (np.abs(mean_speed_error) < NEAR_SPEED * reference_speed)
+    return RunScore(
+        source=source,
+        path=path,
+        reference_speed=reference_speed,
+        t=motion.t,
+        position=motion.pose[:, :2],
+        speed=motion.u,
+        progress=np.array([point.progress for point in points]),
+        cross_track=cross_track,
+        heading=_wrap(chi - stroke_mean(motion.t, psi)),
+        head_angle=_wrap(chi - psi),
+        speed_error=speed_error,
+        settled=int(np.argmax(near)) if near.any() else n,
+        finished=points[-1].finished,
+    )
+
+
+def stroke_mean(t: Array, value: Array) -> Array:
+    """Mean over one stroke around each sample, by the integral of the piecewise linear signal; shorter at the ends."""
+    if len(t) < 2:
+        return value.copy()
+    integral = np.r_[0.0, np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(t))]
+    before, after = np.maximum(t - STROKE / 2, t[0]), np.minimum(t + STROKE / 2, t[-1])
+    return (np.interp(after, t, integral) - np.interp(before, t, integral)) / np.maximum(after - before, 1e-9)
+
+
+def _wrap(angle: Array) -> Array:
+    return np.angle(np.exp(1j * angle))
