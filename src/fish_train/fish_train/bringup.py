@@ -1,6 +1,7 @@
 """The one table of the robot's nodes, and how each is started.
 
-The pip-only starter (`processes.py`, used by `fish_train demo` and the tests) and launch/fish.launch.py read it.
+The pip-only starter (`processes.py`, used by `fish_train demo` and the tests) and launch/fish.launch.py
+read it.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ def command(spec: NodeSpec, parameters: Parameters | None = None, namespace: str
 def environment(domain: int) -> dict[str, str]:
     """The environment of every node: an own DDS domain on this machine only, one thread for small matrices.
 
-    The ROS wheels start Python a second time with LD_LIBRARY_PATH set and leave a guard variable behind; a child
+    The ROS wheels start Python again with LD_LIBRARY_PATH set and leave a guard variable behind; a child
     gets both (inherited) or, where a caller dropped the path, neither.
     """
     env = dict(os.environ)

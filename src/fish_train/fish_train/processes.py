@@ -121,5 +121,5 @@ class NodeProcesses:
 
 
 def _die_with_parent() -> None:
-    """In the child before it starts: a SIGTERM when the parent dies, so that kill -9 of the starter leaves no node."""
+    """In the child before it starts: SIGTERM when the parent dies, kill -9 of the starter leaves no node."""
     _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -1,12 +1,12 @@
-"""How well a recorded run followed its path: errors over time and their summary, from poses, speeds and the path alone.
+"""How well a recorded run followed its path: errors over time and their summary, from poses and speeds alone.
 
-    e_y   = n(s) . (p - p(s))             cross-track [m], positive: head left of the path; s: progress along the path, in order
-    e_psi = wrap(chi(s) - <psi>)          heading [rad]; <psi>: mean over one stroke of the rotor, 0.5 s, centred
-    e_u   = u_ref - u                     speed [m/s], the head's surge speed as it is, stroke by stroke ripple included
+    e_y   = n(s) . (p - p(s))        cross-track [m], positive: head left of the path; s: progress, in order
+    e_psi = wrap(chi(s) - <psi>)     heading [rad]; <psi>: mean over one stroke of the rotor, 0.5 s, centred
+    e_u   = u_ref - u                speed [m/s], the head's surge speed as it is, each stroke's ripple included
 
-The approach phase lasts from the start until the head is for the first time within 0.05 m of the path and the surge speed,
-averaged over a stroke, within 20 % of the commanded one. A run on an open path ends where its path ends.
-Frame: pool. Errors are wanted minus actual, the cross-track error apart. Source: this project.
+The approach phase lasts from the start until the head is for the first time within 0.05 m of the path and the
+surge speed, averaged over a stroke, within 20 % of the commanded one. A run on an open path ends where its
+path ends. Frame: pool. Errors are wanted minus actual, the cross-track error apart. Source: this project.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class RunScore:
 
 
 def score_trial(trial: Trial) -> RunScore:
-    """Score a recording: against the simulator's truth where it was recorded, else the robot's own estimate.
+    """Score a recording: against the simulator's truth where recorded, else the robot's own estimate.
 
     Raises:
         UserError: path, speed or odometry is missing.
@@ -100,12 +100,12 @@ def score_trial(trial: Trial) -> RunScore:
     motion, source = (trial.truth, "truth") if trial.truth is not None else (trial.odometry, "estimate")
     if motion is None:
         raise UserError(
-            f"{trial.name}: neither sim/odometry nor odometry/filtered was recorded; there is nothing to score"
+            f"{trial.name}: neither sim/odometry nor odometry/filtered was recorded; nothing to score"
         )
     if not trial.reference_paths:
-        raise UserError(f"{trial.name}: reference/path was not recorded; there is nothing to score against")
+        raise UserError(f"{trial.name}: reference/path was not recorded; nothing to score against")
     if trial.reference_speed is None:
-        raise UserError(f"{trial.name}: reference/speed was not recorded; there is nothing to score against")
+        raise UserError(f"{trial.name}: reference/speed was not recorded; nothing to score against")
     given = trial.reference_paths[-1]
     return score_motion(
         motion, path_from_points(given.points), float(trial.reference_speed.speed[-1]), given.t, source
@@ -122,10 +122,10 @@ def path_from_points(points: Array) -> ReferencePath:
 def score_motion(
     motion: Odometry, path: ReferencePath, reference_speed: float, start: float, source: str
 ) -> RunScore:
-    """Errors of a motion against a path followed in order, from time `start` [s] to the end of path or motion."""
+    """Errors of a motion on a path followed in order, from time `start` [s] to the end of path or motion."""
     motion = motion.take(motion.t >= start)
     if not len(motion):
-        raise UserError("no pose was recorded after the path was given; there is nothing to score")
+        raise UserError("no pose was recorded after the path was given; nothing to score")
     tracker = PathTracker(path)
     if path.closed:
         tracker.reset(tracker.nearest(motion.pose[0, :2]))
@@ -156,7 +156,7 @@ def score_motion(
 
 
 def stroke_mean(t: Array, value: Array) -> Array:
-    """Mean over one stroke around each sample, by the integral of the piecewise linear signal; shorter at the ends."""
+    """Mean over one stroke around each sample, of the piecewise linear signal; shorter at the ends."""
     if len(t) < 2:
         return value.copy()
     integral = np.r_[0.0, np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(t))]

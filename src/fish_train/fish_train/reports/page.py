@@ -1,4 +1,4 @@
-"""One self-contained HTML page of tables and plotly figures: opens without a network, a server or other files."""
+"""One self-contained HTML page of tables and plotly figures; opens without network, server or other files."""
 
 from __future__ import annotations
 
