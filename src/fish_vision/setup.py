@@ -25,6 +25,8 @@ setup(
     entry_points={
         "console_scripts": [
             "tracker = fish_vision.nodes.tracker:main",
+            "calibrate = fish_vision.commands.calibrate:main",
+            "check_image = fish_vision.commands.check_image:main",
         ],
     },
 )

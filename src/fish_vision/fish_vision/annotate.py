@@ -61,6 +61,6 @@ def _line(
 
 
 def _text(picture: Image, text: str, colour: tuple[int, int, int]) -> Image:
-    cv2.putText(picture, text, (12, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (0, 0, 0), 4, cv2.LINE_AA)
+    cv2.rectangle(picture, (0, 0), (picture.shape[1], 34), (40, 40, 40), cv2.FILLED)
     cv2.putText(picture, text, (12, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, 1, cv2.LINE_AA)
     return picture

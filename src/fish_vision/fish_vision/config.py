@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 from math import isfinite
+from pathlib import Path
+
+import yaml
 
 from fish_vision.calibration import Mount
 from fish_vision.pose import MarkerLayout
@@ -78,6 +81,21 @@ class TrackerConfig:
     def colour(self, marker: str) -> ColourRange:
         """The range of marker `front`, `rear`, `tail_odd` or `tail_even`."""
         return ColourRange(*getattr(self, f"{marker}_colour"))
+
+
+def config_from_file(path: Path) -> TrackerConfig:
+    """Parameters from a ROS params file (the part under `/**` or `/fish/tracker`).
+
+    Raises:
+        ValueError: not such a file, an unknown parameter, or a value out of range.
+    """
+    try:
+        content = yaml.safe_load(path.read_text())
+        part = content.get("/fish/tracker", content.get("/**"))["ros__parameters"]
+        values = {key: tuple(value) if isinstance(value, list) else value for key, value in part.items()}
+        return TrackerConfig(**values)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
+        raise ValueError(f"{path}: not a params file of the tracker ({error})") from error
 
 
 _LISTS = (

@@ -12,6 +12,8 @@ CONVERSIONS = {  # encoding -> channels, conversion to bgr8
     "rgba8": (4, cv2.COLOR_RGBA2BGR),
     "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
 }
+JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
+TRAILER = 64  # bytes at the end in which a JPEG must end; some cameras pad
 
 
 class PictureError(ValueError):
@@ -25,6 +27,8 @@ def from_compressed(data: bytes, size: tuple[int, int]) -> Image:
         PictureError: not an image, or not of the expected size (width, height).
     """
     packed = np.frombuffer(data, np.uint8)
+    if packed[:2].tobytes() == JPEG_START and JPEG_END not in packed[-TRAILER:].tobytes():
+        raise PictureError(f"JPEG picture cut off after {packed.size} bytes")
     try:
         picture = cv2.imdecode(packed, cv2.IMREAD_COLOR) if packed.size else None
     except cv2.error as error:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +10,14 @@ from numpy.typing import NDArray
 from fish_vision.calibration import POOL, Calibration
 from fish_vision.config import TrackerConfig
 from fish_vision.pose import HeadPose, Spot, head_pose, pick_head, tail_angles, tail_is_ahead, wrap
-from fish_vision.segmentation import Blob, Box, Image, around, find_blobs, hsv_of
+from fish_vision.segmentation import Box, Image, around, hsv_of
+from fish_vision.spots import SpotFinder
 
 Array = NDArray[np.float64]
 
 COARSE = (
     2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
 )
-CANDIDATES = 6  # blobs of a colour that are considered, largest first
 JUMP_DISTANCE = 0.03  # m, never counted as a jump
 JUMP_TURN = 0.3  # rad, never counted as a jump
 
@@ -65,8 +64,7 @@ class Tracker:
     def __init__(self, config: TrackerConfig, calibration: Calibration) -> None:
         self._config, self._calibration = config, calibration
         self._layout = config.layout()
-        _, scale = calibration.place_and_scale(calibration.pool_to_pixel([[0.0, 0.0]]))
-        self._pixel = float(abs(np.linalg.det(scale[0])))  # m^2 of water that a pixel shows in the middle
+        self._finder = SpotFinder(config, calibration)
         self._last: Detection | None = None
 
     def track(self, image: Image, stamp: float) -> Detection | Lost:
@@ -88,7 +86,7 @@ class Tracker:
         """Find the head's markers at low resolution, then measure around them."""
         box = (0, 0, image.shape[1], image.shape[0])
         hsv = hsv_of(np.ascontiguousarray(image[::COARSE, ::COARSE]), box)
-        head = self._pick(*(self._spots(hsv, m, (0, 0), COARSE) for m in ("front", "rear")))
+        head = self._pick(*(self._finder.find(hsv, m, (0, 0), COARSE) for m in ("front", "rear")))
         if isinstance(head, Reason):
             return Lost(stamp, head)
         middle = (head[0].position + head[1].position) / 2
@@ -100,12 +98,12 @@ class Tracker:
         if box[0] >= box[2] or box[1] >= box[3]:
             return Lost(stamp, Reason.OUTSIDE)
         hsv = hsv_of(image, box)
-        pair = self._pick(*(self._spots(hsv, m, box[:2]) for m in ("front", "rear")))
+        pair = self._pick(*(self._finder.find(hsv, m, box[:2]) for m in ("front", "rear")))
         if isinstance(pair, Reason):
             return Lost(stamp, pair)
         head = head_pose(*pair, self._layout)
         tail = (
-            [self._spots(hsv, m, box[:2]) for m in ("tail_odd", "tail_even")]
+            [self._finder.find(hsv, m, box[:2]) for m in ("tail_odd", "tail_even")]
             if self._config.tail_links
             else []
         )
@@ -119,37 +117,6 @@ class Tracker:
         r = self._config.roi_radius
         corners = np.array([x, y]) + r * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
         return around(self._calibration.pool_to_pixel(corners), self._calibration.lens.size)
-
-    def _spots(self, hsv: Image, marker: str, origin: tuple[int, int], step: int = 1) -> list[Spot]:
-        """Spots of a marker's colour and size; hsv shows every step-th pixel from the origin on."""
-        config = self._config
-        diameter = config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
-        disc = pi / 4 * diameter**2
-        pixel = self._pixel * step**2
-        limits = (0.5 * config.area_min * disc / pixel, 2.0 * config.area_max * disc / pixel)
-        blobs = find_blobs(hsv, config.colour(marker), limits)[:CANDIDATES]
-        return self._spots_of_size(_enlarged(blobs, origin, step), disc)
-
-    def _spots_of_size(self, blobs: Sequence[Blob], disc: float) -> list[Spot]:
-        """Blobs as spots in the pool, without those whose area does not fit a disc (m^2) at their place.
-
-            std = pixel_std / sqrt(share) + diameter (1 - share) / 8,  share = area / disc area, at most 1
-
-        in pixels: the second term is what a partly hidden disc's middle moves.
-        """
-        if not blobs:
-            return []
-        pixels = np.array([[b.u, b.v] for b in blobs])
-        places, J = self._calibration.place_and_scale(pixels)
-        shares = np.array([b.area for b in blobs]) * np.abs(np.linalg.det(J)) / disc
-        diameters = np.sqrt([4 / pi * b.area for b in blobs])
-        hidden = np.maximum(1.0 - shares, 0.0)
-        std = self._config.pixel_std / np.sqrt(np.minimum(shares, 1.0)) + diameters * hidden / 8
-        return [
-            Spot(places[i], std[i] ** 2 * J[i] @ J[i].T)
-            for i in range(len(blobs))
-            if self._config.area_min <= shares[i] <= self._config.area_max
-        ]
 
     def _pick(self, front: Sequence[Spot], rear: Sequence[Spot]) -> tuple[Spot, Spot] | Reason:
         if not front:
@@ -177,8 +144,3 @@ class Tracker:
         far = np.hypot(head.x - last.x, head.y - last.y) > self._config.max_speed * dt + JUMP_DISTANCE
         turned = abs(wrap(head.heading - last.heading)) > self._config.max_yaw_rate * dt + JUMP_TURN
         return Reason.JUMP if far or turned else None
-
-
-def _enlarged(blobs: Sequence[Blob], origin: tuple[int, int], step: int) -> list[Blob]:
-    """Blobs in pixels of the whole image; column i of a thinned image is column i step of the whole one."""
-    return [Blob(b.u * step + origin[0], b.v * step + origin[1], b.area * step**2) for b in blobs]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fish_sim.camera.fish import FishPose, FishShape, patches, silhouette
 from fish_sim.camera.model import CameraModel
-from fish_sim.camera.water import DEPTH, MovingLight, moving_light, still_pool, vignette
+from fish_sim.camera.water import DEPTH, moving_light, still_pool, vignette
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -43,9 +43,12 @@ class PoolRenderer:
         self._shape, self._look = shape, look
         self._pool = still_pool(camera, look.seed)
         self._light_share = vignette(camera)
-        self._moving: MovingLight = moving_light(camera, look.glare, look.seed)
+        self._caustics, self._glare = moving_light(camera, look.glare, look.seed)
         self._random = np.random.default_rng(look.seed)
         self._noise, self._noise_mean = _noise_tile(camera.size, look.noise_std, self._random)
+        # kept between frames: fresh megabytes cost more in page faults than the sums made in them
+        self._picture, self._light = np.empty_like(self._pool), np.empty_like(self._pool)
+        self._grey = np.empty(self._pool.shape[:2], np.uint8)
 
     def render(self, poses: Sequence[FishPose], time: float) -> Image:
         """(height, width, 3) picture, blue green red.
@@ -54,12 +57,17 @@ class PoolRenderer:
             poses: the fish at equal parts of the exposure (one pose = no motion blur, none = empty pool).
             time: s, moves the light on the water.
         """
-        caustics, glare = self._moving.at(time, self.camera.size)
-        picture = cv2.add(self._pool, cv2.cvtColor(caustics, cv2.COLOR_GRAY2BGR))
+        picture = self._picture
+        self._add_light(self._pool, self._caustics.at(time), picture)
         if poses:
             self._draw_fish(picture, poses)
-        cv2.add(picture, cv2.cvtColor(glare, cv2.COLOR_GRAY2BGR), dst=picture)
+        self._add_light(picture, self._glare.at(time), picture)
         return self._with_noise(picture)
+
+    def _add_light(self, picture: Image, coarse: Image, result: Image) -> None:
+        cv2.resize(coarse, self.camera.size, dst=self._grey)
+        cv2.cvtColor(self._grey, cv2.COLOR_GRAY2BGR, dst=self._light)
+        cv2.add(picture, self._light, dst=result)
 
     def jpeg(self, picture: Image) -> bytes:
         """The picture as JPEG with 4:2:2 colour, as webcams send it."""

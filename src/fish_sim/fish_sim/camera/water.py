@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fish_sim.camera.model import CameraModel
 
@@ -28,7 +28,7 @@ def still_pool(camera: CameraModel, seed: int) -> Image:
     rays = camera.rays(pixels)
     x, y, z = camera.position
     surface = np.array([x, y]) - rays[:, :2] * (z / rays[:, 2])[:, None]
-    colour = _colours(surface, _through_water(surface, rays))
+    colour = _colours(surface, _through_water(surface, rays), z / camera.focal[0])
     grain = np.random.default_rng(seed).normal(0.0, 1.0, (height // 8 + 1, width // 8 + 1)).astype(np.float32)
     grain = cv2.resize(grain, (width, height), interpolation=cv2.INTER_CUBIC).reshape(-1, 1)
     picture = (colour + 2.0 * grain).reshape(height, width, 3) * vignette(camera)[..., None]
@@ -56,43 +56,45 @@ def _through_water(surface: Array, rays: Array) -> Array:
     return np.column_stack([surface + sideways * depth[:, None], -depth])
 
 
-def _colours(surface: Array, end: Array) -> Array:
-    """(N, 3) colour of every pixel from where its ray meets the surface plane and where it ends."""
+def _colours(surface: Array, end: Array, pixel: float) -> Array:
+    """(N, 3) colour of every pixel from where its ray meets the surface plane and where it ends.
+
+    Edges are blended over about a pixel (m) so that they do not show steps.
+    """
     half = np.array(POOL) / 2
     outside = np.max(np.abs(surface) - half, axis=1)
-    tile = np.abs((end[:, :2] / TILE) % 1.0 - 0.5)
-    colour = np.where((tile.max(axis=1) > 0.485)[:, None], GROUT, FLOOR).astype(float)
-    lane = (np.abs(end[:, 1]) < 0.06) & (np.abs(end[:, 0]) < half[0] - 0.35)
-    colour[lane] = LANE
-    colour[end[:, 2] > -DEPTH + 1e-9] = WALL
+    tile = np.abs((end[:, :2] / TILE) % 1.0 - 0.5).max(axis=1)
+    lane = np.maximum(np.abs(end[:, 1]) - 0.06, np.abs(end[:, 0]) - half[0] + 0.35)
+    colour = np.broadcast_to(np.array(FLOOR, float), (len(end), 3))
+    colour = _blend(colour, GROUT, (tile - 0.485) * TILE / pixel)
+    colour = _blend(colour, LANE, -lane / pixel)
+    colour = _blend(colour, WALL, (end[:, 2] + DEPTH) / pixel - 0.5)
     colour *= (1.0 - 0.25 * np.exp(-np.maximum(-outside, 0.0) / 0.10))[:, None]  # darker below the rim
-    colour[outside > 0] = TOP
-    colour[outside > RIM] = DECK
-    shade = np.clip((outside - RIM) / 0.06, 0.0, 1.0)  # the rim's shadow on the deck
-    colour[outside > RIM] *= (0.7 + 0.3 * shade[outside > RIM])[:, None]
-    return colour
+    deck = (
+        np.array(DECK) * (0.7 + 0.3 * np.clip((outside - RIM) / 0.06, 0.0, 1.0))[:, None]
+    )  # in the rim's shadow
+    return _blend(_blend(colour, TOP, outside / pixel), deck, (outside - RIM) / pixel)
+
+
+def _blend(colour: Array, other: ArrayLike, distance: Array) -> Array:
+    """other where distance (pixels beyond an edge) is positive, with one pixel of transition."""
+    share = np.clip(distance + 0.5, 0.0, 1.0)[:, None]
+    return colour * (1.0 - share) + np.asarray(other, float) * share
 
 
 @dataclass(frozen=True)
-class MovingLight:
-    """A loop of coarse grey pictures: caustics (on the floor) and glare (lamps mirrored in the surface).
+class LightLoop:
+    """A loop of coarse grey pictures of moving light. It closes, so any time can be asked."""
 
-    Coarse = a quarter of the image in each direction. The loop closes, so any time can be asked.
-    """
-
-    caustics: NDArray[np.uint8]  # (frames, h, w)
-    glare: NDArray[np.uint8]  # (frames, h, w)
+    frames: Image  # (frames, h, w)
     period: float  # s
 
-    def at(self, time: float, size: tuple[int, int]) -> tuple[Image, Image]:
-        """Caustics and glare at a time, each (height, width), to be added to the picture."""
-        frames = len(self.caustics)
-        place = (time / self.period) % 1.0 * frames
-        i, part = int(place) % frames, place - int(place)
-        return tuple(  # type: ignore[return-value]
-            cv2.resize(cv2.addWeighted(loop[i], 1 - part, loop[(i + 1) % frames], part, 0), size)
-            for loop in (self.caustics, self.glare)
-        )
+    def at(self, time: float) -> Image:
+        """(h, w) light at a time, s, to be enlarged and added to the picture."""
+        count = len(self.frames)
+        place = (time / self.period) % 1.0 * count
+        i, part = int(place) % count, place - int(place)
+        return cv2.addWeighted(self.frames[i], 1 - part, self.frames[(i + 1) % count], part, 0)
 
 
 COARSE = 4  # pixels of the image per coarse pixel
@@ -107,8 +109,11 @@ LAMPS = (
 
 def moving_light(
     camera: CameraModel, strength: float, seed: int, frames: int = 40, period: float = 4.0
-) -> MovingLight:
-    """Make the loop: ripples are sums of travelling waves whose frequencies are multiples of 1 / period."""
+) -> tuple[LightLoop, LightLoop]:
+    """Caustics on the floor and glare of lamps mirrored in the surface, strength 0 to 3.
+
+    Ripples are sums of travelling waves whose frequencies are multiples of 1 / period.
+    """
     width, height = camera.size
     pixels = np.stack(np.meshgrid(np.arange(0, width, COARSE), np.arange(0, height, COARSE)), axis=-1)
     place = (
@@ -124,7 +129,7 @@ def moving_light(
         loops[0].append(np.where(inside, 30.0 * np.exp(-((1.6 * broad) ** 2)), 0.0).astype(np.uint8))
         sparkle = 14.0 * lamps + 300.0 * lamps * np.clip(fine - 0.95, 0.0, 1.0)
         loops[1].append(np.clip(np.where(inside, strength * sparkle, 0.0), 0, 255).astype(np.uint8))
-    return MovingLight(np.array(loops[0]), np.array(loops[1]), period)
+    return LightLoop(np.array(loops[0]), period), LightLoop(np.array(loops[1]), period)
 
 
 def _waves(random: np.random.Generator, count: int, wavenumber: float) -> Array:

@@ -1,0 +1,97 @@
+"""calibrate lens | mount: make the two files that tell the tracker about its camera."""
+
+import argparse
+import csv
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import yaml
+
+from fish_vision.calibrate import lens_from_chessboards, mount_from_points
+from fish_vision.calibration import CalibrationError, lens_document, read_lens
+
+RMS_LIMIT = 5.0  # pixels; worse points are swapped or mistyped
+
+
+def arguments() -> argparse.ArgumentParser:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="calibrate", description=__doc__)
+    verbs = parser.add_subparsers(required=True)
+    lens = verbs.add_parser("lens", help="camera matrix and distortion from chessboard pictures")
+    lens.add_argument("pictures", nargs="+", type=Path)
+    lens.add_argument("--corners", required=True, help="inner corners, for example 8x6")
+    lens.add_argument("--square", required=True, type=float, help="side of a square, m")
+    lens.add_argument(
+        "--out", type=Path, default=Path("camera.yaml"), help="for the camera's camera_info_url"
+    )
+    lens.set_defaults(run=calibrate_lens)
+    mount = verbs.add_parser("mount", help="position and tilt of the camera from known points of the pool")
+    mount.add_argument("points", type=Path, help="CSV with header x,y,u,v: pool frame, m, and pixels")
+    mount.add_argument("--lens", required=True, type=Path, help="file written by `calibrate lens`")
+    mount.add_argument("--height", type=float, default=0.0, help="of the points above the water, m")
+    mount.add_argument("--out", type=Path, default=Path("mount.yaml"), help="params file for the tracker")
+    mount.set_defaults(run=calibrate_mount)
+    return parser
+
+
+def calibrate_lens(args: argparse.Namespace) -> None:
+    """Write a camera calibration file."""
+    sides = args.corners.lower().split("x")
+    if len(sides) != 2 or not all(s.isdigit() and int(s) > 2 for s in sides) or args.square <= 0.0:
+        raise CalibrationError(f"--corners {args.corners} --square {args.square}: expected like 8x6 and 0.03")
+    pictures = [read_picture(path) for path in args.pictures]
+    lens, rms, used = lens_from_chessboards(pictures, (int(sides[0]), int(sides[1])), args.square)
+    args.out.write_text(yaml.safe_dump(lens_document(lens, "overhead"), sort_keys=False))
+    print(f"{args.out}: board found in {len(used)} of {len(pictures)} pictures, error {rms:.3f} pixels rms")
+
+
+def calibrate_mount(args: argparse.Namespace) -> None:
+    """Write a params file with camera_position and camera_tilt."""
+    rows = read_points(args.points)
+    points = np.column_stack([rows[:, :2], np.full(len(rows), args.height)])
+    mount, rms = mount_from_points(read_lens(args.lens), points, rows[:, 2:])
+    if rms > RMS_LIMIT:
+        raise CalibrationError(
+            f"{args.points}: the points fit to {rms:.1f} pixels rms only: expected below {RMS_LIMIT}; "
+            "a point is mistaken or the lens file is of another camera"
+        )
+    values = {"camera_position": list(mount.position), "camera_tilt": list(mount.tilt)}
+    args.out.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
+    print(
+        f"{args.out}: {len(rows)} points, error {rms:.2f} pixels rms, camera {mount.position[2]:.3f} m high"
+    )
+
+
+def read_picture(path: Path) -> np.ndarray:
+    """Picture from a file."""
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise CalibrationError(f"{path}: no such picture, or not one that OpenCV reads")
+    return picture
+
+
+def read_points(path: Path) -> np.ndarray:
+    """(N, 4) x, y, u, v from a CSV file with a header."""
+    try:
+        with path.open(newline="") as file:
+            rows = [[float(row[key]) for key in ("x", "y", "u", "v")] for row in csv.DictReader(file)]
+    except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+        raise CalibrationError(f"{path}: expected CSV with header x,y,u,v and numbers ({error})") from error
+    return np.array(rows).reshape(-1, 4)
+
+
+def main() -> int:
+    """Entry point."""
+    args = arguments().parse_args()
+    try:
+        args.run(args)
+    except (CalibrationError, OSError) as error:
+        print(f"calibrate: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
