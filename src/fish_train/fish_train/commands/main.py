@@ -9,6 +9,7 @@ from functools import partial
 from importlib import import_module
 
 from fish_train.errors import UserError
+
 from .verbs import VERBS
 
 

@@ -11,17 +11,16 @@ import sys
 import time
 from datetime import datetime
 from functools import partial
-from importlib import import_module
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from fish_sim.nodes.start import read_parameters, run
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
+from fish_sim.nodes.start import read_parameters, run
 from fish_train.errors import UserError
-from fish_train.recordings.mcap_writer import McapRecording, Topic
+from fish_train.nodes.raw_topics import from_profile, message_class, to_profile
+from fish_train.recordings.mcap_writer import DiskFullError, McapRecording, Topic
 from fish_train.recordings.qos import Qos
 from fish_train.recordings.recorder_config import RecorderConfig, common_qos, is_selected
 
@@ -55,7 +54,7 @@ class RecorderNode(Node):
     def _follow(self, topic: str, msgtype: str) -> None:
         key = (topic, msgtype)
         offered = [
-            _recorded_qos(info.qos_profile)
+            from_profile(info.qos_profile)
             for info in self.get_publishers_info_by_topic(topic)
             if info.topic_type == msgtype and info.node_name != self.get_name()
         ]
@@ -68,14 +67,16 @@ class RecorderNode(Node):
         if current is not None:
             self.destroy_subscription(current[0])
         try:
+            message = message_class(msgtype)
             entry = self.recording.add_topic(topic, msgtype, offered[0])
-            message = _message_class(msgtype)
-        except (UserError, ImportError, AttributeError) as error:
+        except DiskFullError:
+            raise
+        except UserError as error:
             self._refused.add(key)
             self.get_logger().error(f"{topic} is not recorded: {error}")
             return
         callback = partial(self._store, entry)
-        subscription = self.create_subscription(message, topic, callback, _profile(wanted), raw=True)
+        subscription = self.create_subscription(message, topic, callback, to_profile(wanted), raw=True)
         self._subscriptions_of[key] = (subscription, wanted)
         self.get_logger().info(f"recording {topic} ({msgtype})")
 
@@ -114,27 +115,6 @@ class RecorderNode(Node):
             flush=True,
         )
         super().destroy_node()
-
-
-def _message_class(msgtype: str) -> type:
-    package, _, name = msgtype.split("/")
-    return getattr(import_module(f"{package}.msg"), name)
-
-
-def _recorded_qos(profile: QoSProfile) -> Qos:
-    return Qos(
-        reliable=profile.reliability != ReliabilityPolicy.BEST_EFFORT,
-        transient_local=profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
-        depth=max(1, profile.depth),
-    )
-
-
-def _profile(qos: Qos) -> QoSProfile:
-    return QoSProfile(
-        depth=qos.depth,
-        reliability=ReliabilityPolicy.RELIABLE if qos.reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if qos.transient_local else DurabilityPolicy.VOLATILE,
-    )
 
 
 def main() -> int:

@@ -9,14 +9,14 @@ from typing import Protocol
 
 import yaml
 
-from .message_types import message_type
+from .message_types import MessageType
 from .qos import Qos
 
 
 class RecordedTopic(Protocol):
     """What is said of a topic."""
 
-    type: str
+    message_type: MessageType
     qos: Qos
     count: int
 
@@ -69,10 +69,10 @@ def _topic(topic: RecordedTopic) -> dict:
     return {
         "topic_metadata": {
             "name": topic.name,
-            "type": topic.type,
+            "type": topic.message_type.name,
             "serialization_format": "cdr",
             "offered_qos_profiles": topic.qos.profiles(),
-            "type_description_hash": message_type(topic.type).hash,
+            "type_description_hash": topic.message_type.hash,
         },
         "message_count": topic.count,
     }

@@ -28,6 +28,7 @@ from mcap.records import (
     McapRecord,
     Message,
     MessageIndex,
+    Metadata,
     Schema,
     Statistics,
     SummaryOffset,
@@ -35,13 +36,17 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 from .bag_metadata import write_metadata
-from .message_types import message_type
+from .message_types import MessageType, message_type
 from .problem import RecordingError
 from .qos import Qos
 
 CHUNK_BYTES = 1 << 20
 RESERVE_BYTES = 128 * 1024  # given back when the disk is full, to close the recording with
 RESERVE_NAME = ".reserve"
+LIBRARY = "fish_train"
+CUSTOM_NAME = (
+    "fish_train"  # metadata record that keeps the custom data even if metadata.yaml is never written
+)
 
 
 class DiskFullError(RecordingError):
@@ -53,7 +58,7 @@ class Topic:
     """One topic of a recording."""
 
     channel: Channel
-    type: str
+    message_type: MessageType
     qos: Qos
     count: int = 0
 
@@ -96,7 +101,8 @@ class McapRecording:
         self._file = self.path.open("xb", buffering=0)
         self._good = 0  # bytes up to the end of the last whole record
         self._keep_reserve()
-        self._append(MCAP0_MAGIC + _records(Header("ros2", "fish_train")))
+        start = [Header("ros2", LIBRARY), Metadata(CUSTOM_NAME, self.custom)]
+        self._append(MCAP0_MAGIC + _records(*start))
 
     def __enter__(self) -> McapRecording:
         return self
@@ -114,20 +120,24 @@ class McapRecording:
         """Bytes on disk."""
         return self._good
 
-    def add_topic(self, name: str, msgtype: str, qos: Qos | None = None) -> Topic:
+    def add_topic(self, name: str, msgtype: str | MessageType, qos: Qos | None = None) -> Topic:
         """Announce a topic; the same name and type again give the same topic.
+
+        Args:
+            msgtype: name of a common interface, or the definition of any type.
 
         Raises:
             RecordingError: the type is unknown.
         """
-        known = self.topics.get((name, msgtype))
+        kind = message_type(msgtype) if isinstance(msgtype, str) else msgtype
+        known = self.topics.get((name, kind.name))
         if known is not None:
             return known
-        schema = self._schemas.get(msgtype)
+        schema = self._schemas.get(kind.name)
         new: list[McapRecord] = []
         if schema is None:
-            text = message_type(msgtype).definition.encode()
-            schema = Schema(id=len(self._schemas) + 1, name=msgtype, encoding="ros2msg", data=text)
+            data = kind.definition.encode()
+            schema = Schema(id=len(self._schemas) + 1, name=kind.name, encoding=kind.encoding, data=data)
             new.append(schema)
         qos = qos or Qos()
         channel = Channel(
@@ -138,8 +148,8 @@ class McapRecording:
             metadata={"offered_qos_profiles": yaml.safe_dump(qos.profiles(), sort_keys=False)},
         )
         self._append_or_close(_records(*new, channel))
-        self._schemas[msgtype] = schema
-        topic = self.topics[name, msgtype] = Topic(channel, msgtype, qos)
+        self._schemas[kind.name] = schema
+        topic = self.topics[name, kind.name] = Topic(channel, kind, qos)
         return topic
 
     def write(self, topic: Topic, time_ns: int, data: bytes) -> None:
@@ -251,7 +261,7 @@ class McapRecording:
         channels = [topic.channel for topic in self.topics.values()]
         first, last = self._range or (0, 0)
         statistics = Statistics(
-            attachment_count=0, channel_count=len(channels), chunk_count=len(self._chunks), metadata_count=0,
+            attachment_count=0, channel_count=len(channels), chunk_count=len(self._chunks), metadata_count=1,
             channel_message_counts={topic.channel.id: topic.count for topic in self.topics.values()},
             message_count=self.message_count, message_start_time=first, message_end_time=last,
             schema_count=len(self._schemas),

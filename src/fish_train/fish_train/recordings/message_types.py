@@ -16,8 +16,9 @@ class MessageType:
     """A type as it stands in an MCAP schema and in metadata.yaml."""
 
     name: str  # "sensor_msgs/msg/Imu"
-    definition: str  # concatenated ros2msg text
-    hash: str  # RIHS01
+    definition: str  # concatenated text of the type and those it uses
+    hash: str = ""  # RIHS01, "" if not known
+    encoding: str = "ros2msg"  # of the definition
 
 
 @lru_cache(maxsize=2)

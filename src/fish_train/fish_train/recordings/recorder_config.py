@@ -24,7 +24,9 @@ class RecorderConfig:
     output: str = "recordings"  # folder in which every recording gets a folder of its own
     name: str = ""  # name of that folder; empty: fish_<date>_<time>
     robot: str = ""  # stored with the recording: which robot this was
-    topics: tuple[str, ...] = DEFAULT_TOPICS  # names or patterns, relative to the node's namespace or absolute
+    topics: tuple[str, ...] = (
+        DEFAULT_TOPICS  # names or patterns, relative to the node's namespace or absolute
+    )
     chunk_s: float = 0.5  # s; what a killed recorder loses at most, 0.05 to 1
     discovery_s: float = 0.1  # s; how often new topics are looked for, 0.02 to 5
 
