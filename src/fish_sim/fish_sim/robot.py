@@ -18,7 +18,7 @@ import yaml
 
 from fish_sim.effects import EFFECTS
 from fish_sim.parameter import Parameter
-from fish_sim.sensor_effects import SENSOR_EFFECTS
+from fish_sim.sensors import SENSOR_EFFECTS
 
 FORMAT = 1
 STRIP_ADDED_MASS = (

@@ -17,8 +17,8 @@ class NonuniformCurrent(Effect):
         V_x =  strain x + shear_x y - gyre sin(pi y / W) cos(pi x / L)
         V_y = shear_y x - strain y  + gyre (W / L) sin(pi x / L) cos(pi y / W)
 
-    L, W: length and width of the pool. Both parts are divergence-free; gyre > 0 turns counter-clockwise and is
-    the speed reached at the middle of the long walls. A solid rotation is shear_y = -shear_x. Frame: pool.
+    L, W: length and width of the pool. Both parts are divergence-free; gyre > 0 turns counter-clockwise and
+    is the speed reached at the middle of the long walls. A solid rotation is shear_y = -shear_x. Frame: pool.
     """
 
     name = "nonuniform_current"

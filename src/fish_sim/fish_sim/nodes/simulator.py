@@ -1,0 +1,177 @@
+"""The simulated fish in its pool: what the robot's drivers would publish, and the truth.
+
+In: joint_command (sensor_msgs/JointState, names rotor and rudder; rotor: velocity in rad/s, rudder: position
+in rad). Out, 100 Hz: joint_states (rotor encoder), imu/data, sim/odometry (nav_msgs/Odometry, the truth,
+pool -> base_link), sim/joint_states (tail_1 .. relative angles, rad), /clock; 1 Hz: battery_state,
+/diagnostics; with camera:=pose also camera/pose. Services: pause (std_srvs/SetBool), reset (std_srvs/Trigger).
+
+Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
+nodes may use either clock at factor 1. Without use_sim_time it is set to the wall clock's after a pause or lag.
+"""
+
+import time
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool, Trigger
+
+from fish_sim.model import DT
+from fish_sim.nodes import simulator_messages as messages
+from fish_sim.nodes.pacer import Pacer
+from fish_sim.nodes.start import read_parameters, run
+from fish_sim.robot import Robot, load_robot
+from fish_sim.simulation import Readings, Simulation
+from fish_sim.simulation_config import SimulatorConfig
+
+QUEUE = 10
+SLOW = 0.95  # share of the asked pace below which the node says that it lags
+
+
+class SimulatorNode(Node):
+    """Messages in and out; physics and sensors are in Simulation, the pace in Pacer."""
+
+    def __init__(self) -> None:
+        super().__init__("simulator", namespace="fish")
+        self._config = config = read_parameters(self, SimulatorConfig)
+        robot = load_robot(config.robot_file) if config.robot_file else Robot()
+        self._simulation = Simulation(robot, config)
+        self._follows_wall = not self.get_parameter("use_sim_time").value and config.real_time_factor == 1.0
+        self._paused = config.paused
+        self._refused = self._divergences = 0
+        self._refusal = ""
+        self._create_interfaces(config.camera == "pose")
+        self._start_ns = time.time_ns()
+        self._pacer = Pacer(config.real_time_factor, DT, time.monotonic())
+        self._reported = (time.monotonic(), self._simulation.time, 0.0)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(
+            DT / config.real_time_factor if config.real_time_factor else 0.0, self._tick, clock=steady
+        )
+        self.create_timer(1.0, self._report, clock=steady)
+
+    def _create_interfaces(self, camera_pose: bool) -> None:
+        clock_qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._clock_publisher = self.create_publisher(ClockMessage, "/clock", clock_qos)
+        self._joints = self.create_publisher(JointState, "joint_states", QUEUE)
+        self._imu = self.create_publisher(Imu, "imu/data", QUEUE)
+        self._odometry = self.create_publisher(Odometry, "sim/odometry", QUEUE)
+        self._tail = self.create_publisher(JointState, "sim/joint_states", QUEUE)
+        self._battery = self.create_publisher(BatteryState, "battery_state", QUEUE)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
+        self._camera = (
+            self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE) if camera_pose else None
+        )
+        self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
+        self.create_service(SetBool, "pause", self._on_pause)
+        self.create_service(Trigger, "reset", self._on_reset)
+
+    def _on_command(self, msg: JointState) -> None:
+        try:
+            self._simulation.command(*messages.command(msg))
+        except ValueError as error:
+            self._refused += 1
+            self._refusal = str(error)
+
+    def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        if self._paused and not request.data:
+            self._restart_pace()
+        self._paused = request.data
+        response.success, response.message = True, "paused" if self._paused else "running"
+        return response
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._simulation.reset()
+        response.success, response.message = True, "at rest at the start pose; time goes on"
+        return response
+
+    def _restart_pace(self) -> None:
+        self._pacer.restart(time.monotonic())
+        if self._follows_wall:
+            self._start_ns = time.time_ns() - round(self._simulation.time * 1e9)
+
+    def _tick(self) -> None:
+        if self._paused:
+            return
+        lost = self._pacer.lost
+        periods = self._pacer.due(time.monotonic())
+        if self._pacer.lost > lost:
+            self._restart_pace()
+        for _ in range(periods):
+            try:
+                self._publish(self._simulation.advance())
+            except FloatingPointError as error:
+                self._divergences += 1
+                self.get_logger().error(str(error))
+
+    def _stamp(self, simulated: float) -> Time:
+        seconds, nanoseconds = divmod(self._start_ns + round(simulated * 1e9), 1_000_000_000)
+        return Time(sec=seconds, nanosec=nanoseconds)
+
+    def _publish(self, readings: Readings) -> None:
+        stamp = self._stamp(readings.time)
+        self._clock_publisher.publish(ClockMessage(clock=stamp))
+        pool, body = Header(stamp=stamp, frame_id="pool"), Header(stamp=stamp, frame_id="base_link")
+        self._tail.publish(messages.tail(body, readings.truth))
+        self._odometry.publish(messages.odometry(pool, readings.truth))
+        self._joints.publish(messages.rotor(body, readings.rotor))
+        self._imu.publish(messages.imu(Header(stamp=stamp, frame_id="imu_link"), readings.imu, self._config))
+        if readings.battery is not None:
+            self._battery.publish(messages.battery(body, readings.battery))
+        if self._camera is not None:
+            for sample in readings.camera:
+                header = Header(stamp=self._stamp(sample.stamp), frame_id="pool")
+                self._camera.publish(messages.camera_pose(header, sample, self._config))
+
+    def _report(self) -> None:
+        """Diagnostics, once a second."""
+        now, simulated, lost = time.monotonic(), self._simulation.time, self._pacer.lost
+        then, simulated_then, lost_then = self._reported
+        self._reported = (now, simulated, lost)
+        pace = (simulated - simulated_then) / (now - then)
+        level, text = self._judge(pace, lost - lost_then)
+        values = {
+            "real_time_factor": f"{pace:.3f}",
+            "simulated_s": f"{simulated:.2f}",
+            "lost_s": f"{lost:.2f}",
+            "command_age_s": f"{self._simulation.command_age:.2f}",
+            "commands_refused": str(self._refused),
+            "resets": str(self._simulation.resets),
+            "divergences": str(self._divergences),
+        }
+        status = messages.status(self.get_fully_qualified_name(), level, text, values)
+        header = Header(stamp=self._stamp(simulated))
+        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
+        self._refusal = ""
+
+    def _judge(self, pace: float, lost: float) -> tuple[bytes, str]:
+        """Worst news first."""
+        if self._divergences:
+            return DiagnosticStatus.ERROR, f"the motion diverged {self._divergences} times"
+        if self._refusal:
+            return DiagnosticStatus.WARN, f"joint_command refused: {self._refusal}"
+        if self._paused:
+            return DiagnosticStatus.OK, "paused"
+        if lost > 0.0:
+            return DiagnosticStatus.WARN, f"behind real time, {lost:.2f} s skipped in the last second"
+        if pace < SLOW * self._config.real_time_factor:
+            return DiagnosticStatus.WARN, f"behind real time, running at {pace:.2f}"
+        if self._simulation.command_age > self._config.command_timeout:
+            return DiagnosticStatus.WARN, "no fresh joint_command: rotor runs down, rudder centred"
+        return DiagnosticStatus.OK, "running"
+
+
+def main() -> int:
+    """Entry point."""
+    return run(SimulatorNode, "simulator")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,16 @@
+"""Models of the robot's sensors: what they do wrong (SENSOR_EFFECTS) and how they are noisy."""
+
+from fish_sim.sensors.camera_heading_offset import CameraHeadingOffset
+from fish_sim.sensors.camera_latency import CameraLatency
+from fish_sim.sensors.camera_scale import CameraScale
+from fish_sim.sensors.gyro_scale import GyroScale
+from fish_sim.sensors.imu_misalignment import ImuMisalignment
+from fish_sim.sensors.sensor_effect import SensorEffect
+
+SENSOR_EFFECTS: dict[str, type[SensorEffect]] = {
+    "camera_latency": CameraLatency,
+    "camera_heading_offset": CameraHeadingOffset,
+    "camera_scale": CameraScale,
+    "gyro_scale": GyroScale,
+    "imu_misalignment": ImuMisalignment,
+}

@@ -1,0 +1,20 @@
+"""A heading marker that sits at an angle."""
+
+from fish_sim.parameter import Parameter
+from fish_sim.sensors.sensor_effect import SensorEffect
+
+SOURCE = "mounting of the markers; strength is an assumption"
+
+
+class CameraHeadingOffset(SensorEffect):
+    """The camera's heading is the fish's plus a constant angle."""
+
+    name = "camera_heading_offset"
+    equation = "camera heading = heading + offset"
+    source = SOURCE
+    parameters = {"offset": Parameter(0.0, "rad", -0.8, 0.8, SOURCE, typical=0.06)}
+    strength = ("offset",)
+
+    @staticmethod
+    def pose(p, x, y, heading, xp):
+        return x, y, heading + p.offset

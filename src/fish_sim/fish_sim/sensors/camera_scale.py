@@ -1,0 +1,20 @@
+"""A camera whose metres are not metres."""
+
+from fish_sim.parameter import Parameter
+from fish_sim.sensors.sensor_effect import SensorEffect
+
+SOURCE = "calibration of the camera; strength is an assumption"
+
+
+class CameraScale(SensorEffect):
+    """The camera's position is the true one times a factor, about the pool's centre. Neutral: 1."""
+
+    name = "camera_scale"
+    equation = "camera position = factor position"
+    source = SOURCE
+    parameters = {"factor": Parameter(1.0, "1", 0.5, 2.0, SOURCE, typical=1.05)}
+    strength = ("factor",)
+
+    @staticmethod
+    def pose(p, x, y, heading, xp):
+        return p.factor * x, p.factor * y, heading

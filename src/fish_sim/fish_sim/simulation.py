@@ -1,0 +1,157 @@
+"""The pool with the fish in it, one command period at a time: physics, water disturbance, sensors. No ROS."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fish_sim.model import DT
+from fish_sim.robot import Robot
+from fish_sim.sensors.battery import Battery
+from fish_sim.sensors.distortion import SensorDistortion
+from fish_sim.sensors.encoder import Encoder
+from fish_sim.sensors.imu import Imu, ImuSample
+from fish_sim.sensors.overhead_camera import CameraPose, OverheadCamera
+from fish_sim.simulation_config import SimulationConfig
+from fish_sim.step import Stepper
+
+BATTERY_PERIOD = 1.0  # s
+DISTURBANCE_TIME = 0.5  # s, correlation time of the water's random push; assumption
+DISTURBANCE_ARM = 0.03  # m, its moment about the head per force; assumption
+MAX_ROTOR_SPEED = 1000.0  # rad/s; a faster command is a mistake
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Where the fish is."""
+
+    pose: tuple[float, float, float]  # m, m, rad; pool frame, heading not wrapped
+    velocity: tuple[float, float, float]  # m/s, m/s, rad/s; surge, sway, yaw rate in base_link
+    tail: tuple[float, ...]  # rad, relative angles of the links, counter-clockwise positive
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Everything that is measured at the end of a period."""
+
+    time: float  # s since the start
+    truth: Truth
+    rotor: tuple[float, float]  # rad, rad/s; encoder
+    imu: ImuSample
+    camera: list[CameraPose]  # samples that arrived in this period
+    battery: float | None  # V, once a second
+
+
+class Simulation:
+    """Follows the newest command; without a fresh one the rotor runs down and the rudder centres."""
+
+    def __init__(self, robot: Robot, config: SimulationConfig) -> None:
+        self._config = config
+        self._stepper = Stepper.of(robot.with_effect("disturbance"))
+        self._robot = robot.with_effect("disturbance", **robot.effects.get("disturbance", {}))
+        self._parameters = self._stepper.parameters(self._robot)
+        names = self._stepper.layout.parameters
+        self._pushed = [names.index(f"disturbance.{key}") for key in ("surge", "sway", "yaw")]
+        self._constant_push = self._parameters[self._pushed].copy()
+        self._periods = 0  # since the start; a reset does not turn time back
+        self.resets = -1
+        self.reset()
+        self._stepper.step(self._state, np.zeros(2), self._parameters)  # compiles the kernel now, not later
+
+    def reset(self) -> None:
+        """Fish at rest at the start pose, no command, sensors and water as at the first start."""
+        config = self._config
+        random = np.random.default_rng(config.seed)
+        self._random = random
+        self._state = self._stepper.rest((config.start_x, config.start_y, config.start_heading))
+        self._push = np.zeros(3)
+        self._rotor_angle = 0.0
+        self._command, self._command_time = (0.0, 0.0), -math.inf
+        distortion = SensorDistortion(self._robot.sensors)
+        self._distortion = distortion
+        self._imu = Imu(config, random)
+        self._encoder = Encoder(config, random)
+        self._camera = OverheadCamera(config, distortion, random)
+        self._battery = Battery(config, random)
+        self._battery_due = self.time
+        self.resets += 1
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return self._periods * DT
+
+    @property
+    def command_age(self) -> float:
+        """Time since the last command [s]; infinite before the first."""
+        return self.time - self._command_time
+
+    def command(self, rotor_speed: float, rudder: float) -> None:
+        """Follow this from the next period on [rad/s, rad]. Raises ValueError for what no motor can do."""
+        if not (math.isfinite(rotor_speed) and abs(rotor_speed) <= MAX_ROTOR_SPEED):
+            raise ValueError(f"rotor velocity = {rotor_speed}: expected at most {MAX_ROTOR_SPEED} rad/s")
+        if not (math.isfinite(rudder) and abs(rudder) <= math.pi):
+            raise ValueError(f"rudder position = {rudder}: expected at most pi rad")
+        self._command, self._command_time = (rotor_speed, rudder), self.time
+
+    def effective_command(self) -> tuple[float, float]:
+        """The command; a stale one lets the rotor run down in stop_time and the rudder centre."""
+        late = self.command_age - self._config.command_timeout
+        if late <= 0.0:
+            return self._command
+        if late >= self._config.stop_time:
+            return 0.0, 0.0
+        return self._command[0] * (1.0 - late / self._config.stop_time), 0.0
+
+    def advance(self) -> Readings:
+        """One period of DT; raises FloatingPointError (after a reset) if the motion diverges."""
+        before = self._state
+        self._stir_water()
+        after = self._stepper.step(before, np.array(self.effective_command()), self._parameters)
+        self._periods += 1
+        if not np.all(np.isfinite(after)):
+            self.reset()
+            raise FloatingPointError("the motion diverged; the simulation starts again")
+        self._state = after
+        return self._measure(before, after)
+
+    def _stir_water(self) -> None:
+        """Ornstein-Uhlenbeck wrench on the head with standard deviation `disturbance`."""
+        level = self._config.disturbance
+        kept = math.exp(-DT / DISTURBANCE_TIME)
+        size = level * np.array([1.0, 1.0, DISTURBANCE_ARM])
+        self._push = kept * self._push + math.sqrt(1 - kept**2) * size * self._random.standard_normal(3)
+        self._parameters[self._pushed] = self._constant_push + self._push
+
+    def _measure(self, before: np.ndarray, after: np.ndarray) -> Readings:
+        links = self._stepper.layout.links
+        size, motion = 3 + links, len(self._stepper.layout.motion)
+        x, y, heading = after[:3]
+        cos, sin = math.cos(heading), math.sin(heading)
+        vx, vy, rate = after[size : size + 3]
+        ax, ay = (
+            after[size : size + 2] - before[size : size + 2]
+        ) / DT  # what an IMU's filter sees of a period
+        speed_before, speed = before[motion + 1], after[motion + 1]
+        self._rotor_angle += 0.5 * DT * (speed_before + speed)  # linear within the period
+        inertia = self._robot.parameters["rotor_inertia"]
+        self._battery.draw(inertia * (speed - speed_before) / DT * speed, DT)
+        ahead, left, turn = self._distortion.imu(ax * cos + ay * sin, ay * cos - ax * sin, rate)
+        voltage = None
+        if self.time >= self._battery_due - DT / 2:
+            self._battery_due += BATTERY_PERIOD
+            voltage = self._battery.measure()
+        return Readings(
+            time=self.time,
+            truth=Truth(
+                (float(x), float(y), float(heading)),
+                (float(vx * cos + vy * sin), float(vy * cos - vx * sin), float(rate)),
+                tuple(float(v) for v in np.diff(after[2:size])),
+            ),
+            rotor=self._encoder.measure(self._rotor_angle, speed),
+            imu=self._imu.measure((ahead, left), turn, float(heading), DT),
+            camera=self._camera.update(self.time, x, y, heading),
+            battery=voltage,
+        )

@@ -1,0 +1,54 @@
+"""Parameters of the simulated pool and of the simulator node."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fish_sim import pool
+from fish_sim.sensors.settings import SensorSettings
+
+
+@dataclass(frozen=True)
+class SimulationConfig(SensorSettings):
+    """What is in the pool, where it starts, and how the robot treats stale commands."""
+
+    robot_file: str = ""  # robot.yaml or a model.yaml of the diagnosis; empty: the nominal robot
+    start_x: float = 0.0  # m, pool frame
+    start_y: float = 0.0  # m
+    start_heading: float = 0.0  # rad
+    seed: int = 1  # of all noise
+    disturbance: float = 0.002  # N, std of the water's random push on the head; 0 = still water
+    command_timeout: float = 0.25  # s, older commands are stale
+    stop_time: float = 0.5  # s, in which the rotor of a stale command runs down
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, low, high in (
+            ("start_x", -pool.LENGTH / 2, pool.LENGTH / 2),
+            ("start_y", -pool.WIDTH / 2, pool.WIDTH / 2),
+            ("start_heading", -2 * math.pi, 2 * math.pi),
+            ("seed", 0, 2**31 - 1),
+            ("disturbance", 0.0, 1.0),
+            ("command_timeout", 0.02, 10.0),
+            ("stop_time", 0.01, 10.0),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} = {value}: expected {low:g} to {high:g}")
+
+
+@dataclass(frozen=True)
+class SimulatorConfig(SimulationConfig):
+    """ROS parameters of the simulator node."""
+
+    real_time_factor: float = 1.0  # simulated per real second; 0 = as fast as possible
+    camera: str = "image"  # image: the camera node renders; pose: publish camera/pose from the sensor model
+    paused: bool = False  # start paused
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 <= self.real_time_factor <= 100.0:
+            raise ValueError(f"real_time_factor = {self.real_time_factor}: expected 0 to 100")
+        if self.camera not in ("image", "pose"):
+            raise ValueError(f"camera = {self.camera!r}: expected 'image' or 'pose'")
