@@ -22,7 +22,7 @@ class SpotFinder:
         self._pixel = float(abs(np.linalg.det(scale[0])))  # m^2 of water that a pixel shows in the middle
 
     def find(self, hsv: Image, marker: str, origin: tuple[int, int], step: int = 1) -> list[Spot]:
-        """Spots of a marker in a part of an image: it starts at origin (column, row), has every step-th pixel."""
+        """Spots of a marker in a part of an image: first pixel at origin (column, row), every step-th pixel."""
         config = self._config
         diameter = config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
         disc = pi / 4 * diameter**2
