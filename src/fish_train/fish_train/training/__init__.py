@@ -1,0 +1,1 @@
+"""Learning the controller's gains through the simulator."""

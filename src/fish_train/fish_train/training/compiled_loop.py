@@ -1,0 +1,172 @@
+"""The closed loop as one compiled kernel (c/closed_loop.c): a window and the gradient of its cost in the weights."""
+
+from __future__ import annotations
+
+import ctypes
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_control.path_batch import LOOKAHEAD_SEARCH
+from fish_sim.compiled import lanes, library
+from fish_sim.emit import emit
+from fish_sim.step import Scheme, Stepper, kernel_source
+from fish_train.training.expressions import expressions
+from fish_train.training.fleet import HISTORY, Fleet, WindowResult
+from fish_train.training.loop import COST_NAMES, PHYSICS_STEPS, SIZES, Law
+from fish_train.training.network import LAYERS, split
+from fish_train.training.path_bank import PathBank
+
+Array = NDArray[np.float64]
+MAX_LAYERS = 8
+BLOCK = 8
+POINTER = ctypes.c_void_p
+
+
+class _Network(ctypes.Structure):
+    _fields_ = [
+        ("layers", ctypes.c_long),
+        ("columns", ctypes.c_long),
+        ("size", ctypes.c_long * (MAX_LAYERS + 1)),
+        *((name, POINTER * MAX_LAYERS) for name in ("panels", "transposed", "activation", "adjoint", "bias")),
+    ]
+
+
+class _Window(ctypes.Structure):
+    _fields_ = [
+        *((name, ctypes.c_long) for name in ("batch", "steps", "gradient")),
+        *((name, POINTER) for name in (
+            "p", "speed", "cost", "noise", "delay", "path", "plant", "memory", "place", "history",
+            "report", "gains", "value",
+        )),
+    ]  # fmt: skip
+
+
+class _Path(ctypes.Structure):
+    _fields_ = [
+        ("table", POINTER), ("spacing", ctypes.c_double), ("lap_end", ctypes.c_double), ("count", ctypes.c_long),
+        ("last", ctypes.c_long), ("closed", ctypes.c_int), ("restarts", ctypes.c_int),
+    ]  # fmt: skip
+
+
+class _Search(ctypes.Structure):
+    _fields_ = [(k, ctypes.c_double) for k in ("search_window", "lookahead", "lookahead_search", "capture_distance")]
+
+
+def loop_source(stepper: Stepper, law: Law, width: int) -> str:
+    """Complete C text of the kernel for a robot's structure, an integration scheme and a law."""
+    names = {
+        "NO": "motion", "NU": "guidance", "NK": "control", "NA": "actuator", "NL": "last", "NI": "inputs",
+        "NE": "errors", "NR": "report", "NGAIN": "gains",
+    }  # fmt: skip
+    sizes = {short: SIZES[name] for short, name in names.items()}
+    sizes |= {"NQ": stepper.layout.links + 3, "PHYSICS": PHYSICS_STEPS, "HISTORY": HISTORY, "NCOST": len(COST_NAMES)}
+    c = files("fish_train.training") / "c"
+    return "\n".join([
+        kernel_source(stepper.layout.structure, stepper.scheme, width),
+        *(f"#define {name} {value}" for name, value in sizes.items()),
+        *(emit(function) for function in expressions(law)),
+        *((c / name).read_text() for name in ("mlp.h", "path_search.h", "closed_loop.c")),
+    ])  # fmt: skip
+
+
+class CompiledLoop:
+    """Windows of the closed loop with one law, one structure of robot, one bank of paths and one network."""
+
+    def __init__(
+        self, stepper: Stepper, law: Law, bank: PathBank, layers: tuple[int, ...] = LAYERS, width: int | None = None
+    ) -> None:
+        self._width = width or lanes()
+        loaded = library(loop_source(stepper, law, self._width))
+        if loaded is None:
+            raise RuntimeError("no C compiler: use TorchLoop")
+        self._library = loaded
+        self._library.scratch_size.restype = ctypes.c_long
+        self.layers = layers
+        self.set_bank(bank)
+        tracker = law.tracker
+        self._search = _Search(tracker.search_window, tracker.lookahead, LOOKAHEAD_SEARCH, tracker.capture_distance)
+        self._room: tuple[int, int] | None = None
+
+    @classmethod
+    def available(cls) -> bool:
+        """Whether a working compiler was found."""
+        from fish_sim.compiled import compiler
+
+        return compiler() is not None
+
+    def set_bank(self, bank: PathBank) -> None:
+        """Follow other paths from now on."""
+        self.bank = bank
+        tables = [np.ascontiguousarray(t.rows) for t in bank.tables]
+        self._tables = tables  # the kernel holds pointers into them
+        self._paths = (_Path * len(tables))(*(
+            _Path(rows.ctypes.data, t.spacing, t.lap_end, t.count, len(rows) - 1, t.closed, t.restarts)
+            for rows, t in zip(tables, bank.tables, strict=True)
+        ))  # fmt: skip
+
+    def window(
+        self, weights: Array, fleet: Fleet, steps: int, cost: Array, noise: Array | None = None, gradient: bool = True
+    ) -> WindowResult:
+        """Run `steps` periods from the fleet's state, which is advanced in place.
+
+        weights: flat (W,). cost: (6,) weights of the stage cost. noise: (steps + 1, B, 6) added to what is seen.
+        """
+        batch = len(fleet)
+        self._make_room(batch, steps)
+        weights, cost = np.ascontiguousarray(weights, float), np.ascontiguousarray(cost, float)
+        noise = np.zeros((steps + 1, batch, SIZES["motion"])) if noise is None else np.ascontiguousarray(noise, float)
+        report = np.empty((steps + 1, batch, SIZES["report"]))
+        applied, value = np.empty((steps, batch, SIZES["last"])), np.empty(batch)
+        arrays = (
+            fleet.parameters, fleet.speed, cost, noise, fleet.delay, fleet.path, fleet.plant, fleet.memory,
+            fleet.place, fleet.history, report, applied, value,
+        )  # fmt: skip
+        window = _Window(batch, steps, int(gradient), *(a.ctypes.data for a in arrays))
+        self._library.run_window(
+            ctypes.byref(window), ctypes.byref(self._network), POINTER(weights.ctypes.data), self._paths,
+            ctypes.byref(self._search), POINTER(self._scratch.ctypes.data),
+        )  # fmt: skip
+        mean = float(value.sum() / (batch * steps))
+        return WindowResult(mean, self._weight_gradient() if gradient else None, report, applied)
+
+    def _weight_gradient(self) -> Array:
+        """dJ/dW = G H^T, dJ/db = G 1 over all periods and fish at once."""
+        flat = np.empty(self._weights)
+        for (W, b), H, G in zip(split(flat, self.layers), self._activation, self._adjoint, strict=True):
+            np.matmul(G, H.T, out=W)
+            np.sum(G, axis=1, out=b)
+        return flat
+
+    def _make_room(self, batch: int, steps: int) -> None:
+        """Activation and adjoint matrices and scratch for this size of window."""
+        if self._room == (batch, steps):
+            return
+        self._room = (batch, steps)
+        layers, columns = self.layers, -(-batch // self._width) * self._width * steps
+        pairs = list(zip(layers[:-1], layers[1:], strict=True))
+        self._weights = sum(o * (i + 1) for i, o in pairs)
+        self._activation = [_aligned(i, columns) for i, _ in pairs]
+        self._adjoint = [_aligned(o, columns) for _, o in pairs]
+        self._panels = [_aligned(_padded(o), i) for i, o in pairs]
+        self._transposed = [_aligned(_padded(i), o) for i, o in pairs]
+        network = _Network(len(pairs), columns, (ctypes.c_long * (MAX_LAYERS + 1))(*layers))
+        for name in ("panels", "transposed", "activation", "adjoint"):
+            matrices = getattr(self, f"_{name}")
+            setattr(network, name, (POINTER * MAX_LAYERS)(*(m.ctypes.data for m in matrices)))
+        self._network = network
+        units = sum(map(_padded, layers))
+        size = self._library.scratch_size(ctypes.c_long(steps), ctypes.c_long(units))
+        self._scratch = _aligned(1, size // 8 + 1)
+
+
+def _padded(size: int) -> int:
+    return -(-size // BLOCK) * BLOCK
+
+
+def _aligned(rows: int, columns: int, boundary: int = 64) -> Array:
+    """Zeros (rows, columns) whose first element lies on a cache line, as the kernel's vectors need."""
+    raw = np.zeros(rows * columns + boundary // 8)
+    offset = -(raw.ctypes.data % boundary) % boundary // 8
+    return raw[offset : offset + rows * columns].reshape(rows, columns)

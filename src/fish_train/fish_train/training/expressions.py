@@ -1,0 +1,73 @@
+"""The period's equations (`loop`) as CasADi functions with their adjoints, for the compiled kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import casadi
+
+from fish_sim.ops import CASADI
+from fish_train.training.loop import COST_NAMES, SIZES, Law, act, drive, motion, sense
+
+SENSE_OUTPUTS = ("inputs", "errors", "guidance", "report", "cost")
+ACT_OUTPUTS = ("control", "last", "cost")
+
+
+@lru_cache(maxsize=8)
+def expressions(law: Law) -> tuple[casadi.Function, ...]:
+    """sense, act, drive and motion, each followed by its adjoint `NAME_vjp(inputs.., g) -> adjoints`.
+
+    sense(seen, true, guidance, geometry_seen, geometry_true, speed, weights): adjoints of the first three;
+    act(errors, speed, control, last, raw, weights): of errors, control, last, raw; drive(actuator, setpoint): of both;
+    motion(q3, qd3): of both. Outputs are stacked in the order of SENSE_OUTPUTS, ACT_OUTPUTS, (actuator, command).
+    """
+    return (*_sense(law), *_act(law), *_drive(law), *_motion())
+
+
+def _sense(law: Law) -> tuple[casadi.Function, casadi.Function]:
+    sizes = [SIZES[k] for k in ("motion", "motion", "guidance", "geometry", "geometry")]
+    arguments = _symbols([*sizes, 1, len(COST_NAMES)])
+    seen, true, guidance, near, real, speed, weights = map(casadi.vertsplit, arguments)
+    values = sense(seen, true, guidance, near, real, speed[0], weights, law, CASADI)
+    return _with_adjoint("sense", arguments, [v for k in SENSE_OUTPUTS for v in values[k]], (0, 1, 2))
+
+
+def _act(law: Law) -> tuple[casadi.Function, casadi.Function]:
+    sizes = [SIZES["errors"], 1, *(SIZES[k] for k in ("control", "last", "gains")), len(COST_NAMES)]
+    arguments = _symbols(sizes)
+    errors, speed, control, last, raw, weights = map(casadi.vertsplit, arguments)
+    values = act(errors, speed[0], control, last, raw, weights, law, CASADI)
+    return _with_adjoint("act", arguments, [v for k in ACT_OUTPUTS for v in values[k]], (0, 2, 3, 4))
+
+
+def _drive(law: Law) -> tuple[casadi.Function, casadi.Function]:
+    arguments = _symbols([SIZES["actuator"], 2])
+    actuator, command = drive(*map(casadi.vertsplit, arguments), law, CASADI)
+    return _with_adjoint("drive", arguments, [*actuator, *command], (0, 1))
+
+
+def _motion() -> tuple[casadi.Function, casadi.Function]:
+    arguments = _symbols([3, 3])
+    return _with_adjoint("motion", arguments, motion(*map(casadi.vertsplit, arguments), CASADI), (0, 1))
+
+
+def _symbols(sizes: Sequence[int]) -> list[casadi.SX]:
+    return [casadi.SX.sym(f"a{k}", size) for k, size in enumerate(sizes)]
+
+
+def _with_adjoint(
+    name: str, arguments: list[casadi.SX], outputs: list[casadi.SX], wrt: tuple[int, ...]
+) -> tuple[casadi.Function, casadi.Function]:
+    """(function, adjoint of the arguments numbered in `wrt`)."""
+    value = casadi.vertcat(*outputs)
+    chosen = [arguments[k] for k in wrt]
+    g = casadi.SX.sym("g", value.shape[0])
+    reverse = casadi.jtimes(value, casadi.vertcat(*chosen), g, True)
+    cuts = [0]
+    for argument in chosen:
+        cuts.append(cuts[-1] + argument.shape[0])
+    return (
+        casadi.Function(name, arguments, casadi.cse([value])),
+        casadi.Function(f"{name}_vjp", [*arguments, g], casadi.cse(casadi.vertsplit(reverse, cuts))),
+    )
