@@ -1,7 +1,7 @@
 """robot.yaml <-> the robot's parameters and the effects that are switched on.
 
-Names, units and nominal values are those of the model description; every value in a file is checked and an error
-names file, field, value and what was expected.
+Names, units and nominal values are those of the model description; every value in a file is checked and an
+error names file, field, value and what was expected.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class RobotError(ValueError):
 def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
     """The nominal fish with `links` equal tail links, in the order of the kernels' parameter vector.
 
-    Lengths and masses: measured or published (head 150 mm, tail 100 mm, 535 g); coefficients: assumptions that
-    reproduce the published range of speeds and turning radii.
+    Lengths and masses: measured or published (head 150 mm, tail 100 mm, 535 g); coefficients: assumptions
+    that reproduce the published range of speeds and turning radii.
     """
     _check_links(links)
     n = links
@@ -147,6 +147,8 @@ def _check_table(
 
 def _check_value(where: str, parameter: Parameter, value: Any) -> float:
     expected = f"a number in [{parameter.lowest:g}, {parameter.highest:g}] {parameter.unit}"
+    if isinstance(value, str):
+        expected += " (YAML reads 1e-3 as text: write 1.0e-3)"
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise RobotError(f"{where}: got {value!r}; expected {expected}")
     if not math.isfinite(value) or not parameter.lowest <= value <= parameter.highest:
@@ -193,10 +195,20 @@ def _from_content(content: Any) -> Robot:
     return Robot(
         links=links,
         parameters=_values("parameters", content.get("parameters") or {}, nominal_parameters(links)),
-        effects={k: _values(f"effects.{k}", v or {}) for k, v in (content.get("effects") or {}).items()},
-        sensors={k: _values(f"sensors.{k}", v or {}) for k, v in (content.get("sensors") or {}).items()},
+        effects=_effect_values("effects", content.get("effects") or {}, EFFECTS),
+        sensors=_effect_values("sensors", content.get("sensors") or {}, SENSOR_EFFECTS),
         name=str(content.get("name", "fish")),
     )
+
+
+def _effect_values(where: str, given: Any, table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Parameter values of every effect in a file; unknown names are left to Robot to refuse."""
+    if not isinstance(given, dict):
+        raise RobotError(f"{where}: got {given!r}; expected a table of effect: parameters")
+    return {
+        name: _values(f"{where}.{name}", values or {}, table[name].parameters if name in table else None)
+        for name, values in given.items()
+    }
 
 
 def _values(where: str, table: Any, units: Mapping[str, Parameter] | None = None) -> dict[str, Any]:
@@ -218,7 +230,7 @@ def _values(where: str, table: Any, units: Mapping[str, Parameter] | None = None
 def save_robot(
     robot: Robot, path: str | Path, std: Mapping[str, float] | None = None, notes: str = ""
 ) -> None:
-    """Write robot.yaml with names, units and sources; `std` maps `name` or `effect.name` to a standard error."""
+    """Write robot.yaml with units and sources; `std` maps `name` or `effect.name` to a standard error."""
     std = std or {}
 
     def rows(

@@ -3,10 +3,10 @@
 In: joint_command (sensor_msgs/JointState, names rotor and rudder; rotor: velocity in rad/s, rudder: position
 in rad). Out, 100 Hz: joint_states (rotor encoder), imu/data, sim/odometry (nav_msgs/Odometry, the truth,
 pool -> base_link), sim/joint_states (tail_1 .. relative angles, rad), /clock; 1 Hz: battery_state,
-/diagnostics; with camera:=pose also camera/pose. Services: pause (std_srvs/SetBool), reset (std_srvs/Trigger).
+/diagnostics; with camera:=pose also camera/pose. Services: pause (SetBool), reset (Trigger).
 
 Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
-nodes may use either clock at factor 1. Without use_sim_time it is set to the wall clock's after a pause or lag.
+nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause.
 """
 
 import time
