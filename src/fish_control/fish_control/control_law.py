@@ -20,8 +20,12 @@ class ControlLimits:
 
     steering_scale: float = 2.0  # rad of rudder for a steering PID output of 1
     throttle_scale: float = 4.0  # throttle for a speed PID output of 1
-    curvature_gain: float = 0.21  # m, rudder for a path curvature: alpha = gain kappa (steady turns of the nominal fish)
-    throttle_linear: float = 1.333  # s/m, throttle for a speed u: linear u + quadratic u^2 (nominal fish, straight)
+    curvature_gain: float = (
+        0.21  # m, rudder for a path curvature: alpha = gain kappa (steady turns of the nominal fish)
+    )
+    throttle_linear: float = (
+        1.333  # s/m, throttle for a speed u: linear u + quadratic u^2 (nominal fish, straight)
+    )
     throttle_quadratic: float = 2.13  # s^2/m^2
     turn_linear: float = 1.2  # s/(m rad^2), more throttle in turns: alpha^2 (linear u + quadratic u^2)
     turn_quadratic: float = 10.0  # s^2/(m^2 rad^2)
@@ -92,11 +96,15 @@ def control_step(
 ) -> tuple[ControlState, Setpoint]:
     """One period of both PIDs, dt [s].
 
-        alpha    = sat[ k_kappa kappa + c_a (Kp e + I + Kd e') ],  I' = Ki e + k_w (sat - unsat) / c_a
-        throttle = sat[ ff(u_wanted, alpha) + c_s (Kp e_u + I_u + Kd e_u') ]
+    alpha    = sat[ k_kappa kappa + c_a (Kp e + I + Kd e') ],  I' = Ki e + k_w (sat - unsat) / c_a
+    throttle = sat[ ff(u_wanted, alpha) + c_s (Kp e_u + I_u + Kd e_u') ]
     """
-    rate, d_heading = _derivative(state.heading_error_rate, state.heading_error, errors.heading, state.primed, dt, limits, xp)
-    speed_rate, d_speed = _derivative(state.speed_error_rate, state.speed_error, errors.speed, state.primed, dt, limits, xp)
+    rate, d_heading = _derivative(
+        state.heading_error_rate, state.heading_error, errors.heading, state.primed, dt, limits, xp
+    )
+    speed_rate, d_speed = _derivative(
+        state.speed_error_rate, state.speed_error, errors.speed, state.primed, dt, limits, xp
+    )
     alpha, steering_integral = _pid(
         limits.curvature_gain * errors.curvature,
         (errors.heading, state.steering_integral, d_heading),

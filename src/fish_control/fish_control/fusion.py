@@ -21,8 +21,8 @@ LOST_VARIANCE = 1e4  # published for a pose without camera or a twist without IM
 
 
 @dataclass(frozen=True)
-class FusionConfig:
-    """Constants of the fusion; standard deviations unless said otherwise."""
+class FusionConfig(MotionNoise):
+    """Constants of the fusion and its motion model; standard deviations unless said otherwise."""
 
     camera_position_noise: float = 0.004  # m, floor under what the camera message says
     camera_heading_noise: float = 0.02  # rad, floor
@@ -30,16 +30,18 @@ class FusionConfig:
     history: float = 1.0  # s, how late a camera pose may come
     camera_timeout: float = 0.6  # s without an accepted pose: camera lost
     imu_timeout: float = 0.1  # s without a sample: IMU lost
-    reacquire_time: float = 1.0  # s of poses that agree with each other and not with the estimate: start anew from them
+    reacquire_time: float = (
+        1.0  # s of poses that agree with each other and not with the estimate: start anew from them
+    )
     start_frames: int = 3  # poses that must agree before the first estimate
     camera_offset: float = 0.0  # s, added to camera stamps (negative if images are older than their stamps)
 
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            lowest = -0.5 if f.name == "camera_offset" else 1e-9
-            if not (math.isfinite(value) and value >= lowest):
-                raise ValueError(f"{f.name} is {value!r}, expected a finite number {'>= -0.5' if lowest < 0 else '> 0'}")
+            lowest = -0.5 if f.name == "camera_offset" else 0.0
+            if not (math.isfinite(value) and (value > lowest or value == f.default)):
+                raise ValueError(f"{f.name} is {value!r}, expected a finite number > {lowest}")
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,9 @@ class _Event:
 class Fusion:
     """Feed it samples and poses with their stamps; ask for the estimate."""
 
-    def __init__(self, config: FusionConfig | None = None, noise: MotionNoise | None = None) -> None:
+    def __init__(self, config: FusionConfig | None = None) -> None:
         self.config = config or FusionConfig()
-        self._filter = StrapdownFilter(noise or MotionNoise())
+        self._filter = StrapdownFilter(self.config)
         self.counts: Counter[str] = Counter()  # what became of the measurements, for diagnostics
         self._clear()
 
@@ -219,7 +221,9 @@ class Fusion:
         """IMU at `time` from the samples before and after position `index`."""
         before = next((e for e in reversed(self._events[:index]) if e.imu is not None), None)
         after = next((e for e in self._events[index:] if e.imu is not None), None)
-        nearest = [e for e in (before, after) if e is not None and abs(e.time - time) <= self.config.imu_timeout]
+        nearest = [
+            e for e in (before, after) if e is not None and abs(e.time - time) <= self.config.imu_timeout
+        ]
         if not nearest:
             return InertialSample(0.0, 0.0, 0.0, known=False)
         if len(nearest) == 1 or after.time <= before.time:

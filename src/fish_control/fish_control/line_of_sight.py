@@ -25,7 +25,9 @@ class GuidanceConfig:
     """Constants of the line of sight; part of a weights file's contract."""
 
     compensate_curvature: bool = True  # take gamma off; False is the paper's law
-    slip_arm: float = 0.065  # m, mean heading turns into a curve by slip_arm * kappa (steady turns of the nominal fish)
+    slip_arm: float = (
+        0.065  # m, mean heading turns into a curve by slip_arm * kappa (steady turns of the nominal fish)
+    )
     drift_time: float = 2.0  # s, low-pass of the drift angle; 0 switches it off
     drift_speed: float = 0.05  # m/s, below this speed the drift angle fades out
     drift_limit: float = 0.5  # rad
@@ -100,11 +102,18 @@ def tracking_errors(
     course = xp.arctan2(path.target_y - motion.y, path.target_x - motion.x)
     if config.compensate_curvature:
         course = course - path.chord
-    heading = course + config.slip_arm * path.curvature - state.drift
-    e_psi = wrap(heading - (motion.heading - state.stroke.heading), xp)
+    e_psi = heading_error(state, motion, course, path.curvature, config, xp)
     along_x, along_y = xp.cos(path.heading), xp.sin(path.heading)
     e_y = along_x * (motion.y - path.y) - along_y * (motion.x - path.x)
     return TrackingErrors(e_y, e_psi, speed - motion.surge, wrap(course, xp))
+
+
+def heading_error(
+    state: GuidanceState, motion: Motion, course: Any, curvature: Any, config: GuidanceConfig, xp: Any
+) -> Any:
+    """e_psi = wrap(chi_d + a kappa - beta - psi_mean) [rad] for a wanted course [rad] on a path of curvature [1/m]."""
+    heading = course + config.slip_arm * curvature - state.drift
+    return wrap(heading - (motion.heading - state.stroke.heading), xp)
 
 
 def wrap(angle: Any, xp: Any) -> Any:

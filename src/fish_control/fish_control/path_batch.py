@@ -35,7 +35,9 @@ class TrackerConfig:
             if not (np.isfinite(value) and SAMPLE_SPACING < value <= 2.0):
                 raise ValueError(f"{name} is {value!r} m, expected {SAMPLE_SPACING} < {name} <= 2.0")
         if self.lookahead_mode not in get_args(LookaheadMode):
-            raise ValueError(f"lookahead_mode is {self.lookahead_mode!r}; known: {', '.join(get_args(LookaheadMode))}")
+            raise ValueError(
+                f"lookahead_mode is {self.lookahead_mode!r}; known: {', '.join(get_args(LookaheadMode))}"
+            )
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,9 @@ class PathBatch:
         self.paths = tuple(paths)
         tables = [_table(path, self.config) for path in self.paths]
         rows = max(len(table) for table in tables)
-        self._table = np.stack([np.pad(table, ((0, rows - len(table)), (0, 0)), mode="edge") for table in tables])
+        self._table = np.stack(
+            [np.pad(table, ((0, rows - len(table)), (0, 0)), mode="edge") for table in tables]
+        )
         self._count = np.array([len(path.points) for path in self.paths])
         self._last = np.array([len(table) - 1 for table in tables])
         self._ds = np.array([path.spacing for path in self.paths])
@@ -100,7 +104,9 @@ class PathBatch:
         position = np.asarray(position, dtype=float)
         squared = np.sum((self._table[:, :, :2] - position[:, None, :]) ** 2, axis=-1)
         index = np.arange(squared.shape[1])
-        usable = (index < self._count[:, None]) & (index * self._ds[:, None] >= np.broadcast_to(start, self._row.shape)[:, None])
+        usable = (index < self._count[:, None]) & (
+            index * self._ds[:, None] >= np.broadcast_to(start, self._row.shape)[:, None]
+        )
         return np.argmin(np.where(usable, squared, np.inf), axis=1) * self._ds
 
     def update(self, position: ArrayLike) -> PathState:
@@ -112,7 +118,9 @@ class PathBatch:
         e = -np.sin(at.heading) * offset[:, 0] + np.cos(at.heading) * offset[:, 1]
         finished = (self.progress >= self._lap_end - 1e-6) & ~self._restarts
         target = self._target(position)
-        return PathState(self.progress.copy(), e, at.point, at.heading, at.curvature, target, at.chord, finished)
+        return PathState(
+            self.progress.copy(), e, at.point, at.heading, at.curvature, target, at.chord, finished
+        )
 
     def _advance(self, position: Array) -> None:
         """Move the progress to the nearest point of the window ahead of it, once the robot has reached the path."""

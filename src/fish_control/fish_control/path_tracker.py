@@ -17,6 +17,8 @@ class PathPoint:
 
     progress: float  # m
     cross_track_error: float  # m, positive: robot left of the path
+    x: float  # m, the path's point at the progress
+    y: float  # m
     heading: float  # rad, course of the path
     curvature: float  # 1/m
     target: NDArray[np.float64]  # (2,) m
@@ -50,6 +52,8 @@ class PathTracker:
         return PathPoint(
             float(state.progress[0]),
             float(state.cross_track_error[0]),
+            float(state.point[0, 0]),
+            float(state.point[0, 1]),
             float(state.heading[0]),
             float(state.curvature[0]),
             state.target[0],

@@ -45,7 +45,13 @@ class ReferencePath:
 
     @classmethod
     def from_points(
-        cls, points: ArrayLike, *, name: str, closed: bool = False, end: End | None = None, spacing: float = SAMPLE_SPACING
+        cls,
+        points: ArrayLike,
+        *,
+        name: str,
+        closed: bool = False,
+        end: End | None = None,
+        spacing: float = SAMPLE_SPACING,
     ) -> ReferencePath:
         """Resample a polyline [m] (at least two distinct points) evenly. `end` defaults to loop if closed, else stop."""
         vertices = _checked_vertices(points, name, closed)
@@ -65,7 +71,9 @@ class ReferencePath:
         """Position p(s): (...,) arc length [m] -> (..., 2) [m]."""
         k, delta, beyond = self._locate(s)
         chi = self.heading[k]
-        parabola = delta[..., None] * _unit(chi) + (0.5 * self.curvature[k] * delta**2)[..., None] * _unit(chi + 0.5 * np.pi)
+        parabola = delta[..., None] * _unit(chi) + (0.5 * self.curvature[k] * delta**2)[..., None] * _unit(
+            chi + 0.5 * np.pi
+        )
         return self.points[k] + parabola + beyond[..., None] * self.tangent(s)
 
     def heading_at(self, s: ArrayLike) -> Array:

@@ -14,7 +14,7 @@ Source: Titterton and Weston, Strapdown Inertial Navigation Technology, ch. 3, p
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -30,18 +30,18 @@ H_CAMERA = np.eye(3, SIZE)
 class MotionNoise:
     """Standard deviations of the motion model."""
 
-    gyro_noise: float = 0.02  # rad/s for each sample at 100 Hz; the sensor's 0.006 and the swing between samples
-    accel_noise: float = 0.15  # m/s^2 for each sample at 100 Hz; the sensor's 0.05, tilt, and the swing between samples
+    gyro_noise: float = (
+        0.02  # rad/s for each sample at 100 Hz; the sensor's 0.006 and the swing between samples
+    )
+    accel_noise: float = (
+        0.15  # m/s^2 for each sample at 100 Hz; the sensor's 0.05, tilt, and the swing between samples
+    )
     gyro_drift: float = 1e-4  # rad/s per sqrt(s), of the bias
     accel_drift: float = 1e-3  # m/s^2 per sqrt(s), of the biases
-    coasting_yaw_rate: float = 2.0  # rad/s, unknown yaw rate while there is no IMU (the head swings at up to 4 rad/s)
+    coasting_yaw_rate: float = (
+        2.0  # rad/s, unknown yaw rate while there is no IMU (the head swings at up to 4 rad/s)
+    )
     coasting_accel: float = 1.0  # m/s^2, unknown acceleration while there is no IMU
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{field.name} is {value!r}, expected a positive number")
 
 
 @dataclass(frozen=True)

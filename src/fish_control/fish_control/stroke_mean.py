@@ -27,7 +27,9 @@ class StrokeState(NamedTuple):
     sway: Any = 0.0  # m/s
 
 
-def stroke_step(state: StrokeState, yaw_rate: Any, sway: Any, dt: Any, frequency: float = STROKE_FREQUENCY) -> StrokeState:
+def stroke_step(
+    state: StrokeState, yaw_rate: Any, sway: Any, dt: Any, frequency: float = STROKE_FREQUENCY
+) -> StrokeState:
     """Advance by dt [s] with yaw rate [rad/s] and sway velocity [m/s] held over the step.
 
     Semi-implicit in z (stable for w dt < 2 / (1 + 2 zeta)).

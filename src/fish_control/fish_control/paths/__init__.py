@@ -38,7 +38,9 @@ def make_path(name: str, **arguments: object) -> ReferencePath:
     known = inspect.signature(PATHS[name]).parameters
     unknown = sorted(set(arguments) - set(known))
     if unknown:
-        raise PathError(f"path '{name}' has no argument {', '.join(map(repr, unknown))}; known: {', '.join(known)}")
+        raise PathError(
+            f"path '{name}' has no argument {', '.join(map(repr, unknown))}; known: {', '.join(known)}"
+        )
     try:
         return PATHS[name](**arguments)
     except TypeError as error:

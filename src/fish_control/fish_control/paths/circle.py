@@ -9,12 +9,19 @@ from fish_control.reference_path import End, PathError, ReferencePath
 
 
 def circle(
-    radius: float = 0.6, x: float = 0.0, y: float = 0.0, start: float = -0.5 * np.pi, direction: int = 1, end: End | None = None
+    radius: float = 0.6,
+    x: float = 0.0,
+    y: float = 0.0,
+    start: float = -0.5 * np.pi,
+    direction: int = 1,
+    end: End | None = None,
 ) -> ReferencePath:
     """Circle of `radius` [m] about (x, y), from polar angle `start` [rad]; direction 1 counter-clockwise, -1 clockwise."""
     require_positive("circle", radius=radius)
     if direction not in (1, -1):
-        raise PathError(f"circle: direction is {direction!r}, expected 1 (counter-clockwise) or -1 (clockwise)")
+        raise PathError(
+            f"circle: direction is {direction!r}, expected 1 (counter-clockwise) or -1 (clockwise)"
+        )
     angle = start + direction * np.linspace(0.0, 2.0 * np.pi, 8193)[:-1]
     points = np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)])
     return ReferencePath.from_points(points, name="circle", closed=True, end=end)

@@ -13,7 +13,12 @@ HEIGHT = 1.7  # m, leaves 0.21 m to the walls of the 2.13 m pool
 
 
 def letter(
-    letter: str = "R", height: float = HEIGHT, x: float = 0.0, y: float = 0.0, easing: float = 0.05, end: End | None = None
+    letter: str = "R",
+    height: float = HEIGHT,
+    x: float = 0.0,
+    y: float = 0.0,
+    easing: float = 0.05,
+    end: End | None = None,
 ) -> ReferencePath:
     """A letter of `height` [m] centred on (x, y), in the order of its stroke.
 

@@ -78,7 +78,9 @@ def _read_csv(path: Path) -> tuple[NDArray[np.float64], bool]:
             except (ValueError, IndexError):
                 if number == 1:
                     continue
-                raise PathError(f"{path}: line {number} is {','.join(row)!r}, expected two numbers x,y") from None
+                raise PathError(
+                    f"{path}: line {number} is {','.join(row)!r}, expected two numbers x,y"
+                ) from None
             if not all(map(math.isfinite, point)):
                 raise PathError(f"{path}: line {number} has a coordinate that is not finite")
             points.append(point)

@@ -46,7 +46,9 @@ def _outline(d: str, file: Path) -> tuple[NDArray[np.float64], bool]:
         if command.upper() == "Z":
             return np.array(drawn), True
         if command.upper() == "M" and drawn:
-            raise PathError(f"{file}: the outline has several parts; a fish cannot lift off, draw it in one stroke")
+            raise PathError(
+                f"{file}: the outline has several parts; a fish cannot lift off, draw it in one stroke"
+            )
         absolute = numbers if command.isupper() else numbers + _origin(command, here)
         new, control = _CURVES[command.upper()](here, absolute, control)
         points.append(new[-1])
@@ -71,11 +73,19 @@ def _segments(d: str, file: Path) -> Iterator[tuple[str, NDArray]]:
             command = tokens[i]
             i += 1
             if command.upper() not in _ARGUMENTS:
-                raise PathError(f"{file}: SVG command '{command}' is not supported; known: {' '.join(_ARGUMENTS)}")
+                raise PathError(
+                    f"{file}: SVG command '{command}' is not supported; known: {' '.join(_ARGUMENTS)}"
+                )
         count = _ARGUMENTS.get(command.upper(), 0)
         numbers = tokens[i : i + count]
-        if len(numbers) < count or any(t.isalpha() for t in numbers) or (count == 0 and command.upper() != "Z"):
-            raise PathError(f"{file}: SVG command '{command}' is followed by {numbers}, expected {count} numbers")
+        if (
+            len(numbers) < count
+            or any(t.isalpha() for t in numbers)
+            or (count == 0 and command.upper() != "Z")
+        ):
+            raise PathError(
+                f"{file}: SVG command '{command}' is followed by {numbers}, expected {count} numbers"
+            )
         yield command, np.array([float(t) for t in numbers])
         i += count
         command = {"M": "L", "m": "l"}.get(command, command)

@@ -1,0 +1,102 @@
+"""The controller: motion and plan in; gains, rudder and rotor commands out. No ROS, no clock."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fish_control.control_law import (
+    ActuatorState,
+    ControlState,
+    Errors,
+    Gains,
+    Setpoint,
+    actuator_step,
+    control_step,
+)
+from fish_control.line_of_sight import GuidanceState, Motion, heading_error, observe
+from fish_control.policy import Policy, policy_inputs
+
+LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
+
+
+class Command(NamedTuple):
+    """One joint command."""
+
+    phase: float  # rad, of the rotor's oscillation
+    rotor_speed: float  # rad/s, phi_dot
+    alpha: float  # rad, rudder
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The planner's wishes."""
+
+    course: float  # rad
+    speed: float  # m/s
+    yaw_rate: float  # rad/s, speed times curvature
+    cross_track_error: float  # m
+
+
+class Controller:
+    """Runs a policy and the control law; `rest` stops the fish smoothly."""
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+        self._limits = policy.contract.limits
+        self._guidance = policy.contract.guidance
+        self._motion: Motion | None = None
+        self._time: float | None = None
+        self._observed = GuidanceState()
+        self._control = ControlState()
+        self._setpoint = Setpoint(0.0, 0.0)
+        self._actuators = ActuatorState()
+
+    def observe(self, time: float, motion: Motion) -> None:
+        """Take in odometry stamped `time` [s]; call it with every message."""
+        dt = 0.0 if self._time is None else time - self._time
+        self._time, self._motion = time, motion
+        if 0.0 < dt <= LONGEST_STEP:
+            self._observed = observe(self._observed, motion, dt, self._guidance, np)
+        else:
+            self._observed = GuidanceState()
+
+    def decide(self, wanted: Wanted) -> Gains:
+        """One control period: errors, gains from the policy, new set-points."""
+        if self._motion is None:
+            raise ValueError("decide() before any odometry was observed")
+        motion = self._motion
+        curvature = wanted.yaw_rate / wanted.speed if wanted.speed > 0.0 else 0.0
+        e_psi = float(heading_error(self._observed, motion, wanted.course, curvature, self._guidance, np))
+        e_u = wanted.speed - motion.surge
+        mean_heading = motion.heading - self._observed.stroke.heading
+        inputs = policy_inputs(
+            mean_heading,
+            motion.surge,
+            wanted.speed,
+            e_psi,
+            e_u,
+            wanted.cross_track_error,
+            np,
+            self._policy.contract.inputs,
+        )
+        gains = Gains(*map(float, self._policy.gains(np.array(inputs))))
+        errors = Errors(e_psi, e_u, curvature, wanted.speed)
+        self._control, self._setpoint = control_step(
+            self._control, errors, gains, self._policy.contract.control_period, self._limits, np
+        )
+        return gains
+
+    def rest(self) -> None:
+        """Rotor to a stop and rudder to the centre; the PIDs forget."""
+        self._control, self._setpoint = ControlState(), Setpoint(0.0, 0.0)
+
+    def command(self, dt: float) -> Command:
+        """Advance the actuators by dt [s]."""
+        self._actuators, rotor_speed = actuator_step(self._actuators, self._setpoint, dt, self._limits, np)
+        return Command(
+            math.fmod(self._actuators.phase, 2.0 * math.pi), float(rotor_speed), float(self._actuators.alpha)
+        )

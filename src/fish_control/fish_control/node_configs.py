@@ -1,0 +1,102 @@
+"""Parameters of the planner and controller nodes; those of the fusion node are FusionConfig."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from fish_control.line_of_sight import GuidanceConfig
+from fish_control.path_batch import TrackerConfig
+from fish_control.planner import FASTEST, SLOWEST
+from fish_control.reference_path import End
+
+Resume = Literal["auto", "manual"]
+
+
+def require_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
+    """Raise ValueError naming field, value and range."""
+    if not (math.isfinite(value) and lowest <= value <= highest):
+        raise ValueError(f"{name} is {value!r} {unit}, expected {lowest:g} to {highest:g} {unit}")
+
+
+def require_one_of(name: str, value: str, known: tuple[str, ...]) -> None:
+    """Raise ValueError naming field, value and choices."""
+    if value not in known:
+        raise ValueError(f"{name} is {value!r}; known: {', '.join(known)}")
+
+
+@dataclass(frozen=True)
+class PlannerConfig:
+    """What to swim and how the path is followed."""
+
+    path: str = "R"  # a letter, a family (circle, sinusoid, ...), or topic: what reference/path brings
+    path_args: str = ""  # YAML, arguments of the family: "{radius: 0.6, x: 0.2}"
+    speed: float = 0.2  # m/s, surge
+    end: str = ""  # stop or loop; empty: a closed path loops, an open one stops
+    start: str = "beginning"  # beginning, or nearest: the nearest point of the path
+    margin: float = 0.1  # m, smallest distance of path and walls
+    rate_hz: float = 50.0  # Hz, of target and errors, in steps of the odometry's rate
+    lookahead: float = TrackerConfig.lookahead  # m
+    lookahead_mode: str = TrackerConfig.lookahead_mode  # distance from the robot, or along the path
+    search_window: float = TrackerConfig.search_window  # m
+    capture_distance: float = TrackerConfig.capture_distance  # m
+    compensate_curvature: bool = GuidanceConfig.compensate_curvature  # False: the paper's law
+    slip_arm: float = GuidanceConfig.slip_arm  # m
+    drift_time: float = GuidanceConfig.drift_time  # s
+    drift_speed: float = GuidanceConfig.drift_speed  # m/s
+    drift_limit: float = GuidanceConfig.drift_limit  # rad
+    state_file: str = (
+        ""  # progress for a restart after a crash; empty: in the system's folder for temporary files
+    )
+    resume_timeout: float = 10.0  # s, older progress is not resumed; 0 never resumes
+
+    def __post_init__(self) -> None:
+        require_range("speed", self.speed, SLOWEST, FASTEST, "m/s")
+        require_one_of("end", self.end, ("", *get_args(End)))
+        require_one_of("start", self.start, ("beginning", "nearest"))
+        require_range("margin", self.margin, 0.0, 1.0, "m")
+        require_range("rate_hz", self.rate_hz, 1.0, 100.0, "Hz")
+        require_range("resume_timeout", self.resume_timeout, 0.0, 3600.0, "s")
+        self.tracker()
+        self.guidance()
+
+    def tracker(self) -> TrackerConfig:
+        """The part for the path tracker."""
+        return TrackerConfig(self.lookahead, self.lookahead_mode, self.search_window, self.capture_distance)  # type: ignore[arg-type]
+
+    def guidance(self) -> GuidanceConfig:
+        """The part for the line of sight."""
+        return GuidanceConfig(
+            self.compensate_curvature, self.slip_arm, self.drift_time, self.drift_speed, self.drift_limit
+        )
+
+
+@dataclass(frozen=True)
+class ControllerConfig:
+    """Which gains, how fast, and when to stop."""
+
+    weights_file: str = ""  # safetensors with contract; empty: the one installed with the package
+    rate_hz: float = 50.0  # Hz, control period; must be the weights file's
+    command_rate_hz: float = 100.0  # Hz, joint commands; a multiple of rate_hz
+    lookahead: float = TrackerConfig.lookahead  # m, must be the weights file's and the planner's
+    robot_hash: str = ""  # refuse weights trained for another robot; empty: accept any
+    odometry_timeout: float = 0.15  # s
+    target_timeout: float = 0.25  # s
+    largest_variance: float = 1.0  # m^2, rad^2 and their rates; fusion marks what it has lost with 1e4
+    resume: str = "auto"  # after a stop: auto when all is well; manual when service resume is called
+    resume_delay: float = 0.5  # s, how long all must be well before auto resumes
+
+    def __post_init__(self) -> None:
+        require_range("rate_hz", self.rate_hz, 10.0, 200.0, "Hz")
+        require_range("command_rate_hz", self.command_rate_hz, self.rate_hz, 400.0, "Hz")
+        if abs(self.command_rate_hz / self.rate_hz - round(self.command_rate_hz / self.rate_hz)) > 1e-9:
+            raise ValueError(
+                f"command_rate_hz is {self.command_rate_hz!r} Hz, expected a multiple of rate_hz {self.rate_hz!r} Hz"
+            )
+        require_range("lookahead", self.lookahead, 0.05, 2.0, "m")
+        require_range("odometry_timeout", self.odometry_timeout, 0.02, 5.0, "s")
+        require_range("target_timeout", self.target_timeout, 0.02, 5.0, "s")
+        require_range("largest_variance", self.largest_variance, 1e-6, 1e3, "")
+        require_one_of("resume", self.resume, get_args(Resume))
+        require_range("resume_delay", self.resume_delay, 0.0, 60.0, "s")

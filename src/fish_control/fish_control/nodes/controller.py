@@ -1,0 +1,174 @@
+"""control/target, control/twist, tracking/error, odometry/filtered -> joint_command, control/gains, /diagnostics.
+
+joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder: position =
+alpha (rad). control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy of the weights file gives them.
+The watchdog stops rotor and rudder on stale or bad odometry, lost sensors and a stale target; service resume
+(std_srvs/Trigger) lets the fish swim again where resume is manual. Decisions are in Controller and Watchdog.
+"""
+
+import math
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any
+
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from std_srvs.srv import Trigger
+
+from fish_control.control_law import Gains
+from fish_control.controller import Controller, Wanted
+from fish_control.gains_file import read_gains_file, require_fit
+from fish_control.latency import Latency
+from fish_control.node_configs import ControllerConfig
+from fish_control.nodes.messages import (
+    ERROR,
+    OK,
+    WARN,
+    diagnostics,
+    motion_of,
+    planar_covariance,
+    seconds,
+    yaw_of,
+)
+from fish_control.nodes.start import read_parameters, run
+from fish_control.planner import motion_is_finite
+from fish_control.watchdog import Signs, Watchdog
+
+LONGEST_PERIOD = 0.05  # s; after a stall the rotor's phase goes on from where it was
+
+
+class ControllerNode(Node):
+    """Topics in and out of Controller."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("controller", namespace="fish", **options)
+        self._config = config = read_parameters(self, ControllerConfig)
+        file = config.weights_file or installed_weights()
+        policy = read_gains_file(file)
+        require_fit(policy, file, 1.0 / config.rate_hz, config.lookahead, config.robot_hash)
+        self._controller = Controller(policy)
+        self._watchdog = Watchdog(config)
+        self._signs = Signs(None, True, math.inf, math.inf, None)
+        self._odometry_time = self._target_time = math.nan
+        self._wanted = Wanted(0.0, 0.0, 0.0, 0.0)
+        self._now = math.nan
+        self._ticks = 0
+        self._latency = Latency()
+        self._said = ""
+        self._create_interfaces()
+
+    def _create_interfaces(self) -> None:
+        self._command = self.create_publisher(JointState, "joint_command", 10)
+        self._gains = self.create_publisher(Float64MultiArray, "control/gains", 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
+        self.create_subscription(TwistStamped, "control/twist", self._on_twist, 10)
+        self.create_subscription(Vector3Stamped, "tracking/error", self._on_error, 10)
+        self.create_subscription(PoseStamped, "control/target", self._on_target, 10)
+        self.create_service(Trigger, "resume", self._on_resume)
+        self.create_timer(1.0 / self._config.command_rate_hz, self._tick)
+        self.create_timer(1.0, self._report)
+
+    def _on_odometry(self, message: Odometry) -> None:
+        motion = motion_of(message)
+        finite = motion_is_finite(motion)
+        pose, twist = planar_covariance(message.pose.covariance), planar_covariance(message.twist.covariance)
+        self._signs = replace(
+            self._signs,
+            odometry_finite=finite,
+            pose_variance=float(pose.diagonal().max()),
+            twist_variance=float(twist.diagonal().max()),
+        )
+        self._odometry_time = seconds(message.header.stamp)
+        if finite:
+            self._controller.observe(self._odometry_time, motion)
+
+    def _on_twist(self, message: TwistStamped) -> None:
+        speed, yaw_rate = message.twist.linear.x, message.twist.angular.z
+        if math.isfinite(speed) and math.isfinite(yaw_rate):
+            self._wanted = replace(self._wanted, speed=speed, yaw_rate=yaw_rate)
+
+    def _on_error(self, message: Vector3Stamped) -> None:
+        if math.isfinite(message.vector.x):
+            self._wanted = replace(self._wanted, cross_track_error=message.vector.x)
+
+    def _on_target(self, message: PoseStamped) -> None:
+        course = yaw_of(message.pose.orientation)
+        if math.isfinite(course):
+            self._wanted = replace(self._wanted, course=course)
+            self._target_time = seconds(message.header.stamp)
+
+    def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        refusal = self._watchdog.release()
+        response.success, response.message = refusal is None, refusal or "swimming again"
+        return response
+
+    def _tick(self) -> None:
+        """One period of the command; every so many, one of control."""
+        clock = self.get_clock().now()
+        now = clock.nanoseconds * 1e-9
+        dt = 1.0 / self._config.command_rate_hz if math.isnan(self._now) else now - self._now
+        self._now = now
+        may_swim = self._watchdog.check(now, self._aged_signs(now))
+        if not may_swim or self._wanted.speed <= 0.0:
+            self._controller.rest()
+        elif self._ticks % round(self._config.command_rate_hz / self._config.rate_hz) == 0:
+            self._gains.publish(to_message(self._controller.decide(self._wanted)))
+        self._ticks += 1
+        command = self._controller.command(min(max(dt, 0.0), LONGEST_PERIOD))
+        message = JointState(name=["rotor", "rudder"])
+        message.header.stamp = clock.to_msg()
+        message.position = [command.phase, command.alpha]
+        message.velocity = [command.rotor_speed, 0.0]
+        self._command.publish(message)
+        if may_swim:
+            self._latency.add(now - self._odometry_time)
+        if self._watchdog.state != self._said:
+            self._report()
+
+    def _aged_signs(self, now: float) -> Signs:
+        def age(time: float) -> float | None:
+            return None if math.isnan(time) else now - time
+
+        return replace(self._signs, odometry_age=age(self._odometry_time), target_age=age(self._target_time))
+
+    def _report(self) -> None:
+        self._said = self._watchdog.state
+        level = {"swimming": OK, "waiting": WARN, "stopped": ERROR}[self._said]
+        message = self._watchdog.reason
+        if self._said == "swimming" and self._wanted.speed <= 0.0:
+            message = "at rest: the wanted speed is 0"
+        values: dict[str, object] = {"stops": self._watchdog.stops}
+        delays = self._latency.percentiles()
+        if delays is not None:
+            values["latency_p50_ms"], values["latency_p99_ms"] = (f"{1e3 * delay:.1f}" for delay in delays)
+        now = self.get_clock().now().to_msg()
+        self._diagnostics.publish(diagnostics(now, self.get_fully_qualified_name(), level, message, values))
+
+
+def installed_weights() -> str:
+    """The weights file that came with the package."""
+    try:
+        return f"{get_package_share_directory('fish_control')}/config/gains.safetensors"
+    except (PackageNotFoundError, OSError):  # no workspace is sourced: run from the source tree
+        return str(FilePath(__file__).parents[2] / "config" / "gains.safetensors")
+
+
+def to_message(gains: Gains) -> Float64MultiArray:
+    """Gains with a labelled layout: 2 controllers of 3 gains."""
+    message = Float64MultiArray(data=list(gains))
+    message.layout.dim = [
+        MultiArrayDimension(label="steering,speed", size=2, stride=6),
+        MultiArrayDimension(label="Kp,Ki,Kd", size=3, stride=3),
+    ]
+    return message
+
+
+def main() -> None:
+    """Entry point."""
+    run(ControllerNode, "controller")

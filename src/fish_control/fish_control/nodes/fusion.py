@@ -1,0 +1,123 @@
+"""camera/pose + imu/data -> odometry/filtered (100 Hz, pool -> base_link), /diagnostics.
+
+A pose variance of 1e4 says that the camera is lost, a twist variance of 1e4 that the IMU is. The transform pool ->
+base_link is broadcast where tf2_msgs is installed. Decisions are in Fusion.
+"""
+
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Imu
+
+from fish_control.fusion import Estimate, Fusion, FusionConfig
+from fish_control.nodes.messages import (
+    ERROR,
+    OK,
+    WARN,
+    diagnostics,
+    planar_covariance,
+    seconds,
+    to_covariance,
+    to_quaternion,
+    to_stamp,
+    yaw_of,
+)
+from fish_control.nodes.start import read_parameters, run
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # not among the pip wheels
+    TFMessage = None
+
+SENSORS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class FusionNode(Node):
+    """Topics in and out of Fusion."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("fusion", namespace="fish", **options)
+        self._fusion = Fusion(read_parameters(self, FusionConfig))
+        self._odometry = self.create_publisher(Odometry, "odometry/filtered", 10)
+        self._transform = self.create_publisher(TFMessage, "/tf", 10) if TFMessage else None
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_subscription(Imu, "imu/data", self._on_imu, SENSORS)
+        self.create_subscription(PoseWithCovarianceStamped, "camera/pose", self._on_pose, SENSORS)
+        self.create_timer(1.0, self._report)
+        self._said = ""
+
+    def _on_imu(self, message: Imu) -> None:
+        time = seconds(message.header.stamp)
+        w, a = message.angular_velocity.z, message.linear_acceleration
+        if self._fusion.add_imu(time, w, a.x, a.y):
+            self._publish(time)
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        time, p = seconds(message.header.stamp), message.pose.pose
+        pose = np.array([p.position.x, p.position.y, yaw_of(p.orientation)])
+        self._fusion.add_pose(time, pose, planar_covariance(message.pose.covariance))
+        estimate = self._fusion.estimate(time)
+        if estimate is not None and estimate.imu_lost:  # no IMU message will publish it
+            self._publish(time)
+
+    def _publish(self, now: float) -> None:
+        estimate = self._fusion.estimate(now)
+        if estimate is None:
+            return
+        message = to_odometry(estimate)
+        self._odometry.publish(message)
+        if self._transform:
+            self._transform.publish(TFMessage(transforms=[to_transform(message)]))
+        if self._state(estimate)[1] != self._said:
+            self._report()
+
+    def _state(self, estimate: Estimate | None) -> tuple[bytes, str]:
+        if estimate is None:
+            return WARN, "waiting for camera poses that agree"
+        lost = [name for name, gone in (("camera", estimate.camera_lost), ("IMU", estimate.imu_lost)) if gone]
+        return (ERROR, f"{' and '.join(lost)} lost") if lost else (OK, "estimating")
+
+    def _report(self) -> None:
+        now = self.get_clock().now()
+        estimate = self._fusion.estimate(now.nanoseconds * 1e-9)
+        level, self._said = self._state(estimate)
+        values: dict[str, object] = dict(self._fusion.counts)
+        if estimate is not None:
+            values["gyro_bias_rad_s"] = f"{estimate.gyro_bias:.5f}"
+            values["position_std_m"] = f"{np.sqrt(estimate.pose_covariance[0, 0]):.4f}"
+        self._diagnostics.publish(
+            diagnostics(now.to_msg(), self.get_fully_qualified_name(), level, self._said, values)
+        )
+
+
+def to_odometry(estimate: Estimate) -> Odometry:
+    """An estimate as a message."""
+    message = Odometry(child_frame_id="base_link")
+    message.header.frame_id = "pool"
+    message.header.stamp = to_stamp(estimate.time)
+    pose, twist = message.pose.pose, message.twist.twist
+    pose.position.x, pose.position.y = map(float, estimate.pose[:2])
+    pose.orientation = to_quaternion(float(estimate.pose[2]))
+    twist.linear.x, twist.linear.y, twist.angular.z = map(float, estimate.twist)
+    message.pose.covariance = to_covariance(estimate.pose_covariance)
+    message.twist.covariance = to_covariance(estimate.twist_covariance)
+    return message
+
+
+def to_transform(odometry: Odometry) -> TransformStamped:
+    """pool -> base_link."""
+    message = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
+    position = odometry.pose.pose.position
+    message.transform.translation.x, message.transform.translation.y = position.x, position.y
+    message.transform.rotation = odometry.pose.pose.orientation
+    return message
+
+
+def main() -> None:
+    """Entry point."""
+    run(FusionNode, "fusion")

@@ -1,0 +1,69 @@
+"""Messages to values and back."""
+
+import math
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Quaternion
+from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
+
+from fish_control.line_of_sight import Motion
+
+PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+
+def seconds(stamp: Time) -> float:
+    """A stamp [s]."""
+    return stamp.sec + stamp.nanosec * 1e-9
+
+
+def to_stamp(time: float) -> Time:
+    """Time [s] as a stamp."""
+    sec = math.floor(time)
+    return Time(sec=sec, nanosec=min(round((time - sec) * 1e9), 999_999_999))
+
+
+def yaw_of(q: Quaternion) -> float:
+    """Rotation about z [rad]; NaN if the quaternion is not one."""
+    norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
+    if not 0.5 < norm < 2.0:
+        return math.nan
+    return math.atan2(2.0 * (q.w * q.z + q.x * q.y), norm - 2.0 * (q.y * q.y + q.z * q.z))
+
+
+def to_quaternion(yaw: float) -> Quaternion:
+    """Rotation about z [rad]."""
+    return Quaternion(z=math.sin(0.5 * yaw), w=math.cos(0.5 * yaw))
+
+
+def motion_of(message: Odometry) -> Motion:
+    """Pose in the pool and velocity in base_link."""
+    p, v = message.pose.pose, message.twist.twist
+    return Motion(p.position.x, p.position.y, yaw_of(p.orientation), v.linear.x, v.linear.y, v.angular.z)
+
+
+def planar_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(36,) of a message to (3, 3) of x, y and yaw."""
+    return np.reshape(covariance, (6, 6))[np.ix_(PLANAR, PLANAR)]
+
+
+def to_covariance(planar: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 3) of x, y and yaw to (36,); the rest is known to be zero."""
+    full = np.zeros((6, 6))
+    full[np.ix_(PLANAR, PLANAR)] = planar
+    return full.ravel()
+
+
+def diagnostics(
+    stamp: Time, name: str, level: bytes, message: str, values: dict[str, object]
+) -> DiagnosticArray:
+    """One status of one node."""
+    status = DiagnosticStatus(level=level, name=name.lstrip("/"), message=message, hardware_id="fish")
+    status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    array = DiagnosticArray(status=[status])
+    array.header.stamp = stamp
+    return array

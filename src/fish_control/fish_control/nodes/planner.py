@@ -1,0 +1,210 @@
+"""odometry/filtered -> control/target, control/twist, tracking/error, reference/path, reference/speed, /diagnostics.
+
+control/target (50 Hz, frame pool): position of the lookahead point, orientation of the wanted course.
+control/twist (50 Hz, base_link): wanted surge speed (m/s; 0 after the end of the path) and yaw rate (rad/s, speed
+times the curvature of the path). tracking/error: x cross-track (m, positive: robot left of the path), y heading (rad,
+of the mean over the stroke), z speed (m/s); wanted minus actual. reference/path and reference/speed (transient local)
+on change; with path:=topic the path is taken from reference/path instead. Decisions are in Planner.
+"""
+
+import math
+import os
+import tempfile
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
+from nav_msgs.msg import Odometry, Path
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Float64
+
+from fish_control.line_of_sight import Motion
+from fish_control.node_configs import PlannerConfig
+from fish_control.nodes.messages import ERROR, OK, WARN, diagnostics, motion_of, seconds, to_quaternion
+from fish_control.nodes.start import read_parameters, run
+from fish_control.paths import make_path
+from fish_control.planner import Plan, Planner, motion_is_finite
+from fish_control.pool import check_inside_pool
+from fish_control.progress_file import SavedProgress, load_progress, path_digest, save_progress
+from fish_control.reference_path import PathError, ReferencePath
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+SAVE_PERIOD = 0.2  # s between writes of the progress
+PATH_STEP = 0.02  # m between poses of the published path
+
+
+class PlannerNode(Node):
+    """Topics in and out of Planner."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("planner", namespace="fish", **options)
+        self._config = config = read_parameters(self, PlannerConfig)
+        self._target = self.create_publisher(PoseStamped, "control/target", 10)
+        self._twist = self.create_publisher(TwistStamped, "control/twist", 10)
+        self._error = self.create_publisher(Vector3Stamped, "tracking/error", 10)
+        self._speed = self.create_publisher(Float64, "reference/speed", LATCHED)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._file = FilePath(config.state_file or default_state_file())
+        self._planner: Planner | None = None
+        self._plan: Plan | None = None
+        self._fresh = False
+        self._next_plan = self._next_save = -math.inf
+        self._said_speed = math.nan
+        self._bad_odometry = 0
+        self._problem = ""
+        if config.path == "topic":
+            self.create_subscription(Path, "reference/path", self._on_path, LATCHED)
+        else:
+            self._path = self.create_publisher(Path, "reference/path", LATCHED)
+            path = configured_path(config)
+            self._follow(path)
+            self._path.publish(to_message(path, self.get_clock().now().to_msg()))
+        self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
+        self.create_timer(1.0, self._report)
+
+    def destroy_node(self) -> None:
+        """A planner that ends as it should leaves no progress behind."""
+        self._file.unlink(missing_ok=True)
+        super().destroy_node()
+
+    def _follow(self, path: ReferencePath) -> None:
+        check_inside_pool(path, self._config.margin)
+        config = self._config
+        self._planner = Planner(path, config.speed, config.tracker(), config.guidance())
+        self._digest = path_digest(path)
+        self._fresh = True
+
+    def _on_path(self, message: Path) -> None:
+        points = [(pose.pose.position.x, pose.pose.position.y) for pose in message.poses]
+        closed = len(points) > 3 and math.dist(points[0], points[-1]) < 1e-3
+        try:
+            path = ReferencePath.from_points(
+                points, name="reference/path", closed=closed, end=self._config.end or None
+            )
+            self._follow(path)
+            self._problem = ""
+        except (PathError, ValueError) as error:
+            self._problem = f"path refused: {error}"
+            self.get_logger().error(self._problem)
+
+    def _on_odometry(self, message: Odometry) -> None:
+        time, motion = seconds(message.header.stamp), motion_of(message)
+        if not motion_is_finite(motion):
+            self._bad_odometry += 1
+            return
+        if self._planner is None:
+            return
+        if self._fresh:
+            self._fresh = False
+            self._begin(self._planner, time, motion)
+        self._planner.observe(time, motion)
+        if self._next_plan - 10.0 / self._config.rate_hz > time:  # the clock was set back
+            self._next_plan = self._next_save = -math.inf
+        if time < self._next_plan - 1e-3:
+            return
+        self._next_plan = max(self._next_plan, time - 1.0 / self._config.rate_hz) + 1.0 / self._config.rate_hz
+        self._publish(self._planner.plan(motion), message)
+        if time >= self._next_save:
+            self._next_save = time + SAVE_PERIOD
+            self._save(SavedProgress(self._digest, time, self._planner.tracker.progress))
+
+    def _begin(self, planner: Planner, time: float, motion: Motion) -> None:
+        """Resume a killed planner's progress, or start as the parameters say."""
+        saved = load_progress(self._file)
+        if (
+            saved is not None
+            and saved.path == self._digest
+            and 0.0 <= time - saved.time <= self._config.resume_timeout
+        ):
+            travelled = self._config.lookahead + 2.0 * self._config.speed * (time - saved.time)
+            if planner.resume(motion.x, motion.y, saved.progress, travelled):
+                self.get_logger().info(f"resumed at {planner.tracker.progress:.2f} m of the path")
+                return
+        if self._config.start == "nearest":
+            planner.start_nearest(motion.x, motion.y)
+
+    def _publish(self, plan: Plan, odometry: Odometry) -> None:
+        self._plan = plan
+        target = PoseStamped(header=odometry.header)
+        target.pose.position.x, target.pose.position.y = map(float, plan.at.target)
+        target.pose.orientation = to_quaternion(plan.errors.course)
+        twist = TwistStamped(header=odometry.header)
+        twist.header.frame_id = "base_link"
+        twist.twist.linear.x, twist.twist.angular.z = plan.speed, plan.yaw_rate
+        error = Vector3Stamped(header=odometry.header)
+        error.vector.x, error.vector.y, error.vector.z = (
+            plan.errors.cross_track,
+            plan.errors.heading,
+            plan.errors.speed,
+        )
+        self._twist.publish(twist)
+        self._error.publish(error)
+        self._target.publish(target)
+        if plan.speed != self._said_speed:
+            self._said_speed = plan.speed
+            self._speed.publish(Float64(data=plan.speed))
+
+    def _save(self, progress: SavedProgress) -> None:
+        try:
+            save_progress(self._file, progress)
+        except OSError as error:
+            self._problem = f"progress cannot be saved to {self._file}: {error.strerror}"
+
+    def _report(self) -> None:
+        level, message, values = OK, "waiting for odometry", {}
+        if self._planner is None:
+            level, message = WARN, "waiting for reference/path"
+        elif self._plan is not None:
+            path = self._planner.path
+            message = f"finished {path.name}" if self._planner.finished else f"following {path.name}"
+            values = {
+                "progress_m": f"{self._plan.at.progress:.3f}",
+                "length_m": f"{path.length:.3f}",
+                "cross_track_m": f"{self._plan.errors.cross_track:.4f}",
+            }
+        if self._problem:
+            level, message = ERROR, self._problem
+        values["odometry_not_finite"] = str(self._bad_odometry)
+        now = self.get_clock().now().to_msg()
+        self._diagnostics.publish(diagnostics(now, self.get_fully_qualified_name(), level, message, values))
+
+
+def configured_path(config: PlannerConfig) -> ReferencePath:
+    """The path that the parameters name. Raises PathError."""
+    try:
+        arguments = yaml.safe_load(config.path_args) if config.path_args else {}
+    except yaml.YAMLError as error:
+        raise PathError(
+            f"path_args is {config.path_args!r}, expected YAML such as '{{radius: 0.6}}'"
+        ) from error
+    if not isinstance(arguments, dict):
+        raise PathError(f"path_args is {config.path_args!r}, expected YAML such as '{{radius: 0.6}}'")
+    if config.end:
+        arguments["end"] = config.end
+    return make_path(config.path, **arguments)
+
+
+def default_state_file() -> str:
+    """One for each user and domain."""
+    return f"{tempfile.gettempdir()}/fish_planner_{os.getuid()}_{os.environ.get('ROS_DOMAIN_ID', '0')}.json"
+
+
+def to_message(path: ReferencePath, stamp: Any) -> Path:
+    """Poses along the path, tangent as orientation; a closed path ends where it begins."""
+    message = Path()
+    message.header.frame_id, message.header.stamp = "pool", stamp
+    for s in np.linspace(0.0, path.length, max(int(path.length / PATH_STEP), 2) + 1):
+        pose = PoseStamped(header=message.header)
+        pose.pose.position.x, pose.pose.position.y = map(float, path.point(s))
+        pose.pose.orientation = to_quaternion(float(path.heading_at(s)))
+        message.poses.append(pose)
+    return message
+
+
+def main() -> None:
+    """Entry point."""
+    run(PlannerNode, "planner")
