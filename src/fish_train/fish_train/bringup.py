@@ -68,7 +68,7 @@ def executable_path(spec: NodeSpec) -> Path:
     """
     try:
         path = Path(get_package_prefix(spec.package)) / "lib" / spec.package / spec.executable
-    except PackageNotFoundError:
+    except (PackageNotFoundError, OSError):  # OSError: AMENT_PREFIX_PATH is empty
         raise UserError(
             f"package {spec.package} is not in this shell's workspace; "
             "build it (make build) and source install/setup.bash"

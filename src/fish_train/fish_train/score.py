@@ -1,8 +1,8 @@
 """How well a recorded run followed its path: errors over time and their summary, from poses and speeds alone.
 
     e_y   = n(s) . (p - p(s))        cross-track [m], positive: head left of the path; s: progress, in order
-    e_psi = wrap(chi(s) - <psi>)     heading [rad]; <psi>: mean over one stroke of the rotor, 0.5 s, centred
-    e_u   = u_ref - u                speed [m/s], the head's surge speed as it is, each stroke's ripple included
+    e_psi = wrap(chi(s) - <psi>)     heading [rad]; <psi>: mean over one stroke of the rotor (0.5 s)
+    e_u   = u_ref - u                speed [m/s], the head's surge speed, each stroke's ripple included
 
 The approach phase lasts from the start until the head is for the first time within 0.05 m of the path and the
 surge speed, averaged over a stroke, within 20 % of the commanded one. A run on an open path ends where its

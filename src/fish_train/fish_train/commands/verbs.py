@@ -5,6 +5,8 @@ and one line here; setup.py reads this table, so that `ros2 run fish_train VERB`
 """
 
 VERBS = {
+    "demo": "the whole robot: swim a path, record, score, show",
+    "score": "tracking errors of a recorded run, and its page",
     "inspect": "print and plot what is in a recording",
     "recover": "mend a truncated recording and say what was lost",
     "import_pool": "convert the real robot's ROS 1 bags to recordings in the project's format",

@@ -1,0 +1,117 @@
+"""The whole robot: start every node, let the fish swim a path, record, score and show it.
+
+Simulator, camera, tracker, fusion, planner, controller and recorder run as processes of their own, on
+their own ROS domain. The run ends at the end of the path, after --duration, or with Ctrl-C; what was recorded
+is then scored.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from datetime import datetime
+from pathlib import Path
+
+from rich.console import Console
+
+from fish_train.bringup import CONTROL, RECORDER, ROBOTS, SIMULATED, NodeSpec, Parameters
+from fish_train.domain import choose_domain
+from fish_train.errors import UserError
+from fish_train.nodes.watch import watching
+from fish_train.processes import NodeProcesses
+from fish_train.recordings import read_trial
+from fish_train.reports.page import Table
+from fish_train.reports.run_page import write_run_page
+from fish_train.score import score_trial
+from fish_train.score_table import error_table, print_table
+from fish_train.swim import SwimEnd, swim, wait_for_start
+
+LONGEST = 600.0  # s, a run that does not end by itself
+SIMULATOR = SIMULATED[0]
+PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("--letter", default="R", help="letter, or a path family such as circle (R)")
+    parser.add_argument("--speed", type=float, default=0.2, help="surge speed, m/s (0.2)")
+    parser.add_argument(
+        "--duration", type=float, default=LONGEST, help="end after so many seconds at the latest"
+    )
+    parser.add_argument("--weights", type=Path, help="weights file of the controller (the one it ships with)")
+    parser.add_argument("--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims")
+    parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
+    parser.add_argument("--out", type=Path, help="new folder for recording, page and logs (out/...)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Swim, record, score, show."""
+    if not args.duration > 0.0:
+        raise UserError(f"duration is {args.duration:g} s, expected a positive number")
+    domain = choose_domain(args.domain)
+    folder = _new_folder(args)
+    console = Console(highlight=False)
+    console.print(f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}")
+    end, latency = _swim(args, domain, folder, console)
+    console.print(f"ended {end.reason}, {end.seconds:.1f} s after the first odometry")
+    trial = read_trial(folder / "recording")
+    score = score_trial(trial)
+    tables = [error_table(score), latency, _cpu_table(end)]
+    for table in tables:
+        print_table(console, table)
+    page = folder / "report.html"
+    write_run_page(page, f"Path {args.letter} at {args.speed:g} m/s", trial, score, tables)
+    console.print(f"recording: {folder / 'recording'}\npage: {page}", soft_wrap=True)
+    return 0
+
+
+def node_parameters(args: argparse.Namespace, folder: Path) -> dict[NodeSpec, Parameters]:
+    """What the command line changes in the nodes' parameter files."""
+    changed: dict[NodeSpec, Parameters] = {
+        PLANNER: {"path": args.letter, "speed": args.speed},
+        RECORDER: {"output": str(folder.resolve()), "name": "recording"},
+    }
+    if args.weights:
+        changed[CONTROLLER] = {"gains_file": str(args.weights.resolve())}
+    if args.robot:
+        changed[SIMULATOR] = {"robot_file": str(args.robot.resolve())}
+    return changed
+
+
+def _swim(args: argparse.Namespace, domain: int, folder: Path, console: Console) -> tuple[SwimEnd, Table]:
+    """Start the nodes, watch the run, end them; the recorder first, so the recording ends with the run."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended like with Ctrl-C
+    changed = node_parameters(args, folder)
+    with NodeProcesses(domain, folder / "logs") as nodes:
+        for spec in (RECORDER, *(spec for spec in ROBOTS["sim"] if spec != RECORDER)):
+            nodes.start(spec, changed.get(spec))
+        with watching(domain) as (watch, listen):
+            wait_for_start(nodes, watch, listen)
+            end = swim(nodes, watch, listen, args.duration, console)
+            nodes.stop([RECORDER])
+            return end, _latency_table(watch.diagnostics)
+
+
+def _latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:
+    """What the controller says of its own latency and period."""
+    said = next((values for name, values in diagnostics.items() if name.endswith("/controller")), {})
+    rows = [[key, value] for key, value in said.items() if "latency" in key or "period" in key]
+    return Table(
+        "Controller", ["value", "measured"], rows, "Latency: stamp of the measurement to the command."
+    )
+
+
+def _cpu_table(end: SwimEnd) -> Table:
+    rows = [[spec.name, f"{100 * share:.0f} %"] for spec, share in end.cpu.items()]
+    rows.append(["all nodes", f"{100 * sum(end.cpu.values()):.0f} %"])
+    return Table("CPU", ["node", "of one core"], rows, f"Mean over {end.seconds:.0f} s of swimming.")
+
+
+def _new_folder(args: argparse.Namespace) -> Path:
+    """The folder of this run, made now; refuses one with something in it."""
+    name = "".join(c if c.isalnum() else "_" for c in args.letter)
+    folder = args.out or Path("out") / f"demo_{name}_{datetime.now():%Y%m%d_%H%M%S}"
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UserError(f"{folder} exists and is not empty; choose another folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

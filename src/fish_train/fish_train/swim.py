@@ -1,0 +1,115 @@
+"""One run of the started robot, watched until it ends: progress, end of path or time, nodes that fail."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from rich.console import Console
+from rich.status import Status
+
+from fish_control.path_tracker import PathTracker
+
+from .bringup import NodeSpec
+from .errors import UserError
+from .processes import NodeProcess, NodeProcesses
+
+START_TIMEOUT = 30.0  # s from the start of the nodes to the first odometry and path
+LOOK_PERIOD = 0.1  # s between looks at the robot
+
+
+class Sight(Protocol):
+    """Where the robot believes to be."""
+
+    stamp: float
+    x: float
+    y: float
+    heading: float
+    speed: float
+
+
+class Watch(Protocol):
+    """What the watching node has heard last."""
+
+    sight: Sight | None
+    tracker: PathTracker | None
+
+
+@dataclass(frozen=True)
+class SwimEnd:
+    """How a run ended, and what it cost.
+
+    Attributes:
+        seconds: wall time from the first odometry to the end.
+        cpu: share of one core each node used meanwhile.
+    """
+
+    reason: str
+    seconds: float
+    cpu: dict[NodeSpec, float]
+
+
+def wait_for_start(nodes: NodeProcesses, watch: Watch, listen: Callable[[float], None]) -> None:
+    """Return when path and odometry are there.
+
+    Raises:
+        UserError: a node ended, or nothing came in time.
+    """
+    deadline = time.monotonic() + START_TIMEOUT
+    while watch.sight is None or watch.tracker is None:
+        listen(LOOK_PERIOD)
+        check_running(nodes)
+        if time.monotonic() > deadline:
+            missing = "odometry/filtered" if watch.sight is None else "reference/path"
+            raise UserError(
+                f"no {missing} within {START_TIMEOUT:.0f} s of the start; see the logs of the nodes"
+            )
+
+
+def swim(
+    nodes: NodeProcesses, watch: Watch, listen: Callable[[float], None], duration: float, console: Console
+) -> SwimEnd:
+    """Watch the robot for at most `duration` seconds of its own time, with a line of progress."""
+    begin, cpu_before = time.monotonic(), nodes.cpu_times()
+    with console.status("") as line:
+        try:
+            reason = _follow(nodes, watch, listen, duration, line)
+        except KeyboardInterrupt:
+            reason = "as interrupted"
+    seconds = time.monotonic() - begin
+    used = {spec: spent - cpu_before[spec] for spec, spent in nodes.cpu_times().items()}
+    return SwimEnd(reason, seconds, {spec: cpu_s / seconds for spec, cpu_s in used.items()})
+
+
+def _follow(
+    nodes: NodeProcesses, watch: Watch, listen: Callable[[float], None], duration: float, line: Status
+) -> str:
+    """Until the end of path or duration; the reason."""
+    first, length = watch.sight.stamp, watch.tracker.path.length
+    while (t := watch.sight.stamp - first) < duration:
+        listen(LOOK_PERIOD)
+        check_running(nodes)
+        sight = watch.sight
+        on_path = watch.tracker.update((sight.x, sight.y))
+        line.update(
+            f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
+            f"cross-track {1000 * on_path.cross_track_error:+4.0f} mm   speed {sight.speed:.2f} m/s   "
+            f"{on_path.progress:.2f} of {length:.2f} m"
+        )
+        if on_path.finished:
+            return "at the end of the path"
+    return f"after {duration:.0f} s"
+
+
+def check_running(nodes: NodeProcesses) -> None:
+    """Raise UserError with a node's last words if one has ended."""
+    for process in nodes.ended():
+        raise UserError(_obituary(process))
+
+
+def _obituary(process: NodeProcess) -> str:
+    return (
+        f"{process.spec.name} ended with status {process.status}: {process.last_words()} (log: {process.log})"
+    )

@@ -1,0 +1,117 @@
+"""The node table: complete, startable, and the same for the pip-only starter and the launch file."""
+
+import runpy
+import sys
+import types
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fish_train import bringup
+from fish_train.bringup import NodeSpec
+from fish_train.errors import UserError
+
+SOURCE = Path(__file__).parents[2]
+EVERY_NODE = sorted(
+    {*bringup.ROBOTS["sim"], *bringup.ROBOTS["real"], bringup.REPLAYER}, key=lambda spec: spec.name
+)
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """A stand-in for the install space with one executable."""
+    node = tmp_path / "lib" / "fish_sim" / "camera"
+    node.parent.mkdir(parents=True)
+    node.touch()
+    monkeypatch.setattr(bringup, "get_package_prefix", lambda _: str(tmp_path))
+    monkeypatch.setattr(bringup, "get_package_share_directory", lambda package: f"{tmp_path}/share/{package}")
+    return tmp_path
+
+
+@pytest.mark.parametrize("spec", EVERY_NODE, ids=lambda spec: spec.name)
+def test_every_node_has_an_entry_point_and_a_parameter_file(spec):
+    assert f'"{spec.executable} = {spec.package}.' in (SOURCE / spec.package / "setup.py").read_text()
+    parameters = yaml.safe_load((SOURCE / spec.package / "config" / spec.parameter_file).read_text())
+    for settings in parameters.values():
+        assert isinstance(settings["ros__parameters"], dict)
+
+
+def test_command_line_keeps_types_of_parameters(installed):
+    spec = NodeSpec("fish_sim", "camera", "camera.yaml")
+    line = bringup.command(spec, {"path": "N", "speed": 1.0, "loop": True})
+    given = [line[k + 1] for k, word in enumerate(line) if word == "-p"]
+    values = {name: yaml.safe_load(value) for name, value in (item.split(":=", 1) for item in given)}
+    assert values == {"path": "N", "speed": 1.0, "loop": True}
+    assert all(type(values[name]) is kind for name, kind in (("path", str), ("speed", float), ("loop", bool)))
+    assert line[0] == str(installed / "lib/fish_sim/camera")
+
+
+def test_an_executable_that_is_not_built_is_named(installed):
+    with pytest.raises(UserError, match="lib/fish_sim/absent does not exist; build"):
+        bringup.command(NodeSpec("fish_sim", "absent", "camera.yaml"))
+
+
+def test_a_workspace_that_is_not_sourced_is_said(monkeypatch):
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    with pytest.raises(UserError, match="source install/setup.bash"):
+        bringup.command(NodeSpec("fish_sim", "camera", "camera.yaml"))
+
+
+def test_children_inherit_the_wheels_guard_only_with_the_library_path(monkeypatch):
+    monkeypatch.setenv("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "1")
+    monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)
+    assert "_ROS_WHEELS_BOOTSTRAP_COMPLETE" not in bringup.environment(7)
+    monkeypatch.setenv("LD_LIBRARY_PATH", "somewhere")
+    child = bringup.environment(7)
+    assert child["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] == "1"
+    assert (child["ROS_DOMAIN_ID"], child["ROS_AUTOMATIC_DISCOVERY_RANGE"]) == ("7", "LOCALHOST")
+
+
+class Recorded(types.SimpleNamespace):
+    """Stands for a class of launch: keeps what it was made with."""
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(args=args, **kwargs)
+
+
+class Configuration(Recorded):
+    """Stands for LaunchConfiguration; the context is a dict of arguments."""
+
+    def perform(self, context):
+        return context[self.args[0]]
+
+
+@pytest.fixture
+def launch_file(installed, monkeypatch):
+    """The launch file's names, with stand-ins for launch and launch_ros, which have no wheels."""
+    stand_ins = {
+        "launch": {"LaunchContext": dict, "LaunchDescription": Recorded},
+        "launch.actions": {"DeclareLaunchArgument": Recorded, "OpaqueFunction": Recorded},
+        "launch.substitutions": {"LaunchConfiguration": Configuration},
+        "launch_ros": {},
+        "launch_ros.actions": {"Node": Recorded},
+        "launch_ros.parameter_descriptions": {"ParameterValue": Recorded},
+    }
+    for name, members in stand_ins.items():
+        module = types.ModuleType(name)
+        vars(module).update(members)
+        monkeypatch.setitem(sys.modules, name, module)
+    return runpy.run_path(str(SOURCE / "fish_train" / "launch" / "fish.launch.py"))
+
+
+@pytest.mark.parametrize("robot", bringup.ROBOTS)
+def test_the_launch_file_starts_the_table(launch_file, robot):
+    [*arguments, opaque] = launch_file["generate_launch_description"]().args[0]
+    nodes = opaque.function({"robot": robot})
+    started = [(node.package, node.executable, node.parameters[0]) for node in nodes]
+    assert started == [
+        (s.package, s.executable, str(bringup.parameter_path(s))) for s in bringup.ROBOTS[robot]
+    ]
+    assert {argument.args[0] for argument in arguments} >= {"robot", "path", "speed", "use_sim_time"}
+
+
+def test_the_launch_file_refuses_an_unknown_robot(launch_file):
+    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
+    with pytest.raises(RuntimeError, match="known: sim, real"):
+        opaque.function({"robot": "whale"})
