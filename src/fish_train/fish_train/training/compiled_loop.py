@@ -15,7 +15,7 @@ from fish_sim.step import Scheme, Stepper, kernel_source
 from fish_train.training.expressions import expressions
 from fish_train.training.fleet import HISTORY, Fleet, WindowResult
 from fish_train.training.loop import COST_NAMES, PHYSICS_STEPS, SIZES, Law
-from fish_train.training.network import LAYERS, split
+from fish_train.training.network import LAYERS, split, weight_count
 from fish_train.training.path_bank import PathBank
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ class CompiledLoop:
         self.set_bank(bank)
         tracker = law.tracker
         self._search = _Search(tracker.search_window, tracker.lookahead, LOOKAHEAD_SEARCH, tracker.capture_distance)
-        self._room: tuple[int, int] | None = None
+        self._room = 0
 
     @classmethod
     def available(cls) -> bool:
@@ -114,7 +114,7 @@ class CompiledLoop:
         weights: flat (W,). cost: (6,) weights of the stage cost. noise: (steps + 1, B, 6) added to what is seen.
         """
         batch = len(fleet)
-        self._make_room(batch, steps)
+        self._make_room(steps)
         weights, cost = np.ascontiguousarray(weights, float), np.ascontiguousarray(cost, float)
         noise = np.zeros((steps + 1, batch, SIZES["motion"])) if noise is None else np.ascontiguousarray(noise, float)
         report = np.empty((steps + 1, batch, SIZES["report"]))
@@ -124,29 +124,37 @@ class CompiledLoop:
             fleet.place, fleet.history, report, applied, value,
         )  # fmt: skip
         window = _Window(batch, steps, int(gradient), *(a.ctypes.data for a in arrays))
-        self._library.run_window(
-            ctypes.byref(window), ctypes.byref(self._network), POINTER(weights.ctypes.data), self._paths,
-            ctypes.byref(self._search), POINTER(self._scratch.ctypes.data),
-        )  # fmt: skip
-        mean = float(value.sum() / (batch * steps))
-        return WindowResult(mean, self._weight_gradient() if gradient else None, report, applied)
+        total = self._run_blocks(window, weights, gradient)
+        return WindowResult(float(value.sum() / (batch * steps)), total, report, applied)
+
+    def _run_blocks(self, window: _Window, weights: Array, gradient: bool) -> Array | None:
+        """Block after block of `width` fish, whose activations fit the cache; the sum of their weight gradients."""
+        network, scratch = ctypes.byref(self._network), POINTER(self._scratch.ctypes.data)
+        self._library.repack(network, POINTER(weights.ctypes.data), ctypes.c_long(gradient))
+        total = np.zeros(len(weights)) if gradient else None
+        for first in range(0, window.batch, self._width):
+            self._library.run_block(
+                ctypes.byref(window), network, self._paths, ctypes.byref(self._search), ctypes.c_long(first), scratch
+            )
+            if total is not None:
+                total += self._weight_gradient()
+        return total
 
     def _weight_gradient(self) -> Array:
-        """dJ/dW = G H^T, dJ/db = G 1 over all periods and fish at once."""
-        flat = np.empty(self._weights)
-        for (W, b), H, G in zip(split(flat, self.layers), self._activation, self._adjoint, strict=True):
+        """dJ/dW = G H^T, dJ/db = G 1 over all periods of a block."""
+        for (W, b), H, G in zip(split(self._block_gradient, self.layers), self._activation, self._adjoint, strict=True):
             np.matmul(G, H.T, out=W)
             np.sum(G, axis=1, out=b)
-        return flat
+        return self._block_gradient
 
-    def _make_room(self, batch: int, steps: int) -> None:
-        """Activation and adjoint matrices and scratch for this size of window."""
-        if self._room == (batch, steps):
+    def _make_room(self, steps: int) -> None:
+        """Activation and adjoint matrices and scratch for windows of this length."""
+        if self._room == steps:
             return
-        self._room = (batch, steps)
-        layers, columns = self.layers, -(-batch // self._width) * self._width * steps
+        self._room = steps
+        layers, columns = self.layers, self._width * steps
         pairs = list(zip(layers[:-1], layers[1:], strict=True))
-        self._weights = sum(o * (i + 1) for i, o in pairs)
+        self._block_gradient = np.empty(weight_count(layers))
         self._activation = [_aligned(i, columns) for i, _ in pairs]
         self._adjoint = [_aligned(o, columns) for _, o in pairs]
         self._panels = [_aligned(_padded(o), i) for i, o in pairs]
@@ -156,8 +164,7 @@ class CompiledLoop:
             matrices = getattr(self, f"_{name}")
             setattr(network, name, (POINTER * MAX_LAYERS)(*(m.ctypes.data for m in matrices)))
         self._network = network
-        units = sum(map(_padded, layers))
-        size = self._library.scratch_size(ctypes.c_long(steps), ctypes.c_long(units))
+        size = self._library.scratch_size(ctypes.c_long(steps), ctypes.c_long(sum(map(_padded, layers))))
         self._scratch = _aligned(1, size // 8 + 1)
 
 

@@ -44,7 +44,7 @@ static void zero(V *v, long n) { for (long k = 0; k < n; ++k) v[k] = v_constant(
 static void copy(const V *from, long n, V *to) { for (long k = 0; k < n; ++k) to[k] = from[k]; }
 static void add(const V *from, long n, V *to) { for (long k = 0; k < n; ++k) to[k] += from[k]; }
 
-/* raw outputs of the policy; its hidden activations go to column `column` of the activation matrices */
+/* raw outputs of the policy; every layer's input goes to columns `column` on of the activation matrices */
 static void policy_forward(const Network *net, const V *inputs, long column, V *work, V *raw)
 {
   V *h = work, *next = work + PAD(net->size[0]);
@@ -143,7 +143,7 @@ static void advance_period(const Window *w, const Network *net, long first, long
                            const V *p, V *work, Period *now, Period *next, V *motion_next)
 {
   V driven[NA + NC];
-  policy_forward(net, now->sensed, (first * w->steps) + t * LANES, work, now->raw);
+  policy_forward(net, now->sensed, t * LANES, work, now->raw);
   act(now->sensed + NI, speed, now->control, now->last, now->raw, cost, now->acted);
   copy(now->sensed + NI + NE, NU, next->guidance);
   copy(now->acted, NK, next->control);
@@ -196,7 +196,7 @@ static void advance_reverse(const Window *w, const Network *net, long first, lon
   }
   zero(g_raw, PAD(NGAIN));
   act_vjp(now->sensed + NI, speed, now->control, now->last, now->raw, cost, g_acted, g_errors, g->control, g->last, g_raw);
-  policy_backward(net, g_raw, first * w->steps + t * LANES, work, gs);
+  policy_backward(net, g_raw, t * LANES, work, gs);
   copy(g_errors, NE, gs + NI);
   copy(g->guidance, NU, gs + NI + NE);
   zero(gs + NI + NE + NU, NR);
@@ -259,7 +259,8 @@ static void store(const Window *w, long first, const Period *now, const V *motio
   scatter(value, 1, first, w->batch, w->value);
 }
 
-static void repack(Network *net, const double *weights, int gradient)
+/* lay the flat weights out for `affine`; the network points into them afterwards */
+void repack(Network *net, const double *weights, long gradient)
 {
   for (long l = 0; l < net->layers; ++l) {
     const long n_in = net->size[l], n_out = net->size[l + 1];
@@ -276,29 +277,24 @@ long scratch_size(long steps, long units)
   return (steps + 1) * sizeof(Period) + ((2 * (steps + 1) + HISTORY) * NO + units) * sizeof(V);
 }
 
-/* scratch: scratch_size bytes, 64-byte aligned like the activation matrices */
-void run_window(const Window *w, Network *net, const double *weights, const Path *paths, const Search *search,
-                void *scratch)
+/* the LANES fish from `first` on; scratch: scratch_size bytes, 64-byte aligned like the activation matrices */
+void run_block(const Window *w, const Network *net, const Path *paths, const Search *search, long first, void *scratch)
 {
   Period *periods = scratch;
   V *motions = (V *)(periods + w->steps + 1), *g_motion = motions + (HISTORY + w->steps + 1) * NO;
-  V *work = g_motion + (w->steps + 1) * NO, p[NP], speed[1], cost[NCOST], value;
+  V *work = g_motion + (w->steps + 1) * NO, p[NP], speed[1], cost[NCOST], value = v_constant(0.0);
+  const int perfect = sees_truth(w, first);
   for (int k = 0; k < NCOST; ++k) cost[k] = v_constant(w->cost[k]);
-  repack(net, weights, w->gradient);
-  for (long first = 0; first < w->batch; first += LANES) {
-    const int perfect = sees_truth(w, first);
-    load(w, first, periods, p, speed, motions);
-    value = v_constant(0.0);
-    for (long t = 0; t < w->steps; ++t) {
-      V *motion_next = motions + (HISTORY + t + 1) * NO;
-      sense_period(w, paths, search, first, t, perfect, motions, speed, cost, periods + t);
-      advance_period(w, net, first, t, speed, cost, p, work, periods + t, periods + t + 1, motion_next);
-      if (t > 0) value += periods[t].sensed[SENSE_OUT - 1];
-      value += periods[t].acted[ACT_OUT - 1];
-    }
-    sense_period(w, paths, search, first, w->steps, perfect, motions, speed, cost, periods + w->steps);
-    value += periods[w->steps].sensed[SENSE_OUT - 1];
-    if (w->gradient) backward(w, net, first, motions, speed, cost, p, work, periods, g_motion);
-    store(w, first, periods + w->steps, motions, &value);
+  load(w, first, periods, p, speed, motions);
+  for (long t = 0; t < w->steps; ++t) {
+    V *motion_next = motions + (HISTORY + t + 1) * NO;
+    sense_period(w, paths, search, first, t, perfect, motions, speed, cost, periods + t);
+    advance_period(w, net, first, t, speed, cost, p, work, periods + t, periods + t + 1, motion_next);
+    if (t > 0) value += periods[t].sensed[SENSE_OUT - 1];
+    value += periods[t].acted[ACT_OUT - 1];
   }
+  sense_period(w, paths, search, first, w->steps, perfect, motions, speed, cost, periods + w->steps);
+  value += periods[w->steps].sensed[SENSE_OUT - 1];
+  if (w->gradient) backward(w, net, first, motions, speed, cost, p, work, periods, g_motion);
+  store(w, first, periods + w->steps, motions, &value);
 }

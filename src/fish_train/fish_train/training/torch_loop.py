@@ -1,0 +1,137 @@
+"""The closed loop as torch operations: slow, for machines without a C compiler, and the check of the compiled one.
+
+The same equations (`loop`), differentiated by torch's autograd instead of by hand; physics through fish_sim.torch_step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from fish_sim import torch_step
+from fish_sim.ops import torch_ops
+from fish_sim.step import Stepper
+from fish_train.training.fleet import HISTORY, Fleet, WindowResult
+from fish_train.training.loop import PHYSICS_STEPS, SIZES, Law, act, drive, motion, sense
+from fish_train.training.network import LAYERS, split
+from fish_train.training.path_bank import PathBank
+from fish_train.training.path_search import locate
+
+Array = NDArray[np.float64]
+XP = torch_ops()
+
+
+class TorchLoop:
+    """Windows of the closed loop; the same calls and numbers as `CompiledLoop`."""
+
+    def __init__(self, stepper: Stepper, law: Law, bank: PathBank, layers: tuple[int, ...] = LAYERS) -> None:
+        self._stepper, self._law, self.layers = stepper, law, layers
+        self.set_bank(bank)
+
+    def set_bank(self, bank: PathBank) -> None:
+        """Follow other paths from now on."""
+        self.bank = bank
+
+    def window(
+        self, weights: Array, fleet: Fleet, steps: int, cost: Array, noise: Array | None = None, gradient: bool = True
+    ) -> WindowResult:
+        """Run `steps` periods from the fleet's state, which is advanced in place; see `CompiledLoop.window`."""
+        flat = torch.tensor(weights, requires_grad=gradient)
+        noise = np.zeros((steps + 1, len(fleet), SIZES["motion"])) if noise is None else noise
+        run = _Window(self, flat, fleet, torch.from_numpy(np.asarray(noise)), tuple(map(float, cost)))
+        with torch.set_grad_enabled(gradient):
+            total, reports, applied = torch.zeros(()), [], []
+            for t in range(steps):
+                sensed = run.look(t)
+                total = total + (sensed["cost"][0].sum() if t else 0.0)
+                reports.append(_stack(sensed["report"]))
+                total = total + run.advance(sensed)
+                applied.append(_stack(run.last))
+            kept = fleet.place.copy()
+            sensed = run.look(steps)
+            fleet.place[:] = kept  # the next window looks again at its first period
+            reports.append(_stack(sensed["report"]))
+            mean = (total + sensed["cost"][0].sum()) / (len(fleet) * steps)
+            if gradient:
+                mean.backward()
+        run.store()
+        found = flat.grad.numpy() if gradient else None
+        return WindowResult(float(mean), found, *(torch.stack(v).detach().numpy() for v in (reports, applied)))
+
+    def find(self, fleet: Fleet, which: int, position: Tensor) -> list[Tensor]:
+        """Geometry of every fish on its path; `which` place (0 seen, 1 true) moves on."""
+        geometry = [
+            locate(self.bank.tables[k], self._law.tracker, place[2 * which : 2 * which + 2], xy)
+            for k, place, xy in zip(fleet.path, fleet.place, position.detach().numpy(), strict=True)
+        ]
+        return list(torch.from_numpy(np.array(geometry)).unbind(-1))
+
+    @property
+    def stepper(self) -> Stepper:
+        return self._stepper
+
+    @property
+    def law(self) -> Law:
+        return self._law
+
+
+class _Window:
+    """The state of one window, as lists of (B,) tensors."""
+
+    def __init__(self, loop: TorchLoop, flat: Tensor, fleet: Fleet, noise: Tensor, cost: tuple[float, ...]) -> None:
+        self._loop, self._fleet, self._noise, self._cost = loop, fleet, noise, cost
+        self._weights = split(flat, loop.layers)
+        self._plant = torch.from_numpy(fleet.plant.copy())
+        self._parameters, self._speed = (torch.from_numpy(a) for a in (fleet.parameters, fleet.speed))
+        memory = list(torch.from_numpy(fleet.memory.copy()).unbind(-1))
+        cuts = np.cumsum([SIZES[k] for k in ("guidance", "control", "actuator")])
+        self._guidance, self._control = memory[: cuts[0]], memory[cuts[0] : cuts[1]]
+        self._actuator, self.last = memory[cuts[1] : cuts[2]], memory[cuts[2] :]
+        self._motions = [*torch.from_numpy(fleet.history.copy()).unbind(1), self._motion()]
+
+    def _motion(self) -> Tensor:
+        s, size = self._plant.unbind(-1), self._loop.stepper.layout.links + 3
+        return _stack(motion(s[:3], s[size : size + 3], XP))
+
+    def look(self, t: int) -> dict[str, list[Tensor]]:
+        """Sense at the start of period t of the window."""
+        fleet, true = self._fleet, self._motions[-1]
+        late = zip(range(len(fleet)), HISTORY + t - fleet.delay, strict=True)
+        seen = torch.stack([self._motions[at][b] for b, at in late]) + self._noise[t]
+        near, real = (self._loop.find(fleet, k, o[:, :2]) for k, o in enumerate((seen, true)))
+        rows = (seen.unbind(-1), true.unbind(-1), self._guidance, near, real)
+        return sense(*rows, self._speed, self._cost, self._loop.law, XP)
+
+    def advance(self, sensed: dict[str, list[Tensor]]) -> Tensor:
+        """Policy, control law and physics of one period; the summed cost of gains and set-points."""
+        law = self._loop.law
+        raw = self._policy(_stack(sensed["inputs"])).unbind(-1)
+        acted = act(sensed["errors"], self._speed, self._control, self.last, raw, self._cost, law, XP)
+        self._guidance, self._control, self.last = sensed["guidance"], acted["control"], acted["last"]
+        for _ in range(PHYSICS_STEPS):
+            self._actuator, command = drive(self._actuator, self.last[SIZES["gains"] :], law, XP)
+            command = torch.stack(torch.broadcast_tensors(*command), dim=-1)
+            self._plant = torch_step.step(self._plant, command, self._parameters, self._loop.stepper)
+        self._motions.append(self._motion())
+        return acted["cost"][0].sum()
+
+    def _policy(self, x: Tensor) -> Tensor:
+        for W, b in self._weights[:-1]:
+            x = torch.relu(x @ W.T + b)
+        W, b = self._weights[-1]
+        return x @ W.T + b
+
+    def store(self) -> None:
+        """Hand the state back to the fleet."""
+        memory = [*self._guidance, *self._control, *self._actuator, *self.last]
+        like = self._speed
+        columns = [m if isinstance(m, Tensor) else torch.full_like(like, m) for m in memory]
+        self._fleet.plant[:] = self._plant.detach().numpy()
+        self._fleet.memory[:] = torch.stack(columns, dim=-1).detach().numpy()
+        self._fleet.history[:] = torch.stack(self._motions[-1 - HISTORY : -1], dim=1).detach().numpy()
+
+
+def _stack(values: list[Tensor]) -> Tensor:
+    return torch.stack(torch.broadcast_tensors(*values), dim=-1)
