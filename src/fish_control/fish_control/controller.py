@@ -20,6 +20,7 @@ from fish_control.control_law import (
 from fish_control.line_of_sight import GuidanceState, Motion, heading_error, observe
 from fish_control.policy import Policy, policy_inputs
 
+GLIDING_SPEED = 0.03  # m/s, slower than this the rudder is centred while no speed is wanted
 LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
 
 
@@ -88,6 +89,8 @@ class Controller:
         self._control, self._setpoint = control_step(
             self._control, errors, gains, self._policy.contract.control_period, self._limits, np
         )
+        if wanted.speed <= 0.0:  # gliding: steer while the rudder has a grip, never drive
+            self._setpoint = Setpoint(self._setpoint.alpha if motion.surge > GLIDING_SPEED else 0.0, 0.0)
         return gains
 
     def rest(self) -> None:

@@ -13,6 +13,7 @@ from fish_control.line_of_sight import (
     Motion,
     PathAhead,
     TrackingErrors,
+    heading_error,
     observe,
     tracking_errors,
 )
@@ -89,8 +90,18 @@ class Planner:
         self.finished = self.finished or at.finished
         speed = 0.0 if self.finished else self.speed
         ahead = PathAhead(at.x, at.y, at.heading, at.curvature, at.target[0], at.target[1], at.chord)
-        errors = tracking_errors(self._state, motion, ahead, speed, self._guidance, np)
-        return Plan(at, TrackingErrors(*map(float, errors)), speed, speed * at.curvature)
+        errors = TrackingErrors(
+            *map(float, tracking_errors(self._state, motion, ahead, speed, self._guidance, np))
+        )
+        if self.finished:
+            errors = self._turn_to_centre(errors, motion)
+        return Plan(at, errors, speed, speed * at.curvature)
+
+    def _turn_to_centre(self, errors: TrackingErrors, motion: Motion) -> TrackingErrors:
+        """After the end the fish glides for 0.3 m and more: away from the walls, towards the pool's centre."""
+        course = math.atan2(-motion.y, -motion.x)
+        heading = heading_error(self._state, motion, course, 0.0, self._guidance, np)
+        return errors._replace(course=course, heading=float(heading))
 
 
 def motion_is_finite(motion: Motion) -> bool:

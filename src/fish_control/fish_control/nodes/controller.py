@@ -115,7 +115,7 @@ class ControllerNode(Node):
         dt = 1.0 / self._config.command_rate_hz if math.isnan(self._now) else now - self._now
         self._now = now
         may_swim = self._watchdog.check(now, self._aged_signs(now))
-        if not may_swim or self._wanted.speed <= 0.0:
+        if not may_swim:
             self._controller.rest()
         elif self._ticks % round(self._config.command_rate_hz / self._config.rate_hz) == 0:
             self._gains.publish(to_message(self._controller.decide(self._wanted)))
