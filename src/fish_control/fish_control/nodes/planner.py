@@ -20,7 +20,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, Header
 
 from fish_control.line_of_sight import Motion
 from fish_control.node_configs import PlannerConfig
@@ -132,8 +132,7 @@ class PlannerNode(Node):
         target = PoseStamped(header=odometry.header)
         target.pose.position.x, target.pose.position.y = map(float, plan.at.target)
         target.pose.orientation = to_quaternion(plan.errors.course)
-        twist = TwistStamped(header=odometry.header)
-        twist.header.frame_id = "base_link"
+        twist = TwistStamped(header=Header(stamp=odometry.header.stamp, frame_id="base_link"))
         twist.twist.linear.x, twist.twist.angular.z = plan.speed, plan.yaw_rate
         error = Vector3Stamped(header=odometry.header)
         error.vector.x, error.vector.y, error.vector.z = (
