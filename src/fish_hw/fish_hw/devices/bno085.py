@@ -3,6 +3,11 @@
 The bus carries no checksum and the hub stretches the clock, so packets arrive damaged: what is not plausible
 is dropped and counted, and a bus error while reading counts as "no data". The game rotation vector is used
 because the rotor's magnets disturb the compass.
+
+With the hub's interrupt line samples carry the time of the interrupt and the hub is read only when it has
+data. Without it the hub is asked once per interval, since a read too many stretches the clock until there is
+data, and times are late by up to one interval. Once in EXTRA_READ polls it is asked again all the same, or a
+backlog would stay for ever.
 """
 
 import math
@@ -17,13 +22,14 @@ from fish_hw.protocol import sh2, shtp
 from fish_hw.protocol.sh2 import ProductId, Report
 from fish_hw.protocol.shtp import Cargo, Header
 from fish_hw.transport.errors import TransportError
-from fish_hw.transport.interfaces import I2cBus
+from fish_hw.transport.interfaces import DataReady, I2cBus
 
 FEATURES = (sh2.ACCELEROMETER, sh2.GYROSCOPE, sh2.GAME_ROTATION_VECTOR)
 RESET_WAIT_S = 0.3
 START_READS = 40
 START_READ_WAIT_S = 0.01
 MAX_READS = 8  # packets per poll; one holds all three reports, or three hold one each
+EXTRA_READ = 20  # polls
 LONGEST_READ = 512  # bytes; longer cargoes come in pieces
 MAX_ACCELERATION = 136.0  # m/s^2, magnitude; the sensor ends at 8 g per axis
 MAX_RATE = 60.5  # rad/s, magnitude; the sensor ends at 2000 deg/s per axis
@@ -52,6 +58,7 @@ class Bno085:
         bus: I2cBus,
         address: int,
         interval_us: int,
+        data_ready: DataReady | None = None,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -62,12 +69,14 @@ class Bno085:
         self._bus = bus
         self._address = address
         self._interval_us = interval_us
+        self._data_ready = data_ready
         self._clock = clock
         self._sleep = sleep
         self._writer = shtp.Writer()
         self._newest: dict[int, Report] = {}
         self._product: ProductId | None = None
         self._restarted = False
+        self._polls = 0
 
     def start(self) -> ProductId:
         """Reset, identify, switch the reports on; DeviceError if no BNO085 answers."""
@@ -84,25 +93,44 @@ class Bno085:
         self._restarted = False
         return product
 
-    def poll(self) -> list[ImuSample]:
-        """Samples that are complete now; stops at the first, since a read too many stretches the clock."""
+    def poll(self, timeout_s: float = 0.0) -> list[ImuSample]:
+        """Samples that have come; with an interrupt line waits for them up to timeout_s."""
+        self._polls += 1
+        all_there_is = self._data_ready is not None or self._polls % EXTRA_READ == 0
+        samples: list[ImuSample] = []
         for _ in range(MAX_READS):
+            ready_s = self._ready_time(timeout_s if not samples else 0.0)
+            if ready_s is None:
+                break
             cargo = self._read_cargo()
             if cargo is None:
-                return []
-            samples = self._take(cargo)
-            if self._restarted:
-                self._restarted = False
-                self._request_features()
-            if samples:
-                return samples
-        return []
+                break
+            samples += self._take(cargo, ready_s)
+            self._repeat_features()
+            if samples and not all_there_is:
+                break
+        return samples
+
+    def _ready_time(self, timeout_s: float) -> float | None:
+        """When the hub said that it has data; None while it has none."""
+        if self._data_ready is None:
+            return self._clock()
+        edge = self._data_ready.wait(timeout_s)
+        if not self._data_ready.is_low():
+            return None
+        return self._clock() if edge is None else edge
+
+    def _repeat_features(self) -> None:
+        """After a brown-out the hub has forgotten which reports it should send."""
+        if self._restarted:
+            self._restarted = False
+            self._request_features()
 
     def _wait_for_product(self) -> ProductId:
         for _ in range(START_READS):
             cargo = self._read_cargo()
             if cargo is not None:
-                self._take(cargo)
+                self._take(cargo, self._clock())
             if self._product is not None:
                 return self._product
             self._sleep(START_READ_WAIT_S)
@@ -117,7 +145,7 @@ class Bno085:
             cargo = self._read_cargo()
             if cargo is None:
                 return
-            self._take(cargo)
+            self._take(cargo, self._clock())
 
     def _request_features(self) -> None:
         self._newest.clear()
@@ -127,9 +155,9 @@ class Bno085:
     def _send(self, channel: int, payload: bytes) -> None:
         self._bus.write(self._address, self._writer.frame(channel, payload))
 
-    def _take(self, cargo: Cargo) -> list[ImuSample]:
+    def _take(self, cargo: Cargo, time_s: float) -> list[ImuSample]:
         if cargo.channel in (shtp.REPORTS, shtp.WAKE_REPORTS):
-            return self._take_reports(cargo.payload)
+            return self._take_reports(cargo.payload, time_s)
         if cargo.channel == shtp.EXECUTABLE and cargo.payload == sh2.RESET_COMPLETE:
             self._restarted = True  # after start() this means a brown-out: the reports are off now
             self.counters.resets += 1
@@ -144,9 +172,9 @@ class Bno085:
         if feature is not None:
             self.intervals_us[feature[0]] = feature[1]
 
-    def _take_reports(self, payload: bytes) -> list[ImuSample]:
+    def _take_reports(self, payload: bytes, time_s: float) -> list[ImuSample]:
         samples = []
-        for report in sh2.parse_reports(payload, self._clock(), self.drops):
+        for report in sh2.parse_reports(payload, time_s, self.drops):
             if report.id not in FEATURES:
                 continue
             if not plausible(report):

@@ -12,7 +12,7 @@ from fish_hw.devices.reconnect import Backoff
 from fish_hw.devices.status import ERROR, OK, WARN, Status
 from fish_hw.settings.imu import ImuSettings
 from fish_hw.transport.errors import TransportError
-from fish_hw.transport.interfaces import ByteStream, I2cBus
+from fish_hw.transport.interfaces import ByteStream, DataReady, I2cBus
 
 UNRELIABLE = 0
 SLOWEST_RATE, FASTEST_RATE = 0.9, 2.1  # of the asked rate, SH-2 manual
@@ -33,26 +33,30 @@ class I2cSensor:
         self,
         settings: ImuSettings,
         open_bus: Callable[[], I2cBus],
+        open_line: Callable[[], DataReady | None],
         clock: Callable[[], float],
         sleep: Callable[[float], None],
     ) -> None:
-        self._settings = settings
         self._bus = open_bus()
+        self._line: DataReady | None = None
         interval_us = round(1e6 / settings.rate_hz)
-        self._bno = Bno085(self._bus, settings.address, interval_us, clock, sleep)
         try:
+            self._line = open_line()
+            self._bno = Bno085(self._bus, settings.address, interval_us, self._line, clock, sleep)
             self.name = str(self._bno.start())
         except (TransportError, DeviceError):
-            self._bus.close()
+            self.close()
             raise
 
-    def poll(self, timeout_s: float) -> list[ImuSample]:  # noqa: ARG002 (the bus answers at once)
-        """Samples since the last call."""
-        return self._bno.poll()
+    def poll(self, timeout_s: float) -> list[ImuSample]:
+        """Samples since the last call; waits for them only with an interrupt line."""
+        return self._bno.poll(timeout_s)
 
     def close(self) -> None:
-        """Give the bus back."""
+        """Give bus and line back."""
         self._bus.close()
+        if self._line is not None:
+            self._line.close()
 
     def counters(self) -> dict[str, object]:
         """What went wrong since the start, and the real rates."""
@@ -101,13 +105,14 @@ class ImuDriver:
         self,
         settings: ImuSettings,
         open_bus: Callable[[], I2cBus],
+        open_line: Callable[[], DataReady | None],
         open_stream: Callable[[], ByteStream],
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self.samples = 0
         self._settings = settings
-        self._open_bus, self._open_stream = open_bus, open_stream
+        self._open_bus, self._open_line, self._open_stream = open_bus, open_line, open_stream
         self._clock, self._sleep = clock, sleep
         self._mounting = Mounting(settings)
         self._sensor: I2cSensor | SerialSensor | None = None
@@ -125,19 +130,22 @@ class ImuDriver:
     def connect(self) -> None:
         """Start the sensor; PortUnavailable, TransportError or DeviceError if it cannot."""
         if self._settings.interface == "i2c":
-            self._sensor = I2cSensor(self._settings, self._open_bus, self._clock, self._sleep)
+            self._sensor = I2cSensor(
+                self._settings, self._open_bus, self._open_line, self._clock, self._sleep
+            )
         else:
             self._sensor = SerialSensor(self._open_stream, self._clock)
         self._changed_time = self._clock()
         self._last = None
+        self._rated = (self.samples, self._clock())
         self._backoff.succeeded()
 
     def step(self, timeout_s: float) -> ImuCycle:
-        """Read once; rvc waits for bytes up to timeout_s."""
+        """Read once; waits up to timeout_s for bytes, the interrupt, or the time to try again."""
         now = self._clock()
         try:
             if self._sensor is None:
-                return self._reconnect(now)
+                return self._reconnect(now, timeout_s)
             samples = [self._mounting.to_base(s) for s in self._sensor.poll(timeout_s)]
             self._watch(samples)
         except (TransportError, DeviceError) as error:
@@ -184,8 +192,9 @@ class ImuDriver:
             what = "values stand still" if samples else "no samples"
             raise DeviceError(f"IMU: {what} for {self._settings.watchdog_s} s")
 
-    def _reconnect(self, now: float) -> ImuCycle:
+    def _reconnect(self, now: float, timeout_s: float) -> ImuCycle:
         if not self._backoff.due(now):
+            self._sleep(timeout_s)
             return ImuCycle()
         self.connect()
         return ImuCycle(events=["IMU connected again"])

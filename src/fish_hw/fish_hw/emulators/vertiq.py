@@ -57,7 +57,9 @@ class VertiqEmulator:
         self._boot()
 
     def close(self) -> None:
-        """Stop and take the port away, as pulling the plug does."""
+        """Stop and take the port away, as pulling the plug does; may be called twice."""
+        if self._stop.is_set():
+            return
         self._stop.set()
         self._thread.join()
         os.close(self._slave)

@@ -158,6 +158,9 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
         pass
     except EXPECTED as error:
         failure = one_line(error)
+    except RCLError:
+        if rclpy.ok():  # else a signal came while the node was being made
+            raise
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not interrupt the way to safety
             signal.signal(number, signal.SIG_IGN)

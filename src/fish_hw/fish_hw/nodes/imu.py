@@ -14,8 +14,9 @@ from fish_hw.emulators.bno085 import Bno085Emulator
 from fish_hw.emulators.i2c_bus import I2cBusEmulator
 from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.settings.imu import ImuSettings
+from fish_hw.transport.gpio_line import InterruptLine
 from fish_hw.transport.i2c_bus import KernelI2c
-from fish_hw.transport.interfaces import I2cBus
+from fish_hw.transport.interfaces import DataReady, I2cBus
 from fish_hw.transport.serial_port import SerialPort
 
 
@@ -27,15 +28,23 @@ class ImuNode(DeviceNode):
         settings = self.settings
         self._data = self.create_publisher(Imu, "imu/data", QoSProfile(depth=10))
         self._period_s = 1.0 / settings.rate_hz
-        self._driver = ImuDriver(settings, self._open_bus, lambda: SerialPort(settings.port, BAUD))
+        self._driver = ImuDriver(
+            settings, self._open_bus, self._open_line, lambda: SerialPort(settings.port, BAUD)
+        )
         self._template = self._message_template()
         emulated = settings.interface == "i2c" and settings.bus == "emulator"
-        self.start(self._driver, self._cycle, self._period_s, emulated)
+        waits = settings.interface == "rvc" or settings.int_line >= 0  # a step then lasts until there is data
+        self.start(self._driver, self._cycle, 0.0 if waits else self._period_s, emulated)
 
     def _open_bus(self) -> I2cBus:
         if self.settings.bus == "emulator":
             return I2cBusEmulator({self.settings.address: Bno085Emulator()})
         return KernelI2c(self.settings.bus)
+
+    def _open_line(self) -> DataReady | None:
+        if self.settings.int_line < 0:
+            return None
+        return InterruptLine(self.settings.int_chip, self.settings.int_line)
 
     def _cycle(self) -> None:
         cycle = self._driver.step(self._period_s)

@@ -19,6 +19,10 @@ class ImuSettings:
     interface: str = "i2c"  # i2c | rvc (serial, attitude only: rates are differences)
     bus: str = "/dev/i2c-1"  # i2c: bus, or "emulator"
     address: int = 0x4A  # i2c: 0x4A or 0x4B
+    int_chip: str = "/dev/gpiochip0"  # i2c: GPIO chip of the interrupt line
+    int_line: int = (
+        -1
+    )  # i2c: line that H_INTN is wired to (BCM number); -1 not wired: time stamps up to 10 ms late
     port: str = "/dev/ttyUSB0"  # rvc: serial device
     startup_timeout_s: float = 0.0  # s to wait for the sensor at start; then the node ends with an error
     rate_hz: float = 100.0  # Hz, asked of the sensor (rvc: 100 always)
@@ -36,6 +40,7 @@ class ImuSettings:
         require_choice("address", self.address, (0x4A, 0x4B))
         require_range("startup_timeout_s", self.startup_timeout_s, 0.0, 3600.0)
         require_range("rate_hz", self.rate_hz, 10.0, 200.0)
+        require_range("int_line", self.int_line, -1, 511)
         require_range("watchdog_s", self.watchdog_s, 0.1, 60.0)
         for name in ("mount_roll", "mount_pitch", "mount_yaw"):
             require_range(name, getattr(self, name), -math.pi, math.pi)

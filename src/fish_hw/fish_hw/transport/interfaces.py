@@ -19,6 +19,22 @@ class ByteStream(Protocol):
         ...
 
 
+class DataReady(Protocol):
+    """A line that a device pulls low while it has data."""
+
+    def wait(self, timeout_s: float) -> float | None:
+        """Time [s, monotonic clock] of the newest falling edge within timeout_s; None if none came."""
+        ...
+
+    def is_low(self) -> bool:
+        """Whether the device has data now."""
+        ...
+
+    def close(self) -> None:
+        """Give the line back; may be called twice."""
+        ...
+
+
 class I2cBus(Protocol):
     """An I2C bus with plain writes and plain reads, one message each (no repeated start)."""
 

@@ -1,0 +1,17 @@
+"""Shared by the tests of this package: emulated devices that are always given back."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from fish_hw.emulators.vertiq import VertiqEmulator  # noqa: E402
+
+
+@pytest.fixture
+def vertiq_emulator():
+    emulator = VertiqEmulator()
+    yield emulator
+    emulator.close()

@@ -1,0 +1,44 @@
+"""Stands in for the kernel's I2C driver, so that the real smbus2 runs: replaces its ioctl."""
+
+import ctypes
+import errno
+import os
+from collections.abc import Callable
+
+import smbus2.smbus2
+
+READ = 1  # I2C_M_RD
+
+
+class FakeKernel:
+    """Serves I2C_RDWR with the emulated devices; `fault` may return an errno."""
+
+    def __init__(self, devices: dict) -> None:
+        self.devices = devices
+        self.fault: Callable[[], int | None] = lambda: None
+        self.messages_per_transfer: list[int] = []
+
+    def ioctl(self, descriptor, request, argument=0, *_rest):
+        if descriptor is None:
+            raise TypeError("argument must be an int, or have a fileno() method.")  # as fcntl.ioctl says
+        code = self.fault()
+        if code is not None:
+            raise OSError(code, os.strerror(code))
+        if request == smbus2.smbus2.I2C_FUNCS:
+            argument.value = 0x0EFF0001
+            return 0
+        if request != smbus2.smbus2.I2C_RDWR:
+            raise OSError(errno.ENOTTY, os.strerror(errno.ENOTTY))
+        self.messages_per_transfer.append(argument.nmsgs)
+        for i in range(argument.nmsgs):
+            self._message(argument.msgs[i])
+        return argument.nmsgs
+
+    def _message(self, message) -> None:
+        device = self.devices.get(message.addr)
+        if device is None:
+            raise OSError(errno.EREMOTEIO, os.strerror(errno.EREMOTEIO))
+        if message.flags & READ:
+            ctypes.memmove(message.buf, device.read(message.len), message.len)
+        else:
+            device.write(ctypes.string_at(message.buf, message.len))

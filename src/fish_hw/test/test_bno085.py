@@ -1,0 +1,321 @@
+"""The BNO085 device and the IMU driver on the emulated hub, on simulated time, with every kind of damage."""
+
+import errno
+import math
+from dataclasses import replace
+
+import pytest
+
+from fish_hw.devices import bno085
+from fish_hw.devices.bno085 import Bno085
+from fish_hw.devices.bno085_rvc import Bno085Rvc
+from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.imu_driver import ImuDriver
+from fish_hw.devices.status import ERROR, OK, WARN
+from fish_hw.emulators.bno085 import YAW_FREQUENCY, YAW_RATE, Bno085Emulator
+from fish_hw.emulators.i2c_bus import I2cBusEmulator
+from fish_hw.protocol import rvc, shtp
+from fish_hw.settings.imu import ImuSettings
+from fish_hw.transport.errors import PortUnavailable, TransportError
+from fish_hw.transport.recorded import RecordedStream
+
+INTERVAL_S = 0.01
+
+
+class Bench:
+    """Hub, bus and device on one simulated clock."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+        self.hub = Bno085Emulator(clock=self.clock)
+        self.bus = I2cBusEmulator({0x4A: self.hub})
+        self.bno = Bno085(self.bus, 0x4A, round(1e6 * INTERVAL_S), clock=self.clock, sleep=self.sleep)
+
+    def clock(self) -> float:
+        return self.now
+
+    def sleep(self, duration_s: float) -> None:
+        self.now += duration_s
+
+    def run(self, duration_s: float) -> list:
+        samples = []
+        for _ in range(round(duration_s / INTERVAL_S)):
+            self.sleep(INTERVAL_S)
+            samples += self.bno.poll()
+        return samples
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    bench.bno.start()
+    return bench
+
+
+def test_start_switches_the_reports_on(bench):
+    assert bench.hub.intervals_us == {1: 10000, 2: 10000, 8: 10000}
+    assert bench.hub.written[0] == bytes.fromhex("05 00 01 00 01")
+
+
+def test_samples_have_the_motion_of_the_hub_at_the_time_it_was_measured(bench):
+    started = bench.hub._started
+    samples = bench.run(3.0)
+    assert len(samples) >= 295
+    samples = samples[bno085.EXTRA_READ :]  # until then the answers to start() are a backlog of one
+    for sample in samples:
+        phase = YAW_FREQUENCY * (sample.time_s - started)
+        yaw = YAW_RATE / YAW_FREQUENCY * math.sin(phase)
+        assert sample.angular_velocity == pytest.approx((0.0, 0.0, YAW_RATE * math.cos(phase)), abs=4e-3)
+        assert sample.orientation == pytest.approx((0, 0, math.sin(yaw / 2), math.cos(yaw / 2)), abs=1e-3)
+    assert bench.bno.intervals_us == {1: 10000, 2: 10000, 8: 10000}
+
+
+def test_backlog_does_not_stay(bench):
+    for _ in range(5):
+        bench.sleep(INTERVAL_S)
+        bench.hub._measure()
+    assert len(bench.hub._queue) >= 5
+    bench.run(0.5)
+    assert len(bench.hub._queue) <= 1
+
+
+class Line:
+    """An interrupt line that fell `age_s` ago, low as long as the hub has something."""
+
+    def __init__(self, bench: Bench, age_s: float) -> None:
+        self.bench, self.age_s = bench, age_s
+        self.waited = []
+
+    def wait(self, timeout_s: float) -> float | None:
+        self.waited.append(timeout_s)
+        return self.bench.now - self.age_s
+
+    def is_low(self) -> bool:
+        self.bench.hub._measure()
+        return bool(self.bench.hub._queue or self.bench.hub._open)
+
+    def close(self) -> None:
+        pass
+
+
+def test_interrupt_line_gives_the_time_and_spares_empty_reads():
+    bench = Bench()
+    line = Line(bench, age_s=0.004)
+    bench.bno = Bno085(bench.bus, 0x4A, 10000, line, bench.clock, bench.sleep)
+    bench.bno.start()
+    reads = []
+    read = bench.bus.read
+    bench.bus.read = lambda address, count: reads.append(read(address, count)) or reads[-1]
+    plain = Bench()
+    plain.bno.start()
+    samples, without = bench.run(0.5), plain.run(0.5)
+    assert len(samples) >= 45
+    assert not any(data == bytes(4) for data in reads)
+    assert without[-1].time_s - samples[-1].time_s == pytest.approx(0.004, abs=1e-6)
+
+
+def test_long_cargo_comes_in_pieces(bench, monkeypatch):
+    bench.run(0.1)
+    monkeypatch.setattr(bno085, "LONGEST_READ", 20)
+    samples = bench.run(0.5)  # reports are 43 bytes: three pieces
+    assert len(samples) >= 45
+    assert bench.bno.counters.bad_packets == bench.bno.reassembler.orphans == 0
+
+
+def test_one_bus_error_costs_one_poll(bench):
+    bench.run(0.1)
+    codes = iter([errno.EREMOTEIO])
+    bench.bus.fault = lambda: next(codes, None)
+    assert len(bench.run(0.3)) >= 27
+    assert bench.bno.counters.bus_errors == 1
+
+
+@pytest.mark.parametrize("code", [errno.EREMOTEIO, errno.ETIMEDOUT, errno.EIO])
+def test_bus_errors_for_ever_are_no_data(bench, code):
+    bench.bus.fault = lambda: code
+    assert bench.run(0.3) == []
+    assert bench.bno.counters.bus_errors == 30
+
+
+@pytest.mark.parametrize(
+    ("damage", "counter"),
+    [
+        (lambda p: b"\xff" * len(p), "bad_packets"),
+        (lambda p: p[:2] + b"\x06" + p[3:], "bad_packets"),
+        (lambda p: p if len(p) <= 4 else b"\x05\x00" + p[2:], "bad_packets"),
+    ],
+    ids=["all ones", "channel 6", "length changes between header and packet"],
+)
+def test_damaged_packets_are_dropped_and_it_goes_on(bench, damage, counter):
+    bench.run(0.1)
+    bench.hub.damage = damage
+    assert bench.run(0.3) == []
+    assert getattr(bench.bno.counters, counter) > 0
+    bench.hub.damage = lambda packet: packet
+    assert len(bench.run(0.3)) >= 25
+
+
+def test_lost_first_bit_of_the_time_base(bench):
+    bench.run(0.1)
+    bench.hub.damage = lambda p: p[:4] + p[4:].replace(b"\xfb", b"\x7b", 1)
+    assert bench.run(0.3) == []
+    assert bench.bno.drops.unknown_reports >= 28
+
+
+def test_implausible_values_are_dropped(bench):
+    bench.run(0.1)
+    base = b"\xfb\x00\x00\x00\x00"
+    bench.hub.push(shtp.REPORTS, base + bytes.fromhex("08 00 03 00 ff 7f ff 7f ff 7f ff 7f"))  # |q| = 4
+    bench.hub.push(shtp.REPORTS, base + bytes.fromhex("01 00 03 00 ff 7f ff 7f ff 7f"))  # 22 g
+    bench.hub.push(shtp.REPORTS, base + bytes.fromhex("02 00 03 00 ff 7f ff 7f ff 7f"))  # 6350 deg/s
+    bench.run(0.1)
+    assert bench.bno.counters.implausible == 3
+
+
+def test_reset_of_the_hub_switches_the_reports_on_again(bench):
+    bench.run(0.1)
+    bench.hub.reset()
+    assert bench.hub.intervals_us == {}
+    assert len(bench.run(0.5)) >= 40
+    assert bench.bno.counters.resets == 2  # the first was ours
+
+
+def test_sequence_gaps_are_counted(bench):
+    bench.run(0.1)
+    bench.hub._sequence[shtp.REPORTS] += 3
+    bench.run(0.1)
+    assert bench.bno.reassembler.sequence_gaps == 1
+
+
+def test_nobody_answers():
+    bench = Bench()
+    bench.bno = Bno085(bench.bus, 0x4B, 10000, clock=bench.clock, sleep=bench.sleep)
+    with pytest.raises(DeviceError, match="no BNO085 at 0x4b.*check power, wiring"):
+        bench.bno.start()
+
+
+def test_something_else_answers():
+    bench = Bench()
+    bench.hub.damage = lambda packet: b"\x12" * len(packet)
+    with pytest.raises(DeviceError, match="no BNO085 answers at 0x4a"):
+        bench.bno.start()
+
+
+class DriverBench(Bench):
+    """The whole driver on the emulated hub."""
+
+    def __init__(self, settings: ImuSettings | None = None, stream: RecordedStream | None = None) -> None:
+        super().__init__()
+        settings = settings or ImuSettings()
+        self.driver = ImuDriver(
+            settings, lambda: self.bus, lambda: None, lambda: stream, self.clock, self.sleep
+        )
+        self.events = []
+
+    def run(self, duration_s: float) -> list:
+        samples = []
+        end = self.now + duration_s
+        while self.now < end:
+            self.sleep(INTERVAL_S)
+            cycle = self.driver.step(0.0)
+            samples += cycle.samples
+            self.events += cycle.events
+        return samples
+
+
+def test_driver_reports_its_rate():
+    bench = DriverBench()
+    bench.driver.connect()
+    bench.run(2.0)
+    status = bench.driver.status()
+    assert status.level == OK
+    assert status.values["rate [Hz]"] == pytest.approx(100.0, rel=0.2)
+
+
+def test_driver_turns_to_base_axes():
+    bench = DriverBench(ImuSettings(mount_roll=math.pi))  # upside down
+    bench.driver.connect()
+    samples = bench.run(0.5)
+    assert samples[0].acceleration[2] == pytest.approx(-9.8, abs=0.3)
+    assert samples[0].angular_velocity[2] == pytest.approx(-YAW_RATE, abs=0.05)
+
+
+def test_frozen_values_start_the_sensor_again():
+    bench = DriverBench()
+    bench.driver.connect()
+    bench.run(0.5)
+    bench.hub.frozen = True
+    bench.run(1.2)
+    assert bench.events == ["IMU: values stand still for 1.0 s"]
+    assert bench.driver.status().level == ERROR
+    bench.hub.frozen = False
+    assert bench.run(3.0)
+    assert bench.events[-1] == "IMU connected again"
+
+
+def test_silence_then_return():
+    bench = DriverBench()
+    bench.driver.connect()
+    bench.run(0.5)
+    bench.bus.fault = lambda: errno.EREMOTEIO
+    bench.run(10.0)
+    assert "IMU: no samples for 1.0 s" in bench.events
+    assert len(bench.events) == 2  # lost, and why it cannot come back; not once per attempt
+    bench.bus.fault = lambda: None
+    assert bench.run(8.0)
+    assert bench.driver.connected
+
+
+def test_unreliable_and_slow_sensors_are_said():
+    bench = DriverBench(replace(ImuSettings(), rate_hz=200.0))
+    bench.driver.connect()
+    bench.run(1.0)
+    bench.driver.status()
+    bench.run(1.0)  # polled at 100 Hz only
+    assert (bench.driver.status().level, bench.driver.status().level) == (WARN, ERROR)
+
+
+def test_absent_bus_is_raised_at_start():
+    def absent():
+        raise PortUnavailable("cannot open I2C bus")
+
+    driver = ImuDriver(ImuSettings(), absent, lambda: None, RecordedStream)
+    with pytest.raises(PortUnavailable):
+        driver.connect()
+
+
+def rvc_frames(indices, rate: float) -> list[bytes]:
+    return [
+        rvc.encode(rvc.RvcMessage(i % 256, rate * 0.01 * i, 0.0, 0.0, (0.0, 0.0, 9.80665))) for i in indices
+    ]
+
+
+def test_rvc_rate_is_the_difference_of_attitudes():
+    clock = iter(range(1000))
+    stream = RecordedStream(rvc_frames(range(250, 290), rate=1.0))
+    device = Bno085Rvc(stream, clock=lambda: 0.01 * next(clock))
+    samples = [s for _ in range(40) for s in device.poll(0.0)]
+    assert len(samples) == 39  # the first has nothing to differ from; the index wraps on the way
+    for sample in samples:
+        assert sample.angular_velocity == pytest.approx((0.0, 0.0, 1.0), abs=0.02)
+    steps = [b.time_s - a.time_s for a, b in zip(samples, samples[1:], strict=False)]
+    assert steps == pytest.approx([0.01] * 38)
+
+
+def test_rvc_gaps():
+    frames = rvc_frames([0, 1, 3, 4, 40, 41], rate=0.5)
+    device = Bno085Rvc(RecordedStream(frames), clock=lambda: 0.0)
+    samples = [s for _ in frames for s in device.poll(0.0)]
+    assert [round(s.angular_velocity[2], 1) for s in samples] == [0.5] * 4
+    assert device.lost_frames == 1 + 35
+
+
+def test_rvc_port_lost_and_silent():
+    stream = RecordedStream([*rvc_frames(range(5), 1.0), TransportError("unplugged")])
+    bench = DriverBench(ImuSettings(interface="rvc"), stream)
+    bench.driver.connect()
+    assert len(bench.run(0.1)) == 4
+    assert bench.events == ["unplugged"]
+    assert stream.closed
+    bench.run(2.0)  # opened again, but silent
+    assert "IMU: no samples for 1.0 s" in bench.events

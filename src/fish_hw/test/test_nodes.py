@@ -1,0 +1,301 @@
+"""The nodes: topics, units, frames, stamps and refusals in one process; signals with real processes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import BatteryState, CameraInfo, CompressedImage, Image, Imu, JointState
+from std_srvs.srv import SetBool, Trigger
+from waiting import wait_until
+
+from fish_hw.devices import vertiq_registers as reg
+from fish_hw.devices.usb_camera import jpeg_size
+from fish_hw.emulators.pwm_chip import PwmChipEmulator
+from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
+from fish_hw.nodes.camera import CameraNode
+from fish_hw.nodes.imu import ImuNode
+from fish_hw.nodes.rotor import RotorNode
+from fish_hw.nodes.rudder import RudderNode
+from fish_hw.transport.errors import PortUnavailable
+
+pytestmark = pytest.mark.ros
+DOMAIN = 61
+TIMEOUT_S = 10.0
+
+
+class Graph:
+    """A node under test and a peer, spun together."""
+
+    def __init__(self, node_class: Callable, parameters: dict) -> None:
+        arguments = [a for k, v in parameters.items() for a in ("-p", f"{k}:={v}")]
+        rclpy.init(args=["--ros-args", *arguments], domain_id=DOMAIN)
+        try:
+            self.node = node_class()
+        except Exception:
+            rclpy.try_shutdown()
+            raise
+        self.peer = rclpy.create_node("peer", namespace="fish")
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.executor.add_node(self.peer)
+        self.received: dict[str, list] = {}
+
+    def listen(self, kind: type, topic: str) -> list:
+        self.received[topic] = []
+        self.peer.create_subscription(kind, topic, self.received[topic].append, 10)
+        return self.received[topic]
+
+    def spin(self, until: Callable[[], bool], each: Callable[[], None] = lambda: None) -> bool:
+        deadline = time.monotonic() + TIMEOUT_S
+        while not until() and time.monotonic() < deadline:
+            each()
+            self.executor.spin_once(timeout_sec=0.01)
+        return until()
+
+    def call(self, kind: type, name: str, request) -> object:
+        client = self.peer.create_client(kind, name)
+        assert client.wait_for_service(TIMEOUT_S)
+        future = client.call_async(request)
+        assert self.spin(future.done)
+        return future.result()
+
+    def close(self) -> None:
+        self.node.close()
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.peer.destroy_node()
+        rclpy.try_shutdown()
+
+
+@pytest.fixture
+def graph():
+    graphs = []
+
+    def make(node_class: Callable, **parameters) -> Graph:
+        graphs.append(Graph(node_class, parameters))
+        return graphs[-1]
+
+    yield make
+    for graph in graphs:
+        graph.close()
+
+
+def command(rotor: float = 0.0, rudder: float = 0.0) -> JointState:
+    return JointState(name=["rotor", "rudder"], position=[0.0, rudder], velocity=[rotor, 0.0])
+
+
+def age_s(graph: Graph, stamp) -> float:
+    now = graph.peer.get_clock().now().nanoseconds
+    return (now - stamp.sec * 10**9 - stamp.nanosec) * 1e-9
+
+
+def test_rotor_topics(graph, vertiq_emulator):
+    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.05)
+    states = g.listen(JointState, "joint_states")
+    battery = g.listen(BatteryState, "battery_state")
+    diagnostics = g.listen(DiagnosticArray, "/diagnostics")
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+    assert g.spin(
+        lambda: bool(states) and abs(states[-1].velocity[0] - 80.0) < 1.0,
+        lambda: publisher.publish(command(rotor=80.0)),
+    )
+    assert list(states[-1].name) == ["rotor"]
+    assert len(states[-1].position) == 1
+    assert 0.0 <= age_s(g, states[-1].header.stamp) < 1.0
+    assert g.spin(lambda: bool(battery) and bool(diagnostics))
+    assert battery[0].voltage == pytest.approx(14.8, abs=0.01)
+    assert battery[0].current == pytest.approx(-0.5, abs=0.01)
+    assert diagnostics[0].status[0].name == "fish/rotor"
+    assert {"phase", "crc errors", "volts"} <= {v.key for v in diagnostics[0].status[0].values}
+
+
+def test_rotor_coasts_when_commands_end(graph, vertiq_emulator):
+    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.05)
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+    assert g.spin(
+        lambda: vertiq_emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0))
+    )
+    assert g.spin(lambda: vertiq_emulator.mode == reg.COAST)
+    assert vertiq_emulator.timeouts == 0  # told to, not left to its own watchdog
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        JointState(),
+        JointState(name=["rudder"], position=[0.0]),
+        JointState(name=["rotor"]),
+        JointState(name=["rotor"], velocity=[float("nan")]),
+        JointState(name=["rotor"], velocity=[float("inf")]),
+    ],
+    ids=["empty", "other joint", "no value", "nan", "inf"],
+)
+def test_rotor_survives_bad_commands(graph, vertiq_emulator, bad):
+    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.05)
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+    assert g.spin(lambda: g.node._driver.guard.rejected > 3, lambda: publisher.publish(bad))
+    assert vertiq_emulator.mode == reg.COAST
+    assert g.spin(
+        lambda: vertiq_emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0))
+    )
+
+
+def test_rotor_services(graph, vertiq_emulator):
+    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.05)
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+
+    def drive() -> None:
+        publisher.publish(command(rotor=50.0))
+
+    assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, drive)
+    assert g.call(SetBool, "rotor/enable", SetBool.Request(data=False)).success
+    assert g.spin(lambda: vertiq_emulator.mode == reg.COAST, drive)
+    assert g.call(SetBool, "rotor/enable", SetBool.Request(data=True)).success
+    assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, drive)
+    vertiq_emulator.faults_ever = 2
+    assert g.call(Trigger, "rotor/clear_faults", Trigger.Request()).success
+    assert g.spin(lambda: vertiq_emulator.faults_ever == 0, drive)
+
+
+def test_rudder_follows_and_centres(graph, tmp_path):
+    chip = PwmChipEmulator(tmp_path / "pwmchip0")
+    g = graph(RudderNode, chip=str(chip.chip))
+    diagnostics = g.listen(DiagnosticArray, "/diagnostics")
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+    assert g.spin(
+        lambda: chip.channel.joinpath("duty_cycle").read_text() == "1786500\n",
+        lambda: publisher.publish(command(rudder=0.5)),
+    )
+    assert g.spin(lambda: chip.channel.joinpath("duty_cycle").read_text() == "1500000\n")
+    assert g.spin(lambda: bool(diagnostics))
+
+
+def test_imu_topics(graph):
+    g = graph(ImuNode, bus="emulator")
+    data = g.listen(Imu, "imu/data")
+    diagnostics = g.listen(DiagnosticArray, "/diagnostics")
+    assert g.spin(lambda: len(data) > 30 and bool(diagnostics))
+    message = data[-1]
+    assert message.header.frame_id == "imu_link"
+    assert 0.0 <= age_s(g, message.header.stamp) < 1.0
+    assert message.linear_acceleration.z == pytest.approx(9.8, abs=0.5)
+    assert 0.0 < abs(message.angular_velocity.z) < 0.51
+    assert message.orientation.z**2 + message.orientation.w**2 == pytest.approx(1.0, abs=1e-3)
+    assert message.orientation_covariance[0] == pytest.approx(0.044**2)
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in data]
+    assert stamps == sorted(stamps)
+    assert diagnostics[0].status[0].level == DiagnosticStatus.WARN  # says that it is emulated
+    assert "emulated" in diagnostics[0].status[0].message
+
+
+def test_camera_topics(graph):
+    g = graph(CameraNode, device="emulator", width=160, height=120, publish_raw=True)
+    compressed = g.listen(CompressedImage, "camera/image_raw/compressed")
+    info = g.listen(CameraInfo, "camera/camera_info")
+    raw = g.listen(Image, "camera/image_raw")
+    assert g.spin(lambda: min(len(compressed), len(info), len(raw)) > 5)
+    assert compressed[-1].header.frame_id == "overhead_optical"
+    assert jpeg_size(bytes(compressed[-1].data)) == (160, 120)
+    stamps = [
+        {(m.header.stamp.sec, m.header.stamp.nanosec) for m in topic} for topic in (compressed, info, raw)
+    ]
+    assert len(stamps[0] & stamps[1] & stamps[2]) > 3
+    assert (raw[-1].encoding, raw[-1].step, len(raw[-1].data)) == ("bgr8", 480, 160 * 120 * 3)
+
+
+def test_absent_port_is_refused(graph):
+    with pytest.raises(PortUnavailable, match="there is no such port; available:"):
+        graph(RotorNode, port="/dev/ttyX9")
+
+
+def test_port_that_appears_later(graph, tmp_path):
+    g = graph(RudderNode, chip=str(tmp_path / "pwmchip0"), startup_timeout_s=60)
+    diagnostics = g.listen(DiagnosticArray, "/diagnostics")
+    assert g.spin(lambda: bool(diagnostics) and diagnostics[-1].status[0].level == DiagnosticStatus.ERROR)
+    chip = PwmChipEmulator(tmp_path / "pwmchip0")
+    assert g.spin(lambda: chip.channel.joinpath("enable").read_text() == "1\n")
+
+
+NODES = {
+    "rotor": ["-p", "port:=emulator"],
+    "rudder": ["-p", "backend:=emulator"],
+    "imu": ["-p", "bus:=emulator"],
+    "camera": ["-p", "device:=emulator", "-p", "width:=160", "-p", "height:=120"],
+}
+
+
+def start(name: str, *arguments: str) -> subprocess.Popen:
+    environment = os.environ | {
+        "ROS_DOMAIN_ID": str(DOMAIN),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "PYTHONUNBUFFERED": "1",
+    }
+    return subprocess.Popen(
+        [sys.executable, "-m", f"fish_hw.nodes.{name}", "--ros-args", *arguments],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def first_words(process: subprocess.Popen, words: str) -> None:
+    """Wait for a line of output that contains words."""
+    for line in process.stdout:
+        if words in line:
+            return
+    raise AssertionError(f"the process ended without saying {words!r}")
+
+
+@pytest.mark.parametrize("name", ["rotor", "camera"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_signals_end_with_zero(name, number):
+    process = start(name, *NODES[name])
+    first_words(process, "rotor module" if name == "rotor" else "no calibration_file")
+    process.send_signal(number)
+    output, _ = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 0, output
+    assert "Traceback" not in output
+
+
+def driven_rotor(emulator: VertiqEmulator, graph: Callable) -> tuple[subprocess.Popen, Graph]:
+    """A rotor process that spins the emulated module, commanded from here."""
+    process = start(
+        "rotor", "-p", f"port:={emulator.port}", "-p", "resume:=auto", "-p", "reply_timeout_s:=0.05"
+    )
+    first_words(process, "rotor module")
+    g = graph(RudderNode, backend="emulator")  # any node: this side needs an executor only
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+    assert g.spin(lambda: emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0)))
+    return process, g
+
+
+def test_sigterm_coasts_a_spinning_rotor(graph, vertiq_emulator):
+    process, _ = driven_rotor(vertiq_emulator, graph)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 0
+    assert vertiq_emulator.mode == reg.COAST and vertiq_emulator.timeouts == 0
+
+
+def test_sigkill_leaves_it_to_the_modules_own_watchdog(graph, vertiq_emulator):
+    process, _ = driven_rotor(vertiq_emulator, graph)
+    process.kill()
+    process.communicate(timeout=TIMEOUT_S)
+    assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
+    assert vertiq_emulator.timeouts == 1 and vertiq_emulator.timeout_s == 0.25
+
+
+def test_missing_port_is_one_line_and_an_exit_code():
+    process = start("rotor", "-p", "port:=/dev/ttyX9")
+    output, _ = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 1
+    assert output.startswith("rotor: cannot open serial port /dev/ttyX9: there is no such port; available: ")
+    assert output.count("\n") == 1

@@ -1,0 +1,186 @@
+"""The whole rotor driver on a real port with the emulated module behind it, in real time."""
+
+import math
+import time
+from dataclasses import replace
+
+import pytest
+
+from fish_hw.devices import vertiq_registers as reg
+from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.rotor_driver import RotorDriver
+from fish_hw.devices.rotor_guard import Phase
+from fish_hw.devices.status import ERROR, OK, WARN
+from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
+from fish_hw.protocol.iquart import GET
+from fish_hw.settings.rotor import RotorSettings
+from fish_hw.transport.errors import PortUnavailable
+from fish_hw.transport.serial_port import SerialPort
+
+SETTINGS = RotorSettings(port="test", resume="auto", reply_timeout_s=0.05)
+DT = 0.01
+
+
+class Bench:
+    """A driver on an emulator; run() steps it in real time."""
+
+    def __init__(self, emulator: VertiqEmulator, settings: RotorSettings = SETTINGS) -> None:
+        self.emulator = emulator
+        self.driver = RotorDriver(settings, lambda: SerialPort(self.emulator.port, 115200))
+        self.samples, self.events, self.telemetry = [], [], []
+
+    def run(self, duration_s: float, command=None, until=None) -> bool:
+        start = time.monotonic()
+        while time.monotonic() - start < duration_s:
+            if command is not None:
+                self.driver.command(command(time.monotonic() - start))
+            cycle = self.driver.step()
+            self.events += cycle.events
+            self.samples += [cycle.sample] if cycle.sample else []
+            self.telemetry += [cycle.telemetry] if cycle.telemetry else []
+            if until is not None and until():
+                return True
+            time.sleep(DT)
+        return until is None
+
+
+@pytest.fixture
+def bench(vertiq_emulator):
+    bench = Bench(vertiq_emulator)
+    bench.driver.connect()
+    yield bench
+    bench.driver.close()
+
+
+def oscillation(t: float) -> float:
+    return 9.0 * 4 * math.pi * math.sin(4 * math.pi * t)
+
+
+def steady(_t: float) -> float:
+    return 60.0
+
+
+def test_oscillation_is_followed_and_measured(bench):
+    bench.run(1.0, oscillation)
+    speeds = [s.velocity for s in bench.samples]
+    assert len(speeds) > 25  # some are missed on a loaded machine
+    assert max(speeds) > 80.0 and min(speeds) < -80.0
+    times = [s.time_s for s in bench.samples]
+    assert times == sorted(times)
+    assert bench.driver.status().level == OK
+    assert bench.telemetry[0].volts == pytest.approx(14.8)
+
+
+def test_measured_angle_is_the_integral_of_measured_speed(bench):
+    bench.run(0.8, steady)
+    first, last = bench.samples[len(bench.samples) // 2], bench.samples[-1]
+    assert last.angle - first.angle == pytest.approx(60.0 * (last.time_s - first.time_s), rel=0.05)
+
+
+def test_stale_command_coasts_without_polling(bench):
+    bench.run(0.4, steady)
+    assert bench.run(3.0, until=lambda: bench.driver.guard.phase is Phase.COASTING)
+    asked = sum(m.access == GET for m in bench.emulator.log)
+    bench.run(0.2)
+    assert sum(m.access == GET for m in bench.emulator.log) == asked
+    assert bench.emulator.mode == reg.COAST and bench.emulator.timeouts == 0
+    assert bench.driver.status().level == WARN
+    assert any("no command for" in event for event in bench.events)
+
+
+def test_module_stops_by_itself_if_coast_is_lost(bench):
+    """The trap: polling feeds the module's watchdog. The driver is silent, so it can fire."""
+    bench.run(0.3, steady)
+    bench.driver._vertiq.coast = lambda: None
+    assert bench.run(4.0, until=lambda: bench.emulator.timeouts == 1)
+    assert bench.emulator.mode == reg.COAST
+
+
+def test_module_that_drives_on_its_own_is_told_to_coast(bench):
+    bench.emulator.mode, bench.emulator.commanded = VELOCITY_MODE, 50.0
+    assert bench.run(3.0, until=lambda: any("drove although" in e for e in bench.events))
+    assert bench.run(1.0, until=lambda: bench.emulator.mode == reg.COAST)
+
+
+def test_restarted_module_is_set_up_again_before_it_moves(bench):
+    bench.emulator._booted -= 100.0
+    bench.run(0.5, steady)
+    bench.emulator.reboot()
+    assert bench.emulator.timeout_s == 1.0
+    assert bench.run(3.0, steady, until=lambda: any("restarted" in e for e in bench.events))
+    assert bench.emulator.timeout_s == SETTINGS.module_timeout_s
+    assert bench.emulator.mode == reg.COAST
+
+
+def test_unplugged_then_plugged_again(bench):
+    bench.run(0.2, steady)
+    bench.emulator.close()
+    assert bench.run(2.0, steady, until=lambda: not bench.driver.connected)
+    assert bench.driver.status().level == ERROR
+    said = len(bench.events)
+    bench.run(0.3, steady)
+    assert len(bench.events) == said  # not once per cycle
+    bench.emulator = VertiqEmulator()
+    try:
+        assert bench.run(8.0, steady, until=lambda: bench.driver.connected)
+        assert bench.run(2.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
+    finally:
+        bench.driver.close()
+        bench.emulator.close()
+
+
+def test_silent_module_is_lost_and_found(bench):
+    bench.emulator.mangle = lambda _: b""
+    assert bench.run(3.0, steady, until=lambda: not bench.driver.connected)
+    assert "stopped answering" in bench.driver.status().message
+    bench.emulator.mangle = lambda reply: reply
+    assert bench.run(8.0, until=lambda: bench.driver.connected)
+
+
+def test_low_battery_stops_and_stays_stopped(vertiq_emulator):
+    bench = Bench(vertiq_emulator, replace(SETTINGS, battery_filter_s=0.0))
+    bench.driver.connect()
+    bench.run(0.3, steady)
+    bench.emulator.volts = 4 * 3.2
+    assert bench.run(3.0, steady, until=lambda: bench.emulator.mode == reg.COAST)
+    bench.run(0.8, steady)
+    assert bench.emulator.mode == reg.COAST
+    assert "battery at 3.20 V per cell" in bench.driver.status().message
+    bench.emulator.volts = 4 * 3.8
+    assert bench.run(3.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
+    bench.driver.close()
+
+
+def test_faults_are_named_before_they_are_cleared(bench):
+    bench.emulator.faults_ever = 0b110
+    bench.driver.clear_faults()
+    assert bench.run(
+        2.0, until=lambda: any("it held: input voltage, reference voltage" in e for e in bench.events)
+    )
+
+
+def test_close_coasts(bench):
+    bench.run(0.3, steady)
+    assert bench.emulator.mode == VELOCITY_MODE
+    bench.driver.close()
+    deadline = time.monotonic() + 2.0
+    while bench.emulator.mode != reg.COAST and time.monotonic() < deadline:
+        time.sleep(0.002)
+    assert bench.emulator.mode == reg.COAST and bench.emulator.timeouts == 0
+
+
+def test_port_that_is_absent(vertiq_emulator):
+    driver = RotorDriver(SETTINGS, lambda: SerialPort("/dev/no_such_port", 115200))
+    with pytest.raises(
+        PortUnavailable, match="cannot open serial port /dev/no_such_port: there is no such port"
+    ):
+        driver.connect()
+    assert driver.status().level == ERROR
+
+
+def test_wrong_module_id(vertiq_emulator):
+    settings = replace(SETTINGS, module_id=7, reply_timeout_s=0.01)
+    driver = RotorDriver(settings, lambda: SerialPort(vertiq_emulator.port, 115200))
+    with pytest.raises(DeviceError, match="no Vertiq module 7 answers"):
+        driver.connect()
+    SerialPort(vertiq_emulator.port, 115200).close()  # the port was given back

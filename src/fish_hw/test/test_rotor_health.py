@@ -1,0 +1,58 @@
+"""Battery, temperature and fault limits."""
+
+from dataclasses import replace
+
+import pytest
+
+from fish_hw.devices.rotor_health import RotorHealth
+from fish_hw.devices.vertiq import RotorTelemetry
+from fish_hw.settings.rotor import RotorSettings
+
+SETTINGS = RotorSettings()  # 4 cells, warn 3.5, stop 3.3 V
+WELL = RotorTelemetry(35.0, 40.0, 15.6, 0.5, 10.0, 0, 1.0, 1)
+
+
+def test_well():
+    health = RotorHealth(SETTINGS).judge(WELL, 0.0)
+    assert (health.warnings, health.stops) == ((), ())
+
+
+def test_battery_filter_is_a_first_order_lag():
+    health = RotorHealth(SETTINGS)
+    health.judge(WELL, 0.0)
+    for i in range(1, 26):
+        health.judge(replace(WELL, volts=12.6), 0.2 * i)
+    # one time constant after a step the rest is 1/e
+    assert health.filtered_volts == pytest.approx(12.6 + (15.6 - 12.6) * 0.36788, abs=1e-3)
+
+
+def test_sag_under_load_does_not_stop_but_an_empty_battery_does():
+    health = RotorHealth(SETTINGS)
+    health.judge(WELL, 0.0)
+    assert not health.judge(replace(WELL, volts=11.0), 0.2).stops
+    stops = [health.judge(replace(WELL, volts=12.8), 0.4 + 0.2 * i).stops for i in range(200)]
+    assert stops[-1] == ("battery at 3.20 V per cell",)
+
+
+def test_battery_must_recover_above_the_warning():
+    health = RotorHealth(replace(SETTINGS, battery_filter_s=0.0))
+    assert health.judge(replace(WELL, volts=4 * 3.25), 0.0).stops
+    assert health.judge(replace(WELL, volts=4 * 3.45), 1.0).stops  # relieved of the load
+    assert not health.judge(replace(WELL, volts=4 * 3.55), 2.0).stops
+
+
+@pytest.mark.parametrize(
+    ("change", "warning", "stop"),
+    [
+        ({"volts": 4 * 3.4}, "battery at 3.40 V", ""),
+        ({"volts": 4 * 4.4}, "driven up to 4.40 V", ""),
+        ({"coil_c": 75.0}, "coil at 75", ""),
+        ({"controller_c": 90.0}, "", "controller at 90"),
+        ({"derate": 0.6}, "60% of its power", ""),
+        ({"faults": 0b1000001}, "", "logic supply low, coil temperature"),
+    ],
+)
+def test_limits(change, warning, stop):
+    health = RotorHealth(SETTINGS).judge(replace(WELL, **change), 0.0)
+    assert warning in "".join(health.warnings) and bool(warning) == bool(health.warnings)
+    assert stop in "".join(health.stops) and bool(stop) == bool(health.stops)

@@ -1,0 +1,269 @@
+"""Rudder: pulses, limits, watchdog, both PWM outputs, and the driver around them."""
+
+import errno
+import math
+import os
+import threading
+from dataclasses import replace
+
+import pytest
+from waiting import wait_until
+
+from fish_hw.devices.pca9685 import Pca9685Pwm, prescale
+from fish_hw.devices.rudder_driver import RudderDriver
+from fish_hw.devices.rudder_servo import RudderServo
+from fish_hw.devices.status import ERROR, OK, WARN
+from fish_hw.emulators.i2c_bus import I2cBusEmulator
+from fish_hw.emulators.pca9685 import Pca9685Emulator
+from fish_hw.emulators.pwm_chip import PwmChipEmulator
+from fish_hw.settings.rudder import RudderSettings
+from fish_hw.transport.errors import PortUnavailable, TransportError
+from fish_hw.transport.sysfs_pwm import SysfsPwm
+
+SETTINGS = RudderSettings()
+DT = 0.01
+PCA_COUNTS = {500: 102, 900: 184, 1000: 205, 1250: 256, 1500: 307, 1750: 359, 2000: 410, 2100: 430, 2500: 512}
+
+
+@pytest.mark.parametrize(
+    ("alpha", "change", "pulse_us"),
+    [
+        (0.0, {}, 1500.0),
+        (0.5, {}, 1786.5),
+        (0.5, {"sign": -1}, 1213.5),
+        (0.0, {"trim": 0.1}, 1557.3),
+        (0.8, {"max_us": 1800.0}, 1800.0),
+        (-0.8, {"trim": -0.4}, 1000.0),
+    ],
+)
+def test_pulse(alpha, change, pulse_us):
+    assert RudderServo(replace(SETTINGS, **change)).pulse_ns(alpha) == round(1000 * pulse_us)
+
+
+class ServoBench:
+    def __init__(self) -> None:
+        self.servo = RudderServo(SETTINGS)
+        self.now = 5.0
+
+    def run(self, duration_s: float, alpha: float | None = None) -> list[float]:
+        angles = []
+        for _ in range(round(duration_s / DT)):
+            if alpha is not None:
+                self.servo.command(alpha, self.now)
+            self.servo.step(self.now)
+            angles.append(self.servo.alpha)
+            self.now += DT
+        return angles
+
+
+def test_slew_and_range():
+    angles = ServoBench().run(1.0, 2.0)
+    assert max(b - a for a, b in zip(angles, angles[1:], strict=False)) <= SETTINGS.max_rate * DT + 1e-12
+    assert angles[-1] == SETTINGS.max_angle
+
+
+def test_stale_command_centres_at_the_slew_rate():
+    bench = ServoBench()
+    bench.run(1.0, 0.6)
+    angles = bench.run(1.0)
+    held = sum(a == pytest.approx(0.6) for a in angles)
+    assert held * DT == pytest.approx(SETTINGS.stale_s, abs=2 * DT)
+    assert angles[-1] == 0.0
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_bad_numbers_do_not_feed_the_watchdog(bad):
+    bench = ServoBench()
+    bench.run(0.5, 0.6)
+    assert bench.run(1.0, bad)[-1] == 0.0
+    assert bench.servo.counters.rejected == 100
+
+
+def test_pca9685_start_sequence_and_counts():
+    board = Pca9685Emulator()
+    pwm = Pca9685Pwm(I2cBusEmulator({0x40: board}), 0x40, 0, 25e6, 50.0, sleep=lambda _: None)
+    pwm.start(1_500_000)
+    assert [w.hex(" ") for w in board.log] == ["00 00", "00 10", "fe 79", "00 00", "00 a0", "06 00 00 33 01"]
+    for us, count in PCA_COUNTS.items():
+        pwm.set_pulse_ns(1000 * us)
+        assert board.log[-1] == bytes([0x06, 0, 0]) + count.to_bytes(2, "little")
+    pwm.stop()
+    assert board.log[-1].hex(" ") == "06 00 00 00 10"
+    assert pwm.is_running()
+    board.power_cycle()
+    assert not pwm.is_running()
+
+
+def test_pca9685_channel_and_real_clock():
+    board = Pca9685Emulator()
+    pwm = Pca9685Pwm(I2cBusEmulator({0x40: board}), 0x40, 3, 26e6, 50.0, sleep=lambda _: None)
+    pwm.start(1_500_000)
+    on, off = board.pulse_counts(3)
+    assert on == 0
+    assert off * (board.registers[0xFE] + 1) / 26e6 == pytest.approx(1.5e-3, abs=5e-6)
+
+
+def test_prescale():
+    assert prescale(25e6, 50.0) == 121
+    with pytest.raises(ValueError, match="has 3 to 255"):
+        prescale(25e6, 20.0)
+
+
+@pytest.fixture
+def chip(tmp_path):
+    return PwmChipEmulator(tmp_path / "pwmchip0")
+
+
+@pytest.mark.parametrize("us", [500, 1000, 1500, 2500])
+def test_sysfs_pulse(chip, us):
+    pwm = SysfsPwm(str(chip.chip), 0, 20_000_000)
+    pwm.start(1_500_000)
+    pwm.set_pulse_ns(1000 * us)
+    assert (chip.read("period"), chip.read("duty_cycle"), chip.read("enable")) == (20_000_000, 1000 * us, 1)
+    assert pwm.is_running()
+    pwm.stop()
+    assert not pwm.is_running()
+
+
+def test_sysfs_export_waits_for_the_files(tmp_path):
+    """The kernel makes the channel's files some time after the export."""
+    folder = tmp_path / "pwmchip0"
+    folder.mkdir()
+    (folder / "export").write_text("")
+
+    def kernel() -> None:
+        wait_until(lambda: (folder / "export").read_text() == "1\n")
+        made = PwmChipEmulator(tmp_path / "made", 1)
+        os.rename(made.channel, folder / "pwm1")
+
+    thread = threading.Thread(target=kernel)
+    thread.start()
+    SysfsPwm(str(folder), 1, 20_000_000).start(1_500_000)
+    thread.join()
+    assert (folder / "pwm1" / "duty_cycle").read_text() == "1500000\n"
+
+
+def test_sysfs_files_that_never_become_writable(tmp_path):
+    folder = tmp_path / "pwmchip0"
+    folder.mkdir()
+    (folder / "export").write_text("")
+    with pytest.raises(PortUnavailable, match="did not become writable.*udev rule"):
+        SysfsPwm(str(folder), 0, 20_000_000, sleep=lambda _: None)
+
+
+def test_sysfs_absent_chip_lists_the_others(chip, tmp_path):
+    with pytest.raises(PortUnavailable, match=f"no such chip.*available: {chip.chip}"):
+        SysfsPwm(str(tmp_path / "pwmchip4"), 0, 20_000_000)
+
+
+class DriverBench:
+    """The driver on an emulated chip and a simulated clock."""
+
+    def __init__(self, chip: PwmChipEmulator, settings: RudderSettings = SETTINGS) -> None:
+        self.now = 50.0
+        self.slept = []
+        self.driver = RudderDriver(
+            settings, lambda: SysfsPwm(str(chip.chip), 0, 20_000_000), self.clock, self.sleep
+        )
+        self.events = []
+
+    def clock(self) -> float:
+        return self.now
+
+    def sleep(self, duration_s: float) -> None:
+        self.slept.append(duration_s)
+
+    def run(self, duration_s: float, alpha: float | None = None) -> None:
+        end = self.now + duration_s
+        while self.now < end:
+            self.now += DT
+            if alpha is not None:
+                self.driver.command(alpha)
+            self.events += self.driver.step()
+
+
+def test_driver_starts_centred_and_follows(chip):
+    bench = DriverBench(chip)
+    bench.driver.connect()
+    assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 1)
+    bench.run(0.5, 0.5)
+    assert chip.read("duty_cycle") == 1_786_500
+    assert bench.driver.status().level == OK
+    bench.run(1.0)
+    assert chip.read("duty_cycle") == 1_500_000
+    assert bench.driver.status().level == WARN
+    assert bench.events == ["rudder follows commands", "rudder centred: no command"]
+
+
+def test_close_centres_and_gives_the_servo_time_before_the_pulses_end(chip):
+    bench = DriverBench(chip)
+    bench.driver.connect()
+    bench.run(0.5, 0.6)
+    bench.driver.close()
+    assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
+    assert bench.slept[-1] >= 0.6 / SETTINGS.max_rate
+
+
+def test_close_can_leave_the_pulses_on(chip):
+    bench = DriverBench(chip, replace(SETTINGS, off_at_exit=False))
+    bench.driver.connect()
+    bench.run(0.5, 0.6)
+    bench.driver.close()
+    assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 1)
+
+
+def test_output_that_somebody_switches_off_is_started_again(chip):
+    bench = DriverBench(chip)
+    bench.driver.connect()
+    bench.run(0.5, 0.6)
+    (chip.channel / "enable").write_text("0\n")
+    bench.run(1.2, 0.6)
+    assert any("stopped by itself" in event for event in bench.events)
+    bench.run(2.0, 0.6)
+    assert chip.read("enable") == 1
+    assert chip.read("duty_cycle") == SETTINGS.us_per_rad * 600 + 1_500_000
+    assert bench.events[-1] == "rudder output connected again"
+
+
+def test_bus_error_loses_the_board_and_finds_it_again():
+    board = Pca9685Emulator()
+    bus = I2cBusEmulator({0x40: board})
+    now = [0.0]
+    driver = RudderDriver(
+        SETTINGS,
+        lambda: Pca9685Pwm(bus, 0x40, 0, 25e6, 50.0, sleep=lambda _: None),
+        clock=lambda: now[0],
+        sleep=lambda _: None,
+    )
+    driver.connect()
+    events = []
+
+    def run(duration_s: float) -> None:
+        for _ in range(round(duration_s / DT)):
+            now[0] += DT
+            driver.command(0.3 if now[0] % 0.4 < 0.2 else -0.3)
+            events.extend(driver.step())
+
+    run(0.5)
+    bus.fault = lambda: errno.EREMOTEIO
+    run(4.0)
+    assert driver.status().level == ERROR and not driver.connected
+    assert len(events) == 2  # follows, lost: not one line per attempt
+    bus.fault = lambda: None
+    board.power_cycle()
+    run(6.0)
+    assert driver.connected and board.registers[0xFE] == 121
+
+
+def test_absent_output_is_raised_at_start(tmp_path):
+    driver = RudderDriver(SETTINGS, lambda: SysfsPwm(str(tmp_path / "pwmchip0"), 0, 20_000_000))
+    with pytest.raises(PortUnavailable):
+        driver.connect()
+
+
+def test_write_that_fails_is_a_transport_error(chip):
+    pwm = SysfsPwm(str(chip.chip), 0, 20_000_000)
+    (chip.channel / "duty_cycle").unlink()
+    (chip.channel / "duty_cycle").mkdir()
+    with pytest.raises(TransportError, match="cannot write 1500000 to duty_cycle"):
+        pwm.set_pulse_ns(1_500_000)

@@ -1,0 +1,176 @@
+"""The Vertiq device code on recorded bytes and on the emulated module behind a real port."""
+
+import math
+import struct
+
+import pytest
+from waiting import wait_until
+
+from fish_hw.devices import vertiq_registers as reg
+from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.vertiq import Vertiq
+from fish_hw.protocol.iquart import REPLY, Message, encode
+from fish_hw.transport.recorded import RecordedStream
+from fish_hw.transport.serial_port import SerialPort
+
+VELOCITY_REPLY = bytes.fromhex("55 06 32 0d 03 00 00 18 41 35 fa")  # 9.5 rad/s, vendor's library
+ANGLE_REPLY = encode(Message(50, 12, REPLY, 0, struct.pack("<f", 1.25)))
+PATIENT_S = 0.2  # a loaded machine may keep the emulator waiting
+
+
+class SteppedClock:
+    """Every look costs 1 ms, so that waiting loops end without waiting."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        self.now += 0.001
+        return self.now
+
+
+def recorded(*chunks: bytes, **kwargs) -> tuple[Vertiq, RecordedStream]:
+    stream = RecordedStream(chunks)
+    return Vertiq(stream, clock=SteppedClock(), **kwargs), stream
+
+
+@pytest.fixture
+def module(vertiq_emulator):
+    port = SerialPort(vertiq_emulator.port, 115200)
+    yield Vertiq(port, reply_timeout_s=PATIENT_S), vertiq_emulator
+    port.close()
+
+
+def test_drive_sends_command_and_questions_and_reads_both():
+    vertiq, stream = recorded(b"", VELOCITY_REPLY[:4], VELOCITY_REPLY[4:] + ANGLE_REPLY)
+    sample = vertiq.drive(10.0)
+    assert stream.written == [
+        bytes.fromhex("55 06 34 05 01 00 00 20 41 ed 9e  55 02 32 0d 00 31 b4  55 02 32 0c 00 00 87")
+    ]
+    assert (sample.velocity, sample.angle) == (9.5, 1.25)
+
+
+def test_sign_mirrors_command_and_measurement():
+    vertiq, stream = recorded(b"", VELOCITY_REPLY + ANGLE_REPLY, sign=-1)
+    sample = vertiq.drive(-10.0)
+    assert stream.written[0].startswith(bytes.fromhex("55 06 34 05 01 00 00 20 41 ed 9e"))
+    assert (sample.velocity, sample.angle) == (-9.5, -1.25)
+
+
+def test_coast_is_said_three_times():
+    vertiq, stream = recorded()
+    vertiq.coast()
+    assert stream.written == [bytes.fromhex("55 02 34 02 01 8e 06") * 3]
+
+
+def test_silence_is_no_sample():
+    vertiq, _ = recorded()
+    assert vertiq.measure() is None
+    assert vertiq.counters.timeouts == 1
+
+
+def test_late_reply_is_not_the_next_answer():
+    late = encode(Message(50, 13, REPLY, 0, struct.pack("<f", 77.0)))
+    vertiq, _ = recorded()
+    assert vertiq.measure() is None
+    vertiq._stream.chunks.extend([b"", late, b"", VELOCITY_REPLY + ANGLE_REPLY])
+    assert vertiq.measure().velocity == 9.5
+    assert vertiq.counters.unexpected == 1
+
+
+def test_command_goes_out_before_the_wait_for_late_replies():
+    vertiq, stream = recorded()
+    vertiq.measure()
+    vertiq.drive(10.0)
+    assert stream.written[1] == bytes.fromhex("55 06 34 05 01 00 00 20 41 ed 9e")
+    assert stream.written[2] == bytes.fromhex("55 02 32 0d 00 31 b4  55 02 32 0c 00 00 87")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        encode(Message(50, 13, REPLY, 5, struct.pack("<f", 1.0))),  # another module
+        encode(Message(69, 0, REPLY, 0, struct.pack("<f", 1.0))),  # another register
+        encode(Message(50, 13, REPLY, 0, b"\0\0")),  # wrong size
+        bytes.fromhex("55 02 32 0d 00 31 b4"),  # our own question, echoed by half-duplex wiring
+    ],
+)
+def test_messages_that_are_no_answer_are_counted(wrong):
+    vertiq, _ = recorded(b"", wrong + VELOCITY_REPLY + ANGLE_REPLY)
+    assert vertiq.measure().velocity == 9.5
+    assert vertiq.counters.unexpected == 1
+
+
+def test_value_that_is_no_number_is_no_sample():
+    nan = encode(Message(50, 13, REPLY, 0, struct.pack("<f", math.nan)))
+    vertiq, _ = recorded(b"", nan + ANGLE_REPLY)
+    assert vertiq.measure() is None
+
+
+def test_angle_is_continuous_through_many_turns():
+    vertiq, stream = recorded()
+    period, speed = 0.02, 120.0  # 2.4 rad per sample: more than a third of a turn
+    for i in range(100):
+        vertiq._clock.now = i * period
+        angle = speed * i * period
+        wrapped = math.remainder(angle, math.tau)
+        velocity = encode(Message(50, 13, REPLY, 0, struct.pack("<f", speed)))
+        stream.chunks.extend([b"", velocity + encode(Message(50, 12, REPLY, 0, struct.pack("<f", wrapped)))])
+        assert vertiq.measure().angle == pytest.approx(angle, abs=1e-4)
+
+
+def test_configure_writes_and_reads_back(module):
+    vertiq, emulator = module
+    assert vertiq.configure(0.25) == []
+    assert emulator.timeout_s == 0.25
+    assert emulator.written[reg.TIMEOUT_SONG.type, reg.TIMEOUT_SONG.param] == b"\0"
+
+
+def test_configure_names_settings_that_the_firmware_lacks(module):
+    vertiq, emulator = module
+    vertiq._reply_timeout_s = 0.02
+    del emulator.written[reg.TIMEOUT_SONG.type, reg.TIMEOUT_SONG.param]
+    assert vertiq.configure(0.25) == ["module does not take timeout song = 0"]
+
+
+def test_configure_without_module_says_what_to_check():
+    vertiq, _ = recorded(b"", b"noise")
+    with pytest.raises(DeviceError, match="no Vertiq module 0 answers.*baud rate and module_id"):
+        vertiq.configure(0.25)
+
+
+def test_telemetry(module):
+    vertiq, emulator = module
+    emulator.volts, emulator.coil_c, emulator.faults = 14.2, 51.5, 0b100100
+    telemetry = vertiq.telemetry()
+    assert telemetry.volts == pytest.approx(14.2)
+    assert telemetry.coil_c == pytest.approx(51.5)
+    assert reg.fault_names(telemetry.faults) == ["reference voltage", "controller temperature"]
+    assert (telemetry.derate, telemetry.mode) == (1.0, reg.COAST)
+
+
+def test_fault_memory_is_told_before_it_is_cleared(module):
+    vertiq, emulator = module
+    emulator.faults_ever = 0b10
+    assert vertiq.clear_faults() == 0b10
+    assert wait_until(lambda: emulator.faults_ever == 0)
+
+
+@pytest.mark.parametrize(
+    "mangle",
+    [
+        lambda reply: reply[:-1] + bytes([reply[-1] ^ 1]),
+        lambda reply: reply[:5],
+        lambda _: b"",
+        lambda _: b"\x55\x20" * 3,
+    ],
+    ids=["crc", "truncated", "dropped", "garbage"],
+)
+def test_broken_replies_then_recovery(module, mangle):
+    vertiq, emulator = module
+    vertiq._reply_timeout_s = 0.02
+    emulator.mangle = mangle
+    assert vertiq.measure() is None
+    emulator.mangle = lambda reply: b"\x55\x07" + reply  # garbage before the frame is no obstacle
+    vertiq._reply_timeout_s = PATIENT_S
+    assert vertiq.measure() is not None
