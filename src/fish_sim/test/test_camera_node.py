@@ -66,7 +66,7 @@ class Bench:
         self.odometry.publish(msg)
 
     def spin_until(self, condition, limit: float = 10.0, pose: FishPose | None = None) -> bool:
-        """Spin, with odometry every 10 ms if a pose is given, until the condition holds or the time is over."""
+        """Spin, with odometry every 10 ms if a pose is given, until the condition holds or time is up."""
         start = sent = self.now()
         while not condition() and self.now() - start < limit:
             if pose is not None and self.now() - sent >= 0.01:

@@ -18,6 +18,8 @@ def lens_from_chessboards(
 ) -> tuple[Lens, float, list[int]]:
     """Camera matrix and plumb_bob distortion from pictures of a chessboard (Zhang's method, OpenCV).
 
+    k3 stays zero, as in ROS camera_calibration: it runs wild where no board was seen.
+
     Args:
         pictures: same size, board in different places and tilts, also near the edges.
         corners: inner corners along the board's two sides.
@@ -43,7 +45,8 @@ def lens_from_chessboards(
     grid = np.mgrid[0 : corners[0], 0 : corners[1]].T.reshape(-1, 2) * square
     board = np.column_stack([grid, np.zeros(len(grid))]).astype(np.float32)
     size = sizes.pop()
-    rms, K, D, _, _ = cv2.calibrateCamera([board] * len(found), list(found.values()), size, None, None)
+    boards, places = [board] * len(found), list(found.values())
+    rms, K, D, _, _ = cv2.calibrateCamera(boards, places, size, None, None, flags=cv2.CALIB_FIX_K3)
     return Lens(size, K, D.ravel()[:5]), float(rms), list(found)
 
 
@@ -62,7 +65,8 @@ def mount_from_points(lens: Lens, points: ArrayLike, pixels: ArrayLike) -> tuple
     Raises:
         CalibrationError: fewer than POINTS_MIN points, or points that fix no pose (on one line).
     """
-    points, pixels = np.asarray(points, float).reshape(-1, 3), np.asarray(pixels, float).reshape(-1, 2)
+    points = np.ascontiguousarray(points, float).reshape(-1, 3)
+    pixels = np.ascontiguousarray(pixels, float).reshape(-1, 2)
     if len(points) != len(pixels) or len(points) < POINTS_MIN:
         raise CalibrationError(
             f"{len(points)} points and {len(pixels)} pixels: expected pairs, at least {POINTS_MIN}"

@@ -37,7 +37,7 @@ class TrackerConfig:
     hinge_offset: float = 0.075  # head's centre of mass to the tail's hinge, m
     link_length: float = 0.07 / 3  # hinge to the marker at the far end of a link, m
     area_min: float = 0.35  # least area of a blob, share of the marker's
-    area_max: float = 2.0  # greatest area of a blob, share of the marker's
+    area_max: float = 2.5  # greatest area of a blob, share of the marker's
     spacing_tolerance: float = 0.15  # misfit of the head markers' distance, share
     tail_tolerance: float = 0.008  # misfit of a tail marker's distance from its hinge, m
     roi_radius: float = 0.25  # half side of the part of the image searched around the last pose, m

@@ -13,6 +13,7 @@ Box = tuple[int, int, int, int]  # left, top, right, bottom; pixels, right and b
 PAD = 2  # pixels around a blob that may still hold some of its colour
 HUES = 180  # OpenCV's hue counts half degrees
 HUE_SLACK = 8  # half degrees by which the hue at a blob's edge may leave its range
+MOST = 24  # blobs of a colour that are measured, so that a picture full of specks costs no more
 FAINT = 0.25  # share of a blob's colourfulness below which a pixel counts as none of it
 
 
@@ -68,15 +69,12 @@ def find_blobs(hsv: Image, colour: ColourRange, area_range: tuple[float, float])
     """
     mask = colour.mask(hsv)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    largest_side = 4.0 * np.sqrt(area_range[1])
-    blobs = []
-    for contour in contours:
-        x, y, w, h = cv2.boundingRect(contour)
-        if max(w, h) > largest_side or 2.0 * w * h < area_range[0]:
-            continue
-        blob = _measure(hsv, mask, colour, (x, y, x + w, y + h))
-        if area_range[0] <= blob.area <= area_range[1]:
-            blobs.append(blob)
+    boxes = [cv2.boundingRect(contour) for contour in contours]
+    side = 4.0 * np.sqrt(area_range[1])  # of a box that may still hold a blob in the range
+    boxes = [box for box in boxes if max(box[2:]) <= side and 2.0 * box[2] * box[3] >= area_range[0]]
+    boxes = sorted(boxes, key=lambda box: -box[2] * box[3])[:MOST]
+    blobs = [_measure(hsv, mask, colour, (x, y, x + w, y + h)) for x, y, w, h in boxes]
+    blobs = [blob for blob in blobs if area_range[0] <= blob.area <= area_range[1]]
     return sorted(blobs, key=lambda blob: -blob.area)
 
 

@@ -22,7 +22,7 @@ class SpotFinder:
         self._pixel = float(abs(np.linalg.det(scale[0])))  # m^2 of water that a pixel shows in the middle
 
     def find(self, hsv: Image, marker: str, origin: tuple[int, int], step: int = 1) -> list[Spot]:
-        """Spots of a marker in a part of an image: first pixel at origin (column, row), every step-th pixel."""
+        """Spots of a marker in a part of an image: first pixel at origin, every step-th pixel."""
         config = self._config
         diameter = config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
         disc = pi / 4 * diameter**2
@@ -34,9 +34,9 @@ class SpotFinder:
     def _of_size(self, blobs: Sequence[Blob], disc: float) -> list[Spot]:
         """Blobs as spots, without those whose area does not fit a disc (m^2) at their place.
 
-            std = pixel_std / sqrt(share) + diameter (1 - share) / 8,  share = area / disc area, at most 1
+            std = pixel_std / sqrt(share) + diameter (1 - share) / 3,  share = area / disc area, at most 1
 
-        in pixels: the second term is how far a partly hidden disc's middle moves.
+        in pixels; the second term is how far a partly hidden disc's middle moves (half hidden: 0.21).
         """
         if not blobs:
             return []
@@ -44,7 +44,7 @@ class SpotFinder:
         areas = np.array([b.area for b in blobs])
         shares = areas * np.abs(np.linalg.det(J)) / disc
         whole = np.minimum(shares, 1.0)
-        std = self._config.pixel_std / np.sqrt(whole) + np.sqrt(4 / pi * areas) * (1.0 - whole) / 8
+        std = self._config.pixel_std / np.sqrt(whole) + np.sqrt(4 / pi * areas) * (1.0 - whole) / 3
         return [
             Spot(places[i], std[i] ** 2 * J[i] @ J[i].T)
             for i in range(len(blobs))

@@ -1,0 +1,115 @@
+"""Calibration recovers a camera that made the pictures, drawn here ray by ray."""
+
+import cv2
+import numpy as np
+import pytest
+
+from fish_vision.calibrate import lens_from_chessboards, mount_from_points
+from fish_vision.calibration import Calibration, CalibrationError, Lens, Mount, undistort
+
+SIZE, SQUARE, CORNERS = (480, 360), 0.05, (7, 5)
+TRUE = Lens.from_camera_info(
+    *SIZE, "plumb_bob", [400, 0, 243, 0, 404, 176, 0, 0, 1], [-0.2, 0.05, 0.001, -0.001, 0]
+)
+MOUNT = Mount((0.05, -0.08, 3.2), (-0.022, 0.018, 0.010))
+
+
+def rays_of_pixels(fine: int) -> np.ndarray:
+    """(N, 3) directions of all subpixels: the plumb_bob formula inverted by repeated substitution."""
+    u, v = np.meshgrid(np.arange(SIZE[0] * fine), np.arange(SIZE[1] * fine))
+    pixels = (np.column_stack([u.ravel(), v.ravel()]) + 0.5) / fine - 0.5
+    k1, k2, p1, p2, _ = TRUE.D
+    x_d, y_d = ((pixels - TRUE.K[:2, 2]) / np.diag(TRUE.K)[:2]).T
+    x, y = x_d, y_d
+    for _ in range(15):
+        r2 = x * x + y * y
+        radial = 1 + k1 * r2 + k2 * r2 * r2
+        x, y = (
+            (x_d - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial,
+            (y_d - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial,
+        )
+    return np.column_stack([x, y, np.ones(len(x))])
+
+
+def board_picture(
+    rays: np.ndarray, fine: int, rotation: tuple[float, float, float], t: tuple[float, float, float]
+) -> np.ndarray:
+    """Chessboard seen through the true lens: each subpixel's ray is cut with the board's plane."""
+    R = cv2.Rodrigues(np.array(rotation))[0]
+    depth = (R[:, 2] @ np.array(t)) / (rays @ R[:, 2])
+    board = (rays * depth[:, None] - np.array(t)) @ R[
+        :, :2
+    ] / SQUARE + 1.0  # in squares; (1, 1) = first corner
+    inside = np.all((board > 0) & (board < np.array(CORNERS) + 1), axis=1)
+    dark = (np.floor(board).astype(int).sum(axis=1) % 2 == 0) & inside
+    grey = np.where(dark, 30, 220).astype(np.uint8).reshape(SIZE[1] * fine, SIZE[0] * fine)
+    return cv2.cvtColor(cv2.resize(grey, SIZE, interpolation=cv2.INTER_AREA), cv2.COLOR_GRAY2BGR)
+
+
+@pytest.fixture(scope="module")
+def pictures() -> list[np.ndarray]:
+    poses = [
+        ((0.0, 0.0, 0.0), (-0.15, -0.1, 0.5)),
+        ((0.5, 0.0, 0.1), (-0.25, -0.15, 0.6)),
+        ((-0.5, 0.1, 0.0), (-0.05, -0.12, 0.55)),
+        ((0.1, 0.5, 0.0), (-0.20, -0.02, 0.6)),
+        ((0.0, -0.5, 0.2), (-0.10, -0.20, 0.6)),
+        ((0.4, 0.4, -0.2), (-0.15, -0.05, 0.5)),
+    ]
+    rays = rays_of_pixels(3)
+    return [board_picture(rays, 3, *pose) for pose in poses]
+
+
+def test_lens_is_recovered_from_chessboards(pictures: list[np.ndarray]) -> None:
+    lens, rms, used = lens_from_chessboards([*pictures, np.zeros_like(pictures[0])], CORNERS, SQUARE)
+    assert used == list(range(6)) and rms < 0.15 and lens.size == SIZE
+    u, v = np.meshgrid(np.linspace(60, 420, 9), np.linspace(50, 310, 7))  # where boards were
+    pixels = np.column_stack([u.ravel(), v.ravel()])
+    error = (undistort(pixels, lens) - undistort(pixels, TRUE)) * 400  # in pixels
+    assert np.std(error, axis=0).max() < 0.3  # a common shift is taken up by the mount
+    assert np.abs(error.mean(axis=0)).max() < 1.0
+
+
+def test_too_few_boards_are_refused(pictures: list[np.ndarray]) -> None:
+    with pytest.raises(CalibrationError, match="found in 2 of 3"):
+        lens_from_chessboards([*pictures[:2], np.zeros_like(pictures[0])], CORNERS, SQUARE)
+
+
+def test_pictures_of_different_sizes_are_refused(pictures: list[np.ndarray]) -> None:
+    with pytest.raises(CalibrationError, match="different sizes"):
+        lens_from_chessboards([pictures[0], pictures[1][:100]], CORNERS, SQUARE)
+
+
+def corners_and_pixels(height: float) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array([[2.135, 1.065], [-2.135, 1.065], [-2.135, -1.065], [2.135, -1.065], [0.0, 1.065]])
+    lens = Lens.from_camera_info(1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07])
+    return np.column_stack([points, np.full(5, height)]), Calibration(lens, MOUNT, height).pool_to_pixel(
+        points
+    )
+
+
+@pytest.mark.parametrize("height", [0.0, 0.2])
+def test_mount_is_recovered_from_the_pool_corners(height: float) -> None:
+    lens = Lens.from_camera_info(1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07])
+    mount, rms = mount_from_points(lens, *corners_and_pixels(height))
+    np.testing.assert_allclose(mount.position, MOUNT.position, atol=1e-5)
+    np.testing.assert_allclose(mount.tilt, MOUNT.tilt, atol=1e-5)
+    assert rms < 1e-3
+
+
+def test_mount_from_points_read_to_a_pixel_is_good_to_millimetres() -> None:
+    lens = Lens.from_camera_info(1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07])
+    points, pixels = corners_and_pixels(0.0)
+    mount, rms = mount_from_points(lens, points, np.round(pixels))
+    assert 0.0 < rms < 1.0
+    places = Calibration(lens, mount).pixel_to_pool(pixels)
+    assert np.abs(places - points[:, :2]).max() < 0.005
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "at least 4"), ([[x, 0, 0] for x in range(5)], "one line")],
+)
+def test_points_that_fix_no_pose_are_refused(points: list, message: str) -> None:
+    with pytest.raises(CalibrationError, match=message):
+        mount_from_points(TRUE, points, [[float(i), 0.0] for i in range(len(points))])

@@ -1,0 +1,92 @@
+"""The commands calibrate and check_image, called as from the shell."""
+
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from pool_picture import CONFIG, calibration, discs_of_fish, draw  # noqa: E402
+
+from fish_vision.calibration import lens_document  # noqa: E402
+from fish_vision.commands import calibrate, check_image  # noqa: E402
+from fish_vision.config import config_from_file  # noqa: E402
+
+
+def call(command, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr(sys, "argv", [command.__name__, *map(str, arguments)])
+    return command.main()
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A folder with lens.yaml, points.csv, params.yaml and fish.png that belong together."""
+    lens = lens_document(calibration().lens, "overhead")
+    (tmp_path / "lens.yaml").write_text(yaml.safe_dump(lens))
+    points = np.array([[2.0, 1.0], [-2.0, 1.0], [-2.0, -1.0], [2.0, -1.0]])
+    rows = np.column_stack([points, calibration().pool_to_pixel(points)])
+    np.savetxt(tmp_path / "points.csv", rows, delimiter=",", header="x,y,u,v", comments="")
+    mount = {"camera_position": list(CONFIG.camera_position), "camera_tilt": list(CONFIG.camera_tilt)}
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump({"/**": {"ros__parameters": mount}}))
+    cv2.imwrite(str(tmp_path / "fish.png"), draw(discs_of_fish(0.5, 0.2, 1.0)))
+    return tmp_path
+
+
+def test_check_image_prints_the_pose_and_draws_it(files: Path, monkeypatch, capsys) -> None:
+    arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / "out.png")
+    assert call(check_image, monkeypatch, files / "fish.png", *arguments) == 0
+    printed = capsys.readouterr().out
+    assert "head +0.5" in printed and "+0.2" in printed and "heading +1.0" in printed
+    assert cv2.imread(str(files / "out.png")).shape == (720, 1280, 3)
+
+
+def test_check_image_says_what_is_missing(files: Path, monkeypatch, capsys) -> None:
+    cv2.imwrite(str(files / "empty.png"), draw([]))
+    arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / "out.png")
+    assert call(check_image, monkeypatch, files / "empty.png", *arguments) == 1
+    assert "no front marker" in capsys.readouterr().out
+    assert call(check_image, monkeypatch, files / "none.png", "--lens", files / "lens.yaml") == 1
+    assert "none.png" in capsys.readouterr().err
+
+
+def test_calibrate_mount_writes_params_of_the_tracker(files: Path, monkeypatch, capsys) -> None:
+    arguments = ("mount", files / "points.csv", "--lens", files / "lens.yaml", "--out", files / "mount.yaml")
+    assert call(calibrate, monkeypatch, *arguments) == 0
+    config = config_from_file(files / "mount.yaml")
+    assert config.camera_position == pytest.approx(CONFIG.camera_position, abs=1e-4)
+    assert config.camera_tilt == pytest.approx(CONFIG.camera_tilt, abs=1e-4)
+    assert "4 points" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [("x,y\n1,2\n", "header x,y,u,v"), ("x,y,u,v\n1,2,3,a\n", "header x,y,u,v"), ("x,y,u,v\n", "at least 4")],
+)
+def test_calibrate_mount_refuses_other_files(
+    files: Path, monkeypatch, capsys, content: str, message: str
+) -> None:
+    (files / "points.csv").write_text(content)
+    assert call(calibrate, monkeypatch, "mount", files / "points.csv", "--lens", files / "lens.yaml") == 1
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+
+
+def test_calibrate_mount_refuses_mistaken_points(files: Path, monkeypatch, capsys) -> None:
+    rows = (files / "points.csv").read_text().splitlines()
+    x, y, u, v = rows[1].split(",")
+    rows[1] = ",".join([x, y, str(float(u) - 80), v])
+    (files / "points.csv").write_text("\n".join(rows))
+    assert call(calibrate, monkeypatch, "mount", files / "points.csv", "--lens", files / "lens.yaml") == 1
+    assert "mistaken" in capsys.readouterr().err
+
+
+def test_calibrate_lens_refuses_pictures_without_a_board(files: Path, monkeypatch, capsys) -> None:
+    arguments = ("lens", files / "fish.png", "--corners", "7x5", "--square", "0.05")
+    assert call(calibrate, monkeypatch, *arguments) == 1
+    assert "found in 0 of 1" in capsys.readouterr().err
+    assert call(calibrate, monkeypatch, "lens", files / "fish.png", "--corners", "7", "--square", "0.05") == 1
+    assert "expected like 8x6" in capsys.readouterr().err

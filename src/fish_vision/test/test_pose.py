@@ -1,0 +1,105 @@
+"""Markers to pose: exact recovery, covariance against sampling, identities."""
+
+from math import cos, pi, sin
+
+import numpy as np
+import pytest
+
+from fish_vision.pose import (
+    HeadPose,
+    MarkerLayout,
+    Spot,
+    head_pose,
+    pick_head,
+    tail_angles,
+    tail_is_ahead,
+    wrap,
+)
+
+LAYOUT = MarkerLayout((0.045, 0.0), (-0.045, 0.0), 0.075, 0.0233)
+ODD = MarkerLayout((0.06, 0.012), (-0.03, -0.004), 0.075, 0.0233)
+
+
+def spot(x: float, y: float, std: float = 1e-4) -> Spot:
+    return Spot(np.array([x, y]), np.eye(2) * std**2)
+
+
+def seen(pose: tuple[float, float, float], layout: MarkerLayout) -> tuple[Spot, Spot]:
+    x, y, psi = pose
+    R = np.array([[cos(psi), -sin(psi)], [sin(psi), cos(psi)]])
+    return tuple(spot(*(np.array([x, y]) + R @ np.array(m))) for m in (layout.front, layout.rear))
+
+
+@pytest.mark.parametrize("layout", [LAYOUT, ODD])
+@pytest.mark.parametrize("heading", [-3.1, -pi / 2, 0.0, 1.0, 3.1])
+def test_pose_is_recovered(layout: MarkerLayout, heading: float) -> None:
+    head = head_pose(*seen((0.3, -0.8, heading), layout), layout)
+    assert (head.x, head.y) == pytest.approx((0.3, -0.8)) and wrap(head.heading - heading) == pytest.approx(
+        0.0
+    )
+
+
+@pytest.mark.parametrize("layout", [LAYOUT, ODD])
+def test_covariance_is_that_of_sampled_markers(layout: MarkerLayout) -> None:
+    random = np.random.default_rng(7)
+    front, rear = seen((0.3, -0.8, 0.7), layout)
+    a, b = np.array([[2.0, 0.5], [0.5, 1.0]]) * 1e-7, np.array([[1.0, -0.3], [-0.3, 3.0]]) * 1e-7
+    samples = [
+        head_pose(Spot(p, a), Spot(q, b), layout)
+        for p, q in zip(
+            random.multivariate_normal(front.position, a, 4000),
+            random.multivariate_normal(rear.position, b, 4000),
+            strict=True,
+        )
+    ]
+    measured = np.cov(np.array([[s.x, s.y, s.heading] for s in samples]).T)
+    stated = head_pose(Spot(front.position, a), Spot(rear.position, b), layout).covariance
+    scale = np.sqrt(np.outer(np.diag(stated), np.diag(stated)))
+    np.testing.assert_allclose(measured / scale, stated / scale, atol=0.08)
+
+
+def test_the_pair_with_the_right_distance_is_picked() -> None:
+    front, rear = seen((0.0, 0.0, 0.0), LAYOUT)
+    stray = spot(1.0, 1.0)
+    assert pick_head([stray, front], [rear, spot(1.0, 1.05)], LAYOUT.spacing, 0.15) == (front, rear)
+    assert pick_head([stray], [rear], LAYOUT.spacing, 0.15) is None
+    assert pick_head([], [rear], LAYOUT.spacing, 0.15) is None
+
+
+def chain(pose: tuple[float, float, float], relative: list[float]) -> list[Spot]:
+    x, y, angle = pose
+    place = np.array([x, y]) - 0.075 * np.array([cos(angle), sin(angle)])
+    spots = []
+    for bend in relative:
+        angle += bend
+        place = place - 0.0233 * np.array([cos(angle), sin(angle)])
+        spots.append(spot(*place))
+    return spots
+
+
+@pytest.mark.parametrize("relative", [[0.0, 0.0, 0.0], [0.4, -0.2, 0.3], [-0.8, -0.3, -0.3]])
+def test_tail_angles_are_recovered(relative: list[float]) -> None:
+    pose = (0.5, 0.1, 3.0)
+    one, two, three = chain(pose, relative)
+    red, green = [three, one], [two]  # links 1 and 3 share a colour
+    angles = tail_angles(HeadPose(*pose, np.eye(3)), [red, green, red], LAYOUT, 0.008)
+    assert angles == pytest.approx(relative)
+
+
+def test_a_tail_marker_to_the_left_counts_negative() -> None:
+    left = [[spot(-0.075 - 0.0233 * cos(0.5), 0.0233 * sin(0.5))]]
+    assert tail_angles(HeadPose(0, 0, 0, np.eye(3)), left, LAYOUT, 0.008) == pytest.approx([-0.5])
+
+
+def test_a_chain_with_a_hole_has_no_angles() -> None:
+    pose = (0.5, 0.1, 1.0)
+    one, _, three = chain(pose, [0.1, 0.1, 0.1])
+    assert tail_angles(HeadPose(*pose, np.eye(3)), [[one, three], [], [one, three]], LAYOUT, 0.008) is None
+
+
+def test_swapped_head_markers_are_seen_by_the_tail() -> None:
+    pose = (0.5, 0.1, 1.0)
+    tail = chain(pose, [0.2, 0.1, 0.1])
+    assert not tail_is_ahead(HeadPose(*pose, np.eye(3)), tail, LAYOUT, 0.08)
+    assert tail_is_ahead(HeadPose(0.5, 0.1, 1.0 - pi, np.eye(3)), tail, LAYOUT, 0.08)
+    assert not tail_is_ahead(HeadPose(*pose, np.eye(3)), [], LAYOUT, 0.08)

@@ -1,0 +1,135 @@
+"""The tracker on drawn pictures: poses, reasons when there is none, what it refuses."""
+
+import sys
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from pool_picture import CONFIG, SIZE, calibration, discs_of_fish, draw  # noqa: E402
+
+from fish_vision.annotate import annotated  # noqa: E402
+from fish_vision.tracker import Detection, Lost, Reason, Tracker  # noqa: E402
+
+
+@pytest.fixture
+def tracker() -> Tracker:
+    return Tracker(CONFIG, calibration())
+
+
+def seen(found: Detection | Lost) -> Detection:
+    assert isinstance(found, Detection), found
+    return found
+
+
+def reason(found: Detection | Lost) -> Reason:
+    assert isinstance(found, Lost), found
+    return found.reason
+
+
+@pytest.mark.parametrize(
+    "pose", [(0.0, 0.0, 0.0), (1.9, 0.9, 2.5), (-1.95, -0.9, -2.0), (-0.5, 0.4, -pi / 2)]
+)
+def test_pose_is_found_and_then_followed(tracker: Tracker, pose: tuple[float, float, float]) -> None:
+    tail = (0.3, -0.2, 0.1)
+    first = seen(tracker.track(draw(discs_of_fish(*pose, tail)), 1.0))
+    second = seen(tracker.track(draw(discs_of_fish(pose[0] - 0.01, pose[1], pose[2] + 0.05, tail)), 1.033))
+    assert first.whole_image and not second.whole_image
+    for found, (dx, turn) in ((first, (0.0, 0.0)), (second, (-0.01, 0.05))):
+        assert found.head.x == pytest.approx(pose[0] + dx, abs=5e-4)
+        assert found.head.y == pytest.approx(pose[1], abs=5e-4)
+        assert found.head.heading == pytest.approx(pose[2] + turn, abs=0.006)
+        assert found.tail == pytest.approx(tail, abs=0.08) and found.spacing == pytest.approx(1.0, abs=0.01)
+
+
+def test_an_empty_pool_has_no_front_marker(tracker: Tracker) -> None:
+    assert reason(tracker.track(draw([]), 0.0)) == Reason.NO_FRONT
+
+
+def test_a_head_with_one_marker_is_lost(tracker: Tracker) -> None:
+    front, *others = discs_of_fish(0.0, 0.0, 0.0)
+    assert reason(tracker.track(draw(others), 0.0)) == Reason.NO_FRONT
+    assert reason(tracker.track(draw([front, *others[1:]]), 0.0)) == Reason.NO_REAR
+
+
+def test_markers_that_are_too_far_apart_are_no_head(tracker: Tracker) -> None:
+    discs = [(0.0, 0.0, 0.03, "front"), (0.2, 0.0, 0.03, "rear")]
+    assert reason(tracker.track(draw(discs), 0.0)) == Reason.NO_PAIR
+
+
+def test_swapped_markers_are_refused(tracker: Tracker) -> None:
+    names = {"front": "rear", "rear": "front"}
+    swapped = [(x, y, d, names.get(c, c)) for x, y, d, c in discs_of_fish(0.0, 0.0, 0.0)]
+    assert reason(tracker.track(draw(swapped), 0.0)) == Reason.SWAPPED
+
+
+def test_spots_of_the_wrong_size_are_not_markers(tracker: Tracker) -> None:
+    fish = discs_of_fish(0.5, 0.2, 1.0)
+    clutter = [(-1.0, 0.5, 0.1, "front"), (-1.0, 0.4, 0.008, "rear"), (1.5, -0.5, 0.06, "rear")]
+    found = seen(tracker.track(draw(fish + clutter), 0.0))
+    assert (found.head.x, found.head.y) == pytest.approx((0.5, 0.2), abs=5e-4)
+
+
+def test_a_jump_is_refused_at_first_and_believed_when_it_lasts(tracker: Tracker) -> None:
+    near, far = draw(discs_of_fish(0.0, 0.0, 0.0)), draw(discs_of_fish(1.0, 0.5, 1.0))
+    seen(tracker.track(near, 0.0))
+    assert reason(tracker.track(far, 0.03)) == Reason.JUMP
+    assert reason(tracker.track(far, 0.4)) == Reason.JUMP
+    assert seen(tracker.track(far, 0.6)).head.x == pytest.approx(1.0, abs=5e-4)
+
+
+def test_a_flip_is_a_jump(tracker: Tracker) -> None:
+    seen(tracker.track(draw(discs_of_fish(0.0, 0.0, 0.0)), 0.0))
+    assert reason(tracker.track(draw(discs_of_fish(0.0, 0.0, pi)), 0.03)) == Reason.JUMP
+
+
+def test_a_stamp_that_goes_back_starts_again(tracker: Tracker) -> None:
+    seen(tracker.track(draw(discs_of_fish(0.0, 0.0, 0.0)), 100.0))
+    assert seen(tracker.track(draw(discs_of_fish(1.0, 0.5, 1.0)), 3.0)).whole_image
+
+
+def test_without_a_tail_marker_the_head_is_still_found(tracker: Tracker) -> None:
+    discs = [d for d in discs_of_fish(0.3, 0.3, 2.0) if d[3] != "even"]
+    found = seen(tracker.track(draw(discs), 0.0))
+    assert found.tail is None and found.head.heading == pytest.approx(2.0, abs=0.006)
+
+
+def test_a_fish_without_marked_tail() -> None:
+    tracker = Tracker(replace(CONFIG, tail_links=0), calibration())
+    assert seen(tracker.track(draw(discs_of_fish(0.3, 0.3, 2.0, ())), 0.0)).tail is None
+
+
+def test_a_half_hidden_marker_makes_the_pose_less_certain(tracker: Tracker) -> None:
+    picture = draw(discs_of_fish(0.0, 0.0, 0.0))
+    free = seen(tracker.track(picture, 0.0))
+    picture[:360, 640:] = 255  # white over the upper half of the front marker
+    half = seen(tracker.track(picture, 0.0))
+    assert half.head.covariance[2, 2] > 9 * free.head.covariance[2, 2]
+    error = abs(half.head.heading - free.head.heading)
+    assert 0.005 < error < 3.5 * np.sqrt(half.head.covariance[2, 2])
+
+
+def test_a_pose_outside_the_pool_is_refused() -> None:
+    tracker = Tracker(replace(CONFIG, pool_margin=0.0), calibration())
+    assert reason(tracker.track(draw(discs_of_fish(0.0, 1.1, 0.0)), 0.0)) == Reason.OUTSIDE
+
+
+def test_pictures_of_noise_give_reasons_not_errors(tracker: Tracker) -> None:
+    random = np.random.default_rng(5)
+    for k in range(5):
+        noise = random.integers(0, 256, (SIZE[1], SIZE[0], 3)).astype(np.uint8)
+        assert isinstance(tracker.track(noise, 0.03 * k), Lost)
+
+
+def test_the_annotated_picture_shows_more_than_the_picture(tracker: Tracker) -> None:
+    picture = draw(discs_of_fish(0.3, 0.3, 2.0))
+    before = picture.copy()
+    for image in (picture, draw([])):
+        found = tracker.track(image, 0.0)
+        drawn = annotated(image, found, CONFIG, calibration())
+        assert drawn.shape == image.shape and np.any(drawn != image)
+    np.testing.assert_array_equal(picture, before)

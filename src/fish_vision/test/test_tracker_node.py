@@ -1,0 +1,181 @@
+"""The tracker node in this process: messages in and out, and bad input of every kind."""
+
+import os
+import sys
+from collections.abc import Iterator
+from math import atan2
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+sys.path.insert(0, str(Path(__file__).parent))
+
+import rclpy  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
+from geometry_msgs.msg import PoseWithCovarianceStamped  # noqa: E402
+from pool_picture import CONFIG, discs_of_fish, draw, lens_fields  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState  # noqa: E402
+
+from fish_vision.nodes.tracker import TrackerNode  # noqa: E402
+from fish_vision.picture import to_jpeg  # noqa: E402
+
+pytestmark = pytest.mark.ros
+DOMAIN = 142
+POSE = (0.5, 0.2, 1.0)
+PICTURE = draw(discs_of_fish(*POSE, (0.3, -0.2, 0.1)))
+MOUNT = {"camera_position": list(CONFIG.camera_position), "camera_tilt": list(CONFIG.camera_tilt)}
+
+
+class Bench:
+    """A tracker node and a node that plays camera and listener, spun by hand."""
+
+    def __init__(self, parameters: dict[str, object]) -> None:
+        arguments = ["--ros-args"] + [a for k, v in parameters.items() for a in ("-p", f"{k}:={v}")]
+        rclpy.init(args=arguments, domain_id=DOMAIN)
+        self.tracker, self.peer = TrackerNode(), Node("peer", namespace="fish")
+        self.info = self.peer.create_publisher(CameraInfo, "camera/camera_info", 10)
+        self.jpeg = self.peer.create_publisher(CompressedImage, "camera/image_raw/compressed", 10)
+        self.raw = self.peer.create_publisher(Image, "camera/image_raw", 10)
+        self.got: dict[str, list] = {"pose": [], "tail": [], "debug": [], "diagnostics": []}
+        for name, kind, topic in (
+            ("pose", PoseWithCovarianceStamped, "camera/pose"),
+            ("tail", JointState, "camera/tail"),
+            ("debug", CompressedImage, "camera/debug/compressed"),
+            ("diagnostics", DiagnosticArray, "/diagnostics"),
+        ):
+            self.peer.create_subscription(kind, topic, self.got[name].append, 10)
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.tracker)
+        self.executor.add_node(self.peer)
+        publisher = self.raw if "use_raw" in parameters else self.jpeg
+        assert self.spin_until(
+            lambda: publisher.get_subscription_count() and self.info.get_subscription_count()
+        )
+        self.frame = 0
+
+    def spin_until(self, condition, limit: float = 10.0) -> bool:
+        clock = self.peer.get_clock()
+        start = clock.now()
+        while not condition() and (clock.now() - start).nanoseconds < limit * 1e9:
+            self.executor.spin_once(timeout_sec=0.02)
+        return bool(condition())
+
+    def _stamped(self, msg: CameraInfo | CompressedImage | Image):
+        self.frame += 1
+        msg.header.frame_id, msg.header.stamp.sec = "overhead_optical", 1000
+        msg.header.stamp.nanosec = self.frame * 33_000_000
+        return msg
+
+    def send_info(self, **changes: object) -> None:
+        width, height, model, k, d = lens_fields()
+        fields = {"width": width, "height": height, "distortion_model": model, "k": k, "d": d} | changes
+        self.info.publish(self._stamped(CameraInfo(**fields)))
+        self.spin_until(lambda: self.tracker._info is not None and list(self.tracker._info[3]) == fields["k"])
+
+    def send_jpeg(self, data: bytes) -> None:
+        self.jpeg.publish(self._stamped(CompressedImage(format="jpeg", data=data)))
+
+    def send_raw(self, picture: np.ndarray, encoding: str) -> None:
+        height, width = picture.shape[:2]
+        msg = Image(height=height, width=width, encoding=encoding, step=3 * width, data=picture.tobytes())
+        self.raw.publish(self._stamped(msg))
+
+    def says(self, text: str) -> bool:
+        """Whether a diagnostic message with the text comes."""
+        return self.spin_until(lambda: any(text in d.status[0].message for d in self.got["diagnostics"]))
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.tracker.destroy_node()
+        self.peer.destroy_node()
+        rclpy.try_shutdown()
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    made = Bench(MOUNT | getattr(request, "param", {}))
+    yield made
+    made.close()
+
+
+def check_pose(msg: PoseWithCovarianceStamped) -> None:
+    p, q = msg.pose.pose.position, msg.pose.pose.orientation
+    assert (p.x, p.y, p.z) == pytest.approx((*POSE[:2], 0.0), abs=1e-3)
+    assert 2 * atan2(q.z, q.w) == pytest.approx(POSE[2], abs=0.01)
+    covariance = np.array(msg.pose.covariance).reshape(6, 6)
+    assert 0 < covariance[0, 0] < 1e-5 and 0 < covariance[5, 5] < 1e-3
+    np.testing.assert_allclose(covariance, covariance.T)
+
+
+@pytest.mark.parametrize("bench", [{"debug_image": True}], indirect=True)
+def test_pose_and_tail_come_with_the_stamp_of_the_image(bench: Bench) -> None:
+    bench.send_info()
+    bench.send_jpeg(to_jpeg(PICTURE, 95))
+    assert bench.spin_until(lambda: all(bench.got[k] for k in ("pose", "tail", "debug")))
+    pose, tail = bench.got["pose"][0], bench.got["tail"][0]
+    check_pose(pose)
+    assert pose.header.frame_id == tail.header.frame_id == "pool"
+    assert pose.header.stamp.sec == 1000 and pose.header.stamp.nanosec == bench.frame * 33_000_000
+    assert tail.header.stamp == pose.header.stamp and tail.name == ["tail_1", "tail_2", "tail_3"]
+    assert list(tail.position) == pytest.approx([0.3, -0.2, 0.1], abs=0.1)
+    assert bench.says("fish seen in all 1 images")
+
+
+@pytest.mark.parametrize("bench", [{"use_raw": True}], indirect=True)
+def test_raw_images_work_and_wrong_encodings_are_said(bench: Bench) -> None:
+    bench.send_info()
+    bench.send_raw(PICTURE[..., ::-1], "mono16")
+    assert bench.says("encoding 'mono16'")
+    bench.send_raw(PICTURE[..., ::-1], "rgb8")
+    assert bench.spin_until(lambda: bool(bench.got["pose"]))
+    check_pose(bench.got["pose"][0])
+
+
+def test_bad_images_are_said_and_the_next_good_one_is_tracked(bench: Bench) -> None:
+    assert bench.says("no camera/camera_info yet")
+    bench.send_jpeg(to_jpeg(PICTURE))
+    assert bench.spin_until(lambda: bench.tracker._statistics.refused["no calibration"] == 1)
+    bench.send_info()
+    good = to_jpeg(PICTURE, 95)
+    for bad, text in (
+        (good[:5000], "cut off"),
+        (b"nonsense", "no JPEG"),
+        (to_jpeg(PICTURE[:360]), "1280 x 360"),
+    ):
+        bench.send_jpeg(bad)
+        assert bench.says(text)
+    bench.send_jpeg(to_jpeg(draw([])))
+    assert bench.says("no front marker")
+    assert not bench.got["pose"]
+    bench.send_jpeg(good)
+    assert bench.spin_until(lambda: bool(bench.got["pose"]))
+    check_pose(bench.got["pose"][0])
+    assert bench.tracker._statistics.refused == {"no calibration": 1, "bad image": 3}
+
+
+def test_bad_calibrations_are_said_and_a_good_one_mends_it(bench: Bench) -> None:
+    for changes, text in (
+        ({"k": [0.0] * 9}, "not calibrated"),
+        (
+            {"distortion_model": "equidistant", "d": [0.1] * 4, "k": [901.0] + lens_fields()[3][1:]},
+            "equidistant",
+        ),
+        ({"k": [900.0, 0.0, 5000.0, 0.0, 900.0, 360.0, 0.0, 0.0, 1.0]}, "camera_position"),
+    ):
+        bench.send_info(**changes)
+        assert bench.says(text)
+        assert bench.got["diagnostics"][-1].status[0].level == DiagnosticStatus.ERROR
+    bench.send_info()
+    bench.send_jpeg(to_jpeg(PICTURE, 95))
+    assert bench.spin_until(lambda: bool(bench.got["pose"]))
+
+
+def test_bad_parameters_are_refused_with_their_name() -> None:
+    for name, value in (("area_min", 5.0), ("front_colour", [1, 2, 3]), ("camera_tilt", "flat")):
+        with pytest.raises(ValueError, match=name):
+            Bench({name: value})
+        rclpy.try_shutdown()
