@@ -126,8 +126,8 @@ def _collect(reader: rosbag1.Reader | rosbag2.Reader, wanted: Callable[[str, str
 
 
 def _types(connections: list[Connection], ros1: bool) -> Typesdict:
-    """Definitions stored with the recording, on top of the usual ones of ROS 2 Jazzy."""
-    types: Typesdict = {} if ros1 else dict(typestore().fielddefs)
+    """Definitions stored with the recording, on top of the usual ones."""
+    types: Typesdict = dict(typestore(ros1).fielddefs)
     for connection in connections:
         if connection.msgdef.format != MessageDefinitionFormat.NONE:
             types.update(_definition(connection.msgtype, connection.msgdef.format, connection.msgdef.data))

@@ -72,6 +72,8 @@ def estimate_clock(
     x, d = (stamp_ns - middle) * 1e-9, (delay_ns - base) * 1e-9
     if len(x) < FEWEST or np.ptp(x) == 0:
         return ClockEstimate(clock, topics, base * 1e-9, np.nan, 0.0, np.nan, middle)
+    plausible = _not_early(x, d)
+    x, d = x[plausible], d[plausible]
     pieces = _lowest_points(x, d)
     offset, drift = _edge_at_middle(np.concatenate(pieces))
     spread = np.array([_edge_at_middle(sample) for sample in _resampled(pieces)])
@@ -80,6 +82,26 @@ def estimate_clock(
     return ClockEstimate(
         clock, topics, base * 1e-9 + offset, float(offset_std), drift * 1e6, float(drift_std) * 1e6, middle
     )
+
+
+def _not_early(x: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """(N,) bool: all but single messages that are much earlier than any latency allows (wrong stamps).
+
+    With q the 5 % quantile and m the median of the detrended delay, a one-sided distribution of latencies has nothing
+    far below q; whatever is below q - 2 (m - q) is left out.
+    """
+    level = d - robust_line(x, d)
+    low, middle = np.quantile(level, [0.05, 0.5])
+    return level >= low - 2 * (middle - low)
+
+
+def robust_line(x: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """(N,) straight line through the medians of the first and the last third of points in order of x."""
+    third, order = max(1, len(x) // 3), np.argsort(x, kind="stable")
+    first, last = order[:third], order[-third:]
+    run = np.median(x[last]) - np.median(x[first])
+    slope = (np.median(d[last]) - np.median(d[first])) / run if run > 0 else 0.0
+    return np.median(d) + slope * (x - np.median(x))
 
 
 def _lowest_points(x: np.ndarray, d: np.ndarray) -> list[np.ndarray]:

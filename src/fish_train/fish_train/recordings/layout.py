@@ -64,6 +64,8 @@ class _Walker:
         self.layout = Layout(fixed=list(range(self.base)))
 
     def message(self, msgtype: str, prefix: str) -> None:
+        if msgtype not in self.types:
+            raise LayoutError(f"the recording does not define message type {msgtype}")
         for name, desc in self.types[msgtype][1]:
             self.item(desc, f"{prefix}{name}")
 

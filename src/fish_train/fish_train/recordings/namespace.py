@@ -8,7 +8,10 @@ from .decode import ROLES
 from .problem import RecordingError
 from .topic_map import TopicMap
 
-SIGNS_OF_A_ROBOT = ("commands", "imu")  # two namespaces with one of these are two robots; sim/joint_states is none
+SIGNS_OF_A_ROBOT = (
+    "commands",
+    "imu",
+)  # two namespaces with one of these are two robots; sim/joint_states is none
 
 
 def full_name(namespace: str, topic: str) -> str:

@@ -25,7 +25,7 @@ class ReplayerConfig:
     topics: tuple[str, ...] = ("*", "/*")  # names or patterns, relative to the node's namespace or absolute
     exclude: tuple[str, ...] = ("",)  # taken out of these
     clock_hz: float = 100.0  # Hz of bag time on /clock unless the recording has a /clock of its own; 0: none
-    start_delay_s: float = 0.5  # s before the first message, for subscribers to find the publishers
+    start_delay_s: float = 3.0  # s before the first message: subscribers need up to 2 s to find publishers
 
     def __post_init__(self) -> None:
         if not 0.01 <= self.rate <= 100.0:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .clock import ClockEstimate, estimate_clock
+from .clock import ClockEstimate, estimate_clock, robust_line
 
 MASTER = "robot"  # the clock that commands are stamped with: physics is simulated on its time
 RECORDER = "recorder"
@@ -29,7 +29,7 @@ class Stamps:
         delay = self.arrival_ns - self.stamp_ns
         d = (delay - int(np.median(delay))) * 1e-9
         x = (self.arrival_ns - self.arrival_ns[0]) * 1e-9
-        return np.abs(d - _robust_line(x, d)) < OUTLIER_S
+        return np.abs(d - robust_line(x, d)) < OUTLIER_S
 
 
 @dataclass(frozen=True)
@@ -88,15 +88,3 @@ def _estimate(name: str, stamps: list[Stamps], max_latency_s: float) -> ClockEst
     estimate = estimate_clock(name, tuple(s.topic for s in stamps), stamp_ns, arrival_ns)
     same = -FUTURE_S <= estimate.offset_s <= max_latency_s
     return replace(estimate, applied=not same)
-
-
-def _robust_line(x: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Line through the medians of the first and last third; flat unless it climbs by more than OUTLIER_S."""
-    third = len(x) // 3
-    if third < 1:
-        return np.full(len(x), np.median(d))
-    rise = np.median(d[-third:]) - np.median(d[:third])
-    run = np.median(x[-third:]) - np.median(x[:third])
-    if abs(rise) < OUTLIER_S / 5 or run <= 0:
-        return np.full(len(x), np.median(d))
-    return np.median(d) + rise / run * (x - np.median(x))
