@@ -43,7 +43,7 @@ INPUTS = (
     Input("cross_track_error", "m", 0.1),
 )
 
-OUTPUTS = (  # the paper's ranges, applied to this project's errors (rad, m/s) and output scales (ControlLimits)
+OUTPUTS = (  # the paper's ranges, for this project's errors (rad, m/s) and output scales (ControlLimits)
     Output("steering_kp", 0.0, 1.0),
     Output("steering_ki", 0.0, 1.0),
     Output("steering_kd", 0.0, 1.0),
@@ -75,9 +75,8 @@ class Contract:
 
     def __post_init__(self) -> None:
         if self.layers and (self.layers[0] != len(self.inputs) or self.layers[-1] != len(self.outputs)):
-            raise ContractError(
-                f"layers are {list(self.layers)}, expected {len(self.inputs)} inputs first and {len(self.outputs)} gains last"
-            )
+            sizes = f"{len(self.inputs)} inputs first and {len(self.outputs)} gains last"
+            raise ContractError(f"layers are {list(self.layers)}, expected {sizes}")
         if tuple(o.name for o in self.outputs) != Gains._fields:
             raise ContractError(
                 f"outputs are {[o.name for o in self.outputs]}, expected {list(Gains._fields)}"
@@ -102,10 +101,9 @@ class Contract:
     def differences(self, control_period: float, lookahead: float, robot_hash: str = "") -> list[str]:
         """What does not fit a controller of this period [s], lookahead [m] and robot (empty: any)."""
         found = []
-        if [i.name for i in self.inputs] != [i.name for i in INPUTS]:
-            found.append(
-                f"inputs are {[i.name for i in self.inputs]}, this controller gives {[i.name for i in INPUTS]}"
-            )
+        names, given = [i.name for i in self.inputs], [i.name for i in INPUTS]
+        if names != given:
+            found.append(f"inputs are {names}, this controller gives {given}")
         for name, theirs, ours in (
             ("control period", self.control_period, control_period),
             ("lookahead", self.lookahead, lookahead),

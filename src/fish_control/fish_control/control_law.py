@@ -1,7 +1,7 @@
-"""From errors and gains to rudder angle and rotor speed: two PIDs, feed-forward, throttle map, actuator limits.
+"""From errors and gains to rudder and rotor: two PIDs, feed-forward, throttle map, actuator limits.
 
-Everything is written on generic scalars: `xp` is numpy or casadi (anything with fmin, fmax, sin, sqrt), without a
-branch on a value, so that training differentiates exactly what the controller node runs.
+Everything is written on generic scalars: `xp` is numpy or casadi (anything with fmin, fmax, sin, sqrt),
+without a branch on a value, so that training differentiates exactly what the controller node runs.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Errors(NamedTuple):
 
 
 class ControlState(NamedTuple):
-    """Memory of both PIDs; errors start unknown, so the first derivative is taken as zero through `primed`."""
+    """Memory of both PIDs; `primed` is 0 before the first step, whose derivatives are taken as zero."""
 
     steering_integral: Any = 0.0
     heading_error: Any = 0.0
@@ -99,15 +99,15 @@ def control_step(
     alpha    = sat[ k_kappa kappa + c_a (Kp e + I + Kd e') ],  I' = Ki e + k_w (sat - unsat) / c_a
     throttle = sat[ ff(u_wanted, alpha) + c_s (Kp e_u + I_u + Kd e_u') ]
     """
-    rate, d_heading = _derivative(
-        state.heading_error_rate, state.heading_error, errors.heading, state.primed, dt, limits, xp
+    heading_rate = _filtered_rate(
+        state.heading_error_rate, state.heading_error, errors.heading, state.primed, dt, limits
     )
-    speed_rate, d_speed = _derivative(
-        state.speed_error_rate, state.speed_error, errors.speed, state.primed, dt, limits, xp
+    speed_rate = _filtered_rate(
+        state.speed_error_rate, state.speed_error, errors.speed, state.primed, dt, limits
     )
     alpha, steering_integral = _pid(
         limits.curvature_gain * errors.curvature,
-        (errors.heading, state.steering_integral, d_heading),
+        (errors.heading, state.steering_integral, heading_rate),
         (gains.steering_kp, gains.steering_ki, gains.steering_kd),
         limits.steering_scale,
         (-limits.rudder_range, limits.rudder_range),
@@ -117,7 +117,7 @@ def control_step(
     )
     throttle, speed_integral = _pid(
         feedforward_throttle(errors.speed_wanted, alpha, limits),
-        (errors.speed, state.speed_integral, d_speed),
+        (errors.speed, state.speed_integral, speed_rate),
         (gains.speed_kp, gains.speed_ki, gains.speed_kd),
         limits.throttle_scale,
         (0.0, 1.0),
@@ -125,18 +125,25 @@ def control_step(
         limits,
         xp,
     )
-    new = ControlState(steering_integral, errors.heading, rate, speed_integral, errors.speed, speed_rate, 1.0)
-    return new, Setpoint(alpha, throttle)
+    after = ControlState(
+        steering_integral, errors.heading, heading_rate, speed_integral, errors.speed, speed_rate, 1.0
+    )
+    return after, Setpoint(alpha, throttle)
 
 
 def feedforward_throttle(speed: Any, alpha: Any, limits: ControlLimits) -> Any:
-    """Throttle that holds `speed` [m/s] with the rudder at alpha [rad]; fitted to the nominal fish's steady swimming."""
+    """Throttle that holds `speed` [m/s] with the rudder at alpha [rad].
+
+        s = a u + b u^2 + alpha^2 (c u + d u^2)
+
+    Source: this project, steady swimming of the nominal fish; within 0.05 for u to 0.3 m/s.
+    """
     straight = limits.throttle_linear * speed + limits.throttle_quadratic * speed**2
     return straight + alpha**2 * (limits.turn_linear * speed + limits.turn_quadratic * speed**2)
 
 
 def amplitude_of_throttle(throttle: Any, limits: ControlLimits, xp: Any) -> Any:
-    """A [rad] from A^2 w^4 = s S_max, S_max = (12 w_0^2)^2; smooth at s = 0, where the root has no derivative."""
+    """A [rad] from A^2 w^4 = s S_max, S_max = (12 w_0^2)^2; smooth at s = 0, where the root is not."""
     ratio = (STROKE_FREQUENCY / limits.frequency) ** 2 if limits.frequency > 0.0 else 0.0
     tiny = 1e-6
     return AMPLITUDE_AT_FULL_THROTTLE * ratio * (xp.sqrt(throttle + tiny) - math.sqrt(tiny))
@@ -161,13 +168,10 @@ def _towards(value: Any, goal: Any, step: Any, xp: Any) -> Any:
     return value + xp.fmin(xp.fmax(goal - value, -step), step)
 
 
-def _derivative(
-    filtered: Any, before: Any, now: Any, primed: Any, dt: Any, limits: ControlLimits, xp: Any
-) -> tuple[Any, Any]:
-    """Filtered rate of an error; an angle that wraps is differenced the short way round by the caller's wrapping."""
+def _filtered_rate(rate: Any, before: Any, now: Any, primed: Any, dt: Any, limits: ControlLimits) -> Any:
+    """Rate of an error through a first-order filter; of an angle the caller avoids jumps by 2 pi."""
     raw = primed * (now - before) / dt
-    rate = filtered + (raw - filtered) * dt / (limits.derivative_time + dt)
-    return rate, rate
+    return rate + (raw - rate) * dt / (limits.derivative_time + dt)
 
 
 def _pid(

@@ -21,6 +21,7 @@ from fish_control.line_of_sight import GuidanceState, Motion, heading_error, obs
 from fish_control.policy import Policy, policy_inputs
 
 GLIDING_SPEED = 0.03  # m/s, slower than this the rudder is centred while no speed is wanted
+SEAM = 0.7  # rad, more than the head swings
 LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
 
 
@@ -71,7 +72,10 @@ class Controller:
             raise ValueError("decide() before any odometry was observed")
         motion = self._motion
         curvature = wanted.yaw_rate / wanted.speed if wanted.speed > 0.0 else 0.0
-        e_psi = float(heading_error(self._observed, motion, wanted.course, curvature, self._guidance, np))
+        e_psi = continued(
+            self._control.heading_error,
+            float(heading_error(self._observed, motion, wanted.course, curvature, self._guidance, np)),
+        )
         e_u = wanted.speed - motion.surge
         mean_heading = motion.heading - self._observed.stroke.heading
         inputs = policy_inputs(
@@ -103,3 +107,12 @@ class Controller:
         return Command(
             math.fmod(self._actuators.phase, 2.0 * math.pi), float(rotor_speed), float(self._actuators.alpha)
         )
+
+
+def continued(before: float, angle: float) -> float:
+    """An error angle [rad] on the side it came from: a fish that faces backwards makes up its mind.
+
+    Beyond +-pi by up to SEAM the angle keeps its sign, so that the swing of the head does not throw the rudder over.
+    """
+    unwrapped = before + math.remainder(angle - before, 2.0 * math.pi)
+    return unwrapped if abs(unwrapped) <= math.pi + SEAM else angle

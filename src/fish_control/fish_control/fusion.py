@@ -1,7 +1,8 @@
 """Fusion of camera and IMU; a camera pose counts at the moment it was taken, not when it arrives.
 
-Events of the last second are kept in the order of their stamps, each with the filter's state after it. One that arrives
-late is put in its place and everything after it is replayed; order of arrival therefore makes no difference.
+Events of the last second are kept in the order of their stamps, each with the filter's state after it. One
+that arrives late is put in its place and everything after it is replayed; order of arrival therefore makes no
+difference.
 """
 
 from __future__ import annotations
@@ -179,7 +180,7 @@ class Fusion:
         return len(self._candidates) >= frames
 
     def _reacquire(self, time: float, pose: Array) -> bool:
-        """Believe poses that contradict the estimate once they have agreed with each other for long enough."""
+        """Believe poses that contradict the estimate once they have agreed for long enough."""
         agreeing = self._agreeing(time, pose, self.config.start_frames)
         if agreeing and time - self._candidates[0][0] >= self.config.reacquire_time:
             self._begin(time, pose)
@@ -237,7 +238,7 @@ class Fusion:
         )
 
     def _forget(self, before: float) -> None:
-        """Drop events that nothing can come before any more; the first one left is the base of every replay."""
+        """Drop events that are too old to be replayed; the first one left is the base of every replay."""
         keep = bisect.bisect_right([e.time for e in self._events], before) - 1
         if keep > 0:
             del self._events[:keep]

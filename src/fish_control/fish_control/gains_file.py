@@ -38,7 +38,7 @@ def read_gains_file(file: str | Path) -> Policy:
     """Read and check a weights file.
 
     Raises:
-        GainsFileError: missing, not safetensors, contract not understood, arrays that do not fit it or are not finite.
+        GainsFileError: missing, not safetensors, contract not understood, arrays that do not fit it.
     """
     file = Path(file)
     try:
@@ -89,6 +89,7 @@ def _check_tensors(policy: Policy, file: Path) -> None:
     if not policy.contract.layers:
         for value, output in zip(policy.tensors["gains"], policy.contract.outputs, strict=True):
             if not output.low <= value <= output.high:
+                span = f"[{output.low:g}, {output.high:g}]"
                 raise GainsFileError(
-                    f"weights file {file}: {output.name} is {value:g}, expected within [{output.low:g}, {output.high:g}]"
+                    f"weights file {file}: {output.name} is {value:g}, expected within {span}"
                 )

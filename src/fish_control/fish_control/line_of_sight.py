@@ -1,13 +1,14 @@
 """Line of sight: from pose and velocity to course, heading, speed and cross-track errors.
 
     chi_los = atan2(y_t - y, x_t - x)                 towards the lookahead point (the paper's law)
-    chi_d   = chi_los - gamma                         wanted course; gamma: what the path's own curvature adds to chi_los
+    chi_d   = chi_los - gamma                         wanted course; gamma: share of the path's own curvature
     psi_d   = chi_d + a kappa - beta                  wanted mean heading: slip in a turn, drift in a current
     e_psi   = wrap(psi_d - psi_mean)
 
-On a curved path chi_los alone points inside the curve by gamma = asin(L kappa / 2), which makes any controller that
-tracks it cut corners (0.03 to 0.07 m on the letters); with gamma taken off, a robot on the path aims along the path.
-Written on generic scalars: training runs the same lines in CasADi.
+On a curved path chi_los alone points inside the curve by gamma = asin(L kappa / 2), which makes any
+controller that tracks it cut corners (0.03 to 0.07 m on the letters); with gamma taken off, a robot on the
+path aims along the path. Written on generic scalars: training runs the same lines in CasADi.
+
 Source: line of sight: Fossen 2021, sect. 12.3; corner compensation, slip and drift terms: this project.
 """
 
@@ -83,7 +84,8 @@ def observe(state: GuidanceState, motion: Motion, dt: Any, config: GuidanceConfi
 
         beta' = (fade (atan2(v_mean, u) + a r_mean / u) - beta) / T,   fade = u^2 / (u^2 + u_0^2)
 
-    In still water a steady turn slips by v / u = -a kappa, so beta stays near zero; a current across makes it the crab angle.
+    In still water a steady turn slips by v / u = -a kappa, so beta stays near zero; a current across makes it
+    the crab angle.
     """
     stroke = stroke_step(state.stroke, motion.yaw_rate, motion.sway, dt)
     if config.drift_time == 0.0:
@@ -111,7 +113,7 @@ def tracking_errors(
 def heading_error(
     state: GuidanceState, motion: Motion, course: Any, curvature: Any, config: GuidanceConfig, xp: Any
 ) -> Any:
-    """e_psi = wrap(chi_d + a kappa - beta - psi_mean) [rad] for a wanted course [rad] on a path of curvature [1/m]."""
+    """e_psi = wrap(chi_d + a kappa - beta - psi_mean) [rad] for a course [rad] and curvature [1/m]."""
     heading = course + config.slip_arm * curvature - state.drift
     return wrap(heading - (motion.heading - state.stroke.heading), xp)
 

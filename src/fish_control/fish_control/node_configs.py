@@ -91,9 +91,8 @@ class ControllerConfig:
         require_range("rate_hz", self.rate_hz, 10.0, 200.0, "Hz")
         require_range("command_rate_hz", self.command_rate_hz, self.rate_hz, 400.0, "Hz")
         if abs(self.command_rate_hz / self.rate_hz - round(self.command_rate_hz / self.rate_hz)) > 1e-9:
-            raise ValueError(
-                f"command_rate_hz is {self.command_rate_hz!r} Hz, expected a multiple of rate_hz {self.rate_hz!r} Hz"
-            )
+            rates = f"{self.command_rate_hz!r} Hz, expected a multiple of rate_hz {self.rate_hz!r} Hz"
+            raise ValueError(f"command_rate_hz is {rates}")
         require_range("lookahead", self.lookahead, 0.05, 2.0, "m")
         require_range("odometry_timeout", self.odometry_timeout, 0.02, 5.0, "s")
         require_range("target_timeout", self.target_timeout, 0.02, 5.0, "s")

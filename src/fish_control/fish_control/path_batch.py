@@ -1,6 +1,6 @@
 """Many robots on many paths: progress, cross-track error and lookahead points, vectorised.
 
-The one implementation of path following: `PathTracker` is a batch of one, training and evaluation use it whole.
+The one implementation of path following; `PathTracker` is a batch of one.
 """
 
 from __future__ import annotations
@@ -45,13 +45,14 @@ class PathState:
     """Where a batch of B robots is relative to its paths.
 
     Attributes:
-        progress: (B,) arc length along the path [m]; on a closed looping path it keeps growing with each lap, on an open
-            looping one it starts at 0 again.
-        cross_track_error: (B,) signed distance to the path at `progress` [m], positive when the robot is left of it.
+        progress: (B,) arc length along the path [m]; on a closed looping path it keeps growing with each lap,
+            on an open looping one it starts at 0 again.
+        cross_track_error: (B,) signed distance to the path at `progress` [m], positive when the robot is left
+            of it.
         point: (B, 2) the path there [m]. heading: (B,) course of the path there [rad]. curvature: (B,) [1/m].
         target: (B, 2) lookahead point [m].
-        chord: (B,) direction of the lookahead point of a robot that is exactly on the path, relative to `heading` [rad]:
-            what the path's own curvature contributes to the direction of `target`.
+        chord: (B,) direction of the lookahead point of a robot that is exactly on the path, relative to
+            `heading` [rad]: what the path's own curvature contributes to the direction of `target`.
         finished: (B,) whether the end of a path that stops has been passed.
     """
 
@@ -66,7 +67,7 @@ class PathState:
 
 
 class PathBatch:
-    """Follows B paths in order: the nearest point is searched only in a window ahead of the progress so far."""
+    """Follows B paths in order: the nearest point is searched only in a window ahead of the progress."""
 
     def __init__(self, paths: Sequence[ReferencePath], config: TrackerConfig | None = None) -> None:
         self.config = config or TrackerConfig()
@@ -89,7 +90,7 @@ class PathBatch:
         self._captured = np.zeros(len(self.paths), dtype=bool)
 
     def reset(self, progress: ArrayLike = 0.0) -> None:
-        """Forget the robots; the paths are to be followed from `progress` [m] on (a number or one for each path)."""
+        """Forget the robots; follow the paths from `progress` [m] on (a number, or one for each path)."""
         progress = np.broadcast_to(np.asarray(progress, dtype=float), self.progress.shape)
         if not np.all(np.isfinite(progress) & (progress >= 0.0)):
             raise PathError(f"progress is {progress}, expected finite numbers >= 0")
@@ -123,7 +124,7 @@ class PathBatch:
         )
 
     def _advance(self, position: Array) -> None:
-        """Move the progress to the nearest point of the window ahead of it, once the robot has reached the path."""
+        """Move the progress to the nearest point of its window, once the robot has reached the path."""
         again = self._restarts & (self.progress >= self._lap_end - 1e-6)
         s0 = np.where(again, 0.0, self.progress)
         self._captured &= ~again
@@ -149,8 +150,8 @@ class PathBatch:
     def _target(self, position: Array) -> Array:
         """Lookahead point: where the path ahead leaves a circle about the robot, or a fixed arc length ahead.
 
-        A robot farther from the path than the lookahead aims at the path point at its progress. A path that stays within
-        the circle (curved tighter than it) gives its farthest point on the next 2.5 lookaheads.
+        A robot farther from the path than the lookahead aims at the path point at its progress. A path that
+        stays within the circle (curved tighter than it) gives its farthest point on the next 2.5 lookaheads.
         """
         L = self.config.lookahead
         if self.config.lookahead_mode == "along":

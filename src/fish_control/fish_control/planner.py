@@ -1,4 +1,6 @@
-"""The planner: a path, a speed and a robot's motion in; target point, wanted course, speed and turn, and errors out."""
+"""The planner: a path, a speed and a robot's motion in; target point, wanted course, speed and turn, and
+errors out.
+"""
 
 from __future__ import annotations
 
@@ -61,8 +63,8 @@ class Planner:
     def resume(self, x: float, y: float, progress: float, travelled: float) -> bool:
         """Go on after an interruption at `progress` [m] during which at most `travelled` [m] were swum.
 
-        The nearest point from there on is taken, so that no part is swum twice and none before it; False, and nothing
-        changed, if the robot is not within that distance of the path.
+        The nearest point from there on is taken, so that no part is swum twice and none before it; False, and
+        nothing changed, if the robot is not within that distance of the path.
         """
         s = progress + np.arange(0.0, travelled + self.path.spacing, self.path.spacing)
         if not self.path.closed:
@@ -98,7 +100,9 @@ class Planner:
         return Plan(at, errors, speed, speed * at.curvature)
 
     def _turn_to_centre(self, errors: TrackingErrors, motion: Motion) -> TrackingErrors:
-        """After the end the fish glides for 0.3 m and more: away from the walls, towards the pool's centre."""
+        """After the end the fish glides for 0.3 m and more: away from the walls, towards the pool's
+        centre.
+        """
         course = math.atan2(-motion.y, -motion.x)
         heading = heading_error(self._state, motion, course, 0.0, self._guidance, np)
         return errors._replace(course=course, heading=float(heading))

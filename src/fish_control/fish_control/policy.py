@@ -15,13 +15,20 @@ Array = NDArray[np.float64]
 
 
 def policy_inputs(
-    head_angle: Any, surge_speed: Any, desired_speed: Any, heading_error: Any, speed_error: Any, cross_track_error: Any,
-    xp: Any, inputs: tuple[Input, ...] = INPUTS,
-) -> list[Any]:  # fmt: skip
+    head_angle: Any,
+    surge_speed: Any,
+    desired_speed: Any,
+    heading_error: Any,
+    speed_error: Any,
+    cross_track_error: Any,
+    xp: Any,
+    inputs: tuple[Input, ...] = INPUTS,
+) -> list[Any]:
     """The policy's inputs in the paper's order, normalised as (value - offset) / scale; generic scalars.
 
     Args:
-        head_angle: mean heading over the stroke [rad], any number of turns. Speeds [m/s], errors [rad, m/s, m].
+        head_angle: mean heading over the stroke [rad], any number of turns. Speeds [m/s], errors [rad, m/s,
+            m].
     """
     wrapped = xp.arctan2(xp.sin(head_angle), xp.cos(head_angle))
     values = (wrapped, surge_speed, desired_speed, heading_error, speed_error, cross_track_error)
@@ -29,7 +36,9 @@ def policy_inputs(
 
 
 def tensor_shapes(contract: Contract) -> dict[str, tuple[int, ...]]:
-    """Names and shapes of the arrays a file must hold: `layers.K.weight` (out, in), `layers.K.bias`, or `gains`."""
+    """Names and shapes of the arrays a file must hold: `layers.K.weight` (out, in), `layers.K.bias`, or
+    `gains`.
+    """
     if not contract.layers:
         return {"gains": (len(contract.outputs),)}
     shapes: dict[str, tuple[int, ...]] = {}

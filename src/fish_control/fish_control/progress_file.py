@@ -1,7 +1,7 @@
 """The planner's progress on disk, so that a planner that was killed goes on where it was.
 
-Odometry alone cannot say where on a self-crossing path the robot is, and topics of a killed publisher are gone. The file
-is removed when the planner ends as it should.
+Odometry alone cannot say where on a self-crossing path the robot is, and topics of a killed publisher are
+gone. The file is removed when the planner ends as it should.
 """
 
 from __future__ import annotations

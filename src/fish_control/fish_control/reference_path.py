@@ -24,15 +24,17 @@ class ReferencePath:
 
         p(s), t(s) = (cos chi, sin chi), n(s) = (-sin chi, cos chi), kappa(s) = d chi / d s
 
-    Frame: pool. Between samples the curve is continued as a parabola from the nearest sample, so values are accurate to
-    kappa' ds^3. A closed path is periodic in s; an open one is continued as a straight line beyond its ends.
+    Frame: pool. Between samples the curve is continued as a parabola from the nearest sample, so values are
+    accurate to kappa' ds^3. A closed path is periodic in s; an open one is continued as a straight line
+    beyond its ends.
 
     Attributes:
         points: (M, 2) samples [m]; a closed path does not repeat its first point.
         heading: (M,) course chi of the tangent [rad], unwrapped.
         curvature: (M,) kappa [1/m], positive to the left.
         closed: whether the last point joins the first.
-        end: at the end of the path stop, or loop to its beginning (a closed path goes round, an open one starts anew).
+        end: at the end of the path stop, or loop to its beginning (a closed path goes round, an open one
+            starts anew).
     """
 
     name: str
@@ -53,7 +55,9 @@ class ReferencePath:
         end: End | None = None,
         spacing: float = SAMPLE_SPACING,
     ) -> ReferencePath:
-        """Resample a polyline [m] (at least two distinct points) evenly. `end` defaults to loop if closed, else stop."""
+        """Resample a polyline [m] (at least two distinct points) evenly. `end` defaults to loop if closed,
+        else stop.
+        """
         vertices = _checked_vertices(points, name, closed)
         if end is not None and end not in get_args(End):
             raise PathError(f"path '{name}': end is {end!r}; known: {', '.join(get_args(End))}")
@@ -86,7 +90,9 @@ class ReferencePath:
         return _unit(self.heading_at(s))
 
     def curvature_at(self, s: ArrayLike) -> Array:
-        """Curvature kappa(s) [1/m] of the nearest sample, positive to the left; 0 beyond the ends of an open path."""
+        """Curvature kappa(s) [1/m] of the nearest sample, positive to the left; 0 beyond the ends of an open
+        path.
+        """
         k, _, beyond = self._locate(s)
         return np.where(beyond != 0.0, 0.0, self.curvature[k])
 

@@ -1,14 +1,16 @@
 """Strapdown motion model of the head: inertial measurements drive it, the camera corrects it.
 
-State x = (p_x, p_y, psi, v_x, v_y, b_g, b_x, b_y): position [m] and heading [rad] in the pool, velocity over ground in
-the pool frame [m/s], bias of the gyro [rad/s] and of both accelerometer axes [m/s^2].
+State x = (p_x, p_y, psi, v_x, v_y, b_g, b_x, b_y): position [m] and heading [rad] in the pool, velocity over
+ground in the pool frame [m/s], bias of the gyro [rad/s] and of both accelerometer axes [m/s^2].
 
     p' = v,   psi' = w - b_g,   v' = R(psi) (a - b)
     z_camera = (p_x, p_y, psi) + noise
 
-a is the specific force in base_link; the pool is level and the fish swims upright, so gravity has no share in the plane
-(what tilt adds is taken up by the biases). The swing of the head is in the measurements and needs no model.
-Source: Titterton and Weston, Strapdown Inertial Navigation Technology, ch. 3, planar; noise values: RECORDING.
+a is the specific force in base_link; the pool is level and the fish swims upright, so gravity has no share in
+the plane (what tilt adds is taken up by the biases). The swing of the head is in the measurements and needs
+no model.
+Source: Titterton and Weston, Strapdown Inertial Navigation Technology, ch. 3, planar; noise values:
+    RECORDING.
 """
 
 from __future__ import annotations

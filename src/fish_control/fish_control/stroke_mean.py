@@ -1,13 +1,13 @@
 """Mean motion of a body that swings once a stroke: a notch at the rotor's frequency.
 
-The rotor swings the head by 0.1 to 0.3 rad at 2 Hz; fed back as it is, the swing would wag the rudder. The swing z
-of the heading is what a band-pass lets through of the integrated yaw rate, the mean is the rest:
+The rotor swings the head by 0.1 to 0.3 rad at 2 Hz; fed back as it is, the swing would wag the rudder. The
+swing z of the heading is what a band-pass lets through of the integrated yaw rate, the mean is the rest:
 
     z'' + 2 zeta w z' + w^2 z = 2 zeta w r        psi_mean = psi - z,  r_mean = r - z'
 
-and the same for the sway velocity, whose swing is taken off in the same way. No angle is unwrapped, and a steady turn
-is delayed by 2 zeta / w only (0.08 s at 2 Hz, zeta = 0.5; a mean over one stroke would delay it by 0.25 s).
-Written on generic scalars: numpy and CasADi run the same lines.
+and the same for the sway velocity, whose swing is taken off in the same way. No angle is unwrapped, and a
+steady turn is delayed by 2 zeta / w only (0.08 s at 2 Hz, zeta = 0.5; a mean over one stroke would delay it
+by 0.25 s). Written on generic scalars: numpy and CasADi run the same lines.
 """
 
 from __future__ import annotations

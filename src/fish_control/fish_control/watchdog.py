@@ -75,7 +75,7 @@ class Watchdog:
         if not signs.odometry_finite:
             return "odometry is not finite"
         if signs.odometry_age > self._config.odometry_timeout:
-            return f"odometry is stale: {signs.odometry_age:.2f} s old, {self._config.odometry_timeout:g} s allowed"
+            return _stale("odometry", signs.odometry_age, self._config.odometry_timeout)
         if not signs.pose_variance <= self._config.largest_variance:
             return "camera lost: fusion does not vouch for the pose"
         if not signs.twist_variance <= self._config.largest_variance:
@@ -83,5 +83,9 @@ class Watchdog:
         if signs.target_age is None:
             return "waiting for a target"
         if signs.target_age > self._config.target_timeout:
-            return f"target is stale: {signs.target_age:.2f} s old, {self._config.target_timeout:g} s allowed"
+            return _stale("target", signs.target_age, self._config.target_timeout)
         return None
+
+
+def _stale(name: str, age: float, allowed: float) -> str:
+    return f"{name} is stale: {age:.2f} s old, {allowed:g} s allowed"

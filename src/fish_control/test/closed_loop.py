@@ -3,9 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from fish_sim.robot import Robot
-from fish_sim.simulation import Simulation
-from fish_sim.simulation_config import SimulationConfig
 
 from fish_control.controller import Command, Controller, Wanted
 from fish_control.fusion import Fusion, FusionConfig
@@ -15,6 +12,9 @@ from fish_control.path_tracker import PathTracker
 from fish_control.planner import Planner
 from fish_control.policy import Policy
 from fish_control.reference_path import ReferencePath
+from fish_sim.robot import Robot
+from fish_sim.simulation import Simulation
+from fish_sim.simulation_config import SimulationConfig
 
 DT = 0.01  # s
 RUN_UP = 0.15  # m, start this far before the path

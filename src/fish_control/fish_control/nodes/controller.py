@@ -1,9 +1,10 @@
-"""control/target, control/twist, tracking/error, odometry/filtered -> joint_command, control/gains, /diagnostics.
+"""control/target, control/twist, tracking/error, odometry/filtered -> joint_command, control/gains.
 
-joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder: position =
-alpha (rad). control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy of the weights file gives them.
-The watchdog stops rotor and rudder on stale or bad odometry, lost sensors and a stale target; service resume
-(std_srvs/Trigger) lets the fish swim again where resume is manual. Decisions are in Controller and Watchdog.
+joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder:
+position = alpha (rad). control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy of the
+weights file gives them. The watchdog stops rotor and rudder on stale or bad odometry, lost sensors and a
+stale target; service resume (std_srvs/Trigger) lets the fish swim again where resume is manual. Decisions are
+in Controller and Watchdog.
 """
 
 import math

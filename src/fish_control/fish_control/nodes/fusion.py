@@ -1,7 +1,7 @@
 """camera/pose + imu/data -> odometry/filtered (100 Hz, pool -> base_link), /diagnostics.
 
-A pose variance of 1e4 says that the camera is lost, a twist variance of 1e4 that the IMU is. The transform pool ->
-base_link is broadcast where tf2_msgs is installed. Decisions are in Fusion.
+A pose variance of 1e4 says that the camera is lost, a twist variance of 1e4 that the IMU is. The transform
+pool -> base_link is broadcast where tf2_msgs is installed. Decisions are in Fusion.
 """
 
 from typing import Any

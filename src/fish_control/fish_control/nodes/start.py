@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
@@ -31,9 +31,8 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
         if isinstance(field.default, str) and type(given) is bool and len(field.default) == 1:
             given = "Y" if given else "N"  # YAML 1.1 reads the letters Y and N as truth values
         if type(given) is not type(field.default):
-            raise ValueError(
-                f"{field.name} is {given!r}, expected {type(field.default).__name__} such as {field.default!r}"
-            )
+            kind_name = type(field.default).__name__
+            raise ValueError(f"{field.name} is {given!r}, expected {kind_name} such as {field.default!r}")
         values[field.name] = given
     return kind(**values)
 

@@ -16,7 +16,10 @@ def circle(
     direction: int = 1,
     end: End | None = None,
 ) -> ReferencePath:
-    """Circle of `radius` [m] about (x, y), from polar angle `start` [rad]; direction 1 counter-clockwise, -1 clockwise."""
+    """Circle of `radius` [m] about (x, y) [m], from polar angle `start` [rad].
+
+    Direction 1 is counter-clockwise, -1 clockwise.
+    """
     require_positive("circle", radius=radius)
     if direction not in (1, -1):
         raise PathError(

@@ -22,8 +22,8 @@ def letter(
 ) -> ReferencePath:
     """A letter of `height` [m] centred on (x, y), in the order of its stroke.
 
-    Letters with several strokes are joined: the fish turns in a loop outside the letter instead of lifting a pen.
-    `easing` [m] is the arc length over which curvature builds up.
+    Letters with several strokes are joined: the fish turns in a loop outside the letter instead of lifting a
+    pen. `easing` [m] is the arc length over which curvature builds up.
     """
     key = str(letter).upper()
     if key not in STROKES:

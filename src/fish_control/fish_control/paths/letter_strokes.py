@@ -1,7 +1,8 @@
 """The strokes of the letters, as corners to be rounded; units of letter height.
 
-A corner is (x, y) or (x, y, radius). Turns that a pen would make by lifting are loops, because a fish can neither stop
-nor turn on the spot; no radius is below 0.09 heights (0.126 m for a letter of 1.4 m; the fish can turn in 0.075 m).
+A corner is (x, y) or (x, y, radius). Turns that a pen would make by lifting are loops, because a fish can
+neither stop nor turn on the spot; no radius is below 0.09 heights (0.126 m for a letter of 1.4 m; the fish
+can turn in 0.075 m).
 """
 
 from __future__ import annotations

@@ -27,10 +27,12 @@ def polyline(
     """Path through the points of a CSV file (columns x, y in metres) or the outline of an SVG drawing.
 
     Args:
-        size: larger side of the drawing [m], which is then centred on (x, y). An SVG drawing has no metres and takes
-            1.4 m unless told; without a size the points of a CSV file are used where they are, moved by (x, y).
+        size: larger side of the drawing [m], which is then centred on (x, y). An SVG drawing has no metres
+            and takes 1.4 m unless told; without a size the points of a CSV file are used where they are,
+            moved by (x, y).
         radius: corners are rounded to this [m].
-        closed: join the last point to the first; by default when they coincide, or when an SVG outline is closed.
+        closed: join the last point to the first; by default when they coincide, or when an SVG outline is
+            closed.
     """
     if not file:
         raise PathError("polyline: no file given; set file to a .csv or .svg")

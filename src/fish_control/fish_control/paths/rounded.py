@@ -38,7 +38,9 @@ def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) 
 
 
 def _fillet(corner: NDArray, heading: float, turn: float, tangent: float) -> NDArray[np.float64]:
-    """Points of the arc that starts `tangent` [m] before the corner on `heading` and turns by `turn` [rad]."""
+    """Points of the arc that starts `tangent` [m] before the corner on `heading` and turns by `turn`
+    [rad].
+    """
     if tangent < ARC_STEP or abs(turn) < 1e-6:
         return corner[None]
     radius = tangent / np.tan(abs(turn) / 2.0)
@@ -55,8 +57,8 @@ def _unit(angle: float) -> NDArray[np.float64]:
 def ease(points: ArrayLike, width: float, closed: bool = False) -> NDArray[np.float64]:
     """Smooth along the arc length, so that curvature swells and fades where a straight meets an arc.
 
-    Gaussian of standard deviation `width` [m] on even samples; the ends of an open curve stay where they are. An arc
-    of radius r moves inwards by width^2 / (2 r).
+    Gaussian of standard deviation `width` [m] on even samples; the ends of an open curve stay where they are.
+    An arc of radius r moves inwards by width^2 / (2 r).
 
     Args:
         points: (M, 2) [m].

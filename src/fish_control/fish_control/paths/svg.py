@@ -20,7 +20,8 @@ _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "Z
 def read_svg(file: Path) -> tuple[NDArray[np.float64], bool]:
     """Points (M, 2) in drawing units with y up, and whether the outline is closed.
 
-    Straight lines and Bezier curves are understood (M L H V C S Q T Z, upper and lower case); transforms are not.
+    Straight lines and Bezier curves are understood (M L H V C S Q T Z, upper and lower case); transforms are
+    not.
     """
     try:
         root = ElementTree.parse(file).getroot()
