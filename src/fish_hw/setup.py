@@ -28,6 +28,7 @@ setup(
             "rudder = fish_hw.nodes.rudder:main",
             "imu = fish_hw.nodes.imu:main",
             "camera = fish_hw.nodes.camera:main",
+            "safe_stop = fish_hw.commands.safe_stop:main",
         ],
     },
 )

@@ -74,6 +74,10 @@ class VertiqEmulator:
             (reg.TIMEOUT_MEANING.type, reg.TIMEOUT_MEANING.param): b"\x00",
             (reg.TIMEOUT_SONG.type, reg.TIMEOUT_SONG.param): b"\x02",
             (reg.VELOCITY_KP.type, reg.VELOCITY_KP.param): struct.pack("<f", 0.02),
+            (reg.VELOCITY_KI.type, reg.VELOCITY_KI.param): struct.pack("<f", 0.0),
+            (reg.VELOCITY_KD.type, reg.VELOCITY_KD.param): struct.pack("<f", 0.0),
+            (reg.INPUT_FILTER.type, reg.INPUT_FILTER.param): struct.pack("<I", 1000),
+            (reg.FIRMWARE.type, reg.FIRMWARE.param): struct.pack("<I", 1),
             (reg.VELOCITY_FF1.type, reg.VELOCITY_FF1.param): struct.pack("<f", 0.0258),
         }
 

@@ -6,21 +6,18 @@ Out: servo pulses, /diagnostics
 
 import math
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
-from fish_hw.devices.pca9685 import Pca9685Pwm
 from fish_hw.devices.rudder_driver import PwmOutput, RudderDriver
+from fish_hw.devices.rudder_output import open_output
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.nodes.joint_message import joint_value
 from fish_hw.settings.rudder import RudderSettings
-from fish_hw.transport.i2c_bus import KernelI2c
-from fish_hw.transport.sysfs_pwm import SysfsPwm
-
-NS_PER_S = 1e9
 
 
 class RudderNode(DeviceNode):
@@ -35,12 +32,9 @@ class RudderNode(DeviceNode):
         self.start(self._driver, self._cycle, 1.0 / self.settings.rate_hz, emulated)
 
     def _open_output(self) -> PwmOutput:
-        settings = self.settings
-        if settings.backend == "pca9685":
-            bus = KernelI2c(settings.bus)
-            return Pca9685Pwm(bus, settings.address, settings.channel, settings.pca_clock_hz, settings.pwm_hz)
-        chip = settings.chip if settings.backend == "sysfs" else self._emulated_chip()
-        return SysfsPwm(chip, settings.channel, round(NS_PER_S / settings.pwm_hz))
+        if self.settings.backend == "emulator":
+            return open_output(replace(self.settings, backend="sysfs", chip=self._emulated_chip()))
+        return open_output(self.settings)
 
     def _emulated_chip(self) -> str:
         if self._folder is None:

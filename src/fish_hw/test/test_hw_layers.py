@@ -12,6 +12,7 @@ LAYERS = {
     "transport": {"transport", "settings"},
     "devices": {"devices", "protocol", "transport", "settings"},
     "emulators": {"emulators", "devices", "protocol", "transport", "settings"},
+    "commands": {"devices", "transport", "settings"},
     "nodes": {"nodes", "emulators", "devices", "protocol", "transport", "settings"},
 }
 PORTS = {"serial", "smbus2"}
