@@ -135,7 +135,8 @@ class Contract:
         values["outputs"] = tuple(_build(Output, o, "output") for o in values["outputs"])
         values["limits"] = _build(ControlLimits, values["limits"], "limits")
         values["guidance"] = _build(GuidanceConfig, values["guidance"], "guidance")
-        return _construct(cls, values, "contract")
+        contract: Contract = _construct(cls, values, "contract")
+        return contract
 
 
 def _build(kind: type, data: object, where: str) -> Any:

@@ -112,7 +112,7 @@ class Controller:
 def continued(before: float, angle: float) -> float:
     """An error angle [rad] on the side it came from: a fish that faces backwards makes up its mind.
 
-    Beyond +-pi by up to SEAM the angle keeps its sign, so that the swing of the head does not throw the rudder over.
+    Beyond +-pi by up to SEAM the angle keeps its sign, so that the head's swing does not throw the rudder.
     """
     unwrapped = before + math.remainder(angle - before, 2.0 * math.pi)
     return unwrapped if abs(unwrapped) <= math.pi + SEAM else angle

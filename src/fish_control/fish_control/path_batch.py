@@ -108,7 +108,8 @@ class PathBatch:
         usable = (index < self._count[:, None]) & (
             index * self._ds[:, None] >= np.broadcast_to(start, self._row.shape)[:, None]
         )
-        return np.argmin(np.where(usable, squared, np.inf), axis=1) * self._ds
+        s: Array = np.argmin(np.where(usable, squared, np.inf), axis=1) * self._ds
+        return s
 
     def update(self, position: ArrayLike) -> PathState:
         """Advance the progress to robots at `position` (B, 2) [m] and give errors and targets."""
@@ -163,7 +164,9 @@ class PathBatch:
     def _index(self, s: Array) -> NDArray[np.int64]:
         """Table rows next to arc lengths s (B, K) [m]."""
         k = np.rint(s / self._ds[:, None]).astype(np.int64)
-        return np.where(self._closed[:, None], k % self._count[:, None], np.minimum(k, self._last[:, None]))
+        around, along = k % self._count[:, None], np.minimum(k, self._last[:, None])
+        index: NDArray[np.int64] = np.where(self._closed[:, None], around, along)
+        return index
 
     def _evaluate(self, s: Array) -> _PathSample:
         """The path at arc lengths s (B,)."""
@@ -197,8 +200,9 @@ def leave_circle(ahead: Array, centre: Array, radius: float) -> Array:
     row = np.arange(len(ahead))
     d0, d1 = distance[row, before], distance[row, first]
     share = np.clip(np.divide(radius - d0, d1 - d0, out=np.ones_like(d0), where=d1 > d0), 0.0, 1.0)
-    a, b = ahead[row, before], ahead[row, first]
-    return a + share[:, None] * (b - a)
+    inside, outside = ahead[row, before], ahead[row, first]
+    point: Array = inside + share[:, None] * (outside - inside)
+    return point
 
 
 def _table(path: ReferencePath, config: TrackerConfig) -> Array:

@@ -31,7 +31,7 @@ def check_inside_pool(path: ReferencePath, margin: float) -> None:
     x, y = path.points[worst[0]]
     axis = "xy"[worst[1]]
     raise PathOutsidePoolError(
-        f"path '{path.name}' reaches ({x:.2f}, {y:.2f}) m at {worst[0] * path.spacing:.2f} m along it; with a "
-        f"margin of {margin:.2f} m it must stay within |{axis}| <= {limits[worst[1]]:.3f} m: make it smaller, "
-        "move its centre or lower the margin"
+        f"path '{path.name}' reaches ({x:.2f}, {y:.2f}) m at {worst[0] * path.spacing:.2f} m along it; "
+        f"with a margin of {margin:.2f} m it must stay within |{axis}| <= {limits[worst[1]]:.3f} m: "
+        "make it smaller, move its centre or lower the margin"
     )

@@ -149,4 +149,5 @@ def _curvature(heading: Array, spacing: float, closed: bool) -> Array:
     if not closed:
         return np.gradient(heading, spacing)
     ahead, behind = np.roll(heading, -1), np.roll(heading, 1)
-    return np.angle(np.exp(1j * (ahead - behind))) / (2.0 * spacing)
+    turned: Array = np.angle(np.exp(1j * (ahead - behind)))
+    return turned / (2.0 * spacing)

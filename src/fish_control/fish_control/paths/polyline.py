@@ -65,7 +65,8 @@ def _fit(points: NDArray[np.float64], size: float) -> NDArray[np.float64]:
     extent = float(np.max(high - low))
     if extent <= 0.0:
         raise PathError("polyline: all points are the same")
-    return (points - 0.5 * (low + high)) * size / extent
+    fitted: NDArray[np.float64] = (points - 0.5 * (low + high)) * size / extent
+    return fitted
 
 
 def _read_csv(path: Path) -> tuple[NDArray[np.float64], bool]:

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 
+Array = NDArray[np.float64]
+
 ARC_STEP = 5e-4  # m between points on an arc; leaves a heading error of ARC_STEP / (8 radius) ~ 3e-4 rad
 EASED_STEP = 2e-3  # m between points of an eased curve
 HAIRPIN = np.deg2rad(175.0)  # a corner sharper than this has no useful fillet
 
 
-def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) -> NDArray[np.float64]:
+def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) -> Array:
     """Replace each corner by a circular arc tangent to both sides.
 
         tangent length = r tan(delta / 2), delta = deflection of the corner
@@ -37,7 +39,7 @@ def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) 
     return np.vstack([_fillet(corners[i], angle[i - 1], turn[i], tangent[i]) for i in range(len(corners))])
 
 
-def _fillet(corner: NDArray, heading: float, turn: float, tangent: float) -> NDArray[np.float64]:
+def _fillet(corner: Array, heading: float, turn: float, tangent: float) -> Array:
     """Points of the arc that starts `tangent` [m] before the corner on `heading` and turns by `turn`
     [rad].
     """
@@ -47,14 +49,15 @@ def _fillet(corner: NDArray, heading: float, turn: float, tangent: float) -> NDA
     normal = heading + np.sign(turn) * np.pi / 2.0
     centre = corner - tangent * _unit(heading) + radius * _unit(normal)
     polar = normal + np.pi + np.linspace(0.0, turn, max(int(np.ceil(radius * abs(turn) / ARC_STEP)), 4) + 1)
-    return centre + radius * np.column_stack([np.cos(polar), np.sin(polar)])
+    arc: Array = centre + radius * np.column_stack([np.cos(polar), np.sin(polar)])
+    return arc
 
 
-def _unit(angle: float) -> NDArray[np.float64]:
+def _unit(angle: float) -> Array:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def ease(points: ArrayLike, width: float, closed: bool = False) -> NDArray[np.float64]:
+def ease(points: ArrayLike, width: float, closed: bool = False) -> Array:
     """Smooth along the arc length, so that curvature swells and fades where a straight meets an arc.
 
     Gaussian of standard deviation `width` [m] on even samples; the ends of an open curve stay where they are.
@@ -73,7 +76,9 @@ def ease(points: ArrayLike, width: float, closed: bool = False) -> NDArray[np.fl
     samples = np.column_stack([np.interp(even, s, vertices[:, k]) for k in range(2)])
     sigma = width / (even[1] - even[0])
     if closed:
-        return gaussian_filter1d(samples[:-1], sigma, axis=0, mode="wrap")
+        around: Array = gaussian_filter1d(samples[:-1], sigma, axis=0, mode="wrap")
+        return around
     reach = min(int(np.ceil(4.0 * sigma)), len(samples) - 1)
     before, after = 2.0 * samples[0] - samples[reach:0:-1], 2.0 * samples[-1] - samples[-2 : -reach - 2 : -1]
-    return gaussian_filter1d(np.vstack([before, samples, after]), sigma, axis=0)[reach : reach + len(samples)]
+    extended: Array = gaussian_filter1d(np.vstack([before, samples, after]), sigma, axis=0)
+    return extended[reach : reach + len(samples)]

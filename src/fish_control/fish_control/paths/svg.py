@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from fish_control.reference_path import PathError
 
+Array = NDArray[np.float64]
+
 CURVE_POINTS = 64  # points for each Bezier segment
 _TOKEN = re.compile(r"[A-Za-z]|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "Z": 0}
 
 
-def read_svg(file: Path) -> tuple[NDArray[np.float64], bool]:
+def read_svg(file: Path) -> tuple[Array, bool]:
     """Points (M, 2) in drawing units with y up, and whether the outline is closed.
 
     Straight lines and Bezier curves are understood (M L H V C S Q T Z, upper and lower case); transforms are
@@ -38,10 +40,10 @@ def read_svg(file: Path) -> tuple[NDArray[np.float64], bool]:
     raise PathError(f"{file}: no path, polyline or polygon in the drawing")
 
 
-def _outline(d: str, file: Path) -> tuple[NDArray[np.float64], bool]:
+def _outline(d: str, file: Path) -> tuple[Array, bool]:
     points = [np.zeros(2)]
-    drawn: list[NDArray] = []
-    control: NDArray | None = None
+    drawn: list[Array] = []
+    control: Array | None = None
     for command, numbers in _segments(d, file):
         here = points[-1]
         if command.upper() == "Z":
@@ -57,14 +59,14 @@ def _outline(d: str, file: Path) -> tuple[NDArray[np.float64], bool]:
     return np.array(drawn), False
 
 
-def _origin(command: str, here: NDArray) -> NDArray | float:
+def _origin(command: str, here: Array) -> Array:
     """What relative coordinates are relative to."""
     if command in "hv":
-        return here[0] if command == "h" else here[1]
+        return here[:1] if command == "h" else here[1:]
     return np.tile(here, _ARGUMENTS[command.upper()] // 2)
 
 
-def _segments(d: str, file: Path) -> Iterator[tuple[str, NDArray]]:
+def _segments(d: str, file: Path) -> Iterator[tuple[str, Array]]:
     """(command, its numbers), repeated commands written out."""
     tokens = _TOKEN.findall(d)
     i = 0
@@ -94,7 +96,7 @@ def _segments(d: str, file: Path) -> Iterator[tuple[str, NDArray]]:
             return
 
 
-def _bezier(controls: list[NDArray]) -> NDArray:
+def _bezier(controls: list[Array]) -> Array:
     """De Casteljau at CURVE_POINTS parameters, without the first point."""
     t = np.linspace(0.0, 1.0, CURVE_POINTS + 1)[1:, None]
     levels = [np.broadcast_to(c, (CURVE_POINTS, 2)) for c in controls]
@@ -103,30 +105,30 @@ def _bezier(controls: list[NDArray]) -> NDArray:
     return levels[0]
 
 
-_Drawn = tuple[NDArray, "NDArray | None"]
+_Drawn = tuple[Array, Array | None]
 
 
-def _line(_: NDArray, n: NDArray, __: NDArray | None) -> _Drawn:
+def _line(_: Array, n: Array, __: Array | None) -> _Drawn:
     return n[None], None
 
 
-def _cubic(here: NDArray, n: NDArray, _: NDArray | None) -> _Drawn:
+def _cubic(here: Array, n: Array, _: Array | None) -> _Drawn:
     return _bezier([here, n[:2], n[2:4], n[4:]]), 2.0 * n[4:] - n[2:4]
 
 
-def _smooth_cubic(here: NDArray, n: NDArray, mirrored: NDArray | None) -> _Drawn:
+def _smooth_cubic(here: Array, n: Array, mirrored: Array | None) -> _Drawn:
     return _cubic(here, np.r_[here if mirrored is None else mirrored, n], None)
 
 
-def _quadratic(here: NDArray, n: NDArray, _: NDArray | None) -> _Drawn:
+def _quadratic(here: Array, n: Array, _: Array | None) -> _Drawn:
     return _bezier([here, n[:2], n[2:]]), 2.0 * n[2:] - n[:2]
 
 
-def _smooth_quadratic(here: NDArray, n: NDArray, mirrored: NDArray | None) -> _Drawn:
+def _smooth_quadratic(here: Array, n: Array, mirrored: Array | None) -> _Drawn:
     return _quadratic(here, np.r_[here if mirrored is None else mirrored, n], None)
 
 
-_CURVES: dict[str, Callable[[NDArray, NDArray, NDArray | None], _Drawn]] = {
+_CURVES: dict[str, Callable[[Array, Array, Array | None], _Drawn]] = {
     "M": _line,
     "L": _line,
     "H": lambda here, n, _: (np.array([[n[0], here[1]]]), None),

@@ -1,0 +1,45 @@
+"""The IMU's recent samples, and what it measured in between."""
+
+from __future__ import annotations
+
+import bisect
+from typing import NamedTuple
+
+
+class InertialSample(NamedTuple):
+    """One IMU measurement in base_link."""
+
+    yaw_rate: float  # rad/s
+    forward: float  # m/s^2, specific force
+    left: float  # m/s^2
+
+
+class ImuHistory:
+    """Samples in the order of their stamps."""
+
+    def __init__(self, reach: float) -> None:
+        self._reach = reach  # s, a sample says nothing about moments farther away
+        self._times: list[float] = []
+        self._samples: list[InertialSample] = []
+
+    def add(self, time: float, sample: InertialSample) -> None:
+        """Append a sample that is newer than all others."""
+        self._times.append(time)
+        self._samples.append(sample)
+
+    def at(self, time: float) -> InertialSample | None:
+        """Linear between the neighbouring samples; if only one is in reach, that one; None without any."""
+        i = bisect.bisect_right(self._times, time)
+        before = i - 1 if i > 0 and time - self._times[i - 1] <= self._reach else None
+        after = i if i < len(self._times) and self._times[i] - time <= self._reach else None
+        if before is None or after is None:
+            only = before if before is not None else after
+            return None if only is None else self._samples[only]
+        share = (time - self._times[before]) / (self._times[after] - self._times[before])
+        a, b = self._samples[before], self._samples[after]
+        return InertialSample(*(p + share * (q - p) for p, q in zip(a, b, strict=True)))
+
+    def forget(self, before: float) -> None:
+        """Drop samples older than `before` [s]."""
+        keep = bisect.bisect_left(self._times, before)
+        del self._times[:keep], self._samples[:keep]
