@@ -2,7 +2,7 @@
 # Only `setup` (pip) uses the network; every step is skipped when its stamp is newer than what it depends on.
 
 SHELL := /bin/bash
-.SHELLFLAGS := -eu -o pipefail -c
+.SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-print-directory
 

@@ -18,7 +18,7 @@ from .bringup import NodeSpec, Parameters, command, environment
 GRACE = ((signal.SIGINT, 8.0), (signal.SIGTERM, 4.0), (signal.SIGKILL, 4.0))  # s to wait after each
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
-_libc = ctypes.CDLL(None)
+_prctl = ctypes.CDLL(None).prctl  # resolved here: a forked child must not
 
 
 class NodeProcess:
@@ -122,4 +122,4 @@ class NodeProcesses:
 
 def _die_with_parent() -> None:
     """In the child before it starts: SIGTERM when the parent dies, kill -9 of the starter leaves no node."""
-    _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

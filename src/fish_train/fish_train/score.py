@@ -4,9 +4,10 @@
     e_psi = wrap(chi(s) - <psi>)     heading [rad]; <psi>: mean over one stroke of the rotor (0.5 s)
     e_u   = u_ref - u                speed [m/s], the head's surge speed, each stroke's ripple included
 
-The approach phase lasts from the start until the head is for the first time within 0.05 m of the path and the
-surge speed, averaged over a stroke, within 20 % of the commanded one. A run on an open path ends where its
-path ends. Frame: pool. Errors are wanted minus actual, the cross-track error apart. Source: this project.
+The approach phase lasts from the start until, for the first time, the head is within 0.05 m of the path, the
+heading within 0.3 rad of the path's and the surge speed within 20 % of the commanded one (both averaged over a
+stroke), while the path is being followed (progress > 0). A run on an open path ends where its path ends.
+Frame: pool. Errors are wanted minus actual, the cross-track error apart. Source: this project.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ Array = NDArray[np.float64]
 
 STROKE = 0.5  # s, one rotor period at 2 Hz
 NEAR_PATH = 0.05  # m
+NEAR_HEADING = 0.3  # rad
 NEAR_SPEED = 0.2  # share of the commanded speed
 CLOSED_GAP = 3.0  # a path whose ends are nearer than so many sample distances is closed
 
@@ -82,10 +84,10 @@ class RunScore:
         """Error name -> size, over the whole run or what follows the approach phase."""
         first = 0 if with_approach else self.settled
         errors = {
-            "cross-track [m]": self.cross_track,
-            "heading, stroke mean [rad]": self.heading,
-            "heading, head angle [rad]": self.head_angle,
-            "speed [m/s]": self.speed_error,
+            "cross-track, m": self.cross_track,
+            "heading, rad": self.heading,
+            "head angle, rad": self.head_angle,
+            "speed, m/s": self.speed_error,
         }
         return {name: Summary.of(error[first:]) for name, error in errors.items()}
 
@@ -107,9 +109,11 @@ def score_trial(trial: Trial) -> RunScore:
     if trial.reference_speed is None:
         raise UserError(f"{trial.name}: reference/speed was not recorded; nothing to score against")
     given = trial.reference_paths[-1]
-    return score_motion(
-        motion, path_from_points(given.points), float(trial.reference_speed.speed[-1]), given.t, source
-    )
+    speeds = trial.reference_speed.speed
+    if not np.any(speeds > 0.0):
+        raise UserError(f"{trial.name}: the commanded speed was never above 0; nothing to score")
+    speed = float(speeds[speeds > 0.0][-1])  # 0 is said at the end of the path
+    return score_motion(motion, path_from_points(given.points), speed, given.t, source)
 
 
 def path_from_points(points: Array) -> ReferencePath:
@@ -133,11 +137,17 @@ def score_motion(
     n = next((k + 1 for k, point in enumerate(points) if point.finished), len(points))
     motion, points = motion.take(np.arange(n)), points[:n]
     chi = np.array([point.heading for point in points])
-    psi = np.unwrap(motion.psi)
+    progress = np.array([point.progress for point in points])
     cross_track = np.array([point.cross_track_error for point in points])
+    psi = np.unwrap(motion.psi)
+    heading = _wrap(chi - stroke_mean(motion.t, psi))
     speed_error = reference_speed - motion.u
-    mean_speed_error = stroke_mean(motion.t, speed_error)
-    near = (np.abs(cross_track) < NEAR_PATH) & (np.abs(mean_speed_error) < NEAR_SPEED * reference_speed)
+    on_path = (
+        (progress > progress[0])
+        & (np.abs(cross_track) < NEAR_PATH)
+        & (np.abs(heading) < NEAR_HEADING)
+        & (np.abs(stroke_mean(motion.t, speed_error)) < NEAR_SPEED * reference_speed)
+    )
     return RunScore(
         source=source,
         path=path,
@@ -145,12 +155,12 @@ def score_motion(
         t=motion.t,
         position=motion.pose[:, :2],
         speed=motion.u,
-        progress=np.array([point.progress for point in points]),
+        progress=progress,
         cross_track=cross_track,
-        heading=_wrap(chi - stroke_mean(motion.t, psi)),
+        heading=heading,
         head_angle=_wrap(chi - psi),
         speed_error=speed_error,
-        settled=int(np.argmax(near)) if near.any() else n,
+        settled=int(np.argmax(on_path)) if on_path.any() else n,
         finished=points[-1].finished,
     )
 

@@ -3,37 +3,37 @@
 from __future__ import annotations
 
 import numpy as np
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table as TerminalTable
 
 from .reports.page import Table
-from .score import RunScore
+from .score import RunScore, Summary
 
 
 def error_table(score: RunScore) -> Table:
     """RMSE, 95th percentile and maximum of every error, with and without the approach phase."""
     whole, settled = score.summaries(with_approach=True), score.summaries(with_approach=False)
-    rows = [
-        [name, *(f"{value:.4f}" for summary in (settled[name], whole[name]) for value in _sizes(summary))]
-        for name in whole
-    ]
-    header = ["error", "RMSE", "95 %", "max", "RMSE, all", "95 %, all", "max, all"]
+    rows = [[name, *_cells(settled[name]), *_cells(whole[name])] for name in whole]
+    header = ["error", "RMSE", "95 %", "max", "RMSE *", "95 % *", "max *"]
     approach = "never ended" if np.isnan(score.approach_s) else f"took {score.approach_s:.1f} s"
-    note = f"First three columns without the approach phase (it {approach}), last three with it."
+    note = (
+        f"Without the approach phase, which {approach}; * with it. Heading: mean over a stroke of the tail."
+    )
     return Table("Tracking errors", header, rows, note)
 
 
 def print_table(console: Console, table: Table) -> None:
     """Show a table in the terminal."""
-    shown = TerminalTable(
-        title=table.title, title_justify="left", caption=table.note or None, caption_justify="left"
-    )
+    shown = TerminalTable(title=table.title, title_justify="left", box=SIMPLE, pad_edge=False)
     for k, name in enumerate(table.header):
         shown.add_column(name, justify="left" if k == 0 else "right", no_wrap=True)
     for row in table.rows:
         shown.add_row(*row)
     console.print(shown)
+    if table.note:
+        console.print(table.note, style="dim")
 
 
-def _sizes(summary: object) -> tuple[float, float, float]:
-    return summary.rmse, summary.p95, summary.maximum
+def _cells(summary: Summary) -> list[str]:
+    return [f"{value:.4f}" for value in (summary.rmse, summary.p95, summary.maximum)]

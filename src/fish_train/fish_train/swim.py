@@ -16,7 +16,7 @@ from .bringup import NodeSpec
 from .errors import UserError
 from .processes import NodeProcess, NodeProcesses
 
-START_TIMEOUT = 30.0  # s from the start of the nodes to the first odometry and path
+START_TIMEOUT = 30.0  # s in which each thing that is waited for must come
 LOOK_PERIOD = 0.1  # s between looks at the robot
 
 
@@ -51,21 +51,20 @@ class SwimEnd:
     cpu: dict[NodeSpec, float]
 
 
-def wait_for_start(nodes: NodeProcesses, watch: Watch, listen: Callable[[float], None]) -> None:
-    """Return when path and odometry are there.
+def wait_for(
+    there: Callable[[], bool], what: str, nodes: NodeProcesses, listen: Callable[[float], None]
+) -> None:
+    """Listen until something is there.
 
     Raises:
-        UserError: a node ended, or nothing came in time.
+        UserError: a node ended, or it did not come in time.
     """
     deadline = time.monotonic() + START_TIMEOUT
-    while watch.sight is None or watch.tracker is None:
+    while not there():
         listen(LOOK_PERIOD)
         check_running(nodes)
         if time.monotonic() > deadline:
-            missing = "odometry/filtered" if watch.sight is None else "reference/path"
-            raise UserError(
-                f"no {missing} within {START_TIMEOUT:.0f} s of the start; see the logs of the nodes"
-            )
+            raise UserError(f"no {what} within {START_TIMEOUT:.0f} s of the start; see the logs of the nodes")
 
 
 def swim(

@@ -55,15 +55,15 @@ def test_approach_ends_when_path_and_speed_are_both_near():
     score = score_motion(motion(t, -1.0 + 0.2 * t, y, 0.0, u), STRAIGHT, 0.2, 0.0, "truth")
     assert score.approach_s == pytest.approx(4.0, abs=0.03)
     settled, whole = score.summaries(with_approach=False), score.summaries(with_approach=True)
-    assert settled["cross-track [m]"].maximum == pytest.approx(0.0, abs=1e-9)
-    assert whole["cross-track [m]"].maximum == pytest.approx(0.2)
+    assert settled["cross-track, m"].maximum == pytest.approx(0.0, abs=1e-9)
+    assert whole["cross-track, m"].maximum == pytest.approx(0.2)
 
 
 def test_a_run_that_never_settles_says_so():
     t = np.arange(0.0, 3.0, 0.01)
     score = score_motion(motion(t, -1.0, 0.0, 0.0, 0.0), STRAIGHT, 0.2, 0.0, "truth")
     assert np.isnan(score.approach_s)
-    assert np.isnan(score.summaries(with_approach=False)["speed [m/s]"].rmse)
+    assert np.isnan(score.summaries(with_approach=False)["speed, m/s"].rmse)
 
 
 def test_swing_of_the_head_is_in_the_head_angle_and_not_in_the_mean_heading():

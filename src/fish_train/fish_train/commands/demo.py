@@ -14,6 +14,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from fish_control.paths import make_path
+from fish_control.reference_path import PathError
 from fish_train.bringup import CONTROL, RECORDER, ROBOTS, SIMULATED, NodeSpec, Parameters
 from fish_train.domain import choose_domain
 from fish_train.errors import UserError
@@ -24,7 +26,7 @@ from fish_train.reports.page import Table
 from fish_train.reports.run_page import write_run_page
 from fish_train.score import score_trial
 from fish_train.score_table import error_table, print_table
-from fish_train.swim import SwimEnd, swim, wait_for_start
+from fish_train.swim import SwimEnd, swim, wait_for
 
 LONGEST = 600.0  # s, a run that does not end by itself
 SIMULATOR = SIMULATED[0]
@@ -68,28 +70,46 @@ def run(args: argparse.Namespace) -> int:
 def node_parameters(args: argparse.Namespace, folder: Path) -> dict[NodeSpec, Parameters]:
     """What the command line changes in the nodes' parameter files."""
     changed: dict[NodeSpec, Parameters] = {
+        SIMULATOR: start_pose(args.letter),
         PLANNER: {"path": args.letter, "speed": args.speed},
         RECORDER: {"output": str(folder.resolve()), "name": "recording"},
     }
     if args.weights:
-        changed[CONTROLLER] = {"gains_file": str(args.weights.resolve())}
+        changed[CONTROLLER] = {"weights_file": str(args.weights.resolve())}
     if args.robot:
-        changed[SIMULATOR] = {"robot_file": str(args.robot.resolve())}
+        changed[SIMULATOR] = {**changed[SIMULATOR], "robot_file": str(args.robot.resolve())}
     return changed
 
 
+def start_pose(name: str) -> Parameters:
+    """The fish waits at the beginning of the path, along it.
+
+    Raises:
+        UserError: no such path.
+    """
+    try:
+        path = make_path(name)
+    except PathError as error:
+        raise UserError(str(error)) from error
+    (x, y), heading = path.point(0.0), float(path.heading_at(0.0))
+    return {"start_x": float(x), "start_y": float(y), "start_heading": heading}
+
+
 def _swim(args: argparse.Namespace, domain: int, folder: Path, console: Console) -> tuple[SwimEnd, Table]:
-    """Start the nodes, watch the run, end them; the recorder first, so the recording ends with the run."""
+    """Start the nodes, watch the run, end them; the recorder is there before the fish moves and ends first."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended like with Ctrl-C
     changed = node_parameters(args, folder)
-    with NodeProcesses(domain, folder / "logs") as nodes:
-        for spec in (RECORDER, *(spec for spec in ROBOTS["sim"] if spec != RECORDER)):
-            nodes.start(spec, changed.get(spec))
-        with watching(domain) as (watch, listen):
-            wait_for_start(nodes, watch, listen)
-            end = swim(nodes, watch, listen, args.duration, console)
-            nodes.stop([RECORDER])
-            return end, _latency_table(watch.diagnostics)
+    with NodeProcesses(domain, folder / "logs") as nodes, watching(domain) as (watch, listen):
+        for spec in ROBOTS["sim"]:
+            if spec != CONTROLLER:
+                nodes.start(spec, changed.get(spec))
+        wait_for(lambda: watch.sees(RECORDER.executable), "recorder", nodes, listen)
+        nodes.start(CONTROLLER, changed.get(CONTROLLER))
+        wait_for(lambda: watch.tracker is not None, "reference/path", nodes, listen)
+        wait_for(lambda: watch.sight is not None, "odometry/filtered", nodes, listen)
+        end = swim(nodes, watch, listen, args.duration, console)
+        nodes.stop([RECORDER])
+        return end, _latency_table(watch.diagnostics)
 
 
 def _latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:

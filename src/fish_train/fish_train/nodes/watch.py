@@ -54,6 +54,10 @@ class WatchNode(Node):
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 1)
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 50)
 
+    def sees(self, node: str) -> bool:
+        """Whether a node of this name is in the graph."""
+        return node in self.get_node_names()
+
     def _on_path(self, msg: Path) -> None:
         if self.tracker is None and len(msg.poses) > 1:
             points = np.array([[pose.pose.position.x, pose.pose.position.y] for pose in msg.poses])
