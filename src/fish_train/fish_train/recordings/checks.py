@@ -8,22 +8,25 @@ import numpy as np
 
 from .clock import ClockEstimate
 from .decode import ROLES
+from .jumps import find_jumps
 from .problem import SEVERITIES, Problem
 from .streams import Decoded
 from .topic_map import TopicRule
 from .trial import (
     BAD_STAMP,
     DUPLICATE,
+    JUMP,
     NOT_FINITE,
     TIME_BACK,
     UNREADABLE,
     WRONG_FRAME,
+    Camera,
     Commands,
     Encoder,
     Stream,
 )
 
-GAP_PERIODS = 2.5  # a distance of more than so many median periods is a gap
+GAP_PERIODS = 2.5  # a distance of more than so many periods is a gap
 LONG_GAP_S = 0.5  # from here on a warning
 CONSTANT = 1e-6  # a command that varies less is constant, rad/s or rad
 OF_USE = {"imu": "warning", "encoder": "info"}  # severity of the absence of topics that are not required
@@ -32,6 +35,7 @@ FLAG_TEXTS = {
     DUPLICATE: ("warning", "duplicate", "stamps repeat an earlier one"),
     TIME_BACK: ("warning", "time_back", "stamps are older than the one before"),
     NOT_FINITE: ("warning", "nan", "messages carry NaN, infinity or lack a value"),
+    JUMP: ("warning", "jump", "poses lie far from those before and after"),
     BAD_STAMP: ("warning", "bad_stamp", "stamps are zero or far from the rest"),
     UNREADABLE: ("error", "unreadable", "messages do not fit their type"),
 }
@@ -56,6 +60,8 @@ def flag_samples(
             flags[~np.isfinite(values).reshape(len(t), -1).all(axis=1)] |= NOT_FINITE
     if rule.frame and decoded.frames is not None:
         flags[decoded.frames != rule.frame] |= WRONG_FRAME
+    if ROLES[role].stream is Camera:
+        flags[find_jumps(t, *(decoded.arrays[k] for k in ("x", "y", "psi")))] |= JUMP
     flags[decoded.unreadable] = UNREADABLE
     return flags
 
@@ -80,7 +86,7 @@ def _gaps(stream: Stream) -> Iterator[Problem]:
     if len(t) < 10:
         return
     step = np.diff(t)
-    period = float(np.median(step))
+    period = max(float(np.median(step)), float(step.mean()) / 2)  # the mean where messages come in bursts
     gaps = np.flatnonzero(step > GAP_PERIODS * period)
     if len(gaps):
         longest = float(step.max())

@@ -96,12 +96,12 @@ def _not_early(x: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 
 def robust_line(x: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """(N,) straight line through the medians of the first and the last third of points in order of x."""
+    """(N,) straight line through the 10 % quantiles of d in the first and the last third of x."""
     third, order = max(1, len(x) // 3), np.argsort(x, kind="stable")
-    first, last = order[:third], order[-third:]
-    run = np.median(x[last]) - np.median(x[first])
-    slope = (np.median(d[last]) - np.median(d[first])) / run if run > 0 else 0.0
-    return np.median(d) + slope * (x - np.median(x))
+    ends = order[:third], order[-third:]
+    (x0, x1), (d0, d1) = ([np.median(x[e]) for e in ends], [np.quantile(d[e], 0.1) for e in ends])
+    slope = (d1 - d0) / (x1 - x0) if x1 > x0 else 0.0
+    return d0 + slope * (x - x0)
 
 
 def _lowest_points(x: np.ndarray, d: np.ndarray) -> list[np.ndarray]:

@@ -29,6 +29,7 @@ TIME_BACK = 2  # the stamp is older than one that came before
 NOT_FINITE = 4  # a value that is used is NaN or infinite
 WRONG_FRAME = 8  # frame_id is not the expected one
 BAD_STAMP = 16  # the stamp is zero or far away from the rest of the recording
+JUMP = 64  # a camera pose far from those before and after: lost or swapped markers
 UNREADABLE = 32  # the bytes do not fit the message type; values are NaN, t is the arrival
 
 

@@ -1,0 +1,71 @@
+"""Print what is in a recording or data set (topics, rates, gaps, latency, clocks, problems) and plot it on one page."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from fish_train.recordings.topic_map import TopicMap
+    from fish_train.reports.page import Table as Sheet
+
+COLOURS = {"error": "red", "warning": "yellow"}
+FILE_WIDTH = 160  # columns when the output is not a terminal
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recording", type=Path, help="rosbag2 folder, .mcap, .db3 or .bag file, or a folder of them"
+    )
+    parser.add_argument("--topics", type=Path, help="YAML topic map (default: the names of the format)")
+    parser.add_argument("--namespace", help="robot's namespace (default: found from the topics)")
+    parser.add_argument("--html", type=Path, help="page to write (default: inspect_<name>.html here)")
+    parser.add_argument("--no-html", action="store_true", help="print only")
+
+
+def run(args: argparse.Namespace) -> int:
+    from fish_train.recordings import read_dataset
+    from fish_train.reports.recording_tables import problems_table, tables, trials_table
+
+    data = read_dataset(args.recording, _topic_map(args), progress=True)
+    console = Console()
+    if not console.is_terminal:
+        console.width = FILE_WIDTH
+    if len(data) > 1:
+        _print(console, trials_table(data))
+    for trial in data:
+        for sheet in tables(trial):
+            _print(console, sheet)
+    _print(console, problems_table("Problems of the set", data.problems))
+    if not args.no_html:
+        from fish_train.reports.recording_page import write_recording_page
+
+        page = args.html or Path(f"inspect_{data.name}.html")
+        write_recording_page(data, page)
+        console.print(f"page: {page}", highlight=False, soft_wrap=True)
+    return 0
+
+
+def _topic_map(args: argparse.Namespace) -> TopicMap:
+    from dataclasses import replace
+
+    from fish_train.recordings import TopicMap, load_topic_map
+
+    topics = load_topic_map(args.topics) if args.topics else TopicMap()
+    return topics if args.namespace is None else replace(topics, namespace=args.namespace)
+
+
+def _print(console: Console, sheet: Sheet) -> None:
+    """A table, coloured by severity; nothing if it has no rows."""
+    if not sheet.rows:
+        return
+    table = Table(title=sheet.title, title_justify="left")
+    for name in sheet.header:
+        table.add_column(name, overflow="fold")  # on a narrow terminal names are broken, never cut
+    for row in sheet.rows:
+        table.add_row(*row, style=COLOURS.get(row[0]))
+    console.print(table)
