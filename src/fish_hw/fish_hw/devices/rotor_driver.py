@@ -19,7 +19,8 @@ from fish_hw.settings.rotor import RotorSettings
 from fish_hw.transport.errors import TransportError
 from fish_hw.transport.interfaces import ByteStream
 
-SILENCE_S = 0.5  # unanswered questions for this long: the module is gone
+SILENCE_S = 0.5  # unanswered questions for this long, and at least
+SILENT_QUESTIONS = 5  # of them (a stalled computer asks few), mean that the module is gone
 TELEMETRY_S = 0.2
 
 
@@ -51,6 +52,7 @@ class RotorDriver:
         self._backoff = Backoff()
         self._trouble = "not connected yet"
         self._silent_since: float | None = None
+        self._silent_questions = 0
         self._telemetry: RotorTelemetry | None = None
         self._telemetry_time = 0.0
         self._judge = RotorHealth(settings)
@@ -84,6 +86,7 @@ class RotorDriver:
         self._vertiq = vertiq
         self._telemetry = None
         self._silent_since = None
+        self._silent_questions = 0
         self._backoff.succeeded()
         self._events.append(f"rotor module {settings.module_id} on {settings.port}: {tuning}")
 
@@ -184,9 +187,11 @@ class RotorDriver:
     def _watch_silence(self, asked: bool, answered: bool, now: float) -> None:
         if answered or not asked:
             self._silent_since = None
-        elif self._silent_since is None:
-            self._silent_since = now
-        elif now - self._silent_since > SILENCE_S:
+            self._silent_questions = 0
+            return
+        self._silent_since = now if self._silent_since is None else self._silent_since
+        self._silent_questions += 1
+        if now - self._silent_since > SILENCE_S and self._silent_questions >= SILENT_QUESTIONS:
             raise DeviceError(f"{self._settings.port}: module {self._settings.module_id} stopped answering")
 
     def _check(self, vertiq: Vertiq, telemetry: RotorTelemetry, now: float) -> None:

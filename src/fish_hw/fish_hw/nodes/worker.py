@@ -30,7 +30,9 @@ class Worker:
             while not self._stop.is_set():
                 self._step()
                 now = time.monotonic()
-                due = max(due + self._period_s, now)  # late cycles are not made up for
-                self._stop.wait(due - now)
+                due += self._period_s
+                if due < now - self._period_s:  # a short delay is made up for, a long one is not
+                    due = now
+                self._stop.wait(max(due - now, 0.0))
         finally:
             self._on_end()
