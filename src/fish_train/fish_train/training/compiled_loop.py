@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fish_control.path_batch import LOOKAHEAD_SEARCH
 from fish_sim.compiled import lanes, library
 from fish_sim.emit import emit
-from fish_sim.step import Scheme, Stepper, kernel_source
+from fish_sim.step import Stepper, kernel_source
 from fish_train.training.expressions import expressions
 from fish_train.training.fleet import HISTORY, Fleet, WindowResult
 from fish_train.training.loop import COST_NAMES, PHYSICS_STEPS, SIZES, Law

@@ -8,7 +8,7 @@ from functools import lru_cache
 import casadi
 
 from fish_sim.ops import CASADI
-from fish_train.training.loop import COST_NAMES, SIZES, Law, act, drive, motion, sense
+from fish_train.training.loop import COST_NAMES, PHYSICS_STEPS, SIZES, Law, act, drive, motion, sense
 
 SENSE_OUTPUTS = ("inputs", "errors", "guidance", "report", "cost")
 ACT_OUTPUTS = ("control", "last", "cost")
@@ -26,8 +26,8 @@ def expressions(law: Law) -> tuple[casadi.Function, ...]:
 
 
 def _sense(law: Law) -> tuple[casadi.Function, casadi.Function]:
-    sizes = [SIZES[k] for k in ("motion", "motion", "guidance", "geometry", "geometry")]
-    arguments = _symbols([*sizes, 1, len(COST_NAMES)])
+    sizes = [SIZES[k] for k in ("motion", "guidance", "geometry", "geometry")]
+    arguments = _symbols([PHYSICS_STEPS * SIZES["motion"], *sizes, 1, len(COST_NAMES)])
     seen, true, guidance, near, real, speed, weights = map(casadi.vertsplit, arguments)
     values = sense(seen, true, guidance, near, real, speed[0], weights, law, CASADI)
     return _with_adjoint("sense", arguments, [v for k in SENSE_OUTPUTS for v in values[k]], (0, 1, 2))

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_train.training.loop import SIZES
+from fish_train.training.loop import PHYSICS_STEPS, SIZES
 
 Array = NDArray[np.float64]
-HISTORY = 16  # periods of 20 ms kept for delayed vision: up to 0.32 s
+HISTORY = 32  # physics steps of 10 ms kept for delayed vision
+LONGEST_DELAY = HISTORY - PHYSICS_STEPS + 1
 MEMORY_SIZE = SIZES["guidance"] + SIZES["control"] + SIZES["actuator"] + SIZES["last"]
 
 
@@ -23,7 +24,7 @@ class Fleet:
         place: (B, 4) progress [m] and captured flag, of the path as seen and of the true one.
         history: (B, HISTORY, 6) past motions, newest last.
         parameters: (B, NP) of the robots. path: (B,) numbers in the bank. speed: (B,) wanted surge [m/s].
-        delay: (B,) periods by which what is seen is old.
+        delay: (B,) physics steps (10 ms) by which what is seen is old; at most LONGEST_DELAY.
     """
 
     plant: Array

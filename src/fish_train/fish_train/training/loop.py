@@ -104,10 +104,15 @@ def sense(
     seen: Sequence[Scalar], true: Sequence[Scalar], guidance: Sequence[Scalar], geometry_seen: Sequence[Scalar],
     geometry_true: Sequence[Scalar], speed: Scalar, weights: Sequence[Scalar], law: Law, xp: Any,
 ) -> dict[str, list[Scalar]]:  # fmt: skip
-    """Policy inputs, errors and guidance memory from the motion that is seen; cost and report from the true one."""
-    moved, lookahead = Motion(*seen), law.tracker.lookahead
+    """Policy inputs, errors and guidance memory from the motion that is seen; cost and report from the true one.
+
+    seen: the motions of the last PHYSICS_STEPS, oldest first, one after the other; the nodes observe at that rate, too.
+    """
+    width, lookahead = len(Motion._fields), law.tracker.lookahead
     state = GuidanceState(StrokeState(*guidance[:4]), guidance[4])
-    state = observe(state, moved, CONTROL_PERIOD, law.guidance, xp)
+    for k in range(PHYSICS_STEPS):
+        moved = Motion(*seen[k * width : (k + 1) * width])
+        state = observe(state, moved, DT, law.guidance, xp)
     path = path_ahead(moved.x, moved.y, geometry_seen, lookahead, xp)
     errors = tracking_errors(state, moved, path, speed, law.guidance, xp)
     actual = Motion(*true)

@@ -58,7 +58,7 @@ class TorchLoop:
                 mean.backward()
         run.store()
         found = flat.grad.numpy() if gradient else None
-        return WindowResult(float(mean), found, *(torch.stack(v).detach().numpy() for v in (reports, applied)))
+        return WindowResult(float(mean.detach()), found, *(torch.stack(v).detach().numpy() for v in (reports, applied)))
 
     def find(self, fleet: Fleet, which: int, position: Tensor) -> list[Tensor]:
         """Geometry of every fish on its path; `which` place (0 seen, 1 true) moves on."""
@@ -98,10 +98,13 @@ class _Window:
     def look(self, t: int) -> dict[str, list[Tensor]]:
         """Sense at the start of period t of the window."""
         fleet, true = self._fleet, self._motions[-1]
-        late = zip(range(len(fleet)), HISTORY + t - fleet.delay, strict=True)
-        seen = torch.stack([self._motions[at][b] for b, at in late]) + self._noise[t]
-        near, real = (self._loop.find(fleet, k, o[:, :2]) for k, o in enumerate((seen, true)))
-        rows = (seen.unbind(-1), true.unbind(-1), self._guidance, near, real)
+        newest = HISTORY + PHYSICS_STEPS * t - fleet.delay
+        seen = [
+            torch.stack([self._motions[at - back][b] for b, at in enumerate(newest)]) + self._noise[t]
+            for back in reversed(range(PHYSICS_STEPS))
+        ]
+        near, real = (self._loop.find(fleet, k, o[:, :2]) for k, o in enumerate((seen[-1], true)))
+        rows = (torch.cat(seen, dim=-1).unbind(-1), true.unbind(-1), self._guidance, near, real)
         return sense(*rows, self._speed, self._cost, self._loop.law, XP)
 
     def advance(self, sensed: dict[str, list[Tensor]]) -> Tensor:
@@ -114,7 +117,7 @@ class _Window:
             self._actuator, command = drive(self._actuator, self.last[SIZES["gains"] :], law, XP)
             command = torch.stack(torch.broadcast_tensors(*command), dim=-1)
             self._plant = torch_step.step(self._plant, command, self._parameters, self._loop.stepper)
-        self._motions.append(self._motion())
+            self._motions.append(self._motion())
         return acted["cost"][0].sum()
 
     def _policy(self, x: Tensor) -> Tensor:

@@ -3,7 +3,10 @@
    Before this text stand fish_sim's kernel (V, step, step_vjp, NS, NC, NP), the functions emitted from
    expressions.py and mlp.h, path_search.h. One period: sense, policy, act, PHYSICS times (drive, step).
    Sizes: NO motion, NU guidance, NK control, NA actuator, NL last, NI inputs, NE errors, NR report, NGAIN gains,
-   NCOST cost weights, HISTORY past motions kept for delayed vision. */
+   NCOST cost weights, HISTORY past motions (one a
+   physics step) kept for delayed vision. Motions are counted in physics steps from the start of the window. */
+
+#define NSEEN (PHYSICS * NO) /* what is seen in a period: its motions, oldest first */
 
 #define SENSE_OUT (NI + NE + NU + NR + 1)
 #define ACT_OUT (NK + NL + 1)
@@ -13,7 +16,7 @@
 typedef struct {
   V plant[PHYSICS][NS], actuator[PHYSICS][NA], command[PHYSICS][NC];
   V guidance[NU], control[NK], last[NL];
-  V seen[NO], near[NG], real[NG], sensed[SENSE_OUT], raw[PAD(NGAIN)], acted[ACT_OUT];
+  V seen[NSEEN], near[NG], real[NG], sensed[SENSE_OUT], raw[PAD(NGAIN)], acted[ACT_OUT];
 } Period;
 
 typedef struct {
@@ -29,7 +32,7 @@ typedef struct {
   const double *speed;      /* (batch) wanted */
   const double *cost;       /* (NCOST) */
   const double *noise;      /* (steps + 1, batch, NO), added to what is seen */
-  const long *delay;        /* (batch) periods, how old what is seen is; at most HISTORY */
+  const long *delay;        /* (batch) physics steps, how old what is seen is */
   const long *path;         /* (batch) index of its path */
   double *plant;            /* (batch, NS) in and out, like the following */
   double *memory;           /* (batch, NU + NK + NA + NL) */
@@ -76,22 +79,22 @@ static void policy_backward(const Network *net, const V *g_raw, long column, V *
   }
 }
 
-/* lane l sees what was true delay[l] periods ago */
-static void look(const Window *w, const V *seen_from, long t, long first, V *seen)
+/* lane l sees what was true delay[l] steps ago */
+static void look(const Window *w, const V *motions, long t, long first, V *seen)
 {
   for (int l = 0; l < LANES; ++l) {
     const long b = first + l < w->batch ? first + l : w->batch - 1;
-    const V *row = seen_from + (HISTORY + t - w->delay[b]) * NO;
-    for (int k = 0; k < NO; ++k) LANE(seen[k], l) = LANE(row[k], l) + w->noise[(t * w->batch + b) * NO + k];
+    const V *row = motions + (HISTORY + PHYSICS * (t - 1) + 1 - w->delay[b]) * NO;
+    for (int k = 0; k < NSEEN; ++k) LANE(seen[k], l) = LANE(row[k], l) + w->noise[(t * w->batch + b) * NO + k % NO];
   }
 }
 
 static void look_adjoint(const Window *w, const V *g_seen, long t, long first, V *g_motion)
 {
   for (int l = 0; l < LANES; ++l) {
-    const long b = first + l < w->batch ? first + l : w->batch - 1, at = t - w->delay[b];
-    if (at >= 0)
-      for (int k = 0; k < NO; ++k) LANE(g_motion[at * NO + k], l) += LANE(g_seen[k], l);
+    const long b = first + l < w->batch ? first + l : w->batch - 1;
+    const long at = (PHYSICS * (t - 1) + 1 - w->delay[b]) * NO; /* what was before the window is given */
+    for (long k = at < 0 ? -at : 0; k < NSEEN; ++k) LANE(g_motion[at + k], l) += LANE(g_seen[k], l);
   }
 }
 
@@ -121,12 +124,12 @@ static int sees_truth(const Window *w, long first)
 static void sense_period(const Window *w, const Path *paths, const Search *search, long first, long t, int perfect,
                          const V *motions, const V *speed, const V *cost, Period *now)
 {
-  const V *true_motion = motions + (HISTORY + t) * NO;
+  const V *true_motion = motions + (HISTORY + PHYSICS * t) * NO;
   double kept[4 * LANES];
   look(w, motions, t, first, now->seen);
   for (int l = 0; l < LANES && first + l < w->batch; ++l)
     for (int k = 0; k < 4; ++k) kept[4 * l + k] = w->place[4 * (first + l) + k];
-  find_places(w, paths, search, first, 0, now->seen, now->near);
+  find_places(w, paths, search, first, 0, now->seen + NSEEN - NO, now->near);
   if (perfect) copy(now->near, NG, now->real);
   else find_places(w, paths, search, first, 1, true_motion, now->real);
   for (int l = 0; l < LANES && first + l < w->batch; ++l) {
@@ -140,7 +143,7 @@ static void sense_period(const Window *w, const Path *paths, const Search *searc
 }
 
 static void advance_period(const Window *w, const Network *net, long first, long t, const V *speed, const V *cost,
-                           const V *p, V *work, Period *now, Period *next, V *motion_next)
+                           const V *p, V *work, Period *now, Period *next, V *motions_next)
 {
   V driven[NA + NC];
   policy_forward(net, now->sensed, t * LANES, work, now->raw);
@@ -156,28 +159,37 @@ static void advance_period(const Window *w, const Network *net, long first, long
     copy(driven + NA, NC, now->command[k]);
     copy(now->plant[k], NS, plant);
     step(plant, now->command[k], p);
+    motion(plant, plant + NQ, motions_next + k * NO);
   }
-  motion(next->plant[0], next->plant[0] + NQ, motion_next);
 }
 
 /* adjoints that travel from period to period */
 typedef struct { V plant[NS], guidance[NU], control[NK], actuator[NA], last[NL]; } Adjoint;
 
+static void motion_reverse(const V *plant, const V *g_motion, V *g_plant)
+{
+  V gq[3], gqd[3];
+  motion_vjp(plant, plant + NQ, g_motion, gq, gqd);
+  add(gq, 3, g_plant);
+  add(gqd, 3, g_plant + NQ);
+}
+
 /* reverse of sense_period: gs holds the adjoint of all its outputs */
 static void sense_reverse(const Window *w, long first, long t, const V *motions, const V *speed, const V *cost,
                           const Period *now, const V *gs, V *g_motion, Adjoint *g)
 {
-  V g_seen[NO], g_true[NO];
-  sense_vjp(now->seen, motions + (HISTORY + t) * NO, now->guidance, now->near, now->real, speed, cost, gs, g_seen,
+  V g_seen[NSEEN], g_true[NO];
+  sense_vjp(now->seen, motions + (HISTORY + PHYSICS * t) * NO, now->guidance, now->near, now->real, speed, cost, gs, g_seen,
             g_true, g->guidance);
-  add(g_true, NO, g_motion + t * NO);
+  add(g_true, NO, g_motion + PHYSICS * t * NO);
   look_adjoint(w, g_seen, t, first, g_motion);
 }
 
 /* reverse of advance_period: g of the period after becomes g of this period, before its sensing; gs receives the
    adjoint of what was sensed */
 static void advance_reverse(const Window *w, const Network *net, long first, long t, const V *speed, const V *cost,
-                            const V *p, const V *seed, V *work, const Period *now, Adjoint *g, V *gs)
+                            const V *p, const V *seed, const V *g_motion, V *work, const Period *now, Adjoint *g,
+                            V *gs)
 {
   V g_command[NC], g_driven[NA + NC], g_actuator[NA], g_setpoint[NC], g_acted[ACT_OUT], g_raw[PAD(NGAIN)],
     g_errors[NE], gp[NP];
@@ -188,6 +200,7 @@ static void advance_reverse(const Window *w, const Network *net, long first, lon
   for (int k = PHYSICS - 1; k >= 0; --k) {
     zero(g_command, NC);
     step_vjp(now->plant[k], g->plant, now->command[k], g_command, p, gp);
+    if (k > 0) motion_reverse(now->plant[k], g_motion + (PHYSICS * t + k) * NO, g->plant);
     copy(g->actuator, NA, g_driven);
     copy(g_command, NC, g_driven + NA);
     drive_vjp(now->actuator[k], now->acted + NK + NGAIN, g_driven, g_actuator, g_setpoint);
@@ -202,32 +215,24 @@ static void advance_reverse(const Window *w, const Network *net, long first, lon
   zero(gs + NI + NE + NU, NR);
 }
 
-static void motion_reverse(const Period *now, const V *g_motion, Adjoint *g)
-{
-  V gq[3], gqd[3];
-  motion_vjp(now->plant[0], now->plant[0] + NQ, g_motion, gq, gqd);
-  add(gq, 3, g->plant);
-  add(gqd, 3, g->plant + NQ);
-}
-
 static void backward(const Window *w, const Network *net, long first, const V *motions, const V *speed, const V *cost,
                      const V *p, V *work, Period *periods, V *g_motion)
 {
   Adjoint g;
   V seed, gs[SENSE_OUT + BLOCK];
   zero((V *)&g, sizeof g / sizeof(V));
-  zero(g_motion, (w->steps + 1) * NO);
+  zero(g_motion, (PHYSICS * w->steps + 1) * NO);
   for (int l = 0; l < LANES; ++l) LANE(seed, l) = first + l < w->batch ? 1.0 / (w->batch * w->steps) : 0.0;
   zero(gs, SENSE_OUT);
   gs[SENSE_OUT - 1] = seed;
   sense_reverse(w, first, w->steps, motions, speed, cost, periods + w->steps, gs, g_motion, &g);
-  motion_reverse(periods + w->steps, g_motion + w->steps * NO, &g);
+  motion_reverse(periods[w->steps].plant[0], g_motion + PHYSICS * w->steps * NO, g.plant);
   for (long t = w->steps - 1; t >= 0; --t) {
-    advance_reverse(w, net, first, t, speed, cost, p, &seed, work, periods + t, &g, gs);
+    advance_reverse(w, net, first, t, speed, cost, p, &seed, g_motion, work, periods + t, &g, gs);
     if (t == 0) return; /* the window's start is given */
     gs[SENSE_OUT - 1] = seed;
     sense_reverse(w, first, t, motions, speed, cost, periods + t, gs, g_motion, &g);
-    motion_reverse(periods + t, g_motion + t * NO, &g);
+    motion_reverse(periods[t].plant[0], g_motion + PHYSICS * t * NO, g.plant);
   }
 }
 
@@ -255,7 +260,7 @@ static void store(const Window *w, long first, const Period *now, const V *motio
   copy(now->last, NL, memory + NU + NK + NA);
   scatter(now->plant[0], NS, first, w->batch, w->plant);
   scatter(memory, NU + NK + NA + NL, first, w->batch, w->memory);
-  scatter(motions + w->steps * NO, HISTORY * NO, first, w->batch, w->history);
+  scatter(motions + PHYSICS * w->steps * NO, HISTORY * NO, first, w->batch, w->history);
   scatter(value, 1, first, w->batch, w->value);
 }
 
@@ -274,22 +279,22 @@ void repack(Network *net, const double *weights, long gradient)
 /* bytes for the periods, motions and their adjoints and the policy's work (units in all its layers) of one block */
 long scratch_size(long steps, long units)
 {
-  return (steps + 1) * sizeof(Period) + ((2 * (steps + 1) + HISTORY) * NO + units) * sizeof(V);
+  return (steps + 1) * sizeof(Period) + ((2 * (PHYSICS * steps + 1) + HISTORY) * NO + units) * sizeof(V);
 }
 
 /* the LANES fish from `first` on; scratch: scratch_size bytes, 64-byte aligned like the activation matrices */
 void run_block(const Window *w, const Network *net, const Path *paths, const Search *search, long first, void *scratch)
 {
   Period *periods = scratch;
-  V *motions = (V *)(periods + w->steps + 1), *g_motion = motions + (HISTORY + w->steps + 1) * NO;
-  V *work = g_motion + (w->steps + 1) * NO, p[NP], speed[1], cost[NCOST], value = v_constant(0.0);
+  V *motions = (V *)(periods + w->steps + 1), *g_motion = motions + (HISTORY + PHYSICS * w->steps + 1) * NO;
+  V *work = g_motion + (PHYSICS * w->steps + 1) * NO, p[NP], speed[1], cost[NCOST], value = v_constant(0.0);
   const int perfect = sees_truth(w, first);
   for (int k = 0; k < NCOST; ++k) cost[k] = v_constant(w->cost[k]);
   load(w, first, periods, p, speed, motions);
   for (long t = 0; t < w->steps; ++t) {
-    V *motion_next = motions + (HISTORY + t + 1) * NO;
+    V *motions_next = motions + (HISTORY + PHYSICS * t + 1) * NO;
     sense_period(w, paths, search, first, t, perfect, motions, speed, cost, periods + t);
-    advance_period(w, net, first, t, speed, cost, p, work, periods + t, periods + t + 1, motion_next);
+    advance_period(w, net, first, t, speed, cost, p, work, periods + t, periods + t + 1, motions_next);
     if (t > 0) value += periods[t].sensed[SENSE_OUT - 1];
     value += periods[t].acted[ACT_OUT - 1];
   }
