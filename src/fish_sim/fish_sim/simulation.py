@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fish_sim.checks import stable_scheme
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.sensors.battery import Battery
@@ -49,8 +50,8 @@ class Simulation:
 
     def __init__(self, robot: Robot, config: SimulationConfig) -> None:
         self._config = config
-        self._stepper = Stepper.of(robot.with_effect("disturbance"))
         self._robot = robot.with_effect("disturbance", **robot.effects.get("disturbance", {}))
+        self._stepper = Stepper.of(self._robot, stable_scheme(self._robot))
         self._parameters = self._stepper.parameters(self._robot)
         names = self._stepper.layout.parameters
         self._pushed = [names.index(f"disturbance.{key}") for key in ("surge", "sway", "yaw")]
@@ -75,7 +76,7 @@ class Simulation:
         self._encoder = Encoder(config, random)
         self._camera = OverheadCamera(config, distortion, random)
         self._battery = Battery(config, random)
-        self._battery_due = self.time
+        self._battery_due = self.time + DT
         self.resets += 1
 
     @property

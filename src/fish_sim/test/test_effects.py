@@ -1,0 +1,292 @@
+"""What single effects do, against closed forms and other ways to the same number."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from fish_sim import pool
+from fish_sim.effects import EFFECTS
+from fish_sim.effects.effect import BodyMotion, Drive
+from fish_sim.ops import NUMPY
+from fish_sim.robot import Robot
+from fish_sim.step import Scheme, Stepper
+
+STILL = Drive(0.0, 0.0, 0.0, 0.0)
+
+
+def namespace(name, **values):
+    """Parameters of an effect: the given ones, typical strengths otherwise."""
+    table = EFFECTS[name].parameters
+    full = {k: p.value if p.typical is None else p.typical for k, p in table.items()}
+    return SimpleNamespace(**{**full, **values})
+
+
+def head(x=0.0, y=0.0, heading=0.0, u=0.0, v=0.0, w=0.0):
+    return BodyMotion("head", x, y, np.cos(heading), np.sin(heading), u, v, w, 0.2, 1.5, 3e-3)
+
+
+def wrench(name, body, z=None, drive=STILL, **values):
+    z = SimpleNamespace(**dict(z or {}))
+    return np.array(EFFECTS[name].wrench(namespace(name, **values), body, z, drive, NUMPY))
+
+
+def swim(robot, commands, pose=(0.0, 0.0, 0.0), scheme=None):
+    stepper = Stepper(robot.structure, scheme, compiled=False)
+    return stepper.rollout(stepper.rest(pose), commands, stepper.parameters(robot))
+
+
+def servo(name, commands, **values):
+    """What the rudder effect `name` makes of commands given every 10 ms."""
+    effect, p = EFFECTS[name], namespace(name, **values)
+    memory, out = SimpleNamespace(**dict.fromkeys(effect.memory, 0.0)), []
+    method = effect.rotor if name.startswith(("rotor", "battery")) else effect.rudder
+    for command in commands:
+        value, kept = method(p, memory, command, 0.01, NUMPY)
+        assert set(kept) == set(effect.memory)
+        memory = SimpleNamespace(**kept)
+        out.append(float(value))
+    return np.array(out)
+
+
+# drag and walls
+
+
+def test_quadratic_drag_stops_a_gliding_head_like_the_closed_form():
+    """m u' = -k u^2 from u_0: u = u_0 / (1 + k u_0 t / m), all bodies together, tail straight behind."""
+    zero = [k for k in Robot().parameters if "_drag_" in k]
+    robot = Robot().with_parameters(**dict.fromkeys(zero, 0.0)).with_effect("quadratic_drag", surge=0.6)
+    stepper = Stepper(robot.structure, compiled=False)
+    start = stepper.rest()
+    start[6] = 0.4
+    u = stepper.rollout(start, np.zeros((100, 2)), stepper.parameters(robot))[:, 6]
+    mass = 0.465 + 0.05 + 0.05 + 0.02  # head, its added mass in surge, links, fin
+    np.testing.assert_allclose(u, 0.4 / (1 + 0.6 * 0.4 * 0.01 * np.arange(101) / mass), rtol=1e-9)
+
+
+def test_wall_effect_is_drag_times_1_plus_k_exp_of_distance():
+    d = 0.3
+    body = head(x=pool.LENGTH / 2 - d, u=0.2, v=-0.1, w=0.5)
+    grown = 2.5 * np.exp(-d / 0.2)
+    expected = -grown * np.array([0.2 * 0.2, 1.5 * -0.1, 3e-3 * 0.5])
+    np.testing.assert_allclose(wrench("wall_effect", body, k=2.5, length=0.2), expected, rtol=1e-12)
+    nearer = head(x=1.0, y=-pool.WIDTH / 2 + d, u=0.2, v=-0.1, w=0.5)
+    np.testing.assert_allclose(wrench("wall_effect", nearer, k=2.5, length=0.2), expected, rtol=1e-12)
+
+
+def test_dry_friction_has_one_size_in_every_direction():
+    for u, v in ((0.1, 0.0), (0.0, -0.3), (-0.2, 0.2)):
+        X, Y, N = wrench("dry_friction", head(u=u, v=v), force=0.02)
+        assert np.hypot(X, Y) == pytest.approx(0.02, rel=1e-6) and N == 0.0
+        assert X * u + Y * v == pytest.approx(-0.02 * np.hypot(u, v), rel=1e-6)
+    assert not wrench("dry_friction", head()).any()
+
+
+def test_wave_drag_is_largest_at_the_hump_and_brakes_both_ways():
+    speeds = np.linspace(0.02, 0.5, 200)
+    force = np.array([wrench("wave_drag", head(u=u), speed=0.22)[0] for u in speeds])
+    assert speeds[force.argmin()] == pytest.approx(0.22, abs=0.003)
+    assert wrench("wave_drag", head(u=-0.22), speed=0.22)[0] == pytest.approx(-force.min(), rel=1e-4)
+
+
+def test_hull_asymmetry_keeps_its_sign_and_grows_with_the_square():
+    once, twice = (wrench("hull_asymmetry", head(u=u), sway=0.1, yaw=0.02) for u in (0.1, 0.2))
+    np.testing.assert_allclose(twice, 4 * once)
+    assert once[1] > 0 and once[2] > 0 and once[0] == 0
+
+
+def test_sloshing_pushes_along_the_pool_whatever_the_heading():
+    z = {"phase": 0.7}
+    expected = (0.02 * np.sin(0.7) + 0.01 * np.cos(0.7)) * np.cos(np.pi * 0.5 / pool.LENGTH)
+    for heading in (0.0, 1.0, 2.5):
+        X, Y, N = wrench("sloshing", head(x=0.5, heading=heading), z, sine=0.02, cosine=0.01)
+        cos, sin = np.cos(heading), np.sin(heading)
+        np.testing.assert_allclose([X * cos - Y * sin, X * sin + Y * cos, N], [expected, 0, 0], atol=1e-15)
+    end = head(x=pool.LENGTH / 2)
+    np.testing.assert_allclose(wrench("sloshing", end, z, sine=0.02, cosine=0.01), 0, atol=1e-15)
+
+
+def test_tether_is_slack_inside_its_length_and_pulls_to_the_anchor_outside():
+    line = {"stiffness": 2.0, "length": 0.5, "x": 1.0, "y": 0.0}
+    assert not wrench("tether", head(x=0.6), **line).any()
+    np.testing.assert_allclose(wrench("tether", head(x=0.0), **line), [2.0 * 0.5, 0, 0], rtol=1e-9)
+    np.testing.assert_allclose(
+        wrench("tether", head(x=0.0, heading=np.pi / 2), **line), [0, -1.0, 0], atol=1e-9
+    )
+
+
+# water
+
+
+def test_a_uniform_current_is_a_change_of_frame(strokes):
+    """Moving with the water from the start, the fish swims as in still water."""
+    commands = strokes(60)
+    robot = Robot().with_effect("current", x=0.03, y=-0.02)
+    stepper = Stepper(robot.structure, compiled=False)
+    start = stepper.rest()
+    start[6:8] = 0.03, -0.02
+    carried = stepper.rollout(start, commands, stepper.parameters(robot))
+    still = swim(Robot(), commands)
+    time = 0.01 * np.arange(61)
+    np.testing.assert_allclose(carried[:, 0], still[:, 0] + 0.03 * time, atol=1e-11)
+    np.testing.assert_allclose(carried[:, 1], still[:, 1] - 0.02 * time, atol=1e-11)
+    np.testing.assert_allclose(carried[:, 2:6], still[:, 2:6], atol=1e-10)
+
+
+def test_a_fish_at_rest_ends_drifting_with_the_current():
+    robot = Robot().with_effect("current", x=0.03, y=-0.02)
+    last = swim(robot, np.zeros((3000, 2)), scheme=Scheme("rk4"))[-1]
+    np.testing.assert_allclose(last[6:8], [0.03, -0.02], rtol=0.01)
+
+
+def test_nonuniform_current_is_incompressible_closed_at_the_walls_and_has_its_own_gradient():
+    p, z = namespace("nonuniform_current"), SimpleNamespace()
+    flow = EFFECTS["nonuniform_current"].water
+    h = 1e-6
+    for x, y in np.random.default_rng(0).uniform(-1, 1, (20, 2)):
+        _, gradient = flow(p, x, y, z, NUMPY)
+        dx = (np.array(flow(p, x + h, y, z, NUMPY)[0]) - flow(p, x - h, y, z, NUMPY)[0]) / (2 * h)
+        dy = (np.array(flow(p, x, y + h, z, NUMPY)[0]) - flow(p, x, y - h, z, NUMPY)[0]) / (2 * h)
+        np.testing.assert_allclose(np.array(gradient), np.stack([dx, dy], 1), atol=1e-9)
+        assert gradient[0][0] + gradient[1][1] == pytest.approx(0.0, abs=1e-15)
+    gyre = namespace("nonuniform_current", strain=0.0, shear_x=0.0, shear_y=0.0, gyre=0.03)
+    for s in (-0.4, 0.0, 0.3):
+        assert flow(gyre, pool.LENGTH / 2, s, z, NUMPY)[0][0] == pytest.approx(0.0, abs=1e-15)
+        assert flow(gyre, s, pool.WIDTH / 2, z, NUMPY)[0][1] == pytest.approx(0.0, abs=1e-15)
+    assert flow(gyre, 0.0, -pool.WIDTH / 2, z, NUMPY)[0][0] == pytest.approx(0.03)  # counter-clockwise
+
+
+# tail
+
+
+def test_a_firm_grip_is_the_no_slip_constraint_and_a_loose_one_slips(strokes):
+    commands = strokes(100)
+    nominal = swim(Robot(), commands)
+    gaps = [
+        np.abs(swim(Robot().with_effect("tip_slip", mobility=m), commands)[:, :6] - nominal[:, :6]).max()
+        for m in (1e-6, 1e-3, 1.0 / 6.0)
+    ]
+    assert gaps[0] < 1e-5 < gaps[1] < gaps[2]
+
+
+def test_tip_force_of_a_finite_grip_is_minus_grip_times_slip():
+    """Above mobility A / SLIP_DECAY, A about 14 1/kg, the law is explicit."""
+    robot = Robot().with_effect("tip_slip", mobility=1.0)
+    stepper = Stepper(robot.structure, compiled=False)
+    state = stepper.rest()
+    state[6:12] = (0.1, 0.05, 0.3, 0.2, -0.4, 0.6)
+    out = stepper.outputs(state, np.zeros(2), stepper.parameters(robot))
+    assert out["tip_force"] == pytest.approx(-out["slip"] / 1.0, rel=1e-6)
+    assert EFFECTS["tip_slip"].derived(namespace("tip_slip"))["grip"] == (pytest.approx(6.0), "N s/m")
+
+
+def test_wake_memory_without_share_is_tip_slip(strokes):
+    commands = strokes(60)
+    plain = swim(Robot().with_effect("tip_slip", mobility=0.125), commands)
+    wake = swim(Robot().with_effect("wake_memory", mobility=0.125, share=0.0), commands)
+    np.testing.assert_allclose(wake[:, :12], plain[:, :12], atol=1e-11)
+
+
+def test_tail_hardening_and_damping_are_torques_of_the_joint():
+    hardening = EFFECTS["tail_hardening"].joint_torque
+    assert hardening(namespace("tail_hardening", k3=0.3), 1, -0.5, 9.0, NUMPY) == pytest.approx(-0.0375)
+    damping = EFFECTS["tail_joint_damping"].joint_torque
+    assert damping(namespace("tail_joint_damping", c=1e-3), 2, 9.0, -2.0, NUMPY) == pytest.approx(-2e-3)
+
+
+# mass and rotor
+
+
+def test_a_payload_at_the_centre_is_a_heavier_head(strokes):
+    commands = strokes(60)
+    loaded = swim(Robot().with_effect("payload", mass=0.1, forward=0.0, left=0.0), commands)
+    np.testing.assert_allclose(loaded, swim(Robot().with_parameters(head_mass=0.565), commands), atol=1e-10)
+
+
+def test_a_payload_off_centre_adds_its_moment_of_inertia():
+    """Free head, pure moment: r' = M / (I + m d^2 (1 - m / (m + m_head))), no added mass."""
+    light = dict.fromkeys(("link_mass", "fin_mass"), 1e-9)
+    light |= dict.fromkeys(("link_added_mass_sway", "fin_added_mass_sway", "tail_stiffness"), 0.0)
+    light |= {k: 0.0 for k in Robot().parameters if "_drag_" in k}
+    light |= {"head_added_mass_surge": 0.0, "head_added_mass_sway": 0.0}
+    robot = Robot().with_parameters(**light)
+    loaded = robot.with_effect("payload", mass=0.1, forward=0.03, left=0.04)
+    stepper = Stepper(loaded.structure, compiled=False)
+    rates = np.array([0.0, -1000.0])  # rotor brakes: moment +0.1 N m on the head
+    out = stepper.outputs(stepper.rest(), rates, stepper.parameters(loaded))
+    inertia = 2.4e-3 + 0.05**2 * 0.1 * 0.465 / 0.565
+    assert out["acceleration"][2] == pytest.approx(0.1 / inertia, rel=1e-4)
+
+
+def test_rotor_imbalance_is_the_reaction_of_a_mass_on_a_circle():
+    """-m d2/dt2 of the mass's place on a rotor that turns at phi(t) on a head that turns at rate r."""
+    m_e, r, t, h = 6e-5, 0.8, 0.3, 1e-4
+    phi = lambda t: 3.0 + 20.0 * t + 40.0 * t**2  # noqa: E731
+    place = lambda t: m_e * np.array([np.cos(phi(t) + r * t), np.sin(phi(t) + r * t)])  # noqa: E731
+    reaction = -(place(t + h) - 2 * place(t) + place(t - h)) / h**2
+    cos, sin = np.cos(r * t), np.sin(r * t)
+    expected = np.array([[cos, sin], [-sin, cos]]) @ reaction
+    drive = Drive(0.0, 0.0, 20.0 + 80.0 * t, 80.0)
+    got = wrench("rotor_imbalance", head(w=r), {"angle": phi(t)}, drive, ahead=m_e, left=0.0)
+    np.testing.assert_allclose(got[:2], expected, rtol=1e-5, atol=1e-6)
+
+
+def test_rotor_lag_is_the_exact_answer_to_a_speed_that_is_linear_between_commands():
+    time = 0.01 * np.arange(200)
+    commands = 100 * np.sin(4 * np.pi * time)
+    _, expected, _ = lsim(([1.0], [0.03, 1.0]), commands, time, interp=True)
+    np.testing.assert_allclose(servo("rotor_lag", commands, time_constant=0.03), expected, atol=1e-9)
+
+
+def test_rotor_saturation_clips_and_battery_sag_slows_under_load():
+    np.testing.assert_array_equal(servo("rotor_saturation", [50, 90, -90], limit=70.0), [50, 70, -70])
+    steady = servo("battery_sag", np.full(2000, 100.0), sag=0.2, time_constant=1.0)
+    assert steady[0] == pytest.approx(100.0, rel=0.01)
+    assert steady[-1] == pytest.approx(100.0 * (1 - 0.2), rel=1e-6)
+
+
+# rudder
+
+
+def test_rudder_lag_answers_a_step_exponentially():
+    answer = servo("rudder_lag", np.full(60, 0.4), time_constant=0.12)
+    np.testing.assert_allclose(answer, 0.4 * (1 - np.exp(-0.01 * np.arange(1, 61) / 0.12)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.01, 0.085, 0.3])
+def test_rudder_delay_shifts_and_interpolates(delay):
+    commands = np.random.default_rng(0).normal(size=80)
+    past = np.concatenate([np.zeros(40), commands])
+    expected = np.interp(np.arange(40, 120) - delay / 0.01, np.arange(120), past)
+    np.testing.assert_allclose(servo("rudder_delay", commands, delay=delay), expected, atol=1e-12)
+
+
+def test_rudder_backlash_is_a_play_operator():
+    commands = [0.0, 0.05, 0.2, 0.15, 0.1, -0.1, -0.05]
+    answer = servo("rudder_backlash", commands, play=0.06)
+    np.testing.assert_allclose(answer, [0, 0, 0.14, 0.14, 0.14, -0.04, -0.04], atol=1e-15)
+
+
+def test_rudder_offset_gain_and_saturation():
+    np.testing.assert_allclose(servo("rudder_offset", [0.1, -0.1], offset=0.06), [0.16, -0.04])
+    np.testing.assert_allclose(servo("rudder_gain", [0.1, -0.1], factor=0.8), [0.08, -0.08])
+    np.testing.assert_allclose(servo("rudder_saturation", [0.3, -0.1], limit=0.25), [0.25, -0.1])
+
+
+def test_rudder_effects_act_in_the_order_gain_offset_saturation_delay_backlash_lag():
+    order = [n for n in EFFECTS if n.startswith("rudder_")]
+    names = ("gain", "offset", "saturation", "delay", "backlash", "lag", "placement")
+    assert order == [f"rudder_{n}" for n in names]
+    robot = Robot().with_effect("rudder_offset", offset=0.1).with_effect("rudder_gain", factor=0.5)
+    states = swim(robot, np.tile([0.0, 0.4], (40, 1)))
+    assert states[-1, 12] == pytest.approx(0.5 * 0.4 + 0.1)
+
+
+def test_left_rudder_turns_left_and_so_does_a_positive_offset(strokes):
+    commands = strokes(200) * [1.0, 0.0]
+    straight = swim(Robot(), commands, scheme=Scheme("rk4"))[-1, 2]
+    left = swim(Robot(), commands + [0.0, 0.3], scheme=Scheme("rk4"))[-1, 2]
+    offset = swim(Robot().with_effect("rudder_offset", offset=0.3), commands, scheme=Scheme("rk4"))[-1, 2]
+    assert left > straight + 0.2
+    assert offset == pytest.approx(left, abs=1e-6)

@@ -1,0 +1,106 @@
+"""Derivatives against finite differences for every parameter of the robot and of every effect."""
+
+import numpy as np
+import pytest
+import torch
+from numpy.testing import assert_allclose
+
+from fish_sim import torch_step
+from fish_sim.effects import EFFECTS
+from fish_sim.robot import Robot, parameter_names
+from fish_sim.step import Stepper
+
+PERIODS = 40
+MOVING = (0.3, 0.85, 0.1)
+
+
+def typical(name):
+    return {
+        key: p.typical if p.typical is not None else p.value for key, p in EFFECTS[name].parameters.items()
+    }
+
+
+def finite_difference(stepper, start, commands, p, k):
+    """d(last state)/dp[k], central differences of fourth order."""
+    h = 1e-4 * max(abs(p[k]), 1e-3)
+    shifted = np.tile(p, (4, 1))
+    shifted[:, k] += h * np.array([-2, -1, 1, 2])
+    last = stepper.rollout(start, commands, shifted)[-1]
+    return (last[0] - 8 * last[1] + 8 * last[2] - last[3]) / (12 * h), 1e-13 / h  # and its round-off
+
+
+def tangents(stepper, start, commands, p, indices):
+    """d(last state)/dp[k] for every k, by one batched JVP."""
+    directions = np.zeros((len(indices), len(p)))
+    directions[np.arange(len(indices)), indices] = 1.0
+    zeros = np.zeros_like(commands)
+    _, d = stepper.rollout_jvp(start, commands, p, np.zeros_like(start), zeros, directions)
+    return d[-1]
+
+
+def gentle(commands):
+    """The same rotor with a rudder that the servo can follow."""
+    rudder = 0.35 * np.sin(8.0 * 0.01 * np.arange(1, len(commands) + 1))
+    return np.stack([commands[:, 0], rudder], axis=-1)
+
+
+def case(effects):
+    robot = Robot(effects=effects)
+    stepper = Stepper(robot.structure, compiled=False)
+    start = stepper.rest(MOVING)
+    size = 6
+    start[size : size + 6] = (0.2, 0.03, 0.1, 0.3, 0.5, 0.4)  # moving, so that no |u| u sits on its kink
+    return stepper, start, stepper.parameters(robot)
+
+
+@pytest.mark.parametrize("name", ["nominal", *EFFECTS])
+def test_tangents_equal_finite_differences_and_adjoints_equal_tangents(name, strokes):
+    stepper, start, p = case({} if name == "nominal" else {name: typical(name)})
+    names = parameter_names(stepper.layout.structure)
+    indices = [k for k, n in enumerate(names) if name == "nominal" or n.startswith(name + ".")]
+    # steps reach the servo's rate limit, a nominal parameter; gentle turns let servo effects show
+    commands = strokes(PERIODS) if name == "nominal" else gentle(strokes(PERIODS))
+    forward = tangents(stepper, start, commands, p, indices)
+    for k, tangent in zip(indices, forward, strict=True):
+        difference, noise = finite_difference(stepper, start, commands, p, k)
+        error = np.abs(tangent - difference).max()
+        assert error <= 1e-6 * np.abs(difference).max() + noise, f"{names[k]}: {error}"
+        assert name == "nominal" or np.abs(tangent).max() > 1e-5, f"{names[k]} has no influence"
+    states = stepper.rollout(start, commands, p)
+    weights = np.random.default_rng(1).normal(size=start.size)
+    adjoint = np.zeros_like(states)
+    adjoint[-1] = weights
+    gradient = stepper.rollout_vjp(states, commands, p, adjoint)[2]
+    assert_allclose(gradient[indices], forward @ weights, rtol=1e-9, atol=1e-12)
+
+
+def test_tangents_along_start_and_commands_equal_finite_differences(strokes):
+    stepper, start, p = case({"tip_slip": typical("tip_slip"), "rudder_lag": typical("rudder_lag")})
+    commands = strokes(PERIODS)
+    random = np.random.default_rng(2)
+    ds, dc = random.normal(size=start.shape), random.normal(size=commands.shape) * [10.0, 0.1]
+    _, tangent = stepper.rollout_jvp(start, commands, p, ds, dc, np.zeros_like(p))
+    h = 1e-6
+    plus = stepper.rollout(start + h * ds, commands + h * dc, p)[-1]
+    minus = stepper.rollout(start - h * ds, commands - h * dc, p)[-1]
+    difference = (plus - minus) / (2 * h)
+    assert np.abs(tangent[-1] - difference).max() < 1e-6 * np.abs(difference).max()
+
+
+def test_torch_gradients_are_those_of_the_adjoint(strokes):
+    stepper, start, p = case({"wall_effect": typical("wall_effect"), "rudder_delay": typical("rudder_delay")})
+    values = [torch.tensor(v, requires_grad=True) for v in (start, strokes(10), p)]
+    states = torch_step.rollout(*values, stepper)
+    weights = torch.randn(states.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(3))
+    (states * weights).sum().backward()
+    expected = stepper.rollout_vjp(states.detach().numpy(), strokes(10), p, weights.numpy())
+    for value, gradient in zip(values, expected, strict=True):
+        assert_allclose(value.grad.numpy(), gradient, rtol=1e-12, atol=1e-12)
+
+
+def test_gradcheck_of_a_short_rollout(strokes):
+    stepper, start, p = case({"quadratic_drag": typical("quadratic_drag")})
+    values = [torch.tensor(v, requires_grad=True) for v in (start, strokes(2), p)]
+    assert torch.autograd.gradcheck(
+        lambda s, c, q: torch_step.rollout(s, c, q, stepper)[-1], values, eps=1e-6, atol=1e-5, rtol=1e-5
+    )

@@ -1,0 +1,168 @@
+"""The stepper against SciPy, against itself in all its forms, and against bad input."""
+
+import numpy as np
+import pytest
+import torch
+from scipy.integrate import solve_ivp
+
+from fish_sim import torch_step
+from fish_sim.checks import check_inputs, check_scheme, diverged, modes_at_rest, stable_scheme
+from fish_sim.effects import EFFECTS
+from fish_sim.model import Layout, motion_rate
+from fish_sim.ops import NUMPY
+from fish_sim.robot import Robot
+from fish_sim.step import Scheme, Stepper
+
+
+# together they use states, memory, grip, water, joint torques and every elementary function
+COLOURFUL = (
+    "nonuniform_current wall_effect wake_memory wave_drag tether rotor_imbalance rudder_delay rotor_lag"
+)
+
+
+def colourful():
+    """A fish with one link and many effects at typical strength."""
+    typical = {
+        name: {k: p.typical for k, p in EFFECTS[name].parameters.items() if p.typical is not None}
+        for name in COLOURFUL.split()
+    }
+    return Robot(links=1, effects=typical)
+
+
+@pytest.mark.parametrize("links", [1, 3])
+def test_motion_is_that_of_scipy_with_tight_tolerance(links, strokes):
+    robot = Robot(links=links)
+    stepper = Stepper(robot.structure, compiled=False)
+    commands = strokes(40)
+    states = stepper.rollout(stepper.rest(), commands, stepper.parameters(robot))
+    size, layout, p = 2 * (links + 3), Layout(robot.structure), robot.vector()
+    x, alpha, speed = np.zeros(size), 0.0, 0.0
+    for rotor, rudder in commands:
+        alpha_dot = float(np.clip((rudder - alpha) / 0.01, -6.0, 6.0))
+        ramp = (rotor - speed) / 0.01
+        drive = (alpha, alpha_dot, speed, ramp)
+
+        def rate(t, x, drive=drive):
+            alpha, alpha_dot, speed, ramp = drive
+            return motion_rate(
+                layout, x, (alpha + alpha_dot * t, alpha_dot, speed + ramp * t, ramp), p, NUMPY
+            )
+
+        x = solve_ivp(rate, (0.0, 0.01), x, method="DOP853", rtol=1e-9, atol=1e-11).y[:, -1]
+        alpha, speed = alpha + alpha_dot * 0.01, rotor
+    np.testing.assert_allclose(states[-1, :size], x, rtol=1e-5, atol=1e-6)
+    assert states[-1, size] == pytest.approx(alpha) and states[-1, size + 1] == speed
+
+
+def test_compiled_interpreted_and_torch_forms_agree(strokes):
+    robot, scheme = colourful(), Scheme("rk4")
+    compiled, interpreted = (Stepper(robot.structure, scheme, compiled=c) for c in (True, False))
+    commands, p = strokes(30), compiled.parameters(robot)
+    start = np.tile(compiled.rest((0.3, 0.8, 0.2)), (5, 1))
+    start[:, 4] = np.linspace(-0.4, 0.4, 5)  # not a multiple of any vector width
+    values = [s.rollout(start, commands, p) for s in (compiled, interpreted)]
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-8, atol=1e-10)
+    arguments = [torch.from_numpy(v) for v in (start, commands[:3], p)]
+    generic = torch_step.rollout(*arguments, compiled, generic=True)
+    np.testing.assert_allclose(generic.numpy(), values[0][:4], rtol=1e-8, atol=1e-10)
+    adjoint = np.random.default_rng(0).normal(size=values[0].shape)
+    for a, b in zip(
+        *(s.rollout_vjp(values[0], commands, p, adjoint) for s in (compiled, interpreted)), strict=True
+    ):
+        np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-8 * np.abs(b).max())
+
+
+def test_states_commands_and_parameters_may_each_carry_the_batch(strokes):
+    robot = Robot()
+    stepper = Stepper(robot.structure, compiled=False)
+    p, commands = stepper.parameters(robot), strokes(5)
+    single = stepper.rollout(stepper.rest(), commands, p)
+    for start, c, q in (
+        (np.tile(stepper.rest(), (2, 3, 1)), commands, p),
+        (stepper.rest(), np.tile(commands[:, None, None], (1, 2, 3, 1)), p),
+        (stepper.rest(), commands, np.tile(p, (2, 3, 1))),
+    ):
+        batch = stepper.rollout(start, c, q)
+        assert batch.shape == (6, 2, 3, 14)
+        np.testing.assert_allclose(batch, np.broadcast_to(single[:, None, None], batch.shape), atol=1e-13)
+
+
+def test_the_servo_moves_at_its_rate_limit_and_stops_at_its_range():
+    robot = Robot()
+    stepper = Stepper(robot.structure, compiled=False)
+    states = stepper.rollout(stepper.rest(), np.tile([0.0, 2.0], (20, 1)), stepper.parameters(robot))
+    expected = np.minimum(0.06 * np.arange(21), 0.8)
+    np.testing.assert_allclose(states[:, 12], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_diverging_batch_element_is_flagged_and_leaves_the_others_alone(strokes, compiled):
+    robot = Robot()
+    stepper = Stepper(robot.structure, compiled=compiled)
+    start = np.tile(stepper.rest(), (6, 1))
+    start[1, 6:12], start[4, 0] = 1e200, np.nan
+    commands, p = strokes(20), stepper.parameters(robot)
+    states = stepper.rollout(start, commands, p)
+    np.testing.assert_array_equal(diverged(states), [False, True, False, False, True, False])
+    alone = stepper.rollout(stepper.rest(), commands, p)
+    np.testing.assert_allclose(states[:, [0, 2, 3, 5]], np.tile(alone[:, None], (1, 4, 1)), atol=1e-12)
+
+
+def test_wrong_shapes_and_other_robots_are_refused():
+    stepper = Stepper(Robot().structure, compiled=False)
+    p = stepper.parameters(Robot())
+    with pytest.raises(ValueError, match=r"state: got shape \(13,\); expected \(\.\.\., 14\)"):
+        stepper.step(np.zeros(13), np.zeros(2), p)
+    with pytest.raises(ValueError, match=r"commands: got shape"):
+        stepper.step(stepper.rest(), np.zeros(3), p)
+    with pytest.raises(ValueError, match="structure"):
+        stepper.parameters(Robot(links=2))
+    with pytest.raises(ValueError, match="method: got 'leapfrog'"):
+        Scheme("leapfrog")
+    with pytest.raises(ValueError, match="substeps: got 0"):
+        Scheme(substeps=0)
+
+
+def test_numbers_that_are_not_finite_are_named():
+    stepper = Stepper(Robot().structure, compiled=False)
+    state, command, p = np.tile(stepper.rest(), (3, 1)), np.zeros(2), stepper.parameters(Robot())
+    check_inputs(stepper, state, command, p)
+    state[2, 3] = np.nan
+    with pytest.raises(ValueError, match=r"state theta_1 of batch element \(2,\): got nan"):
+        check_inputs(stepper, state, command, p)
+    with pytest.raises(ValueError, match="command rudder: got inf"):
+        check_inputs(stepper, state[0], np.array([0.0, np.inf]), p)
+    p[0] = np.inf
+    with pytest.raises(ValueError, match="parameter head_mass: got inf"):
+        check_inputs(stepper, state[0], command, p)
+
+
+def test_a_step_too_coarse_for_the_tail_is_refused_with_the_number_that_works():
+    robot = Robot(links=5)
+    coarse = Stepper(robot.structure, Scheme("rk4", 1), compiled=False)
+    p = coarse.parameters(robot)
+    with pytest.raises(ValueError, match=r"substeps = 1 \(rk4, 10 ms\).* use substeps >= 3"):
+        check_scheme(coarse, p)
+    fine = Stepper(robot.structure, Scheme("rk4", 3), compiled=False)
+    check_scheme(fine, p)
+    start = fine.rest()
+    start[7] = 0.01
+    commands = np.tile([0.0, 0.0], (200, 1))
+    assert diverged(coarse.rollout(start, commands, p)) and not diverged(fine.rollout(start, commands, p))
+
+
+def test_fastest_mode_of_the_nominal_tail_is_about_150_per_second():
+    robot = Robot()
+    stepper = Stepper(robot.structure, compiled=False)
+    modes = modes_at_rest(stepper, stepper.parameters(robot))
+    assert np.abs(modes).max() == pytest.approx(150, rel=0.02)
+    assert modes.real.max() < 1e-6  # at rest everything decays or stays
+
+
+@pytest.mark.parametrize("links", [1, 3, 5, 8])
+def test_the_stable_scheme_of_a_robot_is_stable_also_with_a_stiff_tail(links):
+    robot = Robot(links=links).with_effect("tail_joint_damping", c=1e-3)
+    stepper = Stepper(robot.structure, stable_scheme(robot), compiled=False)
+    check_scheme(stepper, stepper.parameters(robot))
+    nominal = stable_scheme(Robot(links=links))
+    assert nominal == Stepper.of(Robot(links=links)).scheme
