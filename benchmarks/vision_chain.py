@@ -113,9 +113,7 @@ def main() -> None:
     print(f"lost: {dict(chain.lost)}")
     for name, times in chain.times.items():
         p50, p99 = np.percentile(np.array(times) * 1e3, [50, 99])
-        print(
-            f"{name:20s} {p50:6.2f} ms median {p99:7.2f} ms 99th percentile (processor time, {len(times)} frames)"
-        )
+        print(f"{name:20s} {p50:6.2f} ms median {p99:7.2f} ms 99th percentile ({len(times)} frames)")
 
 
 if __name__ == "__main__":

@@ -54,7 +54,11 @@ def _outline(points: int = 20) -> np.ndarray:
 
 
 def _line(
-    picture: Image, calibration: Calibration, points: np.ndarray, colour: tuple, closed: bool = False
+    picture: Image,
+    calibration: Calibration,
+    points: np.ndarray,
+    colour: tuple[int, int, int],
+    closed: bool = False,
 ) -> None:
     pixels = np.round(calibration.pool_to_pixel(points) * 16).astype(np.int32)
     cv2.polylines(picture, [pixels], closed, colour, 1, cv2.LINE_AA, shift=4)

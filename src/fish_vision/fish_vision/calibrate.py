@@ -47,7 +47,7 @@ def lens_from_chessboards(
     size = sizes.pop()
     boards, places = [board] * len(found), list(found.values())
     rms, K, D, _, _ = cv2.calibrateCamera(boards, places, size, None, None, flags=cv2.CALIB_FIX_K3)
-    return Lens(size, K, D.ravel()[:5]), float(rms), list(found)
+    return Lens(size, np.asarray(K, float), np.asarray(D, float).ravel()[:5]), float(rms), list(found)
 
 
 def _board(picture: Image, corners: tuple[int, int]) -> np.ndarray | None:

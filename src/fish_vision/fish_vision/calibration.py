@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # float64
 
 R_DOWN = np.diag([1.0, -1.0, -1.0])  # optical axes of an untilted camera: right = pool x, down = pool -y
 MODELS = {"plumb_bob": 5, "rational_polynomial": 8}  # distortion model -> number of coefficients
@@ -67,8 +67,8 @@ class Mount:
         p_cam = R (p_pool - position),  R = exp([tilt]x) diag(1, -1, -1)
     """
 
-    position: tuple[float, float, float]
-    tilt: tuple[float, float, float]
+    position: tuple[float, ...]
+    tilt: tuple[float, ...]
 
     @property
     def R(self) -> Array:
@@ -115,7 +115,7 @@ class Calibration:
     def pixel_to_pool(self, pixels: ArrayLike) -> Array:
         """(N, 2) pixels -> (N, 2) x, y in the markers' plane, m."""
         flat = undistort(np.asarray(pixels, float).reshape(-1, 2), self.lens)
-        plane = np.column_stack([flat, np.ones(len(flat))]) @ self._plane_inverse.T
+        plane: Array = np.column_stack([flat, np.ones(len(flat))]) @ self._plane_inverse.T
         return plane[:, :2] / plane[:, 2:]
 
     def place_and_scale(self, pixels: ArrayLike) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -70,7 +71,7 @@ class TrackerConfig:
 
     def mount(self) -> Mount:
         """Where the camera hangs."""
-        return Mount(tuple(self.camera_position), tuple(self.camera_tilt))
+        return Mount(self.camera_position, self.camera_tilt)
 
     def layout(self) -> MarkerLayout:
         """Where the markers sit on the fish."""
@@ -92,7 +93,9 @@ def config_from_file(path: Path) -> TrackerConfig:
     try:
         content = yaml.safe_load(path.read_text())
         part = content.get("/fish/tracker", content.get("/**"))["ros__parameters"]
-        values = {key: tuple(value) if isinstance(value, list) else value for key, value in part.items()}
+        values: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value for key, value in part.items()
+        }
         return TrackerConfig(**values)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"{path}: not a params file of the tracker ({error})") from error

@@ -3,19 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, pi, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # float64
 
 
 @dataclass(frozen=True)
 class MarkerLayout:
     """Where the markers sit: head markers in base_link axes (x ahead, y left of the centre of mass), m."""
 
-    front: tuple[float, float]
-    rear: tuple[float, float]
+    front: tuple[float, ...]
+    rear: tuple[float, ...]
     hinge_offset: float  # head's centre of mass to the tail's hinge, m
     link_length: float  # hinge to the marker at the far end of a link, m
 

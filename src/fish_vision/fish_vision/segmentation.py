@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Image = NDArray[np.uint8]
+Image = NDArray[Any]  # uint8, (h, w, 3) or (h, w)
 Box = tuple[int, int, int, int]  # left, top, right, bottom; pixels, right and bottom excluded
 
 PAD = 2  # pixels around a blob that may still hold some of its colour

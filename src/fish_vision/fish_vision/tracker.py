@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from fish_vision.pose import HeadPose, Spot, head_pose, pick_head, tail_angles, 
 from fish_vision.segmentation import Box, Image, around, hsv_of
 from fish_vision.spots import SpotFinder
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # float64
 
 COARSE = (
     2  # the whole image is searched at every second pixel; what is found there is measured at full resolution

@@ -59,11 +59,11 @@ class CameraConfig:
         """The geometry of this camera."""
         return CameraModel(
             (self.width, self.height),
-            tuple(self.focal),
-            tuple(self.centre),
-            tuple(self.distortion),
-            tuple(self.camera_position),
-            tuple(self.camera_tilt),
+            self.focal,
+            self.centre,
+            self.distortion,
+            self.camera_position,
+            self.camera_tilt,
         )
 
     def shape(self) -> FishShape:

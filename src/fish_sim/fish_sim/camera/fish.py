@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, pi, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # float64
 Colour = tuple[int, int, int]  # blue, green, red
 
 BODY: Colour = (52, 50, 50)  # black plastic: no hue of its own under the markers
@@ -132,4 +133,5 @@ def _head(pose: FishPose, shape: FishShape, scale: float, points: int = 40) -> A
     along = 0.5 * shape.head_length * np.cos(angles)
     across = 0.5 * shape.head_width * np.sin(angles) * (1.0 + 0.18 * np.cos(angles))
     c, s = cos(pose.heading), sin(pose.heading)
-    return np.array([pose.x, pose.y]) + scale * np.column_stack([along, across]) @ np.array([[c, s], [-s, c]])
+    turned: Array = np.column_stack([along, across]) @ np.array([[c, s], [-s, c]])
+    return np.array([pose.x, pose.y]) + scale * turned

@@ -1,12 +1,13 @@
 """The overhead camera as geometry: pool coordinates to pixels and back."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # float64
 
 R_DOWN = np.diag([1.0, -1.0, -1.0])  # optical axes of an untilted camera: right = pool x, down = pool -y
 
@@ -23,11 +24,11 @@ class CameraModel:
     """
 
     size: tuple[int, int]  # width, height, pixels
-    focal: tuple[float, float]  # fx, fy, pixels
-    centre: tuple[float, float]  # cx, cy, pixels
+    focal: tuple[float, ...]  # fx, fy, pixels
+    centre: tuple[float, ...]  # cx, cy, pixels
     distortion: tuple[float, ...]  # k1, k2, p1, p2, k3
-    position: tuple[float, float, float]  # of the optical centre in the pool frame, m
-    tilt: tuple[float, float, float]  # rotation vector about the optical axes, rad; 0 = straight down
+    position: tuple[float, ...]  # of the optical centre in the pool frame, m
+    tilt: tuple[float, ...]  # rotation vector about the optical axes, rad; 0 = straight down
 
     @property
     def K(self) -> Array:
@@ -48,7 +49,8 @@ class CameraModel:
     @property
     def t(self) -> Array:
         """(3,) pool origin in optical coordinates, m."""
-        return -self.R @ np.asarray(self.position, float)
+        centre: Array = self.R @ np.asarray(self.position, float)
+        return -centre
 
     def project(self, points: ArrayLike) -> Array:
         """(N, 3) points in the pool frame, m -> (N, 2) pixels."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,8 +12,8 @@ from fish_sim.camera.fish import FishPose, FishShape, patches, silhouette
 from fish_sim.camera.model import CameraModel
 from fish_sim.camera.water import DEPTH, moving_light, still_pool, vignette
 
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
+Array = NDArray[Any]  # float64
+Image = NDArray[Any]  # uint8, (h, w, 3) or (h, w)
 
 FINE = 4  # subpixels per pixel and direction when the fish is drawn
 SHIFT = 4  # fractional bits of polygon corners
@@ -123,23 +124,23 @@ def _box(corners: Array, size: tuple[int, int]) -> tuple[int, int, int, int] | N
     return (left, top, right, bottom) if left < right and top < bottom else None
 
 
-def _subpixels(outline: Array, box: tuple[int, int, int, int]) -> NDArray[np.int32]:
+def _subpixels(outline: Array, box: tuple[int, int, int, int]) -> Array:
     """Fixed-point corners in the enlarged patch; subpixel centres: (u - left + 1/2) FINE - 1/2."""
-    place = (outline - np.array(box[:2]) + 0.5) * FINE - 0.5
+    place: Array = (outline - np.array(box[:2]) + 0.5) * FINE - 0.5
     return np.round(place * (1 << SHIFT)).astype(np.int32)
 
 
-def _shrink(canvas: NDArray[np.uint8], box: tuple[int, int, int, int]) -> NDArray[np.uint8]:
+def _shrink(canvas: Image, box: tuple[int, int, int, int]) -> Image:
     return cv2.resize(canvas, (box[2] - box[0], box[3] - box[1]), interpolation=cv2.INTER_AREA)
 
 
-def _canvas(box: tuple[int, int, int, int], *channels: int) -> NDArray[np.uint8]:
+def _canvas(box: tuple[int, int, int, int], *channels: int) -> Image:
     return np.zeros(((box[3] - box[1]) * FINE, (box[2] - box[0]) * FINE, *channels), np.uint8)
 
 
 def _fill(
     fish: list[tuple[Array, tuple[int, int, int]]], box: tuple[int, int, int, int]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[Array, Array]:
     """Colour times cover (h, w, 3) and cover (h, w) of the fish in the patch, antialiased."""
     colour, cover = _canvas(box, 3), _canvas(box)
     for outline, fill in fish:
@@ -149,7 +150,7 @@ def _fill(
     return _shrink(colour, box).astype(np.float32), _shrink(cover, box).astype(np.float32) / 255.0
 
 
-def _shade(outlines: Sequence[Array], box: tuple[int, int, int, int]) -> NDArray[np.float32]:
+def _shade(outlines: Sequence[Array], box: tuple[int, int, int, int]) -> Array:
     """(h, w) cover of the shadow, softened by the depth of the water."""
     cover = _canvas(box)
     for outline in outlines:

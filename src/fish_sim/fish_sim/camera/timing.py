@@ -3,11 +3,12 @@
 from bisect import bisect_right
 from collections import deque
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # float64
 
 
 class History:

@@ -1,6 +1,7 @@
 """The empty pool from above: still picture, and the light that moves on floor and surface."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -8,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fish_sim.camera.model import CameraModel
 
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
+Array = NDArray[Any]  # float64
+Image = NDArray[Any]  # uint8, (h, w, 3) or (h, w)
 
 POOL = (4.27, 2.13)  # m, along pool x and y; MODEL.md
 DEPTH = 0.6  # m, of the drawn floor; appearance only
@@ -24,15 +25,25 @@ TOP, DECK, LANE = (205, 205, 200), (112, 116, 118), (150, 112, 42)
 def still_pool(camera: CameraModel, seed: int) -> Image:
     """(height, width, 3) picture of the pool at rest: rim, walls, tiled floor seen through the water."""
     width, height = camera.size
-    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
-    rays = camera.rays(pixels)
+    rays = _all_rays(camera)
     x, y, z = camera.position
-    surface = np.array([x, y]) - rays[:, :2] * (z / rays[:, 2])[:, None]
+    surface = np.array([x, y], np.float32) - rays[:, :2] * (z / rays[:, 2])[:, None]
     colour = _colours(surface, _through_water(surface, rays), z / camera.focal[0])
-    grain = np.random.default_rng(seed).normal(0.0, 1.0, (height // 8 + 1, width // 8 + 1)).astype(np.float32)
-    grain = cv2.resize(grain, (width, height), interpolation=cv2.INTER_CUBIC).reshape(-1, 1)
-    picture = (colour + 2.0 * grain).reshape(height, width, 3) * vignette(camera)[..., None]
+    coarse = (
+        np.random.default_rng(seed).normal(0.0, 2.0, (height // 8 + 1, width // 8 + 1)).astype(np.float32)
+    )
+    grain = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC).reshape(-1, 1)
+    picture: Array = (colour + grain).reshape(height, width, 3) * vignette(camera)[..., None]
     return cv2.GaussianBlur(np.clip(picture, 0, 255).astype(np.uint8), (3, 3), 0)
+
+
+def _all_rays(camera: CameraModel, step: int = 8) -> Array:
+    """(height * width, 3) directions of all pixels: exact at every step-th, bilinear between (0.01 pixel)."""
+    width, height = camera.size
+    u, v = np.meshgrid(np.arange(0, width + step, step), np.arange(0, height + step, step))
+    coarse = camera.rays(np.column_stack([u.ravel(), v.ravel()])).reshape(*u.shape, 3).astype(np.float32)
+    column, row = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    return cv2.remap(coarse, column / step, row / step, cv2.INTER_LINEAR).reshape(-1, 3)
 
 
 def vignette(camera: CameraModel) -> Array:
@@ -45,14 +56,15 @@ def vignette(camera: CameraModel) -> Array:
 
 def _through_water(surface: Array, rays: Array) -> Array:
     """(N, 3) points on floor or wall where refracted rays end; Snell: sin(after) = sin(before) / n."""
-    flat = np.linalg.norm(rays[:, :2], axis=1)
-    sine = flat / np.linalg.norm(rays, axis=1) / REFRACTION
+    flat = np.hypot(rays[:, 0], rays[:, 1])
+    sine = flat / np.hypot(flat, rays[:, 2]) / REFRACTION
     slope = sine / np.sqrt(1.0 - sine**2)
     sideways = rays[:, :2] / np.maximum(flat, 1e-12)[:, None] * slope[:, None]  # m per m of depth
-    half = np.array(POOL) / 2
+    half = np.array(POOL, np.float32) / 2
     with np.errstate(divide="ignore", invalid="ignore"):
         to_wall = (np.sign(sideways) * half - surface) / sideways
-    depth = np.minimum(DEPTH, np.nanmin(np.where(to_wall >= 0, to_wall, np.inf), axis=1))
+    to_wall = np.where(to_wall >= 0, to_wall, np.inf)
+    depth = np.minimum(DEPTH, np.minimum(to_wall[:, 0], to_wall[:, 1]))
     return np.column_stack([surface + sideways * depth[:, None], -depth])
 
 
@@ -61,17 +73,17 @@ def _colours(surface: Array, end: Array, pixel: float) -> Array:
 
     Edges are blended over about a pixel (m) so that they do not show steps.
     """
-    half = np.array(POOL) / 2
-    outside = np.max(np.abs(surface) - half, axis=1)
-    tile = np.abs((end[:, :2] / TILE) % 1.0 - 0.5).max(axis=1)
+    half = np.array(POOL, np.float32) / 2
+    outside = np.maximum(*(np.abs(surface) - half).T)
+    tile = np.maximum(*np.abs((end[:, :2] / np.float32(TILE)) % 1.0 - 0.5).T)
     lane = np.maximum(np.abs(end[:, 1]) - 0.06, np.abs(end[:, 0]) - half[0] + 0.35)
-    colour = np.broadcast_to(np.array(FLOOR, float), (len(end), 3))
+    colour = np.broadcast_to(np.array(FLOOR, np.float32), (len(end), 3))
     colour = _blend(colour, GROUT, (tile - 0.485) * TILE / pixel)
     colour = _blend(colour, LANE, -lane / pixel)
     colour = _blend(colour, WALL, (end[:, 2] + DEPTH) / pixel - 0.5)
     colour *= (1.0 - 0.25 * np.exp(-np.maximum(-outside, 0.0) / 0.10))[:, None]  # darker below the rim
     deck = (
-        np.array(DECK) * (0.7 + 0.3 * np.clip((outside - RIM) / 0.06, 0.0, 1.0))[:, None]
+        np.array(DECK, np.float32) * (0.7 + 0.3 * np.clip((outside - RIM) / 0.06, 0.0, 1.0))[:, None]
     )  # in the rim's shadow
     return _blend(_blend(colour, TOP, outside / pixel), deck, (outside - RIM) / pixel)
 
@@ -79,7 +91,7 @@ def _colours(surface: Array, end: Array, pixel: float) -> Array:
 def _blend(colour: Array, other: ArrayLike, distance: Array) -> Array:
     """other where distance (pixels beyond an edge) is positive, with one pixel of transition."""
     share = np.clip(distance + 0.5, 0.0, 1.0)[:, None]
-    return colour * (1.0 - share) + np.asarray(other, float) * share
+    return colour * (1.0 - share) + np.asarray(other, np.float32) * share
 
 
 @dataclass(frozen=True)
@@ -94,7 +106,8 @@ class LightLoop:
         count = len(self.frames)
         place = (time / self.period) % 1.0 * count
         i, part = int(place) % count, place - int(place)
-        return cv2.addWeighted(self.frames[i], 1 - part, self.frames[(i + 1) % count], part, 0)
+        now: Image = self.frames[i]
+        return cv2.addWeighted(now, 1 - part, self.frames[(i + 1) % count], part, 0)
 
 
 COARSE = 4  # pixels of the image per coarse pixel
@@ -120,16 +133,16 @@ def moving_light(
         camera.unproject(pixels.reshape(-1, 2) + (COARSE - 1) / 2).reshape(*pixels.shape).astype(np.float32)
     )
     inside = np.all(np.abs(place) < np.array(POOL, np.float32) / 2, axis=-1)
-    lamps = sum(np.exp(-((place - np.array(p, np.float32)) ** 2).sum(-1) / (2 * 0.16**2)) for p in LAMPS)
+    lamps: Array = sum(
+        np.exp(-((place - np.array(p, np.float32)) ** 2).sum(-1) / (2 * 0.16**2)) for p in LAMPS
+    )
     random = np.random.default_rng(seed)
-    waves = [_waves(random, count, scale) for count, scale in ((7, 16.0), (9, 42.0))]
-    loops: tuple[list[Image], list[Image]] = ([], [])
-    for i in range(frames):
-        broad, fine = (_ripple(place, w, i / frames) for w in waves)
-        loops[0].append(np.where(inside, 30.0 * np.exp(-((1.6 * broad) ** 2)), 0.0).astype(np.uint8))
-        sparkle = 14.0 * lamps + 300.0 * lamps * np.clip(fine - 0.95, 0.0, 1.0)
-        loops[1].append(np.clip(np.where(inside, strength * sparkle, 0.0), 0, 255).astype(np.uint8))
-    return LightLoop(np.array(loops[0]), period), LightLoop(np.array(loops[1]), period)
+    broad, fine = (_ripples(place, _waves(random, n, k), frames) for n, k in ((7, 16.0), (9, 42.0)))
+    caustics = 30.0 * inside * np.exp(-((1.6 * broad) ** 2))
+    glare = strength * inside * lamps * (14.0 + 300.0 * np.clip(fine - 0.95, 0.0, 1.0))
+    return LightLoop(caustics.astype(np.uint8), period), LightLoop(
+        np.clip(glare, 0, 255).astype(np.uint8), period
+    )
 
 
 def _waves(random: np.random.Generator, count: int, wavenumber: float) -> Array:
@@ -142,9 +155,15 @@ def _waves(random: np.random.Generator, count: int, wavenumber: float) -> Array:
     )
 
 
-def _ripple(place: NDArray[np.float32], waves: Array, part: float) -> NDArray[np.float32]:
-    """Surface height of unit variance at a part (0..1) of the loop."""
-    total = np.zeros(place.shape[:2], np.float32)
-    for kx, ky, cycles, phase in waves.astype(np.float32):
-        total += np.sin(kx * place[..., 0] + ky * place[..., 1] + (2 * np.pi * cycles * part + phase))
-    return total * np.float32(np.sqrt(2.0 / len(waves)))
+def _ripples(place: Array, waves: Array, frames: int) -> Array:
+    """(frames, h, w) surface heights of unit variance at equal parts of the loop, for places (h, w, 2), m.
+
+        sum_i sin(k_i . p + phase_i + 2 pi cycles_i t) = sum_i sin(a_i) cos(b_i) + cos(a_i) sin(b_i)
+
+    a depends on the place only and b on the time only, so that all frames are two matrix products.
+    """
+    a = place.reshape(-1, 2) @ waves[:, :2].T.astype(np.float32) + waves[:, 3].astype(np.float32)
+    b = 2 * np.pi * np.outer(np.arange(frames) / frames, waves[:, 2]).astype(np.float32)
+    total = np.cos(b) @ np.sin(a).T + np.sin(b) @ np.cos(a).T
+    scaled: Array = total * np.float32(np.sqrt(2.0 / len(waves)))
+    return scaled.reshape(frames, *place.shape[:2])

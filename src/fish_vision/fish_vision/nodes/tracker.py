@@ -9,6 +9,7 @@ and calibrations are counted and said in the diagnostics.
 
 from math import cos, sin
 from time import perf_counter
+from typing import Any
 
 import cv2
 import numpy as np
@@ -39,7 +40,7 @@ class TrackerNode(Node):
         super().__init__("tracker", namespace="fish")
         cv2.setNumThreads(1)  # one small region per image: more threads only take time from other nodes
         self._config = read_parameters(self, TrackerConfig)
-        self._info: tuple | None = None  # fields of the camera_info in use
+        self._info: tuple[Any, ...] | None = None  # fields of the camera_info in use
         self._calibration: Calibration | None = None
         self._calibration_error = "no camera/camera_info yet"
         self._tracker: Tracker | None = None
