@@ -85,8 +85,8 @@ def swim(
 def _follow(
     nodes: NodeProcesses, watch: Watch, listen: Callable[[float], None], duration: float, line: Status
 ) -> str:
-    """Until the end of path or duration; the reason."""
-    first, length = watch.sight.stamp, watch.tracker.path.length
+    """Until the end of the path, one lap of a closed one, or the end of the time; the reason."""
+    first, path, lap_start = watch.sight.stamp, watch.tracker.path, watch.tracker.progress
     while (t := watch.sight.stamp - first) < duration:
         listen(LOOK_PERIOD)
         check_running(nodes)
@@ -95,10 +95,12 @@ def _follow(
         line.update(
             f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
             f"cross-track {1000 * on_path.cross_track_error:+4.0f} mm   speed {sight.speed:.2f} m/s   "
-            f"{on_path.progress:.2f} of {length:.2f} m"
+            f"{on_path.progress:.2f} of {path.length:.2f} m"
         )
         if on_path.finished:
             return "at the end of the path"
+        if path.closed and on_path.progress - lap_start >= path.length:
+            return "after one lap"
     return f"after {duration:.0f} s"
 
 

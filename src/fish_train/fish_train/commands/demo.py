@@ -1,14 +1,15 @@
 """The whole robot: start every node, let the fish swim a path, record, score and show it.
 
 Simulator, camera, tracker, fusion, planner, controller and recorder run as processes of their own, on
-their own ROS domain. The run ends at the end of the path, after --duration, or with Ctrl-C; what was recorded
-is then scored.
+their own ROS domain. The run ends at the end of the path (a closed one: after a lap), after --duration, or
+with Ctrl-C; what was recorded is then scored.
 """
 
 from __future__ import annotations
 
 import argparse
 import signal
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--letter", default="R", help="letter, or a path family such as circle (R)")
     parser.add_argument("--speed", type=float, default=0.2, help="surge speed, m/s (0.2)")
     parser.add_argument(
-        "--duration", type=float, default=LONGEST, help="end after so many seconds at the latest"
+        "--duration", type=float, default=LONGEST, help="s, the longest run; a lap ends a closed path"
     )
     parser.add_argument("--weights", type=Path, help="weights file of the controller (the one it ships with)")
     parser.add_argument("--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims")
@@ -50,11 +51,11 @@ def run(args: argparse.Namespace) -> int:
     """Swim, record, score, show."""
     if not args.duration > 0.0:
         raise UserError(f"duration is {args.duration:g} s, expected a positive number")
-    domain = choose_domain(args.domain)
+    domain, start = choose_domain(args.domain), start_pose(args.letter)
     folder = _new_folder(args)
     console = Console(highlight=False)
     console.print(f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}")
-    end, latency = _swim(args, domain, folder, console)
+    end, latency = _swim(domain, node_parameters(args, start, folder), folder, args.duration, console)
     console.print(f"ended {end.reason}, {end.seconds:.1f} s after the first odometry")
     trial = read_trial(folder / "recording")
     score = score_trial(trial)
@@ -67,17 +68,19 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def node_parameters(args: argparse.Namespace, folder: Path) -> dict[NodeSpec, Parameters]:
+def node_parameters(
+    args: argparse.Namespace, start: Parameters, folder: Path
+) -> dict[NodeSpec, dict[str, object]]:
     """What the command line changes in the nodes' parameter files."""
-    changed: dict[NodeSpec, Parameters] = {
-        SIMULATOR: start_pose(args.letter),
+    changed: dict[NodeSpec, dict[str, object]] = {
+        SIMULATOR: dict(start),
         PLANNER: {"path": args.letter, "speed": args.speed},
         RECORDER: {"output": str(folder.resolve()), "name": "recording"},
     }
+    if args.robot:
+        changed[SIMULATOR]["robot_file"] = str(args.robot.resolve())
     if args.weights:
         changed[CONTROLLER] = {"weights_file": str(args.weights.resolve())}
-    if args.robot:
-        changed[SIMULATOR] = {**changed[SIMULATOR], "robot_file": str(args.robot.resolve())}
     return changed
 
 
@@ -95,10 +98,11 @@ def start_pose(name: str) -> Parameters:
     return {"start_x": float(x), "start_y": float(y), "start_heading": heading}
 
 
-def _swim(args: argparse.Namespace, domain: int, folder: Path, console: Console) -> tuple[SwimEnd, Table]:
-    """Start the nodes, watch the run, end them; the recorder is there before the fish moves and ends first."""
+def _swim(
+    domain: int, changed: Mapping[NodeSpec, Parameters], folder: Path, duration: float, console: Console
+) -> tuple[SwimEnd, Table]:
+    """Start the nodes, watch the run, end them; the recorder comes before the fish moves and ends first."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended like with Ctrl-C
-    changed = node_parameters(args, folder)
     with NodeProcesses(domain, folder / "logs") as nodes, watching(domain) as (watch, listen):
         for spec in ROBOTS["sim"]:
             if spec != CONTROLLER:
@@ -107,7 +111,7 @@ def _swim(args: argparse.Namespace, domain: int, folder: Path, console: Console)
         nodes.start(CONTROLLER, changed.get(CONTROLLER))
         wait_for(lambda: watch.tracker is not None, "reference/path", nodes, listen)
         wait_for(lambda: watch.sight is not None, "odometry/filtered", nodes, listen)
-        end = swim(nodes, watch, listen, args.duration, console)
+        end = swim(nodes, watch, listen, duration, console)
         nodes.stop([RECORDER])
         return end, _latency_table(watch.diagnostics)
 
