@@ -1,4 +1,4 @@
-"""What a caller can ask before and after a rollout: usable numbers, a step that is fine enough, what diverged.
+"""What to ask before and after a rollout: usable numbers, a step that is fine enough, what diverged.
 
 The kernels themselves do not look: a batch element that starts or becomes non-finite stays so and leaves the
 others alone.

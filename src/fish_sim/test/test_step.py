@@ -13,7 +13,6 @@ from fish_sim.ops import NUMPY
 from fish_sim.robot import Robot
 from fish_sim.step import Scheme, Stepper
 
-
 # together they use states, memory, grip, water, joint torques and every elementary function
 COLOURFUL = (
     "nonuniform_current wall_effect wake_memory wave_drag tether rotor_imbalance rudder_delay rotor_lag"

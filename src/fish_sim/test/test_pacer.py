@@ -1,0 +1,37 @@
+"""Pace of the simulation on made-up clocks."""
+
+import pytest
+
+from fish_sim.nodes.pacer import MAX_LAG, Pacer
+
+
+def run(factor, times):
+    pacer = Pacer(factor, 0.01, 100.0)
+    return [pacer.due(100.0 + t) for t in times], pacer
+
+
+@pytest.mark.parametrize(("factor", "expected"), [(1.0, 100), (0.5, 50), (3.0, 300)])
+def test_periods_follow_real_time_at_the_factor(factor, expected):
+    counts, pacer = run(factor, [0.001 * k for k in range(1, 1001)])
+    assert sum(counts) == expected and max(counts) == 1 and pacer.lost == 0.0
+
+
+def test_a_jittering_timer_neither_loses_nor_adds_periods():
+    counts, pacer = run(1.0, [0.01 * k + (0.004 if k % 2 else -0.004) for k in range(1, 101)])
+    assert counts == [1] * 100 and pacer.lost == 0.0
+
+
+def test_a_short_lag_is_caught_up_with():
+    counts, pacer = run(1.0, [0.01, 0.11, 0.12])
+    assert counts == [1, 10, 1] and pacer.lost == 0.0
+
+
+def test_a_long_lag_is_given_up_and_counted():
+    counts, pacer = run(1.0, [0.01, 3.01, 3.02, 3.03])
+    assert counts == [1, 1, 1, 1] and pacer.lost == pytest.approx(3.0)
+    assert MAX_LAG < 3.0
+
+
+def test_factor_0_is_as_fast_as_possible():
+    counts, _ = run(0.0, [0.0, 0.0, 1e-6, 100.0])
+    assert counts == [1, 1, 1, 1]

@@ -1,0 +1,192 @@
+"""The simulator node in this process: topics, clock, services, bad commands, parameters."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rclpy
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_srvs.srv import SetBool, Trigger
+
+from fish_sim.nodes.simulator import SimulatorNode
+from fish_sim.robot import Robot, RobotError, save_robot
+from fish_sim.simulation_config import SimulatorConfig
+
+pytestmark = pytest.mark.ros
+DOMAIN = 143
+FAST = {"real_time_factor": 0.0, "disturbance": 0.0}
+TOPICS = {
+    "joint_states": JointState, "imu/data": Imu, "sim/odometry": Odometry, "sim/joint_states": JointState,
+    "battery_state": BatteryState, "camera/pose": PoseWithCovarianceStamped, "/diagnostics": DiagnosticArray,
+}  # fmt: skip
+
+
+def seconds(stamp) -> float:
+    return stamp.sec + 1e-9 * stamp.nanosec
+
+
+class Bench:
+    """A simulator node and a listener that also commands, spun by hand."""
+
+    def __init__(self, parameters: dict[str, object]) -> None:
+        arguments = ["--ros-args"] + [a for k, v in parameters.items() for a in ("-p", f"{k}:={v}")]
+        rclpy.init(args=arguments, domain_id=DOMAIN)
+        self.simulator, self.peer = SimulatorNode(), Node("peer", namespace="fish")
+        self.got: dict[str, list] = defaultdict(list)
+        for topic, kind in TOPICS.items():
+            self.peer.create_subscription(kind, topic, self.got[topic].append, 1000)
+        self.peer.create_subscription(Clock, "/clock", self.got["/clock"].append, qos_profile_sensor_data)
+        self.commands = self.peer.create_publisher(JointState, "joint_command", 10)
+        self.executor = SingleThreadedExecutor()
+        for node in (self.simulator, self.peer):
+            self.executor.add_node(node)
+
+    def until(self, condition, spins: int = 20000) -> None:
+        """Spin until condition() holds; fail after a number of callbacks, not of seconds."""
+        for _ in range(spins):
+            if condition():
+                return
+            self.executor.spin_once(timeout_sec=1.0)
+        pytest.fail("the condition never came true")
+
+    def collect(self, topic: str, count: int) -> list:
+        """The next `count` messages of a topic."""
+        start = len(self.got[topic])
+        self.until(lambda: len(self.got[topic]) >= start + count)
+        return self.got[topic][start:]
+
+    def call(self, kind, name: str, request):
+        client = self.peer.create_client(kind, name)
+        self.until(client.service_is_ready)
+        future = client.call_async(request)
+        self.until(future.done)
+        return future.result()
+
+    def command(self, rotor: float, rudder: float) -> None:
+        self.commands.publish(
+            JointState(name=["rotor", "rudder"], position=[0.0, rudder], velocity=[rotor, 0.0])
+        )
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        for node in (self.simulator, self.peer):
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    made = Bench({**FAST, **getattr(request, "param", {})})
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("bench", [{"camera": "pose", "start_x": 0.5}], indirect=True)
+def test_every_topic_has_its_type_frame_and_rate(bench):
+    bench.collect("battery_state", 2)
+    bench.collect("sim/odometry", 120)
+    odometry, imu = bench.got["sim/odometry"], bench.got["imu/data"]
+    stamps = [seconds(m.header.stamp) for m in odometry]
+    assert all(b - a == pytest.approx(0.01, abs=1e-5) for a, b in zip(stamps, stamps[1:], strict=False))
+    assert odometry[0].header.frame_id == "pool" and odometry[0].child_frame_id == "base_link"
+    assert odometry[0].pose.pose.position.x == pytest.approx(0.5)
+    assert imu[0].header.frame_id == "imu_link" and imu[0].linear_acceleration.z == pytest.approx(
+        9.81, abs=0.5
+    )
+    assert imu[0].angular_velocity_covariance[8] == pytest.approx(0.006**2)
+    assert bench.got["joint_states"][0].name == ["rotor"]
+    assert bench.got["sim/joint_states"][0].name == ["tail_1", "tail_2", "tail_3"]
+    assert 11.0 < bench.got["battery_state"][0].voltage < 13.0
+    pose = bench.got["camera/pose"]
+    assert pose[0].header.frame_id == "pool" and pose[0].pose.covariance[0] == pytest.approx(0.002**2)
+    gap = seconds(pose[-1].header.stamp) - seconds(pose[0].header.stamp)
+    assert gap / (len(pose) - 1) == pytest.approx(1 / 30, rel=0.1)
+    assert seconds(bench.got["/clock"][-1].clock) >= stamps[-2]
+
+
+def test_a_commanded_fish_swims_and_the_truth_says_so(bench):
+    bench.collect("sim/odometry", 1)
+    for _ in range(150):
+        phase = 4 * math.pi * seconds(bench.got["sim/odometry"][-1].header.stamp)
+        bench.command(100 * math.sin(phase), 0.0)
+        bench.collect("sim/odometry", 1)
+    assert max(m.twist.twist.linear.x for m in bench.got["sim/odometry"]) > 0.05
+    assert max(abs(m.velocity[0]) for m in bench.got["joint_states"]) > 80.0
+    assert bench.got["camera/pose"] == []  # camera: image, the default
+
+
+def test_pause_stops_time_and_reset_brings_the_fish_back_without_turning_time_back(bench):
+    for _ in range(50):
+        bench.command(100.0, 0.3)
+        bench.collect("sim/odometry", 1)
+    assert bench.call(SetBool, "pause", SetBool.Request(data=True)).message == "paused"
+    bench.collect("/diagnostics", 1)  # whatever was under way has arrived by then
+    stopped = seconds(bench.got["sim/odometry"][-1].header.stamp)
+    bench.collect("/diagnostics", 1)
+    assert seconds(bench.got["sim/odometry"][-1].header.stamp) == stopped
+    assert bench.got["/diagnostics"][-1].status[0].message == "paused"
+    assert bench.call(Trigger, "reset", Trigger.Request()).success
+    assert bench.call(SetBool, "pause", SetBool.Request(data=False)).message == "running"
+    message = bench.collect("sim/odometry", 3)[-1]
+    assert seconds(message.header.stamp) > stopped
+    assert abs(message.pose.pose.position.x) < 1e-6 and abs(message.twist.twist.angular.z) < 1e-6
+
+
+def test_bad_commands_are_refused_and_said_in_the_diagnostics(bench):
+    bench.collect("sim/odometry", 1)
+    for message in (
+        JointState(name=["rotor"], velocity=[1.0]),
+        JointState(name=["rotor", "rudder"], velocity=[1.0]),
+        JointState(name=["rotor", "rudder"], position=[0.0, math.nan], velocity=[1.0, 0.0]),
+        JointState(name=["rotor", "rudder"], position=[0.0, 0.0], velocity=[1e9, 0.0]),
+    ):
+        bench.commands.publish(message)
+    bench.until(lambda: any(dict_of(m)["commands_refused"] == "4" for m in bench.got["/diagnostics"]))
+    status = bench.got["/diagnostics"][-1].status[0]
+    assert status.level == DiagnosticStatus.WARN and "joint_command refused" in status.message
+    assert status.name == "/fish/simulator"
+
+
+def dict_of(message: DiagnosticArray) -> dict[str, str]:
+    return {pair.key: pair.value for pair in message.status[0].values}
+
+
+@pytest.mark.parametrize("bench", [{"real_time_factor": 1.0}], indirect=True)
+def test_at_factor_1_stamps_keep_to_the_wall_clock(bench):
+    bench.collect("sim/odometry", 100)
+    now = bench.peer.get_clock().now().nanoseconds * 1e-9
+    assert seconds(bench.got["sim/odometry"][-1].header.stamp) == pytest.approx(now, abs=0.3)
+    bench.collect("/diagnostics", 1)
+    assert float(dict_of(bench.got["/diagnostics"][-1])["simulated_s"]) > 0.9
+
+
+def test_a_robot_file_is_used_and_a_broken_one_refused(tmp_path):
+    save_robot(Robot(links=2), tmp_path / "robot.yaml")
+    bench = Bench({**FAST, "robot_file": tmp_path / "robot.yaml"})
+    try:
+        assert bench.collect("sim/joint_states", 1)[0].name == ["tail_1", "tail_2"]
+    finally:
+        bench.close()
+    (tmp_path / "robot.yaml").write_text("format: 1\nlinks: 0")
+    rclpy.init(args=["--ros-args", "-p", f"robot_file:={tmp_path / 'robot.yaml'}"], domain_id=DOMAIN)
+    try:
+        with pytest.raises(RobotError, match="links: got 0"):
+            SimulatorNode()
+    finally:
+        rclpy.try_shutdown()
+
+
+def test_shipped_parameters_are_those_of_the_dataclass():
+    file = Path(__file__).parent.parent / "config" / "simulator.yaml"
+    values = yaml.safe_load(file.read_text())["/**"]["ros__parameters"]
+    assert SimulatorConfig(**values) == SimulatorConfig()
