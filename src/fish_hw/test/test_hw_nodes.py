@@ -254,15 +254,19 @@ def first_words(process: subprocess.Popen, words: str) -> None:
     raise AssertionError(f"the process ended without saying {words!r}")
 
 
-@pytest.mark.parametrize("name", ["rotor", "camera"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
-def test_signals_end_with_zero(name, number):
-    process = start(name, *NODES[name])
-    first_words(process, "rotor module" if name == "rotor" else "no calibration_file")
-    process.send_signal(number)
-    output, _ = process.communicate(timeout=TIMEOUT_S)
-    assert process.returncode == 0, output
-    assert "Traceback" not in output
+@pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_signals_end_with_zero(first):
+    """All four at once; rotor and imu get the first signal, the others the second."""
+    second = signal.SIGTERM if first == signal.SIGINT else signal.SIGINT
+    processes = {name: start(name, *arguments) for name, arguments in NODES.items()}
+    for process in processes.values():
+        first_words(process, "emulated device ready")
+    for name, process in processes.items():
+        process.send_signal(first if name in ("rotor", "imu") else second)
+    for name, process in processes.items():
+        output, _ = process.communicate(timeout=TIMEOUT_S)
+        assert process.returncode == 0, f"{name}: {output}"
+        assert "Traceback" not in output, name
 
 
 def driven_rotor(emulator: VertiqEmulator, graph: Callable) -> tuple[subprocess.Popen, Graph]:
@@ -270,7 +274,7 @@ def driven_rotor(emulator: VertiqEmulator, graph: Callable) -> tuple[subprocess.
     process = start(
         "rotor", "-p", f"port:={emulator.port}", "-p", "resume:=auto", "-p", "reply_timeout_s:=0.05"
     )
-    first_words(process, "rotor module")
+    first_words(process, "device ready")
     g = graph(RudderNode, backend="emulator")  # any node: this side needs an executor only
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     assert g.spin(lambda: emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0)))

@@ -61,9 +61,9 @@ def steady(_t: float) -> float:
 
 
 def test_oscillation_is_followed_and_measured(bench):
-    bench.run(1.0, oscillation)
+    bench.run(0.7, oscillation)
     speeds = [s.velocity for s in bench.samples]
-    assert len(speeds) > 25  # some are missed on a loaded machine
+    assert len(speeds) > 15  # some are missed on a loaded machine
     assert max(speeds) > 80.0 and min(speeds) < -80.0
     times = [s.time_s for s in bench.samples]
     assert times == sorted(times)

@@ -12,7 +12,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.duration import Duration
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 from fish_hw.devices.camera_calibration import CalibrationError
@@ -77,7 +77,8 @@ class DeviceNode(Node):
             if self.settings.startup_timeout_s == 0.0:
                 raise
             self.get_logger().error(f"{error}; trying for {self.settings.startup_timeout_s} s")
-
+        else:
+            self.get_logger().info("emulated device ready" if emulated else "device ready")
         self._worker = Worker(lambda: self._step(device, step), period_s, self._on_worker_end)
         self._worker.start()
 
@@ -152,8 +153,10 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
     failure = ""
     node: DeviceNode | None = None
     try:
+        executor = SingleThreadedExecutor()  # before the node: a signal while it is made upsets rclpy.spin
         node = make_node()
-        rclpy.spin(node)
+        executor.add_node(node)
+        executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except EXPECTED as error:
