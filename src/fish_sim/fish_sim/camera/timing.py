@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+JUMP = 1.0  # s without a call after which the frames between are not counted as skipped
 Array = NDArray[Any]  # float64
 
 
@@ -61,12 +62,13 @@ class FrameClock:
     def due(self, time: float) -> float | None:
         """Exposure time (s) of the newest frame not after time that was not taken yet, or None.
 
-        A time that jumps back starts again.
+        A time that jumps (a reset or paused simulation) starts again.
         """
         frame = int(np.floor(time * self._rate + 1e-6))
-        if self._taken is not None and self._taken - 1 <= frame <= self._taken:
+        ahead = None if self._taken is None else frame - self._taken
+        if ahead in (-1, 0):
             return None
-        if self._taken is not None and frame > self._taken:
-            self.skipped += frame - self._taken - 1
+        if ahead is not None and 0 < ahead <= max(1.0, JUMP * self._rate):
+            self.skipped += ahead - 1
         self._taken = frame
         return frame / self._rate

@@ -53,6 +53,9 @@ def run(make_node: Callable[[], Node], name: str) -> int:
         return 1
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
+    except RuntimeError:  # rclpy's RCLError: a callback published after the signal had shut the context down
+        if rclpy.ok():
+            raise
     finally:
         if node is not None:
             node.destroy_node()

@@ -24,6 +24,7 @@ from std_msgs.msg import Header
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, CalibrationError, Lens
 from fish_vision.config import TrackerConfig
+from fish_vision.nodes.heap import keep_freed_memory
 from fish_vision.nodes.start import read_parameters, run
 from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
 from fish_vision.statistics import Statistics
@@ -151,6 +152,7 @@ class TrackerNode(Node):
 
 def main() -> int:
     """Entry point."""
+    keep_freed_memory()
     return run(TrackerNode, "tracker")
 
 

@@ -1,0 +1,88 @@
+"""How the nodes of this package start and stop."""
+
+from dataclasses import dataclass
+
+import pytest
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from fish_vision.nodes.start import read_parameters, run
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture(autouse=True)
+def own_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "144")
+
+
+@dataclass(frozen=True)
+class Config:
+    rate: float = 1.0
+    count: int = 2
+    on: bool = False
+    name: str = "a"
+    place: tuple[float, ...] = (0.0, 1.0)
+
+
+class Stopped(Node):
+    """Publishes after its context was shut down, as a callback does that a signal interrupts."""
+
+    def __init__(self) -> None:
+        super().__init__("stopped")
+        self._publisher = self.create_publisher(Header, "h", 1)
+        self.create_timer(0.01, self._tick)
+
+    def _tick(self) -> None:
+        rclpy.shutdown()
+        self._publisher.publish(Header())
+
+
+class Broken(Node):
+    def __init__(self) -> None:
+        super().__init__("broken")
+        raise RuntimeError("a real one")
+
+
+def read(*overrides: str) -> Config:
+    arguments = ["--ros-args"] + [a for text in overrides for a in ("-p", text)]
+    rclpy.init(args=arguments)
+    node = Node("reader")
+    try:
+        return read_parameters(node, Config)
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
+
+
+def test_parameters_come_from_the_dataclass_and_the_command_line() -> None:
+    assert read() == Config()
+    given = read("rate:=3", "count:=5", "on:=true", "name:=b", "place:=[1, 2]")
+    assert given == Config(3.0, 5, True, "b", (1.0, 2.0)) and isinstance(given.rate, float)
+
+
+@pytest.mark.parametrize(
+    "override", ["rate:=fast", "count:=2.5", "on:=1", "name:=3", "place:=1.0", "place:=[a, b]"]
+)
+def test_a_value_of_the_wrong_type_is_refused_with_its_name(override: str) -> None:
+    with pytest.raises(ValueError, match=override.split(":")[0]):
+        read(override)
+
+
+def test_a_callback_that_meets_the_end_is_no_error() -> None:
+    assert run(Stopped, "stopped") == 0
+
+
+def test_other_errors_are_not_hidden() -> None:
+    with pytest.raises(RuntimeError, match="a real one"):
+        run(Broken, "broken")
+
+
+def test_refused_parameters_give_one_line_and_1(capsys: pytest.CaptureFixture[str]) -> None:
+    def refuse() -> Node:
+        raise ValueError("rate = -1: expected a positive number")
+
+    assert run(refuse, "node") == 1
+    assert capsys.readouterr().err == "node: rate = -1: expected a positive number\n"
