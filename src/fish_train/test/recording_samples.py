@@ -6,12 +6,19 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+
 from fish_train.recordings import message_build as build
 from fish_train.recordings.mcap_writer import McapRecording
 from fish_train.recordings.message_types import typestore
 
 START_NS = 1_700_000_000_000_000_000
-LATENCY_S = {"joint_command": 0.0, "joint_states": 0.001, "imu/data": 0.002, "camera/pose": 0.025, "camera/tail": 0.025}
+LATENCY_S = {
+    "joint_command": 0.0,
+    "joint_states": 0.001,
+    "imu/data": 0.002,
+    "camera/pose": 0.025,
+    "camera/tail": 0.025,
+}
 Message = tuple[int, str, object]  # arrival [ns], topic, rosbags message
 
 
@@ -79,7 +86,7 @@ def robot_recording(directory: Path, **options: object) -> Path:
 
 
 def changed(messages: Iterable[Message], topic: str, change) -> list[Message]:
-    """Messages with `change(i, arrival_ns, message) -> (arrival_ns, message) or None` applied to one topic."""
+    """Messages with `change(i, arrival_ns, message)` applied to one topic: (arrival_ns, message), None to drop."""
     out, i = [], 0
     for arrival_ns, name, message in messages:
         if name != topic:

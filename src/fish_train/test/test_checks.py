@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import recording_samples as samples
+
 from fish_train.recordings import message_build as build
 from fish_train.recordings import read_trial, trial
 from fish_train.recordings.jumps import find_jumps
@@ -89,7 +90,8 @@ def test_joint_missing_from_some_messages(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("topic", "severity"), [("joint_command", "error"), ("camera/pose", "error"), ("imu/data", "warning"), ("joint_states", "info")]
+    ("topic", "severity"),
+    [("joint_command", "error"), ("camera/pose", "error"), ("imu/data", "warning"), ("joint_states", "info")],
 )
 def test_missing_topic(tmp_path, topic, severity):
     messages = [m for m in samples.robot_messages() if m[1] != f"/fish/{topic}"]
@@ -98,11 +100,13 @@ def test_missing_topic(tmp_path, topic, severity):
 
 def test_wrong_type(tmp_path):
     messages = samples.changed(
-        samples.robot_messages(), "/fish/imu/data", lambda i, t, m: (t, build.number(1.0))
+        samples.robot_messages(), "/fish/imu/data", lambda _i, t, _m: (t, build.number(1.0))
     )
     result = read(tmp_path, messages)
     assert result.imu is None
-    assert "std_msgs/msg/Float64, expected sensor_msgs/msg/Imu" in problem(result, "wrong_type", "imu/data").text
+    assert (
+        "std_msgs/msg/Float64, expected sensor_msgs/msg/Imu" in problem(result, "wrong_type", "imu/data").text
+    )
 
 
 def test_wrong_frame(tmp_path):

@@ -2,28 +2,31 @@
 
 import numpy as np
 import pytest
+from rosbags.interfaces import Nodetype
+
 from fish_train.recordings import message_build as build
 from fish_train.recordings.layout import LayoutError, decode_blocks, find_layout
 from fish_train.recordings.message_types import typestore
-from rosbags.interfaces import Nodetype
 
 TYPES = {
     "sensor_msgs/msg/JointState": lambda r, n: build.joints(
         r.integers(1, 2**60), ["rotor", "rudder", "x"][: n % 4], r.normal(size=n % 4), r.normal(size=n % 3)
     ),
-    "sensor_msgs/msg/Imu": lambda r, n: build.imu(
+    "sensor_msgs/msg/Imu": lambda r, _n: build.imu(
         r.integers(1, 2**60), r.normal(size=3), r.normal(size=3), r.normal(size=4)
     ),
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda r, n: build.camera_pose(
         r.integers(1, 2**60), "p" * (n % 9), r.normal(size=3), r.uniform(size=3)
     ),
-    "nav_msgs/msg/Odometry": lambda r, n: build.odometry(
+    "nav_msgs/msg/Odometry": lambda r, _n: build.odometry(
         r.integers(1, 2**60), r.normal(size=3), r.normal(size=3)
     ),
-    "sensor_msgs/msg/BatteryState": lambda r, n: build.battery(r.integers(1, 2**60), r.uniform(9, 12)),
-    "std_msgs/msg/Float64MultiArray": lambda r, n: build.labelled_numbers("a" * (n % 6), r.normal(size=n % 7)),
+    "sensor_msgs/msg/BatteryState": lambda r, _n: build.battery(r.integers(1, 2**60), r.uniform(9, 12)),
+    "std_msgs/msg/Float64MultiArray": lambda r, n: build.labelled_numbers(
+        "a" * (n % 6), r.normal(size=n % 7)
+    ),
     "nav_msgs/msg/Path": lambda r, n: build.path(r.integers(1, 2**60), "pool", r.normal(size=(n % 5, 2))),
-    "std_msgs/msg/Float64": lambda r, n: build.number(r.normal()),
+    "std_msgs/msg/Float64": lambda r, _n: build.number(r.normal()),
 }
 
 
@@ -63,7 +66,9 @@ def test_agrees_with_rosbags(msgtype, little_endian):
 def test_padding_bytes_do_not_split_layouts():
     """Other DDS implementations leave garbage in alignment padding."""
     store = typestore()
-    raw = bytearray(store.serialize_cdr(build.joints(5, ["rotor"], [1.0], [2.0]), "sensor_msgs/msg/JointState"))
+    raw = bytearray(
+        store.serialize_cdr(build.joints(5, ["rotor"], [1.0], [2.0]), "sensor_msgs/msg/JointState")
+    )
     other = bytearray(raw)
     other[4 + 13] = 0xAB  # behind the empty frame_id, before the next length
     blocks, bad = decode_blocks([bytes(raw), bytes(other)], "sensor_msgs/msg/JointState", store.fielddefs)
@@ -83,7 +88,9 @@ def test_short_messages_are_named_not_read(cut):
 
 def test_absurd_length_is_refused():
     store = typestore()
-    raw = bytearray(store.serialize_cdr(build.joints(5, ["rotor"], [1.0], [2.0]), "sensor_msgs/msg/JointState"))
+    raw = bytearray(
+        store.serialize_cdr(build.joints(5, ["rotor"], [1.0], [2.0]), "sensor_msgs/msg/JointState")
+    )
     raw[4 + 8 : 4 + 12] = b"\xff\xff\xff\x7f"  # frame_id of 2 GB
     with pytest.raises(LayoutError, match="fields need more"):
         find_layout(bytes(raw), "sensor_msgs/msg/JointState", store.fielddefs, ros1=False)

@@ -5,12 +5,13 @@ import shutil
 import numpy as np
 import pytest
 import recording_samples as samples
-from fish_train.recordings import RecordingError, TopicMap, read_trial
-from fish_train.recordings.message_types import typestore
-from fish_train.recordings.topic_map import DEFAULT_RULES, TopicRule
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
+
+from fish_train.recordings import RecordingError, TopicMap, read_trial
+from fish_train.recordings.message_types import typestore
+from fish_train.recordings.topic_map import DEFAULT_RULES, TopicRule
 
 
 def write_rosbag2(directory, messages, plugin, mode=CompressionMode.NONE):
@@ -61,17 +62,24 @@ def sources(tmp_path_factory):
         "own": own,
         "bare": folder / "bare.mcap",
         "mcap": write_rosbag2(folder / "mcap", messages, StoragePlugin.MCAP),
-        "mcap zstd chunks": write_rosbag2(folder / "z", messages, StoragePlugin.MCAP, CompressionMode.STORAGE),
-        "mcap zstd messages": write_rosbag2(folder / "zm", messages, StoragePlugin.MCAP, CompressionMode.MESSAGE),
+        "mcap zstd chunks": write_rosbag2(
+            folder / "z", messages, StoragePlugin.MCAP, CompressionMode.STORAGE
+        ),
+        "mcap zstd messages": write_rosbag2(
+            folder / "zm", messages, StoragePlugin.MCAP, CompressionMode.MESSAGE
+        ),
         "mcap zstd file": write_rosbag2(folder / "zf", messages, StoragePlugin.MCAP, CompressionMode.FILE),
         "sqlite3": write_rosbag2(folder / "sq", messages, StoragePlugin.SQLITE3),
-        "sqlite3 zstd": write_rosbag2(folder / "sqz", messages, StoragePlugin.SQLITE3, CompressionMode.MESSAGE),
+        "sqlite3 zstd": write_rosbag2(
+            folder / "sqz", messages, StoragePlugin.SQLITE3, CompressionMode.MESSAGE
+        ),
         "ros1": write_rosbag1(folder / "ros1.bag", messages),
     }
 
 
 FORMATS = (
-    "own", "bare", "mcap", "mcap zstd chunks", "mcap zstd messages", "mcap zstd file", "sqlite3", "sqlite3 zstd", "ros1",
+    "own", "bare", "mcap", "mcap zstd chunks", "mcap zstd messages", "mcap zstd file", "sqlite3",
+    "sqlite3 zstd", "ros1",
 )  # fmt: skip
 
 

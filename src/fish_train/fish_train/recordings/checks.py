@@ -86,7 +86,7 @@ def _gaps(stream: Stream) -> Iterator[Problem]:
     if len(t) < 10:
         return
     step = np.diff(t)
-    period = max(float(np.median(step)), float(step.mean()) / 2)  # the mean where messages come in bursts
+    period = max(float(np.median(step)), float(step.mean()) / 3)  # the mean where messages come in bursts
     gaps = np.flatnonzero(step > GAP_PERIODS * period)
     if len(gaps):
         longest = float(step.max())

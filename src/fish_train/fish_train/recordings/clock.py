@@ -79,6 +79,11 @@ def estimate_clock(
     spread = np.array([_edge_at_middle(sample) for sample in _resampled(pieces)])
     offset_std, drift_std = np.sqrt(np.mean((spread - [offset, drift]) ** 2, axis=0))
     offset_std *= np.sqrt(2)  # the smallest of n latencies lies above its limit by as much as it scatters
+    grain = float(np.mean(d - offset - drift * x)) / len(x)  # of the envelope, for exponential latencies
+    offset_std, drift_std = (
+        max(offset_std, grain),
+        max(drift_std, 4 * grain / np.ptp(x)),
+    )  # resampling misses it
     return ClockEstimate(
         clock, topics, base * 1e-9 + offset, float(offset_std), drift * 1e6, float(drift_std) * 1e6, middle
     )

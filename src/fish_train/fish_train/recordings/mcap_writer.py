@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -241,11 +242,13 @@ class McapRecording:
     def _close_full(self) -> None:
         """End the file on a full disk: with the summary if it fits into the reserve, else with the bare footer."""
         (self.directory / RESERVE_NAME).unlink(missing_ok=True)
-        try:
-            self._append(self._ending())
-        except DiskFullError:
-            self._append(_records(DataEnd(0), Footer(0, 0, 0)) + MCAP0_MAGIC)
-        self._finish()
+        bare = _records(DataEnd(0), Footer(0, 0, 0)) + MCAP0_MAGIC
+        for ending in (self._ending(), bare, b""):
+            with suppress(DiskFullError):
+                self._append(ending)
+                break
+        with suppress(OSError):  # without metadata.yaml the file is still read, and mended by recover
+            self._finish()
 
     def _finish(self) -> None:
         self._closed = True

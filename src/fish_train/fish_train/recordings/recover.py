@@ -29,6 +29,7 @@ from .qos import Qos
 
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length
 CHUNK_HEAD = struct.Struct("<QQQI")  # first time, last time, uncompressed size, checksum
+CHUNK_HEAD_BYTES = 64  # with the name of the compression and the size
 
 
 @dataclass
@@ -42,7 +43,6 @@ class Walk:
     messages: list[Message] = field(default_factory=list)
     custom: dict[str, str] = field(default_factory=dict)
     lost: list[str] = field(default_factory=list)  # one sentence per loss
-    complete: bool = False  # footer reached
 
 
 @dataclass(frozen=True)
@@ -103,13 +103,16 @@ def walk_file(path: Path) -> Walk:
     if not data.startswith(MCAP0_MAGIC):
         walk.lost.append(f"{path.name}: {len(data)} bytes that do not start like an MCAP file")
         return walk
+    in_data = True  # before the summary section, which repeats what is known
     for opcode, body, position, cut in _records(data, len(MCAP0_MAGIC)):
-        _take(walk, opcode, body, position, cut)
-        if opcode in (Opcode.DATA_END, Opcode.FOOTER) and not cut:
-            walk.complete = True
+        in_data = in_data and opcode != Opcode.DATA_END
+        if opcode == Opcode.FOOTER and not cut:
             return walk
+        if in_data:
+            _take(walk, opcode, body, position, cut)
     if not walk.lost:
-        walk.lost.append(f"{path.name}: the file ends without index and footer")
+        where = "its footer" if in_data else "its index"
+        walk.lost.append(f"{path.name}: no whole message, but the file ends before {where}")
     return walk
 
 
@@ -153,6 +156,9 @@ def _take(walk: Walk, opcode: int, body: bytes, position: int, cut: bool) -> Non
 def _take_chunk(walk: Walk, body: bytes, position: int, cut: bool) -> None:
     """The records in a chunk; of a cut chunk those before the cut."""
     before = len(walk.messages)
+    if cut and len(body) < CHUNK_HEAD_BYTES:
+        walk.lost.append(f"{walk.path.name}: {len(body)} bytes of a chunk cut at byte {position}")
+        return
     try:
         data, damaged = _decompress(body)
     except (struct.error, zstandard.ZstdError, RuntimeError, UnicodeDecodeError) as error:

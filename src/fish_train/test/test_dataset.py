@@ -1,0 +1,67 @@
+"""Folders of trials: order, bad trials, mixed robots, several processes."""
+
+import numpy as np
+import pytest
+import recording_samples as samples
+
+from fish_train.recordings import RecordingError, read_dataset
+
+
+def kinds(data):
+    return [problem.kind for problem in data.problems]
+
+
+def test_folder_of_trials(tmp_path):
+    for name in ("trial_02", "trial_00", "trial_01"):
+        samples.robot_recording(tmp_path / name, duration=0.3)
+    (tmp_path / "notes.txt").write_text("not a trial")
+    data = read_dataset(tmp_path)
+    assert [trial.name for trial in data] == ["trial_00", "trial_01", "trial_02"]
+    assert data.problems == ()
+    assert data["trial_01"].path == tmp_path / "trial_01"
+    with pytest.raises(KeyError, match="known: trial_00, trial_01"):
+        data["trial_09"]
+
+
+def test_one_trial_is_said(tmp_path):
+    data = read_dataset(samples.robot_recording(tmp_path / "only", duration=0.3))
+    assert (len(data), kinds(data)) == (1, ["one_trial"])
+
+
+def test_unreadable_trial_is_left_out_and_said(tmp_path):
+    for name in ("a", "b", "c"):
+        samples.robot_recording(tmp_path / name, duration=0.3)
+    file = tmp_path / "b" / "b.mcap"
+    file.write_bytes(file.read_bytes()[:3000])
+    data = read_dataset(tmp_path)
+    assert [trial.name for trial in data] == ["a", "c"]
+    assert kinds(data) == ["unreadable_trial"]
+    assert "b left out" in data.problems[0].text and "recover" in data.problems[0].text
+
+
+@pytest.mark.parametrize("folder", ["empty", "missing"])
+def test_nothing_to_read(tmp_path, folder):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(RecordingError, match="no recording|does not exist"):
+        read_dataset(tmp_path / folder)
+
+
+def test_mixed_robots(tmp_path):
+    messages = samples.robot_messages(0.3)
+    samples.write_mcap(tmp_path / "a", messages, {"robot": "trout"})
+    samples.write_mcap(tmp_path / "b", messages, {"robot": "carp"})
+    samples.write_mcap(tmp_path / "c", samples.robot_messages(0.3, namespace="/other"))
+    data = read_dataset(tmp_path)
+    assert kinds(data) == ["mixed_robots", "mixed_robots"]
+    assert "carp: b; trout: a" in data.problems[0].text
+    assert "/other: c" in data.problems[1].text
+
+
+def test_several_processes_read_the_same(tmp_path):
+    for i in range(4):
+        samples.robot_recording(tmp_path / f"trial_{i}", duration=0.2 + 0.1 * i)
+    one, two = read_dataset(tmp_path, processes=1), read_dataset(tmp_path, processes=2)
+    for a, b in zip(one, two, strict=True):
+        assert a.name == b.name
+        np.testing.assert_array_equal(a.imu.gyro, b.imu.gyro)
+        assert a.problems == b.problems and repr(a.topics) == repr(b.topics)

@@ -1,0 +1,81 @@
+"""The command line: every verb loads, mistakes are one line."""
+
+import subprocess
+import sys
+from argparse import ArgumentParser
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+import recording_samples as samples
+
+from fish_train.commands import main as command
+from fish_train.commands.verbs import VERBS
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_is_a_module_with_help(verb):
+    module = import_module(f"fish_train.commands.{verb}")
+    parser = ArgumentParser()
+    module.add_arguments(parser)
+    assert module.__doc__ and callable(module.run)
+    assert callable(getattr(command, verb))  # the entry point of its own executable
+
+
+def test_help_is_fast_because_no_verb_is_loaded():
+    code = "import sys; from fish_train.commands.main import main; main(['--help']); print(*sys.modules)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    *table, modules = out.splitlines()
+    assert all(any(line.split()[:1] == [verb] for line in table) for verb in VERBS)
+    assert not {"numpy", "rosbags", "torch", "rclpy"} & set(modules.split())
+
+
+def test_unknown_verb(capsys):
+    assert command.main(["swim_faster"]) == 2
+    assert "unknown verb 'swim_faster'; known: " in capsys.readouterr().err
+
+
+def test_no_such_entry_point():
+    with pytest.raises(AttributeError, match="swim_faster"):
+        command.swim_faster  # noqa: B018
+
+
+@pytest.mark.parametrize("verb", ["inspect", "recover"])
+def test_bad_path_is_one_line(capsys, verb):
+    assert command.main([verb, "/nowhere/at/all"]) == 1
+    error = capsys.readouterr().err
+    assert error == f"fish_train {verb}: /nowhere/at/all: does not exist\n"
+
+
+def test_recover_prints_what_was_saved_and_lost(tmp_path, capsys):
+    path = samples.robot_recording(tmp_path / "a")
+    file = path / "a.mcap"
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    assert command.main(["recover", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "/fish/imu/data" in out and "lost: a.mcap: " in out
+    assert (tmp_path / "a_recovered" / "metadata.yaml").exists()
+    assert command.main(["recover", str(path)]) == 1
+    assert "never overwritten" in capsys.readouterr().err
+
+
+def test_inspect_prints_and_plots(tmp_path, capsys):
+    def lost(i, t, m):
+        return None if 20 <= i < 120 else (t, m)
+
+    messages = samples.changed(samples.robot_messages(), "/fish/imu/data", lost)
+    path = samples.write_mcap(tmp_path / "a", messages)
+    page = tmp_path / "out" / "page.html"
+    assert command.main(["inspect", str(path), "--html", str(page)]) == 0
+    out = capsys.readouterr().out
+    assert "/fish/camera/pose" in out and "1 gaps, longest 1.010 s, about 100 messages" in out
+    html = page.read_text()
+    assert "a: path in the pool" in html and "1 gaps, longest 1.010 s" in html
+    assert "<script src=" not in html and "Plotly.newPlot" in html
+
+
+def test_inspect_without_page(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert command.main(["inspect", str(samples.robot_recording(tmp_path / "a")), "--no-html"]) == 0
+    assert "robot" in capsys.readouterr().out
+    assert not list(Path(tmp_path).glob("*.html"))

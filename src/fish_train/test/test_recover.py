@@ -1,0 +1,86 @@
+"""Recovery: what was whole is saved bit by bit, what was lost is said."""
+
+import numpy as np
+import pytest
+import recording_samples as samples
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+
+from fish_train.recordings import RecordingError, read_trial
+from fish_train.recordings.recover import recover
+
+
+def damaged(path, change):
+    file = next(path.glob("*.mcap"))
+    data = bytearray(file.read_bytes())
+    file.write_bytes(bytes(change(data)))
+    return path
+
+
+def test_complete_recording_loses_nothing(tmp_path):
+    path = samples.robot_recording(tmp_path / "a")
+    result = recover(path, tmp_path / "b")
+    assert result.lost == () and result.count == len(samples.robot_messages())
+    before, after = read_trial(path), read_trial(tmp_path / "b")
+    for name, stream in before.streams.items():
+        np.testing.assert_array_equal(stream.t, after.streams[name].t)
+    np.testing.assert_array_equal(before.imu.gyro, after.imu.gyro)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.77, 0.9, 0.999])
+def test_cut_anywhere(tmp_path, share):
+    path = damaged(samples.robot_recording(tmp_path / "a"), lambda d: d[: int(len(d) * share)])
+    result = recover(path, tmp_path / "b")
+    assert len(result.lost) == 1
+    after = read_trial(tmp_path / "b")
+    saved_s = (result.last_ns - samples.START_NS) * 1e-9
+    expected = [m for m in samples.robot_messages() if m[0] <= result.last_ns]
+    assert abs(result.count - len(expected)) <= 15  # messages of the same instant as the cut
+    assert saved_s > 2.0 * share - 0.35
+    t = np.arange(0, 2, 0.01)[: len(after.imu)]
+    np.testing.assert_array_equal(after.imu.gyro[:, 2], t)
+
+
+def test_damaged_chunk_is_skipped_and_the_rest_kept(tmp_path):
+    def flip(data):
+        data[data.index(b"imu_link", len(data) // 2)] ^= 0xFF
+        return data
+
+    path = damaged(samples.robot_recording(tmp_path / "a"), flip)
+    result = recover(path, tmp_path / "b")
+    assert "wrong checksum" in result.lost[0]
+    whole = len(samples.robot_messages())
+    assert 0.7 * whole < result.count < whole
+    assert result.last_ns == samples.robot_messages()[-1][0]
+
+
+def test_compressed_chunk_that_is_cut(tmp_path):
+    writer = Writer2(tmp_path / "a", version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    store, count = samples.typestore(), 20_000
+    with writer:
+        imu = writer.add_connection("/fish/imu/data", "sensor_msgs/msg/Imu", typestore=store)
+        for i in range(count):
+            message = samples.build.imu(
+                samples.ns(0.01 * i), (0.1, 0.2, 0.01 * i), (0, 0, 9.81), (0, 0, 0, 1)
+            )
+            raw = bytes(store.serialize_cdr(message, "sensor_msgs/msg/Imu"))
+            writer.write(imu, samples.ns(0.01 * i), raw)
+    path = damaged(tmp_path / "a", lambda d: d[: int(len(d) * 0.6)])
+    result = recover(path, tmp_path / "b")
+    assert 0.3 * count < result.count < 0.8 * count
+    np.testing.assert_allclose(read_trial(tmp_path / "b").imu.gyro[:, 2], 0.01 * np.arange(result.count))
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"not mcap at all" * 100])
+def test_nothing_to_save(tmp_path, content):
+    (tmp_path / "a.mcap").write_bytes(content)
+    with pytest.raises(RecordingError, match="nothing to save"):
+        recover(tmp_path / "a.mcap", tmp_path / "b")
+    assert not (tmp_path / "b").exists()
+
+
+def test_other_formats_are_refused(tmp_path):
+    (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0")
+    with pytest.raises(RecordingError, match="rosbag reindex"):
+        recover(tmp_path / "a.bag", tmp_path / "b")
