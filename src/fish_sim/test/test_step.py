@@ -1,5 +1,9 @@
 """The stepper against SciPy, against itself in all its forms, and against bad input."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -165,3 +169,9 @@ def test_the_stable_scheme_of_a_robot_is_stable_also_with_a_stiff_tail(links):
     check_scheme(stepper, stepper.parameters(robot))
     nominal = stable_scheme(Robot(links=links))
     assert nominal == Stepper.of(Robot(links=links)).scheme
+
+
+def test_the_comparison_with_the_reference_says_when_there_is_none(tmp_path):
+    script = Path(__file__).parent.parent / "benchmarks" / "check_reference.py"
+    run = subprocess.run([sys.executable, script, tmp_path], capture_output=True, text=True)
+    assert run.returncode == 2 and "no reference trajectories" in run.stderr and str(tmp_path) in run.stderr
