@@ -2,10 +2,11 @@
 
     python src/fish_sim/benchmarks/check_reference.py [FOLDER]
 
-FOLDER (default ../shared/reference beside the checkout) holds CSV files: time, q, q', alpha, tip force, inputs;
-they were integrated with RK4 at 0.5 ms. Prints, for every file, the largest difference of any quantity relative to
-its largest value: with that same method (the equations alone), with two coarser steps, and the reference's own
-integration error (RK4 at 0.5 ms against DOP853 at 0.5 ms), below which no better integrator can agree with it.
+FOLDER (default ../shared/reference beside the checkout) holds CSV files: time, q, q', alpha, tip force,
+inputs; they were integrated with RK4 at 0.5 ms. Prints, for every file, the largest difference of any
+quantity relative to its largest value: with that same method (the equations alone), with two coarser steps,
+and the reference's own integration error (RK4 at 0.5 ms against DOP853 at 0.5 ms), below which no better
+integrator can agree with it.
 """
 
 from __future__ import annotations
@@ -78,8 +79,8 @@ def compare(path: Path) -> bool:
     same, coarse, fine, _ = (distance(run, reference) for run in runs)
     own = distance(runs[0], runs[-1])
     print(
-        f"{path.name:20} same method {same:.1e}   {10 / steps:g} ms {coarse:.1e}   {5 / steps:g} ms {fine:.1e}"
-        f"   reference's own error {own:.1e}"
+        f"{path.name:20} same method {same:.1e}   {10 / steps:g} ms {coarse:.1e}"
+        f"   {5 / steps:g} ms {fine:.1e}   reference's own error {own:.1e}"
     )
     return same < SAME_METHOD_LIMIT and fine < LIMIT + own
 
