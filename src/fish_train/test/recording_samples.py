@@ -86,7 +86,7 @@ def robot_recording(directory: Path, **options: object) -> Path:
 
 
 def changed(messages: Iterable[Message], topic: str, change) -> list[Message]:
-    """Messages with `change(i, arrival_ns, message)` applied to one topic: (arrival_ns, message), None to drop."""
+    """Messages with `change(i, arrival_ns, message)` applied to one topic (None drops the message)."""
     out, i = [], 0
     for arrival_ns, name, message in messages:
         if name != topic:

@@ -1,4 +1,4 @@
-"""Print what is in a recording or data set (topics, rates, gaps, latency, clocks, problems) and plot it on one page."""
+"""Print and plot what is in a recording or data set: topics, rates, gaps, latency, clocks, problems."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """The verbs of `fish_train`, for the command line and for the installed executables.
 
-Each is a module of this folder with `add_arguments(parser)` and `run(args) -> int` (exit status). A new verb is one file
-and one line here; setup.py reads this table, so that `ros2 run fish_train VERB` works as well. Nothing is imported here.
+Each is a module of this folder with `add_arguments(parser)` and `run(args) -> int` (exit status). A new
+verb is one file and one line here; setup.py reads this table, so that `ros2 run fish_train VERB` works as
+well. Nothing is imported here.
 """
 
 VERBS = {

@@ -1,8 +1,8 @@
 """Recorder: writes topics as they come, undecoded, to a rosbag2 recording (MCAP) that survives a kill.
 
-In: every topic that the parameter `topics` selects, with the quality of service its publishers offer. Out: the
-recording; /diagnostics. The bag's time is the moment of arrival on the recorder's wall clock, also under use_sim_time:
-simulation time stands in the stamps and on /clock, and the reader relates the two.
+In: every topic that the parameter `topics` selects, with the quality of service its publishers offer. Out:
+the recording; /diagnostics. The bag's time is the moment of arrival on the recorder's wall clock, also
+under use_sim_time: simulation time stands in the stamps and on /clock, and the reader relates the two.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class RecorderNode(Node):
         self.get_logger().info(f"recording to {directory}")
 
     def _discover(self) -> None:
-        """Subscribe to selected topics that are new, and again where their publishers offer something else."""
+        """Subscribe to selected topics that are new, or again where publishers offer something else."""
         for topic, types in self.get_topic_names_and_types():
             if is_selected(topic, self._config.topics, self.get_namespace()):
                 for msgtype in types:

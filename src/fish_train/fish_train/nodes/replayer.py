@@ -1,8 +1,9 @@
 """Replayer: publishes a recording's messages undecoded, at the times at which they had arrived.
 
-Out: the recorded topics that `topics` selects and `exclude` leaves, with the quality of service they were recorded
-with (ROS remapping renames them: --ros-args -r /fish/imu/data:=/other); /clock with bag time unless the recording has a
-/clock of its own; /diagnostics. Service ~/pause (std_srvs/SetBool). Ends with 0 after the last message.
+Out: the recorded topics that `topics` selects and `exclude` leaves, with the quality of service they were
+recorded with (ROS remapping renames them: --ros-args -r /fish/imu/data:=/other); /clock with bag time
+unless the recording has a /clock of its own; /diagnostics. Service ~/pause (std_srvs/SetBool). Ends with 0
+after the last message.
 """
 
 from __future__ import annotations

@@ -91,7 +91,8 @@ def _gaps(stream: Stream) -> Iterator[Problem]:
     if len(gaps):
         longest = float(step.max())
         lost = int(np.sum(np.round(step[gaps] / period) - 1))
-        text = f"{len(gaps)} gaps, longest {longest:.3f} s, about {lost} messages at a period of {period * 1e3:.1f} ms"
+        what = f"{len(gaps)} gaps, longest {longest:.3f} s"
+        text = f"{what}, about {lost} messages at a period of {period * 1e3:.1f} ms"
         severity = "warning" if longest > LONG_GAP_S else "info"
         yield Problem(severity, "gap", stream.topic, text, len(gaps), float(t[gaps[0]]))
 
@@ -111,7 +112,8 @@ def check_excitation(commands: Commands | None) -> Iterator[Problem]:
     for name, unit in (("rotor_speed", "rad/s"), ("rudder", "rad")):
         values = getattr(commands, name)[good]
         if len(values) and np.ptp(values) < CONSTANT:
-            text = f"{name} is {values[0]:g} {unit} throughout: parameters that need it to vary cannot be determined"
+            what = f"{name} is {values[0]:g} {unit} throughout"
+            text = f"{what}: parameters that need it to vary cannot be determined"
             yield Problem(
                 "warning" if name == "rotor_speed" else "info", "constant_command", commands.topic, text
             )
@@ -139,11 +141,12 @@ def check_clock(clock: ClockEstimate) -> Iterator[Problem]:
     if clock.applied:
         text = (
             f"clock {clock.clock!r} stands {clock.offset_s:.6f} s (std {clock.offset_std_s:.1e}) and drifts "
-            f"{clock.drift_ppm:.1f} ppm (std {clock.drift_std_ppm:.1f}) from the recorder's; times were moved by it"
+            f"{clock.drift_ppm:.1f} ppm (std {clock.drift_std_ppm:.1f}) from the recorder's; times were moved"
         )
         yield Problem("info", "clock", "", text)
     elif clock.drift_is_significant and abs(clock.drift_ppm) > 20:
-        text = f"clock {clock.clock!r} drifts {clock.drift_ppm:.1f} ppm (std {clock.drift_std_ppm:.1f}); not corrected"
+        drift = f"{clock.drift_ppm:.1f} ppm (std {clock.drift_std_ppm:.1f})"
+        text = f"clock {clock.clock!r} drifts {drift}; not corrected"
         yield Problem("info", "clock", "", text)
 
 

@@ -18,9 +18,9 @@ class ClockEstimate:
 
         recorder = stamp + offset + drift (stamp - middle),  offset known up to the shortest latency
 
-    Arrival minus stamp is offset plus latency; latency is not negative, so the lower envelope is the offset plus the
-    shortest latency on the way. `offset_s` is that envelope: the true offset is at most so much, and less by the
-    shortest latency, which no recording can tell.
+    Arrival minus stamp is offset plus latency; latency is not negative, so the lower envelope is the offset
+    plus the shortest latency on the way. `offset_s` is that envelope: the true offset is at most so much,
+    and less by the shortest latency, which no recording can tell.
     """
 
     clock: str  # name from the topic map
@@ -60,8 +60,10 @@ def estimate_clock(
 
         maximise a subject to a + b (stamp_i - middle) <= arrival_i - stamp_i  for all i
 
-    which is the edge of the lower convex hull above the middle. Standard errors: bootstrap over pieces of time.
-    Source: Moon, Skelly and Towsley 1999 (linear programming estimate of clock skew), the hull form of the same program.
+    which is the edge of the lower convex hull above the middle. Standard errors: bootstrap over pieces of
+    time.
+    Source: Moon, Skelly and Towsley 1999 (linear programming estimate of clock skew), the hull form of the
+    same program.
 
     Args:
         stamp_ns, arrival_ns: (N,) int64, N >= 1, any order.
@@ -92,8 +94,8 @@ def estimate_clock(
 def _not_early(x: np.ndarray, d: np.ndarray) -> np.ndarray:
     """(N,) bool: all but single messages that are much earlier than any latency allows (wrong stamps).
 
-    With q the 5 % quantile and m the median of the detrended delay, a one-sided distribution of latencies has nothing
-    far below q; whatever is below q - 2 (m - q) is left out.
+    With q the 5 % quantile and m the median of the detrended delay, a one-sided distribution of latencies
+    has nothing far below q; whatever is below q - 2 (m - q) is left out.
     """
     level = d - robust_line(x, d)
     low, middle = np.quantile(level, [0.05, 0.5])
@@ -110,7 +112,7 @@ def robust_line(x: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 
 def _lowest_points(x: np.ndarray, d: np.ndarray) -> list[np.ndarray]:
-    """Per piece of time the (k, 2) points that can lie on the envelope, after the overall trend is taken off."""
+    """Per piece of time the (k, 2) points that can lie on the envelope, with the overall trend taken off."""
     offset, drift = _edge_at_middle(np.column_stack([x, d]))
     above = d - offset - drift * x
     piece = np.minimum(((x - x.min()) / np.ptp(x) * BLOCKS).astype(int), BLOCKS - 1)

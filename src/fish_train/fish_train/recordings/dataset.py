@@ -32,7 +32,7 @@ def find_trials(path: Path) -> list[Path]:
     found = sorted(p for p in path.iterdir() if is_recording(p)) if path.is_dir() else []
     if not found:
         raise RecordingError(
-            f"{path}: no recording; expected a rosbag2 directory, a .mcap, .db3 or .bag file, or a folder of them"
+            f"{path}: no recording; expected a rosbag2 directory, a .mcap, .db3 or .bag file, or several"
         )
     return found
 

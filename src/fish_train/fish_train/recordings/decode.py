@@ -28,7 +28,7 @@ Arrays = dict[str, np.ndarray]
 
 
 def yaw(block: Block, path: str) -> np.ndarray:
-    """Heading of quaternions: psi = atan2(2 (w z + x y), w^2 + x^2 - y^2 - z^2); their length does not matter."""
+    """Heading of quaternions of any length: psi = atan2(2 (w z + x y), w^2 + x^2 - y^2 - z^2)."""
     x, y, z, w = (block.values[f"{path}.{k}"] for k in "xyzw")
     psi = np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
     return np.where(x * x + y * y + z * z + w * w > 0, psi, np.nan)

@@ -15,8 +15,9 @@ HEADING_RAD, TURN_RAD_S = 0.8, 3.0
 def find_jumps(t: np.ndarray, x: np.ndarray, y: np.ndarray, psi: np.ndarray) -> np.ndarray:
     """(N,) bool: pose far from the median of its neighbours in time.
 
-    Sample i jumps if |p_i - median_j p_j| > POSITION + SPEED dt or |median_j wrap(psi_j - psi_i)| > HEADING + TURN dt, where
-    j runs over the finite neighbours and dt is their median distance in time. Up to three bad frames in a row are found.
+    Sample i jumps if |p_i - median_j p_j| > POSITION + SPEED dt or |median_j wrap(psi_j - psi_i)| > HEADING
+    + TURN dt, where j runs over the finite neighbours and dt is their median distance in time. Up to three
+    bad frames in a row are found.
 
     Args:
         t, x, y, psi: (N,) in order of arrival [s, m, m, rad], NaN allowed (never a jump).

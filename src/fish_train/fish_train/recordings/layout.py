@@ -1,9 +1,10 @@
 """Where the fields of a serialised message lie, and decoding of many messages of one layout at once.
 
-Messages of one topic nearly always have the same size, the same strings and the same sequence lengths; only numbers
-change. So the fields are located once, in the first message, by walking its type definition (CDR as in OMG DDSI-RTPS
-10.5 with the alignment rules of XCDR1; ROS 1 serialisation without alignment), and all messages that agree with it
-in every structural byte are decoded as one numpy array. The others form layouts of their own.
+Messages of one topic nearly always have the same size, the same strings and the same sequence lengths; only
+numbers change. So the fields are located once, in the first message, by walking its type definition (CDR as
+in OMG DDSI-RTPS 10.5 with the alignment rules of XCDR1; ROS 1 serialisation without alignment), and all
+messages that agree with it in every structural byte are decoded as one numpy array. The others form layouts
+of their own.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""A rosbag2 recording in MCAP that survives a kill: finished chunks are on disk, the rest is at most `chunk_s` old.
+"""A rosbag2 recording in MCAP that survives a kill: what is older than `chunk_s` is on disk.
 
     magic | Header | Schema, Channel ... | Chunk, MessageIndex ... | DataEnd | summary | Footer | magic
 
-Schemas and channels are written when a topic appears, chunks when they are full or old enough, and every write goes
-to the operating system at once, so that a killed process loses the open chunk only. When the disk is full the file is
-cut back to the last whole record and closed with what space is left; a reserve file keeps a little for that.
+Schemas and channels are written when a topic appears, chunks when they are full or old enough, and every
+write goes to the operating system at once, so that a killed process loses the open chunk only. When the
+disk is full the file is cut back to the last whole record and closed with what space is left; a reserve
+file keeps a little for that.
 Source: MCAP specification (mcap.dev/spec); records are those of the mcap package.
 """
 
@@ -240,7 +241,7 @@ class McapRecording:
             raise DiskFullError(f"{self.directory}: no room for a recording: {error.strerror}") from error
 
     def _close_full(self) -> None:
-        """End the file on a full disk: with the summary if it fits into the reserve, else with the bare footer."""
+        """End the file on a full disk: with the summary if it fits into the reserve, else without."""
         (self.directory / RESERVE_NAME).unlink(missing_ok=True)
         bare = _records(DataEnd(0), Footer(0, 0, 0)) + MCAP0_MAGIC
         for ending in (self._ending(), bare, b""):

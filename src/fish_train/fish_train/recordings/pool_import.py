@@ -1,8 +1,9 @@
 """Importer of the real robot's ROS 1 bags (own message types) into recordings in the project's format.
 
-What the fields mean and how the robot's axes and clocks lie is said in the data's own README; here it is a table of
-constants and one function per topic. Robot and recorder are brought on the recorder's clock; nothing else is corrected:
-frames that the camera program lost (NaN) or took wrongly stay in, and the reader flags them.
+What the fields mean and how the robot's axes and clocks lie is said in the data's own README; here it is a
+table of constants and one function per topic. Robot and recorder are brought on the recorder's clock;
+nothing else is corrected: frames that the camera program lost (NaN) or took wrongly stay in, and the reader
+flags them.
 """
 
 from __future__ import annotations

@@ -1,12 +1,14 @@
 """The real robot's rotor command, rebuilt from what its ROS 1 recordings hold.
 
-The bags carry amplitude A and frequency f of every control loop, but not the speed sent to the motor. Every loop at time
-t_j advances a phase and sends one speed, which the motor holds until the next:
+The bags carry amplitude A and frequency f of every control loop, but not the speed sent to the motor. Every
+loop at time t_j advances a phase and sends one speed, which the motor holds until the next:
 
-    theta_j = theta_{j-1} + 2 pi f_j (t_j - t_{j-1}),   phi_dot = -A_j 2 pi f_j sin(theta_j + delta(t)),  first-order lag tau
+    theta_j = theta_{j-1} + 2 pi f_j (t_j - t_{j-1}),   phi_dot = -A_j 2 pi f_j sin(theta_j + delta(t)),
+    first-order lag tau
 
-The robot's own loop times are not exact, so theta slips by a slow delta(t): straight pieces, fitted with tau to the speed
-that the encoder measured. The minus sign: the motor turns clockwise for positive speed, REP 103 counts the other way.
+The robot's own loop times are not exact, so theta slips by a slow delta(t): straight pieces, fitted with
+tau to the speed that the encoder measured. The minus sign: the motor turns clockwise for positive speed,
+REP 103 counts the other way.
 """
 
 from __future__ import annotations

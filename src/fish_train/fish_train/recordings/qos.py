@@ -1,4 +1,4 @@
-"""Quality of service as recordings store it: the few policies that decide whether publisher and subscriber meet."""
+"""Quality of service as recordings store it: what decides whether publisher and subscriber meet."""
 
 from __future__ import annotations
 

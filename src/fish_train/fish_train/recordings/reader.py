@@ -113,7 +113,7 @@ class _Assembly:
         return mapped
 
     def stamps(self, rule: TopicRule, decoded: Decoded) -> Stamps | None:
-        """Stamps to go by; None where the map says arrival, there is no header, or the stamps were never set."""
+        """Stamps to go by; None where the map says arrival, there is no header, or stamps were never set."""
         if rule.time == "arrival" or decoded.stamp_ns is None:
             return None
         if len(decoded.stamp_ns) > 2 and not np.ptp(decoded.stamp_ns):

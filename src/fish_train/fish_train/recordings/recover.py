@@ -1,8 +1,8 @@
 """Mend an MCAP recording that was cut off or damaged: save every whole message, say what is lost.
 
-A file is walked record by record from its start, without its (missing) index. A chunk that is cut is read as far as it
-goes; a chunk whose checksum or compression is wrong is skipped; the walk ends where a record runs past the end of the
-file or where bytes make no sense.
+A file is walked record by record from its start, without its (missing) index. A chunk that is cut is read
+as far as it goes; a chunk whose checksum or compression is wrong is skipped; the walk ends where a record
+runs past the end of the file or where bytes make no sense.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def _files(path: Path) -> list[Path]:
     files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
     if not files or files[0].suffix != ".mcap":
         raise RecordingError(
-            f"{path}: expected an .mcap file or a folder with one; a sqlite3 recording that was cut off is lost, "
+            f"{path}: expected an .mcap file or a folder with one; a sqlite3 recording cut off is lost, "
             "a ROS 1 bag is mended by 'rosbag reindex'"
         )
     return files
@@ -173,7 +173,8 @@ def _take_chunk(walk: Walk, body: bytes, position: int, cut: bool) -> None:
     if cut:
         saved = len(walk.messages) - before
         walk.lost.append(
-            f"{walk.path.name}: the chunk at byte {position} is cut; its first {saved} messages are saved, the rest is lost"
+            f"{walk.path.name}: the chunk at byte {position} is cut; its first {saved} messages are saved, "
+            "the rest is lost"
         )
 
 

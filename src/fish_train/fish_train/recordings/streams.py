@@ -50,7 +50,7 @@ def decode_topic(raw: RawTopic, role: Role, types: Typesdict, ros1: bool) -> Dec
 
 
 def stamps_of_prefixes(raw: RawTopic, types: Typesdict, ros1: bool) -> np.ndarray | None:
-    """Header stamps of messages of which only the first bytes were kept, (N,) int64 ns; None without a header."""
+    """Header stamps of messages of which the first bytes were kept, (N,) int64 ns; None without a header."""
     definition = types.get(raw.type)
     if definition is None or not definition[1] or definition[1][0][1][1] != "std_msgs/msg/Header":
         return None
@@ -64,7 +64,7 @@ def stamps_of_prefixes(raw: RawTopic, types: Typesdict, ros1: bool) -> np.ndarra
 
 
 def decode_paths(raw: RawTopic, ros1: bool) -> list[tuple[np.ndarray, str]]:
-    """Points (P, 2) and frame of every nav_msgs/Path; through rosbags, since lengths vary and paths are rare."""
+    """Points (P, 2) and frame of every nav_msgs/Path, through rosbags: lengths vary and paths are rare."""
     store = typestore(ros1)
     read = store.deserialize_ros1 if ros1 else store.deserialize_cdr
     paths = []

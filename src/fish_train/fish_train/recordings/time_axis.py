@@ -63,9 +63,10 @@ class TimeAxis:
 def build_axis(stamps: list[Stamps], first_arrival_ns: int, max_latency_s: float) -> TimeAxis:
     """Compare every clock with the recorder's and choose the axis.
 
-    A clock whose shortest latency lies in 0..max_latency_s is taken for the recorder's: the offset cannot be told from
-    latency then and nothing is moved. Otherwise its stamps are moved by the estimate. If that clock is the robot's (two
-    machines, or simulation time against wall time), the axis is the robot's and arrivals are moved instead.
+    A clock whose shortest latency lies in 0..max_latency_s is taken for the recorder's: the offset cannot
+    be told from latency then and nothing is moved. Otherwise its stamps are moved by the estimate. If that
+    clock is the robot's (two machines, or simulation time against wall time), the axis is the robot's and
+    arrivals are moved instead.
     """
     clocks = {}
     for name in dict.fromkeys(s.clock for s in stamps):

@@ -1,4 +1,4 @@
-"""Which topic plays which role, on which clock and in which frame: the default of RECORDING.md, or a YAML file."""
+"""Which topic plays which role, on which clock and in which frame: the default names, or a YAML file."""
 
 from __future__ import annotations
 

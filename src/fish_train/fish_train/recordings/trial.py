@@ -1,11 +1,12 @@
 """The typed data set: what a recording becomes, numpy arrays on one time axis.
 
-Time: every `t` is float64 seconds from `Trial.origin_ns`, the moment of measurement (header stamp, mapped to the
-trial's axis if its clock is another one; arrival time for messages without a header). `t_arrival` is the moment
-the recorder got the message, on the same axis. Values may be slightly negative.
+Time: every `t` is float64 seconds from `Trial.origin_ns`, the moment of measurement (header stamp, mapped
+to the trial's axis if its clock is another one; arrival time for messages without a header). `t_arrival` is
+the moment the recorder got the message, on the same axis. Values may be slightly negative.
 
-Frames: "pool" is REP 103 (x along the pool, y left, z up, origin in its middle); "base_link" is the head's centre of
-mass, x forward, y left, z up; "imu_link" has base_link's axes. Angles in rad, counter-clockwise positive seen from above.
+Frames: "pool" is REP 103 (x along the pool, y left, z up, origin in its middle); "base_link" is the head's
+centre of mass, x forward, y left, z up; "imu_link" has base_link's axes. Angles in rad, counter-clockwise
+positive seen from above.
 
 Samples stand in order of arrival and none is left out. `flags` says what is wrong with each (0 = nothing);
 `Stream.clean()` and `Trial.clean()` return the unflagged samples in order of time, which is what fits need.
@@ -230,7 +231,7 @@ class Trial:
         return self.reference_paths[-1].points if self.reference_paths else None
 
     def clean(self) -> Trial:
-        """The same trial without flagged samples, every stream in order of time; empty streams become None."""
+        """The same trial without flagged samples, streams in order of time; empty streams become None."""
         cleaned = {name: stream.clean() for name, stream in self.streams.items()}
         return replace(self, **{name: stream if len(stream) else None for name, stream in cleaned.items()})
 
