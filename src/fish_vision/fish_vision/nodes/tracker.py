@@ -17,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
@@ -31,6 +31,8 @@ from fish_vision.statistics import Statistics
 from fish_vision.tracker import Detection, Tracker
 
 QUEUE = 10
+# a late image is worse than a lost one
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 UNKNOWN = 1e6  # variance of what an overhead camera does not see: z, roll, pitch
 
 
@@ -59,7 +61,7 @@ class TrackerNode(Node):
             if self._config.use_raw
             else (CompressedImage, "camera/image_raw/compressed")
         )
-        self.create_subscription(kind, topic, self._on_image, qos_profile_sensor_data)
+        self.create_subscription(kind, topic, self._on_image, NEWEST)
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_info(self, msg: CameraInfo) -> None:
