@@ -4,9 +4,9 @@
     e_psi = wrap(chi(s) - <psi>)     heading [rad]; <psi>: mean over one stroke of the rotor (0.5 s)
     e_u   = u_ref - u                speed [m/s], the head's surge speed, each stroke's ripple included
 
-The approach phase lasts from the start until, for the first time, the head is within 0.05 m of the path, the
-heading within 0.3 rad of the path's and the surge speed within 20 % of the commanded one (both averaged over a
-stroke), while the path is being followed (progress > 0). A run on an open path ends where its path ends.
+The approach phase lasts until, for the first time, the head is within 0.05 m of the path, the heading
+within 0.3 rad of the path's and the surge speed within 20 % of the commanded one (both averaged over a
+stroke), while it follows the path (progress > 0). A run on an open path ends where its path ends.
 Frame: pool. Errors are wanted minus actual, the cross-track error apart. Source: this project.
 """
 
@@ -22,6 +22,7 @@ from fish_control.reference_path import ReferencePath
 
 from .errors import UserError
 from .recordings.trial import Odometry, Trial
+from .recordings.trial import ReferencePath as RecordedPath
 
 Array = NDArray[np.float64]
 
@@ -108,12 +109,22 @@ def score_trial(trial: Trial) -> RunScore:
         raise UserError(f"{trial.name}: reference/path was not recorded; nothing to score against")
     if trial.reference_speed is None:
         raise UserError(f"{trial.name}: reference/speed was not recorded; nothing to score against")
-    given = trial.reference_paths[-1]
+    given = _last_path(trial)
     speeds = trial.reference_speed.speed
     if not np.any(speeds > 0.0):
         raise UserError(f"{trial.name}: the commanded speed was never above 0; nothing to score")
     speed = float(speeds[speeds > 0.0][-1])  # 0 is said at the end of the path
     return score_motion(motion, path_from_points(given.points), speed, given.t, source)
+
+
+def _last_path(trial: Trial) -> RecordedPath:
+    """The last path, since it was first given: a planner that is started again says it again."""
+    *earlier, last = trial.reference_paths
+    for path in reversed(earlier):
+        if not np.array_equal(path.points, last.points):
+            break
+        last = path
+    return last
 
 
 def path_from_points(points: Array) -> ReferencePath:

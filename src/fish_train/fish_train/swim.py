@@ -18,6 +18,7 @@ from .processes import NodeProcess, NodeProcesses
 
 START_TIMEOUT = 30.0  # s in which each thing that is waited for must come
 LOOK_PERIOD = 0.1  # s between looks at the robot
+LAST_LOOK = 0.5  # s after the end of the path: the estimate may be there a little before the fish
 
 
 class Sight(Protocol):
@@ -98,6 +99,7 @@ def _follow(
             f"{on_path.progress:.2f} of {path.length:.2f} m"
         )
         if on_path.finished:
+            listen(LAST_LOOK)
             return "at the end of the path"
         if path.closed and on_path.progress - lap_start >= path.length:
             return "after one lap"

@@ -1,12 +1,15 @@
 """The score of a run against motions whose errors are known by construction."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fish_control.paths import make_path
 from fish_control.reference_path import ReferencePath
 from fish_train.errors import UserError
-from fish_train.recordings.trial import Odometry, Trial
+from fish_train.recordings.trial import Odometry, ReferenceSpeed, Trial
+from fish_train.recordings.trial import ReferencePath as RecordedPath
 from fish_train.score import Summary, path_from_points, score_motion, score_trial, stroke_mean
 
 STRAIGHT = ReferencePath.from_points([[-1.0, 0.0], [1.0, 0.0]], name="straight")
@@ -106,3 +109,23 @@ def test_what_is_missing_is_named(tmp_path):
     trial = Trial(name="a", path=tmp_path, origin_ns=0, duration=1.0, namespace="/fish", axis="robot")
     with pytest.raises(UserError, match="odometry"):
         score_trial(trial)
+
+
+def test_a_path_that_is_said_again_does_not_start_the_run_anew(tmp_path):
+    t = np.arange(0.0, 11.0, 0.01)
+    line = RecordedPath(0.0, STRAIGHT.points, "pool")
+    other = RecordedPath(0.0, STRAIGHT.points + 0.5, "pool")
+    common = dict(path=tmp_path, origin_ns=0, duration=11.0, namespace="/fish", axis="robot")
+    truth = motion(t, -1.0 + 0.2 * t, 0.01, 0.0, 0.2)
+    speed = ReferenceSpeed(
+        topic="s",
+        frame_id="",
+        t=t[:2],
+        t_arrival=t[:2],
+        flags=np.zeros(2, np.uint8),
+        speed=np.array([0.2, 0.0]),
+    )
+    paths = (other, replace(line, t=0.5), replace(line, t=5.0))
+    score = score_trial(Trial(name="a", truth=truth, reference_speed=speed, reference_paths=paths, **common))
+    assert score.t[0] == pytest.approx(0.5) and score.finished
+    assert score.reference_speed == 0.2

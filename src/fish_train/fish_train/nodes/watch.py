@@ -71,8 +71,9 @@ class WatchNode(Node):
 
     def _on_diagnostics(self, msg: DiagnosticArray) -> None:
         for status in msg.status:
-            self.diagnostics[status.name] = {item.key: item.value for item in status.values}
-            self.levels[status.name] = (int.from_bytes(status.level), status.message)
+            name = status.name.lstrip("/")
+            self.diagnostics[name] = {item.key: item.value for item in status.values}
+            self.levels[name] = (int.from_bytes(status.level), status.message)
 
 
 @contextmanager

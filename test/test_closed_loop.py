@@ -1,0 +1,146 @@
+"""Real nodes in closed loop: a path is followed, killed nodes resume, a replay gives the same odometry."""
+
+import math
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import CONTROLLER, FUSION, PLANNER, RECORDER, Run, parameters, running
+from rosbags.highlevel import AnyReader
+
+from fish_train.bringup import REPLAYER
+from fish_train.recordings import read_trial
+from fish_train.score import RunScore, score_trial
+
+SINUSOID = "{amplitude: 0.25, length: 2.0}"
+START = (-1.0, 0.0, math.atan(0.25 * math.pi))  # where the sinusoid begins, along it
+CROSS_TRACK_RMSE, SPEED_RMSE = 0.03, 0.04  # m, m/s; on a quiet computer 0.010 and 0.024
+RESUMED_WITHIN = 0.3  # m off the path at most, while a node is being started again and the fish glides
+
+
+@pytest.fixture(scope="module")
+def swum(tmp_path_factory) -> Path:
+    """A recording of the sinusoid from end to end."""
+    folder = tmp_path_factory.mktemp("swum")
+    with running(folder, parameters(folder, "sinusoid", SINUSOID, START, factor=1.5)) as run:
+        run.until(run.finished, "the end of the path")
+        run.listen(0.5)  # the estimate may be there a little before the fish
+        run.nodes.stop([RECORDER])
+    return folder / "recording"
+
+
+@pytest.fixture(scope="module")
+def score(swum) -> RunScore:
+    return score_trial(read_trial(swum))
+
+
+def test_the_path_is_followed_to_its_end(score):
+    assert score.source == "truth" and score.finished
+
+
+def test_errors_are_as_small_as_stated(score):
+    settled = score.summaries(with_approach=False)
+    assert settled["cross-track, m"].rmse < CROSS_TRACK_RMSE
+    assert settled["speed, m/s"].rmse < SPEED_RMSE
+
+
+def test_the_estimate_is_close_to_the_truth(swum):
+    t, estimate = odometry(swum, "/fish/odometry/filtered")
+    t_true, truth = odometry(swum, "/fish/sim/odometry")
+    expected = np.column_stack([np.interp(t, t_true, column) for column in truth.T])
+    rms = np.sqrt(np.mean((estimate - expected) ** 2, axis=0))
+    assert rms[0] < 0.005 and rms[1] < 0.005  # m; the camera's noise is 0.002 m
+    assert rms[2] < 0.03  # rad; 0.012 rad
+
+
+def test_a_replay_through_fusion_gives_the_same_odometry(swum, tmp_path):
+    settings = {
+        RECORDER: {"output": str(tmp_path), "name": "recording", "topics": ["odometry/filtered"]},
+        FUSION: {"use_sim_time": True},
+        REPLAYER: {
+            "recording": str(swum),
+            "topics": ["camera/pose", "imu/data", "joint_states", "/clock"],
+            "start_delay_s": 2.0,
+        },
+    }  # fmt: skip
+    with running(tmp_path, settings, swims=False) as run:
+        assert run.nodes.running[REPLAYER].wait(60.0) == 0
+        run.nodes.stop([RECORDER])
+    t, recorded = odometry(swum, "/fish/odometry/filtered")
+    t_again, replayed = odometry(tmp_path / "recording", "/fish/odometry/filtered")
+    common = (t > t_again[0] + 1.0) & (t < t_again[-1])  # after the filter has started
+    assert np.count_nonzero(common) > 0.7 * len(t)
+    difference = recorded[common] - np.column_stack(
+        [np.interp(t[common], t_again, column) for column in replayed.T]
+    )
+    # the same measurements, in batches of other sizes: differences are far below the sensors' noise
+    assert np.abs(difference[:, :2]).max() < 0.002
+    assert np.abs(difference[:, 2]).max() < 0.01
+
+
+@pytest.mark.parametrize("spec", [PLANNER, FUSION, CONTROLLER], ids=lambda spec: spec.executable)
+def test_a_killed_node_resumes(spec, resumed):
+    before, after = resumed.places[spec]
+    assert (
+        before - 0.05 < after < before + 0.5
+    )  # m: goes on where it was, not from the beginning, nothing left out
+
+
+def test_a_run_with_kills_ends_where_the_path_ends(resumed):
+    score = score_trial(read_trial(resumed.recording))
+    assert score.finished
+    assert np.abs(score.cross_track).max() < RESUMED_WITHIN
+
+
+class Resumed:
+    """What was seen of a run in which nodes were killed."""
+
+    def __init__(self, recording: Path) -> None:
+        self.recording = recording
+        self.places: dict[object, tuple[float, float]] = {}
+
+
+@pytest.fixture(scope="module")
+def resumed(tmp_path_factory) -> Resumed:
+    """The sinusoid again; planner, fusion and controller are killed on the way, one after the other."""
+    folder = tmp_path_factory.mktemp("resumed")
+    seen = Resumed(folder / "recording")
+    with running(folder, parameters(folder, "sinusoid", SINUSOID, START, factor=1.0)) as run:
+        for spec, place in ((PLANNER, 0.4), (FUSION, 0.9), (CONTROLLER, 1.4)):
+            run.until(lambda place=place: run.progress() > place, f"progress of {place} m")
+            seen.places[spec] = kill_and_restart(run, spec)
+        run.until(run.finished, "the end of the path")
+        run.listen(0.5)  # the estimate may be there a little before the fish
+        run.nodes.stop([RECORDER])
+    return seen
+
+
+def kill_and_restart(run: Run, spec) -> tuple[float, float]:
+    """Progress [m] at the kill, and when the planner says it after the fish has swum on for 0.1 m."""
+    process = run.nodes.running[spec]
+    process.signal(signal.SIGKILL)
+    assert process.wait(5.0) == -signal.SIGKILL
+    before = run.progress()
+    run.watch.diagnostics.clear()
+    run.start(spec)
+    run.until(lambda: run.progress() > before + 0.1, f"swimming on after the end of {spec.name}")
+    run.until(lambda: "progress_m" in run.watch.diagnostics.get("fish/planner", {}), "the planner's word")
+    return before, float(run.watch.diagnostics["fish/planner"]["progress_m"])
+
+
+def odometry(recording: Path, topic: str) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps (N,) [s] and x, y, heading (N, 3) of a topic, read with rosbags alone."""
+    times, poses = [], []
+    with AnyReader([recording]) as reader:
+        connections = [c for c in reader.connections if c.topic == topic]
+        for connection, _, data in reader.messages(connections=connections):
+            message = reader.deserialize(data, connection.msgtype)
+            stamp, pose = message.header.stamp, message.pose.pose
+            times.append(stamp.sec + 1e-9 * stamp.nanosec)
+            heading = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
+            poses.append([pose.position.x, pose.position.y, heading])
+    order = np.argsort(times)
+    poses = np.array(poses)[order]
+    poses[:, 2] = np.unwrap(poses[:, 2])
+    return np.array(times)[order], poses
