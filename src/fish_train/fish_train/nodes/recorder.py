@@ -56,7 +56,7 @@ class RecorderNode(Node):
         offered = [
             from_profile(info.qos_profile)
             for info in self.get_publishers_info_by_topic(topic)
-            if info.topic_type == msgtype and info.node_name != self.get_name()
+            if info.topic_type == msgtype
         ]
         if not offered or key in self._refused:
             return
