@@ -1,0 +1,61 @@
+"""Who may import whom, and the house style that tools can check."""
+
+import ast
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("fish_sim", "fish_vision", "fish_control", "fish_hw", "fish_train")
+MAY_IMPORT = {"fish_train": {"fish_sim", "fish_control"}}  # the other four meet through topics
+ROS = ("rclpy", "rcl_interfaces", "launch", "launch_ros", "rosgraph_msgs", "builtin_interfaces")
+GRAPH_FOLDERS = ("nodes", "launch", "test")
+GRAPH_COMMANDS = ()  # commands that need a graph; those there are go through nodes/
+SOURCES = [path for name in PACKAGES for path in sorted((ROOT / "src" / name).rglob("*.py"))]
+
+
+def imported(path):
+    """(line, top-level package) of everything a file imports, wherever it stands."""
+    for node in ast.walk(ast.parse(path.read_text(), str(path))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name.split(".")[0]) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.lineno, node.module.split(".")[0]
+
+
+def is_ros(name):
+    return name in ROS or name.endswith(("_msgs", "_srvs"))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_packages_import_only_what_they_may(package):
+    foreign = set(PACKAGES) - {package} - MAY_IMPORT.get(package, set())
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line} imports {name}"
+        for path in SOURCES
+        if path.relative_to(ROOT / "src").parts[0] == package
+        for line, name in imported(path)
+        if name in foreign
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_only_nodes_know_ros():
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line} imports {name}"
+        for path in SOURCES
+        if not set(GRAPH_FOLDERS) & set(path.relative_to(ROOT / "src").parts) and path.stem not in GRAPH_COMMANDS
+        for line, name in imported(path)
+        if is_ros(name)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("check", [["check"], ["format", "--check"]], ids=["ruff check", "ruff format"])
+def test_ruff(check):
+    program = shutil.which("ruff", path=f"{Path(sys.executable).parent}")
+    result = subprocess.run([program, *check, "--quiet", "."], cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr

@@ -1,0 +1,112 @@
+"""The demo as a user starts it: all nodes with rendered images; and bad input, one line each."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import time
+
+import pytest
+from ament_index_python.packages import get_package_prefix
+
+from fish_train.domain import choose_domain, discovery_port, domain_in_use
+
+PROGRAM = f"{get_package_prefix('fish_train')}/lib/fish_train/fish_train"
+
+
+def demo(folder, *arguments, limit_s=90):
+    """Run `fish_train demo` in a folder."""
+    command = [PROGRAM, "demo", *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=limit_s)
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    """A short demo: its output and its folder."""
+    folder = tmp_path_factory.mktemp("demo")
+    domain = choose_domain()
+    result = demo(
+        folder, "--letter", "S", "--speed", 0.2, "--duration", 10, "--domain", domain, "--out", "run"
+    )
+    assert result.returncode == 0, result.stderr + result.stdout
+    return result.stdout, folder / "run", domain
+
+
+def test_the_fish_swims_on_its_path(shown):
+    output, *_ = shown
+    rmse = float(re.search(r"cross-track, m +([\d.]+)", output)[1])
+    assert rmse < 0.05  # m; on a quiet computer below 0.015
+
+
+def test_latency_and_cpu_of_every_node_are_shown(shown):
+    output, *_ = shown
+    assert float(re.search(r"latency_p99_ms +([\d.]+)", output)[1]) > 0.0
+    for name in ("simulator", "camera", "tracker", "fusion", "planner", "controller", "recorder"):
+        assert re.search(rf"/{name} +\d+ %", output)
+
+
+def test_recording_and_page_are_there(shown):
+    _, folder, _ = shown
+    assert (folder / "recording" / "metadata.yaml").exists()
+    page = (folder / "report.html").read_text()
+    assert "Path in the pool" in page and not re.search(r"<(script|link|img)[^>]+(src|href)=", page)
+
+
+def test_nothing_is_left_running(shown):
+    *_, domain = shown
+    assert not domain_in_use(domain)
+
+
+def test_sigterm_ends_the_demo_and_its_nodes(tmp_path):
+    domain = choose_domain()
+    with subprocess.Popen(
+        [PROGRAM, "demo", "--domain", str(domain), "--out", "run"],
+        cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        deadline = time.monotonic() + 30.0
+        while not (tmp_path / "run" / "logs" / "fish_control.controller.log").exists():
+            assert time.monotonic() < deadline and process.poll() is None, "the demo did not start"
+            time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+        errors = process.communicate(timeout=40)[1]
+    assert "Traceback" not in errors
+    assert not domain_in_use(domain)
+
+
+BROKEN = "weights.safetensors"
+BAD_INPUT = {
+    "letter": (["--letter", "?"], "unknown letter '?'; known: A B C"),
+    "speed": (["--speed", "9"], "expected 0.05 to 0.5"),
+    "duration": (["--duration", "-1"], "expected a positive number"),
+    "domain": (["--domain", "500"], "0 to 232"),
+    "weights": (["--weights", BROKEN], "not a safetensors file"),
+    "robot": (["--robot", "absent.yaml"], "absent.yaml"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "expected"), BAD_INPUT.values(), ids=BAD_INPUT)
+def test_bad_input_is_one_line(arguments, expected, tmp_path):
+    (tmp_path / BROKEN).write_text(json.dumps("not weights"))
+    assert_one_line(demo(tmp_path, *arguments), expected)
+
+
+def test_a_domain_in_use_is_one_line(tmp_path):
+    domain = choose_domain()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("", discovery_port(domain, 0)))
+        assert_one_line(demo(tmp_path, "--domain", domain), f"ROS domain {domain} is in use")
+
+
+def test_an_output_folder_with_something_in_it_is_kept(tmp_path):
+    (tmp_path / "precious").write_text("mine")
+    assert_one_line(demo(tmp_path, "--out", "."), "not empty")
+    assert os.listdir(tmp_path) == ["precious"]
+
+
+def assert_one_line(result, expected):
+    assert result.returncode != 0
+    assert "Traceback" not in result.stderr + result.stdout
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert expected in result.stderr

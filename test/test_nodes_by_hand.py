@@ -1,0 +1,58 @@
+"""Every node of the robot runs alone by hand, says how it is, and ends with 0 on SIGINT and on SIGTERM."""
+
+import signal
+import time
+from contextlib import ExitStack
+
+import pytest
+from conftest import PATIENCE
+
+from fish_train.bringup import RECORDER, ROBOTS
+from fish_train.domain import domain_in_use
+from fish_train.nodes.watch import watching
+from fish_train.processes import NodeProcesses
+
+NODES = ROBOTS["sim"]
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+END_WITHIN = 5.0  # s
+
+
+@pytest.fixture(scope="module", params=SIGNALS, ids=lambda number: number.name)
+def ended(request, tmp_path_factory):
+    """Every node started alone, on a domain of its own, until it published diagnostics; then the signal.
+
+    Returns what each said of itself and its exit status.
+    """
+    folder = tmp_path_factory.mktemp(request.param.name)
+    said, status = {}, {}
+    with ExitStack() as stack:
+        started = {}
+        for domain, spec in zip(free_domains(len(NODES)), NODES, strict=True):
+            nodes = stack.enter_context(NodeProcesses(domain, folder / "logs"))
+            settings = {"output": str(folder), "name": "recording"} if spec == RECORDER else {}
+            started[spec] = (nodes.start(spec, settings), *stack.enter_context(watching(domain)))
+        deadline = time.monotonic() + PATIENCE
+        while len(said) < len(NODES) and time.monotonic() < deadline:
+            for spec, (_, watch, listen) in started.items():
+                listen(0.02)
+                if f"fish/{spec.executable}" in watch.levels:
+                    said[spec] = watch.levels[f"fish/{spec.executable}"]
+        for process, *_ in started.values():
+            process.signal(request.param)
+        for spec, (process, *_) in started.items():
+            status[spec] = process.wait(END_WITHIN)
+    return said, status
+
+
+@pytest.mark.parametrize("spec", NODES, ids=lambda spec: spec.name)
+def test_a_node_runs_alone_and_ends_with_0(spec, ended):
+    said, status = ended
+    assert spec in said, "no diagnostics"
+    assert said[spec][1], "diagnostics without words"
+    assert status[spec] == 0
+
+
+def free_domains(count):
+    free = [domain for domain in range(1, 102) if not domain_in_use(domain)]
+    assert len(free) >= count, "too few free ROS domains"
+    return free[-count:]
