@@ -44,18 +44,20 @@ def gentle(commands):
     return np.stack([commands[:, 0], rudder], axis=-1)
 
 
-def case(effects):
-    robot = Robot(effects=effects)
+def case(effects, links=3):
+    robot = Robot(links=links, effects=effects)
     stepper = Stepper(robot.structure, compiled=False)
     start = stepper.rest(MOVING)
-    size = 6
-    start[size : size + 6] = (0.2, 0.03, 0.1, 0.3, 0.5, 0.4)  # moving, so that no |u| u sits on its kink
+    size = 3 + links
+    start[size : 2 * size] = (0.2, 0.03, 0.1, 0.3, 0.5, 0.4)[
+        :size
+    ]  # moving, so that no |u| u sits on its kink
     return stepper, start, stepper.parameters(robot)
 
 
 @pytest.mark.parametrize("name", ["nominal", *EFFECTS])
 def test_tangents_equal_finite_differences_and_adjoints_equal_tangents(name, strokes):
-    stepper, start, p = case({} if name == "nominal" else {name: typical(name)})
+    stepper, start, p = case({}) if name == "nominal" else case({name: typical(name)}, links=1)
     names = parameter_names(stepper.layout.structure)
     indices = [k for k, n in enumerate(names) if name == "nominal" or n.startswith(name + ".")]
     # steps reach the servo's rate limit, a nominal parameter; gentle turns let servo effects show
