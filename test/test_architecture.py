@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -13,7 +14,6 @@ PACKAGES = ("fish_sim", "fish_vision", "fish_control", "fish_hw", "fish_train")
 MAY_IMPORT = {"fish_train": {"fish_sim", "fish_control"}}  # the other four meet through topics
 ROS = ("rclpy", "rcl_interfaces", "launch", "launch_ros", "rosgraph_msgs", "builtin_interfaces")
 GRAPH_FOLDERS = ("nodes", "launch", "test")
-GRAPH_COMMANDS = ()  # commands that need a graph; those there are go through nodes/
 SOURCES = [path for name in PACKAGES for path in sorted((ROOT / "src" / name).rglob("*.py"))]
 
 
@@ -30,15 +30,23 @@ def is_ros(name):
     return name in ROS or name.endswith(("_msgs", "_srvs"))
 
 
+def may_import(package, path):
+    """Packages of the project that a file may import; tests also what package.xml declares for them."""
+    allowed = {package} | MAY_IMPORT.get(package, set())
+    if "test" in path.relative_to(ROOT / "src").parts:
+        manifest = ElementTree.parse(ROOT / "src" / package / "package.xml")
+        allowed |= {entry.text for entry in manifest.iter("test_depend")}
+    return allowed
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_packages_import_only_what_they_may(package):
-    foreign = set(PACKAGES) - {package} - MAY_IMPORT.get(package, set())
     wrong = [
         f"{path.relative_to(ROOT)}:{line} imports {name}"
         for path in SOURCES
         if path.relative_to(ROOT / "src").parts[0] == package
         for line, name in imported(path)
-        if name in foreign
+        if name in PACKAGES and name not in may_import(package, path)
     ]
     assert not wrong, "\n".join(wrong)
 
@@ -47,7 +55,7 @@ def test_only_nodes_know_ros():
     wrong = [
         f"{path.relative_to(ROOT)}:{line} imports {name}"
         for path in SOURCES
-        if not set(GRAPH_FOLDERS) & set(path.relative_to(ROOT / "src").parts) and path.stem not in GRAPH_COMMANDS
+        if not set(GRAPH_FOLDERS) & set(path.relative_to(ROOT / "src").parts)
         for line, name in imported(path)
         if is_ros(name)
     ]

@@ -56,3 +56,15 @@ def free_domains(count):
     free = [domain for domain in range(1, 102) if not domain_in_use(domain)]
     assert len(free) >= count, "too few free ROS domains"
     return free[-count:]
+
+
+def test_the_simulator_keeps_its_pace_without_a_c_compiler(tmp_path):
+    simulator, domain = NODES[0], free_domains(1)[0]
+    with NodeProcesses(domain, tmp_path / "logs") as nodes, watching(domain) as (watch, listen):
+        nodes.environment["FISH_SIM_NO_COMPILER"] = "1"
+        process = nodes.start(simulator)
+        deadline = time.monotonic() + PATIENCE
+        while not watch.levels.get("fish/simulator", (2, ""))[0] == 0:
+            assert process.status is None, process.last_words()
+            assert time.monotonic() < deadline, watch.levels
+            listen(0.1)
