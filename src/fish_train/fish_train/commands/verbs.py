@@ -11,4 +11,6 @@ VERBS = {
     "inspect": "print and plot what is in a recording",
     "recover": "mend a truncated recording and say what was lost",
     "import_pool": "convert the real robot's ROS 1 bags to recordings in the project's format",
+    "train": "learn the gains through the simulator",
+    "weights": "show what is in a weights file",
 }

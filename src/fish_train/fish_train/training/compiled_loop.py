@@ -13,7 +13,7 @@ from fish_sim.compiled import lanes, library
 from fish_sim.emit import emit
 from fish_sim.step import Stepper, kernel_source
 from fish_train.training.expressions import expressions
-from fish_train.training.fleet import HISTORY, Fleet, WindowResult
+from fish_train.training.fleet import HISTORY, Fleet, WindowResult, check_hold
 from fish_train.training.loop import COST_NAMES, PHYSICS_STEPS, SIZES, Law
 from fish_train.training.network import LAYERS, split, weight_count
 from fish_train.training.path_bank import PathBank
@@ -35,7 +35,7 @@ class _Network(ctypes.Structure):
 
 class _Window(ctypes.Structure):
     _fields_ = [
-        *((name, ctypes.c_long) for name in ("batch", "steps", "gradient")),
+        *((name, ctypes.c_long) for name in ("batch", "steps", "hold", "gradient")),
         *((name, POINTER) for name in (
             "p", "speed", "cost", "noise", "delay", "path", "plant", "memory", "place", "history",
             "report", "gains", "value",
@@ -87,7 +87,7 @@ class CompiledLoop:
         self.set_bank(bank)
         tracker = law.tracker
         self._search = _Search(tracker.search_window, tracker.lookahead, LOOKAHEAD_SEARCH, tracker.capture_distance)
-        self._room = 0
+        self._room: tuple[int, int] | None = None
 
     @classmethod
     def available(cls) -> bool:
@@ -107,14 +107,23 @@ class CompiledLoop:
         ))  # fmt: skip
 
     def window(
-        self, weights: Array, fleet: Fleet, steps: int, cost: Array, noise: Array | None = None, gradient: bool = True
+        self,
+        weights: Array,
+        fleet: Fleet,
+        steps: int,
+        cost: Array,
+        noise: Array | None = None,
+        gradient: bool = True,
+        hold: int = 1,
     ) -> WindowResult:
-        """Run `steps` periods from the fleet's state, which is advanced in place.
+        """Run `steps` control periods from the fleet's state, which is advanced in place.
 
         weights: flat (W,). cost: (6,) weights of the stage cost. noise: (steps + 1, B, 6) added to what is seen.
+        hold: periods for which the gains of one policy decision are kept; divides steps.
         """
+        check_hold(steps, hold)
         batch = len(fleet)
-        self._make_room(steps)
+        self._make_room(steps, hold)
         weights, cost = np.ascontiguousarray(weights, float), np.ascontiguousarray(cost, float)
         noise = np.zeros((steps + 1, batch, SIZES["motion"])) if noise is None else np.ascontiguousarray(noise, float)
         report = np.empty((steps + 1, batch, SIZES["report"]))
@@ -123,7 +132,7 @@ class CompiledLoop:
             fleet.parameters, fleet.speed, cost, noise, fleet.delay, fleet.path, fleet.plant, fleet.memory,
             fleet.place, fleet.history, report, applied, value,
         )  # fmt: skip
-        window = _Window(batch, steps, int(gradient), *(a.ctypes.data for a in arrays))
+        window = _Window(batch, steps, hold, int(gradient), *(a.ctypes.data for a in arrays))
         total = self._run_blocks(window, weights, gradient)
         return WindowResult(float(value.sum() / (batch * steps)), total, report, applied)
 
@@ -147,12 +156,12 @@ class CompiledLoop:
             np.sum(G, axis=1, out=b)
         return self._block_gradient
 
-    def _make_room(self, steps: int) -> None:
+    def _make_room(self, steps: int, hold: int) -> None:
         """Activation and adjoint matrices and scratch for windows of this length."""
-        if self._room == steps:
+        if self._room == (steps, hold):
             return
-        self._room = steps
-        layers, columns = self.layers, self._width * steps
+        self._room = (steps, hold)
+        layers, columns = self.layers, self._width * steps // hold
         pairs = list(zip(layers[:-1], layers[1:], strict=True))
         self._block_gradient = np.empty(weight_count(layers))
         self._activation = [_aligned(i, columns) for i, _ in pairs]

@@ -62,6 +62,12 @@ class Fleet:
         return Fleet(**{name: value.copy() for name, value in vars(self).items()})
 
 
+def check_hold(steps: int, hold: int) -> None:
+    """A window is a whole number of policy decisions."""
+    if hold < 1 or steps < 1 or steps % hold:
+        raise ValueError(f"hold: got {hold} for a window of {steps} periods; expected a divisor")
+
+
 @dataclass(frozen=True)
 class WindowResult:
     """What a window of T periods cost and showed.

@@ -38,16 +38,16 @@ class PathTable:
         """Sample a path; chord as `PathBatch` has it, for the same lookahead."""
         if tracker.lookahead_mode != "distance":
             raise ValueError(f"lookahead_mode: got {tracker.lookahead_mode!r}; training knows 'distance' only")
-        s = np.arange(len(path.points)) * path.spacing
-        if not path.closed:
-            s = np.r_[s, path.length + path.spacing * np.arange(1, int(EXTENSION / path.spacing) + 1)]
-        points, heading = path.point(s), path.heading_at(s)
-        window = np.arange(0.0, LOOKAHEAD_SEARCH * tracker.lookahead + path.spacing, path.spacing)
-        ahead = leave_circle(path.point(s[:, None] + window), points, tracker.lookahead) - points
+        window = int(np.ceil(LOOKAHEAD_SEARCH * tracker.lookahead / path.spacing)) + 2
+        rows = len(path.points) + (0 if path.closed else int(EXTENSION / path.spacing))
+        s = path.spacing * np.arange(rows + window)
+        points, heading = path.point(s), path.heading_at(s[:rows])
+        view = np.lib.stride_tricks.sliding_window_view(points, window, axis=0)[:rows].swapaxes(1, 2)
+        ahead = leave_circle(view, points[:rows], tracker.lookahead) - points[:rows]
         chord = np.angle(np.exp(1j * (np.arctan2(ahead[:, 1], ahead[:, 0]) - heading)))
         loops = path.end == "loop"
         return cls(
-            rows=np.column_stack([points, heading, path.curvature_at(s), chord]),
+            rows=np.column_stack([points[:rows], heading, path.curvature_at(s[:rows]), chord]),
             spacing=path.spacing,
             count=len(path.points),
             length=path.length,

@@ -13,7 +13,7 @@ from torch import Tensor
 from fish_sim import torch_step
 from fish_sim.ops import torch_ops
 from fish_sim.step import Stepper
-from fish_train.training.fleet import HISTORY, Fleet, WindowResult
+from fish_train.training.fleet import HISTORY, Fleet, WindowResult, check_hold
 from fish_train.training.loop import PHYSICS_STEPS, SIZES, Law, act, drive, motion, sense
 from fish_train.training.network import LAYERS, split
 from fish_train.training.path_bank import PathBank
@@ -35,9 +35,17 @@ class TorchLoop:
         self.bank = bank
 
     def window(
-        self, weights: Array, fleet: Fleet, steps: int, cost: Array, noise: Array | None = None, gradient: bool = True
+        self,
+        weights: Array,
+        fleet: Fleet,
+        steps: int,
+        cost: Array,
+        noise: Array | None = None,
+        gradient: bool = True,
+        hold: int = 1,
     ) -> WindowResult:
         """Run `steps` periods from the fleet's state, which is advanced in place; see `CompiledLoop.window`."""
+        check_hold(steps, hold)
         flat = torch.tensor(weights, requires_grad=gradient)
         noise = np.zeros((steps + 1, len(fleet), SIZES["motion"])) if noise is None else noise
         run = _Window(self, flat, fleet, torch.from_numpy(np.asarray(noise)), tuple(map(float, cost)))
@@ -47,6 +55,8 @@ class TorchLoop:
                 sensed = run.look(t)
                 total = total + (sensed["cost"][0].sum() if t else 0.0)
                 reports.append(_stack(sensed["report"]))
+                if t % hold == 0:
+                    run.decide(sensed)
                 total = total + run.advance(sensed)
                 applied.append(_stack(run.last))
             kept = fleet.place.copy()
@@ -107,11 +117,14 @@ class _Window:
         rows = (torch.cat(seen, dim=-1).unbind(-1), true.unbind(-1), self._guidance, near, real)
         return sense(*rows, self._speed, self._cost, self._loop.law, XP)
 
+    def decide(self, sensed: dict[str, list[Tensor]]) -> None:
+        """Ask the policy."""
+        self._raw = self._policy(_stack(sensed["inputs"])).unbind(-1)
+
     def advance(self, sensed: dict[str, list[Tensor]]) -> Tensor:
-        """Policy, control law and physics of one period; the summed cost of gains and set-points."""
+        """Control law and physics of one period; the summed cost of gains and set-points."""
         law = self._loop.law
-        raw = self._policy(_stack(sensed["inputs"])).unbind(-1)
-        acted = act(sensed["errors"], self._speed, self._control, self.last, raw, self._cost, law, XP)
+        acted = act(sensed["errors"], self._speed, self._control, self.last, self._raw, self._cost, law, XP)
         self._guidance, self._control, self.last = sensed["guidance"], acted["control"], acted["last"]
         for _ in range(PHYSICS_STEPS):
             self._actuator, command = drive(self._actuator, self.last[SIZES["gains"] :], law, XP)

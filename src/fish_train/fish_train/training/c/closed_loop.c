@@ -1,7 +1,8 @@
 /* A window of the closed loop, forward and backward, LANES fish at a time.
 
    Before this text stand fish_sim's kernel (V, step, step_vjp, NS, NC, NP), the functions emitted from
-   expressions.py and mlp.h, path_search.h. One period: sense, policy, act, PHYSICS times (drive, step).
+   expressions.py and mlp.h, path_search.h. One period: sense, policy (every `hold` periods; its gains are kept in
+   between), act, PHYSICS times (drive, step).
    Sizes: NO motion, NU guidance, NK control, NA actuator, NL last, NI inputs, NE errors, NR report, NGAIN gains,
    NCOST cost weights, HISTORY past motions (one a
    physics step) kept for delayed vision. Motions are counted in physics steps from the start of the window. */
@@ -27,7 +28,7 @@ typedef struct {
 } Network;
 
 typedef struct {
-  long batch, steps, gradient;
+  long batch, steps, hold, gradient; /* steps: control periods, a multiple of hold */
   const double *p;          /* (batch, NP) */
   const double *speed;      /* (batch) wanted */
   const double *cost;       /* (NCOST) */
@@ -146,11 +147,12 @@ static void advance_period(const Window *w, const Network *net, long first, long
                            const V *p, V *work, Period *now, Period *next, V *motions_next)
 {
   V driven[NA + NC];
-  policy_forward(net, now->sensed, t * LANES, work, now->raw);
+  if (t % w->hold == 0) policy_forward(net, now->sensed, t / w->hold * LANES, work, now->raw);
   act(now->sensed + NI, speed, now->control, now->last, now->raw, cost, now->acted);
   copy(now->sensed + NI + NE, NU, next->guidance);
   copy(now->acted, NK, next->control);
   copy(now->acted + NK, NL, next->last);
+  copy(now->raw, NGAIN, next->raw);
   scatter(next->last, NL, first, w->batch, w->gains + t * w->batch * NL);
   for (int k = 0; k < PHYSICS; ++k) {
     V *plant = k + 1 < PHYSICS ? now->plant[k + 1] : next->plant[0];
@@ -164,7 +166,7 @@ static void advance_period(const Window *w, const Network *net, long first, long
 }
 
 /* adjoints that travel from period to period */
-typedef struct { V plant[NS], guidance[NU], control[NK], actuator[NA], last[NL]; } Adjoint;
+typedef struct { V plant[NS], guidance[NU], control[NK], actuator[NA], last[NL], raw[PAD(NGAIN)]; } Adjoint;
 
 static void motion_reverse(const V *plant, const V *g_motion, V *g_plant)
 {
@@ -191,8 +193,8 @@ static void advance_reverse(const Window *w, const Network *net, long first, lon
                             const V *p, const V *seed, const V *g_motion, V *work, const Period *now, Adjoint *g,
                             V *gs)
 {
-  V g_command[NC], g_driven[NA + NC], g_actuator[NA], g_setpoint[NC], g_acted[ACT_OUT], g_raw[PAD(NGAIN)],
-    g_errors[NE], gp[NP];
+  V g_command[NC], g_driven[NA + NC], g_actuator[NA], g_setpoint[NC], g_acted[ACT_OUT], g_raw[NGAIN], g_errors[NE],
+    gp[NP];
   zero(gp, NP);
   copy(g->control, NK, g_acted);
   copy(g->last, NL, g_acted + NK);
@@ -207,9 +209,13 @@ static void advance_reverse(const Window *w, const Network *net, long first, lon
     copy(g_actuator, NA, g->actuator);
     add(g_setpoint, NC, g_acted + NK + NGAIN);
   }
-  zero(g_raw, PAD(NGAIN));
   act_vjp(now->sensed + NI, speed, now->control, now->last, now->raw, cost, g_acted, g_errors, g->control, g->last, g_raw);
-  policy_backward(net, g_raw, t * LANES, work, gs);
+  add(g_raw, NGAIN, g->raw);
+  zero(gs, NI);
+  if (t % w->hold == 0) {
+    policy_backward(net, g->raw, t / w->hold * LANES, work, gs);
+    zero(g->raw, NGAIN);
+  }
   copy(g_errors, NE, gs + NI);
   copy(g->guidance, NU, gs + NI + NE);
   zero(gs + NI + NE + NU, NR);

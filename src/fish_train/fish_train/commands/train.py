@@ -1,0 +1,114 @@
+"""Learn the gains by backpropagation through simulator, control law and actuators.
+
+Writes for every seed a folder with the weights file (gains.safetensors), a model card, the training curve (curve.csv,
+TensorBoard events) and a checkpoint from which a killed run continues exactly (--resume). Any key of the recipe
+(config/train.yaml) can be set: --set learning_rate=3e-4 latency=0.1 randomise=0.3
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+import yaml
+from rich.console import Console
+
+from fish_sim.robot import Robot, RobotError, load_robot
+
+from ..errors import UserError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the verb."""
+    parser.add_argument("--out", type=Path, default=Path("training"), help="folder of the runs (default: %(default)s)")
+    parser.add_argument("--config", type=Path, help="recipe, a YAML file; keys left out take their defaults")
+    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="values of the recipe")
+    parser.add_argument("--robot", type=Path, help="robot.yaml or a model.yaml of the diagnosis (default: nominal)")
+    parser.add_argument("--warm-start", type=Path, help="weights file to start from")
+    parser.add_argument("--seed", type=int, default=1, help="first seed (default: %(default)s)")
+    parser.add_argument("--seeds", type=int, default=1, help="number of runs, with consecutive seeds")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="runs side by side (default: %(default)s)")
+    parser.add_argument("--max-seconds", type=float, default=float("inf"), help="stop each run after this time")
+    parser.add_argument("--resume", action="store_true", help="continue runs that were stopped or killed")
+    parser.add_argument("--overwrite", action="store_true", help="replace runs that are there")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Train; 0 when every run finished its recipe."""
+    from ..training.config import load_config, make_config
+    from ..training.display import Display
+    from ..training.run import Job
+    from ..training.seeds import run_all
+
+    if args.seeds < 1 or args.jobs < 1 or args.seed < 0:
+        raise UserError(f"--seed {args.seed} --seeds {args.seeds} --jobs {args.jobs}: expected counts of at least 1")
+    config = make_config({**(load_config(args.config) if args.config else {}), **parse_settings(args.set)})
+    robot = read_robot(args.robot)
+    jobs = [
+        Job(
+            folder=args.out / f"seed_{seed}",
+            config=config,
+            robot=robot,
+            seed=seed,
+            command=shlex.join(["fish_train", "train", *command_line(sys.argv)]),
+            warm_start=args.warm_start,
+            resume=args.resume,
+            overwrite=args.overwrite,
+            max_seconds=args.max_seconds,
+        )
+        for seed in range(args.seed, args.seed + args.seeds)
+    ]
+    console = Console()
+    with Display(console) as display:
+        statuses = run_all(jobs, min(args.jobs, args.seeds), display)
+    finished = sum(status.state == "finished" for status in statuses)
+    console.print(f"{finished} of {len(statuses)} runs finished; weights, cards and curves in {args.out}", soft_wrap=True)
+    return 0 if finished == len(statuses) else 1
+
+
+def parse_settings(settings: list[str]) -> dict[str, Any]:
+    """KEY=VALUE pairs, values in YAML."""
+    values = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        if not equals:
+            raise UserError(f"--set {setting}: expected KEY=VALUE")
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise UserError(f"--set {setting}: {text!r} is not a value: {error}") from error
+        if isinstance(value, str):  # YAML takes 3e-4 for a text
+            try:
+                value = float(value)
+            except ValueError:
+                raise UserError(f"--set {setting}: expected a number or a list of numbers") from None
+        values[name] = value
+    return values
+
+
+def read_robot(file: Path | None) -> Robot:
+    """The robot of a file, or the nominal one."""
+    if file is None:
+        return Robot()
+    try:
+        return load_robot(file)
+    except RobotError as error:
+        raise UserError(str(error)) from error
+
+
+def command_line(argv: list[str]) -> list[str]:
+    """What the user typed after the verb, folders left out: it goes into files that travel."""
+    after = argv[argv.index("train") + 1 :] if "train" in argv else argv[1:]
+    kept, skip = [], False
+    for word in after:
+        if skip or word in ("--resume", "--overwrite"):
+            skip = False
+        elif word in ("--out", "--jobs"):
+            skip = True
+        else:
+            kept.append(Path(word).name if "/" in word else word)
+    return kept

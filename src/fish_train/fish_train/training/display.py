@@ -1,0 +1,95 @@
+"""Training as it runs: a live table on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from fish_train.training.run import Status
+
+LINE_PERIOD = 10.0  # s between lines of a run where there is no terminal
+BAR = 12  # characters of the bar of levels
+
+
+class Display:
+    """Shows the newest status of every run; a context manager, called with statuses."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._statuses: dict[int, Status] = {}
+        self._printed: dict[int, float] = {}
+        self._live = Live(console=console, refresh_per_second=4) if console.is_terminal else None
+
+    def __call__(self, status: Status) -> None:
+        self._statuses[status.seed] = status
+        if self._live is not None:
+            self._live.update(self._table())
+        elif status.state != "training" or self._due(status.seed):
+            self._console.print(line(status), soft_wrap=True, highlight=False)
+        if status.message:
+            self._console.print(f"seed {status.seed}: {status.message}", soft_wrap=True, highlight=False)
+
+    def _due(self, seed: int) -> bool:
+        now = time.monotonic()
+        if now - self._printed.get(seed, -LINE_PERIOD) < LINE_PERIOD:
+            return False
+        self._printed[seed] = now
+        return True
+
+    def _table(self) -> Table:
+        table = Table(box=None, pad_edge=False)
+        for name in ("seed", "level", "", "update", "steps/s", "time", "cost", "cross-track", "window", "heading",
+                     "speed", "state"):  # fmt: skip
+            table.add_column(name, justify="left" if name in ("", "state") else "right", no_wrap=True)
+        for _, status in sorted(self._statuses.items()):
+            table.add_row(*cells(status))
+        return table
+
+    def __enter__(self) -> Display:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+
+def cells(status: Status) -> list[str]:
+    """The row of a run; errors in mm, mrad and mm/s."""
+    p = status.progress
+    if p is None:
+        return [str(status.seed), "", "", "", "", f"{status.seconds:.0f} s", "", "", "", "", "", status.state]
+    full = round(BAR * p.level / status.levels)
+    return [
+        str(status.seed),
+        f"{p.level}/{status.levels}",
+        "█" * full + "░" * (BAR - full) + f" {p.name}",
+        str(p.update),
+        f"{status.rate:.0f}",
+        f"{status.seconds:.0f} s",
+        f"{p.cost:.4f}",
+        f"{1e3 * p.cross_track:.1f} mm",
+        f"{1e3 * p.criterion:.1f} mm",
+        f"{1e3 * p.heading:.0f} mrad",
+        f"{1e3 * p.speed:.1f} mm/s",
+        status.state,
+    ]
+
+
+def line(status: Status) -> str:
+    """The same for a log."""
+    p = status.progress
+    if p is None:
+        return f"seed {status.seed}: {status.state}, {status.seconds:.0f} s"
+    return (
+        f"seed {status.seed}: {status.state}, {status.seconds:.0f} s, level {p.level}/{status.levels} ({p.name}), update "
+        f"{p.update}, {status.rate:.0f} env steps/s, cost {p.cost:.4f}, cross-track {1e3 * p.cross_track:.1f} mm "
+        f"(window {1e3 * p.criterion:.1f}), heading {1e3 * p.heading:.0f} mrad, speed {1e3 * p.speed:.1f} mm/s"
+    )

@@ -1,0 +1,154 @@
+"""One training run in its folder: resume, train, save, hand out."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from fish_control.gains_file import GainsFileError, read_gains_file
+from fish_sim.robot import Robot
+from fish_train.errors import UserError
+from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
+from fish_train.training.config import TrainConfig
+from fish_train.training.network import LAYERS, Array, from_tensors
+from fish_train.training.run_log import RunLog
+from fish_train.training.trainer import Progress, Trainer, TrainingDiverged
+from fish_train.training.weights_output import write_weights
+
+CHECKPOINT = "checkpoint.npz"
+CHECKPOINT_PERIOD = 5.0  # s
+STATES = ("training", "finished", "stopped", "diverged")
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to train and where."""
+
+    folder: Path
+    config: TrainConfig
+    robot: Robot
+    seed: int
+    command: str  # said in weights file and model card
+    warm_start: Path | None = None
+    resume: bool = False
+    overwrite: bool = False
+    max_seconds: float = float("inf")
+
+
+@dataclass(frozen=True)
+class Status:
+    """What the display shows of a run."""
+
+    seed: int
+    state: str  # of STATES
+    levels: int
+    seconds: float
+    rate: float  # environment steps per second since this start
+    progress: Progress | None
+    message: str = ""
+
+
+def run(job: Job, report: Callable[[Status], None]) -> Status:
+    """Train to the end of the recipe; returns the last status.
+
+    Diverging training is rolled back to the last good checkpoint, whose weights are handed out, and said.
+    """
+    torch.set_num_threads(1)
+    checkpoint = prepare_folder(job)
+    trainer = Trainer(job.config, job.robot, job.seed, weights=warm_weights(job.warm_start))
+    if checkpoint.exists():
+        load_checkpoint(checkpoint, trainer)
+    else:
+        save_checkpoint(checkpoint, trainer)
+    with RunLog(job.folder, trainer.update) as log:
+        session = _Session(job, trainer, log, report)
+        try:
+            state, message = session.train(), ""
+        except TrainingDiverged as error:
+            at = trainer.update
+            load_checkpoint(checkpoint, trainer)
+            state = "diverged"
+            message = (
+                f"training diverged at update {at} ({error}); rolled back to update {trainer.update}, whose weights are "
+                "kept. Use a smaller learning_rate or clip"
+            )
+    last = session.progress
+    write_weights(job.folder, trainer, last, session.seconds, job.command)
+    status = session.status(state, message)
+    report(status)
+    return status
+
+
+class _Session:
+    """The loop of one start of a run."""
+
+    def __init__(self, job: Job, trainer: Trainer, log: RunLog, report: Callable[[Status], None]) -> None:
+        self._job, self._trainer, self._log, self._report = job, trainer, log, report
+        self._began, self._first = time.monotonic(), trainer.update
+        self.progress: Progress | None = None
+
+    @property
+    def seconds(self) -> float:
+        return self._log.seconds + time.monotonic() - self._began
+
+    def train(self) -> str:
+        """Until finished or out of budget; the state it ended in."""
+        trainer, saved = self._trainer, time.monotonic()
+        while not trainer.finished:
+            progress = trainer.step()
+            if progress is None:
+                continue
+            self.progress = progress
+            self._log.add(self.seconds, progress)
+            self._report(self.status("training"))
+            over = trainer.update >= self._job.config.max_updates or self.seconds >= self._job.max_seconds
+            if over or time.monotonic() - saved >= CHECKPOINT_PERIOD:
+                self._save()
+                saved = time.monotonic()
+            if over:
+                return "stopped"
+        self._trainer.end_episode_early()
+        self._save()
+        return "finished"
+
+    def _save(self) -> None:
+        self._log.flush()
+        save_checkpoint(self._job.folder / CHECKPOINT, self._trainer)
+
+    def status(self, state: str, message: str = "") -> Status:
+        """For the display."""
+        trainer, c = self._trainer, self._job.config
+        steps = (trainer.update - self._first) * c.batch * c.unroll
+        spent = max(time.monotonic() - self._began, 1e-9)
+        return Status(
+            self._job.seed, state, len(trainer.levels), self.seconds, steps / spent, self.progress, message
+        )
+
+
+def prepare_folder(job: Job) -> Path:
+    """The run's folder, empty or to be continued; the path of its checkpoint."""
+    checkpoint = job.folder / CHECKPOINT
+    if checkpoint.exists() and job.overwrite:
+        shutil.rmtree(job.folder)
+    elif checkpoint.exists() and not job.resume:
+        raise UserError(f"{job.folder}: holds a training run; continue it with --resume or replace it with --overwrite")
+    job.folder.mkdir(parents=True, exist_ok=True)
+    return checkpoint
+
+
+def warm_weights(file: Path | None) -> Array | None:
+    """Flat weights of a weights file with the same layers, None without a file."""
+    if file is None:
+        return None
+    try:
+        policy = read_gains_file(file)
+    except GainsFileError as error:
+        raise UserError(str(error)) from error
+    if tuple(policy.contract.layers) != LAYERS:
+        raise UserError(f"{file}: layers are {list(policy.contract.layers)}; a warm start needs {list(LAYERS)}")
+    return from_tensors(policy.tensors)

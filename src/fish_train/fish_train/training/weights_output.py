@@ -1,0 +1,76 @@
+"""What a run hands out: the weights file the controller loads, and a model card beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fish_control.contract import Contract
+from fish_control.gains_file import write_gains_file
+from fish_control.policy import Policy
+from fish_train.training.loop import CONTROL_PERIOD, Law
+from fish_train.training.network import LAYERS, to_tensors
+from fish_train.training.trainer import Progress, Trainer
+
+WEIGHTS = "gains.safetensors"
+CARD = "model_card.md"
+
+
+def make_policy(trainer: Trainer, note: str) -> Policy:
+    """The trained policy with its contract."""
+    law: Law = trainer.law
+    contract = Contract(
+        layers=LAYERS,
+        control_period=CONTROL_PERIOD,
+        lookahead=law.tracker.lookahead,
+        limits=law.limits,
+        guidance=law.guidance,
+        robot_hash=trainer.robot.digest(),
+        training_seed=trainer.seed,
+        note=note,
+    )
+    return Policy(contract, to_tensors(trainer.weights))
+
+
+def write_weights(folder: Path, trainer: Trainer, last: Progress | None, seconds: float, command: str) -> None:
+    """Weights file and model card."""
+    write_gains_file(folder / WEIGHTS, make_policy(trainer, f"trained by: {command}"))
+    (folder / CARD).write_text(model_card(trainer, last, seconds, command), encoding="utf-8")
+
+
+def model_card(trainer: Trainer, last: Progress | None, seconds: float, command: str) -> str:
+    """Markdown: what it is, how it was made, what it is good for."""
+    c, robot = trainer.config, trainer.robot
+    state = "finished" if trainer.finished else f"stopped at level {trainer.level} of {len(trainer.levels)}"
+    effects = ", ".join(robot.effects) or "none"
+    lines = [
+        "# Gains policy of the robot fish",
+        "",
+        "Maps head angle, surge speed, wanted speed, heading, speed and cross-track error to the six gains of the two",
+        f"PID controllers; network {'-'.join(map(str, LAYERS))}, ReLU, tanh to the gain ranges. Read by the controller",
+        "node (fish_control) without torch.",
+        "",
+        f"- command: `{command}`",
+        f"- seed {trainer.seed}; training {state} after {trainer.update} updates, {seconds:.0f} s",
+        f"- robot: {robot.name}, {robot.links} links, effects: {effects}; hash {robot.digest()}",
+        f"- speeds {c.slowest} to {c.fastest} m/s; sinusoids {list(c.amplitudes)} m with {list(c.cycles)} cycles over "
+        f"{c.sinusoid_length} m; circles {list(c.radii)} m",
+        f"- domain randomisation {c.randomise:.0%}, latency up to {c.latency} s, noise {c.noise_position} m, "
+        f"{c.noise_heading} rad, {c.noise_speed} m/s, {c.noise_rate} rad/s",
+    ]
+    if last is not None:
+        lines += [
+            f"- last training episode ({last.name}): mean |cross-track| {last.cross_track:.4f} m, heading "
+            f"{last.heading:.3f} rad, speed {last.speed:.4f} m/s",
+        ]
+    lines += [
+        "",
+        "Not for: speeds or curves outside these ranges, robots with another tail or mass; `fish_train evaluate` tells.",
+        "",
+        "## Recipe",
+        "",
+        "```yaml",
+        *(f"{name}: {value}" for name, value in c.to_plain().items()),
+        "```",
+        "",
+    ]
+    return "\n".join(lines)
