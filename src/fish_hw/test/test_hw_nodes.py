@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 
@@ -26,8 +27,8 @@ from fish_hw.nodes.rudder import RudderNode
 from fish_hw.transport.errors import PortUnavailable
 
 pytestmark = pytest.mark.ros
-DOMAIN = 61
-TIMEOUT_S = 10.0
+DOMAIN = 120 + os.getpid() % 80  # tests of other packages may run beside this one
+TIMEOUT_S = 20.0
 
 
 class Graph:
@@ -97,7 +98,7 @@ def age_s(graph: Graph, stamp) -> float:
 
 
 def test_rotor_topics(graph, vertiq_emulator):
-    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.05)
+    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.2, module_timeout_s=1.0)
     states = g.listen(JointState, "joint_states")
     battery = g.listen(BatteryState, "battery_state")
     diagnostics = g.listen(DiagnosticArray, "/diagnostics")
@@ -109,15 +110,15 @@ def test_rotor_topics(graph, vertiq_emulator):
     assert list(states[-1].name) == ["rotor"]
     assert len(states[-1].position) == 1
     assert 0.0 <= age_s(g, states[-1].header.stamp) < 1.0
-    assert g.spin(lambda: bool(battery) and bool(diagnostics))
+    assert g.spin(lambda: bool(battery) and len(diagnostics) > 1)
     assert battery[0].voltage == pytest.approx(14.8, abs=0.01)
     assert battery[0].current == pytest.approx(-0.5, abs=0.01)
     assert diagnostics[0].status[0].name == "fish/rotor"
-    assert {"phase", "crc errors", "volts"} <= {v.key for v in diagnostics[0].status[0].values}
+    assert {"phase", "crc errors", "volts"} <= {v.key for v in diagnostics[-1].status[0].values}
 
 
 def test_rotor_coasts_when_commands_end(graph, vertiq_emulator):
-    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.05)
+    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.2, module_timeout_s=1.0)
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     assert g.spin(
         lambda: vertiq_emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0))
@@ -138,7 +139,7 @@ def test_rotor_coasts_when_commands_end(graph, vertiq_emulator):
     ids=["empty", "other joint", "no value", "nan", "inf"],
 )
 def test_rotor_survives_bad_commands(graph, vertiq_emulator, bad):
-    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.05)
+    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.2, module_timeout_s=1.0)
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     assert g.spin(lambda: g.node._driver.guard.rejected > 3, lambda: publisher.publish(bad))
     assert vertiq_emulator.mode == reg.COAST
@@ -148,7 +149,7 @@ def test_rotor_survives_bad_commands(graph, vertiq_emulator, bad):
 
 
 def test_rotor_services(graph, vertiq_emulator):
-    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.05)
+    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.2, module_timeout_s=1.0)
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
 
     def drive() -> None:
@@ -208,6 +209,16 @@ def test_camera_topics(graph):
     ]
     assert len(stamps[0] & stamps[1] & stamps[2]) > 3
     assert (raw[-1].encoding, raw[-1].step, len(raw[-1].data)) == ("bgr8", 480, 160 * 120 * 3)
+
+
+def test_a_step_that_raises_ends_the_node_and_leaves_the_device_safe(graph, tmp_path, monkeypatch):
+    chip = PwmChipEmulator(tmp_path / "pwmchip0")
+    g = graph(RudderNode, chip=str(chip.chip))
+    monkeypatch.setattr(threading, "excepthook", lambda _: None)
+    monkeypatch.setattr(g.node._driver.servo, "step", lambda _: 1 / 0)
+    assert wait_until(lambda: not g.node.context.ok(), TIMEOUT_S)
+    assert chip.read("enable") == 0
+    assert g.node.failure == "the device's thread ended unexpectedly"
 
 
 def test_absent_port_is_refused(graph):
@@ -272,7 +283,7 @@ def test_signals_end_with_zero(first):
 def driven_rotor(emulator: VertiqEmulator, graph: Callable) -> tuple[subprocess.Popen, Graph]:
     """A rotor process that spins the emulated module, commanded from here."""
     process = start(
-        "rotor", "-p", f"port:={emulator.port}", "-p", "resume:=auto", "-p", "reply_timeout_s:=0.05"
+        "rotor", "-p", f"port:={emulator.port}", "-p", "resume:=auto", "-p", "reply_timeout_s:=0.2"
     )
     first_words(process, "device ready")
     g = graph(RudderNode, backend="emulator")  # any node: this side needs an executor only
@@ -294,7 +305,7 @@ def test_sigkill_leaves_it_to_the_modules_own_watchdog(graph, vertiq_emulator):
     process.kill()
     process.communicate(timeout=TIMEOUT_S)
     assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
-    assert vertiq_emulator.timeouts == 1 and vertiq_emulator.timeout_s == 0.25
+    assert vertiq_emulator.timeouts >= 1 and vertiq_emulator.timeout_s == 0.25
 
 
 def test_missing_port_is_one_line_and_an_exit_code():

@@ -17,7 +17,8 @@ from fish_hw.settings.rotor import RotorSettings
 from fish_hw.transport.errors import PortUnavailable
 from fish_hw.transport.serial_port import SerialPort
 
-SETTINGS = RotorSettings(port="test", resume="auto", reply_timeout_s=0.05)
+# generous times: a loaded machine keeps the emulator waiting, and that is not what is tested here
+SETTINGS = RotorSettings(port="test", resume="auto", reply_timeout_s=0.2, stale_s=0.4, module_timeout_s=0.5)
 DT = 0.01
 
 
@@ -28,6 +29,10 @@ class Bench:
         self.emulator = emulator
         self.driver = RotorDriver(settings, lambda: SerialPort(self.emulator.port, 115200))
         self.samples, self.events, self.telemetry = [], [], []
+
+    def connect(self) -> None:
+        """Connect, in the second or third try if the emulator's thread is kept waiting."""
+        assert self.run(15.0, until=lambda: self.driver.connected)
 
     def run(self, duration_s: float, command=None, until=None) -> bool:
         start = time.monotonic()
@@ -47,7 +52,7 @@ class Bench:
 @pytest.fixture
 def bench(vertiq_emulator):
     bench = Bench(vertiq_emulator)
-    bench.driver.connect()
+    bench.connect()
     yield bench
     bench.driver.close()
 
@@ -79,7 +84,7 @@ def test_measured_angle_is_the_integral_of_measured_speed(bench):
 
 def test_stale_command_coasts_without_polling(bench):
     bench.run(0.4, steady)
-    assert bench.run(3.0, until=lambda: bench.driver.guard.phase is Phase.COASTING)
+    assert bench.run(15.0, until=lambda: bench.driver.guard.phase is Phase.COASTING)
     asked = sum(m.access == GET for m in bench.emulator.log)
     bench.run(0.2)
     assert sum(m.access == GET for m in bench.emulator.log) == asked
@@ -92,14 +97,14 @@ def test_module_stops_by_itself_if_coast_is_lost(bench):
     """The trap: polling feeds the module's watchdog. The driver is silent, so it can fire."""
     bench.run(0.3, steady)
     bench.driver._vertiq.coast = lambda: None
-    assert bench.run(4.0, until=lambda: bench.emulator.timeouts == 1)
+    assert bench.run(15.0, until=lambda: bench.emulator.timeouts == 1)
     assert bench.emulator.mode == reg.COAST
 
 
 def test_module_that_drives_on_its_own_is_told_to_coast(bench):
     bench.emulator.mode, bench.emulator.commanded = VELOCITY_MODE, 50.0
-    assert bench.run(3.0, until=lambda: any("drove although" in e for e in bench.events))
-    assert bench.run(1.0, until=lambda: bench.emulator.mode == reg.COAST)
+    assert bench.run(15.0, until=lambda: any("drove although" in e for e in bench.events))
+    assert bench.run(15.0, until=lambda: bench.emulator.mode == reg.COAST)
 
 
 def test_restarted_module_is_set_up_again_before_it_moves(bench):
@@ -107,7 +112,7 @@ def test_restarted_module_is_set_up_again_before_it_moves(bench):
     bench.run(0.5, steady)
     bench.emulator.reboot()
     assert bench.emulator.timeout_s == 1.0
-    assert bench.run(3.0, steady, until=lambda: any("restarted" in e for e in bench.events))
+    assert bench.run(15.0, steady, until=lambda: any("restarted" in e for e in bench.events))
     assert bench.emulator.timeout_s == SETTINGS.module_timeout_s
     assert bench.emulator.mode == reg.COAST
 
@@ -115,15 +120,15 @@ def test_restarted_module_is_set_up_again_before_it_moves(bench):
 def test_unplugged_then_plugged_again(bench):
     bench.run(0.2, steady)
     bench.emulator.close()
-    assert bench.run(2.0, steady, until=lambda: not bench.driver.connected)
+    assert bench.run(15.0, steady, until=lambda: not bench.driver.connected)
     assert bench.driver.status().level == ERROR
     said = len(bench.events)
     bench.run(0.3, steady)
     assert len(bench.events) == said  # not once per cycle
     bench.emulator = VertiqEmulator()
     try:
-        assert bench.run(8.0, steady, until=lambda: bench.driver.connected)
-        assert bench.run(2.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
+        assert bench.run(15.0, steady, until=lambda: bench.driver.connected)
+        assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     finally:
         bench.driver.close()
         bench.emulator.close()
@@ -131,23 +136,27 @@ def test_unplugged_then_plugged_again(bench):
 
 def test_silent_module_is_lost_and_found(bench):
     bench.emulator.mangle = lambda _: b""
-    assert bench.run(3.0, steady, until=lambda: not bench.driver.connected)
+    assert bench.run(15.0, steady, until=lambda: not bench.driver.connected)
     assert "stopped answering" in bench.driver.status().message
     bench.emulator.mangle = lambda reply: reply
-    assert bench.run(8.0, until=lambda: bench.driver.connected)
+    assert bench.run(15.0, until=lambda: bench.driver.connected)
 
 
 def test_low_battery_stops_and_stays_stopped(vertiq_emulator):
     bench = Bench(vertiq_emulator, replace(SETTINGS, battery_filter_s=0.0))
-    bench.driver.connect()
-    bench.run(0.3, steady)
+    bench.connect()
+    assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     bench.emulator.volts = 4 * 3.2
-    assert bench.run(3.0, steady, until=lambda: bench.emulator.mode == reg.COAST)
-    bench.run(0.8, steady)
-    assert bench.emulator.mode == reg.COAST
-    assert "battery at 3.20 V per cell" in bench.driver.status().message
+    assert bench.run(15.0, steady, until=lambda: bench.driver.guard.phase is Phase.COASTING)
+    said = "battery at 3.20 V per cell"
+    assert said in bench.driver.guard.reason
+    driven = sum(m == reg.CTRL_VELOCITY.set(0, 60.0) for m in bench.emulator.log)
+    assert bench.run(15.0, steady, until=lambda: bench.driver.guard.phase is Phase.RESTING)
+    bench.run(0.3, steady)
+    assert sum(m == reg.CTRL_VELOCITY.set(0, 60.0) for m in bench.emulator.log) == driven
+    assert said in bench.driver.status().message
     bench.emulator.volts = 4 * 3.8
-    assert bench.run(3.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
+    assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     bench.driver.close()
 
 

@@ -143,6 +143,25 @@ def test_resume_auto_goes_on_after_the_stop_is_complete():
     assert first <= SETTINGS.max_acceleration * DT + 1e-9  # from rest again, no jump
 
 
+@pytest.mark.parametrize("resume", ["auto", "zero"])
+def test_no_resuming_while_there_is_an_obstacle(resume):
+    bench = Bench(replace(SETTINGS, resume=resume))
+    bench.guard.enable()
+    bench.run(0.5, lambda _: 0.0)
+    bench.run(0.5, lambda _: 100.0)
+    driven = []
+    for i in range(300):
+        bench.guard.command(0.0 if i > 100 else 100.0, bench.now)
+        action = bench.guard.step(bench.now, ("battery",))
+        driven.append(action.velocity)
+        bench.now += DT
+    assert driven[0] < 100.0  # the ramp begins at once
+    assert all(v is None for v in driven[30:])
+    assert (bench.guard.latched, bench.guard.reason) == (True, "battery")
+    bench.run(0.4, lambda _: 0.0)
+    assert bench.run(0.1, oscillation)[-1].velocity is not None
+
+
 def test_cut_is_silent_at_once():
     bench = Bench()
     bench.run(0.2, lambda _: 100.0)

@@ -77,6 +77,7 @@ class Bno085:
         self._product: ProductId | None = None
         self._restarted = False
         self._polls = 0
+        self._read_s = 0.0
 
     def start(self) -> ProductId:
         """Reset, identify, switch the reports on; DeviceError if no BNO085 answers."""
@@ -99,26 +100,22 @@ class Bno085:
         all_there_is = self._data_ready is not None or self._polls % EXTRA_READ == 0
         samples: list[ImuSample] = []
         for _ in range(MAX_READS):
-            ready_s = self._ready_time(timeout_s if not samples else 0.0)
-            if ready_s is None:
-                break
-            cargo = self._read_cargo()
+            ready, edge_s = self._wait(timeout_s if not samples else 0.0)
+            cargo = self._read_cargo() if ready else None
             if cargo is None:
                 break
-            samples += self._take(cargo, ready_s)
+            samples += self._take(cargo, self._read_s if edge_s is None else edge_s)
             self._repeat_features()
             if samples and not all_there_is:
                 break
         return samples
 
-    def _ready_time(self, timeout_s: float) -> float | None:
-        """When the hub said that it has data; None while it has none."""
+    def _wait(self, timeout_s: float) -> tuple[bool, float | None]:
+        """Whether the hub may have data, and since when if that is known."""
         if self._data_ready is None:
-            return self._clock()
-        edge = self._data_ready.wait(timeout_s)
-        if not self._data_ready.is_low():
-            return None
-        return self._clock() if edge is None else edge
+            return True, None
+        edge_s = self._data_ready.wait(timeout_s)
+        return self._data_ready.is_low(), edge_s
 
     def _repeat_features(self) -> None:
         """After a brown-out the hub has forgotten which reports it should send."""
@@ -130,7 +127,7 @@ class Bno085:
         for _ in range(START_READS):
             cargo = self._read_cargo()
             if cargo is not None:
-                self._take(cargo, self._clock())
+                self._take(cargo, self._read_s)
             if self._product is not None:
                 return self._product
             self._sleep(START_READ_WAIT_S)
@@ -145,7 +142,7 @@ class Bno085:
             cargo = self._read_cargo()
             if cargo is None:
                 return
-            self._take(cargo, self._clock())
+            self._take(cargo, self._read_s)
 
     def _request_features(self) -> None:
         self._newest.clear()
@@ -208,6 +205,7 @@ class Bno085:
 
     def _read_header(self) -> Header | None:
         data = self._read(shtp.HEADER_BYTES)
+        self._read_s = self._clock()  # after the read: the hub may have stretched it until it had data
         if data is None:
             return None
         header = shtp.parse_header(data)

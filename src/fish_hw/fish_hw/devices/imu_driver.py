@@ -1,8 +1,9 @@
 """The IMU as a whole: sensor by I2C or serial, mounting, watchdog, and finding it again after it was lost."""
 
+import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fish_hw.devices.bno085 import Bno085
 from fish_hw.devices.bno085_rvc import Bno085Rvc
@@ -15,6 +16,7 @@ from fish_hw.transport.errors import TransportError
 from fish_hw.transport.interfaces import ByteStream, DataReady, I2cBus
 
 UNRELIABLE = 0
+LEAST_STEP_S = 1e-4  # the sensor's own tick
 SLOWEST_RATE, FASTEST_RATE = 0.9, 2.1  # of the asked rate, SH-2 manual
 
 
@@ -120,6 +122,7 @@ class ImuDriver:
         self._trouble = "not connected yet"
         self._last: ImuSample | None = None
         self._changed_time = 0.0
+        self._newest_s = -math.inf
         self._rated = (0, clock())
 
     @property
@@ -146,7 +149,7 @@ class ImuDriver:
         try:
             if self._sensor is None:
                 return self._reconnect(now, timeout_s)
-            samples = [self._mounting.to_base(s) for s in self._sensor.poll(timeout_s)]
+            samples = [self._in_order(self._mounting.to_base(s)) for s in self._sensor.poll(timeout_s)]
             self._watch(samples)
         except (TransportError, DeviceError) as error:
             return ImuCycle(events=self._lose(str(error), now))
@@ -173,6 +176,12 @@ class ImuDriver:
         if not SLOWEST_RATE * self._settings.rate_hz <= rate <= FASTEST_RATE * self._settings.rate_hz:
             return Status(WARN, f"{rate:.0f} samples/s instead of {self._settings.rate_hz:.0f}", values)
         return Status(OK, f"{rate:.0f} samples/s", values)
+
+    def _in_order(self, sample: ImuSample) -> ImuSample:
+        """The sample, later than the one before: a delayed read makes times jitter by some milliseconds."""
+        sample = replace(sample, time_s=max(sample.time_s, self._newest_s + LEAST_STEP_S))
+        self._newest_s = sample.time_s
+        return sample
 
     def _rate(self) -> float:
         """Samples per second since the last call."""

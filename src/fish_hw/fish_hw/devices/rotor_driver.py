@@ -161,9 +161,7 @@ class RotorDriver:
         if self._clear_faults.is_set():
             self._clear_module_faults(vertiq)
         with self._lock:
-            if self._health.stops:
-                self.guard.stop("; ".join(self._health.stops))
-            before, action = self.guard.phase, self.guard.step(now)
+            before, action = self.guard.phase, self.guard.step(now, self._health.stops)
         self._note_phase(before)
         cycle.sample = self._perform(vertiq, action)
         self._watch_silence(action.ask, cycle.sample is not None, now)

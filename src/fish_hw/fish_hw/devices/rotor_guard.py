@@ -95,12 +95,15 @@ class RotorGuard:
         """Seconds since the last good command; infinite if there was none."""
         return math.inf if self._command_time is None else now - self._command_time
 
-    def step(self, now: float) -> Action:
-        """The action of this cycle."""
+    def step(self, now: float, obstacles: tuple[str, ...] = ()) -> Action:
+        """The action of this cycle; obstacles are reasons to stop that last (no resuming while there is one)."""
+        if obstacles:
+            self.stop("; ".join(obstacles))
         dt = 0.0 if self._last_step is None else min(now - self._last_step, LONGEST_STEP_S)
         self._last_step = now
         fresh = self.command_age(now) <= self._settings.stale_s
-        self._rearm(fresh, now)
+        if not obstacles:
+            self._rearm(fresh, now)
         if self.phase is Phase.COASTING:
             return self._wait(now)
         if self.phase is Phase.RUNNING and not fresh:

@@ -24,6 +24,7 @@ from fish_hw.transport.errors import TransportError
 
 NAMESPACE = "fish"
 END_TIMEOUT_S = 2.0
+CLOCK_TRIES = 3
 EXPECTED = (TransportError, DeviceError, CalibrationError, ValueError)
 
 
@@ -79,7 +80,7 @@ class DeviceNode(Node):
             self.get_logger().error(f"{error}; trying for {self.settings.startup_timeout_s} s")
         else:
             self.get_logger().info("emulated device ready" if emulated else "device ready")
-        self._worker = Worker(lambda: self._step(device, step), period_s, self._on_worker_end)
+        self._worker = Worker(lambda: self._step(device, step), period_s, self._on_failure)
         self._worker.start()
 
     def close(self) -> None:
@@ -90,8 +91,17 @@ class DeviceNode(Node):
             self._device.close()
 
     def stamp(self, time_s: float) -> Time:
-        """ROS time of a moment on the monotonic clock."""
-        return (self.get_clock().now() - Duration(seconds=time.monotonic() - time_s)).to_msg()
+        """ROS time of a moment on the monotonic clock.
+
+        The two clocks are read one after the other; of several tries the one that was interrupted least counts.
+        """
+        tries = []
+        for _ in range(CLOCK_TRIES):
+            before = time.monotonic()
+            now = self.get_clock().now()
+            after = time.monotonic()
+            tries.append((after - before, now - Duration(seconds=(before + after) / 2 - time_s)))
+        return min(tries, key=lambda entry: entry[0])[1].to_msg()
 
     def publish(self, publisher: Any, message: Any) -> None:
         """Publish, unless the node is about to end (the device's thread lives a little longer than the
@@ -116,13 +126,12 @@ class DeviceNode(Node):
             return
         step()
 
-    def _on_worker_end(self) -> None:
-        """The thread ended: by stop(), or by an error that must not leave the device as it is."""
+    def _on_failure(self) -> None:
+        """A step raised what nobody expected: that must not leave the device as it is."""
+        self.failure = "the device's thread ended unexpectedly"
         if self._device is not None:
             self._device.close()
-        if self.context.ok():
-            self.failure = self.failure or "the device's thread ended unexpectedly"
-            self.context.try_shutdown()
+        self.context.try_shutdown()
 
     def _on_diagnostics(self) -> None:
         if self._device is None:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 
 class Worker:
-    """Calls step() every period_s until stop(); calls on_end() in any case, a failing step included."""
+    """Calls step() every period_s until stop(); calls on_failure() if a step raises."""
 
-    def __init__(self, step: Callable[[], None], period_s: float, on_end: Callable[[], None]) -> None:
+    def __init__(self, step: Callable[[], None], period_s: float, on_failure: Callable[[], None]) -> None:
         self._step = step
         self._period_s = period_s
-        self._on_end = on_end
+        self._on_failure = on_failure
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="device", daemon=True)
 
@@ -26,6 +26,7 @@ class Worker:
 
     def _run(self) -> None:
         due = time.monotonic()
+        finished = False
         try:
             while not self._stop.is_set():
                 self._step()
@@ -34,5 +35,7 @@ class Worker:
                 if due < now - self._period_s:  # a short delay is made up for, a long one is not
                     due = now
                 self._stop.wait(max(due - now, 0.0))
+            finished = True
         finally:
-            self._on_end()
+            if not finished:
+                self._on_failure()
