@@ -55,6 +55,11 @@ def is_recording(path: Path) -> bool:
     return path.suffix in SUFFIXES
 
 
+def is_pool_bag(bag: RawBag) -> bool:
+    """Whether the bag is one of the real robot's ROS 1 bags, with message types of their own."""
+    return {"/runcam_tracking", "/purepursuit_target"} <= {raw.topic for raw in bag.topics}
+
+
 def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
     """Read one recording.
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from . import message_build as build
-from .bag import RawBag, read_bag
+from .bag import RawBag, is_pool_bag, read_bag
 from .layout import decode_blocks
 from .mcap_writer import McapRecording
 from .message_types import typestore
@@ -69,11 +69,6 @@ class ImportReport:
     robot_offset_s: float  # recorder minus robot
     camera_offset_s: float
     rotor_residual: float  # median abs of encoder minus rebuilt command [rad/s]
-
-
-def is_pool_bag(bag: RawBag) -> bool:
-    """Whether the bag is one of the real robot's."""
-    return {SOURCES["camera"], SOURCES["control"]} <= {raw.topic for raw in bag.topics}
 
 
 def import_bag(path: Path, out: Path) -> ImportReport:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from . import checks
-from .bag import RawBag, RawTopic, read_bag
+from .bag import RawBag, RawTopic, is_pool_bag, read_bag
 from .decode import PATH_ROLE, PATH_TYPE, ROLES
 from .namespace import find_namespace, full_name
 from .problem import Problem, RecordingError
@@ -61,7 +61,10 @@ class _Assembly:
         mapped = self.decode()
         if not mapped and self.topic_of(PATH_ROLE) is None:
             held = ", ".join(sorted(f"{raw.topic} ({raw.type})" for raw in self.bag.topics))
-            raise RecordingError(f"{self.bag.path}: none of the robot's topics is in it; it holds {held}")
+            advice = "; 'fish_train import_pool' converts it" if is_pool_bag(self.bag) else ""
+            raise RecordingError(
+                f"{self.bag.path}: none of the robot's topics is in it; it holds {held}{advice}"
+            )
         arrivals = np.concatenate([raw.arrival_ns for raw in self.bag.topics])
         stamps = [m.stamps for m in mapped.values() if m.stamps is not None]
         axis = build_axis(stamps, int(arrivals.min()), self.topics.max_latency_s)
