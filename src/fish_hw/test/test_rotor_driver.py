@@ -136,6 +136,7 @@ def test_unplugged_then_plugged_again(bench):
 
 def test_silent_module_is_lost_and_found(bench):
     bench.emulator.mangle = lambda _: b""
+    bench.driver._vertiq._reply_timeout_s = 0.02  # no need to wait long for what will not come
     assert bench.run(15.0, steady, until=lambda: not bench.driver.connected)
     assert "stopped answering" in bench.driver.status().message
     bench.emulator.mangle = lambda reply: reply
