@@ -40,7 +40,7 @@ def run_verb(verb: str, argv: list[str] | None = None) -> int:
     module.add_arguments(parser)
     args = parser.parse_args(argv)
     try:
-        return module.run(args)
+        return int(module.run(args))
     except UserError as error:
         print(f"fish_train {verb}: {error}", file=sys.stderr)
         return 1

@@ -76,7 +76,7 @@ def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
         with (rosbag1.Reader if ros1 else rosbag2.Reader)(source) as reader:
             topics = _collect(reader, wanted)
             types = _types(reader.connections, ros1)
-            metadata = {} if ros1 else dict(reader.storage.metadata.custom or {})
+            metadata = {} if isinstance(reader, rosbag1.Reader) else reader.storage.metadata.custom or {}
     except (rosbag1.ReaderError, rosbag2.ReaderError, SerdeError, TypesysError) as error:
         raise RecordingError(f"{path}: {_advice(source, str(error))}") from error
     except OSError as error:

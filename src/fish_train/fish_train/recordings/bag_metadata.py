@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import yaml
 
@@ -57,7 +57,7 @@ def write_metadata(
     os.replace(part, directory / "metadata.yaml")
 
 
-def _extent(first: int, last: int, count: int) -> dict:
+def _extent(first: int, last: int, count: int) -> dict[str, Any]:
     return {
         "starting_time": {"nanoseconds_since_epoch": first},
         "duration": {"nanoseconds": last - first},
@@ -65,7 +65,7 @@ def _extent(first: int, last: int, count: int) -> dict:
     }
 
 
-def _topic(topic: RecordedTopic) -> dict:
+def _topic(topic: RecordedTopic) -> dict[str, Any]:
     return {
         "topic_metadata": {
             "name": topic.name,

@@ -73,7 +73,7 @@ def check_stream(stream: Stream, rule: TopicRule) -> Iterator[Problem]:
         if len(where):
             what = f"{len(where)} of {len(stream)} {text}"
             yield Problem(severity, kind, stream.topic, what, len(where), float(stream.t_arrival[where[0]]))
-    wrong = np.count_nonzero(stream.flags & WRONG_FRAME)
+    wrong = int(np.count_nonzero(stream.flags & WRONG_FRAME))
     if wrong:
         text = f"{wrong} of {len(stream)} messages in frame {stream.frame_id!r}, expected {rule.frame!r}"
         yield Problem("error", "wrong_frame", stream.topic, text, wrong)

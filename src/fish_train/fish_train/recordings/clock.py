@@ -99,7 +99,7 @@ def _not_early(x: np.ndarray, d: np.ndarray) -> np.ndarray:
     """
     level = d - robust_line(x, d)
     low, middle = np.quantile(level, [0.05, 0.5])
-    return level >= low - 2 * (middle - low)
+    return np.asarray(level >= low - 2 * (middle - low))
 
 
 def robust_line(x: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -108,7 +108,7 @@ def robust_line(x: np.ndarray, d: np.ndarray) -> np.ndarray:
     ends = order[:third], order[-third:]
     (x0, x1), (d0, d1) = ([np.median(x[e]) for e in ends], [np.quantile(d[e], 0.1) for e in ends])
     slope = (d1 - d0) / (x1 - x0) if x1 > x0 else 0.0
-    return d0 + slope * (x - x0)
+    return np.asarray(d0 + slope * (x - x0))
 
 
 def _lowest_points(x: np.ndarray, d: np.ndarray) -> list[np.ndarray]:

@@ -9,9 +9,9 @@ of their own.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -70,7 +70,7 @@ class _Walker:
         for name, desc in self.types[msgtype][1]:
             self.item(desc, f"{prefix}{name}")
 
-    def item(self, desc: tuple, path: str) -> None:
+    def item(self, desc: Any, path: str) -> None:
         kind, what = desc
         if kind == Nodetype.NAME:
             self.message(what, f"{path}.")
@@ -83,7 +83,7 @@ class _Walker:
         else:
             self.elements(what[0], path, self.length())
 
-    def elements(self, desc: tuple, path: str, count: int) -> None:
+    def elements(self, desc: Any, path: str, count: int) -> None:
         kind, what = desc
         if kind == Nodetype.BASE and what[0] != "string":
             self.numbers(what[0], path, count)
@@ -108,7 +108,7 @@ class _Walker:
         start = self.pos
         self.advance(4)
         self.layout.fixed.extend(range(start, self.pos))
-        return struct.unpack_from(f"{self.order}I", self.raw, start)[0]
+        return int.from_bytes(self.raw[start : self.pos], "little" if self.order == "<" else "big")
 
     def string(self) -> str:
         length = self.length()

@@ -178,7 +178,7 @@ class McapRecording:
         if not self._chunk.times:
             return
         chunk, self._chunk = self._chunk, _OpenChunk()
-        first, last, data = min(chunk.times), max(chunk.times), chunk.records.end()
+        first, last, data = min(chunk.times), max(chunk.times), chunk.records.end()  # type: ignore[no-untyped-call]
         body = _records(
             Chunk(
                 compression="", data=data, uncompressed_size=len(data), uncompressed_crc=zlib.crc32(data),
@@ -214,8 +214,9 @@ class McapRecording:
         try:
             self._append(data)
         except DiskFullError:
-            for topic in self.topics.values() if lost else ():
-                topic.count -= len(lost.index.get(topic.channel.id, []))
+            gone = lost.index if lost else {}
+            for topic in self.topics.values():
+                topic.count -= len(gone.get(topic.channel.id, []))
             self._close_full()
             raise
 
@@ -293,7 +294,7 @@ def _records(*records: McapRecord) -> bytes:
     builder = RecordBuilder()
     for record in records:
         record.write(builder)
-    return builder.end()
+    return bytes(builder.end())  # type: ignore[no-untyped-call]
 
 
 def _footer(summary_start: int, offset_start: int, summary: bytes) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,22 +12,22 @@ from .message_types import typestore
 NS_PER_S = 1_000_000_000
 
 
-def make(msgtype: str, **fields: object) -> object:
+def make(msgtype: str, **fields: Any) -> Any:
     """A message of any type; every field must be given."""
     return typestore().types[msgtype](**fields)
 
 
-def header(stamp_ns: int, frame: str = "") -> object:
+def header(stamp_ns: int, frame: str = "") -> Any:
     sec, nanosec = divmod(int(stamp_ns), NS_PER_S)
     stamp = make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
     return make("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
 
 
-def vector3(x: float, y: float, z: float) -> object:
+def vector3(x: float, y: float, z: float) -> Any:
     return make("geometry_msgs/msg/Vector3", x=float(x), y=float(y), z=float(z))
 
 
-def pose(x: float, y: float, psi: float) -> object:
+def pose(x: float, y: float, psi: float) -> Any:
     """A pose in the plane."""
     position = make("geometry_msgs/msg/Point", x=float(x), y=float(y), z=0.0)
     half = 0.5 * float(psi)
@@ -34,25 +35,27 @@ def pose(x: float, y: float, psi: float) -> object:
     return make("geometry_msgs/msg/Pose", position=position, orientation=turn)
 
 
-def pose_stamped(stamp_ns: int, frame: str, x: float, y: float, psi: float) -> object:
+def pose_stamped(stamp_ns: int, frame: str, x: float, y: float, psi: float) -> Any:
     return make("geometry_msgs/msg/PoseStamped", header=header(stamp_ns, frame), pose=pose(x, y, psi))
 
 
-def planar_covariance(variance: Sequence[float]) -> np.ndarray:
+def planar_covariance(variance: Sequence[float] | np.ndarray) -> np.ndarray:
     """(36,) covariance with the variances of x, y and psi on the diagonal."""
     matrix = np.zeros((6, 6))
     matrix[[0, 1, 5], [0, 1, 5]] = variance
     return matrix.ravel()
 
 
-def camera_pose(stamp_ns: int, frame: str, xypsi: Sequence[float], variance: Sequence[float]) -> object:
+def camera_pose(
+    stamp_ns: int, frame: str, xypsi: Sequence[float], variance: Sequence[float] | np.ndarray
+) -> Any:
     body = make(
         "geometry_msgs/msg/PoseWithCovariance", pose=pose(*xypsi), covariance=planar_covariance(variance)
     )
     return make("geometry_msgs/msg/PoseWithCovarianceStamped", header=header(stamp_ns, frame), pose=body)
 
 
-def odometry(stamp_ns: int, xypsi: Sequence[float], uvr: Sequence[float]) -> object:
+def odometry(stamp_ns: int, xypsi: Sequence[float], uvr: Sequence[float]) -> Any:
     """Pose in pool, velocity in base_link, covariances zero."""
     where = make("geometry_msgs/msg/PoseWithCovariance", pose=pose(*xypsi), covariance=np.zeros(36))
     u, v, r = uvr
@@ -62,9 +65,7 @@ def odometry(stamp_ns: int, xypsi: Sequence[float], uvr: Sequence[float]) -> obj
     return make("nav_msgs/msg/Odometry", header=head, child_frame_id="base_link", pose=where, twist=speed)
 
 
-def joints(
-    stamp_ns: int, names: list[str], position: Sequence[float], velocity: Sequence[float] = ()
-) -> object:
+def joints(stamp_ns: int, names: list[str], position: Sequence[float], velocity: Sequence[float] = ()) -> Any:
     return make(
         "sensor_msgs/msg/JointState",
         header=header(stamp_ns),
@@ -75,7 +76,7 @@ def joints(
     )
 
 
-def imu(stamp_ns: int, gyro: Sequence[float], accel: Sequence[float], orientation: Sequence[float]) -> object:
+def imu(stamp_ns: int, gyro: Sequence[float], accel: Sequence[float], orientation: Sequence[float]) -> Any:
     """Angular velocity [rad/s], specific force [m/s^2], quaternion x, y, z, w; frame imu_link."""
     x, y, z, w = (float(q) for q in orientation)
     return make(
@@ -90,15 +91,15 @@ def imu(stamp_ns: int, gyro: Sequence[float], accel: Sequence[float], orientatio
     )
 
 
-def vector_stamped(stamp_ns: int, frame: str, xyz: Sequence[float]) -> object:
+def vector_stamped(stamp_ns: int, frame: str, xyz: Sequence[float]) -> Any:
     return make("geometry_msgs/msg/Vector3Stamped", header=header(stamp_ns, frame), vector=vector3(*xyz))
 
 
-def number(value: float) -> object:
+def number(value: float) -> Any:
     return make("std_msgs/msg/Float64", data=float(value))
 
 
-def labelled_numbers(label: str, values: Sequence[float]) -> object:
+def labelled_numbers(label: str, values: Sequence[float]) -> Any:
     """Float64MultiArray with one dimension whose label names the values."""
     n = len(values)
     dimension = make("std_msgs/msg/MultiArrayDimension", label=label, size=n, stride=n)
@@ -106,13 +107,13 @@ def labelled_numbers(label: str, values: Sequence[float]) -> object:
     return make("std_msgs/msg/Float64MultiArray", layout=layout, data=np.array(values, float))
 
 
-def path(stamp_ns: int, frame: str, points: np.ndarray) -> object:
+def path(stamp_ns: int, frame: str, points: np.ndarray) -> Any:
     """(P, 2) points [m]."""
     poses = [pose_stamped(stamp_ns, frame, x, y, 0.0) for x, y in points]
     return make("nav_msgs/msg/Path", header=header(stamp_ns, frame), poses=poses)
 
 
-def battery(stamp_ns: int, voltage: float, current: float = np.nan, temperature: float = np.nan) -> object:
+def battery(stamp_ns: int, voltage: float, current: float = np.nan, temperature: float = np.nan) -> Any:
     unknown = dict.fromkeys(("charge", "capacity", "design_capacity", "percentage"), np.nan)
     return make(
         "sensor_msgs/msg/BatteryState",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rosbags import rosbag2
-from rosbags.interfaces import Connection, QosDurability, QosReliability
+from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
 
 from .problem import RecordingError
 from .qos import Qos
@@ -101,7 +101,7 @@ class Playback:
 
 def offered_qos(connection: Connection) -> Qos:
     """What the recorded publisher offered."""
-    profiles = connection.ext.offered_qos_profiles
+    profiles = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
     if not profiles:
         return Qos()
     return Qos(

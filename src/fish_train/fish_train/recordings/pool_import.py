@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from .pool_rotor import RotorCommand, rebuild_rotor_command
 from .problem import RecordingError
 from .streams import NS_PER_S, decode_paths
 
-Message = tuple[int, str, object]  # arrival [ns], topic, message
+Message = tuple[int, str, Any]  # arrival [ns], topic, message
 
 CENTRE = np.array([1.9005, 0.8688])  # m, image centre in the tracker's frame, taken for the pool's centre
 GRAVITY = 9.81  # m/s^2, what the sensor's gravity removal is undone with

@@ -51,14 +51,14 @@ class _Loops:
 
     def phase(self, slip: np.ndarray) -> np.ndarray:
         """theta + delta on the grid."""
-        return self.theta[self.loop] + np.interp(self.grid, self.knots, slip)
+        return np.asarray(self.theta[self.loop] + np.interp(self.grid, self.knots, slip))
 
     def speed(self, slip: np.ndarray, lag_s: float) -> np.ndarray:
         """phi_dot on the grid."""
         held = self.amplitude * self.omega
-        command = -held[self.loop] * np.sin(self.theta[self.loop] + np.interp(self.grid, self.knots, slip))
+        command = -held[self.loop] * np.sin(self.phase(slip))
         decay = np.exp(-GRID_S / max(lag_s, 1e-6))
-        return lfilter([1 - decay], [1, -decay], command)
+        return np.asarray(lfilter([1 - decay], [1, -decay], command))
 
 
 def rebuild_rotor_command(
@@ -81,7 +81,7 @@ def rebuild_rotor_command(
     t_fit, measured = t_encoder[use], encoder_speed[use]
 
     def residuals(p: np.ndarray) -> np.ndarray:
-        return np.interp(t_fit, loops.grid, loops.speed(p[1:], p[0] * FIRST_LAG_S)) - measured
+        return np.asarray(np.interp(t_fit, loops.grid, loops.speed(p[1:], p[0] * FIRST_LAG_S)) - measured)
 
     def cost(first_phase: float) -> float:
         early = np.abs(residuals(np.concatenate([[1.0], np.full(len(loops.knots), first_phase)])))[:100]

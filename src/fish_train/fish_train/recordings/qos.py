@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -13,7 +14,7 @@ class Qos:
     transient_local: bool = False
     depth: int = 10
 
-    def profiles(self) -> list[dict]:
+    def profiles(self) -> list[dict[str, Any]]:
         """As `offered_qos_profiles` of rosbag2 (metadata version 9): a list of one profile."""
         unset = {"sec": 0, "nsec": 0}
         return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,7 @@ class _Assembly:
         arrivals = np.concatenate([raw.arrival_ns for raw in self.bag.topics])
         stamps = [m.stamps for m in mapped.values() if m.stamps is not None]
         axis = build_axis(stamps, int(arrivals.min()), self.topics.max_latency_s)
-        streams = {role: self.stream(role, m, axis) for role, m in mapped.items()}
+        streams: dict[str, Any] = {role: self.stream(role, m, axis) for role, m in mapped.items()}
         paths = self.paths(axis)
         for clock in axis.clocks.values():
             self.problems += checks.check_clock(clock)
@@ -132,9 +133,11 @@ class _Assembly:
         plausible = np.ones(len(t), bool) if stamps is None else stamps.plausible
         flags = checks.flag_samples(role, decoded, rule, t, plausible, stamps is not None)
         frame = "" if decoded.frames is None else str(decoded.frames[0])
-        common = {"topic": decoded.topic, "frame_id": frame, "t": t, "t_arrival": t_arrival, "flags": flags}
-        names = {"names": decoded.names} if ROLES[role].names else {}
-        stream = ROLES[role].stream(**common, **names, **decoded.arrays)
+        values: dict[str, Any] = dict(decoded.arrays)
+        if ROLES[role].names:
+            values["names"] = decoded.names
+        values |= {"topic": decoded.topic, "frame_id": frame, "t": t, "t_arrival": t_arrival, "flags": flags}
+        stream = ROLES[role].stream(**values)
         self.problems += checks.check_stream(stream, rule)
         return stream
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from rosbags.interfaces.typing import Typesdict
@@ -69,7 +70,7 @@ def decode_paths(raw: RawTopic, ros1: bool) -> list[tuple[np.ndarray, str]]:
     read = store.deserialize_ros1 if ros1 else store.deserialize_cdr
     paths = []
     for message in raw.raws:
-        path = read(message, PATH_TYPE)
+        path: Any = read(message, PATH_TYPE)
         points = [(p.pose.position.x, p.pose.position.y) for p in path.poses]
         paths.append((np.array(points, float).reshape(-1, 2), path.header.frame_id))
     return paths

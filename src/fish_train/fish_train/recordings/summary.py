@@ -20,7 +20,7 @@ def summarise(raw: RawTopic, role: str, t: np.ndarray, t_arrival: np.ndarray, st
         rate_hz=(len(t) - 1) / span if span > 0 else np.nan,
         period_s=float(np.median(steps)) if len(steps) else np.nan,
         longest_gap_s=float(steps.max()) if len(steps) else np.nan,
-        latency_s=tuple(float(q) for q in latency),
+        latency_s=(float(latency[0]), float(latency[1]), float(latency[2])),
         role=role,
         stamped=stamped,
     )

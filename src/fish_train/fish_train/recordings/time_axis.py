@@ -29,7 +29,7 @@ class Stamps:
         delay = self.arrival_ns - self.stamp_ns
         d = (delay - int(np.median(delay))) * 1e-9
         x = (self.arrival_ns - self.arrival_ns[0]) * 1e-9
-        return np.abs(d - robust_line(x, d)) < OUTLIER_S
+        return np.asarray(np.abs(d - robust_line(x, d)) < OUTLIER_S)
 
 
 @dataclass(frozen=True)

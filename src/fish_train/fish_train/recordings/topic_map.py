@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -65,7 +66,7 @@ class TopicMap:
         if not self.max_latency_s > 0:
             raise RecordingError(f"topic map: max_latency_s {self.max_latency_s}; expected > 0")
 
-    def as_dict(self) -> dict:
+    def as_dict(self) -> dict[str, Any]:
         """What stands in the YAML file."""
         rules = {role: asdict(rule) for role, rule in self.rules.items()}
         return {"namespace": self.namespace, "max_latency_s": self.max_latency_s, "topics": rules}

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -233,7 +233,8 @@ class Trial:
     def clean(self) -> Trial:
         """The same trial without flagged samples, streams in order of time; empty streams become None."""
         cleaned = {name: stream.clean() for name, stream in self.streams.items()}
-        return replace(self, **{name: stream if len(stream) else None for name, stream in cleaned.items()})
+        kept: dict[str, Any] = {name: stream if len(stream) else None for name, stream in cleaned.items()}
+        return replace(self, **kept)
 
 
 @dataclass(frozen=True)

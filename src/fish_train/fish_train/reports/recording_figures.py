@@ -55,7 +55,7 @@ def _rows(trial: Trial) -> Iterator[Row]:
     speeds = [(k, s) for k, s in (("odometry", odometry), ("truth", truth)) if s is not None]
     if speeds:
         yield "surge speed (m/s)", [(name, s, s.u) for name, s in speeds]
-    rotor = []
+    rotor: list[tuple[str, Stream, np.ndarray]] = []
     if trial.commands is not None:
         rotor.append(("rotor command", trial.commands, trial.commands.rotor_speed))
     if trial.encoder is not None:
@@ -124,7 +124,7 @@ def _thinned(stream: Stream) -> np.ndarray:
     """Positions in order of time, at most MOST_POINTS, without stamps that make no sense."""
     order = np.argsort(stream.t, kind="stable")
     order = order[np.abs(stream.t[order] - stream.t_arrival[order]) < 60]
-    return order[:: max(1, len(order) // MOST_POINTS)]
+    return np.asarray(order[:: max(1, len(order) // MOST_POINTS)])
 
 
 def _mark(figure: go.Figure, stream: Stream, x: np.ndarray, y: np.ndarray, **where: int) -> None:
