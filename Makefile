@@ -11,7 +11,7 @@ unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE LD_LIBRARY_PATH _ROS_WHEE
 unexport AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH ROS_DISTRO
 
 VENV := .venv
-PIP := $(VENV)/bin/python -m pip --disable-pip-version-check install --quiet $(PIP_ARGS) --constraint constraints.txt
+PIP := $(VENV)/bin/python -m pip --disable-pip-version-check install --quiet --quiet $(PIP_ARGS) --constraint constraints.txt
 ACTIVATE := source $(VENV)/bin/activate
 WORKSPACE := $(ACTIVATE); source install/setup.bash
 FISH_TRAIN := $(WORKSPACE); exec install/fish_train/lib/fish_train/fish_train
@@ -24,11 +24,12 @@ PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 .PHONY: help setup build demo test lint identify diagnose predict train evaluate prove paper clean distclean
 
 help:
-	@echo "make demo [LETTER=R] [SPEED=0.2] [DURATION=s] [DOMAIN=n] [OUT=dir]   the whole robot swims, is recorded and scored"
-	@echo "make test                                                            build and all tests"
-	@echo "make identify|diagnose|predict|train|evaluate ARGS='...'             the offline tools (ARGS=--help says more)"
-	@echo "make prove, make paper                                               the blind study, short; the paper's figures"
-	@echo "make setup, build, lint, clean, distclean                            the single steps"
+	@echo "make demo       the whole robot swims the letter R, is recorded, scored and shown; options:"
+	@echo "                LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder"
+	@echo "make test       build, the tests of every package, the tests across packages"
+	@echo "make identify, diagnose, predict, train, evaluate ARGS='...'   the offline tools; ARGS=--help says more"
+	@echo "make prove      the blind study, short; make paper: the paper's figures"
+	@echo "make setup, build, lint, clean, distclean   the single steps"
 
 # --- set-up: virtual environment and wheels -----------------------------------------------------------------------------
 $(VENV)/.created:
@@ -40,7 +41,7 @@ $(VENV)/.created:
 	@touch $@
 
 $(VENV)/.run: requirements.txt constraints.txt $(VENV)/.created
-	@echo "setup: wheels of requirements.txt"
+	@echo "setup: wheels of requirements.txt (about a minute, or as long as your line takes)"
 	@$(PIP) -r requirements.txt
 	@touch $@
 
@@ -65,7 +66,7 @@ build: install/.built
 
 # --- the robot and the tools ----------------------------------------------------------------------------------------------
 demo: build
-	@$(FISH_TRAIN) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(SPEED),--speed '$(SPEED)') \
+	@$(FISH_TRAIN) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
 		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
 
 identify diagnose predict train evaluate prove paper: build $(VENV)/.train

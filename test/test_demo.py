@@ -78,6 +78,8 @@ def test_sigterm_ends_the_demo_and_its_nodes(tmp_path):
 BROKEN = "weights.safetensors"
 BAD_INPUT = {
     "letter": (["--letter", "?"], "unknown letter '?'; known: A B C"),
+    "path arguments": (["--letter", "circle", "--path-args", "{radius: "], "expected YAML"),
+    "walls": (["--letter", "circle", "--path-args", "{radius: 1}"], "must stay within |y|"),
     "speed": (["--speed", "9"], "expected 0.05 to 0.5"),
     "duration": (["--duration", "-1"], "expected a positive number"),
     "domain": (["--domain", "500"], "0 to 232"),

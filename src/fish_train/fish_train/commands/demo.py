@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 
+import yaml
 from rich.console import Console
 
 from fish_control.paths import make_path
@@ -37,6 +38,9 @@ PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("--letter", default="R", help="letter, or a path family such as circle (R)")
+    parser.add_argument(
+        "--path-args", default="", help="of the family, YAML: '{radius: 0.5}', '{file: my.svg}'"
+    )
     parser.add_argument("--speed", type=float, default=0.2, help="surge speed, m/s (0.2)")
     parser.add_argument(
         "--duration", type=float, default=LONGEST, help="s, the longest run; a lap ends a closed path"
@@ -51,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     """Swim, record, score, show."""
     if not args.duration > 0.0:
         raise UserError(f"duration is {args.duration:g} s, expected a positive number")
-    domain, start = choose_domain(args.domain), start_pose(args.letter)
+    domain, start = choose_domain(args.domain), start_pose(args.letter, args.path_args)
     folder = _new_folder(args)
     console = Console(highlight=False)
     console.print(f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}")
@@ -74,7 +78,7 @@ def node_parameters(
     """What the command line changes in the nodes' parameter files."""
     changed: dict[NodeSpec, dict[str, object]] = {
         SIMULATOR: dict(start),
-        PLANNER: {"path": args.letter, "speed": args.speed},
+        PLANNER: {"path": args.letter, "path_args": args.path_args, "speed": args.speed},
         RECORDER: {"output": str(folder.resolve()), "name": "recording"},
     }
     if args.robot:
@@ -84,14 +88,20 @@ def node_parameters(
     return changed
 
 
-def start_pose(name: str) -> Parameters:
+def start_pose(name: str, path_args: str) -> Parameters:
     """The fish waits at the beginning of the path, along it.
 
     Raises:
         UserError: no such path.
     """
     try:
-        path = make_path(name)
+        arguments = yaml.safe_load(path_args) or {}
+    except yaml.YAMLError:
+        arguments = None
+    if not isinstance(arguments, dict):
+        raise UserError(f"path-args is {path_args!r}, expected YAML such as '{{radius: 0.5}}'")
+    try:
+        path = make_path(name, **arguments)
     except PathError as error:
         raise UserError(str(error)) from error
     (x, y), heading = path.point(0.0), float(path.heading_at(0.0))

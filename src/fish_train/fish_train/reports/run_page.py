@@ -108,7 +108,7 @@ def _speed(score: RunScore) -> go.Figure:
 
 
 def _gains(trial: Trial) -> go.Figure:
-    figure = make_subplots(rows=1, cols=2, subplot_titles=("steering", "speed"))
+    figure = make_subplots(rows=1, cols=2)
     for k, name in enumerate(GAIN_NAMES):
         figure.add_scatter(x=trial.gains.t, y=trial.gains.values[:, k], name=name, row=1, col=1 + k // 3)
     figure.update_xaxes(title="time in the recording [s]")
