@@ -1,0 +1,1 @@
+"""How well gains follow paths: on any plant, with perfect or realistic sensing."""

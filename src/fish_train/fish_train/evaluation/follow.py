@@ -1,0 +1,140 @@
+"""A batch of robots on a batch of paths: sensing, planner's and controller's laws, plant, 10 ms at a time.
+
+The laws are those of the nodes (fish_control's generic functions) on arrays of B robots; the node's handling of a fish
+that faces backwards, of stale data and of the end of a path is not part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_control.control_law import (
+    ActuatorState,
+    ControlState,
+    Errors,
+    Setpoint,
+    actuator_step,
+    control_step,
+)
+from fish_control.line_of_sight import GuidanceState, Motion, PathAhead, observe, tracking_errors
+from fish_control.path_batch import PathBatch
+from fish_control.policy import policy_inputs
+from fish_control.reference_path import ReferencePath
+from fish_control.stroke_mean import StrokeState
+from fish_sim.model import DT
+from fish_train.evaluation.gains_source import GainsSource
+from fish_train.evaluation.plant import Plant
+from fish_train.evaluation.sensing import Sensing
+from fish_train.training.loop import CONTROL_PERIOD, PHYSICS_STEPS, Law
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What happened, every control period (20 ms); (T, B, ...) arrays, NaN after a robot's end.
+
+    Attributes:
+        time: (T,) [s]. motion: (T, B, 6) true motion. cross_track [m], course [rad] (of the path), progress [m]: of the
+            true position, (T, B). alpha [rad], throttle: set-points (T, B). gains: (T, B, 6).
+        speed: (B,) wanted [m/s]. finished: (B,) reached the end of an open path.
+    """
+
+    time: Array
+    motion: Array
+    cross_track: Array
+    course: Array
+    progress: Array
+    alpha: Array
+    throttle: Array
+    gains: Array
+    speed: Array
+    finished: NDArray[np.bool_]
+
+
+class Follower:
+    """The laws' memory for a batch."""
+
+    def __init__(self, paths: Sequence[ReferencePath], speed: Array, gains: GainsSource, law: Law) -> None:
+        self._law, self._gains, self._speed = law, gains, np.asarray(speed, dtype=float)
+        self._paths = PathBatch(paths, law.tracker)
+        zeros = np.zeros(len(paths))
+        self._guidance = GuidanceState(StrokeState(*(zeros for _ in StrokeState._fields)), zeros)
+        self._control = ControlState(*(zeros for _ in ControlState._fields))
+        self._actuator = ActuatorState(*(zeros for _ in ActuatorState._fields))
+        self.setpoint = Setpoint(zeros, zeros)
+        self.gains = np.full((len(paths), 6), np.nan)
+
+    def observe(self, seen: Array, known: NDArray[np.bool_]) -> None:
+        """Take in what is seen (B, 6); robots without an estimate yet keep their memory."""
+        motion = Motion(*seen.T)
+        after = observe(self._guidance, motion, DT, self._law.guidance, np)
+        stroke = StrokeState(*(np.where(known, a, b) for a, b in zip(after.stroke, self._guidance.stroke, strict=True)))
+        self._guidance = GuidanceState(stroke, np.where(known, after.drift, self._guidance.drift))
+
+    def decide(self, seen: Array, known: NDArray[np.bool_]) -> None:
+        """One control period of planner, policy and control law."""
+        motion, at = Motion(*seen.T), self._paths.update(seen[:, :2])
+        ahead = PathAhead(*at.point.T, at.heading, at.curvature, *at.target.T, at.chord)
+        errors = tracking_errors(self._guidance, motion, ahead, self._speed, self._law.guidance, np)
+        mean_heading = motion.heading - self._guidance.stroke.heading
+        inputs = policy_inputs(
+            mean_heading, motion.surge, self._speed, errors.heading, errors.speed, errors.cross_track, np
+        )
+        gains = self._gains.gains(np.stack(inputs, axis=-1), self._speed, at.curvature)
+        wanted = Errors(errors.heading, errors.speed, at.curvature, self._speed)
+        control, setpoint = control_step(self._control, wanted, gains, CONTROL_PERIOD, self._law.limits, np)
+        self._control = ControlState(*(np.where(known, a, b) for a, b in zip(control, self._control, strict=True)))
+        self.setpoint = Setpoint(*(np.where(known, a, 0.0) for a in setpoint))
+        self.gains = np.stack(gains, axis=-1)
+
+    def command(self) -> Array:
+        """Commands (B, 2) for the next 10 ms."""
+        self._actuator, rotor_speed = actuator_step(self._actuator, self.setpoint, DT, self._law.limits, np)
+        return np.column_stack([rotor_speed, self._actuator.alpha])
+
+
+def follow(
+    plant: Plant,
+    sensing: Sensing,
+    gains: GainsSource,
+    paths: Sequence[ReferencePath],
+    speed: Array,
+    starts: Array,
+    durations: Array,
+    law: Law,
+) -> Trace:
+    """Swim from rest at `starts` (B, 3); a robot ends with its path, or after its duration [s] (B,)."""
+    plant.reset(starts)
+    follower, judge = Follower(paths, speed, gains, law), PathBatch(paths, law.tracker)
+    durations = np.asarray(durations, dtype=float)
+    finished, ended = np.zeros(len(paths), dtype=bool), np.zeros(len(paths), dtype=bool)
+    rows: list[tuple[Array, ...]] = []
+    for k in range(1, PHYSICS_STEPS * int(np.ceil(durations.max() / CONTROL_PERIOD)) + 1):
+        plant.step(follower.command())
+        time, motion = k * DT, plant.motion
+        lost = ~np.all(np.isfinite(motion), axis=1)
+        seen, known = sensing.update(time, np.where(lost[:, None], 0.0, motion))
+        follower.observe(seen, known)
+        if k % PHYSICS_STEPS:
+            continue
+        follower.decide(seen, known)
+        at = judge.update(np.where(lost[:, None], 0.0, motion)[:, :2])
+        rows.append(
+            tuple(
+                np.where(ended, np.nan, value.T).T
+                for value in (
+                    motion, at.cross_track_error, at.heading, at.progress, *follower.setpoint, follower.gains
+                )
+            )
+        )  # fmt: skip
+        finished |= at.finished & ~ended
+        ended |= at.finished | (time >= durations) | lost
+        if ended.all():
+            break
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return Trace(CONTROL_PERIOD * np.arange(1, len(rows) + 1), *columns, np.asarray(speed, dtype=float), finished)

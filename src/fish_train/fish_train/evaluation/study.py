@@ -1,0 +1,142 @@
+"""Runs of candidates under conditions over cells, in batches and processes; rows of metrics come back."""
+
+from __future__ import annotations
+
+import csv
+import multiprocessing
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from fish_sim.robot import Robot
+from fish_sim.sensors.settings import SensorSettings
+from fish_train.evaluation.cells import Cell, longest, read_path, start_pose
+from fish_train.evaluation.follow import Trace, follow
+from fish_train.evaluation.gains_source import GainsSource
+from fish_train.evaluation.metrics import ErrorSizes, RunMetrics, measure
+from fish_train.evaluation.plant import FishSimPlant, Plant
+from fish_train.evaluation.sensing import FusedSensing, PerfectSensing, Sensing
+from fish_train.training.episodes import CERTAIN
+from fish_train.training.loop import Law
+
+MakePlant = Callable[[Sequence[Robot], Sequence[int], float], Plant]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """On what and with what eyes."""
+
+    name: str = "nominal"
+    robot: Robot = field(default_factory=Robot)
+    off: float = 0.0  # relative half-width of the uncertain parameters, drawn by the seed
+    fused: bool = True  # sensors and fusion; False: perfect state
+    sensors: SensorSettings = field(default_factory=SensorSettings)
+    disturbance: float = 0.002  # N, as in the simulator node
+    plant: MakePlant = FishSimPlant
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Gains and the constants of the law they were made for."""
+
+    name: str
+    gains: GainsSource
+    law: Law = field(default_factory=Law)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run with its metrics."""
+
+    candidate: str
+    condition: str
+    cell: Cell
+    metrics: RunMetrics
+
+
+def detuned(robot: Robot, off: float, seed: int) -> Robot:
+    """Uncertain parameters multiplied by a uniform 1 +- off."""
+    if off == 0.0:
+        return robot
+    random = np.random.default_rng([seed, 4])
+    factors = {k: 1.0 + off * random.uniform(-1.0, 1.0) for k in robot.parameters if k not in CERTAIN}
+    return robot.with_parameters(**{k: robot.parameters[k] * factor for k, factor in factors.items()})
+
+
+def swim(candidate: Candidate, condition: Condition, cells: Sequence[Cell]) -> Trace:
+    """All cells at once."""
+    paths = [read_path(cell.path) for cell in cells]
+    seeds = [cell.seed for cell in cells]
+    robots = [detuned(condition.robot, condition.off, seed) for seed in seeds]
+    plant = condition.plant(robots, seeds, condition.disturbance)
+    sensing: Sensing = FusedSensing(robots, seeds, condition.sensors) if condition.fused else PerfectSensing()
+    speed = np.array([cell.speed for cell in cells])
+    starts = np.array([start_pose(path, seed) for path, seed in zip(paths, seeds, strict=True)])
+    durations = np.array([longest(path, v) for path, v in zip(paths, speed, strict=True)])
+    return follow(plant, sensing, candidate.gains, paths, speed, starts, durations, candidate.law)
+
+
+def evaluate(candidate: Candidate, condition: Condition, cells: Sequence[Cell]) -> list[Row]:
+    """Metrics of all cells."""
+    trace = swim(candidate, condition, cells)
+    return [
+        Row(candidate.name, condition.name, cell, measure(trace, k, read_path(cell.path)))
+        for k, cell in enumerate(cells)
+    ]
+
+
+def run_study(
+    candidates: Sequence[Candidate],
+    conditions: Sequence[Condition],
+    cells: Sequence[Cell],
+    jobs: int,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Row]:
+    """Everything against everything, `jobs` processes; cells of like duration swim together."""
+    ordered = sorted(cells, key=lambda cell: longest(read_path(cell.path), cell.speed))
+    size = max(1, min(16, -(-len(ordered) // max(jobs, 1))))
+    batches = [ordered[k : k + size] for k in range(0, len(ordered), size)]
+    tasks = [(c, d, batch) for c in candidates for d in conditions for batch in batches]
+    rows: list[Row] = []
+    if jobs == 1:
+        for done, task in enumerate(tasks, start=1):
+            rows += evaluate(*task)
+            report(done, len(tasks))
+        return rows
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        futures = [pool.submit(evaluate, *task) for task in tasks]
+        for done, future in enumerate(futures, start=1):
+            rows += future.result()
+            report(done, len(tasks))
+    return rows
+
+
+def mean_sizes(sizes: Sequence[ErrorSizes]) -> ErrorSizes:
+    """Field by field over runs; NaN runs count as NaN."""
+    return ErrorSizes(*(float(np.mean([getattr(s, f.name) for s in sizes])) for f in fields(ErrorSizes)))
+
+
+def write_rows(path: Path, rows: Sequence[Row]) -> None:
+    """All runs as CSV."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        table: csv.DictWriter[str] | None = None
+        for row in rows:
+            values = {"candidate": row.candidate, "condition": row.condition, **asdict(row.cell)}
+            values |= {"approach": row.metrics.approach, "failure": row.metrics.failure}
+            values |= {f"settled_{k}": v for k, v in asdict(row.metrics.settled).items()}
+            values |= {f"whole_{k}": v for k, v in asdict(row.metrics.whole).items()}
+            if table is None:
+                table = csv.DictWriter(stream, list(values))
+                table.writeheader()
+            table.writerow(values)
+
+
+def with_sensors(condition: Condition, **values: float) -> Condition:
+    """The same condition with other sensor settings."""
+    return replace(condition, sensors=replace(condition.sensors, **values))
