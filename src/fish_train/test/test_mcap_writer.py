@@ -13,8 +13,9 @@ from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
 from fish_train.recordings import RecordingError, read_trial
-from fish_train.recordings.mcap_writer import RESERVE_NAME, DiskFullError, McapRecording
+from fish_train.recordings.mcap_writer import McapRecording
 from fish_train.recordings.qos import Qos
+from fish_train.recordings.record_file import RESERVE_NAME, DiskFullError
 from fish_train.recordings.recover import recover
 
 IMU = "sensor_msgs/msg/Imu"
@@ -155,7 +156,7 @@ def test_any_amount_of_room_leaves_a_recording_that_can_be_saved(tmp_path, room)
     topic = recording.add_topic("/fish/imu/data", IMU)
     recording.write(topic, 1, PAYLOAD)
     recording.flush()
-    recording._file = FullAfter(recording._file, room)
+    recording._file._raw = FullAfter(recording._file._raw, room)
     with pytest.raises(DiskFullError, match="No space left"):
         for i in range(1000):
             recording.write(topic, 2 + i * 10_000_000, PAYLOAD)

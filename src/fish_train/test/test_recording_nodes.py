@@ -144,6 +144,45 @@ def test_bad_parameters_are_one_line(peer, node, parameters, text):
     assert out.startswith(text) and "Traceback" not in out and len(out.splitlines()) == 1
 
 
+FULL_DISK = '''
+import errno, sys
+from fish_train.nodes import recorder
+from fish_train.recordings.record_file import RecordFile
+
+class Full:
+    """A disk with room for 60 kB and for what the reserve gives back."""
+    def __init__(self, raw, reserve): self.raw, self.reserve, self.room = raw, reserve, 60_000
+    def __getattr__(self, name): return getattr(self.raw, name)
+    def write(self, data):
+        self.room -= len(data)
+        if self.room < 0 and self.reserve.exists(): raise OSError(errno.ENOSPC, "No space left on device")
+        return self.raw.write(data)
+
+start = RecordFile.__init__
+def limited(self, path):
+    start(self, path)
+    self._raw = Full(self._raw, self._reserve)
+RecordFile.__init__ = limited
+sys.exit(recorder.main())
+'''
+
+
+def test_full_disk_is_one_line_and_a_valid_recording(peer, tmp_path):
+    arguments = ["--ros-args", "-p", f"output:={tmp_path}", "-p", "name:=run", "--log-level", "warn"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", FULL_DISK, *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env=os.environ | {"ROS_DOMAIN_ID": str(peer.domain)},
+    )  # fmt: skip
+    peer.processes.append(process)
+    publish_all(peer, 250)
+    _, errors = process.communicate(timeout=15)
+    assert process.returncode == 1
+    assert errors.startswith("recorder: ") and "No space left on device" in errors
+    assert len(errors.splitlines()) == 1
+    assert len(read_trial(tmp_path / "run").imu) > 50
+
+
 def test_replay_sends_the_same_bytes_at_the_same_times(peer, tmp_path):
     path = samples.robot_recording(tmp_path / "run", duration=2.0)
     got: list[tuple[float, bytes]] = []

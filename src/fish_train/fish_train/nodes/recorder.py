@@ -20,8 +20,9 @@ from rclpy.subscription import Subscription
 from fish_sim.nodes.start import read_parameters, run
 from fish_train.errors import UserError
 from fish_train.nodes.raw_topics import from_profile, message_class, to_profile
-from fish_train.recordings.mcap_writer import DiskFullError, McapRecording, Topic
+from fish_train.recordings.mcap_writer import McapRecording, Topic
 from fish_train.recordings.qos import Qos
+from fish_train.recordings.record_file import DiskFullError
 from fish_train.recordings.recorder_config import RecorderConfig, common_qos, is_selected
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -72,18 +72,20 @@ def _read_all(
     jobs = [(path, topics) for path in paths]
     if processes is None:
         processes = 1 if len(paths) < PARALLEL_FROM else min(len(os.sched_getaffinity(0)), len(paths))
+    if processes == 1:
+        yield from zip(paths, _shown(map(_read_one, jobs), len(paths), progress), strict=True)
+        return
+    # fork: a caller's script needs no "if __name__" guard; started before the bar, which brings a thread
+    with multiprocessing.get_context("fork").Pool(processes) as pool:
+        results = pool.imap(_read_one, jobs, chunksize=2)
+        yield from zip(paths, _shown(results, len(paths), progress), strict=True)
+
+
+def _shown(results: Iterable[Trial | str], total: int, progress: bool) -> Iterator[Trial | str]:
+    """The results as they come, with a progress bar if asked for."""
     columns = (TextColumn("reading trials"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, disable=not progress, transient=True) as bar:
-        task = bar.add_task("", total=len(paths))
-        if processes == 1:
-            for path, result in zip(paths, map(_read_one, jobs), strict=True):
-                bar.advance(task)
-                yield path, result
-            return
-        with multiprocessing.get_context("fork").Pool(processes) as pool:
-            for path, result in zip(paths, pool.imap(_read_one, jobs, chunksize=2), strict=True):
-                bar.advance(task)
-                yield path, result
+        yield from bar.track(results, total=total)
 
 
 def _read_one(job: tuple[Path, TopicMap]) -> Trial | str:

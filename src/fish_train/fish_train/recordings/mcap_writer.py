@@ -11,7 +11,6 @@ Source: MCAP specification (mcap.dev/spec); records are those of the mcap packag
 
 from __future__ import annotations
 
-import os
 import zlib
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -41,18 +40,13 @@ from .bag_metadata import write_metadata
 from .message_types import MessageType, message_type
 from .problem import RecordingError
 from .qos import Qos
+from .record_file import DiskFullError, RecordFile
 
 CHUNK_BYTES = 1 << 20
-RESERVE_BYTES = 128 * 1024  # given back when the disk is full, to close the recording with
-RESERVE_NAME = ".reserve"
 LIBRARY = "fish_train"
 CUSTOM_NAME = (
     "fish_train"  # metadata record that keeps the custom data even if metadata.yaml is never written
 )
-
-
-class DiskFullError(RecordingError):
-    """Nothing more can be written; what was written before is closed and valid."""
 
 
 @dataclass
@@ -100,11 +94,9 @@ class McapRecording:
         self._chunks: list[ChunkIndex] = []
         self._range: tuple[int, int] | None = None
         self._closed = False
-        self._file = self.path.open("xb", buffering=0)
-        self._good = 0  # bytes up to the end of the last whole record
-        self._keep_reserve()
+        self._file = RecordFile(self.path)
         start = [Header("ros2", LIBRARY), Metadata(CUSTOM_NAME, self.custom)]
-        self._append(MCAP0_MAGIC + _records(*start))
+        self._file.append(MCAP0_MAGIC + _records(*start))
 
     def __enter__(self) -> McapRecording:
         return self
@@ -120,7 +112,7 @@ class McapRecording:
     @property
     def size(self) -> int:
         """Bytes on disk."""
-        return self._good
+        return self._file.size
 
     def add_topic(self, name: str, msgtype: str | MessageType, qos: Qos | None = None) -> Topic:
         """Announce a topic; the same name and type again give the same topic.
@@ -187,10 +179,10 @@ class McapRecording:
         )  # fmt: skip
         offsets, index = {}, b""
         for channel, entries in chunk.index.items():
-            offsets[channel] = self._good + len(body) + len(index)
+            offsets[channel] = self._file.size + len(body) + len(index)
             index += _records(MessageIndex(channel_id=channel, records=entries))
         entry = ChunkIndex(
-            chunk_start_offset=self._good, chunk_length=len(body), compression="",
+            chunk_start_offset=self._file.size, chunk_length=len(body), compression="",
             compressed_size=len(data), uncompressed_size=len(data),
             message_index_offsets=offsets, message_index_length=len(index),
             message_start_time=first, message_end_time=last,
@@ -212,7 +204,7 @@ class McapRecording:
     def _append_or_close(self, data: bytes, lost: _OpenChunk | None = None) -> None:
         """Write whole records; on a full disk end the recording without them and say so."""
         try:
-            self._append(data)
+            self._file.append(data)
         except DiskFullError:
             gone = lost.index if lost else {}
             for topic in self.topics.values():
@@ -220,49 +212,26 @@ class McapRecording:
             self._close_full()
             raise
 
-    def _append(self, data: bytes) -> None:
-        """Write whole records, or leave the file as it was and raise DiskFullError."""
-        try:
-            view = memoryview(data)
-            while view:
-                view = view[self._file.write(view) :]
-        except OSError as error:
-            self._file.truncate(self._good)
-            self._file.seek(self._good)
-            raise DiskFullError(
-                f"{self.path}: writing failed: {error.strerror}; {self._good} bytes written before are kept"
-            ) from error
-        self._good += len(data)
-
-    def _keep_reserve(self) -> None:
-        try:
-            (self.directory / RESERVE_NAME).write_bytes(bytes(RESERVE_BYTES))
-        except OSError as error:
-            self._file.close()
-            raise DiskFullError(f"{self.directory}: no room for a recording: {error.strerror}") from error
-
     def _close_full(self) -> None:
         """End the file on a full disk: with the summary if it fits into the reserve, else without."""
-        (self.directory / RESERVE_NAME).unlink(missing_ok=True)
+        self._file.release_reserve()
         bare = _records(DataEnd(0), Footer(0, 0, 0)) + MCAP0_MAGIC
         for ending in (self._ending(), bare, b""):
             with suppress(DiskFullError):
-                self._append(ending)
+                self._file.append(ending)
                 break
         with suppress(OSError):  # without metadata.yaml the file is still read, and mended by recover
             self._finish()
 
     def _finish(self) -> None:
         self._closed = True
-        (self.directory / RESERVE_NAME).unlink(missing_ok=True)
-        os.fsync(self._file.fileno())
         self._file.close()
         write_metadata(self.directory, self.path.name, list(self.topics.values()), self._range, self.custom)
 
     def _ending(self) -> bytes:
         """DataEnd, summary section with its offsets, footer and magic."""
         end = _records(DataEnd(0))
-        start = self._good + len(end)
+        start = self._file.size + len(end)
         channels = [topic.channel for topic in self.topics.values()]
         first, last = self._range or (0, 0)
         statistics = Statistics(
