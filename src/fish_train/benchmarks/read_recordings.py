@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 
@@ -35,21 +36,34 @@ def make_trials(folder: Path, count: int) -> None:
         shutil.copytree(first, folder / f"trial_{i:03d}")
 
 
-def raw_rate(folder: Path) -> float:
-    """Messages per second of rosbags, one process."""
-    store, count, start = get_typestore(Stores.ROS2_JAZZY), 0, perf_counter()
+def raw_reading(folder: Path) -> int:
+    """All messages of all trials through rosbags, undecoded; how many they are."""
+    store, count = get_typestore(Stores.ROS2_JAZZY), 0
     for path in find_trials(folder):
         with AnyReader([path], default_typestore=store) as reader:
             count += sum(1 for _ in reader.messages())
-    return count / (perf_counter() - start)
+    return count
 
 
-def typed_rate(folder: Path, processes: int) -> tuple[float, float]:
-    """Messages per second and seconds of read_dataset."""
-    start = perf_counter()
+def typed_reading(folder: Path, processes: int) -> int:
+    """The same through read_dataset."""
     data = read_dataset(folder, processes=processes)
-    seconds = perf_counter() - start
-    return sum(topic.count for trial in data for topic in trial.topics) / seconds, seconds
+    return sum(topic.count for trial in data for topic in trial.topics)
+
+
+def measure(name: str, read: Callable[[], int], reference: float | None = None) -> float:
+    """Messages per second of processor time (children's too), which other load on the machine does not change."""
+    start, before = perf_counter(), processor_time()
+    count = read()
+    seconds, busy = perf_counter() - start, processor_time() - before
+    ratio = "" if reference is None else f", {count / busy / reference:.2f} of raw"
+    print(f"{name}: {count / busy:9,.0f} messages per processor second{ratio}; {seconds:.2f} s on the clock")
+    return count / busy
+
+
+def processor_time() -> float:
+    used = os.times()
+    return used.user + used.system + used.children_user + used.children_system
 
 
 def main() -> None:
@@ -63,15 +77,10 @@ def main() -> None:
         folder = args.recordings or Path(temporary)
         if args.recordings is None:
             make_trials(folder, args.trials)
-        raw_rate(folder)  # files into memory
-        raw = raw_rate(folder)
-        print(f"rosbags raw, 1 process: {raw:10,.0f} messages/s")
-        for processes in (1, min(2, len(os.sched_getaffinity(0)))):
-            rate, seconds = typed_rate(folder, processes)
-            ratio = rate / raw
-            print(
-                f"typed, {processes} process(es): {rate:10,.0f} messages/s, {ratio:.2f} of raw, {seconds:.2f} s in all"
-            )
+        raw_reading(folder)  # files into memory, code into caches
+        raw = measure("rosbags raw, 1 process ", lambda: raw_reading(folder))
+        measure("typed, 1 process       ", lambda: typed_reading(folder, 1), raw)
+        measure("typed, 2 processes     ", lambda: typed_reading(folder, 2), raw)
 
 
 if __name__ == "__main__":
