@@ -14,7 +14,8 @@ from fish_control.path_tracker import PathTracker
 
 from .bringup import NodeSpec
 from .errors import UserError
-from .processes import NodeProcess, NodeProcesses
+from .interruption import Interruption
+from .processes import NodeProcesses
 
 START_TIMEOUT = 30.0  # s in which each thing that is waited for must come
 LOOK_PERIOD = 0.1  # s between looks at the robot
@@ -52,67 +53,67 @@ class SwimEnd:
     cpu: dict[NodeSpec, float]
 
 
-def wait_for(
-    there: Callable[[], bool], what: str, nodes: NodeProcesses, listen: Callable[[float], None]
-) -> None:
-    """Listen until something is there.
+@dataclass(frozen=True)
+class Robot:
+    """A started robot and the eyes on it."""
 
-    Raises:
-        UserError: a node ended, or it did not come in time.
-    """
-    deadline = time.monotonic() + START_TIMEOUT
-    while not there():
-        listen(LOOK_PERIOD)
-        check_running(nodes)
-        if time.monotonic() > deadline:
-            raise UserError(f"no {what} within {START_TIMEOUT:.0f} s of the start; see the logs of the nodes")
+    nodes: NodeProcesses
+    watch: Watch
+    listen: Callable[[float], None]  # for so many seconds
+    interruption: Interruption
 
+    def wait_for(self, there: Callable[[], bool], what: str) -> None:
+        """Listen until something is there.
 
-def swim(
-    nodes: NodeProcesses, watch: Watch, listen: Callable[[float], None], duration: float, console: Console
-) -> SwimEnd:
-    """Watch the robot for at most `duration` seconds of its own time, with a line of progress."""
-    begin, cpu_before = time.monotonic(), nodes.cpu_times()
-    with console.status("") as line:
-        try:
-            reason = _follow(nodes, watch, listen, duration, line)
-        except KeyboardInterrupt:
-            reason = "as interrupted"
-    seconds = time.monotonic() - begin
-    used = {spec: spent - cpu_before[spec] for spec, spent in nodes.cpu_times().items()}
-    return SwimEnd(reason, seconds, {spec: cpu_s / seconds for spec, cpu_s in used.items()})
+        Raises:
+            UserError: a node ended, or it did not come in time.
+            KeyboardInterrupt: the user does not want to wait.
+        """
+        deadline = time.monotonic() + START_TIMEOUT
+        while not there():
+            self._look()
+            if self.interruption.asked:
+                raise KeyboardInterrupt
+            if time.monotonic() > deadline:
+                raise UserError(f"no {what} within {START_TIMEOUT:.0f} s; see the logs of the nodes")
 
+    def swim(self, duration: float, console: Console) -> SwimEnd:
+        """Watch for at most `duration` seconds of the robot's own time, with a line of progress."""
+        begin, before = time.monotonic(), self.nodes.cpu_times()
+        with console.status("") as line:
+            reason = self._follow(duration, line)
+        seconds = time.monotonic() - begin
+        used = {spec: spent - before[spec] for spec, spent in self.nodes.cpu_times().items()}
+        return SwimEnd(reason, seconds, {spec: cpu_s / seconds for spec, cpu_s in used.items()})
 
-def _follow(
-    nodes: NodeProcesses, watch: Watch, listen: Callable[[float], None], duration: float, line: Status
-) -> str:
-    """Until the end of the path, one lap of a closed one, or the end of the time; the reason."""
-    first, path, lap_start = watch.sight.stamp, watch.tracker.path, watch.tracker.progress
-    while (t := watch.sight.stamp - first) < duration:
-        listen(LOOK_PERIOD)
-        check_running(nodes)
-        sight = watch.sight
-        on_path = watch.tracker.update((sight.x, sight.y))
-        line.update(
-            f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
-            f"cross-track {1000 * on_path.cross_track_error:+4.0f} mm   speed {sight.speed:.2f} m/s   "
-            f"{on_path.progress:.2f} of {path.length:.2f} m"
-        )
-        if on_path.finished:
-            listen(LAST_LOOK)
-            return "at the end of the path"
-        if path.closed and on_path.progress - lap_start >= path.length:
-            return "after one lap"
-    return f"after {duration:.0f} s"
+    def _follow(self, duration: float, line: Status) -> str:
+        """Until the end of the path, one lap of a closed one, the end of the time or Ctrl-C; the reason."""
+        tracker = self.watch.tracker
+        first, lap_start = self.watch.sight.stamp, tracker.progress
+        while (t := self.watch.sight.stamp - first) < duration and not self.interruption.asked:
+            self._look()
+            sight = self.watch.sight
+            on_path = tracker.update((sight.x, sight.y))
+            line.update(
+                f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
+                f"cross-track {1000 * on_path.cross_track_error:+4.0f} mm   speed {sight.speed:.2f} m/s   "
+                f"{on_path.progress:.2f} of {tracker.path.length:.2f} m"
+            )
+            if on_path.finished:
+                self.listen(LAST_LOOK)
+                return "at the end of the path"
+            if tracker.path.closed and on_path.progress - lap_start >= tracker.path.length:
+                return "after one lap"
+        return "as interrupted" if self.interruption.asked else f"after {duration:.0f} s"
+
+    def _look(self) -> None:
+        self.listen(LOOK_PERIOD)
+        check_running(self.nodes)
 
 
 def check_running(nodes: NodeProcesses) -> None:
     """Raise UserError with a node's last words if one has ended."""
     for process in nodes.ended():
-        raise UserError(_obituary(process))
-
-
-def _obituary(process: NodeProcess) -> str:
-    return (
-        f"{process.spec.name} ended with status {process.status}: {process.last_words()} (log: {process.log})"
-    )
+        raise UserError(
+            f"{process.spec.name} ended with status {process.status}: {process.last_words()} (log: {process.log})"
+        )

@@ -8,7 +8,6 @@ with Ctrl-C; what was recorded is then scored.
 from __future__ import annotations
 
 import argparse
-import signal
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
@@ -21,6 +20,7 @@ from fish_control.reference_path import PathError
 from fish_train.bringup import CONTROL, RECORDER, ROBOTS, SIMULATED, NodeSpec, Parameters
 from fish_train.domain import choose_domain
 from fish_train.errors import UserError
+from fish_train.interruption import Interruption
 from fish_train.nodes.watch import watching
 from fish_train.processes import NodeProcesses
 from fish_train.recordings import read_trial
@@ -28,7 +28,7 @@ from fish_train.reports.page import Table
 from fish_train.reports.run_page import write_run_page
 from fish_train.score import score_trial
 from fish_train.score_table import error_table, print_table
-from fish_train.swim import SwimEnd, swim, wait_for
+from fish_train.swim import Robot, SwimEnd
 
 LONGEST = 600.0  # s, a run that does not end by itself
 SIMULATOR = SIMULATED[0]
@@ -112,18 +112,19 @@ def _swim(
     domain: int, changed: Mapping[NodeSpec, Parameters], folder: Path, duration: float, console: Console
 ) -> tuple[SwimEnd, Table]:
     """Start the nodes, watch the run, end them; the recorder comes before the fish moves and ends first."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended like with Ctrl-C
-    with NodeProcesses(domain, folder / "logs") as nodes, watching(domain) as (watch, listen):
-        for spec in ROBOTS["sim"]:
-            if spec != CONTROLLER:
-                nodes.start(spec, changed.get(spec))
-        wait_for(lambda: watch.sees(RECORDER.executable), "recorder", nodes, listen)
-        nodes.start(CONTROLLER, changed.get(CONTROLLER))
-        wait_for(lambda: watch.tracker is not None, "reference/path", nodes, listen)
-        wait_for(lambda: watch.sight is not None, "odometry/filtered", nodes, listen)
-        end = swim(nodes, watch, listen, duration, console)
-        nodes.stop([RECORDER])
-        return end, _latency_table(watch.diagnostics)
+    with Interruption() as interruption, NodeProcesses(domain, folder / "logs") as nodes:
+        with watching(domain) as (watch, listen):
+            robot = Robot(nodes, watch, listen, interruption)
+            for spec in ROBOTS["sim"]:
+                if spec != CONTROLLER:
+                    nodes.start(spec, changed.get(spec))
+            robot.wait_for(lambda: watch.sees(RECORDER.executable), "recorder")
+            nodes.start(CONTROLLER, changed.get(CONTROLLER))
+            robot.wait_for(lambda: watch.tracker is not None, "reference/path")
+            robot.wait_for(lambda: watch.sight is not None, "odometry/filtered")
+            end = robot.swim(duration, console)
+            nodes.stop([RECORDER])
+            return end, _latency_table(watch.diagnostics)
 
 
 def _latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:
