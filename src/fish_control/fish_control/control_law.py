@@ -11,23 +11,21 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 STROKE_FREQUENCY = 2.0  # Hz, MODEL: f fixed, A carries the throttle
+TINY = 1e-9  # m, keeps a share of nothing at zero
 AMPLITUDE_AT_FULL_THROTTLE = 12.0  # rad, MODEL: S_max = (12 rad (2 pi 2 Hz)^2)^2
 
 
 @dataclass(frozen=True)
 class ControlLimits:
-    """Constants of the control law; they are part of a weights file's contract."""
+    """Constants of the control law, part of a weights file's contract; feed-forward from the nominal fish."""
 
     steering_scale: float = 2.0  # rad of rudder for a steering PID output of 1
     throttle_scale: float = 4.0  # throttle for a speed PID output of 1
-    curvature_gain: float = (
-        0.21  # m, rudder for a path curvature: alpha = gain kappa (steady turns of the nominal fish)
-    )
-    throttle_linear: float = (
-        1.333  # s/m, throttle for a speed u: linear u + quadratic u^2 (nominal fish, straight)
-    )
+    curvature_gain: float = 0.222  # m, rudder for a path curvature: alpha = gain kappa; steady turns
+    curvature_lag: float = 0.025  # m, lag of that curvature along the path: a rudder step yaws at once
+    throttle_linear: float = 1.333  # s/m, throttle for a speed u: linear u + quadratic u^2; straight
     throttle_quadratic: float = 2.13  # s^2/m^2
-    turn_linear: float = 1.2  # s/(m rad^2), more throttle in turns: alpha^2 (linear u + quadratic u^2)
+    turn_linear: float = 1.2  # s/(m rad^2), and in turns: alpha^2 (linear u + quadratic u^2)
     turn_quadratic: float = 10.0  # s^2/(m^2 rad^2)
     derivative_time: float = 0.15  # s, first-order filter of both derivatives
     integral_limit: float = 0.25  # of the PID output, both integrals
@@ -74,6 +72,7 @@ class ControlState(NamedTuple):
     speed_error: Any = 0.0
     speed_error_rate: Any = 0.0
     primed: Any = 0.0
+    curvature: Any = 0.0  # 1/m, lagged
 
 
 class Setpoint(NamedTuple):
@@ -96,7 +95,7 @@ def control_step(
 ) -> tuple[ControlState, Setpoint]:
     """One period of both PIDs, dt [s].
 
-    alpha    = sat[ k_kappa kappa + c_a (Kp e + I + Kd e') ],  I' = Ki e + k_w (sat - unsat) / c_a
+    alpha    = sat[ k_kappa kappa_lag + c_a (Kp e + I + Kd e') ],  I' = Ki e + k_w (sat - unsat) / c_a
     throttle = sat[ ff(u_wanted, alpha) + c_s (Kp e_u + I_u + Kd e_u') ]
     """
     heading_rate = _filtered_rate(
@@ -105,8 +104,11 @@ def control_step(
     speed_rate = _filtered_rate(
         state.speed_error_rate, state.speed_error, errors.speed, state.primed, dt, limits
     )
+    travelled = errors.speed_wanted * dt
+    share = travelled / (limits.curvature_lag + travelled + TINY)
+    curvature = state.curvature + share * (errors.curvature - state.curvature)
     alpha, steering_integral = _pid(
-        limits.curvature_gain * errors.curvature,
+        limits.curvature_gain * curvature,
         (errors.heading, state.steering_integral, heading_rate),
         (gains.steering_kp, gains.steering_ki, gains.steering_kd),
         limits.steering_scale,
@@ -126,7 +128,14 @@ def control_step(
         xp,
     )
     after = ControlState(
-        steering_integral, errors.heading, heading_rate, speed_integral, errors.speed, speed_rate, 1.0
+        steering_integral,
+        errors.heading,
+        heading_rate,
+        speed_integral,
+        errors.speed,
+        speed_rate,
+        1.0,
+        curvature,
     )
     return after, Setpoint(alpha, throttle)
 

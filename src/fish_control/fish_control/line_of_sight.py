@@ -26,10 +26,8 @@ class GuidanceConfig:
     """Constants of the line of sight; part of a weights file's contract."""
 
     compensate_curvature: bool = True  # take gamma off; False is the paper's law
-    slip_arm: float = (
-        0.065  # m, mean heading turns into a curve by slip_arm * kappa (steady turns of the nominal fish)
-    )
-    drift_time: float = 2.0  # s, low-pass of the drift angle; 0 switches it off
+    slip_arm: float = 0.073  # m, a: in a curve the mean heading leads the course by a kappa; nominal fish
+    drift_time: float = 1.0  # s, low-pass of the drift angle; 0 switches it off
     drift_speed: float = 0.05  # m/s, below this speed the drift angle fades out
     drift_limit: float = 0.5  # rad
 

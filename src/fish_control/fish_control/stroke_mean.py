@@ -6,7 +6,7 @@ swing z of the heading is what a band-pass lets through of the integrated yaw ra
     z'' + 2 zeta w z' + w^2 z = 2 zeta w r        psi_mean = psi - z,  r_mean = r - z'
 
 and the same for the sway velocity, whose swing is taken off in the same way. No angle is unwrapped, and a
-steady turn is delayed by 2 zeta / w only (0.08 s at 2 Hz, zeta = 0.5; a mean over one stroke would delay it
+steady turn is delayed by 2 zeta / w only (0.05 s at 2 Hz; a mean over one stroke would delay it
 by 0.25 s). Written on generic scalars: numpy and CasADi run the same lines.
 """
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 STROKE_FREQUENCY = 2.0  # Hz, fixed by the throttle map of MODEL (A carries the throttle)
-DAMPING = 0.5  # zeta; width of the notch, this project: see the closed-loop comparison in the tests
+DAMPING = 0.3  # zeta, half the notch's width: wider delays turns, narrower learns a new swing slowly
 
 
 class StrokeState(NamedTuple):
