@@ -43,7 +43,7 @@ def read_dataset(
     """Read one recording, or all recordings of a folder, into a data set.
 
     Args:
-        topics: which topic is what; None: the names of RECORDING.md.
+        topics: which topic is what; None: the default names (config/topics.yaml).
         progress: draw a progress bar on the terminal.
         processes: how many read at the same time; None: by number of trials and cores.
 

@@ -25,7 +25,7 @@ def read_trial(path: Path | str, topics: TopicMap | None = None) -> Trial:
 
     Args:
         path: rosbag2 directory (MCAP or sqlite3), bare .mcap or .db3 file, or ROS 1 .bag file.
-        topics: which topic is what; None: the names of RECORDING.md.
+        topics: which topic is what; None: the default names (config/topics.yaml).
 
     Raises:
         RecordingError: nothing can be read; everything less stands in Trial.problems.
