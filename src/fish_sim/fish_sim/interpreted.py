@@ -75,6 +75,17 @@ class InterpretedKernel:
         p, dp = _columns(parameters, len(x)), _columns(d_parameters, len(x))
         out[:], d_out[:] = (v.full().T for v in self._functions.rate_jvp(x.T, w.T, p, dx.T, dw.T, dp))
 
+    def memory_jvp(
+        self, memory: Array, tangents: Array, commands: Array, parameters: Array, d_parameters: Array
+    ) -> None:
+        """Fill memory[1:] and tangents[1:] (T + 1, batch, NM)."""
+        batch = memory.shape[1]
+        p, dp = _columns(parameters, batch), _columns(d_parameters, batch)
+        for t in range(len(commands)):
+            c = _columns(commands[t], batch)
+            m, dm = self._functions.follow_jvp(memory[t].T, c, p, tangents[t].T, 0.0 * c, dp)
+            memory[t + 1], tangents[t + 1] = m.full().T, dm.full().T
+
     def _step(self, s: Array, c: Array, p: Array) -> tuple[Array, list[Array]]:
         """(state after the step, the state at every stage of every substep)."""
         x, m0 = s[: self._nx], s[self._nx :]

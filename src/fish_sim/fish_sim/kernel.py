@@ -62,6 +62,15 @@ class CompiledKernel:
             *_shared(parameters, 0), *_shared(d_parameters, 0), _at(out), _at(d_out),
         )  # fmt: skip
 
+    def memory_jvp(
+        self, memory: Array, tangents: Array, commands: Array, parameters: Array, d_parameters: Array
+    ) -> None:
+        """Fill memory[1:] and tangents[1:] (T + 1, batch, NM)."""
+        self._library.memory_jvp(
+            *_sizes(memory), _at(memory), _at(tangents), *_shared(commands, 1),
+            *_shared(parameters, 0), *_shared(d_parameters, 0),
+        )  # fmt: skip
+
 
 def _at(array: Array) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)

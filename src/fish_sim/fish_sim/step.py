@@ -156,6 +156,21 @@ class Stepper:
         self._kernel(len(rate)).rates_jvp(*arrays, p, dp, rate, tangent)
         return rate, tangent
 
+    def memory_jvp(self, start: Array, commands: Array, parameters: Array, d_parameters: Array) -> tuple[Array, Array]:
+        """Memory (T + 1, B, NM) under commands (T, B, 2), which needs no motion, and its derivative along d_parameters.
+
+        start (B, NM); parameters and d_parameters (NP,) or (B, NP).
+        """
+        start = np.ascontiguousarray(start, dtype=float)
+        memory = np.empty((len(commands) + 1, *start.shape))
+        tangents = np.empty_like(memory)
+        memory[0], tangents[0] = start, 0.0
+        p, dp = (np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters))
+        self._check_width("memory", start, len(self.layout.memory))
+        commands = np.ascontiguousarray(commands, dtype=float)
+        self._kernel(start.shape[0]).memory_jvp(memory, tangents, commands, p, dp)
+        return memory, tangents
+
     def outputs(self, state: Array, drive_end: Array, parameters: Array) -> dict[str, Array]:
         """Accelerations q'', tip force [N] and slip [m/s] of states (..., NS) at rest inputs.
 

@@ -1,0 +1,1 @@
+"""Identification: trials to parameters with uncertainties."""

@@ -1,0 +1,285 @@
+/* Extended Kalman filter of one trial with forward sensitivities; see filter.py for the model.
+
+   Stands behind fish_sim's kernel text: V, LANES, NX, NM, NS, NP, NC, NW, DT, step_jvp, rate_jvp, follow_jvp.
+   N = NX + 6: motion, wrench on the head, biases of gyro and accelerometer. Directions: N - 3 columns of the
+   Jacobian (motion, wrench), then K free parameters; each carries NS + 6 numbers (state, wrench, biases). */
+#include <stdlib.h>
+#include <string.h>
+
+#define N (NX + 6)
+#define ND (NS + 6)
+
+typedef struct {
+  double camera_latency, camera_heading_offset, camera_scale, gyro_scale, imu_misalignment; /* sensors */
+  long free_latency, free_heading, free_scale, free_gyro, free_misalignment; /* index of the free parameter or -1 */
+  long wrench_at[3];                                                         /* places in p */
+  long links;
+  double wrench_decay, wrench_variance[3]; /* per step of 10 ms */
+  double gyro, accel, position, heading;   /* standard deviations */
+  double gate_imu, gate_camera;            /* squared normalised innovation */
+} Settings;
+
+typedef struct {
+  double xi[N], P[N][N], F[N][N], memory[NM];
+  double *D; /* (K, ND) derivatives of state, wrench and biases */
+} Work;
+
+typedef struct {
+  double log_likelihood, samples;
+  double *gradient, *normal;
+} Sums;
+
+/* lanes of directions first .. first + LANES - 1: tangents of state and parameters at the current estimate */
+static void fill(const Settings *c, const Work *f, long K, const double *p, const double *dp, long first, V *s, V *ds,
+                 V *pv, V *dpv)
+{
+  for (int k = 0; k < NX; ++k) s[k] = v_constant(f->xi[k]);
+  for (int k = 0; k < NM; ++k) s[NX + k] = v_constant(f->memory[k]);
+  for (int k = 0; k < NP; ++k) pv[k] = v_constant(p[k]);
+  for (int i = 0; i < 3; ++i) pv[c->wrench_at[i]] = v_constant(f->xi[NX + i]);
+  for (int k = 0; k < NS; ++k) ds[k] = v_constant(0.0);
+  for (int k = 0; k < NP; ++k) dpv[k] = v_constant(0.0);
+  for (int l = 0; l < LANES; ++l) {
+    const long j = first + l;
+    if (j < NX) LANE(ds[j], l) = 1.0;
+    else if (j < NX + 3) LANE(dpv[c->wrench_at[j - NX]], l) = 1.0;
+    else if (j < NX + 3 + K) {
+      const double *D = f->D + (j - NX - 3) * ND, *row = dp + (j - NX - 3) * NP;
+      for (int k = 0; k < NS; ++k) LANE(ds[k], l) = D[k];
+      for (int k = 0; k < NP; ++k) LANE(dpv[k], l) = row[k];
+      for (int i = 0; i < 3; ++i) LANE(dpv[c->wrench_at[i]], l) = D[NS + i];
+    }
+  }
+}
+
+/* rates of motion just after the grid point, and along every direction (directions, NX) */
+static void rates(const Settings *c, const Work *f, long K, const double *p, const double *dp, const double *command,
+                  double *rate, double *tangent)
+{
+  V s[NS], ds[NS], pv[NP], dpv[NP], cmd[NC], zero[NC], m1[NM], dm1[NM], w[NW], dw[NW], out[NX], d_out[NX];
+  for (int i = 0; i < NC; ++i) { cmd[i] = v_constant(command[i]); zero[i] = v_constant(0.0); }
+  for (long first = 0; first < NX + 3 + K; first += LANES) {
+    fill(c, f, K, p, dp, first, s, ds, pv, dpv);
+    follow_jvp(s + NX, cmd, pv, ds + NX, zero, dpv, m1, dm1);
+    drive_at(s + NX, m1, 0.0, w);
+    drive_at(ds + NX, dm1, 0.0, dw);
+    rate_jvp(s, w, pv, ds, dw, dpv, out, d_out);
+    for (int k = 0; k < NX; ++k) rate[k] = LANE(out[k], 0);
+    for (int l = 0; l < LANES && first + l < NX + 3 + K; ++l)
+      for (int k = 0; k < NX; ++k) tangent[(first + l) * NX + k] = LANE(d_out[k], l);
+  }
+}
+
+/* one step of 10 ms: estimate, covariance, derivatives */
+static void predict(const Settings *c, Work *f, long K, const double *p, const double *dp, const double *command)
+{
+  V s[NS], ds[NS], pv[NP], dpv[NP], cmd[NC], zero[NC];
+  double next[NS] = {0}, T[N][N];
+  double *D = malloc(sizeof(double) * (K ? K : 1) * ND);
+  memset(f->F, 0, sizeof f->F);
+  memcpy(D, f->D, sizeof(double) * K * ND);
+  for (int i = 0; i < NC; ++i) { cmd[i] = v_constant(command[i]); zero[i] = v_constant(0.0); }
+  for (long first = 0; first < NX + 3 + K; first += LANES) {
+    fill(c, f, K, p, dp, first, s, ds, pv, dpv);
+    step_jvp(s, ds, cmd, zero, pv, dpv);
+    for (int k = 0; k < NS; ++k) next[k] = LANE(s[k], 0);
+    for (int l = 0; l < LANES; ++l) {
+      const long j = first + l;
+      if (j < NX + 3) for (int k = 0; k < NX; ++k) f->F[k][j] = LANE(ds[k], l);
+      else if (j < NX + 3 + K) for (int k = 0; k < NS; ++k) D[(j - NX - 3) * ND + k] = LANE(ds[k], l);
+    }
+  }
+  for (long j = 0; j < K; ++j)
+    for (int i = 0; i < 3; ++i) D[j * ND + NS + i] *= c->wrench_decay;
+  memcpy(f->D, D, sizeof(double) * K * ND);
+  free(D);
+  memcpy(f->xi, next, sizeof(double) * NX);
+  memcpy(f->memory, next + NX, sizeof(double) * NM);
+  for (int i = 0; i < 3; ++i) {
+    f->xi[NX + i] *= c->wrench_decay;
+    f->F[NX + i][NX + i] = c->wrench_decay;
+    f->F[NX + 3 + i][NX + 3 + i] = 1.0;
+  }
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j < N; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < N; ++k) sum += f->F[i][k] * f->P[k][j];
+      T[i][j] = sum;
+    }
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < N; ++k) sum += T[i][k] * f->F[j][k];
+      f->P[i][j] = f->P[j][i] = sum;
+    }
+  for (int k = 0; k < NX; ++k) f->P[k][k] += 1e-14; /* keeps the covariance regular on the constraint */
+  for (int i = 0; i < 3; ++i) f->P[NX + i][NX + i] += c->wrench_variance[i];
+}
+
+/* Kalman update with three rows: innovation e, Jacobian H, derivatives dh (3, K), standard deviations sd */
+static int update(Work *f, long K, const double *e, double H[3][N], const double *dh, const double *sd, double gate,
+                  Sums *sums, double *whitened)
+{
+  double PH[N][3], S[3][3], L[3][3] = {{0}}, G[N][3], r[3];
+  for (int i = 0; i < N; ++i)
+    for (int a = 0; a < 3; ++a) {
+      double sum = 0.0;
+      for (int k = 0; k < N; ++k) sum += f->P[i][k] * H[a][k];
+      PH[i][a] = sum;
+    }
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) {
+      double sum = a == b ? sd[a] * sd[a] : 0.0;
+      for (int k = 0; k < N; ++k) sum += H[a][k] * PH[k][b];
+      S[a][b] = sum;
+    }
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b <= a; ++b) {
+      double sum = S[a][b];
+      for (int k = 0; k < b; ++k) sum -= L[a][k] * L[b][k];
+      L[a][b] = a == b ? sqrt(sum) : sum / L[b][b];
+    }
+  double squared = 0.0;
+  for (int a = 0; a < 3; ++a) {
+    r[a] = e[a];
+    for (int k = 0; k < a; ++k) r[a] -= L[a][k] * r[k];
+    r[a] /= L[a][a];
+    squared += r[a] * r[a];
+  }
+  if (!(squared < gate)) return 0;
+  for (int i = 0; i < N; ++i) { /* G = P H^T S^-1 by the two triangular solves */
+    double y[3];
+    for (int a = 0; a < 3; ++a) {
+      y[a] = PH[i][a];
+      for (int k = 0; k < a; ++k) y[a] -= L[a][k] * y[k];
+      y[a] /= L[a][a];
+    }
+    for (int a = 2; a >= 0; --a) {
+      G[i][a] = y[a];
+      for (int k = a + 1; k < 3; ++k) G[i][a] -= L[k][a] * G[i][k];
+      G[i][a] /= L[a][a];
+    }
+  }
+  for (int i = 0; i < N; ++i)
+    for (int a = 0; a < 3; ++a) f->xi[i] += G[i][a] * e[a];
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j <= i; ++j) {
+      double sum = f->P[i][j];
+      for (int a = 0; a < 3; ++a) sum -= G[i][a] * PH[j][a];
+      f->P[i][j] = f->P[j][i] = sum;
+    }
+  double J[3][K ? K : 1];
+  for (long j = 0; j < K; ++j) {
+    double *D = f->D + j * ND;
+    for (int i = 0; i < N; ++i) {
+      const int at = i < NX ? i : NS + i - NX;
+      for (int a = 0; a < 3; ++a) D[at] -= G[i][a] * dh[a * K + j];
+    }
+    for (int a = 0; a < 3; ++a) { /* derivative of the whitened innovation */
+      J[a][j] = -dh[a * K + j];
+      for (int k = 0; k < a; ++k) J[a][j] -= L[a][k] * J[k][j];
+      J[a][j] /= L[a][a];
+    }
+  }
+  sums->log_likelihood -= 0.5 * squared + log(L[0][0] * L[1][1] * L[2][2]) + 1.5 * log(2.0 * M_PI);
+  sums->samples += 3;
+  for (int a = 0; a < 3; ++a) {
+    whitened[a] = r[a];
+    for (long i = 0; i < K; ++i) {
+      sums->gradient[i] += r[a] * J[a][i];
+      for (long j = 0; j <= i; ++j) sums->normal[i * K + j] += J[a][i] * J[a][j];
+    }
+  }
+  return 1;
+}
+
+/* gyro about z and accelerometer: h = (scale r, R(-mu) acceleration in the head's frame) + bias */
+static void measure_imu(const Settings *c, Work *f, long K, const double *z, const double *rate,
+                        const double *tangent, double *dh, Sums *sums, double *whitened)
+{
+  const int q = c->links + 3;
+  const double axis = f->xi[2] + c->imu_misalignment, cs = cos(axis), sn = sin(axis);
+  const double forward = rate[q] * cs + rate[q + 1] * sn, left = rate[q + 1] * cs - rate[q] * sn;
+  const double sd[3] = {c->gyro, c->accel, c->accel};
+  double H[3][N] = {{0}};
+  const double e[3] = {z[0] - c->gyro_scale * f->xi[q + 2] - f->xi[NX + 3], z[1] - forward - f->xi[NX + 4],
+                       z[2] - left - f->xi[NX + 5]};
+  for (long j = 0; j < NX + 3 + K; ++j) {
+    const double *D = j < NX + 3 ? NULL : f->D + (j - NX - 3) * ND, *t = tangent + j * NX;
+    const double turn = D ? D[2] : j == 2, spin = D ? D[q + 2] : j == q + 2;
+    const double d[3] = {c->gyro_scale * spin, t[q] * cs + t[q + 1] * sn + left * turn,
+                         t[q + 1] * cs - t[q] * sn - forward * turn};
+    for (int a = 0; a < 3; ++a) {
+      if (D) dh[a * K + j - NX - 3] = d[a] + D[NS + 3 + a];
+      else H[a][j] = d[a];
+    }
+  }
+  for (int a = 0; a < 3; ++a) H[a][NX + 3 + a] = 1.0;
+  if (c->free_gyro >= 0) dh[c->free_gyro] += f->xi[q + 2];
+  if (c->free_misalignment >= 0) {
+    dh[K + c->free_misalignment] += left;
+    dh[2 * K + c->free_misalignment] -= forward;
+  }
+  update(f, K, e, H, dh, sd, c->gate_imu, sums, whitened);
+}
+
+/* camera pose at the grid point + offset */
+static void measure_camera(const Settings *c, Work *f, long K, const double *z, double offset, const double *rate,
+                           double *dh, Sums *sums, double *whitened)
+{
+  const int q = c->links + 3;
+  const double gain[3] = {c->camera_scale, c->camera_scale, 1.0}, sd[3] = {c->position, c->position, c->heading};
+  double H[3][N] = {{0}}, e[3], here[3], velocity[3];
+  for (int a = 0; a < 3; ++a) {
+    here[a] = f->xi[a] + offset * f->xi[q + a] + 0.5 * offset * offset * rate[q + a];
+    velocity[a] = f->xi[q + a] + offset * rate[q + a];
+    e[a] = z[a] - gain[a] * here[a] - (a == 2 ? c->camera_heading_offset : 0.0);
+    H[a][a] = gain[a];
+    H[a][q + a] = gain[a] * offset;
+    for (long j = 0; j < K; ++j) dh[a * K + j] = gain[a] * (f->D[j * ND + a] + offset * f->D[j * ND + q + a]);
+    if (c->free_latency >= 0) dh[a * K + c->free_latency] -= gain[a] * velocity[a];
+    if (c->free_scale >= 0 && a < 2) dh[a * K + c->free_scale] += here[a];
+  }
+  e[2] = remainder(e[2], 2.0 * M_PI);
+  if (c->free_heading >= 0) dh[2 * K + c->free_heading] += 1.0;
+  update(f, K, e, H, dh, sd, c->gate_camera, sums, whitened);
+}
+
+/* Arrays: commands (steps, NC), imu (steps, 3) with NaN where missing, offset (steps) NaN without a frame,
+   pose (steps, 3), p (NP), dp (K, NP), start (N), start_P (N, N), memory0 (NM). Results: sums[2] = log likelihood,
+   samples; gradient (K); normal (K, K) lower triangle; whitened (steps, 6), NaN on entry. history NULL or
+   (steps, 3 N N + 2 N + NM) rows: predicted xi, P, filtered xi, P, transition F to the next, memory. */
+void filter_trial(long steps, long K, const double *commands, const double *imu, const double *offset,
+                  const double *pose, const double *p, const double *dp, const Settings *c, const double *start,
+                  const double *start_P, const double *memory0, double *sums_out, double *gradient, double *normal,
+                  double *whitened, double *history)
+{
+  Work f;
+  Sums sums = {0.0, 0.0, gradient, normal};
+  double rate[NX];
+  double *tangent = malloc(sizeof(double) * (NX + 3 + K) * NX), *dh = malloc(sizeof(double) * 3 * (K ? K : 1));
+  const long row = 3 * N * N + 2 * N + NM;
+  f.D = calloc((K ? K : 1) * ND, sizeof(double));
+  memcpy(f.xi, start, sizeof f.xi);
+  memcpy(f.P, start_P, sizeof f.P);
+  memcpy(f.memory, memory0, sizeof f.memory);
+  for (long k = 0; k < steps; ++k) {
+    double *h = history ? history + k * row : NULL;
+    if (h) { memcpy(h, f.xi, sizeof f.xi); memcpy(h + N, f.P, sizeof f.P); }
+    const int has_imu = isfinite(imu[3 * k] + imu[3 * k + 1] + imu[3 * k + 2]), has_camera = isfinite(offset[k]);
+    if (has_imu || has_camera) rates(c, &f, K, p, dp, commands + k * NC, rate, tangent);
+    if (has_imu) measure_imu(c, &f, K, imu + 3 * k, rate, tangent, dh, &sums, whitened + 6 * k);
+    if (has_camera) measure_camera(c, &f, K, pose + 3 * k, offset[k], rate, dh, &sums, whitened + 6 * k + 3);
+    if (h) {
+      memcpy(h + N + N * N, f.xi, sizeof f.xi);
+      memcpy(h + 2 * N + N * N, f.P, sizeof f.P);
+      memcpy(h + 2 * N + 3 * N * N, f.memory, sizeof f.memory);
+    }
+    if (k + 1 < steps) predict(c, &f, K, p, dp, commands + k * NC);
+    if (h) memcpy(h + 2 * N + 2 * N * N, f.F, sizeof f.F);
+    if (!isfinite(f.xi[0])) { sums.log_likelihood = -INFINITY; break; }
+  }
+  sums_out[0] = sums.log_likelihood;
+  sums_out[1] = sums.samples;
+  free(tangent); free(dh); free(f.D);
+}

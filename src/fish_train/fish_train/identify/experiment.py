@@ -1,0 +1,118 @@
+"""Trials on the filter's grid: every 10 ms a command, an IMU sample, an encoder sample and perhaps a camera pose.
+
+All trials of a data set stand side by side, padded to the longest; `valid` says where a trial has data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_train.recordings.trial import Trial
+
+Array = NDArray[np.float64]
+
+
+class ExperimentError(ValueError):
+    """The recordings do not allow what was asked; the message says what is missing."""
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Camera poses of one trial in order of stamps."""
+
+    t: Array  # (F,) s from the trial's grid start
+    pose: Array  # (F, 3) x, y [m], psi [rad] unwrapped, pool frame
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Trials on one grid of 10 ms; NaN where a sensor says nothing."""
+
+    names: tuple[str, ...]  # M trials
+    steps: NDArray[np.int64]  # (M,) grid points with data
+    commands: Array  # (T, M, 2) rotor speed [rad/s], rudder [rad]
+    gyro: Array  # (T, M) rad/s, about z
+    accel: Array  # (T, M, 2) m/s^2, forward and left
+    encoder: Array  # (T, M) rad/s
+    frames: tuple[Frames, ...]
+    start_at_rest: bool  # fish and rotor still, rudder centred, at the first grid point
+
+    def select(self, which: Sequence[int]) -> Experiment:
+        """Some of the trials."""
+        index = np.array(which, dtype=int)
+        longest = int(self.steps[index].max())
+        arrays = {k: getattr(self, k)[:longest, index] for k in ("commands", "gyro", "accel", "encoder")}
+        names, frames = tuple(self.names[i] for i in which), tuple(self.frames[i] for i in which)
+        return replace(self, names=names, frames=frames, steps=self.steps[index], **arrays)
+
+    @property
+    def length(self) -> int:
+        return len(self.commands)
+
+
+def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None) -> Experiment:
+    """Put trials on the grid of their commands.
+
+    start_at_rest None: decided from the first half second (rotor and gyro quiet).
+    Raises ExperimentError when commands or camera poses are missing.
+    """
+    if not trials:
+        raise ExperimentError("no trial with data; expected at least one")
+    gridded = [_grid(trial.clean()) for trial in trials]
+    steps = np.array([len(g["commands"]) for g in gridded])
+    longest = int(steps.max())
+
+    def stack(key: str) -> Array:
+        filler = 0.0 if key == "commands" else np.nan
+        shape = (longest, len(gridded), *gridded[0][key].shape[1:])
+        out = np.full(shape, filler)
+        for i, g in enumerate(gridded):
+            out[: steps[i], i] = g[key]
+        return out
+
+    arrays = {key: stack(key) for key in ("commands", "gyro", "accel", "encoder")}
+    rest = _starts_at_rest(arrays) if start_at_rest is None else start_at_rest
+    frames = tuple(Frames(g["frame_t"], g["frame_pose"]) for g in gridded)
+    return Experiment(tuple(t.name for t in trials), steps, **arrays, frames=frames, start_at_rest=rest)
+
+
+def _starts_at_rest(arrays: dict[str, Array]) -> bool:
+    """No turning yet at the first sample: the gyro reads a bias below 0.1 rad/s."""
+    first = arrays["gyro"][0]
+    return bool(np.all(np.isfinite(first)) and np.max(np.abs(first)) < 0.1)
+
+
+def _grid(trial: Trial) -> dict[str, Array]:
+    if trial.commands is None:
+        raise ExperimentError(f"{trial.name}: no joint_command; the inputs of the fish are needed")
+    if trial.camera is None or len(trial.camera) < 3:
+        raise ExperimentError(f"{trial.name}: no camera/pose; at least three poses are needed")
+    c = trial.commands
+    start, end = c.t[0], max(c.t[-1], trial.camera.t[-1])
+    count = int(np.floor((end - start) / DT + 1e-6)) + 1
+    t = start + DT * np.arange(count)
+    held = np.clip(np.searchsorted(c.t, t + 0.5 * DT, side="right") - 1, 0, len(c.t) - 1)
+    imu, encoder, camera = trial.imu, trial.encoder, trial.camera
+    nothing = np.full(count, np.nan)
+    return {
+        "commands": np.column_stack([c.rotor_speed, c.rudder])[held],
+        "gyro": nothing if imu is None else _nearest(imu.t, imu.gyro[:, 2], t),
+        "accel": np.full((count, 2), np.nan) if imu is None else _nearest(imu.t, imu.accel[:, :2], t),
+        "encoder": nothing if encoder is None else _nearest(encoder.t, encoder.speed, t),
+        "frame_t": camera.t - start,
+        "frame_pose": np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)]),
+    }
+
+
+def _nearest(t: Array, values: Array, grid: Array) -> Array:
+    """Each sample once, at its nearest grid point; NaN at grid points without one."""
+    out = np.full((len(grid), *values.shape[1:]), np.nan)
+    index = np.round((t - grid[0]) / DT).astype(int)
+    inside = (index >= 0) & (index < len(grid))
+    out[index[inside]] = values[inside]
+    return out

@@ -1,0 +1,148 @@
+"""The filter's pass in C, one trial per call, several trials on several threads."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import os
+from concurrent.futures import ThreadPoolExecutor
+from importlib.resources import files
+
+import numpy as np
+
+from fish_sim.compiled import lanes, library
+from fish_sim.model import DT, Structure
+from fish_sim.step import Scheme, Stepper, kernel_source
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import (
+    ENCODER_ROW, ROWS, WRENCH, Array, FilterResult, History, Noise, SensorModel, first_memory, first_state,
+    place_frames,
+)
+
+SENSORS = ("camera_latency", "camera_heading_offset", "camera_scale", "gyro_scale", "imu_misalignment")
+
+
+class Settings(ctypes.Structure):
+    """`Settings` of c/filter.c."""
+
+    _fields_ = [
+        *((name, ctypes.c_double) for name in SENSORS),
+        *((f"free_{name}", ctypes.c_long) for name in SENSORS),
+        ("wrench_at", ctypes.c_long * 3),
+        ("links", ctypes.c_long),
+        ("wrench_decay", ctypes.c_double),
+        ("wrench_variance", ctypes.c_double * 3),
+        *((name, ctypes.c_double) for name in ("gyro", "accel", "position", "heading", "gate_imu", "gate_camera")),
+    ]
+
+
+def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
+    """Numbers for the C code."""
+    decay = float(np.exp(-DT / noise.wrench_time))
+    variance = np.square(noise.wrench) * (1.0 - decay**2)
+    return Settings(
+        *(getattr(sensors, name) for name in SENSORS),
+        *(sensors.free.get(name, -1) for name in SENSORS),
+        (ctypes.c_long * 3)(*(stepper.layout.parameters.index(name) for name in WRENCH)),
+        stepper.layout.links, decay, (ctypes.c_double * 3)(*variance),
+        noise.gyro, noise.accel, noise.camera_position, noise.camera_heading, noise.gate_imu, noise.gate_camera,
+    )  # fmt: skip
+
+
+@functools.lru_cache(maxsize=128)
+def filter_library(structure: Structure, scheme: Scheme) -> ctypes.CDLL | None:
+    """The compiled filter of a structure, or None without a compiler."""
+    text = (files("fish_train") / "identify" / "c" / "filter.c").read_text()
+    return library(kernel_source(structure, scheme, lanes()) + text)
+
+
+def compiled_pass(
+    experiment: Experiment, stepper: Stepper, p: Array, dp: Array, sensors: SensorModel, noise: Noise, keep: bool
+) -> FilterResult | None:
+    """The result of a pass, or None when it cannot be compiled here."""
+    loaded = filter_library(stepper.layout.structure, stepper.scheme)
+    if loaded is None:
+        return None
+    job = _Job(loaded, experiment, stepper, p, dp, sensors, noise, keep)
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        list(pool.map(job.run, range(len(experiment.names))))
+    return job.result()
+
+
+class _Job:
+    """Arrays of one pass, C order, one block per trial."""
+
+    def __init__(
+        self, loaded: ctypes.CDLL, experiment: Experiment, stepper: Stepper, p: Array, dp: Array,
+        sensors: SensorModel, noise: Noise, keep: bool,
+    ) -> None:  # fmt: skip
+        self.loaded, self.experiment, self.noise = loaded, experiment, noise
+        self.settings = settings(stepper, sensors, noise)
+        layout, T, M, K = stepper.layout, experiment.length, len(experiment.names), len(dp)
+        self.n, self.K, self.memory_size = len(layout.motion) + 6, K, len(layout.memory)
+        self.p, self.dp = np.ascontiguousarray(p, float), np.ascontiguousarray(dp, float)
+        self.commands = _per_trial(experiment.commands)
+        self.imu = _per_trial(np.concatenate([experiment.gyro[..., None], experiment.accel], axis=2))
+        offset, pose = place_frames(experiment, sensors)
+        self.offset, self.pose = _per_trial(offset), _per_trial(pose)
+        self.start, self.start_P = first_state(experiment, layout, sensors, noise)
+        self.memory0 = np.zeros((M, self.memory_size))
+        self.memory0[:, :2] = first_memory(experiment)
+        self.sums, self.gradient, self.normal = np.zeros((M, 2)), np.zeros((M, K)), np.zeros((M, K, K))
+        self.whitened = np.full((M, T, 6), np.nan)
+        row = 3 * self.n**2 + 2 * self.n + self.memory_size
+        self.history = np.zeros((M, T, row)) if keep else None
+        repeated = np.tile(self.dp, (M, 1)) if K else np.zeros((M, len(p)))
+        memory0 = np.repeat(self.memory0, max(K, 1), axis=0)
+        commands = np.repeat(experiment.commands, max(K, 1), axis=1)
+        self.memory = stepper.memory_jvp(memory0, commands, self.p, repeated)
+
+    def run(self, m: int) -> None:
+        """Filter trial m."""
+        arrays = (self.commands, self.imu, self.offset, self.pose)
+        results = (self.sums, self.gradient, self.normal, self.whitened)
+        history = None if self.history is None else _at(self.history[m])
+        self.loaded.filter_trial(
+            ctypes.c_long(int(self.experiment.steps[m])), ctypes.c_long(self.K), *(_at(a[m]) for a in arrays),
+            _at(self.p), _at(self.dp), ctypes.byref(self.settings), _at(self.start[m]), _at(self.start_P[m]),
+            _at(self.memory0[m]), *(_at(a[m]) for a in results), history,
+        )  # fmt: skip
+
+    def result(self) -> FilterResult:
+        """Sums of all trials, the encoder's among them."""
+        T, M, K = self.experiment.length, len(self.experiment.names), self.K
+        normal = self.normal + np.tril(self.normal, -1).transpose(0, 2, 1)
+        memory, d_memory = (a.reshape(T + 1, M, max(K, 1), -1) for a in self.memory)
+        rotor, d_rotor = memory[:T, :, 0, 1], d_memory[:T, :, :K, 1]
+        sd = self.noise.encoder
+        e = (self.experiment.encoder - rotor) / sd
+        good = np.isfinite(e) & (np.arange(T)[:, None] < self.experiment.steps)
+        r, J = np.where(good, e, 0.0), -np.where(good[..., None], d_rotor, 0.0) / sd
+        whitened = np.full((T, M, len(ROWS) + 1), np.nan)
+        whitened[..., :6] = self.whitened.transpose(1, 0, 2)
+        whitened[..., ENCODER_ROW] = np.where(good, e, np.nan)
+        encoder = -0.5 * np.sum(r**2, axis=0) - good.sum(0) * np.log(sd * np.sqrt(2 * np.pi))
+        return FilterResult(
+            self.sums[:, 0] + encoder,
+            self.sums[:, 1] + good.sum(0),
+            self.gradient + np.einsum("tm,tmk->mk", r, J),
+            normal + np.einsum("tmj,tmk->mjk", J, J),
+            whitened,
+            None if self.history is None else self._history(memory[:, :, 0]),
+        )
+
+    def _history(self, memory: Array) -> History:
+        n, h = self.n, self.history.transpose(1, 0, 2)
+        T, M = h.shape[:2]
+        cuts = np.cumsum([n, n * n, n, n * n, n * n])
+        parts = np.split(h, cuts, axis=2)[:5]
+        shaped = [a.reshape(T, M, n, n) if a.shape[2] == n * n else a for a in parts]
+        return History(shaped[0], shaped[1], shaped[2], shaped[3], shaped[4], memory)
+
+
+def _per_trial(array: Array) -> Array:
+    return np.ascontiguousarray(np.swapaxes(array, 0, 1), dtype=float)
+
+
+def _at(array: Array) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)

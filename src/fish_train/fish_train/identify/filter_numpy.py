@@ -1,0 +1,260 @@
+"""The filter's pass in NumPy, all trials at once: the readable form, and the one used without a C compiler.
+
+`filter_compiled` does the same per trial in C; a test holds them equal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_sim.step import Stepper
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import (
+    ENCODER_ROW, ROWS, WRENCH, Array, FilterResult, History, Noise, SensorModel, first_memory, first_state, place_frames,
+)
+
+
+class Filter:
+    """One pass over an experiment for given parameters."""
+
+    def __init__(
+        self, experiment: Experiment, stepper: Stepper, p: Array, dp: Array, sensors: SensorModel, noise: Noise
+    ) -> None:
+        """p (NP,) parameters; dp (K, NP) derivative of p with respect to each free parameter."""
+        self.experiment, self.stepper, self.sensors, self.noise = experiment, stepper, sensors, noise
+        layout = stepper.layout
+        self.p, self.dp = p, dp
+        self.trials, self.free = len(experiment.names), len(dp)
+        self.nq, self.nx, self.n = layout.links + 3, len(layout.motion), len(layout.motion) + 6
+        self.wrench_at = [layout.parameters.index(name) for name in WRENCH]
+        self.directions = self.nx + 3 + self.free
+        self.frames = place_frames(experiment, sensors)
+        self.memory, self.d_memory = self._follow_commands()
+
+    def run(self, keep: bool = False) -> FilterResult:
+        """Filter all trials; keep=True stores the history for the smoother."""
+        T, M, K, n = self.experiment.length, self.trials, self.free, self.n
+        xi, P = first_state(self.experiment, self.stepper.layout, self.sensors, self.noise)
+        D = np.zeros((M, n, K))
+        sums = _Sums(M, K, T)
+        history = _empty_history(T, M, n, self.memory) if keep else None
+        decay = np.exp(-DT / self.noise.wrench_time)
+        Q = np.zeros((n, n))
+        wrench = slice(self.nx, self.nx + 3)
+        Q[wrench, wrench] = np.diag(np.square(self.noise.wrench) * (1.0 - decay**2))
+        Q[range(2 * self.nq), range(2 * self.nq)] = 1e-14  # keeps the covariance regular on the constraint
+        for k in range(T):
+            if history is not None:
+                history.predicted[k], history.predicted_P[k] = xi, P
+            active = k < self.experiment.steps
+            xi, P, D = self._measure(k, xi, P, D, active, sums)
+            if history is not None:
+                history.filtered[k], history.filtered_P[k] = xi, P
+            if k == T - 1:
+                break
+            xi, F, D = self._predict(k, xi, D, decay)
+            P = F @ P @ F.transpose(0, 2, 1) + Q
+            P = 0.5 * (P + P.transpose(0, 2, 1))
+            if history is not None:
+                history.transition[k] = F
+        self._encoder(sums)
+        return FilterResult(sums.log_likelihood, sums.samples, sums.gradient, sums.normal, sums.whitened, history)
+
+    def _follow_commands(self) -> tuple[Array, Array]:
+        """Memory (T + 1, M, NM) and its derivatives (T + 1, M, NM, K): they need no motion."""
+        M, K, nm = self.trials, max(self.free, 1), len(self.stepper.layout.memory)
+        start = np.zeros((M, nm))
+        start[:, :2] = first_memory(self.experiment)
+        commands = np.repeat(self.experiment.commands, K, axis=1)
+        dp = np.tile(self.dp, (M, 1)) if self.free else np.zeros((M, len(self.p)))
+        memory, tangents = self.stepper.memory_jvp(np.repeat(start, K, axis=0), commands, self.p, dp)
+        T = len(memory)
+        memory = memory.reshape(T, M, K, nm)[:, :, 0]
+        return memory, tangents.reshape(T, M, K, nm).transpose(0, 1, 3, 2)[..., : self.free]
+
+    def _directions(self, D: Array, width: int) -> tuple[Array, Array]:
+        """Tangent directions (M, directions, width) of the motion and (M, directions, NP) of the parameters."""
+        M, nx = self.trials, self.nx
+        ds = np.zeros((M, self.directions, width))
+        ds[:, range(nx), range(nx)] = 1.0
+        ds[:, nx + 3 :, :nx] = D[:, :nx].transpose(0, 2, 1)
+        dp = np.zeros((M, self.directions, len(self.p)))
+        dp[:, range(nx, nx + 3), self.wrench_at] = 1.0
+        dp[:, nx + 3 :] = self.dp
+        dp[:, nx + 3 :, self.wrench_at] = D[:, nx : nx + 3].transpose(0, 2, 1)
+        return ds, dp
+
+    def _parameters(self, xi: Array) -> Array:
+        p = np.tile(self.p, (self.trials, 1))
+        p[:, self.wrench_at] = xi[:, self.nx : self.nx + 3]
+        return p
+
+    def _predict(self, k: int, xi: Array, D: Array, decay: float) -> tuple[Array, Array, Array]:
+        """One step of 10 ms: (xi, F, D)."""
+        M, nx, n, R = self.trials, self.nx, self.n, self.directions
+        width = len(self.stepper.layout.state)
+        state = np.concatenate([xi[:, :nx], self.memory[k]], axis=1)
+        ds, dp = self._directions(D, width)
+        ds[:, nx + 3 :, nx:] = self.d_memory[k].transpose(0, 2, 1)
+        command = np.repeat(self.experiment.commands[k], R, axis=0)
+        values, tangents = self.stepper.rollout_jvp(
+            np.repeat(state, R, axis=0), command[None], np.repeat(self._parameters(xi), R, axis=0),
+            ds.reshape(M * R, width), np.zeros((1, 1, 2)), dp.reshape(M * R, -1),
+        )  # fmt: skip
+        values, tangents = values[1].reshape(M, R, width), tangents[1].reshape(M, R, width)
+        moved = xi.copy()
+        moved[:, :nx] = values[:, 0, :nx]
+        moved[:, nx : nx + 3] *= decay
+        F = np.tile(np.eye(n), (M, 1, 1))
+        F[:, :nx, : nx + 3] = tangents[:, : nx + 3, :nx].transpose(0, 2, 1)
+        F[:, range(nx, nx + 3), range(nx, nx + 3)] = decay
+        D = D.copy()
+        D[:, :nx] = tangents[:, nx + 3 :, :nx].transpose(0, 2, 1)
+        D[:, nx : nx + 3] *= decay
+        return moved, F, D
+
+    def _measure(
+        self, k: int, xi: Array, P: Array, D: Array, active: NDArray[np.bool_], sums: _Sums
+    ) -> tuple[Array, Array, Array]:
+        """Take in IMU and camera of one grid point: (xi, P, D)."""
+        offset, pose = self.frames[0][k], self.frames[1][k]
+        z_imu = np.column_stack([self.experiment.gyro[k], self.experiment.accel[k]])
+        imu, camera = active & np.isfinite(z_imu).all(1), active & np.isfinite(offset)
+        if not imu.any() and not camera.any():
+            return xi, P, D
+        rate, tangent = self._rates(k, xi, D)
+        if imu.any():
+            h, H, dh = self._imu(xi, rate, tangent, D)
+            R = np.diag([self.noise.gyro**2, self.noise.accel**2, self.noise.accel**2])
+            xi, P, D = _update(k, slice(0, 3), z_imu - h, H, dh, R, imu, self.noise.gate_imu, (xi, P, D), sums)
+        if camera.any():
+            h, H, dh = self._camera(xi, np.nan_to_num(offset), rate, D)
+            position, heading = self.noise.camera_position, self.noise.camera_heading
+            R = np.diag([position**2, position**2, heading**2])
+            e = pose - h
+            e[:, 2] = (e[:, 2] + np.pi) % (2 * np.pi) - np.pi
+            xi, P, D = _update(k, slice(3, 6), e, H, dh, R, camera, self.noise.gate_camera, (xi, P, D), sums)
+        return xi, P, D
+
+    def _rates(self, k: int, xi: Array, D: Array) -> tuple[Array, Array]:
+        """Rates of motion (M, nx) and their tangents (M, directions, nx) just after the grid point."""
+        M, nx, R = self.trials, self.nx, self.directions
+        m0, m1 = self.memory[k, :, :2], self.memory[k + 1, :, :2]
+        d0, d1 = self.d_memory[k, :, :2], self.d_memory[k + 1, :, :2]
+        ds, dp = self._directions(D, nx)
+        drive = np.stack([m0[:, 0], (m1 - m0)[:, 0] / DT, m0[:, 1], (m1 - m0)[:, 1] / DT], axis=-1)
+        d_drive = np.zeros((M, R, 4))
+        d_drive[:, nx + 3 :] = np.stack([d0[:, 0], (d1 - d0)[:, 0] / DT, d0[:, 1], (d1 - d0)[:, 1] / DT], axis=-1)
+        rate, tangent = self.stepper.rates_jvp(
+            np.repeat(xi[:, :nx], R, axis=0), np.repeat(drive, R, axis=0), np.repeat(self._parameters(xi), R, axis=0),
+            ds.reshape(M * R, nx), d_drive.reshape(M * R, 4), dp.reshape(M * R, -1),
+        )  # fmt: skip
+        return rate.reshape(M, R, nx)[:, 0], tangent.reshape(M, R, nx)
+
+    def _imu(self, xi: Array, rate: Array, tangent: Array, D: Array) -> tuple[Array, Array, Array]:
+        """Predicted gyro and accelerometer (M, 3), their Jacobian (M, 3, n) and derivatives (M, 3, K)."""
+        M, nq, nx, s = self.trials, self.nq, self.nx, self.sensors
+        axis = xi[:, 2] + s.imu_misalignment
+        cos, sin = np.cos(axis), np.sin(axis)
+        ax, ay = rate[:, nq], rate[:, nq + 1]
+        forward, left = ax * cos + ay * sin, ay * cos - ax * sin
+        h = np.stack([s.gyro_scale * xi[:, nq + 2], forward, left], axis=1) + xi[:, nx + 3 :]
+        t_x, t_y = tangent[:, :, nq], tangent[:, :, nq + 1]
+        turn = np.concatenate([np.zeros((M, nx + 3)), D[:, 2]], axis=1)  # change of heading along each direction
+        turn[:, 2] = 1.0
+        spin = np.concatenate([np.zeros((M, nx + 3)), D[:, nq + 2]], axis=1)
+        spin[:, nq + 2] = 1.0
+        d = np.stack(
+            [
+                s.gyro_scale * spin,
+                t_x * cos[:, None] + t_y * sin[:, None] + left[:, None] * turn,
+                t_y * cos[:, None] - t_x * sin[:, None] - forward[:, None] * turn,
+            ],
+            axis=1,
+        )
+        H = np.concatenate([d[:, :, : nx + 3], np.tile(np.eye(3), (M, 1, 1))], axis=2)
+        dh = d[:, :, nx + 3 :] + D[:, nx + 3 :]
+        if "gyro_scale" in s.free:
+            dh[:, 0, s.free["gyro_scale"]] += xi[:, nq + 2]
+        if "imu_misalignment" in s.free:
+            dh[:, 1, s.free["imu_misalignment"]] += left
+            dh[:, 2, s.free["imu_misalignment"]] -= forward
+        return h, H, dh
+
+    def _camera(self, xi: Array, offset: Array, rate: Array, D: Array) -> tuple[Array, Array, Array]:
+        """Predicted camera pose at the grid point + offset, its Jacobian and derivatives."""
+        nq, s = self.nq, self.sensors
+        gain = np.array([s.camera_scale, s.camera_scale, 1.0])
+        velocity = xi[:, nq : nq + 3] + offset[:, None] * rate[:, nq : nq + 3]
+        here = xi[:, :3] + offset[:, None] * xi[:, nq : nq + 3] + 0.5 * offset[:, None] ** 2 * rate[:, nq : nq + 3]
+        h = here * gain + np.array([0.0, 0.0, s.camera_heading_offset])
+        H = np.zeros((self.trials, 3, self.n))
+        H[:, range(3), range(3)] = gain
+        H[:, range(3), range(nq, nq + 3)] = gain * offset[:, None]
+        dh = H @ D
+        if "camera_latency" in s.free:
+            dh[:, :, s.free["camera_latency"]] -= gain * velocity
+        if "camera_scale" in s.free:
+            dh[:, :2, s.free["camera_scale"]] += here[:, :2]
+        if "camera_heading_offset" in s.free:
+            dh[:, 2, s.free["camera_heading_offset"]] += 1.0
+        return h, H, dh
+
+    def _encoder(self, sums: _Sums) -> None:
+        """The encoder reads the rotor's speed, which follows from the commands alone."""
+        T, M = self.experiment.encoder.shape
+        e = self.experiment.encoder - self.memory[:T, :, 1]
+        good = np.isfinite(e) & (np.arange(T)[:, None] < self.experiment.steps)
+        r = np.where(good, e, 0.0) / self.noise.encoder
+        J = -np.where(good[..., None], self.d_memory[:T, :, 1], 0.0) / self.noise.encoder
+        sums.log_likelihood -= 0.5 * np.sum(r**2, axis=0) + good.sum(0) * np.log(self.noise.encoder * np.sqrt(2 * np.pi))
+        sums.samples += good.sum(0)
+        sums.gradient += np.einsum("tm,tmk->mk", r, J)
+        sums.normal += np.einsum("tmj,tmk->mjk", J, J)
+        sums.whitened[..., ENCODER_ROW] = np.where(good, r, np.nan)
+
+
+class _Sums:
+    """What a pass adds up."""
+
+    def __init__(self, trials: int, free: int, steps: int) -> None:
+        self.log_likelihood, self.samples = np.zeros(trials), np.zeros(trials)
+        self.gradient, self.normal = np.zeros((trials, free)), np.zeros((trials, free, free))
+        self.whitened = np.full((steps, trials, len(ROWS) + 1), np.nan)
+
+
+def _update(
+    k: int, rows: slice, e: Array, H: Array, dh: Array, R: Array, use: NDArray[np.bool_], gate: float,
+    state: tuple[Array, Array, Array], sums: _Sums,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Kalman update of the trials in `use`; innovations beyond `gate` (squared, normalised) are left out."""
+    xi, P, D = state
+    PHt = P @ H.transpose(0, 2, 1)
+    S = H @ PHt + R
+    L = np.linalg.cholesky(S)
+    e = np.where(use[:, None], e, 0.0)
+    white = np.linalg.solve(L, e[..., None])[..., 0]
+    use = use & (np.sum(white**2, axis=1) < gate)
+    white = np.where(use[:, None], white, 0.0)
+    J = np.where(use[:, None, None], -np.linalg.solve(L, dh), 0.0)  # derivative of the whitened innovation
+    K = np.where(use[:, None, None], np.linalg.solve(S, PHt.transpose(0, 2, 1)).transpose(0, 2, 1), 0.0)
+    xi = xi + (K @ e[..., None])[..., 0]
+    D = D - K @ dh
+    P = P - K @ PHt.transpose(0, 2, 1)
+    log_det = 2.0 * np.sum(np.log(np.diagonal(L, axis1=1, axis2=2)), axis=1)
+    size = e.shape[1]
+    sums.log_likelihood -= 0.5 * np.where(use, np.sum(white**2, axis=1) + log_det + size * np.log(2 * np.pi), 0.0)
+    sums.samples += size * use
+    sums.gradient += np.einsum("mi,mik->mk", white, J)
+    sums.normal += J.transpose(0, 2, 1) @ J
+    sums.whitened[k, use, rows] = white[use]
+    return xi, P, D
+
+
+def _empty_history(T: int, M: int, n: int, memory: Array) -> History:
+    return History(
+        np.zeros((T, M, n)), np.zeros((T, M, n, n)), np.zeros((T, M, n)), np.zeros((T, M, n, n)),
+        np.zeros((T, M, n, n)), memory,
+    )  # fmt: skip

@@ -1,0 +1,122 @@
+"""Extended Kalman filter of the fish with forward sensitivities: the model, its numbers, its results.
+
+State xi = [motion (q, q', states of effects), wrench on the head (3), biases of gyro and accelerometer (3)].
+    motion' = f(motion, drive, p, wrench)          drive (rotor, rudder) known from the commands
+    wrench' = -wrench / tau + noise                 the unexplained force
+    gyro z = scale r + b_g;  accelerometer = R(-mu) R_body_pool q'' + b_a;  camera = pose(t - latency)
+One pass gives the innovations, their covariance and, with the filter's gains held fixed, the derivative of every
+innovation with respect to every free parameter (prediction-error method; Ljung 1999, ch. 7 and 10). Gauss-Newton,
+score tests and the ranking of candidates all come from the normal matrices that the pass adds up per trial.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_sim.model import Layout
+from fish_train.identify.experiment import Experiment
+
+Array = NDArray[np.float64]
+
+WRENCH = ("disturbance.surge", "disturbance.sway", "disturbance.yaw")  # parameters of the model the filter drives
+GYRO, ACCEL, CAMERA = slice(0, 1), slice(1, 3), slice(3, 6)  # rows of the innovations
+ROWS = ("gyro", "accel_forward", "accel_left", "camera_x", "camera_y", "camera_heading")
+ENCODER_ROW = 6
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations. Sensors: per sample; wrench: stationary values of its random walk back to zero."""
+
+    wrench: tuple[float, float, float] = (0.005, 0.02, 5e-4)  # N, N, N m
+    wrench_time: float = 0.3  # s, tau
+    gyro: float = 0.006  # rad/s
+    accel: float = 0.05  # m/s^2
+    camera_position: float = 0.002  # m
+    camera_heading: float = 0.012  # rad
+    encoder: float = 0.15  # rad/s
+    gyro_bias: float = 0.05  # rad/s, prior
+    accel_bias: float = 0.3  # m/s^2, prior
+    start_speed: float = 0.3  # m/s and rad/s x 10, prior of motion that does not start at rest
+    gate_camera: float = 60.0  # poses whose squared normalised innovation exceeds this are left out
+    gate_imu: float = 400.0  # likewise IMU samples
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """What the sensors do to the truth; `free` maps a field to the index of its free parameter."""
+
+    camera_latency: float = 0.0  # s, the image is older than its stamp
+    camera_heading_offset: float = 0.0  # rad, measured minus true
+    camera_scale: float = 1.0  # measured over true
+    gyro_scale: float = 1.0  # measured over true
+    imu_misalignment: float = 0.0  # rad, IMU axes counter-clockwise from base_link
+    free: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class FilterResult:
+    """Sums per trial and, if asked, everything along the way."""
+
+    log_likelihood: Array  # (M,)
+    samples: Array  # (M,) scalar measurements used
+    gradient: Array  # (M, K) d(-log likelihood)/d theta with gains held fixed
+    normal: Array  # (M, K, K) Gauss-Newton matrix of -log likelihood
+    whitened: Array  # (T, M, 7) innovations over their standard deviation, NaN where there is none
+    history: History | None
+
+
+@dataclass(frozen=True)
+class History:
+    """Filtered and predicted moments for the smoother."""
+
+    predicted: Array  # (T, M, N)
+    predicted_P: Array  # (T, M, N, N)
+    filtered: Array  # (T, M, N)
+    filtered_P: Array  # (T, M, N, N)
+    transition: Array  # (T, M, N, N)
+    memory: Array  # (T + 1, M, NM)
+
+
+def place_frames(experiment: Experiment, sensors: SensorModel) -> tuple[Array, Array]:
+    """(offset (T, M), pose (T, M, 3)): each camera pose at its nearest grid point, moved back by the latency."""
+    T, M = experiment.length, len(experiment.names)
+    offset, pose = np.full((T, M), np.nan), np.full((T, M, 3), np.nan)
+    for m, frames in enumerate(experiment.frames):
+        t = frames.t - sensors.camera_latency
+        k = np.round(t / DT).astype(int)
+        inside = (k >= 0) & (k < experiment.steps[m])
+        offset[k[inside], m] = (t - k * DT)[inside]
+        pose[k[inside], m] = frames.pose[inside]
+    return offset, pose
+
+
+def first_memory(experiment: Experiment) -> Array:
+    """alpha and rotor speed (M, 2) at the first grid point: zero at rest, else as commanded."""
+    if experiment.start_at_rest:
+        return np.zeros((len(experiment.names), 2))
+    return np.column_stack([np.clip(experiment.commands[0, :, 1], -0.8, 0.8), experiment.commands[0, :, 0]])
+
+
+def first_state(experiment: Experiment, layout: Layout, sensors: SensorModel, noise: Noise) -> tuple[Array, Array]:
+    """Prior of the state (M, N) and its covariance: at the first camera pose with a straight tail."""
+    M, nq, nx = len(experiment.names), layout.links + 3, len(layout.motion)
+    n, rest = nx + 6, experiment.start_at_rest
+    xi, variance, P = np.zeros((M, n)), np.zeros(n), np.zeros((M, n, n))
+    for m, frames in enumerate(experiment.frames):
+        xi[m, :2] = frames.pose[0, :2] / sensors.camera_scale
+        xi[m, 2:nq] = frames.pose[0, 2] - sensors.camera_heading_offset
+    speed = 1e-3 if rest else noise.start_speed
+    variance[:2] = 0.05**2
+    variance[2:nq] = 1e-6 if rest else 0.2**2
+    variance[nq : nq + 2] = speed**2
+    variance[nq + 2 : 2 * nq] = (10.0 * speed) ** 2
+    variance[nx : nx + 3] = np.square(noise.wrench)
+    variance[nx + 3 :] = np.square([noise.gyro_bias, noise.accel_bias, noise.accel_bias])
+    P[:, range(n), range(n)] = variance
+    P[:, 2:nq, 2:nq] += 0.1**2  # head and tail turn together
+    return xi, P
