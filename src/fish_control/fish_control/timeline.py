@@ -82,8 +82,14 @@ class Timeline:
         return max(bisect.bisect_right(self._moments, time, key=lambda moment: moment.time), 1)
 
     def _insert(self, moment: Moment) -> None:
+        """Put the moment in its place and replay from there.
+
+        Poses taken since the IMU sample before are replayed too: what the IMU did at them is known only now.
+        """
         index = self._place(moment.time)
         self._moments.insert(index, moment)
+        while index > 1 and self._moments[index - 1].camera is not None:
+            index -= 1
         before = self._moments[index - 1]
         self._filter.set(before.x, before.P)
         for current in self._moments[index:]:

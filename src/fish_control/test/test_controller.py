@@ -1,0 +1,96 @@
+"""The controller between odometry and commands."""
+
+import numpy as np
+import pytest
+
+from fish_control.control_law import Gains
+from fish_control.controller import Controller, Wanted, continued
+from fish_control.line_of_sight import Motion
+from fish_control.policy import Policy
+
+POLICY = Policy.constant(Gains(0.3, 0.4, 0.03, 0.6, 0.07, 0.0))
+STRAIGHT = Wanted(0.0, 0.2, 0.0, 0.0)
+
+
+def controller(heading=0.0, surge=0.2):
+    made = Controller(POLICY)
+    for k in range(3):
+        made.observe(0.01 * k, Motion(0.0, 0.0, heading, surge, 0.0, 0.0))
+    return made
+
+
+def test_it_steers_towards_the_wanted_course():
+    for course in (0.3, -0.3):
+        made = controller()
+        made.decide(Wanted(course, 0.2, 0.0, 0.0))
+        assert np.sign(made.command(0.01).alpha) == np.sign(course)
+
+
+def test_gains_are_the_policys():
+    assert controller().decide(STRAIGHT) == pytest.approx(Gains(0.3, 0.4, 0.03, 0.6, 0.07, 0.0))
+
+
+def test_a_slow_fish_gets_more_throttle():
+    def rotor(surge):
+        made = controller(surge=surge)
+        for _ in range(25):
+            made.decide(STRAIGHT)
+            speeds = [made.command(0.01).rotor_speed for _ in range(2)]
+        return np.abs(speeds).max()
+
+    assert rotor(0.1) > rotor(0.2) > rotor(0.3)
+
+
+def test_rest_stops_rotor_and_centres_rudder_within_half_a_second():
+    made = controller()
+    for _ in range(50):
+        made.decide(Wanted(1.0, 0.2, 0.0, 0.0))
+        made.command(0.02)
+    made.rest()
+    for _ in range(60):
+        command = made.command(0.01)
+    assert command.rotor_speed == pytest.approx(0.0, abs=1e-9) and command.alpha == 0.0
+
+
+def test_no_speed_wanted_means_no_drive_but_steering_while_gliding():
+    made = controller(surge=0.15)
+    made.decide(Wanted(0.5, 0.0, 0.0, 0.0))
+    command = [made.command(0.01) for _ in range(10)][-1]
+    assert command.rotor_speed == 0.0 and command.alpha > 0.05
+    still = controller(surge=0.01)
+    still.decide(Wanted(0.5, 0.0, 0.0, 0.0))
+    assert still.command(0.01).alpha == 0.0
+
+
+def test_curvature_is_fed_forward():
+    made = controller(heading=POLICY.contract.guidance.slip_arm * 2.0)
+    for _ in range(100):
+        made.decide(Wanted(0.0, 0.2, 0.4, 0.0))
+        command = made.command(0.02)
+    assert command.alpha == pytest.approx(POLICY.contract.limits.curvature_gain * 2.0, rel=0.05)
+
+
+def test_decide_before_odometry_is_an_error_of_the_caller():
+    with pytest.raises(ValueError, match="before any odometry"):
+        Controller(POLICY).decide(STRAIGHT)
+
+
+def test_phase_is_published_within_one_turn():
+    made = controller()
+    phases = [made.command(0.01).phase for _ in range(200)]
+    assert 0.0 <= min(phases) and max(phases) < 2.0 * np.pi
+
+
+def test_a_fish_that_faces_backwards_keeps_turning_the_same_way():
+    errors, e = [], 0.0
+    for k in range(400):  # facing pi, swinging by 0.3 rad
+        measured = np.pi + 0.3 * np.sin(0.25 * k)
+        e = continued(e, float(np.arctan2(np.sin(measured), np.cos(measured))))
+        errors.append(e)
+    assert np.all(np.array(errors[1:]) > 2.0) or np.all(np.array(errors[1:]) < -2.0)
+
+
+def test_continued_error_comes_back_within_reach():
+    assert continued(3.0, -2.0) == -2.0
+    assert continued(3.0, -3.1) == pytest.approx(2 * np.pi - 3.1)
+    assert continued(0.1, 0.2) == pytest.approx(0.2)

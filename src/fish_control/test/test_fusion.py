@@ -1,0 +1,211 @@
+"""Fusion of a swinging head seen by a late, lossy camera."""
+
+import numpy as np
+import pytest
+
+from fish_control.fusion import LOST_VARIANCE, Fusion, FusionConfig
+
+DT = 0.01
+W = 4.0 * np.pi
+SWING, SPEED, TURN = 0.2, 0.2, 0.3  # rad, m/s, rad/s
+FLIPPED = np.array([0.0, 0.0, np.pi])
+
+
+def truth(t):
+    """Pose, yaw rate and specific force of a head that swings at the rotor's frequency on a circular course."""
+    course = TURN * t
+    heading = course + SWING * np.sin(W * t)
+    radius = SPEED / TURN
+    pose = np.array([radius * np.sin(course), radius * (1 - np.cos(course)), heading])
+    acceleration = SPEED * TURN * np.array([-np.sin(course), np.cos(course)])
+    c, s = np.cos(heading), np.sin(heading)
+    force = np.array([[c, s], [-s, c]]) @ acceleration
+    return pose, TURN + SWING * W * np.cos(W * t), force
+
+
+def measurements(seconds, seed=0, latency=0.08, gyro_bias=0.02, noisy=True):
+    """(arrival, kind, stamp, values) in the order of arrival."""
+    rng = np.random.default_rng(seed)
+    noise = 1.0 if noisy else 0.0
+    events = []
+    for t in np.arange(0.0, seconds, DT):
+        _, rate, force = truth(t)
+        imu = [rate + gyro_bias + noise * rng.normal(0, 0.006), *(force + noise * rng.normal(0, 0.05, 2))]
+        events.append((t, "imu", t, imu))
+    for t in np.arange(0.003, seconds, 1.0 / 30.0):
+        pose = truth(t)[0] + noise * rng.normal(0, [0.002, 0.002, 0.012])
+        pose[2] = (pose[2] + np.pi) % (2 * np.pi) - np.pi
+        events.append((t + latency + noise * rng.exponential(0.01), "camera", t, pose))
+    return sorted(events, key=lambda e: e[0])
+
+
+def feed(fusion, events):
+    for _, kind, stamp, values in events:
+        if kind == "imu":
+            fusion.add_imu(stamp, *values)
+        else:
+            fusion.add_pose(stamp, values)
+
+
+def pose_error(estimate):
+    error = estimate.pose - truth(estimate.time)[0]
+    error[2] = (error[2] + np.pi) % (2 * np.pi) - np.pi
+    return error
+
+
+@pytest.mark.parametrize("latency", [0.0, 0.08, 0.3])
+def test_pose_and_velocity_of_a_swinging_head_in_spite_of_latency(latency):
+    fusion, events = Fusion(), measurements(8.0, latency=latency)
+    poses, twists = [], []
+    for event in events:
+        feed(fusion, [event])
+        if event[1] == "imu" and event[0] > 3.0:
+            estimate = fusion.estimate()
+            pose, rate, _ = truth(estimate.time)
+            swing = pose[2] - TURN * estimate.time
+            poses.append(pose_error(estimate))
+            twists.append(estimate.twist - [SPEED * np.cos(swing), -SPEED * np.sin(swing), rate])
+    rmse = np.sqrt(np.mean(np.square(poses), axis=0))
+    assert rmse[0] < 0.004 and rmse[1] < 0.004 and rmse[2] < 0.01
+    assert np.all(np.sqrt(np.mean(np.square(twists), axis=0)) < [0.012, 0.012, 0.02])
+
+
+def test_gyro_bias_is_found():
+    fusion = Fusion()
+    feed(fusion, measurements(10.0, gyro_bias=0.03))
+    assert fusion.estimate().gyro_bias == pytest.approx(0.03, abs=0.004)
+
+
+def test_errors_are_as_large_as_the_covariance_says():
+    squares = []
+    for seed in range(12):
+        fusion = Fusion(FusionConfig(camera_position_noise=0.002, camera_heading_noise=0.012))
+        feed(fusion, measurements(5.0, seed=seed))
+        estimate = fusion.estimate()
+        error = pose_error(estimate)
+        squares.append(error @ np.linalg.solve(estimate.pose_covariance, error))
+    assert 0.5 < np.mean(squares) < 6.0  # chi^2 of 3 has mean 3; the model's noise is on the safe side
+
+
+def test_order_of_arrival_makes_no_difference():
+    events = measurements(4.0, noisy=False)
+    rng = np.random.default_rng(5)
+    start = [e for e in events if e[2] < 1.0]
+    rest = [e for e in events if e[2] >= 1.0]
+    in_order, shuffled = Fusion(), Fusion()
+    feed(in_order, sorted(start, key=lambda e: e[2]) + sorted(rest, key=lambda e: e[2]))
+    late = [
+        (stamp + (rng.uniform(0.0, 0.5) if kind == "camera" else 0.0), kind, stamp, v)
+        for _, kind, stamp, v in rest
+    ]
+    feed(shuffled, sorted(start, key=lambda e: e[2]) + sorted(late, key=lambda e: e[0]))
+    a, b = in_order.estimate(), shuffled.estimate()
+    assert shuffled.counts["pose"] == in_order.counts["pose"]
+    np.testing.assert_allclose(a.pose, b.pose, atol=1e-9)
+    np.testing.assert_allclose(a.pose_covariance, b.pose_covariance, rtol=1e-6, atol=1e-12)
+
+
+def test_flipped_headings_and_far_positions_are_refused():
+    fusion, events = Fusion(), measurements(6.0)
+    rng = np.random.default_rng(6)
+    for event in events:
+        if event[1] == "camera" and event[2] > 1.0 and rng.random() < 0.2:
+            wrong = FLIPPED if rng.random() < 0.5 else np.array([0.3, -0.2, 0.0])
+            assert not fusion.add_pose(event[2], event[3] + wrong)
+        else:
+            feed(fusion, [event])
+    assert fusion.counts["pose_outlier"] > 15
+    assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
+
+
+def test_a_flip_among_the_first_frames_does_not_start_the_filter():
+    fusion, seen = Fusion(), 0
+    for event in measurements(2.0):
+        if event[1] == "camera":
+            seen += 1
+            if seen == 2:
+                fusion.add_pose(event[2], event[3] + FLIPPED)
+                continue
+        feed(fusion, [event])
+    assert abs(pose_error(fusion.estimate())[2]) < 0.05
+
+
+def test_a_fish_that_was_carried_away_is_found_again():
+    fusion, moved = Fusion(), np.array([0.8, -0.5, 0.0])
+    for event in measurements(6.0):
+        late = event[1] == "camera" and event[2] > 2.0
+        feed(fusion, [(*event[:3], event[3] + moved) if late else event])
+    assert fusion.counts["reacquired"] == 1
+    np.testing.assert_allclose(pose_error(fusion.estimate())[:2], moved[:2], atol=0.01)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_values_that_are_not_finite_are_counted_and_dropped(bad):
+    fusion = Fusion()
+    feed(fusion, measurements(2.0))
+    before = fusion.estimate()
+    assert not fusion.add_imu(2.0, bad, 0.0, 0.0)
+    assert not fusion.add_pose(2.0, [0.0, bad, 0.0])
+    assert not fusion.add_pose(2.0, [0.0, 0.0, 0.0], np.full((3, 3), bad))
+    assert fusion.counts["imu_not_finite"] == 1 and fusion.counts["pose_not_finite"] == 2
+    np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
+
+
+def test_too_late_and_repeated_measurements_are_dropped():
+    fusion = Fusion()
+    feed(fusion, measurements(3.0))
+    assert not fusion.add_pose(0.5, truth(0.5)[0])
+    assert not fusion.add_imu(1.0 + 1.9, 0.0, 0.0, 0.0)
+    assert fusion.counts["pose_too_late"] == 1 and fusion.counts["imu_out_of_order"] == 1
+
+
+def test_lost_camera_is_said_in_the_covariance_and_passes():
+    fusion, events = Fusion(), measurements(6.0)
+    lost = []
+    for event in events:
+        if event[1] == "camera" and 2.0 < event[2] < 4.0:
+            continue
+        feed(fusion, [event])
+        estimate = fusion.estimate()
+        if event[1] == "imu" and estimate is not None:
+            lost.append((event[0], estimate.camera_lost, estimate.pose_covariance[0, 0] == LOST_VARIANCE))
+    times = [t for t, gone, said in lost if gone and said]
+    assert min(times) == pytest.approx(2.6, abs=0.06) and max(times) == pytest.approx(4.1, abs=0.1)
+    assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
+
+
+def test_lost_imu_is_said_and_the_camera_goes_on():
+    fusion = Fusion()
+    feed(fusion, [e for e in measurements(4.0) if e[1] == "camera" or e[2] < 2.0])
+    estimate = fusion.estimate(4.0)
+    assert estimate.imu_lost and not estimate.camera_lost
+    assert estimate.twist_covariance[2, 2] == LOST_VARIANCE
+    assert np.hypot(*pose_error(estimate)[:2]) < 0.05
+
+
+def test_a_clock_set_back_starts_anew():
+    fusion = Fusion()
+    feed(fusion, [(a + 100, k, s + 100, v) for a, k, s, v in measurements(2.0)])
+    feed(fusion, measurements(2.0))
+    assert fusion.counts["restarted"] == 1
+    assert fusion.estimate().time < 3.0
+    assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.02
+
+
+def test_nothing_is_estimated_before_poses_agree():
+    fusion = Fusion()
+    fusion.add_imu(0.0, 0.0, 0.0, 0.0)
+    for k in range(20):  # jumps of a metre
+        assert not fusion.add_pose(0.01 + k / 30.0, [float(k % 2), 0.0, 0.0])
+    assert fusion.estimate() is None
+
+
+def test_camera_offset_moves_the_stamps():
+    fusion = Fusion(FusionConfig(camera_offset=-0.05))
+    feed(fusion, [(a, k, s + 0.05 * (k == "camera"), v) for a, k, s, v in measurements(5.0)])
+    assert np.all(np.abs(pose_error(fusion.estimate())) < [0.008, 0.008, 0.03])
+
+
+def test_config_names_field_and_value():
+    with pytest.raises(ValueError, match="gate is -1.0"):
+        FusionConfig(gate=-1.0)

@@ -1,0 +1,50 @@
+"""YAML files and dataclasses say the same; ranges are checked."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fish_control.fusion import FusionConfig
+from fish_control.gains_file import read_gains_file, require_fit
+from fish_control.node_configs import ControllerConfig, PlannerConfig
+
+CONFIG = Path(__file__).parents[1] / "config"
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("fusion", FusionConfig), ("planner", PlannerConfig), ("controller", ControllerConfig)]
+)
+def test_yaml_holds_the_dataclass(name, kind):
+    parameters = yaml.safe_load((CONFIG / f"{name}.yaml").read_text())["/**"]["ros__parameters"]
+    assert parameters == asdict(kind())
+    assert list(parameters) == list(asdict(kind()))
+
+
+def test_shipped_weights_fit_the_shipped_controller():
+    config = ControllerConfig()
+    policy = read_gains_file(CONFIG / "gains.safetensors")
+    require_fit(policy, "gains.safetensors", 1.0 / config.rate_hz, config.lookahead)
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "value", "expected"),
+    [
+        (PlannerConfig, "speed", 0.6, "0.05 to 0.5 m/s"),
+        (PlannerConfig, "speed", float("nan"), "0.05 to 0.5 m/s"),
+        (PlannerConfig, "end", "bounce", "known: , stop, loop"),
+        (PlannerConfig, "start", "middle", "known: beginning, nearest"),
+        (PlannerConfig, "lookahead", 0.0, "lookahead"),
+        (PlannerConfig, "slip_arm", -1.0, "slip_arm"),
+        (ControllerConfig, "resume", "never", "known: auto, manual"),
+        (ControllerConfig, "command_rate_hz", 120.0, "a multiple of rate_hz"),
+        (ControllerConfig, "odometry_timeout", 0.0, "0.02 to 5"),
+    ],
+)
+def test_a_value_out_of_range_is_named(kind, field, value, expected):
+    with pytest.raises(ValueError) as refusal:
+        kind(**{field: value})
+    assert (
+        field in str(refusal.value) and repr(value) in str(refusal.value) and expected in str(refusal.value)
+    )

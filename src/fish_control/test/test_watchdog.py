@@ -1,0 +1,86 @@
+"""When the fish may swim."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from fish_control.node_configs import ControllerConfig
+from fish_control.watchdog import Signs, Watchdog
+
+GOOD = Signs(0.01, True, 1e-5, 1e-4, 0.02)
+FAULTS = {
+    "odometry is stale": replace(GOOD, odometry_age=0.3),
+    "odometry is not finite": replace(GOOD, odometry_finite=False),
+    "camera lost": replace(GOOD, pose_variance=1e4),
+    "IMU lost": replace(GOOD, twist_variance=1e4),
+    "target is stale": replace(GOOD, target_age=0.5),
+}
+
+
+def swimming(**parameters):
+    dog = Watchdog(ControllerConfig(**parameters))
+    assert dog.check(0.0, GOOD)
+    return dog
+
+
+def test_it_waits_for_odometry_and_target_without_calling_it_a_stop():
+    dog = Watchdog(ControllerConfig())
+    assert not dog.check(0.0, Signs(None, True, math.inf, math.inf, None))
+    assert dog.reason == "waiting for odometry"
+    assert not dog.check(0.1, replace(GOOD, target_age=None))
+    assert (dog.state, dog.stops) == ("waiting", 0)
+    assert dog.check(0.2, GOOD) and dog.state == "swimming"
+
+
+@pytest.mark.parametrize("said", FAULTS)
+def test_every_fault_stops_at_once_and_is_said(said):
+    dog = swimming()
+    assert not dog.check(0.01, FAULTS[said])
+    assert dog.state == "stopped" and dog.reason.startswith(said) and dog.stops == 1
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_variance_that_is_no_number_is_a_fault(value):
+    assert not swimming().check(0.01, replace(GOOD, pose_variance=value))
+
+
+@pytest.mark.parametrize("said", FAULTS)
+def test_auto_resumes_after_the_delay(said):
+    dog = swimming(resume_delay=0.5)
+    dog.check(0.1, FAULTS[said])
+    assert not dog.check(0.2, GOOD)
+    assert not dog.check(0.6, GOOD)
+    assert dog.check(0.71, GOOD)
+
+
+def test_the_delay_starts_again_with_every_fault():
+    dog = swimming(resume_delay=0.5)
+    dog.check(0.1, FAULTS["camera lost"])
+    dog.check(0.2, GOOD)
+    dog.check(0.6, FAULTS["camera lost"])
+    assert not dog.check(0.8, GOOD)
+    assert dog.stops == 1
+
+
+def test_manual_resumes_only_when_told_and_all_is_well():
+    dog = swimming(resume="manual")
+    dog.check(0.1, FAULTS["camera lost"])
+    assert dog.release() is not None and "camera lost" in dog.release()
+    assert not dog.check(100.0, GOOD)
+    assert dog.reason == "all is well again; call resume"
+    assert dog.release() is None
+    assert dog.check(100.1, GOOD)
+
+
+def test_a_release_does_not_outlive_the_next_fault():
+    dog = swimming(resume="manual")
+    dog.check(0.1, FAULTS["camera lost"])
+    dog.check(0.2, GOOD)
+    dog.release()
+    dog.check(0.3, FAULTS["camera lost"])
+    assert not dog.check(0.4, GOOD)
+
+
+def test_release_while_swimming_says_so():
+    assert swimming().release() == "not stopped but swimming"
