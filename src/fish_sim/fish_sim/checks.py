@@ -49,7 +49,8 @@ def _check_finite(what: str, array: Array, names: Sequence[str]) -> None:
 
 def diverged(states: Array) -> NDArray[np.bool_]:
     """Which batch elements of states (T + 1, ..., NS) left the finite world: (...)."""
-    return ~np.all(np.abs(states) < FINITE_LIMIT, axis=(0, -1))
+    finite: NDArray[np.bool_] = np.all(np.abs(states) < FINITE_LIMIT, axis=(0, -1))
+    return ~finite
 
 
 def check_scheme(stepper: Stepper, parameters: Array) -> None:
@@ -94,7 +95,7 @@ def modes_at_rest(stepper: Stepper, parameters: Array) -> Modes:
     still = np.zeros((size, 4))
     p = np.tile(parameters, (size, 1))
     _, columns = stepper.rates_jvp(rest, still, p, np.eye(size), still, np.zeros_like(p))
-    return np.linalg.eigvals(columns.T)
+    return np.linalg.eigvals(columns.T).astype(complex)
 
 
 def _growth(method: Method, modes: Modes, substeps: int) -> float:
@@ -105,4 +106,4 @@ def _growth(method: Method, modes: Modes, substeps: int) -> float:
 def _stability_function(method: Method, z: complex) -> complex:
     """R(z) = 1 + z b (1 - z A)^-1 (1, .., 1)."""
     A, ones = np.array(method.A), np.ones(len(method.B))
-    return 1.0 + z * np.dot(method.B, np.linalg.solve(np.eye(len(ones)) - z * A, ones))
+    return complex(1.0 + z * np.dot(method.B, np.linalg.solve(np.eye(len(ones)) - z * A, ones)))

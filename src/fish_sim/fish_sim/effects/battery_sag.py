@@ -1,6 +1,9 @@
 """A battery whose voltage gives way under load."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Followed, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "first-order (Thevenin) battery, speed proportional to voltage; strengths are an assumption"
@@ -27,7 +30,7 @@ class BatterySag(Effect):
     memory = ("load",)
 
     @staticmethod
-    def rotor(p, m, command, dt, xp):
+    def rotor(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         reached = 1.0 - xp.exp(-dt / p.time_constant)
         load = m.load + reached * ((command / REFERENCE_SPEED) ** 2 - m.load)
         return command * xp.fmax(0.0, 1.0 - p.sag * load), {"load": load}

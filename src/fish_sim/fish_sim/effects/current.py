@@ -1,6 +1,9 @@
 """Steady uniform flow through the pool."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Flow, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "Fossen 2021, sect. 10.3: irrotational constant current; strength is an assumption"
@@ -23,5 +26,5 @@ class Current(Effect):
     strength = ("x", "y")
 
     @staticmethod
-    def water(p, x, y, z, xp):
+    def water(p: Values, x: Scalar, y: Scalar, z: Values, xp: Any) -> Flow:
         return (p.x, p.y), ((0.0, 0.0), (0.0, 0.0))

@@ -1,8 +1,9 @@
 """An external wrench on the head: what pushes the fish and has no name (yet)."""
 
 import math
+from typing import Any
 
-from fish_sim.effects.effect import Effect
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
 SOURCE = "this project: latent force of grey-box models (Kristensen, Madsen and Jorgensen 2004)"
@@ -29,5 +30,5 @@ class Disturbance(Effect):
     strength = ("surge", "sway", "yaw")
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         return (p.surge, p.sway, p.yaw) if body.name == "head" else None

@@ -1,6 +1,8 @@
 """Drag that does not depend on speed."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
 SOURCE = "Coulomb friction, regularised; strength is an assumption (surface film, cable)"
@@ -24,7 +26,7 @@ class DryFriction(Effect):
     dissipative = True
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         if body.name != "head":
             return None
         speed = xp.sqrt(body.u**2 + body.v**2 + (1e-3 * SMOOTHING) ** 2)  # never 0/0

@@ -15,6 +15,12 @@ from typing import Any, ClassVar
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
+Values = SimpleNamespace  # of parameters, states or memory, by name
+Wrench = tuple[Scalar, Scalar, Scalar]  # X, Y [N], N [N m] in the frame of a body
+Pair = tuple[Scalar, Scalar]
+Flow = tuple[Pair, tuple[Pair, Pair]]  # water velocity [m/s] and its gradient [1/s]
+Followed = tuple[Scalar, dict[str, Scalar]]  # what becomes of a command, and the memory after it
+
 
 @dataclass(frozen=True)
 class BodyMotion:
@@ -69,57 +75,51 @@ class Effect:
     dissipative: ClassVar[bool] = False  # its wrench never adds energy in still water
 
     @staticmethod
-    def wrench(p: SimpleNamespace, body: BodyMotion, z: SimpleNamespace, drive: Drive, xp: Any) -> Any:
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         """(X, Y, N) on a body in its own frame [N, N, N m]."""
         return None
 
     @staticmethod
-    def joint_torque(p: SimpleNamespace, joint: int, angle: Scalar, rate: Scalar, xp: Any) -> Scalar:
+    def joint_torque(p: Values, joint: int, angle: Scalar, rate: Scalar, xp: Any) -> Scalar:
         """Torque that opposes the joint's deflection [N m], added to the spring's; joint 1 is at the head."""
         return 0.0
 
     @staticmethod
-    def water(p: SimpleNamespace, x: Scalar, y: Scalar, z: SimpleNamespace, xp: Any) -> Any:
+    def water(p: Values, x: Scalar, y: Scalar, z: Values, xp: Any) -> Flow | None:
         """Water velocity (V_x, V_y) and gradient ((dVx/dx, dVx/dy), (dVy/dx, dVy/dy)), pool frame."""
         return None
 
     @staticmethod
-    def point_masses(p: SimpleNamespace) -> Any:
-        """[(mass, forward, left)] rigid on the head, relative to its centre of mass [kg, m, m]."""
+    def point_masses(p: Values) -> tuple[tuple[Scalar, Scalar, Scalar], ...]:
+        """((mass, forward, left), ..) rigid on the head, relative to its centre of mass [kg, m, m]."""
         return ()
 
     @staticmethod
-    def grip(p: SimpleNamespace, z: SimpleNamespace, xp: Any) -> Grip | None:
+    def grip(p: Values, z: Values, xp: Any) -> Grip | None:
         """Finite grip of the tip, or None."""
         return None
 
     @staticmethod
-    def tip_share(p: SimpleNamespace) -> Scalar:
+    def tip_share(p: Values) -> Scalar:
         """Part of alpha that turns the fin at the tip instead of the root of the tail."""
         return 0.0
 
     @staticmethod
-    def derivative(
-        p: SimpleNamespace, z: SimpleNamespace, slip: Scalar, drive: Drive, xp: Any
-    ) -> tuple[Scalar, ...]:
+    def derivative(p: Values, z: Values, slip: Scalar, drive: Drive, xp: Any) -> tuple[Scalar, ...]:
         """Time derivatives of `states`; slip is the tip's lateral velocity through the water [m/s]."""
         return ()
 
     @staticmethod
-    def rudder(
-        p: SimpleNamespace, m: SimpleNamespace, command: Scalar, dt: float, xp: Any
-    ) -> tuple[Scalar, dict]:
+    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         """(commanded alpha as the servo follows it [rad], updated memory)."""
         return command, {}
 
     @staticmethod
-    def rotor(
-        p: SimpleNamespace, m: SimpleNamespace, command: Scalar, dt: float, xp: Any
-    ) -> tuple[Scalar, dict]:
+    def rotor(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         """(commanded rotor speed as the motor follows it [rad/s], updated memory)."""
         return command, {}
 
     @staticmethod
-    def derived(p: SimpleNamespace) -> Mapping[str, tuple[float, str]]:
+    def derived(p: Values) -> Mapping[str, tuple[float, str]]:
         """Numbers people know better than the parameters: name -> (value, unit). For reports only."""
         return {}

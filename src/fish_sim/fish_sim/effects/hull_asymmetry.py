@@ -1,6 +1,8 @@
 """A hull that is not quite symmetric."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
 SOURCE = "Y_uu, N_uu of an asymmetric hull (Fossen 2021, sect. 6.4); strengths are an assumption"
@@ -25,7 +27,7 @@ class HullAsymmetry(Effect):
     strength = ("sway", "yaw")
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         if body.name != "head":
             return None
         pressure = body.u * xp.fabs(body.u)

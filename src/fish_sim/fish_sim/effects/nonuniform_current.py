@@ -1,9 +1,11 @@
 """Steady flow that differs from place to place."""
 
 import math
+from typing import Any
 
 from fish_sim import pool
-from fish_sim.effects.effect import Effect
+from fish_sim.effects.effect import Effect, Flow, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = (
@@ -37,7 +39,7 @@ class NonuniformCurrent(Effect):
     strength = ("strain", "shear_x", "shear_y", "gyre")
 
     @staticmethod
-    def water(p, x, y, z, xp):
+    def water(p: Values, x: Scalar, y: Scalar, z: Values, xp: Any) -> Flow:
         kx, ky = math.pi / pool.LENGTH, math.pi / pool.WIDTH
         sx, cx, sy, cy = xp.sin(kx * x), xp.cos(kx * x), xp.sin(ky * y), xp.cos(ky * y)
         across = p.gyre * (kx / ky)

@@ -1,6 +1,7 @@
 """Something heavy tied to the head."""
 
-from fish_sim.effects.effect import Effect
+from fish_sim.effects.effect import Effect, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "point mass; strength is an assumption"
@@ -21,5 +22,5 @@ class Payload(Effect):
     strength = ("mass",)
 
     @staticmethod
-    def point_masses(p):
+    def point_masses(p: Values) -> tuple[tuple[Scalar, Scalar, Scalar], ...]:
         return ((p.mass, p.forward, p.left),)

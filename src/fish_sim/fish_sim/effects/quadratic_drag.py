@@ -1,6 +1,8 @@
 """Form drag on the head."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
 SOURCE = "Fossen 2021, sect. 6.4.3: separate quadratic terms per direction; strengths are an assumption"
@@ -27,7 +29,7 @@ class QuadraticDrag(Effect):
     dissipative = True
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         if body.name != "head":
             return None
         return (

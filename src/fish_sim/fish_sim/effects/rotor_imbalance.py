@@ -1,8 +1,11 @@
 """A rotor whose centre of mass is off its axis."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
-from fish_sim.effects.effect import Effect
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "rigid-body dynamics of an eccentric rotor; strength is an assumption"
@@ -30,7 +33,7 @@ class RotorImbalance(Effect):
     states = ("angle",)
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         if body.name != "head":
             return None
         cos, sin = xp.cos(z.angle), xp.sin(z.angle)
@@ -40,11 +43,11 @@ class RotorImbalance(Effect):
         return spin * ahead + push * left, spin * left - push * ahead, 0.0
 
     @staticmethod
-    def derivative(p, z, slip, drive, xp):
+    def derivative(p: Values, z: Values, slip: Scalar, drive: Drive, xp: Any) -> tuple[Scalar, ...]:
         return (drive.rotor_speed,)
 
     @staticmethod
-    def derived(p):
+    def derived(p: Values) -> Mapping[str, tuple[float, str]]:
         return {
             "mass_eccentricity": (math.hypot(p.ahead, p.left), "kg m"),
             "phase": (math.atan2(p.left, p.ahead), "rad"),

@@ -1,6 +1,9 @@
 """A motor that follows its speed command late."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Followed, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "first-order speed loop; strength is an assumption"
@@ -24,7 +27,7 @@ class RotorLag(Effect):
     memory = ("speed", "command")
 
     @staticmethod
-    def rotor(p, m, command, dt, xp):
+    def rotor(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         behind = p.time_constant * (command - m.command) / dt
         kept = xp.exp(-dt / xp.fmax(p.time_constant, SHORTEST))
         speed = command - behind + (m.speed - m.command + behind) * kept

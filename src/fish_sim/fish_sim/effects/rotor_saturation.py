@@ -1,6 +1,9 @@
 """A motor with a top speed."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Followed, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "no-load speed at the given voltage; strength is an assumption"
@@ -18,5 +21,5 @@ class RotorSaturation(Effect):
     strength = ("limit",)
 
     @staticmethod
-    def rotor(p, m, command, dt, xp):
+    def rotor(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         return xp.fmax(-p.limit, xp.fmin(command, p.limit)), {}

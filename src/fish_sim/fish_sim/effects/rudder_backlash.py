@@ -1,6 +1,9 @@
 """Play in the rudder's linkage."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Followed, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "play operator (Visintin 1994, ch. III); strength is an assumption"
@@ -23,6 +26,6 @@ class RudderBacklash(Effect):
     memory = ("target",)
 
     @staticmethod
-    def rudder(p, m, command, dt, xp):
+    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         target = xp.fmax(command - p.play, xp.fmin(command + p.play, m.target))
         return target, {"target": target}

@@ -1,6 +1,9 @@
 """A servo that hears its commands late."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Followed, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "transport delay of radio and servo loop; strength is an assumption"
@@ -25,7 +28,7 @@ class RudderDelay(Effect):
     memory = tuple(f"past_{j}" for j in range(1, LENGTH + 1))
 
     @staticmethod
-    def rudder(p, m, command, dt, xp):
+    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         commands = [command, *(getattr(m, key) for key in RudderDelay.memory)]
         periods = p.delay / dt
         target = sum(xp.fmax(0.0, 1.0 - xp.fabs(periods - j)) * c for j, c in enumerate(commands))

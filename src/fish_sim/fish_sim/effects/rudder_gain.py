@@ -1,6 +1,9 @@
 """A linkage with another ratio than assumed."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Followed, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "linkage ratio; strength is an assumption"
@@ -17,5 +20,5 @@ class RudderGain(Effect):
     strength = ("factor",)
 
     @staticmethod
-    def rudder(p, m, command, dt, xp):
+    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         return p.factor * command, {}

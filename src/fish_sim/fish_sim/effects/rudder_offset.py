@@ -1,6 +1,9 @@
 """A servo horn that sits askew."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Followed, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "mounting error, one spline tooth is 0.25 rad; strength is an assumption"
@@ -17,5 +20,5 @@ class RudderOffset(Effect):
     strength = ("offset",)
 
     @staticmethod
-    def rudder(p, m, command, dt, xp):
+    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         return command + p.offset, {}

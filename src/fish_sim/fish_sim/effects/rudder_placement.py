@@ -1,6 +1,7 @@
 """Where the servo bends the tail."""
 
-from fish_sim.effects.effect import Effect
+from fish_sim.effects.effect import Effect, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "the project's model description: root of the tail (nominal) or fin at the tip"
@@ -22,5 +23,5 @@ class RudderPlacement(Effect):
     strength = ("tip_share",)
 
     @staticmethod
-    def tip_share(p):
+    def tip_share(p: Values) -> Scalar:
         return p.tip_share

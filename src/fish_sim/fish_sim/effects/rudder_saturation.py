@@ -1,6 +1,9 @@
 """A servo that does not reach its full range."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Followed, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "end stop or pulse width limit; strength is an assumption"
@@ -21,5 +24,5 @@ class RudderSaturation(Effect):
     strength = ("limit",)
 
     @staticmethod
-    def rudder(p, m, command, dt, xp):
+    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         return xp.fmax(-p.limit, xp.fmin(command, p.limit)), {}

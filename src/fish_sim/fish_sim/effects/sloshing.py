@@ -1,9 +1,12 @@
 """The pool's standing wave."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from fish_sim import pool
-from fish_sim.effects.effect import Effect
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "first longitudinal seiche mode (Lamb 1932, art. 190); strength is an assumption"
@@ -32,7 +35,7 @@ class Sloshing(Effect):
     states = ("phase",)
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         if body.name != "head":
             return None
         push = p.sine * xp.sin(z.phase) + p.cosine * xp.cos(z.phase)
@@ -40,11 +43,11 @@ class Sloshing(Effect):
         return push * body.cos, -push * body.sin, 0.0
 
     @staticmethod
-    def derivative(p, z, slip, drive, xp):
+    def derivative(p: Values, z: Values, slip: Scalar, drive: Drive, xp: Any) -> tuple[Scalar, ...]:
         return (2.0 * math.pi * p.frequency,)
 
     @staticmethod
-    def derived(p):
+    def derived(p: Values) -> Mapping[str, tuple[float, str]]:
         return {
             "amplitude": (math.hypot(p.sine, p.cosine), "N"),
             "phase": (math.atan2(p.cosine, p.sine), "rad"),

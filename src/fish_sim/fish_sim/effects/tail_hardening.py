@@ -1,6 +1,9 @@
 """A tail that stiffens as it bends."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "Duffing spring; strength is an assumption"
@@ -20,5 +23,5 @@ class TailHardening(Effect):
     strength = ("k3",)
 
     @staticmethod
-    def joint_torque(p, joint, angle, rate, xp):
+    def joint_torque(p: Values, joint: int, angle: Scalar, rate: Scalar, xp: Any) -> Scalar:
         return p.k3 * angle**3

@@ -1,6 +1,9 @@
 """Losses in the tail's material."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "Kelvin-Voigt material; strength is an assumption"
@@ -21,5 +24,5 @@ class TailJointDamping(Effect):
     dissipative = True
 
     @staticmethod
-    def joint_torque(p, joint, angle, rate, xp):
+    def joint_torque(p: Values, joint: int, angle: Scalar, rate: Scalar, xp: Any) -> Scalar:
         return p.c * rate

@@ -1,6 +1,8 @@
 """A line to a fixed point."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
 SOURCE = "massless elastic line; strengths are an assumption"
@@ -29,7 +31,7 @@ class Tether(Effect):
     strength = ("stiffness",)
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         if body.name != "head":
             return None
         dx, dy = p.x - body.x, p.y - body.y

@@ -1,6 +1,9 @@
 """The tail's tip slides sideways."""
 
-from fish_sim.effects.effect import Effect, Grip
+from collections.abc import Mapping
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Grip, Values
 from fish_sim.parameter import Parameter
 
 SOURCE = "lateral drag of a finite fin instead of the no-slip constraint; strength is an assumption"
@@ -22,9 +25,9 @@ class TipSlip(Effect):
     strength = ("mobility",)
 
     @staticmethod
-    def grip(p, z, xp):
+    def grip(p: Values, z: Values, xp: Any) -> Grip:
         return Grip(p.mobility)
 
     @staticmethod
-    def derived(p):
+    def derived(p: Values) -> Mapping[str, tuple[float, str]]:
         return {"grip": (1.0 / p.mobility if p.mobility > 0 else float("inf"), "N s/m")}

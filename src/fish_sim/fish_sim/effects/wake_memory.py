@@ -1,6 +1,10 @@
 """Part of the tip's grip answers late."""
 
-from fish_sim.effects.effect import Effect, Grip
+from collections.abc import Mapping
+from typing import Any
+
+from fish_sim.effects.effect import Drive, Effect, Grip, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "one-lag approximation of Wagner's lift build-up (Fung 1955, sect. 6.7); strengths are an assumption"
@@ -27,13 +31,13 @@ class WakeMemory(Effect):
     states = ("wake",)
 
     @staticmethod
-    def grip(p, z, xp):
+    def grip(p: Values, z: Values, xp: Any) -> Grip:
         return Grip(p.mobility, p.share, p.share * z.wake)
 
     @staticmethod
-    def derivative(p, z, slip, drive, xp):
+    def derivative(p: Values, z: Values, slip: Scalar, drive: Drive, xp: Any) -> tuple[Scalar, ...]:
         return ((slip - z.wake) / p.time_constant,)
 
     @staticmethod
-    def derived(p):
+    def derived(p: Values) -> Mapping[str, tuple[float, str]]:
         return {"grip": (1.0 / p.mobility if p.mobility > 0 else float("inf"), "N s/m")}

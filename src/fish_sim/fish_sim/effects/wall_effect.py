@@ -1,7 +1,9 @@
 """More drag close to a wall."""
 
+from typing import Any
+
 from fish_sim import pool
-from fish_sim.effects.effect import Effect
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
 SOURCE = "assumption: confinement raises drag, decaying with distance (cf. Happel & Brenner 1983, ch. 7)"
@@ -27,7 +29,7 @@ class WallEffect(Effect):
     dissipative = True
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench:
         gap = xp.fmin(pool.LENGTH / 2 - xp.fabs(body.x), pool.WIDTH / 2 - xp.fabs(body.y))
         grown = p.k * xp.exp(-xp.fmax(gap, 0.0) / p.length)
         return (

@@ -1,6 +1,8 @@
 """A hump of surge drag at one hull speed."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
 SOURCE = "assumption: Gaussian hump in place of the wave-resistance curve (Newman 1977, ch. 6)"
@@ -28,7 +30,7 @@ class WaveDrag(Effect):
     dissipative = True
 
     @staticmethod
-    def wrench(p, body, z, drive, xp):
+    def wrench(p: Values, body: BodyMotion, z: Values, drive: Drive, xp: Any) -> Wrench | None:
         if body.name != "head":
             return None
         off = (xp.fabs(body.u) - p.speed) / p.width

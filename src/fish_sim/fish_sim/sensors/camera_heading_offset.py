@@ -1,5 +1,9 @@
 """A heading marker that sits at an angle."""
 
+from types import SimpleNamespace
+from typing import Any
+
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 from fish_sim.sensors.sensor_effect import SensorEffect
 
@@ -16,5 +20,5 @@ class CameraHeadingOffset(SensorEffect):
     strength = ("offset",)
 
     @staticmethod
-    def pose(p, x, y, heading, xp):
+    def pose(p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any) -> tuple[Scalar, ...]:
         return x, y, heading + p.offset

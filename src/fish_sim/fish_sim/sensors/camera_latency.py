@@ -1,5 +1,8 @@
 """Images that are older than they say."""
 
+from types import SimpleNamespace
+
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 from fish_sim.sensors.sensor_effect import SensorEffect
 
@@ -16,5 +19,5 @@ class CameraLatency(SensorEffect):
     strength = ("delay",)
 
     @staticmethod
-    def pose_delay(p):
+    def pose_delay(p: SimpleNamespace) -> Scalar:
         return p.delay

@@ -1,5 +1,9 @@
 """A camera whose metres are not metres."""
 
+from types import SimpleNamespace
+from typing import Any
+
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 from fish_sim.sensors.sensor_effect import SensorEffect
 
@@ -16,5 +20,5 @@ class CameraScale(SensorEffect):
     strength = ("factor",)
 
     @staticmethod
-    def pose(p, x, y, heading, xp):
+    def pose(p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any) -> tuple[Scalar, ...]:
         return p.factor * x, p.factor * y, heading

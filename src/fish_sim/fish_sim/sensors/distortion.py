@@ -19,7 +19,7 @@ class SensorDistortion:
 
     def pose_delay(self) -> float:
         """Sum of the delays [s]."""
-        return sum(effect.pose_delay(p) for effect, p in self._effects)
+        return float(sum(effect.pose_delay(p) for effect, p in self._effects))
 
     def pose(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
         """Camera pose from the true one."""

@@ -1,5 +1,9 @@
 """A gyroscope with another sensitivity than assumed."""
 
+from types import SimpleNamespace
+from typing import Any
+
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 from fish_sim.sensors.sensor_effect import SensorEffect
 
@@ -16,5 +20,5 @@ class GyroScale(SensorEffect):
     strength = ("factor",)
 
     @staticmethod
-    def imu(p, ahead, left, rate, xp):
+    def imu(p: SimpleNamespace, ahead: Scalar, left: Scalar, rate: Scalar, xp: Any) -> tuple[Scalar, ...]:
         return ahead, left, p.factor * rate

@@ -1,5 +1,9 @@
 """An IMU that is glued in askew."""
 
+from types import SimpleNamespace
+from typing import Any
+
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 from fish_sim.sensors.sensor_effect import SensorEffect
 
@@ -19,6 +23,6 @@ class ImuMisalignment(SensorEffect):
     strength = ("angle",)
 
     @staticmethod
-    def imu(p, ahead, left, rate, xp):
+    def imu(p: SimpleNamespace, ahead: Scalar, left: Scalar, rate: Scalar, xp: Any) -> tuple[Scalar, ...]:
         cos, sin = xp.cos(p.angle), xp.sin(p.angle)
         return cos * ahead + sin * left, cos * left - sin * ahead, rate
