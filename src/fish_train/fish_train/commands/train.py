@@ -28,6 +28,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, help="recipe, a YAML file; keys left out take their defaults")
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="values of the recipe")
     parser.add_argument("--robot", type=Path, help="robot.yaml or a model.yaml of the diagnosis (default: nominal)")
+    parser.add_argument(
+        "--form",
+        choices=["network", "schedule", "constant"],
+        default="network",
+        help="what is learned: the paper's network, or for comparison gains scheduled on speed and curvature, or constants",
+    )
+    parser.add_argument(
+        "--search",
+        action="store_true",
+        help="find a schedule or constants by differential evolution instead of gradients",
+    )
     parser.add_argument("--warm-start", type=Path, help="weights file to start from")
     parser.add_argument("--seed", type=int, default=1, help="first seed (default: %(default)s)")
     parser.add_argument("--seeds", type=int, default=1, help="number of runs, with consecutive seeds")
@@ -46,6 +57,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.seeds < 1 or args.jobs < 1 or args.seed < 0:
         raise UserError(f"--seed {args.seed} --seeds {args.seeds} --jobs {args.jobs}: expected counts of at least 1")
+    if args.search and args.form == "network":
+        raise UserError("--search: got form network; differential evolution is for --form constant or schedule")
     config = make_config({**(load_config(args.config) if args.config else {}), **parse_settings(args.set)})
     robot = read_robot(args.robot)
     jobs = [
@@ -56,6 +69,8 @@ def run(args: argparse.Namespace) -> int:
             seed=seed,
             command=shlex.join(["fish_train", "train", *command_line(sys.argv)]),
             warm_start=args.warm_start,
+            form=args.form,
+            search=args.search,
             resume=args.resume,
             overwrite=args.overwrite,
             max_seconds=args.max_seconds,

@@ -12,5 +12,6 @@ VERBS = {
     "recover": "mend a truncated recording and say what was lost",
     "import_pool": "convert the real robot's ROS 1 bags to recordings in the project's format",
     "train": "learn the gains through the simulator",
+    "evaluate": "how well gains follow paths on a plant",
     "weights": "show what is in a weights file",
 }

@@ -14,7 +14,7 @@ from fish_control.reference_path import PathError, ReferencePath
 from fish_train.errors import UserError
 
 RUN_UP = 0.15  # m, runs start this far before their path
-START_OFFSET = 0.02  # m, std of the start's distance from the path; seed 0 starts exactly
+START_OFFSET = 0.01  # m, std of the start's distance from the path; seed 0 starts exactly
 START_HEADING = 0.05  # rad, std
 LAPS = 2.0  # of a closed path
 SLACK = 1.5  # an open path may take this much longer than length / speed

@@ -1,4 +1,4 @@
-"""Where gains come from: a policy, constants, or a schedule over wanted speed and curvature."""
+"""Where gains come from: a weights file's policy, or one of the baselines' forms."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.contract import OUTPUTS
 from fish_control.control_law import Gains
 from fish_control.policy import Policy
+from fish_sim.ops import NUMPY
+from fish_train.training.loop import gains_of, schedule_inputs
+from fish_train.training.network import FORMS, split
 
 Array = NDArray[np.float64]
-LOW = np.array([o.low for o in OUTPUTS])
-HIGH = np.array([o.high for o in OUTPUTS])
 
 
 class GainsSource(Protocol):
@@ -35,31 +35,17 @@ class PolicyGains:
         return self.policy.gains(inputs)
 
 
-SPEED_MIDDLE, SPEED_SPAN = 0.2, 0.1  # m/s
-CURVATURE_SPAN = 3.0  # 1/m
-
-
 @dataclass(frozen=True)
 class ScheduledGains:
-    """Gains that follow wanted speed and curvature smoothly, kept in their ranges.
+    """Gains that follow wanted speed and curvature smoothly: tanh(W x + b), scaled to the ranges.
 
-        gain = low + (high - low) / (1 + exp(-(a + b (u - 0.2) / 0.1 + c |kappa| / 3)))
-
-    Attributes:
-        coefficients: (6, 3) rows (a, b, c); b = c = 0 are constant gains.
+    x = ((u - 0.2) / 0.1, |kappa| / 3); weights: flat (18,), W (6, 2) then b (6,).
     """
 
-    coefficients: Array
-
-    @classmethod
-    def constant(cls, values: Array) -> ScheduledGains:
-        """The same gains always; values (6,) inside the ranges."""
-        share = np.clip((np.asarray(values, dtype=float) - LOW) / (HIGH - LOW), 1e-6, 1.0 - 1e-6)
-        return cls(np.column_stack([np.log(share / (1.0 - share)), np.zeros((6, 2))]))
+    weights: Array
 
     def gains(self, inputs: Array, speed: Array, curvature: Array) -> Gains:  # noqa: ARG002
         """By wanted speed and curvature only."""
-        features = np.stack([np.ones_like(speed), (speed - SPEED_MIDDLE) / SPEED_SPAN, np.abs(curvature) / CURVATURE_SPAN])
-        exponent = np.clip(self.coefficients @ features, -50.0, 50.0)
-        share = 1.0 / (1.0 + np.exp(-exponent))
-        return Gains(*(LOW[:, None] + (HIGH - LOW)[:, None] * share))
+        [(W, b)] = split(np.asarray(self.weights), FORMS["schedule"].layers)
+        x = np.stack(schedule_inputs(speed, curvature, NUMPY), axis=-1)
+        return gains_of(np.moveaxis(x @ W.T + b, -1, 0), NUMPY)

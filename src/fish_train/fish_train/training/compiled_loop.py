@@ -14,7 +14,7 @@ from fish_sim.emit import emit
 from fish_sim.step import Stepper, kernel_source
 from fish_train.training.expressions import expressions
 from fish_train.training.fleet import HISTORY, Fleet, WindowResult, check_hold
-from fish_train.training.loop import COST_NAMES, PHYSICS_STEPS, SIZES, Law
+from fish_train.training.loop import COST_NAMES, INPUT_COUNTS, PHYSICS_STEPS, SIZES, Law
 from fish_train.training.network import LAYERS, split, weight_count
 from fish_train.training.path_bank import PathBank
 
@@ -57,10 +57,10 @@ class _Search(ctypes.Structure):
 def loop_source(stepper: Stepper, law: Law, width: int) -> str:
     """Complete C text of the kernel for a robot's structure, an integration scheme and a law."""
     names = {
-        "NO": "motion", "NU": "guidance", "NK": "control", "NA": "actuator", "NL": "last", "NI": "inputs",
-        "NE": "errors", "NR": "report", "NGAIN": "gains",
+        "NO": "motion", "NU": "guidance", "NK": "control", "NA": "actuator", "NL": "last", "NE": "errors",
+        "NR": "report", "NGAIN": "gains",
     }  # fmt: skip
-    sizes = {short: SIZES[name] for short, name in names.items()}
+    sizes = {short: SIZES[name] for short, name in names.items()} | {"NI": INPUT_COUNTS[law.inputs]}
     sizes |= {"NQ": stepper.layout.links + 3, "PHYSICS": PHYSICS_STEPS, "HISTORY": HISTORY, "NCOST": len(COST_NAMES)}
     c = files("fish_train.training") / "c"
     return "\n".join([
@@ -83,6 +83,8 @@ class CompiledLoop:
             raise RuntimeError("no C compiler: use TorchLoop")
         self._library = loaded
         self._library.scratch_size.restype = ctypes.c_long
+        if layers[0] != INPUT_COUNTS[law.inputs]:
+            raise ValueError(f"layers: got {layers}; expected {INPUT_COUNTS[law.inputs]} inputs ({law.inputs})")
         self.layers = layers
         self.set_bank(bank)
         tracker = law.tracker

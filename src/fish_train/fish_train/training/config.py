@@ -51,6 +51,7 @@ class TrainConfig:
     approach: float = 6.0  # s at the start of an episode that the criterion leaves out
     start_offset: float = 0.1  # m, std of the start's distance from the path
     start_heading: float = 0.3  # rad, std of the start's heading error
+    start_rest: float = 0.1  # share of fish that start at rest; the others at half to all of the wanted speed
     # robustness, all off in the default recipe
     randomise: float = 0.0  # relative half-width of the robot's drags, stiffness and added masses
     noise_position: float = 0.0  # m, std of what the loop sees
@@ -87,7 +88,7 @@ class TrainConfig:
             self._within(name, low, high)
         for name, low, high in (
             ("learning_rate", 1e-8, 1.0), ("clip", 1e-6, 1e6), ("episode", 1.0, 600.0), ("approach", 0.0, 600.0),
-            ("start_offset", 0.0, 0.2), ("start_heading", 0.0, 1.0), ("randomise", 0.0, 0.9),
+            ("start_offset", 0.0, 0.2), ("start_heading", 0.0, 1.0), ("start_rest", 0.0, 1.0), ("randomise", 0.0, 0.9),
             ("noise_position", 0.0, 0.5), ("noise_heading", 0.0, 1.0), ("noise_speed", 0.0, 0.5),
             ("noise_rate", 0.0, 5.0), ("noise_time", 0.0, 10.0), ("latency", 0.0, LONGEST_DELAY * DT),
             *((f"cost_{name}", 0.0, 1e6) for name in COST_NAMES),

@@ -30,7 +30,7 @@ class Episodes:
         self._uncertain = np.array([name not in CERTAIN for name in stepper.layout.parameters])
 
     def start(self, bank: PathBank, rng: np.random.Generator) -> Fleet:
-        """A batch at anything from rest to the wanted speed, scattered about random places on random paths of the bank."""
+        """A batch, some at rest, most near the wanted speed, scattered about random places on random paths of the bank."""
         c, batch = self._config, self._config.batch
         path = rng.integers(len(bank), size=batch)
         share = (rng.permutation(batch) + rng.uniform(size=batch)) / batch
@@ -40,7 +40,8 @@ class Episodes:
             for k, v in zip(path, speed, strict=True)
         ])  # fmt: skip
         poses = self._poses(bank, path, progress, rng)
-        surge = speed * rng.uniform(size=batch)
+        moving = rng.uniform(size=batch) >= c.start_rest
+        surge = speed * moving * rng.uniform(0.5, 1.0, batch)
         plant = self._gliding(poses, surge)
         parameters = self._robots(batch, rng)
         seen = np.column_stack([poses, surge, np.zeros((batch, 2))])

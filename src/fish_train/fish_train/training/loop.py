@@ -31,6 +31,7 @@ from fish_control.line_of_sight import (
     GuidanceState,
     Motion,
     PathAhead,
+    TrackingErrors,
     observe,
     tracking_errors,
 )
@@ -55,14 +56,22 @@ GEOMETRY_NAMES = (
     "from_x", "from_y", "to_x", "to_y",
 )  # fmt: skip
 ERROR_NAMES = ("heading", "speed", "curvature")
+INPUT_COUNTS = {"policy": len(INPUTS), "schedule": 2, "none": 0}
+SPEED_MIDDLE, SPEED_SPAN = 0.2, 0.1  # m/s, of a schedule's first input
+CURVATURE_SPAN = 3.0  # 1/m, of its second
 REPORT_NAMES = ("cross_track", "heading", "speed")  # of the true motion
 COST_NAMES = ("heading", "speed", "cross_track", "setpoint_change", "gain_size", "gain_change")
 
 
 @dataclass(frozen=True)
 class Law:
-    """Constants of the law that is trained; the weights file carries them."""
+    """Constants of the law that is trained; the weights file carries them.
 
+    inputs: what the policy looks at: `policy` the six of the weights file; for baselines `schedule` wanted speed and
+    curvature of the path, or `none`.
+    """
+
+    inputs: str = "policy"
     limits: ControlLimits = field(default_factory=ControlLimits)
     guidance: GuidanceConfig = field(default_factory=GuidanceConfig)
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
@@ -120,15 +129,28 @@ def sense(
     real = tracking_errors(state, actual, truth, speed, law.guidance, xp)
     cost = weights[0] * real.heading**2 + weights[1] * real.speed**2 + weights[2] * real.cross_track**2
     return {
-        "inputs": policy_inputs(
-            moved.heading - state.stroke.heading, moved.surge, speed,
-            errors.heading, errors.speed, errors.cross_track, xp,
-        ),
+        "inputs": _inputs(moved, state, errors, path.curvature, speed, law, xp),
         "errors": [errors.heading, errors.speed, path.curvature],
         "guidance": [*state.stroke, state.drift],
         "report": [real.cross_track, real.heading, real.speed],
         "cost": [cost],
     }
+
+
+def _inputs(
+    moved: Motion, state: GuidanceState, errors: TrackingErrors, curvature: Scalar, speed: Scalar, law: Law, xp: Any
+) -> list[Scalar]:
+    if law.inputs == "policy":
+        mean_heading = moved.heading - state.stroke.heading
+        return policy_inputs(mean_heading, moved.surge, speed, errors.heading, errors.speed, errors.cross_track, xp)
+    if law.inputs == "schedule":
+        return schedule_inputs(speed, curvature, xp)
+    return []
+
+
+def schedule_inputs(speed: Scalar, curvature: Scalar, xp: Any) -> list[Scalar]:
+    """What scheduled gains depend on: wanted speed [m/s] and size of the path's curvature [1/m], normalised."""
+    return [(speed - SPEED_MIDDLE) / SPEED_SPAN, xp.fabs(curvature) / CURVATURE_SPAN]
 
 
 def gains_of(raw: Sequence[Scalar], xp: Any) -> Gains:
@@ -169,7 +191,6 @@ SIZES = {
     "actuator": len(ActuatorState._fields),
     "last": len(LAST_NAMES),
     "geometry": len(GEOMETRY_NAMES),
-    "inputs": len(INPUTS),
     "errors": len(ERROR_NAMES),
     "report": len(REPORT_NAMES),
     "gains": len(OUTPUTS),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,21 @@ from fish_control.contract import HIDDEN, OUTPUTS
 
 Array = NDArray[np.float64]
 LAYERS = HIDDEN  # 6-128-128-64-6
+
+
+@dataclass(frozen=True)
+class Form:
+    """What is learned: layer sizes, and what the first layer looks at (`Law.inputs`)."""
+
+    layers: tuple[int, ...]
+    inputs: str
+
+
+FORMS = {
+    "network": Form(LAYERS, "policy"),  # the paper's; what the controller loads
+    "schedule": Form((2, len(OUTPUTS)), "schedule"),  # baseline: by wanted speed and curvature
+    "constant": Form((0, len(OUTPUTS)), "none"),  # baseline; the controller loads these, too
+}
 
 
 def weight_count(layers: tuple[int, ...] = LAYERS) -> int:
@@ -40,7 +56,7 @@ def initial_weights(
     flat = np.zeros(weight_count(layers))
     views = split(flat, layers)
     for k, (W, b) in enumerate(views):
-        bound = np.sqrt(6.0 / W.shape[1]) * (0.01 if k == len(views) - 1 else 1.0)
+        bound = np.sqrt(6.0 / max(W.shape[1], 1)) * (0.01 if k == len(views) - 1 else 1.0)
         W[:] = rng.uniform(-bound, bound, W.shape)
         if k == len(views) - 1:
             share = [(start[o.name] - o.low) / (o.high - o.low) for o in OUTPUTS]

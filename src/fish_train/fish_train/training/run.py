@@ -15,8 +15,9 @@ from fish_sim.robot import Robot
 from fish_train.errors import UserError
 from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
 from fish_train.training.config import TrainConfig
-from fish_train.training.network import LAYERS, Array, from_tensors
+from fish_train.training.network import FORMS, LAYERS, Array, from_tensors
 from fish_train.training.run_log import RunLog
+from fish_train.training.search import search
 from fish_train.training.trainer import Progress, Trainer, TrainingDiverged
 from fish_train.training.weights_output import write_weights
 
@@ -35,6 +36,8 @@ class Job:
     seed: int
     command: str  # said in weights file and model card
     warm_start: Path | None = None
+    form: str = "network"  # of network.FORMS
+    search: bool = False  # differential evolution instead of gradients
     resume: bool = False
     overwrite: bool = False
     max_seconds: float = float("inf")
@@ -60,11 +63,13 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
     """
     torch.set_num_threads(1)
     checkpoint = prepare_folder(job)
-    trainer = Trainer(job.config, job.robot, job.seed, weights=warm_weights(job.warm_start))
+    trainer = Trainer(job.config, job.robot, job.seed, weights=warm_weights(job), form=FORMS[job.form])
     if checkpoint.exists():
         load_checkpoint(checkpoint, trainer)
     else:
         save_checkpoint(checkpoint, trainer)
+    if job.search:
+        return _search(job, trainer, report)
     with RunLog(job.folder, trainer.update) as log:
         session = _Session(job, trainer, log, report)
         try:
@@ -82,6 +87,21 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
     status = session.status(state, message)
     report(status)
     return status
+
+
+def _search(job: Job, trainer: Trainer, report: Callable[[Status], None]) -> Status:
+    """Hand out what differential evolution finds."""
+    began = time.monotonic()
+
+    def status(state: str, message: str) -> Status:
+        return Status(job.seed, state, len(trainer.levels), time.monotonic() - began, 0.0, None, message)
+
+    cost, weights = search(trainer, lambda text: report(status("training", text)))
+    trainer.set_weights(weights)
+    write_weights(job.folder, trainer, None, time.monotonic() - began, job.command)
+    last = status("finished", f"mean stage cost {cost:.5f}")
+    report(last)
+    return last
 
 
 class _Session:
@@ -141,10 +161,13 @@ def prepare_folder(job: Job) -> Path:
     return checkpoint
 
 
-def warm_weights(file: Path | None) -> Array | None:
-    """Flat weights of a weights file with the same layers, None without a file."""
+def warm_weights(job: Job) -> Array | None:
+    """Flat weights of the job's weights file, None without one; only networks start warm."""
+    file = job.warm_start
     if file is None:
         return None
+    if job.form != "network":
+        raise UserError(f"--warm-start {file}: got form {job.form}; only a network can start from a weights file")
     try:
         policy = read_gains_file(file)
     except GainsFileError as error:

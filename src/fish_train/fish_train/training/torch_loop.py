@@ -119,7 +119,8 @@ class _Window:
 
     def decide(self, sensed: dict[str, list[Tensor]]) -> None:
         """Ask the policy."""
-        self._raw = self._policy(_stack(sensed["inputs"])).unbind(-1)
+        inputs = _stack(sensed["inputs"]) if sensed["inputs"] else self._plant.new_zeros(len(self._plant), 0)
+        self._raw = self._policy(inputs).unbind(-1)
 
     def advance(self, sensed: dict[str, list[Tensor]]) -> Tensor:
         """Control law and physics of one period; the summed cost of gains and set-points."""
@@ -134,6 +135,7 @@ class _Window:
         return acted["cost"][0].sum()
 
     def _policy(self, x: Tensor) -> Tensor:
+        """(B, inputs) -> (B, 6) before tanh."""
         for W, b in self._weights[:-1]:
             x = torch.relu(x @ W.T + b)
         W, b = self._weights[-1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from fish_train.training.curriculum import SlidingCriterion, make_levels
 from fish_train.training.episodes import Episodes, SeenNoise
 from fish_train.training.fleet import Fleet, WindowResult
 from fish_train.training.loop import CONTROL_PERIOD, Law
-from fish_train.training.network import initial_weights
+from fish_train.training.network import FORMS, Form, initial_weights
 from fish_train.training.path_bank import PathBank
 from fish_train.training.torch_loop import TorchLoop
 
@@ -51,9 +51,16 @@ class Trainer:
     """One run: weights, optimiser, curriculum and the fish that swim now."""
 
     def __init__(
-        self, config: TrainConfig, robot: Robot, seed: int, law: Law | None = None, weights: Array | None = None
+        self,
+        config: TrainConfig,
+        robot: Robot,
+        seed: int,
+        law: Law | None = None,
+        weights: Array | None = None,
+        form: Form = FORMS["network"],
     ) -> None:
-        self.config, self.robot, self.seed, self.law = config, robot, seed, law or Law()
+        self.config, self.robot, self.seed, self.form = config, robot, seed, form
+        self.law = replace(law or Law(), inputs=form.inputs)
         self.rng = np.random.default_rng(seed)
         self.levels = make_levels(config)
         self.level, self.update, self.polished = 0, 0, 0
@@ -61,7 +68,7 @@ class Trainer:
         self._stepper = Stepper(robot.structure, training_scheme(robot))
         self._episodes = Episodes(config, robot, self._stepper, self.law.tracker)
         self._noise = SeenNoise(config)
-        start = initial_weights(self.rng, config.start_gains) if weights is None else np.array(weights)
+        start = initial_weights(self.rng, config.start_gains, form.layers) if weights is None else np.array(weights)
         self._flat = torch.from_numpy(start).requires_grad_(True)
         self._optimiser = torch.optim.Adam([self._flat], lr=config.learning_rate)
         self._window = config.unroll * config.hold  # control periods
@@ -72,12 +79,34 @@ class Trainer:
 
     def _make_loop(self, bank: PathBank) -> CompiledLoop | TorchLoop:
         kind = CompiledLoop if CompiledLoop.available() else TorchLoop
-        return kind(self._stepper, self.law, bank)
+        return kind(self._stepper, self.law, bank, self.form.layers)
 
     @property
     def weights(self) -> Array:
         """Flat weights, a copy."""
         return self._flat.detach().numpy().copy()
+
+    def set_weights(self, weights: Array) -> None:
+        """Replace the weights; the optimiser's memory stays."""
+        with torch.no_grad():
+            self._flat.copy_(torch.from_numpy(np.asarray(weights, dtype=float)))
+
+    def ladder_bank(self) -> PathBank:
+        """A few paths of every level."""
+        rng = np.random.default_rng([self.seed, len(self.levels)])
+        ladder = self.levels[: len(self.levels) // len(self.config.thresholds)]
+        return PathBank([p for level in ladder for p in level.paths(self.config, rng, POLISH_PHASES)], self.law.tracker)
+
+    def rollout_cost(self, weights: Array, fleet: Fleet, bank: PathBank) -> float:
+        """Mean stage cost of an episode from a fleet's state on a bank's paths; the fleet is advanced."""
+        self._loop.set_bank(bank)
+        steps = self._episode_windows * self._window
+        cost = np.array(self.config.cost)
+        return self._loop.window(weights, fleet, steps, cost, gradient=False, hold=self.config.hold).cost
+
+    def draw_fleet(self, bank: PathBank) -> Fleet:
+        """The start of an episode."""
+        return self._episodes.start(bank, self.rng)
 
     @property
     def finished(self) -> bool:
@@ -92,11 +121,9 @@ class Trainer:
     def _make_bank(self) -> PathBank:
         """Paths of the present level; of the whole ladder while polishing. Drawn from seed and level alone."""
         rng = np.random.default_rng([self.seed, self.level])
-        if not self.passed_all:
-            return PathBank(self.levels[self.level].paths(self.config, rng), self.law.tracker)
-        ladder = self.levels[: len(self.levels) // len(self.config.thresholds)]
-        paths = [path for level in ladder for path in level.paths(self.config, rng, POLISH_PHASES)]
-        return PathBank(paths, self.law.tracker)
+        if self.passed_all:
+            return self.ladder_bank()
+        return PathBank(self.levels[self.level].paths(self.config, rng), self.law.tracker)
 
     def _begin_episode(self) -> None:
         self.fleet: Fleet = self._episodes.start(self._loop.bank, self.rng)

@@ -2,24 +2,39 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+
+import numpy as np
 
 from fish_control.contract import Contract
 from fish_control.gains_file import write_gains_file
 from fish_control.policy import Policy
-from fish_train.training.loop import CONTROL_PERIOD, Law
-from fish_train.training.network import LAYERS, to_tensors
+from fish_sim.ops import NUMPY
+from fish_train.training.loop import CONTROL_PERIOD, Law, gains_of
+from fish_train.training.network import to_tensors
 from fish_train.training.trainer import Progress, Trainer
 
 WEIGHTS = "gains.safetensors"
+SCHEDULE = "schedule.json"
+WHAT = {
+    "policy": (
+        "Maps head angle, surge speed, wanted speed, heading, speed and cross-track error to the six gains of the two",
+        "PID controllers; network 6-128-128-64-6, ReLU, tanh to the gain ranges. Read by the controller node",
+        "(fish_control) without torch.",
+    ),
+    "none": ("Six constant gains of the two PID controllers, a baseline. Read by the controller node (fish_control).",),
+    "schedule": ("Gains of the two PID controllers by wanted speed and path curvature: a baseline, not for the robot.",),
+}
 CARD = "model_card.md"
 
 
 def make_policy(trainer: Trainer, note: str) -> Policy:
-    """The trained policy with its contract."""
+    """The trained network or constants with their contract."""
     law: Law = trainer.law
+    constant = trainer.form.inputs == "none"
     contract = Contract(
-        layers=LAYERS,
+        layers=() if constant else trainer.form.layers,
         control_period=CONTROL_PERIOD,
         lookahead=law.tracker.lookahead,
         limits=law.limits,
@@ -28,12 +43,18 @@ def make_policy(trainer: Trainer, note: str) -> Policy:
         training_seed=trainer.seed,
         note=note,
     )
+    if constant:
+        return Policy(contract, {"gains": np.array(gains_of(list(trainer.weights), NUMPY))})
     return Policy(contract, to_tensors(trainer.weights))
 
 
 def write_weights(folder: Path, trainer: Trainer, last: Progress | None, seconds: float, command: str) -> None:
-    """Weights file and model card."""
-    write_gains_file(folder / WEIGHTS, make_policy(trainer, f"trained by: {command}"))
+    """Weights file (of a schedule, which no controller loads, its coefficients) and model card."""
+    if trainer.form.inputs == "schedule":
+        content = {"form": "schedule", "command": command, "weights": trainer.weights.tolist()}
+        (folder / SCHEDULE).write_text(json.dumps(content, indent=1), encoding="utf-8")
+    else:
+        write_gains_file(folder / WEIGHTS, make_policy(trainer, f"trained by: {command}"))
     (folder / CARD).write_text(model_card(trainer, last, seconds, command), encoding="utf-8")
 
 
@@ -45,9 +66,7 @@ def model_card(trainer: Trainer, last: Progress | None, seconds: float, command:
     lines = [
         "# Gains policy of the robot fish",
         "",
-        "Maps head angle, surge speed, wanted speed, heading, speed and cross-track error to the six gains of the two",
-        f"PID controllers; network {'-'.join(map(str, LAYERS))}, ReLU, tanh to the gain ranges. Read by the controller",
-        "node (fish_control) without torch.",
+        *WHAT[trainer.form.inputs],
         "",
         f"- command: `{command}`",
         f"- seed {trainer.seed}; training {state} after {trainer.update} updates, {seconds:.0f} s",

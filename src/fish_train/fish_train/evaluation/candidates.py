@@ -1,0 +1,68 @@
+"""Gains to be compared, read from what training wrote or from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from fish_control.contract import OUTPUTS
+from fish_control.control_law import Gains
+from fish_control.gains_file import GainsFileError, read_gains_file
+from fish_control.path_batch import TrackerConfig
+from fish_control.policy import Policy
+from fish_train.errors import UserError
+from fish_train.evaluation.gains_source import PolicyGains, ScheduledGains
+from fish_train.evaluation.study import Candidate
+from fish_train.training.loop import CONTROL_PERIOD, Law
+from fish_train.training.network import FORMS, weight_count
+
+
+def read_candidate(text: str) -> Candidate:
+    """`[NAME=]FILE` of a weights file (.safetensors) or of a schedule (.json)."""
+    name, equals, rest = text.partition("=")
+    path = Path(rest if equals else text)
+    name = name if equals else f"{path.parent.name}/{path.stem}" if path.parent.name else path.stem
+    return read_schedule(name, path) if path.suffix == ".json" else read_policy(name, path)
+
+
+def read_policy(name: str, path: Path) -> Candidate:
+    """A weights file with the law it was made for."""
+    try:
+        policy = read_gains_file(path)
+    except GainsFileError as error:
+        raise UserError(str(error)) from error
+    c = policy.contract
+    if not np.isclose(c.control_period, CONTROL_PERIOD):
+        raise UserError(f"{path}: control period is {c.control_period} s; evaluation runs at {CONTROL_PERIOD} s")
+    tracker = TrackerConfig(lookahead=c.lookahead)
+    return Candidate(name, PolicyGains(policy), Law(limits=c.limits, guidance=c.guidance, tracker=tracker))
+
+
+def read_schedule(name: str, path: Path) -> Candidate:
+    """The coefficients of scheduled gains."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        weights = np.array(content["weights"], dtype=float)
+    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+        raise UserError(f"{path}: not a schedule written by fish_train train --form schedule ({error})") from error
+    expected = weight_count(FORMS["schedule"].layers)
+    if weights.shape != (expected,):
+        raise UserError(f"{path}: weights have shape {weights.shape}; expected ({expected},)")
+    return Candidate(name, ScheduledGains(weights))
+
+
+def constant_candidate(text: str) -> Candidate:
+    """`[NAME=]kp,ki,kd,kp,ki,kd` of steering and speed."""
+    name, equals, rest = text.partition("=")
+    try:
+        values = [float(part) for part in (rest if equals else text).split(",")]
+    except ValueError:
+        raise UserError(f"constant gains {text!r}: expected six numbers, kp,ki,kd of steering and of speed") from None
+    if len(values) != len(OUTPUTS):
+        raise UserError(f"constant gains {text!r}: got {len(values)} numbers; expected {len(OUTPUTS)}")
+    for value, output in zip(values, OUTPUTS, strict=True):
+        if not output.low <= value <= output.high:
+            raise UserError(f"{output.name}: got {value}; expected {output.low:g} to {output.high:g}")
+    return Candidate(name if equals else "constant", PolicyGains(Policy.constant(Gains(*values))))

@@ -1,0 +1,23 @@
+"""The page of an evaluation: summary, robustness and the cells of each candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fish_train.evaluation.study import Row
+from fish_train.evaluation.tables import cell_table, ratio_table, summary_table, unique
+from fish_train.reports.page import Block, write_page
+
+
+def write_study_page(path: Path, rows: Sequence[Row]) -> None:
+    """Tables of a study; the first condition is the one the others are compared with."""
+    conditions = unique(rows, lambda r: r.condition)
+    blocks: list[Block] = [summary_table(rows, "Tracking")]
+    if len(conditions) > 1:
+        blocks.append(ratio_table(rows, conditions[0], "Robustness"))
+    for candidate in unique(rows, lambda r: r.candidate):
+        for condition in conditions:
+            mine = [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]
+            blocks.append(cell_table(mine, f"{candidate}: {condition}"))
+    write_page(path, "Evaluation", f"{len(rows)} simulated runs from rest, each path swum once.", blocks)

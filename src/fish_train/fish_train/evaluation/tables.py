@@ -1,0 +1,109 @@
+"""What a study found, as tables for terminal and page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fish_train.evaluation.metrics import ErrorSizes
+from fish_train.evaluation.study import Row, mean_sizes
+from fish_train.reports.page import Table
+
+SUMMARY_COLUMNS = (
+    ("cross-track RMSE", "cross_track_rmse", 1e3, "mm"),
+    ("mean", "cross_track_mean", 1e3, "mm"),
+    ("95 %", "cross_track_p95", 1e3, "mm"),
+    ("heading RMSE", "heading_rmse", 1e3, "mrad"),
+    ("speed RMSE", "speed_rmse", 1e3, "mm/s"),
+    ("rudder rate", "rudder_rate_rms", 1.0, "rad/s"),
+    ("throttle", "throttle_mean", 1.0, ""),
+)
+APPROACH_COLUMNS = (("cross-track RMSE *", "cross_track_rmse", 1e3, "mm"), ("speed RMSE *", "speed_rmse", 1e3, "mm/s"))
+
+
+def unique(rows: Sequence[Row], key: Callable[[Row], object]) -> list:
+    """Distinct values in order of appearance."""
+    return list(dict.fromkeys(map(key, rows)))
+
+
+def summary_table(rows: Sequence[Row], title: str) -> Table:
+    """One line for each candidate under each condition, means over its runs."""
+    header = ["gains", "condition", "runs", "failed"]
+    header += [f"{name}, {unit}" if unit else name for name, _, _, unit in (*SUMMARY_COLUMNS, *APPROACH_COLUMNS)]
+    lines = []
+    for candidate in unique(rows, lambda r: r.candidate):
+        for condition in unique(rows, lambda r: r.condition):
+            runs = [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]
+            if runs:
+                lines.append([candidate, condition, str(len(runs)), str(_failures(runs)), *_summary(runs)])
+    note = "Means over the runs that did not fail, after the approach; * approach included. Speed: ripple of each stroke included."
+    return Table(title, header, lines, note)
+
+
+def cell_table(rows: Sequence[Row], title: str) -> Table:
+    """Cross-track and speed RMSE of every path and speed, averaged over seeds, for one candidate and condition."""
+    speeds = sorted(set(r.cell.speed for r in rows))
+    header = ["path", *(f"{v:g} m/s" for v in speeds)]
+    lines = []
+    for path in unique(rows, lambda r: r.cell.path):
+        cells = [[r for r in rows if r.cell.path == path and r.cell.speed == v] for v in speeds]
+        lines.append([path, *(_cell(runs) for runs in cells)])
+    return Table(title, header, lines, "Cross-track RMSE [mm] / speed RMSE [mm/s] after the approach.")
+
+
+def ratio_table(rows: Sequence[Row], nominal: str, title: str) -> Table:
+    """How much worse each condition makes the worst and the mean cell of a candidate, against its nominal condition."""
+    lines = []
+    for candidate in unique(rows, lambda r: r.candidate):
+        for condition in unique(rows, lambda r: r.condition):
+            if condition == nominal:
+                continue
+            ratios = cell_ratios(rows, candidate, condition, nominal)
+            failed = _failures([r for r in rows if (r.candidate, r.condition) == (candidate, condition)])
+            cells = [f"{np.mean(v):.2f} / {np.max(v):.2f}" if len(v) else "" for v in ratios]
+            over = sum(int(np.sum(np.array(v) > 2.0)) for v in ratios)
+            lines.append([candidate, condition, str(failed), *cells, str(over)])
+    header = ["gains", "condition", "failed", "cross-track, mean / worst", "speed, mean / worst", "cells above twice"]
+    return Table(title, header, lines, f"Ratios of RMSE to the same cell under: {nominal}.")
+
+
+def cell_ratios(rows: Sequence[Row], candidate: str, condition: str, nominal: str) -> tuple[list[float], list[float]]:
+    """Ratios of cross-track and of speed RMSE, cell by cell (means over seeds)."""
+
+    def means(name: str) -> dict[tuple[str, float], ErrorSizes]:
+        mine = [r for r in rows if (r.candidate, r.condition) == (candidate, name)]
+        keys = unique(mine, lambda r: (r.cell.path, r.cell.speed))
+        return {k: mean_sizes([r.metrics.settled for r in mine if (r.cell.path, r.cell.speed) == k]) for k in keys}
+
+    worse, base = means(condition), means(nominal)
+    shared = [k for k in worse if k in base]
+    return (
+        [worse[k].cross_track_rmse / base[k].cross_track_rmse for k in shared],
+        [worse[k].speed_rmse / base[k].speed_rmse for k in shared],
+    )
+
+
+def _failures(runs: Sequence[Row]) -> int:
+    return sum(bool(r.metrics.failure) for r in runs)
+
+
+def _summary(runs: Sequence[Row]) -> list[str]:
+    good = [r.metrics for r in runs if not r.metrics.failure]
+    if not good:
+        return [""] * (len(SUMMARY_COLUMNS) + len(APPROACH_COLUMNS))
+    settled, whole = mean_sizes([m.settled for m in good]), mean_sizes([m.whole for m in good])
+    return [
+        *(f"{scale * getattr(settled, field):.3g}" for _, field, scale, _ in SUMMARY_COLUMNS),
+        *(f"{scale * getattr(whole, field):.3g}" for _, field, scale, _ in APPROACH_COLUMNS),
+    ]
+
+
+def _cell(runs: Sequence[Row]) -> str:
+    good = [r.metrics.settled for r in runs if not r.metrics.failure]
+    if not good:
+        return "failed" if runs else ""
+    sizes = mean_sizes(good)
+    return f"{1e3 * sizes.cross_track_rmse:.1f} / {1e3 * sizes.speed_rmse:.1f}"
+
+
