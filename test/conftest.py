@@ -19,7 +19,7 @@ from fish_train.swim import check_running
 
 SIMULATOR, CAMERA = SIMULATED
 TRACKER, FUSION, PLANNER, CONTROLLER = CONTROL
-PATIENCE = 40.0  # s of real time in which anything waited for must happen
+PATIENCE = 60.0  # s of real time in which anything waited for must happen
 
 
 def pytest_configure() -> None:

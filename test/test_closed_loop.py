@@ -13,8 +13,9 @@ from fish_train.bringup import REPLAYER
 from fish_train.recordings import read_trial
 from fish_train.score import RunScore, score_trial
 
-SINUSOID = "{amplitude: 0.25, length: 2.0}"
-START = (-1.0, 0.0, math.atan(0.25 * math.pi))  # where the sinusoid begins, along it
+SHORT, SHORT_START = "{amplitude: 0.15, length: 1.2}", (-0.6, 0.0, math.atan(0.15 * math.pi / 0.6))
+LONG, LONG_START = "{amplitude: 0.25, length: 2.0}", (-1.0, 0.0, math.atan(0.25 * math.pi))
+FACTOR = 0.5  # simulated seconds in a second: time enough on a computer that does other things as well
 CROSS_TRACK_RMSE, SPEED_RMSE = 0.03, 0.04  # m, m/s; on a quiet computer 0.010 and 0.024
 RESUMED_WITHIN = 0.3  # m off the path at most, while a node is being started again and the fish glides
 
@@ -23,7 +24,7 @@ RESUMED_WITHIN = 0.3  # m off the path at most, while a node is being started ag
 def swum(tmp_path_factory) -> Path:
     """A recording of the sinusoid from end to end."""
     folder = tmp_path_factory.mktemp("swum")
-    with running(folder, parameters(folder, "sinusoid", SINUSOID, START, factor=1.5)) as run:
+    with running(folder, parameters(folder, "sinusoid", SHORT, SHORT_START, FACTOR)) as run:
         run.until(run.finished, "the end of the path")
         run.listen(0.5)  # the estimate may be there a little before the fish
         run.nodes.stop([RECORDER])
@@ -106,7 +107,7 @@ def resumed(tmp_path_factory) -> Resumed:
     """The sinusoid again; planner, fusion and controller are killed on the way, one after the other."""
     folder = tmp_path_factory.mktemp("resumed")
     seen = Resumed(folder / "recording")
-    with running(folder, parameters(folder, "sinusoid", SINUSOID, START, factor=1.0)) as run:
+    with running(folder, parameters(folder, "sinusoid", LONG, LONG_START, FACTOR)) as run:
         for spec, place in ((PLANNER, 0.4), (FUSION, 0.9), (CONTROLLER, 1.4)):
             run.until(lambda place=place: run.progress() > place, f"progress of {place} m")
             seen.places[spec] = kill_and_restart(run, spec)
