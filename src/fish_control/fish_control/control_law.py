@@ -28,7 +28,7 @@ class ControlLimits:
     turn_linear: float = 1.2  # s/(m rad^2), and in turns: alpha^2 (linear u + quadratic u^2)
     turn_quadratic: float = 10.0  # s^2/(m^2 rad^2)
     derivative_time: float = 0.15  # s, first-order filter of both derivatives
-    integral_limit: float = 0.25  # of the PID output, both integrals
+    integral_limit: float = 0.1  # of the PID output, both integrals
     unwinding_rate: float = 2.0  # 1/s, how fast an integral gives way to a saturated output
     rudder_range: float = 0.8  # rad, MODEL
     rudder_rate: float = 6.0  # rad/s, MODEL: the servo's limit

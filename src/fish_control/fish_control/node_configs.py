@@ -61,6 +61,10 @@ class PlannerConfig:
         self.tracker()
         self.guidance()
 
+    def ending(self) -> End | None:
+        """What `end` says; None where the path decides."""
+        return {"stop": "stop", "loop": "loop"}.get(self.end)  # type: ignore[return-value]
+
     def tracker(self) -> TrackerConfig:
         """The part for the path tracker."""
         return TrackerConfig(self.lookahead, self.lookahead_mode, self.search_window, self.capture_distance)  # type: ignore[arg-type]

@@ -1,7 +1,7 @@
 """The planner's progress on disk, so that a planner that was killed goes on where it was.
 
-Odometry alone cannot say where on a self-crossing path the robot is, and topics of a killed publisher are
-gone. The file is removed when the planner ends as it should.
+Odometry alone cannot say where on a self-crossing path the robot is, and topics of a killed publisher are gone.
+The file is removed when the planner ends as it should.
 """
 
 from __future__ import annotations
@@ -10,19 +10,11 @@ import hashlib
 import json
 import math
 import os
-from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from fish_control.reference_path import ReferencePath
 
-
-@dataclass(frozen=True)
-class SavedProgress:
-    """Where a planner was."""
-
-    path: str  # digest of the path
-    time: float  # s, stamp of the odometry
-    progress: float  # m
+SAVE_PERIOD = 0.2  # s between writes
 
 
 def path_digest(path: ReferencePath) -> str:
@@ -31,22 +23,41 @@ def path_digest(path: ReferencePath) -> str:
     return hashlib.sha256(content).hexdigest()[:16]
 
 
-def save_progress(file: Path, saved: SavedProgress) -> None:
-    """Replace the file in one step. Raises OSError."""
-    new = file.with_name(file.name + ".new")
-    new.write_text(json.dumps(asdict(saved)), encoding="utf-8")
-    os.replace(new, file)
+class ProgressFile:
+    """Keeps the progress along one path at a time."""
 
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._next_save = -math.inf
+        self.problem = ""  # why it could not be written, if so
 
-def load_progress(file: Path) -> SavedProgress | None:
-    """What was saved; None if there is none or it is damaged."""
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-        saved = SavedProgress(str(data["path"]), float(data["time"]), float(data["progress"]))
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return (
-        saved
-        if math.isfinite(saved.time) and math.isfinite(saved.progress) and saved.progress >= 0.0
-        else None
-    )
+    def recall(self, digest: str, time: float, oldest: float) -> tuple[float, float] | None:
+        """(progress [m], age [s]) that was kept for this path within `oldest` [s] before `time` [s].
+
+        None if there is none: no file, a damaged one, another path, too old, or from a clock that was ahead.
+        """
+        try:
+            data = json.loads(self._file.read_text(encoding="utf-8"))
+            known, kept, progress = str(data["path"]), float(data["time"]), float(data["progress"])
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        if known != digest or not 0.0 <= time - kept <= oldest or not 0.0 <= progress < math.inf:
+            return None
+        return progress, time - kept
+
+    def keep(self, digest: str, time: float, progress: float) -> None:
+        """Write, at most every SAVE_PERIOD of `time` [s]; the file is replaced in one step."""
+        if self._next_save - 10.0 * SAVE_PERIOD < time < self._next_save:  # a clock set back writes at once
+            return
+        self._next_save = time + SAVE_PERIOD
+        new = self._file.with_name(self._file.name + ".new")
+        try:
+            new.write_text(json.dumps({"path": digest, "time": time, "progress": progress}), encoding="utf-8")
+            os.replace(new, self._file)
+            self.problem = ""
+        except OSError as error:
+            self.problem = f"progress cannot be kept in {self._file}: {error.strerror}"
+
+    def forget(self) -> None:
+        """Remove the file."""
+        self._file.unlink(missing_ok=True)

@@ -1,17 +1,28 @@
 """Progress on disk."""
 
+import json
+
 import pytest
 
 from fish_control.paths import make_path
-from fish_control.progress_file import SavedProgress, load_progress, path_digest, save_progress
+from fish_control.progress_file import ProgressFile, path_digest
 
 
-def test_what_is_saved_is_loaded(tmp_path):
-    saved = SavedProgress("abc", 12.5, 1.25)
-    save_progress(tmp_path / "p.json", saved)
-    save_progress(tmp_path / "p.json", saved)
-    assert load_progress(tmp_path / "p.json") == saved
-    assert [file.name for file in tmp_path.iterdir()] == ["p.json"]
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "p.json"
+
+
+def test_what_is_kept_is_recalled_by_the_next_planner(file):
+    ProgressFile(file).keep("abc", 12.5, 1.25)
+    assert ProgressFile(file).recall("abc", 14.0, oldest=10.0) == (1.25, 1.5)
+    assert [f.name for f in file.parent.iterdir()] == [file.name]
+
+
+@pytest.mark.parametrize(("digest", "time"), [("other", 14.0), ("abc", 23.0), ("abc", 12.0)])
+def test_other_paths_old_progress_and_a_clock_behind_are_not_resumed(file, digest, time):
+    ProgressFile(file).keep("abc", 12.5, 1.25)
+    assert ProgressFile(file).recall(digest, time, oldest=10.0) is None
 
 
 @pytest.mark.parametrize(
@@ -23,15 +34,39 @@ def test_what_is_saved_is_loaded(tmp_path):
         '{"path": "a"}',
         '{"path": "a", "time": "x", "progress": 1}',
         '{"path": "a", "time": 1, "progress": -1}',
+        '{"path": "a", "time": 1, "progress": NaN}',
     ],
 )
-def test_damaged_files_are_no_progress(tmp_path, content):
-    (tmp_path / "p.json").write_text(content)
-    assert load_progress(tmp_path / "p.json") is None
+def test_damaged_files_are_no_progress(file, content):
+    file.write_text(content)
+    assert ProgressFile(file).recall("a", 1.0, oldest=10.0) is None
 
 
-def test_no_file_is_no_progress(tmp_path):
-    assert load_progress(tmp_path / "p.json") is None
+def test_no_file_is_no_progress(file):
+    assert ProgressFile(file).recall("a", 1.0, oldest=10.0) is None
+
+
+def test_it_writes_five_times_a_second_and_at_once_when_the_clock_is_set_back(file):
+    keeper = ProgressFile(file)
+    for k in range(16):
+        keeper.keep("a", 100.0 + 0.0625 * k, float(k))
+    assert json.loads(file.read_text())["progress"] == 12.0
+    keeper.keep("a", 1.0, 99.0)
+    assert json.loads(file.read_text())["progress"] == 99.0
+
+
+def test_a_folder_that_cannot_be_written_is_said_and_not_fatal(tmp_path):
+    keeper = ProgressFile(tmp_path / "missing" / "p.json")
+    keeper.keep("a", 1.0, 0.5)
+    assert "cannot be kept" in keeper.problem
+
+
+def test_forgotten_progress_is_gone(file):
+    keeper = ProgressFile(file)
+    keeper.forget()
+    keeper.keep("a", 1.0, 0.5)
+    keeper.forget()
+    assert not file.exists()
 
 
 def test_digest_tells_paths_apart():

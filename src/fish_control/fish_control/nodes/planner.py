@@ -30,11 +30,10 @@ from fish_control.nodes.start import read_parameters, run
 from fish_control.paths import make_path
 from fish_control.planner import Plan, Planner, motion_is_finite
 from fish_control.pool import check_inside_pool
-from fish_control.progress_file import SavedProgress, load_progress, path_digest, save_progress
+from fish_control.progress_file import ProgressFile, path_digest
 from fish_control.reference_path import PathError, ReferencePath
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-SAVE_PERIOD = 0.2  # s between writes of the progress
 PATH_STEP = 0.02  # m between poses of the published path
 
 
@@ -49,11 +48,11 @@ class PlannerNode(Node):
         self._error = self.create_publisher(Vector3Stamped, "tracking/error", 10)
         self._speed = self.create_publisher(Float64, "reference/speed", LATCHED)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._file = FilePath(config.state_file or default_state_file())
+        self._progress = ProgressFile(FilePath(config.state_file or default_state_file()))
         self._planner: Planner | None = None
         self._plan: Plan | None = None
         self._fresh = False
-        self._next_plan = self._next_save = -math.inf
+        self._next_plan = -math.inf
         self._said_speed = math.nan
         self._bad_odometry = 0
         self._problem = ""
@@ -69,7 +68,7 @@ class PlannerNode(Node):
 
     def destroy_node(self) -> None:
         """A planner that ends as it should leaves no progress behind."""
-        self._file.unlink(missing_ok=True)
+        self._progress.forget()
         super().destroy_node()
 
     def _follow(self, path: ReferencePath) -> None:
@@ -84,7 +83,7 @@ class PlannerNode(Node):
         closed = len(points) > 3 and math.dist(points[0], points[-1]) < 1e-3
         try:
             path = ReferencePath.from_points(
-                points, name="reference/path", closed=closed, end=self._config.end or None
+                points, name="reference/path", closed=closed, end=self._config.ending()
             )
             self._follow(path)
             self._problem = ""
@@ -104,25 +103,20 @@ class PlannerNode(Node):
             self._begin(self._planner, time, motion)
         self._planner.observe(time, motion)
         if self._next_plan - 10.0 / self._config.rate_hz > time:  # the clock was set back
-            self._next_plan = self._next_save = -math.inf
+            self._next_plan = -math.inf
         if time < self._next_plan - 1e-3:
             return
         self._next_plan = max(self._next_plan, time - 1.0 / self._config.rate_hz) + 1.0 / self._config.rate_hz
         self._publish(self._planner.plan(motion), message)
-        if time >= self._next_save:
-            self._next_save = time + SAVE_PERIOD
-            self._save(SavedProgress(self._digest, time, self._planner.tracker.progress))
+        self._progress.keep(self._digest, time, self._planner.tracker.progress)
 
     def _begin(self, planner: Planner, time: float, motion: Motion) -> None:
         """Resume a killed planner's progress, or start as the parameters say."""
-        saved = load_progress(self._file)
-        if (
-            saved is not None
-            and saved.path == self._digest
-            and 0.0 <= time - saved.time <= self._config.resume_timeout
-        ):
-            travelled = self._config.lookahead + 2.0 * self._config.speed * (time - saved.time)
-            if planner.resume(motion.x, motion.y, saved.progress, travelled):
+        kept = self._progress.recall(self._digest, time, self._config.resume_timeout)
+        if kept is not None:
+            progress, age = kept
+            travelled = self._config.lookahead + 2.0 * self._config.speed * age
+            if planner.resume(motion.x, motion.y, progress, travelled):
                 self.get_logger().info(f"resumed at {planner.tracker.progress:.2f} m of the path")
                 return
         if self._config.start == "nearest":
@@ -136,11 +130,8 @@ class PlannerNode(Node):
         twist = TwistStamped(header=Header(stamp=odometry.header.stamp, frame_id="base_link"))
         twist.twist.linear.x, twist.twist.angular.z = plan.speed, plan.yaw_rate
         error = Vector3Stamped(header=odometry.header)
-        error.vector.x, error.vector.y, error.vector.z = (
-            plan.errors.cross_track,
-            plan.errors.heading,
-            plan.errors.speed,
-        )
+        e = plan.errors
+        error.vector.x, error.vector.y, error.vector.z = e.cross_track, e.heading, e.speed
         self._twist.publish(twist)
         self._error.publish(error)
         self._target.publish(target)
@@ -148,27 +139,20 @@ class PlannerNode(Node):
             self._said_speed = plan.speed
             self._speed.publish(Float64(data=plan.speed))
 
-    def _save(self, progress: SavedProgress) -> None:
-        try:
-            save_progress(self._file, progress)
-        except OSError as error:
-            self._problem = f"progress cannot be saved to {self._file}: {error.strerror}"
-
     def _report(self) -> None:
-        level, message, values = OK, "waiting for odometry", {}
+        level, message = OK, "waiting for odometry"
+        values: dict[str, object] = {"odometry_not_finite": self._bad_odometry}
         if self._planner is None:
             level, message = WARN, "waiting for reference/path"
         elif self._plan is not None:
             path = self._planner.path
             message = f"finished {path.name}" if self._planner.finished else f"following {path.name}"
-            values = {
-                "progress_m": f"{self._plan.at.progress:.3f}",
-                "length_m": f"{path.length:.3f}",
-                "cross_track_m": f"{self._plan.errors.cross_track:.4f}",
-            }
-        if self._problem:
-            level, message = ERROR, self._problem
-        values["odometry_not_finite"] = str(self._bad_odometry)
+            values["progress_m"] = f"{self._plan.at.progress:.3f}"
+            values["length_m"] = f"{path.length:.3f}"
+            values["cross_track_m"] = f"{self._plan.errors.cross_track:.4f}"
+        problem = self._problem or self._progress.problem
+        if problem:
+            level, message = ERROR, problem
         now = self.get_clock().now().to_msg()
         self._diagnostics.publish(diagnostics(now, self.get_fully_qualified_name(), level, message, values))
 
@@ -177,10 +161,8 @@ def configured_path(config: PlannerConfig) -> ReferencePath:
     """The path that the parameters name. Raises PathError."""
     try:
         arguments = yaml.safe_load(config.path_args) if config.path_args else {}
-    except yaml.YAMLError as error:
-        raise PathError(
-            f"path_args is {config.path_args!r}, expected YAML such as '{{radius: 0.6}}'"
-        ) from error
+    except yaml.YAMLError:
+        arguments = None
     if not isinstance(arguments, dict):
         raise PathError(f"path_args is {config.path_args!r}, expected YAML such as '{{radius: 0.6}}'")
     if config.end:
