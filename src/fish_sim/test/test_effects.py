@@ -249,9 +249,18 @@ def test_rotor_saturation_clips_and_battery_sag_slows_under_load():
 # rudder
 
 
-def test_rudder_lag_answers_a_step_exponentially():
-    answer = servo("rudder_lag", np.full(60, 0.4), time_constant=0.12)
-    np.testing.assert_allclose(answer, 0.4 * (1 - np.exp(-0.01 * np.arange(1, 61) / 0.12)), rtol=1e-12)
+def test_rudder_lag_answers_a_step_exponentially_or_at_the_rate_limit():
+    lag = Robot(links=1).with_effect("rudder_lag", time_constant=0.12)
+    commands = np.tile([0.0, 0.4], (60, 1))
+    time = 0.01 * np.arange(61)
+    fast = swim(lag.with_parameters(servo_rate_limit=1e3), commands)[:, 8]
+    np.testing.assert_allclose(fast, 0.4 * (1 - np.exp(-time / 0.12)), rtol=1e-12, atol=1e-15)
+    slow = swim(lag.with_parameters(servo_rate_limit=1.0), commands)[:, 8]
+    # at the limit until what is left asks for less: 0.4 - alpha = rate * reach, reach = dt / (1 - exp(-dt / T))
+    reach = 0.01 / (1 - np.exp(-0.01 / 0.12))
+    limited = slow < 0.4 - reach
+    np.testing.assert_allclose(slow[limited], time[limited], atol=1e-12)
+    assert 25 < limited.sum() < 35 and slow[-1] < 0.4
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.01, 0.085, 0.3])
