@@ -6,7 +6,7 @@ from fish_sim.effects.effect import Effect, Flow, Values
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
-SOURCE = "Fossen 2021, sect. 10.3: irrotational constant current; strength is an assumption"
+SOURCE = "Fossen 2021, ocean currents: irrotational constant current; strength is an assumption"
 
 
 class Current(Effect):

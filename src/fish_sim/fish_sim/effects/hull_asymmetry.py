@@ -5,7 +5,7 @@ from typing import Any
 from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
-SOURCE = "Y_uu, N_uu of an asymmetric hull (Fossen 2021, sect. 6.4); strengths are an assumption"
+SOURCE = "Y_uu, N_uu of an asymmetric hull (Fossen 2021); strengths are an assumption"
 
 
 class HullAsymmetry(Effect):

@@ -5,7 +5,7 @@ from typing import Any
 from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
-SOURCE = "Fossen 2021, sect. 6.4.3: separate quadratic terms per direction; strengths are an assumption"
+SOURCE = "Fossen 2021, nonlinear damping: separate quadratic terms per direction; strengths are an assumption"
 
 
 class QuadraticDrag(Effect):

@@ -6,7 +6,7 @@ from fish_sim.effects.effect import Effect, Followed, Values
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
-SOURCE = "play operator (Visintin 1994, ch. III); strength is an assumption"
+SOURCE = "play operator (Visintin 1994); strength is an assumption"
 
 
 class RudderBacklash(Effect):

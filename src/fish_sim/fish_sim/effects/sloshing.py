@@ -9,7 +9,7 @@ from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
-SOURCE = "first longitudinal seiche mode (Lamb 1932, art. 190); strength is an assumption"
+SOURCE = "first longitudinal seiche mode (Lamb 1932); strength is an assumption"
 
 
 class Sloshing(Effect):

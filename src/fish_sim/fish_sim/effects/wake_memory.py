@@ -7,7 +7,7 @@ from fish_sim.effects.effect import Drive, Effect, Grip, Values
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
-SOURCE = "one-lag approximation of Wagner's lift build-up (Fung 1955, sect. 6.7); strengths are an assumption"
+SOURCE = "one-lag approximation of Wagner's lift build-up (Fung 1955); strengths are an assumption"
 
 
 class WakeMemory(Effect):

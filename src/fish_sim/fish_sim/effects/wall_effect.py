@@ -6,7 +6,7 @@ from fish_sim import pool
 from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
-SOURCE = "assumption: confinement raises drag, decaying with distance (cf. Happel & Brenner 1983, ch. 7)"
+SOURCE = "assumption: confinement raises drag, decaying with distance (cf. Happel and Brenner 1983)"
 
 
 class WallEffect(Effect):

@@ -5,7 +5,7 @@ from typing import Any
 from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.parameter import Parameter
 
-SOURCE = "assumption: Gaussian hump in place of the wave-resistance curve (Newman 1977, ch. 6)"
+SOURCE = "assumption: Gaussian hump in place of the wave-resistance curve (Newman 1977)"
 SMOOTHING = 0.01  # m/s, the force turns over within this speed
 
 
