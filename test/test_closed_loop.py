@@ -17,6 +17,7 @@ SHORT, SHORT_START = "{amplitude: 0.15, length: 1.2}", (-0.6, 0.0, math.atan(0.1
 LONG, LONG_START = "{amplitude: 0.25, length: 2.0}", (-1.0, 0.0, math.atan(0.25 * math.pi))
 FACTOR = 0.5  # simulated seconds in a second: time enough on a computer that does other things as well
 CROSS_TRACK_RMSE, SPEED_RMSE = 0.03, 0.04  # m, m/s; on a quiet computer 0.010 and 0.024
+STOP_WITHIN = 0.8  # s from the last estimate: 0.15 s until it is stale, 0.5 s in which the rotor runs down
 RESUMED_WITHIN = 0.3  # m off the path at most, while a node is being started again and the fish glides
 
 
@@ -94,6 +95,17 @@ def test_a_run_with_kills_ends_where_the_path_ends(resumed):
     assert np.abs(score.cross_track).max() < RESUMED_WITHIN
 
 
+def test_rotor_stops_and_rudder_centres_while_there_is_no_estimate(resumed):
+    t, _ = messages(resumed.recording, "/fish/odometry/filtered")
+    longest = int(np.argmax(np.diff(t)))  # fusion is being started again
+    stopped, again = t[longest] + STOP_WITHIN, t[longest + 1]
+    assert again > stopped + 0.2, "fusion was back too soon to see anything"
+    stamps, commands = messages(resumed.recording, "/fish/joint_command")
+    meanwhile = [c for stamp, c in zip(stamps, commands, strict=True) if stopped < stamp < again]
+    assert len(meanwhile) > 10  # they do not just cease
+    assert all(c.velocity[0] == 0.0 and c.position[1] == 0.0 for c in meanwhile)
+
+
 class Resumed:
     """What was seen of a run in which nodes were killed."""
 
@@ -130,18 +142,21 @@ def kill_and_restart(run: Run, spec) -> tuple[float, float]:
     return before, float(run.watch.diagnostics["fish/planner"]["progress_m"])
 
 
-def odometry(recording: Path, topic: str) -> tuple[np.ndarray, np.ndarray]:
-    """Stamps (N,) [s] and x, y, heading (N, 3) of a topic, read with rosbags alone."""
-    times, poses = [], []
+def messages(recording: Path, topic: str) -> tuple[np.ndarray, list]:
+    """Header stamps (N,) [s] and messages of a topic in order of stamp, read with rosbags alone."""
+    stamped = []
     with AnyReader([recording]) as reader:
         connections = [c for c in reader.connections if c.topic == topic]
         for connection, _, data in reader.messages(connections=connections):
             message = reader.deserialize(data, connection.msgtype)
-            stamp, pose = message.header.stamp, message.pose.pose
-            times.append(stamp.sec + 1e-9 * stamp.nanosec)
-            heading = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
-            poses.append([pose.position.x, pose.position.y, heading])
-    order = np.argsort(times)
-    poses = np.array(poses)[order]
-    poses[:, 2] = np.unwrap(poses[:, 2])
-    return np.array(times)[order], poses
+            stamped.append((message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec, message))
+    stamped.sort(key=lambda pair: pair[0])
+    return np.array([stamp for stamp, _ in stamped]), [message for _, message in stamped]
+
+
+def odometry(recording: Path, topic: str) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps (N,) [s] and x, y, heading (N, 3), unwrapped."""
+    t, found = messages(recording, topic)
+    poses = [message.pose.pose for message in found]
+    heading = np.unwrap([2.0 * math.atan2(pose.orientation.z, pose.orientation.w) for pose in poses])
+    return t, np.column_stack([[(pose.position.x, pose.position.y) for pose in poses], heading])
