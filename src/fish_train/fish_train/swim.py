@@ -22,14 +22,15 @@ LOOK_PERIOD = 0.1  # s between looks at the robot
 LAST_LOOK = 0.5  # s after the end of the path: the estimate may be there a little before the fish
 
 
-class Sight(Protocol):
-    """Where the robot believes to be."""
+@dataclass(frozen=True)
+class Sight:
+    """The robot's estimate of itself, last heard."""
 
-    stamp: float
-    x: float
-    y: float
-    heading: float
-    speed: float
+    stamp: float  # s, header stamp
+    x: float  # m
+    y: float  # m
+    heading: float  # rad
+    speed: float  # m/s, surge
 
 
 class Watch(Protocol):
@@ -88,11 +89,11 @@ class Robot:
 
     def _follow(self, duration: float, line: Status) -> str:
         """Until the end of the path, one lap of a closed one, the end of the time or Ctrl-C; the reason."""
-        tracker = self.watch.tracker
-        first, lap_start = self.watch.sight.stamp, tracker.progress
-        while (t := self.watch.sight.stamp - first) < duration and not self.interruption.asked:
+        sight, tracker = self._seen()
+        first, lap_start = sight.stamp, tracker.progress
+        while (t := sight.stamp - first) < duration and not self.interruption.asked:
             self._look()
-            sight = self.watch.sight
+            sight, tracker = self._seen()
             on_path = tracker.update((sight.x, sight.y))
             line.update(
                 f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
@@ -105,6 +106,11 @@ class Robot:
             if tracker.path.closed and on_path.progress - lap_start >= tracker.path.length:
                 return "after one lap"
         return "as interrupted" if self.interruption.asked else f"after {duration:.0f} s"
+
+    def _seen(self) -> tuple[Sight, PathTracker]:
+        if self.watch.sight is None or self.watch.tracker is None:
+            raise RuntimeError("wait for odometry and path before swimming")
+        return self.watch.sight, self.watch.tracker
 
     def _look(self) -> None:
         self.listen(LOOK_PERIOD)

@@ -10,7 +10,6 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from math import atan2
 
 import numpy as np
@@ -26,19 +25,9 @@ from rclpy.signals import SignalHandlerOptions
 from fish_control.path_tracker import PathTracker
 from fish_train.bringup import NAMESPACE
 from fish_train.score import path_from_points
+from fish_train.swim import Sight
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-@dataclass(frozen=True)
-class Sight:
-    """The robot's estimate of itself, last heard."""
-
-    stamp: float  # s, header stamp
-    x: float  # m
-    y: float  # m
-    heading: float  # rad
-    speed: float  # m/s, surge
 
 
 class WatchNode(Node):
