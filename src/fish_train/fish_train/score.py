@@ -182,8 +182,9 @@ def stroke_mean(t: Array, value: Array) -> Array:
         return value.copy()
     integral = np.r_[0.0, np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(t))]
     before, after = np.maximum(t - STROKE / 2, t[0]), np.minimum(t + STROKE / 2, t[-1])
-    return (np.interp(after, t, integral) - np.interp(before, t, integral)) / np.maximum(after - before, 1e-9)
+    whole = np.interp(after, t, integral) - np.interp(before, t, integral)
+    return np.asarray(whole / np.maximum(after - before, 1e-9))
 
 
 def _wrap(angle: Array) -> Array:
-    return np.angle(np.exp(1j * angle))
+    return np.asarray(np.angle(np.exp(1j * angle)))

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fish_control.pool import HALF_LENGTH, HALF_WIDTH
-from fish_train.recordings.trial import Trial
+from fish_train.recordings.trial import Commands, Gains, Trial
 from fish_train.score import RunScore, stroke_mean
 
 from .page import Block, Figure, Table, styled, write_page
@@ -26,9 +26,11 @@ def write_run_page(path: Path, title: str, trial: Trial, score: RunScore, tables
     blocks += tables[:1]
     blocks += [Figure("Errors", _errors(score)), Figure("Surge speed", _speed(score))]
     if trial.gains is not None:
-        blocks.append(Figure("Gains", _gains(trial), "As published by the controller."))
+        blocks.append(Figure("Gains", _gains(trial.gains), "As published by the controller."))
     if trial.commands is not None:
-        blocks.append(Figure("Commands", _commands(trial), "Rotor speed and rudder angle as commanded."))
+        blocks.append(
+            Figure("Commands", _commands(trial.commands), "Rotor speed and rudder angle as commanded.")
+        )
     write_page(path, title, _lead(score), [*blocks, *tables[1:]])
 
 
@@ -107,17 +109,16 @@ def _speed(score: RunScore) -> go.Figure:
     return styled(figure)
 
 
-def _gains(trial: Trial) -> go.Figure:
+def _gains(gains: Gains) -> go.Figure:
     figure = make_subplots(rows=1, cols=2)
     for k, name in enumerate(GAIN_NAMES):
-        figure.add_scatter(x=trial.gains.t, y=trial.gains.values[:, k], name=name, row=1, col=1 + k // 3)
+        figure.add_scatter(x=gains.t, y=gains.values[:, k], name=name, row=1, col=1 + k // 3)
     figure.update_xaxes(title="time in the recording [s]")
     return styled(figure)
 
 
-def _commands(trial: Trial) -> go.Figure:
+def _commands(commands: Commands) -> go.Figure:
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
-    commands = trial.commands
     lines = ((1, "rotor speed [rad/s]", commands.rotor_speed), (2, "rudder [rad]", commands.rudder))
     for row, name, value in lines:
         figure.add_scatter(x=commands.t, y=value, name=name, line={"width": 1}, row=row, col=1)
