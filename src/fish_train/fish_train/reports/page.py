@@ -46,9 +46,10 @@ class Figure:
     @property
     def html(self) -> str:
         """The figure as a <div>; the library itself stands once in the page."""
-        return self.figure.to_html(
+        html = self.figure.to_html(
             full_html=False, include_plotlyjs=False, config={"displaylogo": False, "responsive": True}
         )
+        return str(html)
 
 
 Block = Text | Table | Figure
