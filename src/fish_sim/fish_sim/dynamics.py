@@ -21,6 +21,7 @@ from fish_sim.ops import Scalar
 
 # 1/s, Baumgarte rate of the tip constraint: slip decays within 10 ms; RK4 at 10 ms is stable up to 278
 SLIP_DECAY = 100.0
+STIFF_GRIP = 8.0  # the blend of constraint and grip fades beyond 1/8 of the mobility A / SLIP_DECAY
 
 
 @dataclass(frozen=True)
@@ -309,13 +310,13 @@ def tip_force(slip: Scalar, A: Scalar, b: Scalar, grip: Grip | None, xp: Any) ->
     No slip:       lambda = -(b + slip / tau) / A,          tau = 1 / SLIP_DECAY (Baumgarte)
     Finite grip g: lambda = -g slip,                        mobility s = 1/g
     Both in one:   lambda = -(slip + tau b) / (s + tau A),  tau -> 0 once s is well above A / SLIP_DECAY, so that
-    zero mobility is exactly the constraint and a compliant tip is exactly the explicit law.
+    zero mobility is exactly the constraint and a tip that is soft enough to be integrated is exactly the explicit law.
     """
     tau = 1.0 / SLIP_DECAY
     if grip is None:
         return -(b + slip / tau) / A
     held = 1.0 - grip.share
-    tau = tau * xp.exp(-((grip.mobility / (A * tau)) ** 2))
+    tau = tau * xp.exp(-((STIFF_GRIP * grip.mobility / (A * tau)) ** 2))
     return -(held * (slip + tau * b) + grip.share * grip.wake) / (grip.mobility + held * tau * A)
 
 

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class InterpretedKernel:
-    """step, JVP and VJP of `c/rollout.c` on (size, batch) matrices."""
+    """step, JVP and VJP of the C texts on (size, batch) matrices."""
 
     def __init__(self, structure: Structure, method: Method, substeps: int) -> None:
         self._functions = functions(structure)

@@ -123,6 +123,8 @@ def follow_command(
         kept = {**kept, **turned}
         memory += [kept[key] for key in e.effect.memory]
     rudder = xp.fmax(xp.fmin(rudder, r.rudder_range), -r.rudder_range)
+    for e in effects:
+        rudder = e.effect.servo(e.p, m[0], rudder, dt, xp)
     limit = r.servo_rate_limit * dt
     alpha = m[0] + xp.fmax(xp.fmin(rudder - m[0], limit), -limit)
     return [alpha, rotor, *memory]

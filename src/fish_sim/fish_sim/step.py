@@ -239,7 +239,24 @@ def kernel(
 
 def kernel_source(structure: Structure, scheme: Scheme, width: int) -> str:
     """Complete C text of the kernel of a structure."""
-    layout, table, method = Layout(structure), functions(structure), METHODS[scheme.method]
+    table, texts = functions(structure), files("fish_sim") / "c"
+    adjoints = [emit(f) for f in (table.rate_vjp, table.follow_vjp)]
+    parts = [(texts / name).read_text() for name in ("adjoint.c", "rollout.c")]
+    return "\n".join([tangent_source(structure, scheme, width), *adjoints, *parts])
+
+
+def tangent_source(structure: Structure, scheme: Scheme, width: int) -> str:
+    """The part of the kernel that steps and differentiates forward; filters build on it."""
+    table, texts = functions(structure), files("fish_sim") / "c"
+    emitted = [emit(f) for f in (table.rate, table.rate_jvp, table.follow, table.follow_jvp)]
+    parts = [(texts / name).read_text() for name in ("step.c", "tangent.c")]
+    head = _definitions(Layout(structure), scheme, width)
+    return "\n".join([*head, (texts / "vector.h").read_text(), *emitted, *parts])
+
+
+def _definitions(layout: Layout, scheme: Scheme, width: int) -> list[str]:
+    """Sizes and the tableau as C text."""
+    method = METHODS[scheme.method]
     sizes = {
         "LANES": width,
         "NX": len(layout.motion),
@@ -257,19 +274,5 @@ def kernel_source(structure: Structure, scheme: Scheme, width: int) -> str:
     lines = [f"#define {name} {value}" for name, value in sizes.items()]
     rows = ["{" + ", ".join(map(repr, row)) + "}" for row in method.A]
     lines.append("static const double A[STAGES][STAGES] = {" + ", ".join(rows) + "};")
-    lines += [
-        f"static const double {k}[STAGES] = {{{', '.join(map(repr, getattr(method, k)))}}};" for k in "BC"
-    ]
-    c = files("fish_sim") / "c"
-    emitted = [
-        emit(f)
-        for f in (
-            table.rate,
-            table.rate_jvp,
-            table.rate_vjp,
-            table.follow,
-            table.follow_jvp,
-            table.follow_vjp,
-        )
-    ]
-    return "\n".join([*lines, (c / "vector.h").read_text(), *emitted, (c / "rollout.c").read_text()])
+    vectors = ((k, ", ".join(map(repr, getattr(method, k)))) for k in "BC")
+    return [*lines, *(f"static const double {k}[STAGES] = {{{values}}};" for k, values in vectors)]

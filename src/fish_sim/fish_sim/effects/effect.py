@@ -115,6 +115,11 @@ class Effect:
         return command, {}
 
     @staticmethod
+    def servo(p: Values, alpha: Scalar, target: Scalar, dt: float, xp: Any) -> Scalar:
+        """Where a servo at alpha would be one period later but for its rate limit [rad]."""
+        return target
+
+    @staticmethod
     def rotor(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         """(commanded rotor speed as the motor follows it [rad/s], updated memory)."""
         return command, {}

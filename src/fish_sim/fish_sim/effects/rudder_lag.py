@@ -8,23 +8,18 @@ SHORTEST = 1e-6  # s, keeps exp(-dt/T) defined at T = 0
 
 
 class RudderLag(Effect):
-    """The servo's target follows the command with a time constant.
+    """The servo approaches its target with a time constant, at most at its rate limit.
 
-        target' = (command - target) / T,   exactly: target += (1 - exp(-dt / T)) (command - target)
-
-    The command is constant over its period dt. The target starts at 0 (centred).
+    alpha' = (target - alpha) / T,   exactly over a period dt: alpha += (1 - exp(-dt / T)) (target - alpha)
     """
 
     name = "rudder_lag"
     kind = "actuator"
-    equation = "target' = (command - target)/time_constant"
+    equation = "alpha' = (command - alpha)/time_constant, at most the servo's rate limit"
     source = SOURCE
     parameters = {"time_constant": Parameter(0.0, "s", 0.0, 2.0, SOURCE, typical=0.12)}
     strength = ("time_constant",)
-    memory = ("target",)
 
     @staticmethod
-    def rudder(p, m, command, dt, xp):
-        reached = 1.0 - xp.exp(-dt / xp.fmax(p.time_constant, SHORTEST))
-        target = m.target + reached * (command - m.target)
-        return target, {"target": target}
+    def servo(p, alpha, target, dt, xp):
+        return alpha + (1.0 - xp.exp(-dt / xp.fmax(p.time_constant, SHORTEST))) * (target - alpha)

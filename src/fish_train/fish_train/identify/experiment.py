@@ -58,7 +58,8 @@ class Experiment:
 def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None) -> Experiment:
     """Put trials on the grid of their commands.
 
-    start_at_rest None: decided from the first half second (rotor and gyro quiet).
+    start_at_rest None: decided from the first sample of the gyro.
+    What was measured before the first command or after the last one is left out: nobody knows what the rotor did then.
     Raises ExperimentError when commands or camera poses are missing.
     """
     if not trials:
@@ -93,19 +94,24 @@ def _grid(trial: Trial) -> dict[str, Array]:
     if trial.camera is None or len(trial.camera) < 3:
         raise ExperimentError(f"{trial.name}: no camera/pose; at least three poses are needed")
     c = trial.commands
-    start, end = c.t[0], max(c.t[-1], trial.camera.t[-1])
+    start, end = c.t[0], c.t[-1] + DT
     count = int(np.floor((end - start) / DT + 1e-6)) + 1
     t = start + DT * np.arange(count)
     held = np.clip(np.searchsorted(c.t, t + 0.5 * DT, side="right") - 1, 0, len(c.t) - 1)
     imu, encoder, camera = trial.imu, trial.encoder, trial.camera
+    seen = (camera.t >= start - 0.5 * DT) & (camera.t <= end)
+    if seen.sum() < 3:
+        raise ExperimentError(
+            f"{trial.name}: {seen.sum()} camera poses between the first and the last command; at least three are needed"
+        )
     nothing = np.full(count, np.nan)
     return {
         "commands": np.column_stack([c.rotor_speed, c.rudder])[held],
         "gyro": nothing if imu is None else _nearest(imu.t, imu.gyro[:, 2], t),
         "accel": np.full((count, 2), np.nan) if imu is None else _nearest(imu.t, imu.accel[:, :2], t),
         "encoder": nothing if encoder is None else _nearest(encoder.t, encoder.speed, t),
-        "frame_t": camera.t - start,
-        "frame_pose": np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)]),
+        "frame_t": camera.t[seen] - start,
+        "frame_pose": np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])[seen],
     }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from fish_sim.compiled import lanes, library
 from fish_sim.model import DT, Structure
-from fish_sim.step import Scheme, Stepper, kernel_source
+from fish_sim.step import Scheme, Stepper, tangent_source
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
     ENCODER_ROW, ROWS, WRENCH, Array, FilterResult, History, Noise, SensorModel, first_memory, first_state,
@@ -27,6 +27,7 @@ class Settings(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_double) for name in SENSORS),
+        *((f"slope_{name}", ctypes.c_double) for name in SENSORS),
         *((f"free_{name}", ctypes.c_long) for name in SENSORS),
         ("wrench_at", ctypes.c_long * 3),
         ("links", ctypes.c_long),
@@ -42,6 +43,7 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
     variance = np.square(noise.wrench) * (1.0 - decay**2)
     return Settings(
         *(getattr(sensors, name) for name in SENSORS),
+        *(sensors.slope.get(name, 1.0) for name in SENSORS),
         *(sensors.free.get(name, -1) for name in SENSORS),
         (ctypes.c_long * 3)(*(stepper.layout.parameters.index(name) for name in WRENCH)),
         stepper.layout.links, decay, (ctypes.c_double * 3)(*variance),
@@ -53,7 +55,7 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
 def filter_library(structure: Structure, scheme: Scheme) -> ctypes.CDLL | None:
     """The compiled filter of a structure, or None without a compiler."""
     text = (files("fish_train") / "identify" / "c" / "filter.c").read_text()
-    return library(kernel_source(structure, scheme, lanes()) + text)
+    return library(tangent_source(structure, scheme, lanes()) + text)
 
 
 def compiled_pass(

@@ -177,10 +177,10 @@ class Filter:
         H = np.concatenate([d[:, :, : nx + 3], np.tile(np.eye(3), (M, 1, 1))], axis=2)
         dh = d[:, :, nx + 3 :] + D[:, nx + 3 :]
         if "gyro_scale" in s.free:
-            dh[:, 0, s.free["gyro_scale"]] += xi[:, nq + 2]
+            dh[:, 0, s.free["gyro_scale"]] += s.slope.get("gyro_scale", 1.0) * xi[:, nq + 2]
         if "imu_misalignment" in s.free:
-            dh[:, 1, s.free["imu_misalignment"]] += left
-            dh[:, 2, s.free["imu_misalignment"]] -= forward
+            dh[:, 1, s.free["imu_misalignment"]] += s.slope.get("imu_misalignment", 1.0) * left
+            dh[:, 2, s.free["imu_misalignment"]] -= s.slope.get("imu_misalignment", 1.0) * forward
         return h, H, dh
 
     def _camera(self, xi: Array, offset: Array, rate: Array, D: Array) -> tuple[Array, Array, Array]:
@@ -195,11 +195,11 @@ class Filter:
         H[:, range(3), range(nq, nq + 3)] = gain * offset[:, None]
         dh = H @ D
         if "camera_latency" in s.free:
-            dh[:, :, s.free["camera_latency"]] -= gain * velocity
+            dh[:, :, s.free["camera_latency"]] -= s.slope.get("camera_latency", 1.0) * gain * velocity
         if "camera_scale" in s.free:
-            dh[:, :2, s.free["camera_scale"]] += here[:, :2]
+            dh[:, :2, s.free["camera_scale"]] += s.slope.get("camera_scale", 1.0) * here[:, :2]
         if "camera_heading_offset" in s.free:
-            dh[:, 2, s.free["camera_heading_offset"]] += 1.0
+            dh[:, 2, s.free["camera_heading_offset"]] += s.slope.get("camera_heading_offset", 1.0)
         return h, H, dh
 
     def _encoder(self, sums: _Sums) -> None:

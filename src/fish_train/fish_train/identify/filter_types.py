@@ -56,6 +56,7 @@ class SensorModel:
     gyro_scale: float = 1.0  # measured over true
     imu_misalignment: float = 0.0  # rad, IMU axes counter-clockwise from base_link
     free: dict[str, int] = field(default_factory=dict)
+    slope: dict[str, float] = field(default_factory=dict)  # d field / d free parameter, 1 where not given
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@
 
 typedef struct {
   double camera_latency, camera_heading_offset, camera_scale, gyro_scale, imu_misalignment; /* sensors */
+  double slope_latency, slope_heading, slope_scale, slope_gyro, slope_misalignment; /* d sensor / d parameter */
   long free_latency, free_heading, free_scale, free_gyro, free_misalignment; /* index of the free parameter or -1 */
   long wrench_at[3];                                                         /* places in p */
   long links;
@@ -215,10 +216,10 @@ static void measure_imu(const Settings *c, Work *f, long K, const double *z, con
     }
   }
   for (int a = 0; a < 3; ++a) H[a][NX + 3 + a] = 1.0;
-  if (c->free_gyro >= 0) dh[c->free_gyro] += f->xi[q + 2];
+  if (c->free_gyro >= 0) dh[c->free_gyro] += c->slope_gyro * f->xi[q + 2];
   if (c->free_misalignment >= 0) {
-    dh[K + c->free_misalignment] += left;
-    dh[2 * K + c->free_misalignment] -= forward;
+    dh[K + c->free_misalignment] += c->slope_misalignment * left;
+    dh[2 * K + c->free_misalignment] -= c->slope_misalignment * forward;
   }
   update(f, K, e, H, dh, sd, c->gate_imu, sums, whitened);
 }
@@ -237,11 +238,11 @@ static void measure_camera(const Settings *c, Work *f, long K, const double *z, 
     H[a][a] = gain[a];
     H[a][q + a] = gain[a] * offset;
     for (long j = 0; j < K; ++j) dh[a * K + j] = gain[a] * (f->D[j * ND + a] + offset * f->D[j * ND + q + a]);
-    if (c->free_latency >= 0) dh[a * K + c->free_latency] -= gain[a] * velocity[a];
-    if (c->free_scale >= 0 && a < 2) dh[a * K + c->free_scale] += here[a];
+    if (c->free_latency >= 0) dh[a * K + c->free_latency] -= c->slope_latency * gain[a] * velocity[a];
+    if (c->free_scale >= 0 && a < 2) dh[a * K + c->free_scale] += c->slope_scale * here[a];
   }
   e[2] = remainder(e[2], 2.0 * M_PI);
-  if (c->free_heading >= 0) dh[2 * K + c->free_heading] += 1.0;
+  if (c->free_heading >= 0) dh[2 * K + c->free_heading] += c->slope_heading;
   update(f, K, e, H, dh, sd, c->gate_camera, sums, whitened);
 }
 

@@ -1,0 +1,32 @@
+"""Which trials fit, which are held out, which are enough to search on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fish_train.identify.experiment import Experiment
+
+SEARCH_TRIALS = 4  # the search's cost is proportional to them; the final fits use all training trials
+
+
+@dataclass(frozen=True)
+class Split:
+    """Indices of trials."""
+
+    training: tuple[int, ...]
+    held_out: tuple[int, ...]
+    search: tuple[int, ...]  # part of training
+
+
+def split_trials(experiment: Experiment) -> Split:
+    """Every third trial is held out; the search uses the most strongly and most differently excited training trials."""
+    count = len(experiment.names)
+    held = tuple(i for i in range(count) if i % 3 == 2)
+    training = tuple(i for i in range(count) if i % 3 != 2)
+    rudder = experiment.commands[..., 1].std(axis=0) + 0.2 * np.abs(experiment.commands[..., 1]).mean(axis=0)
+    rotor = experiment.commands[..., 0].std(axis=0)
+    strength = rotor / (rotor.max() + 1e-12) * (0.2 + rudder / (rudder.max() + 1e-12))
+    chosen = sorted(training, key=lambda i: -strength[i])[:SEARCH_TRIALS]
+    return Split(training, held, tuple(sorted(chosen)))

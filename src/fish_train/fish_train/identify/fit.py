@@ -1,0 +1,154 @@
+"""Fit a hypothesis: Levenberg-Marquardt on the innovations' likelihood, then the noise, in turn.
+
+Convergence is the hard part: with small process noise the likelihood has many optima. Every fit therefore starts with
+the wrench noise inflated, which makes the problem nearly convex, and ends with the noise that the data ask for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.robot import Robot
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter import run_filter
+from fish_train.identify.filter_types import FilterResult, Noise, SensorModel
+from fish_train.identify.hypothesis import Coordinates, Hypothesis
+
+Array = NDArray[np.float64]
+
+LARGEST_STEP = 0.5  # of theta in one iteration
+SMALL_GAIN = 0.05  # nats; below it an iteration has converged
+INFLATION = 5.0  # of the wrench's standard deviations in the first phase
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted hypothesis."""
+
+    hypothesis: Hypothesis
+    theta: Array  # (K,)
+    robot: Robot
+    noise: Noise
+    log_likelihood: Array  # (M,) per trial
+    objective: float  # log likelihood of all trials + log prior of theta
+    result: FilterResult
+    normal: Array  # (K, K) Gauss-Newton matrix of -objective
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Free parameters by name."""
+        decoded = Coordinates(self.hypothesis).decode(self.theta)
+        return dict(zip(self.hypothesis.free, decoded.tolist(), strict=True))
+
+    @property
+    def covariance(self) -> Array:
+        """(K, K) of theta: inverse of the normal matrix."""
+        return np.linalg.inv(self.normal)
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Of the physical values, to first order."""
+        slope = Coordinates(self.hypothesis).slope(self.theta)
+        deviation = np.sqrt(np.diag(self.covariance)) * np.abs(slope)
+        return dict(zip(self.hypothesis.free, deviation.tolist(), strict=True))
+
+
+def evaluate(hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise, keep: bool = False) -> Fit:
+    """The hypothesis at theta, with score and normal matrix."""
+    coordinates = Coordinates(hypothesis)
+    p, dp, sensors = coordinates.filter_inputs(theta)
+    result = run_filter(experiment, coordinates.stepper, p, dp, sensors, noise, keep)
+    objective = float(result.log_likelihood.sum()) - 0.5 * float(np.sum((theta / coordinates.prior) ** 2))
+    normal = result.normal.sum(0) + np.diag(1.0 / coordinates.prior**2)
+    robot = coordinates.robot(theta)
+    return Fit(hypothesis, theta, robot, noise, result.log_likelihood, objective, result, normal)
+
+
+def climb(start: Fit, experiment: Experiment, iterations: int, noise: Noise | None = None) -> Fit:
+    """Levenberg-Marquardt from a fit, with fixed noise."""
+    coordinates = Coordinates(start.hypothesis)
+    noise = noise or start.noise
+    best = evaluate(start.hypothesis, start.theta, experiment, noise)
+    damping, small = 1e-3, 0
+    for _ in range(iterations):
+        gradient = best.result.gradient.sum(0) + best.theta / coordinates.prior**2
+        damped = best.normal + damping * np.diag(np.diag(best.normal))
+        move = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
+        trial = evaluate(start.hypothesis, coordinates.clip(best.theta + move), experiment, noise)
+        gain = trial.objective - best.objective
+        if np.isfinite(gain) and gain > 0:
+            best, damping = trial, max(damping / 10.0, 1e-9)
+            small = small + 1 if gain < SMALL_GAIN else 0
+        else:
+            damping *= 10.0
+            small += np.isfinite(gain) and gain > -SMALL_GAIN
+        if small >= 1 or damping > 1e4:
+            break
+    return best
+
+
+def likelihood(fit: Fit, experiment: Experiment, noise: Noise) -> float:
+    """Log likelihood at a fit's parameters under other noise."""
+    coordinates = Coordinates(fit.hypothesis)
+    p, _, sensors = coordinates.filter_inputs(fit.theta)
+    plain = replace(sensors, free={}, slope={})
+    result = run_filter(experiment, coordinates.stepper, p, np.zeros((0, len(p))), plain, noise)
+    return float(result.log_likelihood.sum())
+
+
+def _wrench(index: int) -> Callable[[Noise, float], Noise]:
+    def change(noise: Noise, factor: float) -> Noise:
+        wrench = list(noise.wrench)
+        wrench[index] *= factor
+        return replace(noise, wrench=tuple(wrench))
+
+    return change
+
+
+def _field(name: str) -> Callable[[Noise, float], Noise]:
+    def change(noise: Noise, factor: float) -> Noise:
+        return replace(noise, **{name: getattr(noise, name) * factor})
+
+    return change
+
+
+NOISE_MOVES = (*(_wrench(i) for i in range(3)), _field("wrench_time"))
+
+
+def adapt_noise(fit: Fit, experiment: Experiment, rounds: int = 1) -> Noise:
+    """Maximum-likelihood wrench intensities and their time constant: parabola through three points each, in turn."""
+    noise, best = fit.noise, likelihood(fit, experiment, fit.noise)
+    for _ in range(rounds):
+        for change in NOISE_MOVES:
+            low, high = (likelihood(fit, experiment, change(noise, f)) for f in (0.5, 2.0))
+            curvature, slope = low + high - 2.0 * best, 0.5 * (high - low)
+            octaves = -slope / curvature if curvature < 0 else np.sign(slope) * 2.0
+            candidate = change(noise, 2.0 ** float(np.clip(octaves, -2.0, 2.0)))
+            value = likelihood(fit, experiment, candidate)
+            if value > best:
+                noise, best = candidate, value
+    return noise
+
+
+def fit_hypothesis(
+    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array | None = None,
+    iterations: int = 10, rounds: int = 2,
+) -> Fit:  # fmt: skip
+    """Cold fit: inflated wrench noise first, then `rounds` of noise estimation and refits."""
+    start = Coordinates(hypothesis).origin() if theta is None else theta
+    inflated = replace(noise, wrench=tuple(INFLATION * w for w in noise.wrench))
+    fit = climb(evaluate(hypothesis, start, experiment, inflated), experiment, iterations)
+    fit = replace(fit, noise=noise)
+    for _ in range(rounds):
+        adapted = adapt_noise(fit, experiment)
+        fit = climb(replace(fit, noise=adapted), experiment, iterations)
+    return fit
+
+
+def sensor_model(fit: Fit) -> SensorModel:
+    """The fitted sensors."""
+    return Coordinates(fit.hypothesis).filter_inputs(fit.theta)[2]
