@@ -20,7 +20,8 @@ from fish_control.control_law import (
 from fish_control.line_of_sight import GuidanceState, Motion, heading_error, observe
 from fish_control.policy import Policy, policy_inputs
 
-GLIDING_SPEED = 0.03  # m/s, slower than this the rudder is centred while no speed is wanted
+STANDING_SPEED = 0.02  # m/s, a gliding fish that is slower has stopped
+RELEASE_RATE = 0.2  # rad/s, of a rudder that is let go
 SEAM = 0.7  # rad, more than the head swings
 LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
 
@@ -56,6 +57,7 @@ class Controller:
         self._control = ControlState()
         self._setpoint = Setpoint(0.0, 0.0)
         self._actuators = ActuatorState()
+        self._glides = True
 
     def observe(self, time: float, motion: Motion) -> None:
         """Take in odometry stamped `time` [s]; call it with every message."""
@@ -67,11 +69,11 @@ class Controller:
             self._observed = GuidanceState()
 
     def decide(self, wanted: Wanted) -> Gains:
-        """One control period: errors, gains from the policy, new set-points."""
+        """One control period at a wanted speed above zero: errors, gains from the policy, new set-points."""
         if self._motion is None:
             raise ValueError("decide() before any odometry was observed")
         motion = self._motion
-        curvature = wanted.yaw_rate / wanted.speed if wanted.speed > 0.0 else 0.0
+        curvature = wanted.yaw_rate / wanted.speed
         e_psi = continued(
             self._control.heading_error,
             float(heading_error(self._observed, motion, wanted.course, curvature, self._guidance, np)),
@@ -93,9 +95,23 @@ class Controller:
         self._control, self._setpoint = control_step(
             self._control, errors, gains, self._policy.contract.control_period, self._limits, np
         )
-        if wanted.speed <= 0.0:  # gliding: steer while the rudder has a grip, never drive
-            self._setpoint = Setpoint(self._setpoint.alpha if motion.surge > GLIDING_SPEED else 0.0, 0.0)
+        self._glides = True
         return gains
+
+    def glide(self, yaw_rate: float, dt: float) -> None:
+        """No drive for dt [s]; rudder hard over to the side of `yaw_rate` until the fish stands, then let go slowly.
+
+        A held rudder brakes: 0.24 m ahead and 0.24 m aside from 0.2 m/s instead of 0.44 m straight on. Steering by
+        the PID would flap the rudder and so go on swimming; a rudder let go at once would push off again.
+        """
+        self._control = ControlState()
+        self._glides = self._glides and self._motion is not None and self._motion.surge > STANDING_SPEED
+        if self._glides:
+            alpha = math.copysign(self._limits.rudder_range, yaw_rate) if yaw_rate != 0.0 else 0.0
+        else:
+            held = self._setpoint.alpha
+            alpha = math.copysign(max(abs(held) - RELEASE_RATE * dt, 0.0), held)
+        self._setpoint = Setpoint(alpha, 0.0)
 
     def rest(self) -> None:
         """Rotor to a stop and rudder to the centre; the PIDs forget."""

@@ -30,7 +30,7 @@ def require_one_of(name: str, value: str, known: tuple[str, ...]) -> None:
 class PlannerConfig:
     """What to swim and how the path is followed."""
 
-    path: str = "R"  # a letter, a family (circle, sinusoid, ...), or topic: what reference/path brings
+    path: str = "R"  # a letter, a family (circle, ...), a .csv or .svg file, or topic: reference/path
     path_args: str = ""  # YAML, arguments of the family: "{radius: 0.6, x: 0.2}"
     speed: float = 0.2  # m/s, surge
     end: str = ""  # stop or loop; empty: a closed path loops, an open one stops

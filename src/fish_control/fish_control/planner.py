@@ -15,15 +15,16 @@ from fish_control.line_of_sight import (
     Motion,
     PathAhead,
     TrackingErrors,
-    heading_error,
     observe,
     tracking_errors,
 )
 from fish_control.path_batch import TrackerConfig
 from fish_control.path_tracker import PathPoint, PathTracker
+from fish_control.pool import stopping_side
 from fish_control.reference_path import ReferencePath
 
 SLOWEST, FASTEST = 0.05, 0.5  # m/s, the range of speeds of the robot
+GLIDING_YAW_RATE = 0.5  # rad/s, wanted after the end; the rudder is hard over, so only its sign counts
 LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
 
 
@@ -34,7 +35,7 @@ class Plan:
     at: PathPoint
     errors: TrackingErrors
     speed: float  # m/s, wanted surge; 0 once the end of the path is passed
-    yaw_rate: float  # rad/s, wanted: speed times the curvature of the path
+    yaw_rate: float  # rad/s, wanted: speed times the curvature of the path; after the end the side to turn to
 
 
 class Planner:
@@ -55,6 +56,7 @@ class Planner:
         self._guidance = guidance or GuidanceConfig()
         self._state = GuidanceState()
         self._time: float | None = None
+        self._side = 0.0  # +1 left, -1 right, chosen when the end is passed
 
     def start_nearest(self, x: float, y: float) -> None:
         """Begin at the point of the path nearest to (x, y) [m] instead of at its beginning."""
@@ -96,16 +98,14 @@ class Planner:
             *map(float, tracking_errors(self._state, motion, ahead, speed, self._guidance, np))
         )
         if self.finished:
-            errors = self._turn_to_centre(errors, motion)
-        return Plan(at, errors, speed, speed * at.curvature)
+            return Plan(at, errors, 0.0, self._stopping_yaw_rate(motion))
+        return Plan(at, errors, self.speed, self.speed * at.curvature)
 
-    def _turn_to_centre(self, errors: TrackingErrors, motion: Motion) -> TrackingErrors:
-        """After the end the fish glides for 0.3 m and more: away from the walls, towards the pool's
-        centre.
-        """
-        course = math.atan2(-motion.y, -motion.x)
-        heading = heading_error(self._state, motion, course, 0.0, self._guidance, np)
-        return errors._replace(course=course, heading=float(heading))
+    def _stopping_yaw_rate(self, motion: Motion) -> float:
+        """Yaw rate [rad/s] while the fish glides after the end: to the side with more room, chosen once."""
+        if self._side == 0.0:
+            self._side = stopping_side(motion.x, motion.y, motion.heading)
+        return self._side * GLIDING_YAW_RATE
 
 
 def motion_is_finite(motion: Motion) -> bool:

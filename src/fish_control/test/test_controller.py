@@ -52,14 +52,26 @@ def test_rest_stops_rotor_and_centres_rudder_within_half_a_second():
     assert command.rotor_speed == pytest.approx(0.0, abs=1e-9) and command.alpha == 0.0
 
 
-def test_no_speed_wanted_means_no_drive_but_steering_while_gliding():
+def test_gliding_holds_the_rudder_without_drive_until_the_fish_has_stopped():
     made = controller(surge=0.15)
-    made.decide(Wanted(0.5, 0.0, 0.0, 0.0))
-    command = [made.command(0.01) for _ in range(10)][-1]
-    assert command.rotor_speed == 0.0 and command.alpha > 0.05
-    still = controller(surge=0.01)
-    still.decide(Wanted(0.5, 0.0, 0.0, 0.0))
-    assert still.command(0.01).alpha == 0.0
+    made.decide(STRAIGHT)
+    for _ in range(60):
+        made.glide(0.5, 0.01)
+        command = made.command(0.01)
+    assert command.rotor_speed == pytest.approx(0.0, abs=1e-9) and command.alpha == 0.8
+    angles = []
+    for k in range(500):  # noise about standing still does not start it again
+        made.observe(1.0 + 0.01 * k, Motion(0.0, 0.0, 0.0, 0.015 + 0.03 * (k % 2), 0.0, 0.0))
+        made.glide(0.5, 0.01)
+        angles.append(made.command(0.01).alpha)
+    np.testing.assert_allclose(np.diff(angles[:300]), -0.002, atol=1e-9)
+    assert angles[-1] == 0.0
+
+
+def test_gliding_straight_on_when_no_turn_is_wanted():
+    made = controller(surge=0.15)
+    made.glide(0.0, 0.01)
+    assert made.command(0.01) == (pytest.approx(2 * np.pi * 0.02), 0.0, 0.0)
 
 
 def test_curvature_is_fed_forward():

@@ -27,17 +27,20 @@ def test_yaw_rate_is_speed_times_curvature():
 
 def test_speed_is_wanted_until_the_end_and_zero_for_good_after_it():
     planner = Planner(make_path("I"), 0.15)
-    assert follow(planner, 0.0, 1.69).speed == 0.15
-    assert follow(planner, 1.69, 1.75).speed == 0.0
+    length = planner.path.length
+    assert follow(planner, 0.0, length - 0.01).speed == 0.15
+    assert follow(planner, length - 0.01, length + 0.05).speed == 0.0
     assert planner.finished
     assert planner.plan(at(planner.path, 1.0)).speed == 0.0
 
 
-def test_after_the_end_the_course_is_to_the_centre_of_the_pool():
-    planner = Planner(make_path("I"), 0.15)
-    plan = follow(planner, 0.0, 1.75)
-    x, y = planner.path.point(1.75)
-    assert plan.errors.course == pytest.approx(np.arctan2(-y, -x), abs=0.05)
+@pytest.mark.parametrize(("x", "side"), [(-1.9, -1.0), (1.9, 1.0)])
+def test_after_the_end_it_turns_to_the_side_with_more_room_and_stays_with_it(x, side):
+    planner = Planner(make_path("straight", length=1.0, course=np.pi / 2, x=x), 0.2)
+    follow(planner, 0.0, 1.01)
+    for heading in (1.6, 0.0, 3.1, -2.0):
+        plan = planner.plan(Motion(x, 0.55, heading, 0.1, 0.0, 0.0))
+        assert plan.speed == 0.0 and np.sign(plan.yaw_rate) == side
 
 
 def test_closed_path_goes_on():

@@ -22,6 +22,12 @@ def test_csv_points_are_metres_where_they_are(tmp_path):
     np.testing.assert_allclose(path.point([0.0, 1.0, 1.5]), [[0, 0], [1, 0], [1, 0.5]], atol=5e-3)
 
 
+def test_a_file_name_is_a_path(tmp_path):
+    file = tmp_path / "l.csv"
+    file.write_text("0,0\n1,0\n")
+    assert make_path(str(file)).length == pytest.approx(1.0)
+
+
 def test_csv_that_returns_to_its_start_is_closed(tmp_path):
     file = tmp_path / "square.csv"
     file.write_text("0,0\n1,0\n1,1\n0,1\n0,0\n")

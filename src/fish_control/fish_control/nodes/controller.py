@@ -114,14 +114,17 @@ class ControllerNode(Node):
         clock = self.get_clock().now()
         now = clock.nanoseconds * 1e-9
         dt = 1.0 / self._config.command_rate_hz if math.isnan(self._now) else now - self._now
+        dt = min(max(dt, 0.0), LONGEST_PERIOD)
         self._now = now
         may_swim = self._watchdog.check(now, self._aged_signs(now))
         if not may_swim:
             self._controller.rest()
+        elif self._wanted.speed <= 0.0:
+            self._controller.glide(self._wanted.yaw_rate, dt)
         elif self._ticks % round(self._config.command_rate_hz / self._config.rate_hz) == 0:
             self._gains.publish(to_message(self._controller.decide(self._wanted)))
         self._ticks += 1
-        command = self._controller.command(min(max(dt, 0.0), LONGEST_PERIOD))
+        command = self._controller.command(dt)
         message = JointState(name=["rotor", "rudder"])
         message.header.stamp = clock.to_msg()
         message.position = [command.phase, command.alpha]

@@ -52,7 +52,7 @@ class PlannerNode(Node):
         self._planner: Planner | None = None
         self._plan: Plan | None = None
         self._fresh = False
-        self._next_plan = -math.inf
+        self._planned = -math.inf  # s, stamp of the last odometry that was planned for
         self._said_speed = math.nan
         self._bad_odometry = 0
         self._problem = ""
@@ -102,11 +102,9 @@ class PlannerNode(Node):
             self._fresh = False
             self._begin(self._planner, time, motion)
         self._planner.observe(time, motion)
-        if self._next_plan - 10.0 / self._config.rate_hz > time:  # the clock was set back
-            self._next_plan = -math.inf
-        if time < self._next_plan - 1e-3:
+        if 0.0 <= time - self._planned < 0.75 / self._config.rate_hz:  # stamps jitter
             return
-        self._next_plan = max(self._next_plan, time - 1.0 / self._config.rate_hz) + 1.0 / self._config.rate_hz
+        self._planned = time
         self._publish(self._planner.plan(motion), message)
         self._progress.keep(self._digest, time, self._planner.tracker.progress)
 

@@ -1,6 +1,5 @@
 """What every node of this package does to start and to end: parameters from a dataclass, a clean end."""
 
-import os
 import sys
 from collections.abc import Callable
 from dataclasses import fields
@@ -54,6 +53,4 @@ def run(make_node: Callable[[], Node], name: str) -> None:
             node.destroy_node()
         rclpy.try_shutdown()
     if failure:
-        print(f"{name}: {failure}", file=sys.stderr)
-        sys.stderr.flush()
-        os._exit(1)
+        sys.exit(f"{name}: {failure}")

@@ -26,15 +26,19 @@ PATHS: dict[str, Callable[..., ReferencePath]] = {
 
 
 def make_path(name: str, **arguments: object) -> ReferencePath:
-    """Build a path by family name; a single letter means that letter.
+    """Build a path by family name; a single letter means that letter, a .csv or .svg file that drawing.
 
     Raises:
         PathError: unknown family, unknown argument or bad value; lists what is known.
     """
     if len(name) == 1:
         name, arguments = "letter", {"letter": name, **arguments}
+    elif name.lower().endswith((".csv", ".svg")):
+        name, arguments = "polyline", {"file": name, **arguments}
     if name not in PATHS:
-        raise PathError(f"unknown path {name!r}; known: {', '.join(PATHS)}, or a single letter A to Z")
+        raise PathError(
+            f"unknown path {name!r}; known: {', '.join(PATHS)}, a letter A to Z, or a .csv or .svg file"
+        )
     known = inspect.signature(PATHS[name]).parameters
     unknown = sorted(set(arguments) - set(known))
     if unknown:

@@ -1,0 +1,420 @@
+"""The three nodes in one process: topics, frames, units, faults; and how they start and end as programs."""
+
+import math
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TwistStamped, Vector3Stamped
+from nav_msgs.msg import Odometry, Path
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64, Float64MultiArray
+from std_srvs.srv import Trigger
+
+from fish_control.fusion import LOST_VARIANCE
+from fish_control.nodes import controller, fusion, planner
+from fish_control.nodes.controller import ControllerNode
+from fish_control.nodes.fusion import FusionNode
+from fish_control.nodes.messages import seconds, to_quaternion, to_stamp, yaw_of
+from fish_control.nodes.planner import PlannerNode
+
+pytestmark = pytest.mark.ros
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Bench:
+    """A node under test beside one that talks to it and keeps what it hears."""
+
+    def __init__(self, make_node, **parameters):
+        self.other = Node("bench", namespace="fish")
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.other)
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        self.node = make_node(parameter_overrides=overrides)
+        self.executor.add_node(self.node)
+        self.heard = {}
+        self._publishers = {}
+        self.listen("/diagnostics", DiagnosticArray)
+
+    def listen(self, topic, kind, qos=10):
+        self.heard[topic] = []
+        self.other.create_subscription(kind, topic, self.heard[topic].append, qos)
+
+    def say(self, topic, message, qos=10):
+        if topic not in self._publishers:
+            publisher = self._publishers[topic] = self.other.create_publisher(type(message), topic, qos)
+            self.until(lambda: publisher.get_subscription_count() > 0)
+        self._publishers[topic].publish(message)
+
+    def until(self, condition, seconds=10.0):
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, (
+                f"not within {seconds} s; heard { ({k: len(v) for k, v in self.heard.items()}) }"
+            )
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def spin(self, seconds):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.005)
+
+    def now(self):
+        return self.other.get_clock().now().nanoseconds * 1e-9
+
+    def said(self, level, text):
+        """Whether the newest status of the node's diagnostics is this."""
+        own = self.node.get_fully_qualified_name().lstrip("/")
+        statuses = [s for array in self.heard["/diagnostics"] for s in array.status if s.name == own]
+        return bool(statuses) and statuses[-1].level == level and text in statuses[-1].message
+
+    def close(self):
+        for node in self.executor.get_nodes():
+            node.destroy_node()
+        self.executor.shutdown()
+
+
+@pytest.fixture(autouse=True)
+def graph(monkeypatch):
+    """A domain of its own."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", "83")
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+
+
+@pytest.fixture
+def bench(graph, tmp_path):
+    rclpy.init()
+    made = []
+
+    def make(kind, **parameters):
+        if kind is PlannerNode:
+            parameters = {"state_file": str(tmp_path / "progress.json"), **parameters}
+        made.append(Bench(kind, **parameters))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+    rclpy.try_shutdown()
+
+
+def odometry(time, x=0.0, y=0.0, yaw=0.0, u=0.2, variance=1e-5, twist_variance=1e-4):
+    message = Odometry(child_frame_id="base_link")
+    message.header.frame_id, message.header.stamp = "pool", to_stamp(time)
+    message.pose.pose.position.x, message.pose.pose.position.y = x, y
+    message.pose.pose.orientation = to_quaternion(yaw)
+    message.twist.twist.linear.x = u
+    message.pose.covariance = (np.eye(6) * variance).ravel()
+    message.twist.covariance = (np.eye(6) * twist_variance).ravel()
+    return message
+
+
+def feed_fusion(bench, start, seconds, camera=True, imu=True):
+    """A fish that swims ahead at 0.2 m/s, in stamps that run ahead of the clock as fast as they are said."""
+    for k in range(int(seconds * 100)):
+        t = start + 0.01 * k
+        if imu:
+            sample = Imu()
+            sample.header.stamp, sample.header.frame_id = to_stamp(t), "imu_link"
+            sample.linear_acceleration.z = 9.81
+            bench.say("imu/data", sample)
+        if camera and k % 3 == 0:
+            pose = PoseWithCovarianceStamped()
+            pose.header.stamp, pose.header.frame_id = to_stamp(t), "pool"
+            pose.pose.pose.position.x = 0.2 * (t - start)
+            pose.pose.pose.orientation = to_quaternion(0.0)
+            bench.say("camera/pose", pose)
+        bench.executor.spin_once(timeout_sec=0.001)
+        bench.executor.spin_once(timeout_sec=0.001)
+
+
+def test_fusion_publishes_odometry_in_the_pool_at_the_imu_s_stamps(bench):
+    b = bench(FusionNode)
+    b.listen("odometry/filtered", Odometry)
+    start = b.now()
+    feed_fusion(b, start, 2.5)
+    b.spin(0.2)
+    last = b.heard["odometry/filtered"][-1]
+    t = seconds(last.header.stamp) - start
+    assert (last.header.frame_id, last.child_frame_id) == ("pool", "base_link")
+    assert last.pose.pose.position.x == pytest.approx(0.2 * t, abs=0.02)
+    assert yaw_of(last.pose.pose.orientation) == pytest.approx(0.0, abs=0.05)
+    assert last.twist.twist.linear.x == pytest.approx(0.2, abs=0.05)
+    assert 0.0 < last.pose.covariance[0] < 1e-3 and 0.0 < last.twist.covariance[35] < 1e-2
+
+
+def test_fusion_says_at_once_that_the_camera_is_lost(bench):
+    b = bench(FusionNode)
+    b.listen("odometry/filtered", Odometry)
+    start = b.now()
+    feed_fusion(b, start, 1.0)
+    feed_fusion(b, start + 1.0, 1.0, camera=False)
+    b.until(lambda: b.said(b"\x02", "camera lost"))
+    b.until(lambda: b.heard["odometry/filtered"][-1].pose.covariance[0] == LOST_VARIANCE)
+
+
+def test_fusion_goes_on_with_the_camera_when_the_imu_is_lost(bench):
+    b = bench(FusionNode)
+    b.listen("odometry/filtered", Odometry)
+    start = b.now()
+    feed_fusion(b, start, 1.0)
+    feed_fusion(b, start + 1.0, 0.5, imu=False)
+    b.until(lambda: b.said(b"\x02", "IMU lost"))
+    b.until(lambda: b.heard["odometry/filtered"][-1].twist.covariance[35] == LOST_VARIANCE)
+
+
+def test_fusion_survives_values_that_are_no_numbers(bench):
+    b = bench(FusionNode)
+    b.listen("odometry/filtered", Odometry)
+    feed_fusion(b, b.now(), 0.5)
+    bad = Imu()
+    bad.angular_velocity.z = math.nan
+    bad.header.stamp = to_stamp(b.now() + 10.0)
+    b.say("imu/data", bad)
+    pose = PoseWithCovarianceStamped()  # a quaternion of zeros
+    pose.header.stamp = to_stamp(b.now())
+    pose.pose.pose.orientation.w = 0.0
+    b.say("camera/pose", pose)
+    b.spin(0.2)
+    assert all(math.isfinite(m.pose.pose.position.x) for m in b.heard["odometry/filtered"])
+
+
+def test_planner_publishes_path_target_twist_error_and_speed(bench):
+    b = bench(PlannerNode, path="straight", path_args="{length: 3.0}", speed=0.15)
+    b.listen("control/target", PoseStamped)
+    b.listen("control/twist", TwistStamped)
+    b.listen("tracking/error", Vector3Stamped)
+    b.listen("reference/path", Path, LATCHED)
+    b.listen("reference/speed", Float64, LATCHED)
+    t = b.now()
+    b.say("odometry/filtered", odometry(t, x=-1.4, y=0.05, u=0.1))
+    b.until(lambda: all(b.heard[k] for k in b.heard if k != "/diagnostics"))
+    target, twist, error = (b.heard[k][0] for k in ("control/target", "control/twist", "tracking/error"))
+    assert target.header.frame_id == "pool" and seconds(target.header.stamp) == pytest.approx(t, abs=1e-6)
+    assert math.dist((target.pose.position.x, target.pose.position.y), (-1.4, 0.05)) == pytest.approx(
+        0.4, abs=1e-3
+    )
+    assert yaw_of(target.pose.orientation) == pytest.approx(-math.asin(0.05 / 0.4), abs=2e-3)
+    assert (twist.header.frame_id, twist.twist.linear.x, twist.twist.angular.z) == ("base_link", 0.15, 0.0)
+    assert error.vector.x == pytest.approx(0.05, abs=1e-6)
+    assert error.vector.y == pytest.approx(-math.asin(0.05 / 0.4), abs=2e-3)
+    assert error.vector.z == pytest.approx(0.05)
+    path = b.heard["reference/path"][0]
+    assert path.header.frame_id == "pool" and path.poses[0].pose.position.x == pytest.approx(-1.5)
+    assert path.poses[-1].pose.position.x == pytest.approx(1.5)
+    assert b.heard["reference/speed"][0].data == 0.15
+
+
+def test_planner_plans_at_half_the_rate_of_the_odometry(bench):
+    b = bench(PlannerNode, path="I")
+    b.listen("control/target", PoseStamped)
+    t = b.now()
+    for k in range(100):
+        b.say("odometry/filtered", odometry(t + 0.01 * k, y=-0.8, yaw=1.57))
+        b.spin(0.002)
+    b.until(lambda: len(b.heard["control/target"]) >= 50)
+    b.spin(0.2)
+    assert len(b.heard["control/target"]) == 50
+
+
+def test_planner_that_was_killed_resumes_where_it_was(bench, tmp_path):
+    first = bench(PlannerNode, path="I")
+    first.listen("tracking/error", Vector3Stamped)
+    t = first.now()
+    for k in range(40):
+        first.say("odometry/filtered", odometry(t + 0.02 * k, y=-0.85 + 0.02 * k, yaw=1.57))
+        first.spin(0.002)
+    first.until(lambda: len(first.heard["tracking/error"]) >= 40)
+    left_behind = (tmp_path / "progress.json").read_text()
+    second = bench(PlannerNode, path="I", state_file=str(tmp_path / "second.json"))
+    (tmp_path / "second.json").write_text(left_behind)
+    second.say("odometry/filtered", odometry(t + 1.5, y=0.05, yaw=1.57))
+    second.until(lambda: second.node._plan is not None)
+    assert second.node._plan.at.progress == pytest.approx(0.9, abs=0.01)
+
+
+def test_planner_follows_a_path_from_a_topic_and_refuses_one_through_the_wall(bench):
+    b = bench(PlannerNode, path="topic")
+    b.listen("control/target", PoseStamped)
+
+    def path(half_length):
+        message = Path()
+        message.header.frame_id = "pool"
+        for x in (-half_length, half_length):
+            pose = PoseStamped()
+            pose.pose.position.x = x
+            message.poses.append(pose)
+        return message
+
+    b.say("reference/path", path(3.0), LATCHED)
+    b.until(lambda: b.said(b"\x02", "path refused: path 'reference/path' reaches"))
+    b.say("odometry/filtered", odometry(b.now(), x=-0.9))
+    b.spin(0.3)
+    assert not b.heard["control/target"]
+    b.say("reference/path", path(1.0), LATCHED)
+    b.spin(0.3)
+    b.say("odometry/filtered", odometry(b.now(), x=-0.9))
+    b.until(lambda: b.heard["control/target"])
+    assert b.heard["control/target"][0].pose.position.x == pytest.approx(-0.5, abs=1e-3)
+
+
+def drive(b, seconds, **changes):
+    """Feed the controller for a while with a fish that should turn left."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        t = b.now()
+        if "odometry" not in changes.get("without", ()):
+            b.say("odometry/filtered", odometry(t, **changes.get("odometry", {})))
+        if "target" not in changes.get("without", ()):
+            twist = TwistStamped()
+            twist.twist.linear.x = changes.get("speed", 0.2)
+            twist.twist.angular.z = changes.get("yaw_rate", 0.1)
+            target = PoseStamped()
+            target.header.stamp = to_stamp(t)
+            target.pose.orientation = to_quaternion(0.3)
+            b.say("control/twist", twist)
+            b.say("tracking/error", Vector3Stamped())
+            b.say("control/target", target)
+        b.spin(0.01)
+
+
+def controller_bench(bench, **parameters):
+    """A patient watchdog, because a busy machine may pause the test for longer than a robot would wait."""
+    b = bench(ControllerNode, odometry_timeout=0.5, target_timeout=0.5, **parameters)
+    b.listen("joint_command", JointState)
+    b.listen("control/gains", Float64MultiArray)
+    return b
+
+
+def commands(b, count):
+    newest = b.heard["joint_command"][-count:]
+    return np.array([(m.position[0], m.velocity[0], m.position[1]) for m in newest])
+
+
+def test_controller_streams_named_commands_and_labelled_gains(bench):
+    b = controller_bench(bench)
+    drive(b, 1.5)
+    message = b.heard["joint_command"][-1]
+    assert list(message.name) == ["rotor", "rudder"]
+    moved = commands(b, 60)
+    assert np.abs(moved[:, 1]).max() > 20.0 and moved[-1, 2] > 0.0  # rad/s; a left turn
+    gains = b.heard["control/gains"][-1]
+    assert [d.label for d in gains.layout.dim] == ["steering,speed", "Kp,Ki,Kd"]
+    assert len(gains.data) == 6
+    rate = len(b.heard["joint_command"]) / (
+        seconds(message.header.stamp) - seconds(b.heard["joint_command"][0].header.stamp)
+    )
+    assert rate == pytest.approx(100.0, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ({"without": ["odometry"]}, "odometry is stale"),
+        ({"without": ["target"]}, "target is stale"),
+        ({"odometry": {"x": math.nan}}, "odometry is not finite"),
+        ({"odometry": {"variance": LOST_VARIANCE}}, "camera lost"),
+        ({"odometry": {"twist_variance": LOST_VARIANCE}}, "IMU lost"),
+    ],
+)
+def test_controller_stops_on_every_fault_and_swims_again_when_it_has_passed(bench, fault, said):
+    b = controller_bench(bench, resume_delay=0.1)
+    drive(b, 0.6)
+    assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
+    drive(b, 1.0, **fault)
+    assert b.said(b"\x02", said)
+    np.testing.assert_allclose(commands(b, 5)[:, 1:], 0.0, atol=1e-6)
+    drive(b, 0.8)
+    assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
+    assert b.said(b"\x00", "swimming")
+
+
+def test_controller_with_manual_resume_waits_for_its_service(bench):
+    b = controller_bench(bench, resume="manual")
+    client = b.other.create_client(Trigger, "resume")
+
+    def resume():
+        future = client.call_async(Trigger.Request())
+        b.until(future.done)
+        return future.result()
+
+    drive(b, 0.5)
+    drive(b, 0.7, odometry={"variance": LOST_VARIANCE})
+    assert not resume().success
+    drive(b, 1.0)
+    np.testing.assert_allclose(commands(b, 5)[:, 1:], 0.0, atol=1e-6)
+    drive(b, 0.1)
+    assert resume().success
+    drive(b, 0.8)
+    assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
+
+
+def test_controller_glides_when_no_speed_is_wanted(bench):
+    b = controller_bench(bench)
+    drive(b, 0.5)
+    drive(b, 0.8, speed=0.0, yaw_rate=0.5)
+    moved = commands(b, 10)
+    np.testing.assert_allclose(moved[:, 1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(moved[:, 2], 0.8)
+
+
+def test_controller_reports_its_latency(bench):
+    b = controller_bench(bench)
+    drive(b, 1.5)
+    values = {}
+    for array in b.heard["/diagnostics"]:
+        values.update({v.key: v.value for v in array.status[0].values})
+    assert 0.0 < float(values["latency_p50_ms"]) <= float(values["latency_p99_ms"]) < 500.0
+
+
+@pytest.mark.parametrize(
+    ("main", "parameter", "said"),
+    [
+        (planner.main, "path:='7'", "unknown letter '7'; known: A B"),
+        (planner.main, "path:=circel", "unknown path 'circel'; known: circle"),
+        (planner.main, "speed:=0.7", "speed is 0.7 m/s, expected 0.05 to 0.5 m/s"),
+        (planner.main, "speed:=fast", "speed is 'fast', expected float"),
+        (planner.main, "path_args:='{height: 2.2}'", "this must stay within |y| <= 0.965"),
+        (planner.main, "path_args:='{'", "expected YAML"),
+        (controller.main, "weights_file:=nowhere.safetensors", "nowhere.safetensors: cannot be read"),
+        (controller.main, f"weights_file:={__file__}", "not a safetensors file"),
+        (controller.main, "lookahead:=0.5", "does not fit: lookahead is 0.4, this controller runs at 0.5"),
+        (fusion.main, "gate:=-1.0", "gate is -1.0"),
+    ],
+)
+def test_what_cannot_start_says_why_in_one_line(main, parameter, said, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["node", "--ros-args", "-p", parameter])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert said in str(end.value) and "\n" not in str(end.value)
+
+
+@pytest.mark.parametrize("key", ["Y", "N", "O"])
+def test_letters_that_yaml_takes_for_something_else(graph, key, tmp_path):
+    rclpy.init()
+    arguments = ["--ros-args", "-p", f"path:={key}", "-p", f"state_file:={tmp_path / 'p.json'}"]
+    node = PlannerNode(cli_args=arguments)
+    name = node._planner.path.name
+    node.destroy_node()
+    rclpy.try_shutdown()
+    assert name == f"letter {key}"
+
+
+def test_a_program_that_cannot_start_exits_with_1(tmp_path):
+    code = "from fish_control.nodes.planner import main; main()"
+    ended = subprocess.run(
+        [sys.executable, "-c", code, "--ros-args", "-p", "path:=circel"],
+        capture_output=True,
+        text=True,
+        timeout=30,
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("planner: unknown path") and ended.stderr.count("\n") == 1
