@@ -64,6 +64,7 @@ def test_only_nodes_know_ros():
 
 @pytest.mark.parametrize("check", [["check"], ["format", "--check"]], ids=["ruff check", "ruff format"])
 def test_ruff(check):
-    program = shutil.which("ruff", path=f"{Path(sys.executable).parent}")
-    result = subprocess.run([program, *check, "--quiet", "."], cwd=ROOT, capture_output=True, text=True)
-    assert result.returncode == 0, result.stdout + result.stderr
+    program = shutil.which("ruff", path=str(Path(sys.executable).parent))
+    command = [program, *check, "--output-format", "concise", "."]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, "\n" + result.stdout + result.stderr
