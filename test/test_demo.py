@@ -80,6 +80,7 @@ BAD_INPUT = {
     "letter": (["--letter", "?"], "unknown letter '?'; known: A B C"),
     "path arguments": (["--letter", "circle", "--path-args", "{radius: "], "expected YAML"),
     "walls": (["--letter", "circle", "--path-args", "{radius: 1}"], "must stay within |y|"),
+    "not a number": (["--speed", "fast"], "invalid float value: 'fast'"),
     "speed": (["--speed", "9"], "expected 0.05 to 0.5"),
     "duration": (["--duration", "-1"], "expected a positive number"),
     "domain": (["--domain", "500"], "0 to 232"),

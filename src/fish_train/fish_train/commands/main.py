@@ -7,10 +7,19 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
+from typing import NoReturn
 
 from fish_train.errors import UserError
 
 from .verbs import VERBS
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong with an argument in one line; usage comes with --help."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2."""
+        self.exit(2, f"{self.prog}: {message} (--help says more)\n")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -36,7 +45,7 @@ def usage() -> str:
 def run_verb(verb: str, argv: list[str] | None = None) -> int:
     """Parse the arguments of one verb and run it; errors the user can mend become one line and status 1."""
     module = import_module(f"{__package__}.{verb}")
-    parser = argparse.ArgumentParser(prog=f"fish_train {verb}", description=module.__doc__)
+    parser = OneLineParser(prog=f"fish_train {verb}", description=module.__doc__)
     module.add_arguments(parser)
     args = parser.parse_args(argv)
     try:
