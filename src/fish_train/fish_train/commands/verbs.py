@@ -13,5 +13,6 @@ VERBS = {
     "import_pool": "convert the real robot's ROS 1 bags to recordings in the project's format",
     "train": "learn the gains through the simulator",
     "evaluate": "how well gains follow paths on a plant",
+    "paper": "remake the figures and the table of the paper",
     "weights": "show what is in a weights file",
 }

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from fish_train.evaluation.sensing import FusedSensing, PerfectSensing, Sensing
 from fish_train.training.episodes import CERTAIN
 from fish_train.training.loop import Law
 
+LARGEST_BATCH = 16  # runs
 MakePlant = Callable[[Sequence[Robot], Sequence[int], float], Plant]
 
 
@@ -97,24 +99,56 @@ def run_study(
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Row]:
     """Everything against everything, `jobs` processes; cells of like duration swim together."""
-    ordered = sorted(cells, key=lambda cell: longest(read_path(cell.path), cell.speed))
-    size = max(1, min(16, -(-len(ordered) // max(jobs, 1))))
-    batches = [ordered[k : k + size] for k in range(0, len(ordered), size)]
-    tasks = [(c, d, batch) for c in candidates for d in conditions for batch in batches]
+    tasks = [(c, d, batch) for c in candidates for d in conditions for batch in _batches(cells, jobs)]
+    if jobs > 1:
+        found = _in_processes(evaluate, tasks, jobs, report)
+        return [row for rows in found for row in rows]
     rows: list[Row] = []
-    if jobs == 1:
-        for done, task in enumerate(tasks, start=1):
-            rows += evaluate(*task)
-            report(done, len(tasks))
-        return rows
+    for done, task in enumerate(tasks, start=1):
+        rows += evaluate(*task)
+        report(done, len(tasks))
+    return rows
+
+
+def _batches(cells: Sequence[Cell], jobs: int) -> list[list[Cell]]:
+    """Cells of like duration together, no batch longer than needed to occupy every process."""
+    ordered = sorted(cells, key=lambda cell: longest(read_path(cell.path), cell.speed))
+    size = max(1, min(LARGEST_BATCH, -(-len(ordered) // jobs)))
+    return [ordered[k : k + size] for k in range(0, len(ordered), size)]
+
+
+def _in_processes(
+    work: Callable[..., Any],
+    tasks: Sequence[tuple[Any, ...]],
+    jobs: int,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Any]:
+    """work(*task) for every task, one core for each process; results in order."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    results = []
     with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
-        futures = [pool.submit(evaluate, *task) for task in tasks]
+        futures = [pool.submit(work, *task) for task in tasks]
         for done, future in enumerate(futures, start=1):
-            rows += future.result()
+            results.append(future.result())
             report(done, len(tasks))
-    return rows
+    return results
+
+
+def swim_all(
+    candidate: Candidate, condition: Condition, cells: Sequence[Cell], jobs: int
+) -> tuple[list[tuple[Cell, Trace, int]], list[Row]]:
+    """Traces and metrics of all cells: (cell, trace of its batch, place in the batch)."""
+    batches = _batches(cells, jobs)
+    tasks = [(candidate, condition, batch) for batch in batches]
+    traces = [swim(*task) for task in tasks] if jobs == 1 else _in_processes(swim, tasks, jobs)
+    swum = [
+        (cell, trace, k) for batch, trace in zip(batches, traces, strict=True) for k, cell in enumerate(batch)
+    ]
+    rows = [
+        Row(candidate.name, condition.name, cell, measure(trace, k, read_path(cell.path))) for cell, trace, k in swum
+    ]
+    return swum, rows
 
 
 def mean_sizes(sizes: Sequence[ErrorSizes]) -> ErrorSizes:

@@ -33,7 +33,7 @@ class TrainConfig:
     # gains and change of gains as shares of their ranges
     cost_heading: float = 1.0
     cost_speed: float = 10.0
-    cost_cross_track: float = 20.0
+    cost_cross_track: float = 50.0
     cost_setpoint_change: float = 5.0
     cost_gain_size: float = 0.002
     cost_gain_change: float = 0.2
