@@ -92,18 +92,35 @@ static inline V v_exp(V a) EACH(exp(LANE(a, l)))
 static inline V v_log(V a) EACH(log(LANE(a, l)))
 static inline V v_tanh(V a) EACH(tanh(LANE(a, l)))
 static inline V v_sqrt(V a) EACH(sqrt(LANE(a, l)))
-static inline V v_fabs(V a) EACH(fabs(LANE(a, l)))
 static inline V v_floor(V a) EACH(floor(LANE(a, l)))
-static inline V v_sign(V a) EACH((double)((LANE(a, l) > 0) - (LANE(a, l) < 0)))
-static inline V v_not(V a) EACH(LANE(a, l) == 0 ? 1.0 : 0.0)
 static inline V v_atan2(V a, V b) EACH(atan2(LANE(a, l), LANE(b, l)))
 static inline V v_pow(V a, V b) EACH(pow(LANE(a, l), LANE(b, l)))
-static inline V v_fmin(V a, V b) EACH(LANE(a, l) < LANE(b, l) ? LANE(a, l) : LANE(b, l))
-static inline V v_fmax(V a, V b) EACH(LANE(a, l) > LANE(b, l) ? LANE(a, l) : LANE(b, l))
-static inline V v_lt(V a, V b) EACH(LANE(a, l) < LANE(b, l) ? 1.0 : 0.0)
-static inline V v_le(V a, V b) EACH(LANE(a, l) <= LANE(b, l) ? 1.0 : 0.0)
-static inline V v_eq(V a, V b) EACH(LANE(a, l) == LANE(b, l) ? 1.0 : 0.0)
-static inline V v_ne(V a, V b) EACH(LANE(a, l) != LANE(b, l) ? 1.0 : 0.0)
-static inline V v_and(V a, V b) EACH(LANE(a, l) != 0 && LANE(b, l) != 0 ? 1.0 : 0.0)
-static inline V v_or(V a, V b) EACH(LANE(a, l) != 0 || LANE(b, l) != 0 ? 1.0 : 0.0)
-static inline V v_if_else_zero(V a, V b) EACH(LANE(a, l) != 0 ? LANE(b, l) : 0.0)
+
+/* comparisons and selections: C's ?: does not take vectors, masks do */
+#if LANES == 1
+static inline V v_fabs(V a) { return fabs(a); }
+static inline V v_fmin(V a, V b) { return a < b ? a : b; }
+static inline V v_fmax(V a, V b) { return a > b ? a : b; }
+static inline V v_lt(V a, V b) { return a < b; }
+static inline V v_le(V a, V b) { return a <= b; }
+static inline V v_eq(V a, V b) { return a == b; }
+static inline V v_ne(V a, V b) { return a != b; }
+static inline V v_not(V a) { return a == 0.0; }
+static inline V v_if_else_zero(V a, V b) { return a != 0.0 ? b : 0.0; }
+#else
+typedef long long M __attribute__((vector_size(8 * LANES)));
+static inline V v_select(M m, V a, V b) { return (V)((m & (M)a) | (~m & (M)b)); }
+static inline V v_where(M m, V a) { return (V)(m & (M)a); }
+static inline V v_fabs(V a) { return v_select(a < v_constant(0.0), -a, a); }
+static inline V v_fmin(V a, V b) { return v_select(a < b, a, b); }
+static inline V v_fmax(V a, V b) { return v_select(a > b, a, b); }
+static inline V v_lt(V a, V b) { return v_where(a < b, v_constant(1.0)); }
+static inline V v_le(V a, V b) { return v_where(a <= b, v_constant(1.0)); }
+static inline V v_eq(V a, V b) { return v_where(a == b, v_constant(1.0)); }
+static inline V v_ne(V a, V b) { return v_where(a != b, v_constant(1.0)); }
+static inline V v_not(V a) { return v_where(a == v_constant(0.0), v_constant(1.0)); }
+static inline V v_if_else_zero(V a, V b) { return v_where(a != v_constant(0.0), b); }
+#endif
+static inline V v_and(V a, V b) { return v_if_else_zero(a, v_ne(b, v_constant(0.0))); }
+static inline V v_or(V a, V b) { return v_fmax(v_ne(a, v_constant(0.0)), v_ne(b, v_constant(0.0))); }
+static inline V v_sign(V a) { return v_lt(v_constant(0.0), a) - v_lt(a, v_constant(0.0)); }

@@ -16,9 +16,9 @@ from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, fit_hypothesis
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 
-RANK_STARTS = (0.3, 1.0)  # strengths, in typical ones, from which a candidate is tried
+RANK_STARTS = (0.3,)  # strengths, in typical ones, from which a candidate is tried
 RANK_ITERATIONS = 2
-SHORTLIST = 5
+SHORTLIST = 4
 LOOK_ALIKES = (
     ("tip_slip", "wake_memory", "tail_joint_damping"),
     ("rudder_lag", "rudder_delay"),
