@@ -10,7 +10,8 @@ import math
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
-STROKE_FREQUENCY = 2.0  # Hz, MODEL: f fixed, A carries the throttle
+from fish_control.stroke_mean import STROKE_FREQUENCY
+
 TINY = 1e-9  # m, keeps a share of nothing at zero
 AMPLITUDE_AT_FULL_THROTTLE = 12.0  # rad, MODEL: S_max = (12 rad (2 pi 2 Hz)^2)^2
 

@@ -17,13 +17,13 @@ from fish_control.control_law import (
     actuator_step,
     control_step,
 )
-from fish_control.line_of_sight import GuidanceState, Motion, heading_error, observe
+from fish_control.line_of_sight import Motion, heading_error
+from fish_control.motion_observer import MotionObserver
 from fish_control.policy import Policy, policy_inputs
 
 STANDING_SPEED = 0.02  # m/s, a gliding fish that is slower has stopped
 RELEASE_RATE = 0.2  # rad/s, of a rudder that is let go
 SEAM = 0.7  # rad, more than the head swings
-LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
 
 
 class Command(NamedTuple):
@@ -52,8 +52,7 @@ class Controller:
         self._limits = policy.contract.limits
         self._guidance = policy.contract.guidance
         self._motion: Motion | None = None
-        self._time: float | None = None
-        self._observed = GuidanceState()
+        self._observer = MotionObserver(self._guidance)
         self._control = ControlState()
         self._setpoint = Setpoint(0.0, 0.0)
         self._actuators = ActuatorState()
@@ -61,12 +60,8 @@ class Controller:
 
     def observe(self, time: float, motion: Motion) -> None:
         """Take in odometry stamped `time` [s]; call it with every message."""
-        dt = 0.0 if self._time is None else time - self._time
-        self._time, self._motion = time, motion
-        if 0.0 < dt <= LONGEST_STEP:
-            self._observed = observe(self._observed, motion, dt, self._guidance, np)
-        else:
-            self._observed = GuidanceState()
+        self._motion = motion
+        self._observer.add(time, motion)
 
     def decide(self, wanted: Wanted) -> Gains:
         """One control period at a wanted speed above zero: errors, gains from the policy, new set-points."""
@@ -76,10 +71,10 @@ class Controller:
         curvature = wanted.yaw_rate / wanted.speed
         e_psi = continued(
             self._control.heading_error,
-            float(heading_error(self._observed, motion, wanted.course, curvature, self._guidance, np)),
+            float(heading_error(self._observer.state, motion, wanted.course, curvature, self._guidance, np)),
         )
         e_u = wanted.speed - motion.surge
-        mean_heading = motion.heading - self._observed.stroke.heading
+        mean_heading = motion.heading - self._observer.state.stroke.heading
         inputs = policy_inputs(
             mean_heading,
             motion.surge,

@@ -11,13 +11,12 @@ import numpy as np
 
 from fish_control.line_of_sight import (
     GuidanceConfig,
-    GuidanceState,
     Motion,
     PathAhead,
     TrackingErrors,
-    observe,
     tracking_errors,
 )
+from fish_control.motion_observer import MotionObserver
 from fish_control.path_batch import TrackerConfig
 from fish_control.path_tracker import PathPoint, PathTracker
 from fish_control.pool import stopping_side
@@ -25,7 +24,6 @@ from fish_control.reference_path import ReferencePath
 
 SLOWEST, FASTEST = 0.05, 0.5  # m/s, the range of speeds of the robot
 GLIDING_YAW_RATE = 0.5  # rad/s, wanted after the end; the rudder is hard over, so only its sign counts
-LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
 
 
 @dataclass(frozen=True)
@@ -54,8 +52,7 @@ class Planner:
         self.tracker = PathTracker(path, tracker)
         self.finished = False
         self._guidance = guidance or GuidanceConfig()
-        self._state = GuidanceState()
-        self._time: float | None = None
+        self._observer = MotionObserver(self._guidance)
         self._side = 0.0  # +1 left, -1 right, chosen when the end is passed
 
     def start_nearest(self, x: float, y: float) -> None:
@@ -81,12 +78,7 @@ class Planner:
 
     def observe(self, time: float, motion: Motion) -> None:
         """Take in odometry stamped `time` [s]; call it with every message."""
-        dt = 0.0 if self._time is None else time - self._time
-        self._time = time
-        if not 0.0 < dt <= LONGEST_STEP:
-            self._state = GuidanceState()
-            return
-        self._state = observe(self._state, motion, dt, self._guidance, np)
+        self._observer.add(time, motion)
 
     def plan(self, motion: Motion) -> Plan:
         """Advance along the path and say what to do."""
@@ -95,7 +87,7 @@ class Planner:
         speed = 0.0 if self.finished else self.speed
         ahead = PathAhead(at.x, at.y, at.heading, at.curvature, at.target[0], at.target[1], at.chord)
         errors = TrackingErrors(
-            *map(float, tracking_errors(self._state, motion, ahead, speed, self._guidance, np))
+            *map(float, tracking_errors(self._observer.state, motion, ahead, speed, self._guidance, np))
         )
         if self.finished:
             return Plan(at, errors, 0.0, self._stopping_yaw_rate(motion))

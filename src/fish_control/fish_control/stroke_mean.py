@@ -6,8 +6,13 @@ swing z of the heading is what a band-pass lets through of the integrated yaw ra
     z'' + 2 zeta w z' + w^2 z = 2 zeta w r        psi_mean = psi - z,  r_mean = r - z'
 
 and the same for the sway velocity, whose swing is taken off in the same way. No angle is unwrapped, and a
-steady turn is delayed by 2 zeta / w only (0.05 s at 2 Hz; a mean over one stroke would delay it
-by 0.25 s). Written on generic scalars: numpy and CasADi run the same lines.
+steady turn is delayed by 2 zeta / w only (0.05 s at 2 Hz; a mean over one stroke would delay it by 0.25 s).
+
+Measured in the closed loop with simulated sensors (letters R, S, I at 0.15 and 0.2 m/s): speed error 9 to 17 mm/s
+and rudder motion 0.35 to 0.6 rad/s with the mean heading; 30 to 73 mm/s and 2.7 to 2.9 rad/s with the heading as
+it is, because a wagging rudder swims by itself.
+
+Written on generic scalars: numpy and CasADi run the same lines.
 """
 
 from __future__ import annotations
