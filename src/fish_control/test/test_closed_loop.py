@@ -1,16 +1,14 @@
 """The whole chain without ROS: simulated fish, noisy and delayed sensors, fusion, planner, controller."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from closed_loop import swim
 
-from fish_control.gains_file import read_gains_file
+from fish_control.hand_tuned import hand_tuned_policy
 from fish_control.line_of_sight import GuidanceConfig
 from fish_control.paths import make_path
 
-POLICY = read_gains_file(Path(__file__).parents[1] / "config" / "gains.safetensors")
+POLICY = hand_tuned_policy()
 
 
 def test_the_letter_r_from_rest():
