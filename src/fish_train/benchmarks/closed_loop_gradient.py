@@ -2,10 +2,11 @@
 
     taskset -c 0 python src/fish_train/benchmarks/closed_loop_gradient.py
 
-Needs jax and jaxlib (pip install jax jaxlib), which nothing else in the project uses. The laws and the cost are the
-project's own functions traced with jax.numpy; the physics is written anew on whole arrays (bodies x coordinates x fish),
-because XLA runs the project's scalar form 30 times slower; periods, physics steps and stages run in lax.scan. Prints
-environment steps (of 20 ms, two physics steps) per second, forward and backward, and how far both gradients are apart.
+Needs jax and jaxlib (pip install jax jaxlib), which nothing else in the project uses. The laws and the cost are
+the project's own functions traced with jax.numpy; the physics is written anew on whole arrays (bodies x
+coordinates x fish), because XLA runs the project's scalar form several times slower; periods, physics steps and
+stages run in lax.scan. Prints environment steps (of 20 ms, two physics steps) per second, forward and backward,
+and how far both gradients are apart.
 """
 
 from __future__ import annotations
@@ -37,7 +38,9 @@ from fish_train.training.path_bank import PathBank  # noqa: E402
 
 STEPS = 15
 COST = np.array([1.0, 10.0, 10.0, 0.1, 0.01, 0.1])
-RK4 = np.array([[0.0, 1 / 6, 0.0], [0.5, 1 / 3, 0.5], [0.5, 1 / 3, 0.5], [1.0, 1 / 6, 1.0]])  # a, b, c of each stage
+RK4 = np.array(
+    [[0.0, 1 / 6, 0.0], [0.5, 1 / 3, 0.5], [0.5, 1 / 3, 0.5], [1.0, 1 / 6, 1.0]]
+)  # a, b, c of each stage
 COORDINATES = 6  # x, y, head, three links
 ANGLES = np.array([2, 3, 4, 5, 5])  # of head, links, fin among the coordinates
 LENGTH = np.array([0, 1, 1, 1, 2])  # which length reaches back along each angle
@@ -63,8 +66,10 @@ def motion_rates(x: jax.Array, drive: jax.Array, drive_rate: jax.Array, p: dict[
     lengths = jnp.stack([p["hinge_offset"], p["link_length"], p["fin_length"]])[LENGTH]  # (5 angles, B)
     arm = -ARM[..., None] * lengths  # (6, 5, B)
     jx, jy = -arm * sin, arm * cos
-    J = [jnp.concatenate([jnp.broadcast_to(unit, (6, 2, x.shape[1])), j[:, :3], j[:, 3:4] + j[:, 4:5]], axis=1)
-         for unit, j in ((np.array([1.0, 0.0])[None, :, None], jx), (np.array([0.0, 1.0])[None, :, None], jy))]  # fmt: skip
+    J = []
+    for unit, j in (([1.0, 0.0], jx), ([0.0, 1.0], jy)):
+        base = jnp.broadcast_to(np.array(unit)[None, :, None], (6, 2, x.shape[1]))
+        J.append(jnp.concatenate([base, j[:, :3], j[:, 3:4] + j[:, 4:5]], axis=1))
     c, s = cos[DIRECTION][:, None], sin[DIRECTION][:, None]
     along, left = J[0] * c + J[1] * s, J[1] * c - J[0] * s  # (6, 6, B)
     u, v = (along * qd).sum(axis=1), (left * qd).sum(axis=1)
@@ -80,7 +85,9 @@ def motion_rates(x: jax.Array, drive: jax.Array, drive_rate: jax.Array, p: dict[
     h = (along[body] * X[:, None] + left[body] * Y[:, None]).sum(axis=0)
     h = h.at[TURN].add(N).at[3:].add(bend).at[2:5].add(-bend).at[2].add(p["rotor_inertia"] * drive_rate[1])
     mu, mv = (mass + surge)[:, None, None], (mass + sway)[:, None, None]
-    M = (mu * along[body, :, None] * along[body, None] + mv * left[body, :, None] * left[body, None]).sum(axis=0)
+    M = (mu * along[body, :, None] * along[body, None] + mv * left[body, :, None] * left[body, None]).sum(
+        axis=0
+    )
     M = M.at[TURN, TURN].add(inertia)
     free, response = _solve(M, jnp.stack([-h, left[5]], axis=1))
     slip, course = v[5], u[5]
@@ -122,7 +129,9 @@ class JaxLoop:
     def __init__(self, stepper: Stepper, law: Law, bank: PathBank) -> None:
         self._stepper, self._law = stepper, law
         rows = max(len(t.rows) for t in bank.tables)
-        self._rows = jnp.array([np.pad(t.rows, ((0, rows - len(t.rows)), (0, 0)), mode="edge") for t in bank.tables])
+        self._rows = jnp.array(
+            [np.pad(t.rows, ((0, rows - len(t.rows)), (0, 0)), mode="edge") for t in bank.tables]
+        )
         self._spacing = jnp.array([t.spacing for t in bank.tables])
         self._count = jnp.array([t.count if t.closed else 10**9 for t in bank.tables])
         self._last = jnp.array([len(t.rows) - 1 for t in bank.tables])
@@ -187,12 +196,16 @@ class JaxLoop:
         now = self._motion(carry["plant"])
         x, y = (jax.lax.stop_gradient(v) for v in now[:2])
         place, near = self._locate(path, (carry["progress"], carry["captured"]), x, y)
-        return place, sense([*carry["before"], *now], now, list(carry["guidance"]), near, near, speed, COST, self._law, XP)
+        return place, sense(
+            [*carry["before"], *now], now, list(carry["guidance"]), near, near, speed, COST, self._law, XP
+        )
 
     def _motion(self, plant: jax.Array) -> list[jax.Array]:
         return motion(list(plant[:3]), list(plant[COORDINATES : COORDINATES + 3]), XP)
 
-    def _cost(self, flat: jax.Array, carry: dict, path: jax.Array, speed: jax.Array, p: jax.Array) -> jax.Array:
+    def _cost(
+        self, flat: jax.Array, carry: dict, path: jax.Array, speed: jax.Array, p: jax.Array
+    ) -> jax.Array:
         """Mean stage cost of the window."""
         weights, parameters = split(flat), dict(zip(self._stepper.layout.parameters, p.T, strict=True))
         stack = lambda values: jnp.stack(jnp.broadcast_arrays(*values))  # noqa: E731
@@ -214,7 +227,9 @@ class JaxLoop:
             start = (carry["plant"], carry["actuator"])
             (plant, actuator), motions = jax.lax.scan(physics, start, length=PHYSICS_STEPS)
             after = {"plant": plant, "before": motions[-2], "progress": place[0], "captured": place[1]}
-            after |= {k: stack(v) for k, v in (("guidance", sensed["guidance"]), ("control", acted["control"]))}
+            after |= {
+                k: stack(v) for k, v in (("guidance", sensed["guidance"]), ("control", acted["control"]))
+            }
             after |= {"actuator": actuator, "last": stack(acted["last"])}
             return after, sensed["cost"][0].sum() * carry["counts"] + acted["cost"][0].sum()
 
@@ -242,7 +257,9 @@ def make_fleet(stepper: Stepper, bank: PathBank, batch: int, rng: np.random.Gene
 def carry_of(fleet: Fleet) -> dict:
     """The fleet's state as JaxLoop carries it: rows are quantities, columns fish."""
     cuts = np.cumsum([SIZES[k] for k in ("guidance", "control", "actuator")])
-    parts = dict(zip(("guidance", "control", "actuator", "last"), np.split(fleet.memory.T, cuts), strict=True))
+    parts = dict(
+        zip(("guidance", "control", "actuator", "last"), np.split(fleet.memory.T, cuts), strict=True)
+    )
     carry = {"plant": fleet.plant.T, "before": fleet.history[:, -1].T, **parts, "progress": fleet.place[:, 0]}
     return {k: jnp.array(v) for k, v in carry.items()} | {"captured": jnp.array(fleet.place[:, 1] != 0.0)}
 
@@ -265,16 +282,24 @@ def main() -> None:
     args = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
     law, stepper = Law(), Stepper(Robot().structure, Scheme("rk4", 1))
-    bank = PathBank([make_path("circle", radius=1.0), make_path("sinusoid", amplitude=1.0, length=10.0)], law.tracker)
+    bank = PathBank(
+        [make_path("circle", radius=1.0), make_path("sinusoid", amplitude=1.0, length=10.0)], law.tracker
+    )
     rng = np.random.default_rng(0)
-    start = dict(steering_kp=0.5, steering_ki=0.1, steering_kd=0.1, speed_kp=1.0, speed_ki=0.05, speed_kd=0.01)
+    start = dict(
+        steering_kp=0.5, steering_ki=0.1, steering_kd=0.1, speed_kp=1.0, speed_ki=0.05, speed_kd=0.01
+    )
     weights = initial_weights(rng, start) + 0.02 * rng.standard_normal(len(initial_weights(rng, start)))
     ours, theirs = CompiledLoop(stepper, law, bank), JaxLoop(stepper, law, bank)
     for batch in args.batch:
         fleet = make_fleet(stepper, bank, batch, rng)
         for _ in range(3):
             ours.window(weights, fleet, STEPS, COST)
-        inputs = (jnp.array(weights), carry_of(fleet), *map(jnp.array, (fleet.path, fleet.speed, fleet.parameters)))
+        inputs = (
+            jnp.array(weights),
+            carry_of(fleet),
+            *map(jnp.array, (fleet.path, fleet.speed, fleet.parameters)),
+        )
         began = time.perf_counter()
         value, gradient = jax.block_until_ready(theirs.gradient(*inputs))
         compiled_in = time.perf_counter() - began
@@ -292,7 +317,8 @@ def main() -> None:
         rate = batch * STEPS
         print(
             f"B = {batch:3d}: compiled {rate / a:9.0f} env steps/s, JAX {rate / b:9.0f}, ratio {b / a:.2f} "
-            f"(cost {mine.cost:.9f} / {float(value):.9f}, gradients {apart:.1e} apart, JAX compiled in {compiled_in:.0f} s)"
+            f"(cost {mine.cost:.9f} / {float(value):.9f}, gradients {apart:.1e} apart, "
+            f"JAX compiled in {compiled_in:.0f} s)"
         )
 
 

@@ -1,7 +1,7 @@
 """How well gains follow paths: any weights on any paths, speeds, plants and seeds.
 
-Without --perfect every run goes through the camera model (noise, jitter, loss, latency), the IMU model and the robot's own
-fusion. Writes runs.csv and a page; prints the table.
+Without --perfect every run goes through the camera model (noise, jitter, loss, latency), the IMU model and the
+robot's own fusion. Writes runs.csv and a page; prints the table.
 """
 
 from __future__ import annotations
@@ -14,40 +14,54 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from ..errors import UserError
-
+from fish_train.errors import UserError
 
 LOG_WIDTH = 200  # characters, where the output is no terminal
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
-    parser.add_argument("--weights", nargs="+", default=[], metavar="[NAME=]FILE", help="weights files, schedules")
     parser.add_argument(
-        "--constant", nargs="+", default=[], metavar="[NAME=]KP,KI,KD,KP,KI,KD", help="gains of steering and speed"
+        "--weights", nargs="+", default=[], metavar="[NAME=]FILE", help="weights files, schedules"
+    )
+    parser.add_argument(
+        "--constant",
+        nargs="+",
+        default=[],
+        metavar="[NAME=]KP,KI,KD,KP,KI,KD",
+        help="gains of steering and speed",
     )
     parser.add_argument("--paths", nargs="+", default=["I", "R", "O", "S"], help="R, circle:radius=0.6, ...")
     parser.add_argument("--speeds", nargs="+", type=float, default=[0.1, 0.15, 0.2, 0.25], help="m/s")
     parser.add_argument("--seeds", type=int, default=3, help="runs of each cell (default: %(default)s)")
     parser.add_argument("--plant", type=Path, help="robot.yaml or model.yaml (default: the nominal robot)")
-    parser.add_argument("--off", type=float, default=0.0, help="uncertain parameters wrong by up to this share")
+    parser.add_argument(
+        "--off", type=float, default=0.0, help="uncertain parameters wrong by up to this share"
+    )
     parser.add_argument("--current", type=float, default=0.0, help="m/s, across the pool")
     parser.add_argument("--latency", type=float, help="s, of the camera")
-    parser.add_argument("--perfect", action="store_true", help="perfect state and still water instead of sensors")
-    parser.add_argument("--robust", action="store_true", help="nominal, parameters off 30 %%, latency 0.3 s, current")
+    parser.add_argument(
+        "--perfect", action="store_true", help="perfect state and still water instead of sensors"
+    )
+    parser.add_argument(
+        "--robust", action="store_true", help="nominal, parameters off 30 %%, latency 0.3 s, current"
+    )
     parser.add_argument("--out", type=Path, default=Path("evaluation"), help="folder (default: %(default)s)")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate, print, write; 1 if a run failed."""
-    from ..evaluation.candidates import constant_candidate, read_candidate
-    from ..evaluation.cells import make_cells, read_path
-    from ..evaluation.conditions import make_condition, robust_conditions
-    from ..evaluation.page import write_study_page
-    from ..evaluation.study import run_study, write_rows
-    from ..evaluation.tables import summary_table
-    from ..score_table import print_table
+    from fish_train.evaluation.candidates import constant_candidate, read_candidate
+    from fish_train.evaluation.cells import make_cells, read_path
+    from fish_train.evaluation.conditions import make_condition, robust_conditions
+    from fish_train.evaluation.page import write_study_page
+    from fish_train.evaluation.study import run_study, write_rows
+    from fish_train.evaluation.tables import summary_table
+    from fish_train.score_table import print_table
+
     from .train import read_robot
 
     candidates = [*map(read_candidate, args.weights), *map(constant_candidate, args.constant)]
@@ -69,7 +83,11 @@ def run(args: argparse.Namespace) -> int:
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task(f"{len(candidates) * len(conditions) * len(cells)} runs", total=None)
         rows = run_study(
-            candidates, conditions, cells, args.jobs, lambda done, total: progress.update(task, completed=done, total=total)
+            candidates,
+            conditions,
+            cells,
+            args.jobs,
+            lambda done, total: progress.update(task, completed=done, total=total),
         )
     args.out.mkdir(parents=True, exist_ok=True)
     write_rows(args.out / "runs.csv", rows)
@@ -78,7 +96,11 @@ def run(args: argparse.Namespace) -> int:
     failed = [row for row in rows if row.metrics.failure]
     for row in failed[:20]:
         cell = f"{row.cell.path} at {row.cell.speed:g} m/s, seed {row.cell.seed}"
-        console.print(f"failed: {row.candidate}, {row.condition}, {cell}: {row.metrics.failure}", soft_wrap=True)
+        console.print(
+            f"failed: {row.candidate}, {row.condition}, {cell}: {row.metrics.failure}", soft_wrap=True
+        )
     spent = time.monotonic() - began
-    console.print(f"{len(rows)} runs in {spent:.0f} s; runs.csv and evaluation.html in {args.out}", soft_wrap=True)
+    console.print(
+        f"{len(rows)} runs in {spent:.0f} s; runs.csv and evaluation.html in {args.out}", soft_wrap=True
+    )
     return 1 if failed else 0

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from ..errors import UserError
-from ..evaluation import paper_numbers as paper
+from fish_train.errors import UserError
+from fish_train.evaluation import paper_numbers as paper
 
 if TYPE_CHECKING:
-    from ..training.run_log import CurveRow
+    from fish_train.training.run_log import CurveRow
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,17 +26,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--weights", type=Path, help="weights file (default: of the first trained seed)")
     parser.add_argument("--training", type=Path, help="folder of trained seeds (default: OUT/training)")
     parser.add_argument("--training-seeds", type=int, default=paper.SEEDS, help="default: %(default)s")
-    parser.add_argument("--seeds", type=int, default=3, help="runs of each letter and speed (default: %(default)s)")
+    parser.add_argument(
+        "--seeds", type=int, default=3, help="runs of each letter and speed (default: %(default)s)"
+    )
     parser.add_argument("--robot", type=Path, help="robot.yaml or model.yaml (default: nominal)")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Everything; 0 when the page is written."""
-    from ..evaluation.candidates import read_policy
-    from ..evaluation.cells import make_cells
-    from ..evaluation.conditions import make_condition
-    from ..evaluation.paper_page import (
+    from fish_train.evaluation.candidates import read_policy
+    from fish_train.evaluation.cells import make_cells
+    from fish_train.evaluation.conditions import make_condition
+    from fish_train.evaluation.paper_page import (
         better_cells,
         error_table,
         letter_blocks,
@@ -45,7 +49,8 @@ def run(args: argparse.Namespace) -> int:
         training_blocks,
         write_paper_page,
     )
-    from ..evaluation.study import swim_all
+    from fish_train.evaluation.study import swim_all
+
     from .train import read_robot
 
     if min(args.seeds, args.jobs, args.training_seeds) < 1:
@@ -65,7 +70,9 @@ def run(args: argparse.Namespace) -> int:
         error_table(rows), *letter_blocks(candidate, condition, traces),
     ])  # fmt: skip
     total = len(paper.LETTERS) * len(paper.SPEEDS)
-    console.print(f"better than the paper's real robot in {better_cells(rows)} of {total} cells; {page}", soft_wrap=True)
+    console.print(
+        f"better than the paper's real robot in {better_cells(rows)} of {total} cells; {page}", soft_wrap=True
+    )
     return 0
 
 
@@ -73,12 +80,12 @@ def trained(
     folder: Path, seeds: int, robot: object, jobs: int, console: Console
 ) -> tuple[Sequence[Sequence[CurveRow]], int]:
     """Curves of the seeds, trained or continued where they are not finished; and the number of levels."""
-    from ..training.config import TrainConfig
-    from ..training.curriculum import make_levels
-    from ..training.display import Display
-    from ..training.run import Job
-    from ..training.run_log import read_curve
-    from ..training.seeds import run_all
+    from fish_train.training.config import TrainConfig
+    from fish_train.training.curriculum import make_levels
+    from fish_train.training.display import Display
+    from fish_train.training.run import Job
+    from fish_train.training.run_log import read_curve
+    from fish_train.training.seeds import run_all
 
     config = TrainConfig()
     todo = [

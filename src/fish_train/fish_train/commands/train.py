@@ -1,8 +1,8 @@
 """Learn the gains by backpropagation through simulator, control law and actuators.
 
-Writes for every seed a folder with the weights file (gains.safetensors), a model card, the training curve (curve.csv,
-TensorBoard events) and a checkpoint from which a killed run continues exactly (--resume). Any key of the recipe
-(config/train.yaml) can be set: --set learning_rate=3e-4 latency=0.1 randomise=0.3
+Writes for every seed a folder with the weights file (gains.safetensors), a model card, the training curve
+(curve.csv, TensorBoard events) and a checkpoint from which a killed run continues exactly (--resume). Any key of
+the recipe (config/train.yaml) can be set: --set learning_rate=3e-4 latency=0.1 randomise=0.3
 """
 
 from __future__ import annotations
@@ -18,21 +18,24 @@ import yaml
 from rich.console import Console
 
 from fish_sim.robot import Robot, RobotError, load_robot
-
-from ..errors import UserError
+from fish_train.errors import UserError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
-    parser.add_argument("--out", type=Path, default=Path("training"), help="folder of the runs (default: %(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("training"), help="folder of the runs (default: %(default)s)"
+    )
     parser.add_argument("--config", type=Path, help="recipe, a YAML file; keys left out take their defaults")
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="values of the recipe")
-    parser.add_argument("--robot", type=Path, help="robot.yaml or a model.yaml of the diagnosis (default: nominal)")
+    parser.add_argument(
+        "--robot", type=Path, help="robot.yaml or a model.yaml of the diagnosis (default: nominal)"
+    )
     parser.add_argument(
         "--form",
         choices=["network", "schedule", "constant"],
         default="network",
-        help="what is learned: the paper's network, or for comparison gains scheduled on speed and curvature, or constants",
+        help="what is learned: the paper's network, or as baselines a schedule on speed and curvature, constants",
     )
     parser.add_argument(
         "--search",
@@ -42,23 +45,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--warm-start", type=Path, help="weights file to start from")
     parser.add_argument("--seed", type=int, default=1, help="first seed (default: %(default)s)")
     parser.add_argument("--seeds", type=int, default=1, help="number of runs, with consecutive seeds")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="runs side by side (default: %(default)s)")
-    parser.add_argument("--max-seconds", type=float, default=float("inf"), help="stop each run after this time")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, help="runs side by side (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--max-seconds", type=float, default=float("inf"), help="stop each run after this time"
+    )
     parser.add_argument("--resume", action="store_true", help="continue runs that were stopped or killed")
     parser.add_argument("--overwrite", action="store_true", help="replace runs that are there")
 
 
 def run(args: argparse.Namespace) -> int:
     """Train; 0 when every run finished its recipe."""
-    from ..training.config import load_config, make_config
-    from ..training.display import Display
-    from ..training.run import Job
-    from ..training.seeds import run_all
+    from fish_train.training.config import load_config, make_config
+    from fish_train.training.display import Display
+    from fish_train.training.run import Job
+    from fish_train.training.seeds import run_all
 
     if args.seeds < 1 or args.jobs < 1 or args.seed < 0:
-        raise UserError(f"--seed {args.seed} --seeds {args.seeds} --jobs {args.jobs}: expected counts of at least 1")
+        raise UserError(
+            f"--seed {args.seed} --seeds {args.seeds} --jobs {args.jobs}: expected counts of at least 1"
+        )
     if args.search and args.form == "network":
-        raise UserError("--search: got form network; differential evolution is for --form constant or schedule")
+        raise UserError(
+            "--search: got form network; differential evolution is for --form constant or schedule"
+        )
     config = make_config({**(load_config(args.config) if args.config else {}), **parse_settings(args.set)})
     robot = read_robot(args.robot)
     jobs = [
@@ -81,7 +92,10 @@ def run(args: argparse.Namespace) -> int:
     with Display(console) as display:
         statuses = run_all(jobs, min(args.jobs, args.seeds), display)
     finished = sum(status.state == "finished" for status in statuses)
-    console.print(f"{finished} of {len(statuses)} runs finished; weights, cards and curves in {args.out}", soft_wrap=True)
+    console.print(
+        f"{finished} of {len(statuses)} runs finished; weights, cards and curves in {args.out}",
+        soft_wrap=True,
+    )
     return 0 if finished == len(statuses) else 1
 
 

@@ -16,8 +16,7 @@ from rich.table import Table
 from fish_control.contract import INPUTS
 from fish_control.gains_file import GainsFileError, read_gains_file
 from fish_control.policy import Policy, policy_inputs
-
-from ..errors import UserError
+from fish_train.errors import UserError
 
 SITUATIONS = (  # heading error [rad], speed error [m/s], cross-track error [m], wanted speed [m/s]
     ("on the path, 0.1 m/s", 0.0, 0.0, 0.0, 0.1),
@@ -81,4 +80,3 @@ def gains_table(policy: Policy) -> Table:
         gains = policy.gains(np.array(policy_inputs(*values, np, inputs)))
         table.add_row(name, *(f"{float(g):.4f}" for g in gains))
     return table
-

@@ -35,7 +35,9 @@ def read_policy(name: str, path: Path) -> Candidate:
         raise UserError(str(error)) from error
     c = policy.contract
     if not np.isclose(c.control_period, CONTROL_PERIOD):
-        raise UserError(f"{path}: control period is {c.control_period} s; evaluation runs at {CONTROL_PERIOD} s")
+        raise UserError(
+            f"{path}: control period is {c.control_period} s; evaluation runs at {CONTROL_PERIOD} s"
+        )
     tracker = TrackerConfig(lookahead=c.lookahead)
     return Candidate(name, PolicyGains(policy), Law(limits=c.limits, guidance=c.guidance, tracker=tracker))
 
@@ -46,7 +48,9 @@ def read_schedule(name: str, path: Path) -> Candidate:
         content = json.loads(path.read_text(encoding="utf-8"))
         weights = np.array(content["weights"], dtype=float)
     except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-        raise UserError(f"{path}: not a schedule written by fish_train train --form schedule ({error})") from error
+        raise UserError(
+            f"{path}: not a schedule written by fish_train train --form schedule ({error})"
+        ) from error
     expected = weight_count(FORMS["schedule"].layers)
     if weights.shape != (expected,):
         raise UserError(f"{path}: weights have shape {weights.shape}; expected ({expected},)")
@@ -59,7 +63,9 @@ def constant_candidate(text: str) -> Candidate:
     try:
         values = [float(part) for part in (rest if equals else text).split(",")]
     except ValueError:
-        raise UserError(f"constant gains {text!r}: expected six numbers, kp,ki,kd of steering and of speed") from None
+        raise UserError(
+            f"constant gains {text!r}: expected six numbers, kp,ki,kd of steering and of speed"
+        ) from None
     if len(values) != len(OUTPUTS):
         raise UserError(f"constant gains {text!r}: got {len(values)} numbers; expected {len(OUTPUTS)}")
     for value, output in zip(values, OUTPUTS, strict=True):

@@ -69,5 +69,5 @@ def start_pose(path: ReferencePath, seed: int) -> tuple[float, float, float]:
 def longest(path: ReferencePath, speed: float) -> float:
     """Duration of a run [s]."""
     if path.closed:
-        return (LAPS * path.length + RUN_UP) / speed + STARTING / 2
-    return SLACK * (path.length + RUN_UP) / speed + STARTING
+        return float(LAPS * path.length + RUN_UP) / speed + STARTING / 2
+    return float(SLACK * (path.length + RUN_UP)) / speed + STARTING

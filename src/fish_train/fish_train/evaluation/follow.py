@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +74,9 @@ class Follower:
         """Take in what is seen (B, 6); robots without an estimate yet keep their memory."""
         motion = Motion(*seen.T)
         after = observe(self._guidance, motion, DT, self._law.guidance, np)
-        stroke = StrokeState(*(np.where(known, a, b) for a, b in zip(after.stroke, self._guidance.stroke, strict=True)))
+        stroke = StrokeState(
+            *(np.where(known, a, b) for a, b in zip(after.stroke, self._guidance.stroke, strict=True))
+        )
         self._guidance = GuidanceState(stroke, np.where(known, after.drift, self._guidance.drift))
 
     def decide(self, seen: Array, known: NDArray[np.bool_]) -> None:
@@ -88,7 +91,9 @@ class Follower:
         gains = self._gains.gains(np.stack(inputs, axis=-1), self._speed, at.curvature)
         wanted = Errors(errors.heading, errors.speed, at.curvature, self._speed)
         control, setpoint = control_step(self._control, wanted, gains, CONTROL_PERIOD, self._law.limits, np)
-        self._control = ControlState(*(np.where(known, a, b) for a, b in zip(control, self._control, strict=True)))
+        self._control = ControlState(
+            *(np.where(known, a, b) for a, b in zip(control, self._control, strict=True))
+        )
         self.setpoint = Setpoint(*(np.where(known, a, 0.0) for a in setpoint))
         self.gains = np.stack(gains, axis=-1)
 
@@ -113,7 +118,7 @@ def follow(
     follower, judge = Follower(paths, speed, gains, law), PathBatch(paths, law.tracker)
     durations = np.asarray(durations, dtype=float)
     finished, ended = np.zeros(len(paths), dtype=bool), np.zeros(len(paths), dtype=bool)
-    rows: list[tuple[Array, ...]] = []
+    rows: list[list[Array]] = []
     for k in range(1, PHYSICS_STEPS * int(np.ceil(durations.max() / CONTROL_PERIOD)) + 1):
         plant.step(follower.command())
         time, motion = k * DT, plant.motion
@@ -124,17 +129,14 @@ def follow(
             continue
         follower.decide(seen, known)
         at = judge.update(np.where(lost[:, None], 0.0, motion)[:, :2])
-        rows.append(
-            tuple(
-                np.where(ended, np.nan, value.T).T
-                for value in (
-                    motion, at.cross_track_error, at.heading, at.progress, *follower.setpoint, follower.gains
-                )
-            )
-        )  # fmt: skip
+        row = (motion, at.cross_track_error, at.heading, at.progress, *follower.setpoint, follower.gains)
+        rows.append([np.where(ended, np.nan, value.T).T for value in row])
         finished |= at.finished & ~ended
         ended |= at.finished | (time >= durations) | lost
         if ended.all():
             break
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    return Trace(CONTROL_PERIOD * np.arange(1, len(rows) + 1), *columns, np.asarray(speed, dtype=float), finished)
+    time_axis = CONTROL_PERIOD * np.arange(1, len(rows) + 1, dtype=float)
+    columns: list[Array] = [np.array(column) for column in zip(*rows, strict=True)]
+    names = ("motion", "cross_track", "course", "progress", "alpha", "throttle", "gains")
+    recorded: dict[str, Any] = dict(zip(names, columns, strict=True))
+    return Trace(time_axis, **recorded, speed=np.asarray(speed, dtype=float), finished=finished)

@@ -48,4 +48,4 @@ class ScheduledGains:
         """By wanted speed and curvature only."""
         [(W, b)] = split(np.asarray(self.weights), FORMS["schedule"].layers)
         x = np.stack(schedule_inputs(speed, curvature, NUMPY), axis=-1)
-        return gains_of(np.moveaxis(x @ W.T + b, -1, 0), NUMPY)
+        return gains_of(list(np.moveaxis(x @ W.T + b, -1, 0)), NUMPY)

@@ -51,7 +51,9 @@ def measure(trace: Trace, run: int, path: ReferencePath) -> RunMetrics:
     mean_heading = stroke_mean(time, motion[:, 2])
     heading = np.angle(np.exp(1j * (trace.course[rows, run] - mean_heading)))
     speed_error = speed - motion[:, 3]
-    errors = np.column_stack([cross_track, heading, speed_error, trace.alpha[rows, run], trace.throttle[rows, run]])
+    errors = np.column_stack(
+        [cross_track, heading, speed_error, trace.alpha[rows, run], trace.throttle[rows, run]]
+    )
     near = (
         (progress > progress[0])
         & (np.abs(cross_track) < NEAR_PATH)

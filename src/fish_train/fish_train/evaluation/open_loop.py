@@ -26,10 +26,12 @@ class Swim:
     velocity: Array
 
 
-def swing(robot: Robot, amplitude: Array, frequency: float, seconds: float, rudder: float = 0.0) -> list[Swim]:
+def swing(
+    robot: Robot, amplitude: Array, frequency: float, seconds: float, rudder: float = 0.0
+) -> list[Swim]:
     """Rotor speed A w sin(w t) for each amplitude A (B,) [rad], from rest at the origin."""
     stepper = Stepper.of(robot)
-    time = DT * np.arange(round(seconds / DT) + 1)
+    time: Array = DT * np.arange(round(seconds / DT) + 1, dtype=float)
     w = 2.0 * np.pi * frequency
     speeds = np.asarray(amplitude)[None, :] * w * np.sin(w * time[1:, None])
     commands = np.stack([speeds, np.full_like(speeds, rudder)], axis=-1)

@@ -65,7 +65,14 @@ def training_figure(curves: Sequence[Sequence[CurveRow]]) -> go.Figure:
             name="± 1 std", hoverinfo="skip", showlegend=col == 1, row=1, col=col,
         )  # fmt: skip
         figure.add_scatter(
-            x=steps, y=mean, mode="lines", line={"color": COLOURS[0]}, name="mean", showlegend=col == 1, row=1, col=col
+            x=steps,
+            y=mean,
+            mode="lines",
+            line={"color": COLOURS[0]},
+            name="mean",
+            showlegend=col == 1,
+            row=1,
+            col=col,
         )
         figure.update_xaxes(title="environment steps", row=1, col=col)
     return _with_titles(styled(figure, 340))

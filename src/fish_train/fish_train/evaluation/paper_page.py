@@ -39,7 +39,9 @@ def open_loop_blocks(robot: Robot) -> list[Block]:
     title = f"Open loop, A = {paper.PORTRAIT_AMPLITUDE:g} rad, f = {paper.PORTRAIT_FREQUENCY:g} Hz"
     return [
         Figure(title, portrait_figure(portrait, LIMIT_CYCLE)),
-        Figure("Speed against throttle", throttle_figure(throttle, speed), f"Full throttle: {speed[-1]:.2f} m/s."),
+        Figure(
+            "Speed against throttle", throttle_figure(throttle, speed), f"Full throttle: {speed[-1]:.2f} m/s."
+        ),
     ]
 
 
@@ -75,7 +77,9 @@ def simulation_blocks(candidate: Candidate, condition: Condition) -> list[Block]
     return [*blocks, Table("Simulation with perfect state", header, lines, "After the approach.")]
 
 
-def letter_blocks(candidate: Candidate, condition: Condition, traces: Sequence[tuple[Cell, Trace, int]]) -> list[Block]:
+def letter_blocks(
+    candidate: Candidate, condition: Condition, traces: Sequence[tuple[Cell, Trace, int]]
+) -> list[Block]:
     """Letters swum through the full chain, and the gains on R and S."""
     blocks: list[Block] = []
     for letter in paper.LETTERS:
@@ -125,5 +129,5 @@ def _failures(runs: Sequence[RunMetrics]) -> int:
 
 def write_paper_page(path: Path, blocks: Sequence[Block]) -> None:
     """One self-contained page."""
-    lead = "The figures and the table of the paper, made anew with this project's simulator, training and control chain."
+    lead = "The figures and the table of the paper, made anew with this project's simulator, training and control."
     write_page(path, "The paper, remade", lead, blocks)

@@ -38,9 +38,13 @@ class PerfectSensing:
 class FusedSensing:
     """Overhead camera (noise, jitter, loss, latency), IMU (noise, bias) and the robot's own fusion, for each robot."""
 
-    def __init__(self, robots: Sequence[Robot], seeds: Sequence[int], settings: SensorSettings | None = None) -> None:
+    def __init__(
+        self, robots: Sequence[Robot], seeds: Sequence[int], settings: SensorSettings | None = None
+    ) -> None:
         settings = settings or SensorSettings()
-        self._robots = [_SensedRobot(robot, seed, settings) for robot, seed in zip(robots, seeds, strict=True)]
+        self._robots = [
+            _SensedRobot(robot, seed, settings) for robot, seed in zip(robots, seeds, strict=True)
+        ]
 
     def update(self, time: float, motion: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Every robot's estimate."""

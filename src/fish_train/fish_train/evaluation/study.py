@@ -96,7 +96,7 @@ def run_study(
     conditions: Sequence[Condition],
     cells: Sequence[Cell],
     jobs: int,
-    report: Callable[[int, int], None] = lambda done, total: None,
+    report: Callable[[int, int], None] | None = None,
 ) -> list[Row]:
     """Everything against everything, `jobs` processes; cells of like duration swim together."""
     tasks = [(c, d, batch) for c in candidates for d in conditions for batch in _batches(cells, jobs)]
@@ -106,7 +106,8 @@ def run_study(
     rows: list[Row] = []
     for done, task in enumerate(tasks, start=1):
         rows += evaluate(*task)
-        report(done, len(tasks))
+        if report is not None:
+            report(done, len(tasks))
     return rows
 
 
@@ -121,7 +122,7 @@ def _in_processes(
     work: Callable[..., Any],
     tasks: Sequence[tuple[Any, ...]],
     jobs: int,
-    report: Callable[[int, int], None] = lambda done, total: None,
+    report: Callable[[int, int], None] | None = None,
 ) -> list[Any]:
     """work(*task) for every task, one core for each process; results in order."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -131,7 +132,8 @@ def _in_processes(
         futures = [pool.submit(work, *task) for task in tasks]
         for done, future in enumerate(futures, start=1):
             results.append(future.result())
-            report(done, len(tasks))
+            if report is not None:
+                report(done, len(tasks))
     return results
 
 
@@ -146,7 +148,8 @@ def swim_all(
         (cell, trace, k) for batch, trace in zip(batches, traces, strict=True) for k, cell in enumerate(batch)
     ]
     rows = [
-        Row(candidate.name, condition.name, cell, measure(trace, k, read_path(cell.path))) for cell, trace, k in swum
+        Row(candidate.name, condition.name, cell, measure(trace, k, read_path(cell.path)))
+        for cell, trace, k in swum
     ]
     return swum, rows
 

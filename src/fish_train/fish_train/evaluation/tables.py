@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,13 @@ SUMMARY_COLUMNS = (
     ("rudder rate", "rudder_rate_rms", 1.0, "rad/s"),
     ("throttle", "throttle_mean", 1.0, ""),
 )
-APPROACH_COLUMNS = (("cross-track RMSE *", "cross_track_rmse", 1e3, "mm"), ("speed RMSE *", "speed_rmse", 1e3, "mm/s"))
+APPROACH_COLUMNS = (
+    ("cross-track RMSE *", "cross_track_rmse", 1e3, "mm"),
+    ("speed RMSE *", "speed_rmse", 1e3, "mm/s"),
+)
 
 
-def unique(rows: Sequence[Row], key: Callable[[Row], object]) -> list:
+def unique(rows: Sequence[Row], key: Callable[[Row], object]) -> list[Any]:
     """Distinct values in order of appearance."""
     return list(dict.fromkeys(map(key, rows)))
 
@@ -30,14 +34,19 @@ def unique(rows: Sequence[Row], key: Callable[[Row], object]) -> list:
 def summary_table(rows: Sequence[Row], title: str) -> Table:
     """One line for each candidate under each condition, means over its runs."""
     header = ["gains", "condition", "runs", "failed"]
-    header += [f"{name}, {unit}" if unit else name for name, _, _, unit in (*SUMMARY_COLUMNS, *APPROACH_COLUMNS)]
+    header += [
+        f"{name}, {unit}" if unit else name for name, _, _, unit in (*SUMMARY_COLUMNS, *APPROACH_COLUMNS)
+    ]
     lines = []
     for candidate in unique(rows, lambda r: r.candidate):
         for condition in unique(rows, lambda r: r.condition):
             runs = [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]
             if runs:
                 lines.append([candidate, condition, str(len(runs)), str(_failures(runs)), *_summary(runs)])
-    note = "Means over the runs that did not fail, after the approach; * approach included. Speed: ripple of each stroke included."
+    note = (
+        "Means over the runs that did not fail, after the approach; * approach included. "
+        "Speed: ripple of each stroke included."
+    )
     return Table(title, header, lines, note)
 
 
@@ -64,17 +73,28 @@ def ratio_table(rows: Sequence[Row], nominal: str, title: str) -> Table:
             cells = [f"{np.mean(v):.2f} / {np.max(v):.2f}" if len(v) else "" for v in ratios]
             over = sum(int(np.sum(np.array(v) > 2.0)) for v in ratios)
             lines.append([candidate, condition, str(failed), *cells, str(over)])
-    header = ["gains", "condition", "failed", "cross-track, mean / worst", "speed, mean / worst", "cells above twice"]
+    header = [
+        "gains",
+        "condition",
+        "failed",
+        "cross-track, mean / worst",
+        "speed, mean / worst",
+        "cells above twice",
+    ]
     return Table(title, header, lines, f"Ratios of RMSE to the same cell under: {nominal}.")
 
 
-def cell_ratios(rows: Sequence[Row], candidate: str, condition: str, nominal: str) -> tuple[list[float], list[float]]:
+def cell_ratios(
+    rows: Sequence[Row], candidate: str, condition: str, nominal: str
+) -> tuple[list[float], list[float]]:
     """Ratios of cross-track and of speed RMSE, cell by cell (means over seeds)."""
 
     def means(name: str) -> dict[tuple[str, float], ErrorSizes]:
         mine = [r for r in rows if (r.candidate, r.condition) == (candidate, name)]
         keys = unique(mine, lambda r: (r.cell.path, r.cell.speed))
-        return {k: mean_sizes([r.metrics.settled for r in mine if (r.cell.path, r.cell.speed) == k]) for k in keys}
+        return {
+            k: mean_sizes([r.metrics.settled for r in mine if (r.cell.path, r.cell.speed) == k]) for k in keys
+        }
 
     worse, base = means(condition), means(nominal)
     shared = [k for k in worse if k in base]
@@ -105,5 +125,3 @@ def _cell(runs: Sequence[Row]) -> str:
         return "failed" if runs else ""
     sizes = mean_sizes(good)
     return f"{1e3 * sizes.cross_track_rmse:.1f} / {1e3 * sizes.speed_rmse:.1f}"
-
-

@@ -20,9 +20,10 @@ FORMAT = 1
 def save_checkpoint(path: Path, trainer: Trainer) -> None:
     """Write the trainer's state; an older checkpoint is replaced in one step."""
     plain, arrays = trainer.state()
+    content: dict[str, Any] = arrays
     plain |= {"format": FORMAT, "config": trainer.config.to_plain(), "robot": trainer.robot.digest()}
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.name, delete=False) as stream:
-        np.savez(stream, plain=np.array(json.dumps(plain)), **arrays)
+        np.savez(stream, plain=np.array(json.dumps(plain)), **content)
     os.replace(stream.name, path)
 
 
@@ -37,7 +38,9 @@ def load_checkpoint(path: Path, trainer: Trainer) -> None:
             arrays = {name: content[name] for name in content.files}
         plain: dict[str, Any] = json.loads(str(arrays.pop("plain")))
     except (zipfile.BadZipFile, ValueError, KeyError, EOFError) as error:
-        raise UserError(f"{path}: not a checkpoint of training ({error}); start anew with --overwrite") from error
+        raise UserError(
+            f"{path}: not a checkpoint of training ({error}); start anew with --overwrite"
+        ) from error
     came = (plain.get("format"), plain.get("robot"), plain.get("seed"))
     expected = (FORMAT, trainer.robot.digest(), trainer.seed)
     if came != expected:
@@ -46,5 +49,7 @@ def load_checkpoint(path: Path, trainer: Trainer) -> None:
     differing = [k for k in ours if ours[k] != theirs.get(k)]
     if differing:
         said = ", ".join(f"{k} was {theirs.get(k)!r}, is {ours[k]!r}" for k in differing)
-        raise UserError(f"{path}: made by another recipe: {said}; continue with the same or start anew (--overwrite)")
+        raise UserError(
+            f"{path}: made by another recipe: {said}; continue with the same or start anew (--overwrite)"
+        )
     trainer.restore(plain, arrays)

@@ -51,7 +51,9 @@ class _Path(ctypes.Structure):
 
 
 class _Search(ctypes.Structure):
-    _fields_ = [(k, ctypes.c_double) for k in ("search_window", "lookahead", "lookahead_search", "capture_distance")]
+    _fields_ = [
+        (k, ctypes.c_double) for k in ("search_window", "lookahead", "lookahead_search", "capture_distance")
+    ]
 
 
 def loop_source(stepper: Stepper, law: Law, width: int) -> str:
@@ -61,7 +63,12 @@ def loop_source(stepper: Stepper, law: Law, width: int) -> str:
         "NR": "report", "NGAIN": "gains",
     }  # fmt: skip
     sizes = {short: SIZES[name] for short, name in names.items()} | {"NI": INPUT_COUNTS[law.inputs]}
-    sizes |= {"NQ": stepper.layout.links + 3, "PHYSICS": PHYSICS_STEPS, "HISTORY": HISTORY, "NCOST": len(COST_NAMES)}
+    sizes |= {
+        "NQ": stepper.layout.links + 3,
+        "PHYSICS": PHYSICS_STEPS,
+        "HISTORY": HISTORY,
+        "NCOST": len(COST_NAMES),
+    }
     c = files("fish_train.training") / "c"
     return "\n".join([
         kernel_source(stepper.layout.structure, stepper.scheme, width),
@@ -75,7 +82,12 @@ class CompiledLoop:
     """Windows of the closed loop with one law, one structure of robot, one bank of paths and one network."""
 
     def __init__(
-        self, stepper: Stepper, law: Law, bank: PathBank, layers: tuple[int, ...] = LAYERS, width: int | None = None
+        self,
+        stepper: Stepper,
+        law: Law,
+        bank: PathBank,
+        layers: tuple[int, ...] = LAYERS,
+        width: int | None = None,
     ) -> None:
         self._width = width or lanes()
         loaded = library(loop_source(stepper, law, self._width))
@@ -84,11 +96,15 @@ class CompiledLoop:
         self._library = loaded
         self._library.scratch_size.restype = ctypes.c_long
         if layers[0] != INPUT_COUNTS[law.inputs]:
-            raise ValueError(f"layers: got {layers}; expected {INPUT_COUNTS[law.inputs]} inputs ({law.inputs})")
+            raise ValueError(
+                f"layers: got {layers}; expected {INPUT_COUNTS[law.inputs]} inputs ({law.inputs})"
+            )
         self.layers = layers
         self.set_bank(bank)
         tracker = law.tracker
-        self._search = _Search(tracker.search_window, tracker.lookahead, LOOKAHEAD_SEARCH, tracker.capture_distance)
+        self._search = _Search(
+            tracker.search_window, tracker.lookahead, LOOKAHEAD_SEARCH, tracker.capture_distance
+        )
         self._room: tuple[int, int] | None = None
 
     @classmethod
@@ -127,7 +143,11 @@ class CompiledLoop:
         batch = len(fleet)
         self._make_room(steps, hold)
         weights, cost = np.ascontiguousarray(weights, float), np.ascontiguousarray(cost, float)
-        noise = np.zeros((steps + 1, batch, SIZES["motion"])) if noise is None else np.ascontiguousarray(noise, float)
+        noise = (
+            np.zeros((steps + 1, batch, SIZES["motion"]))
+            if noise is None
+            else np.ascontiguousarray(noise, float)
+        )
         report = np.empty((steps + 1, batch, SIZES["report"]))
         applied, value = np.empty((steps, batch, SIZES["last"])), np.empty(batch)
         arrays = (
@@ -145,7 +165,12 @@ class CompiledLoop:
         total = np.zeros(len(weights)) if gradient else None
         for first in range(0, window.batch, self._width):
             self._library.run_block(
-                ctypes.byref(window), network, self._paths, ctypes.byref(self._search), ctypes.c_long(first), scratch
+                ctypes.byref(window),
+                network,
+                self._paths,
+                ctypes.byref(self._search),
+                ctypes.c_long(first),
+                scratch,
             )
             if total is not None:
                 total += self._weight_gradient()
@@ -153,7 +178,9 @@ class CompiledLoop:
 
     def _weight_gradient(self) -> Array:
         """dJ/dW = G H^T, dJ/db = G 1 over all periods of a block."""
-        for (W, b), H, G in zip(split(self._block_gradient, self.layers), self._activation, self._adjoint, strict=True):
+        for (W, b), H, G in zip(
+            split(self._block_gradient, self.layers), self._activation, self._adjoint, strict=True
+        ):
             np.matmul(G, H.T, out=W)
             np.sum(G, axis=1, out=b)
         return self._block_gradient

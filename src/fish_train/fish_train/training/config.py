@@ -29,8 +29,8 @@ class TrainConfig:
     clip: float = 1.0  # largest norm of the gradient
     max_updates: int = 20_000  # stop here if the curriculum is not finished
     polish_updates: int = 1_000  # after the last level: all levels at once, learning rate falling to a tenth
-    # stage cost: weights of heading [1/rad^2], speed [s^2/m^2], cross-track [1/m^2], change of the set-points per period,
-    # gains and change of gains as shares of their ranges
+    # stage cost: weights of heading [1/rad^2], speed [s^2/m^2], cross-track [1/m^2], change of the set-points in
+    # a control period, gains and change of gains as shares of their ranges
     cost_heading: float = 1.0
     cost_speed: float = 10.0
     cost_cross_track: float = 50.0
@@ -42,7 +42,10 @@ class TrainConfig:
     cycles: tuple[float, ...] = (0.5, 1.0, 2.0)  # over sinusoid_length
     sinusoid_length: float = 10.0  # m along x; the paper does not say
     radii: tuple[float, ...] = (1.5, 1.4, 1.3, 1.2, 1.1, 1.0)  # m, of the circles
-    thresholds: tuple[float, ...] = (0.03, 0.01)  # m, mean |cross-track| that passes a level; one pass for each
+    thresholds: tuple[float, ...] = (
+        0.03,
+        0.01,
+    )  # m, mean |cross-track| that passes a level; one pass for each
     slowest: float = 0.1  # m/s, wanted speeds are spread over this range in each batch
     fastest: float = 0.3  # m/s
     criterion_episodes: int = 4  # length of the sliding window, in episodes
@@ -51,7 +54,7 @@ class TrainConfig:
     approach: float = 6.0  # s at the start of an episode that the criterion leaves out
     start_offset: float = 0.1  # m, std of the start's distance from the path
     start_heading: float = 0.3  # rad, std of the start's heading error
-    start_rest: float = 0.1  # share of fish that start at rest; the others at half to all of the wanted speed
+    start_rest: float = 0.1  # share of fish that start at rest; the others at 0.5 to 1 of the wanted speed
     # robustness, all off in the default recipe
     randomise: float = 0.0  # relative half-width of the robot's drags, stiffness and added masses
     noise_position: float = 0.0  # m, std of what the loop sees
@@ -79,13 +82,14 @@ class TrainConfig:
             self._within(f"start_{o.name}", o.low, o.high)
 
     def _check_numbers(self) -> None:
-        for name, low, high in (
-            ("batch", 1, 4096), ("unroll", 1, 1000), ("hold", 1, 100), ("max_updates", 1, 10**9), ("polish_updates", 0, 10**9),
-            ("criterion_episodes", 1, 1000),
-        ):  # fmt: skip
+        counts = (
+            ("batch", 1, 4096), ("unroll", 1, 1000), ("hold", 1, 100), ("max_updates", 1, 10**9),
+            ("polish_updates", 0, 10**9), ("criterion_episodes", 1, 1000),
+        )  # fmt: skip
+        for name, least, most in counts:
             if not isinstance(getattr(self, name), int) or isinstance(getattr(self, name), bool):
                 raise UserError(f"{name}: got {getattr(self, name)!r}; expected a whole number")
-            self._within(name, low, high)
+            self._within(name, least, most)
         for name, low, high in (
             ("learning_rate", 1e-8, 1.0), ("clip", 1e-6, 1e6), ("episode", 1.0, 600.0), ("approach", 0.0, 600.0),
             ("start_offset", 0.0, 0.2), ("start_heading", 0.0, 1.0), ("start_rest", 0.0, 1.0), ("randomise", 0.0, 0.9),
@@ -95,7 +99,9 @@ class TrainConfig:
         ):  # fmt: skip
             self._within(name, low, high)
         if self.approach >= self.episode:
-            raise UserError(f"approach: got {self.approach} s; expected less than an episode of {self.episode} s")
+            raise UserError(
+                f"approach: got {self.approach} s; expected less than an episode of {self.episode} s"
+            )
 
     def _check_curriculum(self) -> None:
         for name, low, high in (

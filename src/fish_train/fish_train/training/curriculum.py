@@ -26,7 +26,9 @@ class Level:
     cycles: float  # of a sinusoid
     threshold: float  # m
 
-    def paths(self, config: TrainConfig, rng: np.random.Generator, phases: int = PHASES) -> list[ReferencePath]:
+    def paths(
+        self, config: TrainConfig, rng: np.random.Generator, phases: int = PHASES
+    ) -> list[ReferencePath]:
         """The paths of this level: sinusoids of random phase, circles in both directions."""
         if self.family == "circle":
             return [make_path("circle", radius=self.size, direction=direction) for direction in (1, -1)]
@@ -44,11 +46,17 @@ class Level:
 
 
 def make_levels(config: TrainConfig) -> list[Level]:
-    """Sinusoids of growing amplitude and frequency alternate with circles of falling radius, once for each threshold."""
+    """Growing sinusoids alternate with shrinking circles; the ladder is climbed once for each threshold."""
     levels: list[Level] = []
     for threshold in config.thresholds:
         sinusoids = [
-            Level(f"sinusoid {amplitude:g} m x {cycles:g}, {threshold:g} m", "sinusoid", amplitude, cycles, threshold)
+            Level(
+                f"sinusoid {amplitude:g} m x {cycles:g}, {threshold:g} m",
+                "sinusoid",
+                amplitude,
+                cycles,
+                threshold,
+            )
             for amplitude in config.amplitudes
             for cycles in config.cycles
         ]

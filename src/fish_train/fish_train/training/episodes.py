@@ -30,7 +30,7 @@ class Episodes:
         self._uncertain = np.array([name not in CERTAIN for name in stepper.layout.parameters])
 
     def start(self, bank: PathBank, rng: np.random.Generator) -> Fleet:
-        """A batch, some at rest, most near the wanted speed, scattered about random places on random paths of the bank."""
+        """A batch, some at rest, most near the wanted speed, scattered about random places on random paths."""
         c, batch = self._config, self._config.batch
         path = rng.integers(len(bank), size=batch)
         share = (rng.permutation(batch) + rng.uniform(size=batch)) / batch
@@ -54,7 +54,9 @@ class Episodes:
         """Progress up to which an open path is long enough for an episode [m]."""
         return max(bank.tables[k].length - self._config.episode * speed * 1.2 - RUN_OUT, 0.0)
 
-    def _poses(self, bank: PathBank, path: NDArray[np.int64], progress: Array, rng: np.random.Generator) -> Array:
+    def _poses(
+        self, bank: PathBank, path: NDArray[np.int64], progress: Array, rng: np.random.Generator
+    ) -> Array:
         """Poses (B, 3) beside the path."""
         points = np.array([bank.paths[k].point(s) for k, s in zip(path, progress, strict=True)])
         heading = np.array([float(bank.paths[k].heading_at(s)) for k, s in zip(path, progress, strict=True)])
@@ -78,7 +80,8 @@ class Episodes:
         if self._config.randomise == 0.0:
             return np.tile(self._parameters, (batch, 1))
         factors = rng.uniform(-1.0, 1.0, (batch, len(self._parameters))) * self._config.randomise
-        return self._parameters * (1.0 + factors * self._uncertain)
+        robots: Array = self._parameters * (1.0 + factors * self._uncertain)
+        return robots
 
 
 class SeenNoise:
@@ -86,7 +89,9 @@ class SeenNoise:
 
     def __init__(self, config: TrainConfig) -> None:
         c = config
-        self._std = np.array([c.noise_position] * 2 + [c.noise_heading] + [c.noise_speed] * 2 + [c.noise_rate])
+        self._std = np.array(
+            [c.noise_position] * 2 + [c.noise_heading] + [c.noise_speed] * 2 + [c.noise_rate]
+        )
         self._kept = np.exp(-CONTROL_PERIOD / c.noise_time) if c.noise_time > 0.0 else 0.0
         self.state = np.zeros((c.batch, len(self._std)))
 

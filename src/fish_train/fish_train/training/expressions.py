@@ -43,13 +43,15 @@ def _act(law: Law) -> tuple[casadi.Function, casadi.Function]:
 
 def _drive(law: Law) -> tuple[casadi.Function, casadi.Function]:
     arguments = _symbols([SIZES["actuator"], 2])
-    actuator, command = drive(*map(casadi.vertsplit, arguments), law, CASADI)
+    moving, setpoint = map(casadi.vertsplit, arguments)
+    actuator, command = drive(moving, setpoint, law, CASADI)
     return _with_adjoint("drive", arguments, [*actuator, *command], (0, 1))
 
 
 def _motion() -> tuple[casadi.Function, casadi.Function]:
     arguments = _symbols([3, 3])
-    return _with_adjoint("motion", arguments, motion(*map(casadi.vertsplit, arguments), CASADI), (0, 1))
+    q, qd = map(casadi.vertsplit, arguments)
+    return _with_adjoint("motion", arguments, motion(q, qd, CASADI), (0, 1))
 
 
 def _symbols(sizes: Sequence[int]) -> list[casadi.SX]:

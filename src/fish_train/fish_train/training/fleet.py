@@ -20,7 +20,8 @@ class Fleet:
     """B fish between two windows; arrays are C-contiguous and are written in place.
 
     Attributes:
-        plant: (B, NS) simulator states. memory: (B, MEMORY_SIZE) guidance, control, actuators, last gains and set-point.
+        plant: (B, NS) simulator states. memory: (B, MEMORY_SIZE) guidance, control, actuators, last gains and
+            set-point.
         place: (B, 4) progress [m] and captured flag, of the path as seen and of the true one.
         history: (B, HISTORY, 6) past motions, newest last.
         parameters: (B, NP) of the robots. path: (B,) numbers in the bank. speed: (B,) wanted surge [m/s].
@@ -48,7 +49,9 @@ class Fleet:
             memory=np.zeros((batch, MEMORY_SIZE)),
             place=np.zeros((batch, 4)),
             history=np.repeat(np.asarray(motion, dtype=float)[:, None], HISTORY, axis=1).copy(),
-            parameters=np.ascontiguousarray(np.broadcast_to(parameters, (batch, np.shape(parameters)[-1])), float),
+            parameters=np.ascontiguousarray(
+                np.broadcast_to(parameters, (batch, np.shape(parameters)[-1])), float
+            ),
             path=np.asarray(path, dtype=np.int64),
             speed=np.asarray(speed, dtype=float),
             delay=np.zeros(batch, dtype=np.int64) if delay is None else np.asarray(delay, dtype=np.int64),

@@ -4,9 +4,9 @@ The laws are fish_control's own functions; this module only strings them togethe
 
     J = w_psi e_psi^2 + w_u e_u^2 + w_y e_y^2 + w_d |change of set-point|^2 + w_g |gains|^2 + w_c |change of gains|^2
 
-with the gains as shares of their ranges, the set-point as shares of rudder range and full throttle. Order in a period of
-CONTROL_PERIOD: sense (errors and policy inputs), policy, act (gains and set-point), then for each 10 ms of physics drive
-(the actuators' commands). Everything is a list of scalars in the order of the *_NAMES below.
+with the gains as shares of their ranges, the set-point as shares of rudder range and full throttle. Order in a
+period of CONTROL_PERIOD: sense (errors and policy inputs), policy, act (gains and set-point), then for each 10 ms of
+physics drive (the actuators' commands). Everything is a list of scalars in the order of the *_NAMES below.
 """
 
 from __future__ import annotations
@@ -138,11 +138,18 @@ def sense(
 
 
 def _inputs(
-    moved: Motion, state: GuidanceState, errors: TrackingErrors, curvature: Scalar, speed: Scalar, law: Law, xp: Any
+    moved: Motion,
+    state: GuidanceState,
+    errors: TrackingErrors,
+    curvature: Scalar,
+    speed: Scalar,
+    law: Law,
+    xp: Any,
 ) -> list[Scalar]:
     if law.inputs == "policy":
         mean_heading = moved.heading - state.stroke.heading
-        return policy_inputs(mean_heading, moved.surge, speed, errors.heading, errors.speed, errors.cross_track, xp)
+        values = moved.surge, speed, errors.heading, errors.speed, errors.cross_track
+        return list(policy_inputs(mean_heading, *values, xp))
     if law.inputs == "schedule":
         return schedule_inputs(speed, curvature, xp)
     return []
@@ -155,7 +162,9 @@ def schedule_inputs(speed: Scalar, curvature: Scalar, xp: Any) -> list[Scalar]:
 
 def gains_of(raw: Sequence[Scalar], xp: Any) -> Gains:
     """Last layer's outputs to gains: tanh and affine scaling to the ranges."""
-    return Gains(*(o.low + 0.5 * (o.high - o.low) * (1.0 + xp.tanh(v)) for v, o in zip(raw, OUTPUTS, strict=True)))
+    return Gains(
+        *(o.low + 0.5 * (o.high - o.low) * (1.0 + xp.tanh(v)) for v, o in zip(raw, OUTPUTS, strict=True))
+    )
 
 
 def act(

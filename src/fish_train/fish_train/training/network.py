@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +35,8 @@ def weight_count(layers: tuple[int, ...] = LAYERS) -> int:
     return sum(n_out * (n_in + 1) for n_in, n_out in zip(layers[:-1], layers[1:], strict=True))
 
 
-def split(flat: Array, layers: tuple[int, ...] = LAYERS) -> list[tuple[Array, Array]]:
-    """Views (W, b) of every layer; works on anything that slices and reshapes (NumPy, torch)."""
+def split(flat: Any, layers: tuple[int, ...] = LAYERS) -> list[tuple[Any, Any]]:
+    """Views (W, b) of every layer of a flat NumPy array or torch tensor."""
     views, at = [], 0
     for n_in, n_out in zip(layers[:-1], layers[1:], strict=True):
         W = flat[at : at + n_out * n_in].reshape(n_out, n_in)

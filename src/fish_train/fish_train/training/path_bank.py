@@ -37,7 +37,9 @@ class PathTable:
     def of(cls, path: ReferencePath, tracker: TrackerConfig) -> PathTable:
         """Sample a path; chord as `PathBatch` has it, for the same lookahead."""
         if tracker.lookahead_mode != "distance":
-            raise ValueError(f"lookahead_mode: got {tracker.lookahead_mode!r}; training knows 'distance' only")
+            raise ValueError(
+                f"lookahead_mode: got {tracker.lookahead_mode!r}; training knows 'distance' only"
+            )
         window = int(np.ceil(LOOKAHEAD_SEARCH * tracker.lookahead / path.spacing)) + 2
         rows = len(path.points) + (0 if path.closed else int(EXTENSION / path.spacing))
         s = path.spacing * np.arange(rows + window)

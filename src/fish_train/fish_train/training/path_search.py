@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fish_control.path_batch import LOOKAHEAD_SEARCH, TrackerConfig
 from fish_train.training.path_bank import PathTable
@@ -37,7 +37,7 @@ def locate(table: PathTable, tracker: TrackerConfig, place: Array, position: Arr
     return np.array([x, y, heading, lowest, highest, *row, shift, *before, *after])
 
 
-def _rows(table: PathTable, s: Array | float) -> Array:
+def _rows(table: PathTable, s: ArrayLike) -> Array:
     k = np.rint(np.asarray(s) / table.spacing).astype(np.int64)
     return table.rows[k % table.count if table.closed else np.minimum(k, len(table.rows) - 1)]
 

@@ -79,8 +79,8 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
             load_checkpoint(checkpoint, trainer)
             state = "diverged"
             message = (
-                f"training diverged at update {at} ({error}); rolled back to update {trainer.update}, whose weights are "
-                "kept. Use a smaller learning_rate or clip"
+                f"training diverged at update {at} ({error}); rolled back to update {trainer.update}, whose "
+                "weights are kept. Use a smaller learning_rate or clip"
             )
     last = session.progress
     write_weights(job.folder, trainer, last, session.seconds, job.command)
@@ -156,7 +156,9 @@ def prepare_folder(job: Job) -> Path:
     if checkpoint.exists() and job.overwrite:
         shutil.rmtree(job.folder)
     elif checkpoint.exists() and not job.resume:
-        raise UserError(f"{job.folder}: holds a training run; continue it with --resume or replace it with --overwrite")
+        raise UserError(
+            f"{job.folder}: holds a training run; continue it with --resume or replace it with --overwrite"
+        )
     job.folder.mkdir(parents=True, exist_ok=True)
     return checkpoint
 
@@ -167,11 +169,15 @@ def warm_weights(job: Job) -> Array | None:
     if file is None:
         return None
     if job.form != "network":
-        raise UserError(f"--warm-start {file}: got form {job.form}; only a network can start from a weights file")
+        raise UserError(
+            f"--warm-start {file}: got form {job.form}; only a network can start from a weights file"
+        )
     try:
         policy = read_gains_file(file)
     except GainsFileError as error:
         raise UserError(str(error)) from error
     if tuple(policy.contract.layers) != LAYERS:
-        raise UserError(f"{file}: layers are {list(policy.contract.layers)}; a warm start needs {list(LAYERS)}")
+        raise UserError(
+            f"{file}: layers are {list(policy.contract.layers)}; a warm start needs {list(LAYERS)}"
+        )
     return from_tensors(policy.tensors)

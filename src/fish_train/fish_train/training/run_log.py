@@ -80,9 +80,15 @@ def read_curve(folder: Path) -> list[CurveRow]:
         raise UserError(f"{path}: no training curve here; expected a folder written by fish_train train")
     return [
         CurveRow(
-            *(float(row["seconds"]), int(row["update"]), int(row["environment_steps"]), int(row["level"])),
-            *(float(row[k]) for k in ("cost", "cross_track", "heading", "speed")),
-            tuple(float(row[k]) for k in GAIN_COLUMNS),
+            seconds=float(row["seconds"]),
+            update=int(row["update"]),
+            environment_steps=int(row["environment_steps"]),
+            level=int(row["level"]),
+            cost=float(row["cost"]),
+            cross_track=float(row["cross_track"]),
+            heading=float(row["heading"]),
+            speed=float(row["speed"]),
+            gains=tuple(float(row[k]) for k in GAIN_COLUMNS),
         )
         for row in _rows(path)
     ]

@@ -17,7 +17,7 @@ from fish_train.training.trainer import Trainer
 Array = NDArray[np.float64]
 EPISODES = 3  # batches of fish that every candidate swims
 POPULATION = 10  # candidates per number
-GENERATIONS = {6: 40, 18: 60}  # by how many numbers are sought
+GENERATIONS = {6: 40, 18: 20}  # by how many numbers are sought
 REACH = 3.0  # of the numbers before tanh: gains to within 0.25 % of their range's ends
 
 

@@ -64,11 +64,10 @@ class TorchLoop:
             fleet.place[:] = kept  # the next window looks again at its first period
             reports.append(_stack(sensed["report"]))
             mean = (total + sensed["cost"][0].sum()) / (len(fleet) * steps)
-            if gradient:
-                mean.backward()
+        found = torch.autograd.grad(mean, flat)[0].numpy() if gradient else None
         run.store()
-        found = flat.grad.numpy() if gradient else None
-        return WindowResult(float(mean.detach()), found, *(torch.stack(v).detach().numpy() for v in (reports, applied)))
+        report, moved = (torch.stack(rows).detach().numpy() for rows in (reports, applied))
+        return WindowResult(float(mean.detach()), found, report, moved)
 
     def find(self, fleet: Fleet, which: int, position: Tensor) -> list[Tensor]:
         """Geometry of every fish on its path; `which` place (0 seen, 1 true) moves on."""
@@ -90,7 +89,9 @@ class TorchLoop:
 class _Window:
     """The state of one window, as lists of (B,) tensors."""
 
-    def __init__(self, loop: TorchLoop, flat: Tensor, fleet: Fleet, noise: Tensor, cost: tuple[float, ...]) -> None:
+    def __init__(
+        self, loop: TorchLoop, flat: Tensor, fleet: Fleet, noise: Tensor, cost: tuple[float, ...]
+    ) -> None:
         self._loop, self._fleet, self._noise, self._cost = loop, fleet, noise, cost
         self._weights = split(flat, loop.layers)
         self._plant = torch.from_numpy(fleet.plant.copy())
@@ -129,17 +130,18 @@ class _Window:
         self._guidance, self._control, self.last = sensed["guidance"], acted["control"], acted["last"]
         for _ in range(PHYSICS_STEPS):
             self._actuator, command = drive(self._actuator, self.last[SIZES["gains"] :], law, XP)
-            command = torch.stack(torch.broadcast_tensors(*command), dim=-1)
-            self._plant = torch_step.step(self._plant, command, self._parameters, self._loop.stepper)
+            self._plant = torch_step.step(self._plant, _stack(command), self._parameters, self._loop.stepper)
             self._motions.append(self._motion())
-        return acted["cost"][0].sum()
+        cost: Tensor = acted["cost"][0].sum()
+        return cost
 
     def _policy(self, x: Tensor) -> Tensor:
         """(B, inputs) -> (B, 6) before tanh."""
         for W, b in self._weights[:-1]:
             x = torch.relu(x @ W.T + b)
         W, b = self._weights[-1]
-        return x @ W.T + b
+        raw: Tensor = x @ W.T + b
+        return raw
 
     def store(self) -> None:
         """Hand the state back to the fleet."""
@@ -152,4 +154,5 @@ class _Window:
 
 
 def _stack(values: list[Tensor]) -> Tensor:
-    return torch.stack(torch.broadcast_tensors(*values), dim=-1)
+    same_shape: list[Tensor] = torch.broadcast_tensors(*values)  # type: ignore[no-untyped-call]
+    return torch.stack(same_shape, dim=-1)

@@ -1,8 +1,7 @@
-"""Backpropagation through time, window by window, up the ladder of levels; all of its state can be saved and restored."""
+"""Backpropagation through time, window by window, up the ladder of levels; its whole state can be saved."""
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -68,7 +67,11 @@ class Trainer:
         self._stepper = Stepper(robot.structure, training_scheme(robot))
         self._episodes = Episodes(config, robot, self._stepper, self.law.tracker)
         self._noise = SeenNoise(config)
-        start = initial_weights(self.rng, config.start_gains, form.layers) if weights is None else np.array(weights)
+        start = (
+            initial_weights(self.rng, config.start_gains, form.layers)
+            if weights is None
+            else np.array(weights)
+        )
         self._flat = torch.from_numpy(start).requires_grad_(True)
         self._optimiser = torch.optim.Adam([self._flat], lr=config.learning_rate)
         self._window = config.unroll * config.hold  # control periods
@@ -95,7 +98,9 @@ class Trainer:
         """A few paths of every level."""
         rng = np.random.default_rng([self.seed, len(self.levels)])
         ladder = self.levels[: len(self.levels) // len(self.config.thresholds)]
-        return PathBank([p for level in ladder for p in level.paths(self.config, rng, POLISH_PHASES)], self.law.tracker)
+        return PathBank(
+            [p for level in ladder for p in level.paths(self.config, rng, POLISH_PHASES)], self.law.tracker
+        )
 
     def rollout_cost(self, weights: Array, fleet: Fleet, bank: PathBank) -> float:
         """Mean stage cost of an episode from a fleet's state on a bank's paths; the fleet is advanced."""
@@ -143,7 +148,9 @@ class Trainer:
         norm = self._descend(result)
         self.update += 1
         self.polished += self.passed_all
-        self._rows.append((np.abs(result.report[1:]).mean(axis=1), result.applied.mean(axis=1), result.cost, norm))
+        self._rows.append(
+            (np.abs(result.report[1:]).mean(axis=1), result.applied.mean(axis=1), result.cost, norm)
+        )
         if len(self._rows) < self._episode_windows:
             return None
         progress = self._end_episode()
@@ -157,8 +164,12 @@ class Trainer:
 
     def _descend(self, result: WindowResult) -> float:
         """Clip and apply the gradient; its norm."""
-        if not (np.isfinite(result.cost) and np.all(np.isfinite(result.gradient))):
-            raise TrainingDiverged(f"cost {result.cost}, largest gradient {np.abs(result.gradient).max()}")
+        if (
+            result.gradient is None
+            or not np.isfinite(result.cost)
+            or not np.all(np.isfinite(result.gradient))
+        ):
+            raise TrainingDiverged(f"cost {result.cost}")
         self._flat.grad = torch.from_numpy(result.gradient)
         norm = float(torch.nn.utils.clip_grad_norm_([self._flat], self.config.clip))
         for group in self._optimiser.param_groups:
@@ -171,7 +182,7 @@ class Trainer:
         c = self.config
         if not self.passed_all or c.polish_updates == 0:
             return c.learning_rate
-        return c.learning_rate * 0.1 ** min(self.polished / c.polish_updates, 1.0)
+        return float(c.learning_rate * 0.1 ** min(self.polished / c.polish_updates, 1.0))
 
     def _end_episode(self) -> Progress:
         """Judge the episode, move up if the level is passed."""
@@ -198,7 +209,6 @@ class Trainer:
             self.criterion = SlidingCriterion(self.config.criterion_episodes)
             self._loop.set_bank(self._make_bank())
         return progress
-
 
     def state(self) -> tuple[dict[str, Any], dict[str, Array]]:
         """(plain values, arrays) from which `restore` continues exactly; between episodes only."""
@@ -234,7 +244,10 @@ class Trainer:
             self._optimiser.state[self._flat] = {"step": torch.tensor(plain["optimiser_step"]), **moments}
         self._noise.state = np.array(arrays["noise"])
         self._loop.set_bank(self._make_bank())
-        self.fleet = Fleet(**{k.removeprefix("fleet."): v for k, v in arrays.items() if k.startswith("fleet.")})
+        fleet: dict[str, Any] = {
+            k.removeprefix("fleet."): v for k, v in arrays.items() if k.startswith("fleet.")
+        }
+        self.fleet = Fleet(**fleet)
         self._rows = []
 
 

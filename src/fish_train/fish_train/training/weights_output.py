@@ -23,8 +23,12 @@ WHAT = {
         "PID controllers; network 6-128-128-64-6, ReLU, tanh to the gain ranges. Read by the controller node",
         "(fish_control) without torch.",
     ),
-    "none": ("Six constant gains of the two PID controllers, a baseline. Read by the controller node (fish_control).",),
-    "schedule": ("Gains of the two PID controllers by wanted speed and path curvature: a baseline, not for the robot.",),
+    "none": (
+        "Six constant gains of the two PID controllers, a baseline. Read by the controller node (fish_control).",
+    ),
+    "schedule": (
+        "Gains of the two PID controllers by wanted speed and path curvature: a baseline, not for the robot.",
+    ),
 }
 CARD = "model_card.md"
 
@@ -48,7 +52,9 @@ def make_policy(trainer: Trainer, note: str) -> Policy:
     return Policy(contract, to_tensors(trainer.weights))
 
 
-def write_weights(folder: Path, trainer: Trainer, last: Progress | None, seconds: float, command: str) -> None:
+def write_weights(
+    folder: Path, trainer: Trainer, last: Progress | None, seconds: float, command: str
+) -> None:
     """Weights file (of a schedule, which no controller loads, its coefficients) and model card."""
     if trainer.form.inputs == "schedule":
         content = {"form": "schedule", "command": command, "weights": trainer.weights.tolist()}
@@ -83,7 +89,7 @@ def model_card(trainer: Trainer, last: Progress | None, seconds: float, command:
         ]
     lines += [
         "",
-        "Not for: speeds or curves outside these ranges, robots with another tail or mass; `fish_train evaluate` tells.",
+        "Not for: speeds or curves outside these ranges, other robots; `fish_train evaluate` tells.",
         "",
         "## Recipe",
         "",

@@ -1,0 +1,100 @@
+"""The batch follower and the training loop run what the nodes run: fish_control's Controller and Planner."""
+
+import numpy as np
+import pytest
+from training_setup import COST, make_stepper
+
+from fish_control.contract import Contract
+from fish_control.controller import Controller, Wanted
+from fish_control.line_of_sight import Motion
+from fish_control.paths import make_path
+from fish_control.planner import Planner
+from fish_control.policy import Policy
+from fish_sim.model import DT
+from fish_sim.robot import Robot
+from fish_train.evaluation.follow import Follower
+from fish_train.evaluation.gains_source import PolicyGains
+from fish_train.training.compiled_loop import CompiledLoop
+from fish_train.training.fleet import Fleet
+from fish_train.training.loop import Law
+from fish_train.training.network import initial_weights, to_tensors
+from fish_train.training.path_bank import PathBank
+from fish_train.training.torch_loop import TorchLoop
+
+SPEED = 0.2  # m/s
+STEPS = 100  # control periods
+START = (0.02, -0.03, 0.15)  # beside a straight path, m, m, rad
+
+
+def motion_of(state: np.ndarray, size: int) -> Motion:
+    cos, sin = np.cos(state[2]), np.sin(state[2])
+    vx, vy, rate = state[size : size + 3]
+    return Motion(*map(float, (*state[:3], cos * vx + sin * vy, cos * vy - sin * vx, rate)))
+
+
+def node_swim(policy: Policy, path, stepper) -> np.ndarray:
+    """States (STEPS, NS) at control instants under the node's own classes."""
+    controller, planner = Controller(policy), Planner(path, SPEED)
+    state, parameters, rows = stepper.rest(START), stepper.parameters(Robot()), []
+    size = stepper.layout.links + 3
+    start = motion_of(state, size)
+    for observer in (controller, planner):  # the first message only sets the clock
+        observer.observe(-DT, start)
+        observer.observe(0.0, start)
+    for k in range(STEPS * 2):
+        if k % 2 == 0:
+            plan = planner.plan(motion_of(state, size))
+            controller.decide(Wanted(plan.errors.course, plan.speed, plan.yaw_rate, plan.errors.cross_track))
+        command = controller.command(DT)
+        state = stepper.step(state, np.array([command.rotor_speed, command.alpha]), parameters)
+        for observer in (controller, planner):
+            observer.observe((k + 1) * DT, motion_of(state, size))
+        if k % 2:
+            rows.append(state)
+    return np.array(rows)
+
+
+@pytest.fixture(scope="module")
+def setting():
+    rng = np.random.default_rng(9)
+    start = dict(
+        steering_kp=0.4, steering_ki=0.3, steering_kd=0.03, speed_kp=0.6, speed_ki=0.05, speed_kd=0.01
+    )
+    weights = initial_weights(rng, start)
+    weights += 0.02 * rng.standard_normal(weights.shape)
+    policy = Policy(Contract(), to_tensors(weights))
+    path, stepper = make_path("straight", length=3.0, x=1.5), make_stepper()
+    return weights, policy, path, stepper, node_swim(policy, path, stepper)
+
+
+def test_training_runs_the_nodes_laws(setting) -> None:
+    weights, _, path, stepper, expected = setting
+    law = Law()
+    bank = PathBank([path], law.tracker)
+    kind = CompiledLoop if CompiledLoop.available() else TorchLoop
+    seen = np.array([[*START, 0.0, 0.0, 0.0]])
+    fleet = Fleet.at(
+        stepper.rest(START)[None], stepper.parameters(Robot()), np.zeros(1), np.array([SPEED]), seen
+    )
+    loop = kind(stepper, law, bank)
+    for k in range(0, STEPS, 20):
+        loop.window(weights, fleet, 20, COST, gradient=False)
+        assert np.allclose(fleet.plant[0], expected[k + 19], atol=1e-9)
+
+
+def test_the_follower_runs_the_nodes_laws(setting) -> None:
+    _, policy, path, stepper, expected = setting
+    law, known = Law(), np.ones(2, dtype=bool)
+    follower = Follower([path, path], np.array([SPEED, 0.3]), PolicyGains(policy), law)
+    state, parameters = np.array([stepper.rest(START)] * 2), stepper.parameters(Robot())
+    size = stepper.layout.links + 3
+    seen = np.array([motion_of(row, size) for row in state])
+    for k in range(STEPS * 2):
+        if k % 2 == 0:
+            follower.observe(seen, known) if k == 0 else None
+            follower.decide(seen, known)
+        state = stepper.step(state, follower.command(), parameters)
+        seen = np.array([motion_of(row, size) for row in state])
+        follower.observe(seen, known)
+        if k % 2:
+            assert np.allclose(state[0], expected[k // 2], atol=1e-9)

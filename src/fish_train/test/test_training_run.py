@@ -1,0 +1,144 @@
+"""A run on disk: exact resume, roll-back of diverging training, weights that the controller reads."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from fish_control.gains_file import read_gains_file
+from fish_sim.robot import Robot
+from fish_train.errors import UserError
+from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
+from fish_train.training.config import TrainConfig, make_config
+from fish_train.training.fleet import WindowResult
+from fish_train.training.network import FORMS, from_tensors, split
+from fish_train.training.run import CHECKPOINT, Job, Status, run
+from fish_train.training.run_log import read_curve
+from fish_train.training.search import search
+from fish_train.training.trainer import Trainer
+
+SHORT = {
+    "batch": 3,
+    "unroll": 4,
+    "hold": 5,
+    "episode": 1.2,
+    "approach": 0.4,
+    "amplitudes": [1.0],
+    "cycles": [0.5],
+    "radii": [1.5],
+    "thresholds": [0.4],
+    "criterion_episodes": 2,
+    "polish_updates": 6,
+    "noise_position": 0.002,
+    "latency": 0.05,
+    "randomise": 0.2,
+}
+
+
+def short(**values) -> TrainConfig:
+    return make_config({**SHORT, **values})
+
+
+def job(folder: Path, **values) -> Job:
+    return Job(folder, short(), Robot(), 3, "fish_train train", **values)
+
+
+def episodes(trainer: Trainer, count: int) -> list:
+    rows = []
+    while len(rows) < count:
+        if (progress := trainer.step()) is not None:
+            rows.append(progress)
+    return rows
+
+
+def test_a_restored_run_continues_exactly(tmp_path: Path) -> None:
+    first = Trainer(short(), Robot(), 3)
+    episodes(first, 2)
+    save_checkpoint(tmp_path / CHECKPOINT, first)
+    expected = episodes(first, 3)
+    second = Trainer(short(), Robot(), 3)
+    load_checkpoint(tmp_path / CHECKPOINT, second)
+    assert episodes(second, 3) == expected
+    assert np.array_equal(second.weights, first.weights)
+
+
+def test_a_checkpoint_of_another_recipe_is_refused(tmp_path: Path) -> None:
+    save_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 3))
+    with pytest.raises(UserError, match="learning_rate was 0.001, is 0.01"):
+        load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(learning_rate=0.01), Robot(), 3))
+    with pytest.raises(UserError, match="format, robot and seed"):
+        load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 4))
+    (tmp_path / CHECKPOINT).write_bytes(b"PK\x03\x04 cut short")
+    with pytest.raises(UserError, match="not a checkpoint of training"):
+        load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 3))
+
+
+def test_a_run_finishes_and_its_weights_are_those_of_torch(tmp_path: Path) -> None:
+    statuses: list[Status] = []
+    last = run(job(tmp_path / "run"), statuses.append)
+    assert last.state == "finished" and last.progress.level == 2
+    assert [row.level for row in read_curve(tmp_path / "run")][-1] == 2
+    policy = read_gains_file(tmp_path / "run" / "gains.safetensors")
+    assert policy.contract.training_seed == 3 and policy.contract.robot_hash == Robot().digest()
+    rng = np.random.default_rng(1)
+    x = torch.from_numpy(rng.standard_normal((20, 6)))
+    h = x
+    layers = split(from_tensors(policy.tensors))
+    for k, (W, b) in enumerate(layers):
+        h = h @ torch.from_numpy(W).T + torch.from_numpy(b)
+        h = torch.tanh(h) if k == len(layers) - 1 else torch.relu(h)
+    low = torch.tensor([o.low for o in policy.contract.outputs])
+    span = torch.tensor([o.high - o.low for o in policy.contract.outputs])
+    expected = low + span * 0.5 * (h + 1.0)
+    assert np.allclose(np.stack(policy.gains(x.numpy()), axis=-1), expected.numpy(), atol=1e-6)
+    assert "seed 3; training finished" in (tmp_path / "run" / "model_card.md").read_text()
+    again = Trainer(short(), Robot(), 3, weights=from_tensors(policy.tensors))
+    assert np.array_equal(again.weights, from_tensors(policy.tensors))
+
+
+def test_a_run_stopped_and_resumed_ends_like_one_in_one_go(tmp_path: Path) -> None:
+    run(job(tmp_path / "whole"), lambda _: None)
+    stopped = replace(job(tmp_path / "parts"), max_seconds=0.0)
+    assert run(stopped, lambda _: None).state == "stopped"
+    with pytest.raises(UserError, match="--resume"):
+        run(job(tmp_path / "parts"), lambda _: None)
+    assert run(job(tmp_path / "parts", resume=True), lambda _: None).state == "finished"
+    whole, parts = (read_gains_file(tmp_path / k / "gains.safetensors").tensors for k in ("whole", "parts"))
+    assert all(np.array_equal(whole[name], parts[name]) for name in whole)
+
+
+def test_diverging_training_is_said_and_rolled_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    good = Trainer(short(), Robot(), 3)
+    calls = 0
+    honest = type(good._loop).window
+
+    def window(self, *args, **kwargs) -> WindowResult:
+        nonlocal calls
+        calls += 1
+        result = honest(self, *args, **kwargs)
+        return replace(result, cost=float("nan")) if calls == 7 else result
+
+    monkeypatch.setattr(type(good._loop), "window", window)
+    statuses: list[Status] = []
+    last = run(job(tmp_path / "run"), statuses.append)
+    assert last.state == "diverged"
+    assert "rolled back to update 0" in last.message and "smaller learning_rate" in last.message
+    weights = from_tensors(read_gains_file(tmp_path / "run" / "gains.safetensors").tensors)
+    assert np.array_equal(weights, good.weights)
+
+
+def test_search_does_not_lose_against_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fish_train.training.search.GENERATIONS", {6: 2})
+    monkeypatch.setattr("fish_train.training.search.POPULATION", 2)
+    monkeypatch.setattr("fish_train.training.search.EPISODES", 1)
+    said: list[str] = []
+    trainer = Trainer(short(), Robot(), 3, form=FORMS["constant"])
+    bank = trainer.ladder_bank()
+    found, weights = search(trainer, said.append)
+    again = Trainer(short(), Robot(), 3, form=FORMS["constant"])
+    fleet = again.draw_fleet(again.ladder_bank())
+    assert again.rollout_cost(weights, fleet.copy(), bank) == pytest.approx(found)
+    assert found <= again.rollout_cost(again.weights, fleet.copy(), bank)
+    assert said and "generation 1" in said[0]
