@@ -88,8 +88,11 @@ def line(status: Status) -> str:
     p = status.progress
     if p is None:
         return f"seed {status.seed}: {status.state}, {status.seconds:.0f} s"
+    errors = (
+        f"cross-track {1e3 * p.cross_track:.1f} mm (window {1e3 * p.criterion:.1f}), "
+        f"heading {1e3 * p.heading:.0f} mrad, speed {1e3 * p.speed:.1f} mm/s"
+    )
     return (
         f"seed {status.seed}: {status.state}, {status.seconds:.0f} s, level {p.level}/{status.levels} ({p.name}), "
-        f"update {p.update}, {status.rate:.0f} env steps/s, cost {p.cost:.4f}, "
-        f"cross-track {1e3 * p.cross_track:.1f} mm (window {1e3 * p.criterion:.1f}), heading {1e3 * p.heading:.0f} mrad, speed {1e3 * p.speed:.1f} mm/s"
+        f"update {p.update}, {status.rate:.0f} env steps/s, cost {p.cost:.4f}, {errors}"
     )
