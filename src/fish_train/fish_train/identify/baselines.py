@@ -2,10 +2,10 @@
 
     constant    speed and yaw rate stay as they are
     arx         linear: y_k = A1 y_k-1 + A2 y_k-2 + B1 w_k + B2 w_k-1 + c, y = (u, v, r), w = (sqrt(throttle), alpha)
-    bilinear    u' = a0 + a1 u + a2 sqrt(throttle),  r = b0 + b1 alpha u,  v = c r: six numbers
+    bilinear    u' = a0 + a1 u + a2 sqrt(throttle),  r_k = b0 + b1 (alpha u)_k + b2 (alpha u)_k-1 + b3 r_k-1,  v = c r
 
-fitted to stroke means of the training trials by least squares. All start from the same filter's estimates as the
-physics model: position at the start, heading, speeds and yaw rate averaged over the last stroke.
+fitted to stroke means of the training trials by least squares. They start from the camera's stroke means, which know half
+a second of what comes: an advantage over the physics model, whose estimates know only what was measured before.
 """
 
 from __future__ import annotations
@@ -15,18 +15,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from fish_sim.model import DT
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.motion import HALF_WINDOW, stroke_mean
-from fish_train.identify.prediction import Estimates, Predictions
+from fish_train.identify.prediction import Predictions
 
 Array = NDArray[np.float64]
 
 FULL_ACCELERATION = 12.0 * (4.0 * np.pi) ** 2  # rad/s^2, of the rotor at full throttle: 12 rad at 2 Hz
-STROKE = 0.5  # s
 STEP = 0.25  # s, period of the baselines
 STRIDE = round(STEP / DT)
+OUTLOOK = 3.0  # s, over which the bilinear model's surge is fitted
 RIDGE = 1e-6  # of each regressor's mean square: keeps constant commands solvable
 
 
@@ -97,20 +98,45 @@ def fit_arx(data: list[Table]) -> Advance:
 
 
 def fit_bilinear(data: list[Table]) -> Advance:
-    """Surge acceleration from speed and sqrt(throttle), yaw rate from alpha times speed, sway in proportion to it."""
-    mean = [0.5 * (np.column_stack([d.y[1:, 0], d.w[1:, 0]]) + np.column_stack([d.y[:-1, 0], d.w[:-1, 0]])) for d in data]
-    a = _solve([np.column_stack([np.ones(len(x)), x]) for x in mean], [np.diff(d.y[:, 0]) / STEP for d in data])
-    turn = [np.column_stack([np.ones(len(d.y)), d.w[:, 1] * d.y[:, 0]]) for d in data]
-    b = _solve(turn, [d.y[:, 2] for d in data])
+    """Surge acceleration from speed and sqrt(throttle), yaw rate from alpha times speed with a lag, sway from yaw rate."""
+    a = _fit_surge(data)
+    product = [d.w[:, 1] * d.y[:, 0] for d in data]
+    rows = [
+        np.column_stack([np.ones(len(x) - 1), x[1:], x[:-1], d.y[:-1, 2]]) for x, d in zip(product, data, strict=True)
+    ]
+    b = _solve(rows, [d.y[1:, 2] for d in data])
     c = _solve([d.y[:, 2:] for d in data], [d.y[:, 1] for d in data])
 
     def advance(y: Array, y_before: Array, w: Array, w_before: Array) -> Array:
-        throttle = 0.5 * (w + w_before)[:, 0]
-        u = y[:, 0] + STEP * (a[0] + a[1] * y[:, 0] + a[2] * throttle)
-        r = b[0] + b[1] * w[:, 1] * u
+        u = _surge(a, y[:, 0], w[:, 0], w_before[:, 0])
+        r = b[0] + b[1] * w[:, 1] * u + b[2] * w_before[:, 1] * y[:, 0] + b[3] * y[:, 2]
         return np.column_stack([u, c[0] * r, r])
 
     return advance
+
+
+def _surge(a: Array, u: Array, throttle: Array, throttle_before: Array) -> Array:
+    """Speed one STEP later: u' = a0 + a1 u + a2 sqrt(throttle)."""
+    return u + STEP * (a[0] + a[1] * u + a[2] * 0.5 * (throttle + throttle_before))
+
+
+def _fit_surge(data: list[Table]) -> Array:
+    """a (3,) that predicts best over OUTLOOK: single differences would take the noise in u for damping."""
+    n = round(OUTLOOK / STEP)
+    windows = [(d.y[k : k + n + 1, 0], d.w[k : k + n + 1, 0]) for d in data for k in range(0, len(d.y) - n, 2)]
+    windows = [(u, w) for u, w in windows if np.isfinite(u).all()]
+    if not windows:
+        raise ValueError(f"no training trial has {OUTLOOK:g} s of camera poses without a gap")
+    u, w = (np.array(column).T for column in zip(*windows, strict=True))
+
+    def misfit(a: Array) -> Array:
+        now, errors = u[0], []
+        for k in range(n):
+            now = _surge(a, now, w[k + 1], w[k])
+            errors.append(now - u[k + 1])
+        return np.concatenate(errors)
+
+    return least_squares(misfit, np.array([0.0, -0.5, 0.1]), bounds=([-1, -3, -3], [1, 0, 3])).x
 
 
 def fit_baselines(training: Experiment) -> dict[str, Advance]:
@@ -125,10 +151,10 @@ def predict_baseline(advance: Advance, like: Predictions) -> Predictions:
     """The baseline's predictions from the start points of `like`."""
     experiment, length = like.estimates.experiment, len(like.pose) - 1
     w = inputs(experiment)
-    y, y_before = _mean_velocity(like, 0), _mean_velocity(like, STRIDE)
-    heading = _mean_heading(like) + 0.5 * STROKE * y[:, 2]
+    measured = _measured(like, 0)
+    y, y_before = measured[:, 3:], _measured(like, STRIDE)[:, 3:]
     pose = np.empty_like(like.pose)
-    pose[0] = np.column_stack([like.pose[0, :, :2], heading])
+    pose[0] = measured[:, :3]
     for begin in range(0, length, STRIDE):
         now, then = (w[np.minimum(like.start + k, experiment.length - 1), like.trial] for k in (begin, begin + STRIDE))
         y, y_before = advance(y, y_before, then, now), y
@@ -149,15 +175,11 @@ def _travel(pose: Array, y: Array, y_next: Array) -> Array:
     return np.concatenate([pose[:, :2] + DT * np.cumsum(moved, axis=0), (pose[:, 2] + turned)[..., None]], axis=-1)
 
 
-def _last_stroke(like: Predictions, values: Array, lag: int) -> Array:
-    """(S, ...) mean of values (T, M, ...) over the stroke that ends `lag` grid points before each start."""
-    back = lag + np.arange(round(STROKE / DT))[:, None]
-    return values[np.maximum(like.start - back, 0), like.trial].mean(0)
-
-
-def _mean_velocity(like: Predictions, lag: int) -> Array:
-    return _last_stroke(like, like.estimates.velocity, lag)
-
-
-def _mean_heading(like: Predictions) -> Array:
-    return _last_stroke(like, like.estimates.pose[..., 2], 0)
+def _measured(like: Predictions, lag: int) -> Array:
+    """(S, 6) stroke means of pose and velocity, `lag` grid points before each start but never too early for a mean."""
+    out = np.full((len(like.start), 6), np.nan)
+    for m, frames in enumerate(like.estimates.experiment.frames):
+        which = like.trial == m
+        centres = np.maximum((like.start[which] - lag) * DT, frames.t[0] + HALF_WINDOW)
+        out[which] = stroke_mean(frames.t, centres)(frames.pose)
+    return out

@@ -122,3 +122,9 @@ def _nearest(t: Array, values: Array, grid: Array) -> Array:
     inside = (index >= 0) & (index < len(grid))
     out[index[inside]] = values[inside]
     return out
+
+
+def shorten(experiment: Experiment, steps: int) -> Experiment:
+    """The first `steps` grid points of every trial."""
+    arrays = {k: getattr(experiment, k)[:steps] for k in ("commands", "gyro", "accel", "encoder")}
+    return replace(experiment, steps=np.minimum(experiment.steps, steps), **arrays)

@@ -6,7 +6,7 @@ the wrench noise inflated, which makes the problem nearly convex, and ends with 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from fish_train.identify.filter_types import FilterResult, Noise, SensorModel
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 
 Array = NDArray[np.float64]
+NoiseMove = Callable[[Noise, float], Noise]
 
 LARGEST_STEP = 0.5  # of theta in one iteration
 SMALL_GAIN = 0.05  # nats; below it an iteration has converged
@@ -68,11 +69,10 @@ def evaluate(hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise
     return Fit(hypothesis, theta, robot, noise, result.log_likelihood, objective, result, normal)
 
 
-def climb(start: Fit, experiment: Experiment, iterations: int, noise: Noise | None = None) -> Fit:
-    """Levenberg-Marquardt from a fit, with fixed noise."""
+def climb(start: Fit, experiment: Experiment, iterations: int) -> Fit:
+    """Levenberg-Marquardt with fixed noise from a fit that was evaluated on this experiment."""
     coordinates = Coordinates(start.hypothesis)
-    noise = noise or start.noise
-    best = evaluate(start.hypothesis, start.theta, experiment, noise)
+    best, noise = start, start.noise
     damping, small = 1e-3, 0
     for _ in range(iterations):
         gradient = best.result.gradient.sum(0) + best.theta / coordinates.prior**2
@@ -100,7 +100,7 @@ def likelihood(fit: Fit, experiment: Experiment, noise: Noise) -> float:
     return float(result.log_likelihood.sum())
 
 
-def _wrench(index: int) -> Callable[[Noise, float], Noise]:
+def _wrench(index: int) -> NoiseMove:
     def change(noise: Noise, factor: float) -> Noise:
         wrench = list(noise.wrench)
         wrench[index] *= factor
@@ -109,7 +109,7 @@ def _wrench(index: int) -> Callable[[Noise, float], Noise]:
     return change
 
 
-def _field(name: str) -> Callable[[Noise, float], Noise]:
+def _field(name: str) -> NoiseMove:
     def change(noise: Noise, factor: float) -> Noise:
         return replace(noise, **{name: getattr(noise, name) * factor})
 
@@ -117,13 +117,14 @@ def _field(name: str) -> Callable[[Noise, float], Noise]:
 
 
 NOISE_MOVES = (*(_wrench(i) for i in range(3)), _field("wrench_time"))
+SENSOR_MOVES = tuple(map(_field, ("gyro", "accel", "camera_position", "camera_heading")))
 
 
-def adapt_noise(fit: Fit, experiment: Experiment, rounds: int = 1) -> Noise:
+def adapt_noise(fit: Fit, experiment: Experiment, rounds: int = 1, moves: Sequence[NoiseMove] = NOISE_MOVES) -> Noise:
     """Maximum-likelihood wrench intensities and their time constant: parabola through three points each, in turn."""
     noise, best = fit.noise, likelihood(fit, experiment, fit.noise)
     for _ in range(rounds):
-        for change in NOISE_MOVES:
+        for change in moves:
             low, high = (likelihood(fit, experiment, change(noise, f)) for f in (0.5, 2.0))
             curvature, slope = low + high - 2.0 * best, 0.5 * (high - low)
             octaves = -slope / curvature if curvature < 0 else np.sign(slope) * 2.0
@@ -145,7 +146,7 @@ def fit_hypothesis(
     fit = replace(fit, noise=noise)
     for _ in range(rounds):
         adapted = adapt_noise(fit, experiment)
-        fit = climb(replace(fit, noise=adapted), experiment, iterations)
+        fit = climb(evaluate(hypothesis, fit.theta, experiment, adapted), experiment, iterations)
     return fit
 
 

@@ -38,6 +38,8 @@ class Estimates:
     state: Array  # (T, M, NS) state of the stepper
     wrench: Array  # (T, M, 3) unexplained force on the head [N, N, N m]
     velocity: Array  # (T, M, 3) u, v [m/s], r [rad/s]
+    bias: Array  # (M, 3) of gyro [rad/s] and accelerometer forward, left [m/s^2], at the end of each trial
+    bias_std: Array  # (M, 3)
 
     @property
     def pose(self) -> Array:
@@ -93,6 +95,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
     stepper, nx = coordinates.stepper, len(coordinates.stepper.layout.motion)
     T, M = experiment.length, len(experiment.names)
     state, wrench = np.full((T, M, len(stepper.layout.state)), np.nan), np.full((T, M, 3), np.nan)
+    bias, bias_std = np.zeros((M, 3)), np.zeros((M, 3))
     for first in range(0, M, TRIALS_AT_ONCE):
         part = list(range(first, min(first + TRIALS_AT_ONCE, M)))
         chosen = experiment.select(part)
@@ -101,9 +104,12 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
         n = chosen.length
         state[:n, part, :nx], state[:n, part, nx:] = history.filtered[..., :nx], history.memory[:n]
         wrench[:n, part] = history.filtered[..., nx : nx + 3]
+        last = (chosen.steps - 1, np.arange(len(part)))
+        bias[part] = history.filtered[last][:, nx + 3 :]
+        bias_std[part] = np.sqrt(np.diagonal(history.filtered_P[last], axis1=1, axis2=2)[:, nx + 3 :])
     beyond = np.arange(T)[:, None] >= experiment.steps
     state[beyond], wrench[beyond] = np.nan, np.nan
-    return Estimates(experiment, state, wrench, body_velocity(state, stepper.layout.links))
+    return Estimates(experiment, state, wrench, body_velocity(state, stepper.layout.links), bias, bias_std)
 
 
 def body_velocity(state: Array, links: int) -> Array:

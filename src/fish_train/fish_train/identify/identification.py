@@ -1,0 +1,187 @@
+"""Identify a robot from recordings: parameters with standard errors, and how well they predict unseen trials."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.robot import Robot
+from fish_train.identify.baselines import fit_baselines, predict_baseline
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import NOISE_MOVES, SENSOR_MOVES, Fit, adapt_noise, climb, evaluate, fit_hypothesis
+from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, Hypothesis, nominal_hypothesis
+from fish_train.identify.prediction import (
+    EVERY, HORIZONS, WARM_UP, ErrorSizes, Estimates, Predictions, estimate, predict, prediction_errors,
+)
+from fish_train.identify.settle import LADDER, open_gates, suitable_noise, worst_row
+
+Array = NDArray[np.float64]
+
+UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data say little
+ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
+STILL = 0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
+Report = Callable[[str], None]  # told what is being done
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What came out."""
+
+    fit: Fit
+    start: Robot
+    training: Experiment
+    held_out: Experiment | None  # None: a single trial
+    judged: Predictions  # of the held-out trials, or of the only trial
+    estimates: Estimates  # of the training trials
+    errors: dict[str, ErrorSizes]  # "start", "identified", then the baselines that could be fitted
+    statements: tuple[str, ...]  # what is wrong with the data or the result, and what can still be said
+    seconds: float
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters whose uncertainty is about the prior's: the data do not determine them."""
+        return undetermined(self.fit)
+
+    @property
+    def correlation(self) -> Array:
+        """(K, K) of the parameters' errors."""
+        deviation = np.sqrt(np.diag(self.fit.covariance))
+        return self.fit.covariance / np.outer(deviation, deviation)
+
+
+def identify(
+    experiment: Experiment, robot: Robot, noise: Noise | None = None, hold_out: int = 4,
+    free: tuple[str, ...] = NOMINAL_FREE, report: Report = lambda text: None,
+) -> Identification:  # fmt: skip
+    """Fit the nominal parameters (and those of the robot's effects in `free`) and judge them on trials left out.
+
+    hold_out: every so-manieth trial takes no part in fitting; 0: none. Raises ValueError when it is negative or 1.
+    """
+    began = time.monotonic()
+    train, held = split(len(experiment.names), hold_out)
+    training, held_out = experiment.select(train), experiment.select(held) if held else None
+    fit = fit_training(training, nominal_hypothesis(robot, free), noise or Noise(), report)
+    report("predicting trials left out")
+    judged, errors, lacking = judge(training, held_out, robot, fit)
+    return Identification(
+        fit, robot, training, held_out, judged, estimate(training, fit.robot, fit.noise), errors,
+        tuple([*data_statements(experiment, held_out), *fit_statements(fit), *lacking, *verdict(errors)]),
+        time.monotonic() - began,
+    )  # fmt: skip
+
+
+def split(trials: int, hold_out: int) -> tuple[list[int], list[int]]:
+    """Indices of training and held-out trials: every `hold_out`-th, the last one of a small set, none of a single one."""
+    if hold_out < 0 or hold_out == 1:
+        raise ValueError(f"hold-out {hold_out}: expected 0 (none) or at least 2 (every second trial)")
+    if hold_out == 0 or trials == 1:
+        return list(range(trials)), []
+    held = list(range(hold_out - 1, trials, hold_out)) or [trials - 1]
+    return [i for i in range(trials) if i not in held], held
+
+
+def fit_training(training: Experiment, hypothesis: Hypothesis, noise: Noise, report: Report) -> Fit:
+    """Cold fit; where the sensors are noisier than `noise` says, their noise is estimated before and after."""
+    report("noise of the recordings")
+    origin = Coordinates(hypothesis).origin()
+    generous = replace(open_gates(noise), wrench=tuple(LADDER[2] * w for w in noise.wrench))
+    if worst_row(evaluate(hypothesis, origin, training, generous)) < 4.0:
+        report("fitting parameters and process noise")
+        fit = fit_hypothesis(hypothesis, training, open_gates(noise))
+        report("last steps with outliers left out")
+        return climb(replace(fit, noise=replace(fit.noise, gate_camera=noise.gate_camera, gate_imu=noise.gate_imu)), training, 3)
+    report("fitting with unknown sensor noise")
+    settled = suitable_noise(training, hypothesis.robot, noise)
+    fit = climb(evaluate(hypothesis, origin, training, settled), training, 8)
+    for _ in range(2):
+        adapted = adapt_noise(fit, training, 1, (*SENSOR_MOVES, *NOISE_MOVES))
+        fit = climb(replace(fit, noise=adapted), training, 8)
+    return fit
+
+
+def judge(
+    training: Experiment, held_out: Experiment | None, start: Robot, fit: Fit
+) -> tuple[Predictions, dict[str, ErrorSizes], list[str]]:
+    """Predictions, errors of both robots and of the baselines, and what could not be had, on the held-out trials."""
+    unseen = held_out or training
+    longest = max(HORIZONS)
+    judged = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP)
+    before = predict(unseen, start, suitable_noise(unseen, start, fit.noise), longest, EVERY, WARM_UP)
+    errors = {"start": prediction_errors(before), "identified": prediction_errors(judged)}
+    try:
+        baselines = fit_baselines(training)
+    except ValueError as error:
+        return judged, errors, [f"no baselines: {error}"]
+    errors |= {name: prediction_errors(predict_baseline(advance, judged)) for name, advance in baselines.items()}
+    return judged, errors, []
+
+
+def undetermined(fit: Fit) -> tuple[str, ...]:
+    """Free parameters whose posterior standard deviation is above UNDETERMINED times the prior's."""
+    deviation, prior = np.sqrt(np.diag(fit.covariance)), Coordinates(fit.hypothesis).prior
+    return tuple(n for n, d, p in zip(fit.hypothesis.free, deviation, prior, strict=True) if d > UNDETERMINED * p)
+
+
+def entangled(fit: Fit) -> list[tuple[str, str, float]]:
+    """Pairs of parameters with a correlation beyond ENTANGLED."""
+    deviation = np.sqrt(np.diag(fit.covariance))
+    correlation = fit.covariance / np.outer(deviation, deviation)
+    names = fit.hypothesis.free
+    pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > ENTANGLED]
+    return [(names[j], names[i], float(correlation[i, j])) for i, j in pairs]
+
+
+def data_statements(experiment: Experiment, held_out: Experiment | None) -> list[str]:
+    """What the recordings lack, and what that costs."""
+    out = []
+    if held_out is None:
+        out.append("no trial was held out: errors below are of trials that took part in the fit, unseen ones are worse")
+    for what, rows in (("IMU", experiment.gyro), ("encoder", experiment.encoder)):
+        missing = [name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()]
+        if missing:
+            cost = "its biases stay unknown, fast motion is seen by the camera only" if what == "IMU" else "the rotor is taken to follow its commands"
+            out.append(f"no {what} in {', '.join(missing)}: {cost}")
+    valid = np.arange(experiment.length)[:, None] < experiment.steps
+    rotor, rudder = (experiment.commands[..., i][valid] for i in (0, 1))
+    if np.std(rudder) < STILL:
+        out.append("the rudder hardly moved: turning (yaw and sway drag, servo) is not excited; add rudder steps or sines")
+    if np.std(rotor) < STILL * 150.0:
+        out.append("the rotor's speed hardly changed: nothing drives the fish; add strokes of several amplitudes")
+    short = [n for n, k in zip(experiment.names, experiment.steps, strict=True) if k * 0.01 < WARM_UP + max(HORIZONS)]
+    if short:
+        out.append(f"shorter than {WARM_UP + max(HORIZONS):g} s, so without a say at the longest horizons: {', '.join(short)}")
+    return out
+
+
+def fit_statements(fit: Fit) -> list[str]:
+    """What the data do not determine."""
+    out = []
+    if names := undetermined(fit):
+        out.append(f"the data do not determine {', '.join(names)}: their values are the starting file's, their errors the prior's")
+    for first, second, value in entangled(fit):
+        out.append(f"{first} and {second} are hardly told apart (correlation {value:+.3f})")
+    if (worst := worst_row(fit)) > 1.5:
+        out.append(f"innovations are {worst:.1f} times as large as the noise explains: standard errors are too small")
+    out.append("rigid masses and lengths are taken as measured; all else scales with them")
+    return out
+
+
+def verdict(errors: dict[str, ErrorSizes]) -> list[str]:
+    """Whether the physics beats the bilinear model, horizon by horizon."""
+    if "bilinear" not in errors:
+        return []
+    mine, theirs = errors["identified"], errors["bilinear"]
+    lost = [
+        f"{name} at {h:g} s ({mine.rms[i, j]:.3g} against {theirs.rms[i, j]:.3g})"
+        for i, h in enumerate(mine.horizons)
+        for j, name in enumerate(("position", "heading", "speed"))
+        if mine.rms[i, j] >= theirs.rms[i, j]
+    ]
+    if lost:
+        return [f"the physics model does NOT beat the bilinear one in {', '.join(lost)}"]
+    return ["the physics model beats the bilinear one in position, heading and speed at every horizon"]

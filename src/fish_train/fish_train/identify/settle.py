@@ -1,0 +1,41 @@
+"""Noise that suits a model and its recordings before anything is fitted: a filter that trusts a wrong model gets lost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fish_sim.robot import Robot
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import NOISE_MOVES, SENSOR_MOVES, Fit, adapt_noise, evaluate, likelihood
+from fish_train.identify.hypothesis import nominal_hypothesis
+
+OPEN = 1e9  # gates: nothing is left out
+LADDER = (1.0, 4.0, 16.0, 64.0)  # of the wrench's standard deviations
+STRANGE = 4.0  # rms of whitened innovations that no wrench explains: the sensors are noisier than said
+SENSOR_ROWS = slice(0, 6)  # of the whitened innovations: all but the encoder's, which no free number moves
+
+
+def open_gates(noise: Noise) -> Noise:
+    """The same noise without gates: a filter that leaves out what surprises it can lose the fish for good."""
+    return replace(noise, gate_camera=OPEN, gate_imu=OPEN)
+
+
+def worst_row(fit: Fit) -> float:
+    """Largest rms of whitened innovations over the rows of IMU and camera, 1 when the noise is right."""
+    rows = fit.result.whitened[..., SENSOR_ROWS]
+    count = np.maximum(np.isfinite(rows).sum(axis=(0, 1)), 1)
+    return float(np.sqrt(np.max(np.nansum(rows**2, axis=(0, 1)) / count)))
+
+
+def suitable_noise(experiment: Experiment, robot: Robot, noise: Noise) -> Noise:
+    """The wrench noise of LADDER with the highest likelihood; sensor noise too when the sensors are noisier than `noise`."""
+    fit = evaluate(nominal_hypothesis(robot, free=()), np.zeros(0), experiment, open_gates(noise))
+    scaled = [replace(fit.noise, wrench=tuple(f * w for w in noise.wrench)) for f in LADDER]
+    best = max(scaled, key=lambda n: likelihood(fit, experiment, n))
+    fit = evaluate(fit.hypothesis, fit.theta, experiment, best)
+    if worst_row(fit) < STRANGE and best is not scaled[-1]:
+        return best
+    return adapt_noise(fit, experiment, 2, (*SENSOR_MOVES, *NOISE_MOVES))
