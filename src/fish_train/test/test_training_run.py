@@ -15,7 +15,7 @@ from fish_train.training.config import TrainConfig, make_config
 from fish_train.training.fleet import WindowResult
 from fish_train.training.network import FORMS, from_tensors, split
 from fish_train.training.run import CHECKPOINT, Job, Status, run
-from fish_train.training.run_log import read_curve
+from fish_train.training.run_log import RunLog, read_curve
 from fish_train.training.search import search
 from fish_train.training.trainer import Trainer
 
@@ -107,6 +107,19 @@ def test_a_run_stopped_and_resumed_ends_like_one_in_one_go(tmp_path: Path) -> No
     assert run(job(tmp_path / "parts", resume=True), lambda _: None).state == "finished"
     whole, parts = (read_gains_file(tmp_path / k / "gains.safetensors").tensors for k in ("whole", "parts"))
     assert all(np.array_equal(whole[name], parts[name]) for name in whole)
+
+
+def test_what_was_logged_after_the_checkpoint_is_forgotten(tmp_path: Path) -> None:
+    progress = episodes(Trainer(short(), Robot(), 3), 3)
+    with RunLog(tmp_path, 0) as log:
+        for row in progress:
+            log.add(1.0, row)
+    with RunLog(tmp_path, progress[1].update) as log:
+        assert [row.update for row in read_curve(tmp_path)] == [p.update for p in progress[:2]]
+        assert log.seconds == 1.0
+    with (tmp_path / "curve.csv").open("a") as stream:
+        stream.write("2.0,99,7")  # a kill in the middle of a line
+    assert len(read_curve(tmp_path)) == 2
 
 
 def test_diverging_training_is_said_and_rolled_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

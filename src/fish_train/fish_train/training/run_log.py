@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -27,10 +28,14 @@ class RunLog:
         path = folder / CURVE
         kept = [row for row in _rows(path) if int(row["update"]) <= update] if path.exists() else []
         self.seconds = float(kept[-1]["seconds"]) if kept else 0.0  # spent before this start
-        self._file = path.open("w", newline="", encoding="utf-8")
-        self._table = csv.DictWriter(self._file, COLUMNS)
-        self._table.writeheader()
-        self._table.writerows(kept)
+        fresh = path.with_suffix(".new")
+        with fresh.open("w", newline="", encoding="utf-8") as stream:
+            table = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
+            table.writeheader()
+            table.writerows(kept)
+        os.replace(fresh, path)
+        self._file = path.open("a", newline="", encoding="utf-8")
+        self._table = csv.DictWriter(self._file, COLUMNS, lineterminator="\n")
         self._events = SummaryWriter(str(folder / "tensorboard"), purge_step=update + 1)
 
     def add(self, seconds: float, progress: Progress) -> None:
