@@ -77,12 +77,16 @@ def _solve(rows: list[Array], targets: list[Array]) -> Array:
     good = np.isfinite(A).all(1) & np.isfinite(b).reshape(len(b), -1).all(1)
     A, b = A[good], b[good]
     if len(A) <= A.shape[1]:
-        raise ValueError(f"{len(A)} rows of stroke means for {A.shape[1]} numbers: the training trials are too short")
+        raise ValueError(
+            f"{len(A)} rows of stroke means for {A.shape[1]} numbers: the training trials are too short"
+        )
     ridge = RIDGE * np.diag(np.sum(A**2, axis=0) + 1e-12)
     return np.linalg.solve(A.T @ A + ridge, A.T @ b)
 
 
-Advance = Callable[[Array, Array, Array, Array], Array]  # (y_k, y_k-1, w_k+1, w_k), each (S, .) -> y_k+1 (S, 3)
+Advance = Callable[
+    [Array, Array, Array, Array], Array
+]  # (y_k, y_k-1, w_k+1, w_k), each (S, .) -> y_k+1 (S, 3)
 
 
 def constant() -> Advance:
@@ -94,7 +98,9 @@ def fit_arx(data: list[Table]) -> Advance:
     """Second-order linear model."""
     rows = [np.column_stack([d.y[1:-1], d.y[:-2], d.w[2:], d.w[1:-1], np.ones(len(d.y) - 2)]) for d in data]
     theta = _solve(rows, [d.y[2:] for d in data])
-    return lambda y, y_before, w, w_before: np.column_stack([y, y_before, w, w_before, np.ones(len(y))]) @ theta
+    return lambda y, y_before, w, w_before: (
+        np.column_stack([y, y_before, w, w_before, np.ones(len(y))]) @ theta
+    )
 
 
 def fit_bilinear(data: list[Table]) -> Advance:
@@ -102,7 +108,8 @@ def fit_bilinear(data: list[Table]) -> Advance:
     a = _fit_surge(data)
     product = [d.w[:, 1] * d.y[:, 0] for d in data]
     rows = [
-        np.column_stack([np.ones(len(x) - 1), x[1:], x[:-1], d.y[:-1, 2]]) for x, d in zip(product, data, strict=True)
+        np.column_stack([np.ones(len(x) - 1), x[1:], x[:-1], d.y[:-1, 2]])
+        for x, d in zip(product, data, strict=True)
     ]
     b = _solve(rows, [d.y[1:, 2] for d in data])
     c = _solve([d.y[:, 2:] for d in data], [d.y[:, 1] for d in data])
@@ -123,7 +130,9 @@ def _surge(a: Array, u: Array, throttle: Array, throttle_before: Array) -> Array
 def _fit_surge(data: list[Table]) -> Array:
     """a (3,) that predicts best over OUTLOOK: single differences would take the noise in u for damping."""
     n = round(OUTLOOK / STEP)
-    windows = [(d.y[k : k + n + 1, 0], d.w[k : k + n + 1, 0]) for d in data for k in range(0, len(d.y) - n, 2)]
+    windows = [
+        (d.y[k : k + n + 1, 0], d.w[k : k + n + 1, 0]) for d in data for k in range(0, len(d.y) - n, 2)
+    ]
     windows = [(u, w) for u, w in windows if np.isfinite(u).all()]
     if not windows:
         raise ValueError(f"no training trial has {OUTLOOK:g} s of camera poses without a gap")
@@ -156,7 +165,9 @@ def predict_baseline(advance: Advance, like: Predictions) -> Predictions:
     pose = np.empty_like(like.pose)
     pose[0] = measured[:, :3]
     for begin in range(0, length, STRIDE):
-        now, then = (w[np.minimum(like.start + k, experiment.length - 1), like.trial] for k in (begin, begin + STRIDE))
+        now, then = (
+            w[np.minimum(like.start + k, experiment.length - 1), like.trial] for k in (begin, begin + STRIDE)
+        )
         y, y_before = advance(y, y_before, then, now), y
         count = min(STRIDE, length - begin)
         pose[begin + 1 : begin + count + 1] = _travel(pose[begin], y_before, y)[:count]
@@ -172,7 +183,9 @@ def _travel(pose: Array, y: Array, y_next: Array) -> Array:
     psi = pose[:, 2] + turned - 0.5 * DT * velocity[..., 2]
     u, v = velocity[..., 0], velocity[..., 1]
     moved = np.stack([u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)], axis=-1)
-    return np.concatenate([pose[:, :2] + DT * np.cumsum(moved, axis=0), (pose[:, 2] + turned)[..., None]], axis=-1)
+    return np.concatenate(
+        [pose[:, :2] + DT * np.cumsum(moved, axis=0), (pose[:, 2] + turned)[..., None]], axis=-1
+    )
 
 
 def _measured(like: Predictions, lag: int) -> Array:

@@ -58,7 +58,9 @@ class Fit:
         return dict(zip(self.hypothesis.free, deviation.tolist(), strict=True))
 
 
-def evaluate(hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise, keep: bool = False) -> Fit:
+def evaluate(
+    hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise, keep: bool = False
+) -> Fit:
     """The hypothesis at theta, with score and normal matrix."""
     coordinates = Coordinates(hypothesis)
     p, dp, sensors = coordinates.filter_inputs(theta)
@@ -92,12 +94,13 @@ def climb(start: Fit, experiment: Experiment, iterations: int) -> Fit:
 
 
 def likelihood(fit: Fit, experiment: Experiment, noise: Noise) -> float:
-    """Log likelihood at a fit's parameters under other noise."""
+    """Log likelihood at a fit's parameters under other noise; -inf where the filter diverges."""
     coordinates = Coordinates(fit.hypothesis)
     p, _, sensors = coordinates.filter_inputs(fit.theta)
     plain = replace(sensors, free={}, slope={})
     result = run_filter(experiment, coordinates.stepper, p, np.zeros((0, len(p))), plain, noise)
-    return float(result.log_likelihood.sum())
+    total = float(result.log_likelihood.sum())
+    return total if np.isfinite(total) else -np.inf
 
 
 def _wrench(index: int) -> NoiseMove:
@@ -120,14 +123,17 @@ NOISE_MOVES = (*(_wrench(i) for i in range(3)), _field("wrench_time"))
 SENSOR_MOVES = tuple(map(_field, ("gyro", "accel", "camera_position", "camera_heading")))
 
 
-def adapt_noise(fit: Fit, experiment: Experiment, rounds: int = 1, moves: Sequence[NoiseMove] = NOISE_MOVES) -> Noise:
+def adapt_noise(
+    fit: Fit, experiment: Experiment, rounds: int = 1, moves: Sequence[NoiseMove] = NOISE_MOVES
+) -> Noise:
     """Maximum-likelihood wrench intensities and their time constant: parabola through three points each, in turn."""
     noise, best = fit.noise, likelihood(fit, experiment, fit.noise)
     for _ in range(rounds):
         for change in moves:
             low, high = (likelihood(fit, experiment, change(noise, f)) for f in (0.5, 2.0))
             curvature, slope = low + high - 2.0 * best, 0.5 * (high - low)
-            octaves = -slope / curvature if curvature < 0 else np.sign(slope) * 2.0
+            parabola = np.isfinite(curvature) and curvature < 0
+            octaves = -slope / curvature if parabola else np.sign(np.nan_to_num(slope)) * 2.0
             candidate = change(noise, 2.0 ** float(np.clip(octaves, -2.0, 2.0)))
             value = likelihood(fit, experiment, candidate)
             if value > best:

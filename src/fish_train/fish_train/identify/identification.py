@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,23 @@ from fish_sim.robot import Robot
 from fish_train.identify.baselines import fit_baselines, predict_baseline
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import NOISE_MOVES, SENSOR_MOVES, Fit, adapt_noise, climb, evaluate, fit_hypothesis
-from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, Hypothesis, nominal_hypothesis
-from fish_train.identify.prediction import (
-    EVERY, HORIZONS, WARM_UP, ErrorSizes, Estimates, Predictions, estimate, predict, prediction_errors,
+from fish_train.identify.fit import (
+    Fit,
 )
-from fish_train.identify.settle import LADDER, open_gates, suitable_noise, worst_row
+from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, nominal_hypothesis
+from fish_train.identify.prediction import (
+    EVERY,
+    HORIZONS,
+    WARM_UP,
+    ErrorSizes,
+    Estimates,
+    Predictions,
+    estimate,
+    predict,
+    prediction_errors,
+)
+from fish_train.identify.settle import suitable_noise, worst_row
+from fish_train.identify.tempering import fit_tempered
 
 Array = NDArray[np.float64]
 
@@ -65,7 +76,7 @@ def identify(
     began = time.monotonic()
     train, held = split(len(experiment.names), hold_out)
     training, held_out = experiment.select(train), experiment.select(held) if held else None
-    fit = fit_training(training, nominal_hypothesis(robot, free), noise or Noise(), report)
+    fit = fit_tempered(nominal_hypothesis(robot, free), training, noise or Noise(), report=report)
     report("predicting trials left out")
     judged, errors, lacking = judge(training, held_out, robot, fit)
     return Identification(
@@ -85,25 +96,6 @@ def split(trials: int, hold_out: int) -> tuple[list[int], list[int]]:
     return [i for i in range(trials) if i not in held], held
 
 
-def fit_training(training: Experiment, hypothesis: Hypothesis, noise: Noise, report: Report) -> Fit:
-    """Cold fit; where the sensors are noisier than `noise` says, their noise is estimated before and after."""
-    report("noise of the recordings")
-    origin = Coordinates(hypothesis).origin()
-    generous = replace(open_gates(noise), wrench=tuple(LADDER[2] * w for w in noise.wrench))
-    if worst_row(evaluate(hypothesis, origin, training, generous)) < 4.0:
-        report("fitting parameters and process noise")
-        fit = fit_hypothesis(hypothesis, training, open_gates(noise))
-        report("last steps with outliers left out")
-        return climb(replace(fit, noise=replace(fit.noise, gate_camera=noise.gate_camera, gate_imu=noise.gate_imu)), training, 3)
-    report("fitting with unknown sensor noise")
-    settled = suitable_noise(training, hypothesis.robot, noise)
-    fit = climb(evaluate(hypothesis, origin, training, settled), training, 8)
-    for _ in range(2):
-        adapted = adapt_noise(fit, training, 1, (*SENSOR_MOVES, *NOISE_MOVES))
-        fit = climb(replace(fit, noise=adapted), training, 8)
-    return fit
-
-
 def judge(
     training: Experiment, held_out: Experiment | None, start: Robot, fit: Fit
 ) -> tuple[Predictions, dict[str, ErrorSizes], list[str]]:
@@ -117,14 +109,18 @@ def judge(
         baselines = fit_baselines(training)
     except ValueError as error:
         return judged, errors, [f"no baselines: {error}"]
-    errors |= {name: prediction_errors(predict_baseline(advance, judged)) for name, advance in baselines.items()}
+    errors |= {
+        name: prediction_errors(predict_baseline(advance, judged)) for name, advance in baselines.items()
+    }
     return judged, errors, []
 
 
 def undetermined(fit: Fit) -> tuple[str, ...]:
     """Free parameters whose posterior standard deviation is above UNDETERMINED times the prior's."""
     deviation, prior = np.sqrt(np.diag(fit.covariance)), Coordinates(fit.hypothesis).prior
-    return tuple(n for n, d, p in zip(fit.hypothesis.free, deviation, prior, strict=True) if d > UNDETERMINED * p)
+    return tuple(
+        n for n, d, p in zip(fit.hypothesis.free, deviation, prior, strict=True) if d > UNDETERMINED * p
+    )
 
 
 def entangled(fit: Fit) -> list[tuple[str, str, float]]:
@@ -140,21 +136,37 @@ def data_statements(experiment: Experiment, held_out: Experiment | None) -> list
     """What the recordings lack, and what that costs."""
     out = []
     if held_out is None:
-        out.append("no trial was held out: errors below are of trials that took part in the fit, unseen ones are worse")
+        out.append(
+            "no trial was held out: errors below are of trials that took part in the fit, unseen ones are worse"
+        )
     for what, rows in (("IMU", experiment.gyro), ("encoder", experiment.encoder)):
         missing = [name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()]
         if missing:
-            cost = "its biases stay unknown, fast motion is seen by the camera only" if what == "IMU" else "the rotor is taken to follow its commands"
+            cost = (
+                "its biases stay unknown, fast motion is seen by the camera only"
+                if what == "IMU"
+                else "the rotor is taken to follow its commands"
+            )
             out.append(f"no {what} in {', '.join(missing)}: {cost}")
     valid = np.arange(experiment.length)[:, None] < experiment.steps
     rotor, rudder = (experiment.commands[..., i][valid] for i in (0, 1))
     if np.std(rudder) < STILL:
-        out.append("the rudder hardly moved: turning (yaw and sway drag, servo) is not excited; add rudder steps or sines")
+        out.append(
+            "the rudder hardly moved: turning (yaw and sway drag, servo) is not excited; add rudder steps or sines"
+        )
     if np.std(rotor) < STILL * 150.0:
-        out.append("the rotor's speed hardly changed: nothing drives the fish; add strokes of several amplitudes")
-    short = [n for n, k in zip(experiment.names, experiment.steps, strict=True) if k * 0.01 < WARM_UP + max(HORIZONS)]
+        out.append(
+            "the rotor's speed hardly changed: nothing drives the fish; add strokes of several amplitudes"
+        )
+    short = [
+        n
+        for n, k in zip(experiment.names, experiment.steps, strict=True)
+        if k * 0.01 < WARM_UP + max(HORIZONS)
+    ]
     if short:
-        out.append(f"shorter than {WARM_UP + max(HORIZONS):g} s, so without a say at the longest horizons: {', '.join(short)}")
+        out.append(
+            f"shorter than {WARM_UP + max(HORIZONS):g} s, so without a say at the longest horizons: {', '.join(short)}"
+        )
     return out
 
 
@@ -162,11 +174,15 @@ def fit_statements(fit: Fit) -> list[str]:
     """What the data do not determine."""
     out = []
     if names := undetermined(fit):
-        out.append(f"the data do not determine {', '.join(names)}: their values are the starting file's, their errors the prior's")
+        out.append(
+            f"the data do not determine {', '.join(names)}: their values are the starting file's, their errors the prior's"
+        )
     for first, second, value in entangled(fit):
         out.append(f"{first} and {second} are hardly told apart (correlation {value:+.3f})")
     if (worst := worst_row(fit)) > 1.5:
-        out.append(f"innovations are {worst:.1f} times as large as the noise explains: standard errors are too small")
+        out.append(
+            f"innovations are {worst:.1f} times as large as the noise explains: standard errors are too small"
+        )
     out.append("rigid masses and lengths are taken as measured; all else scales with them")
     return out
 

@@ -82,7 +82,10 @@ class ErrorSizes:
         """{"1": {"position": .., "heading": .., "speed": .., "count": ..}, ..}; horizons without data are left out."""
         count = self.counts.sum(0)
         return {
-            f"{h:g}": {**dict(zip(("position", "heading", "speed"), self.rms[i].tolist(), strict=True)), "count": int(count[i])}
+            f"{h:g}": {
+                **dict(zip(("position", "heading", "speed"), self.rms[i].tolist(), strict=True)),
+                "count": int(count[i]),
+            }
             for i, h in enumerate(self.horizons)
             if count[i]
         }
@@ -120,7 +123,12 @@ def body_velocity(state: Array, links: int) -> Array:
 
 
 def predict(
-    experiment: Experiment, robot: Robot, noise: Noise, horizon: float, every: float | None = None, first: float = 0.0
+    experiment: Experiment,
+    robot: Robot,
+    noise: Noise,
+    horizon: float,
+    every: float | None = None,
+    first: float = 0.0,
 ) -> Predictions:
     """Predictions over `horizon` [s] from start points every `every` (default: horizon), the first at `first` [s].
 
@@ -150,7 +158,12 @@ def start_points(experiment: Experiment, every: float, first: float) -> NDArray[
 
 
 def _simulate(
-    estimates: Estimates, robot: Robot, noise: Noise, trial: NDArray[np.int64], start: NDArray[np.int64], length: int
+    estimates: Estimates,
+    robot: Robot,
+    noise: Noise,
+    trial: NDArray[np.int64],
+    start: NDArray[np.int64],
+    length: int,
 ) -> Array:
     """(length + 1, S, 3) poses, NaN beyond the end of the trial."""
     experiment = estimates.experiment

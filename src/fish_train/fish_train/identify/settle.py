@@ -24,10 +24,12 @@ def open_gates(noise: Noise) -> Noise:
 
 
 def worst_row(fit: Fit) -> float:
-    """Largest rms of whitened innovations over the rows of IMU and camera, 1 when the noise is right."""
+    """Largest rms of whitened innovations over the rows of IMU and camera: 1 when the noise is right, inf when the filter diverged."""
     rows = fit.result.whitened[..., SENSOR_ROWS]
-    count = np.maximum(np.isfinite(rows).sum(axis=(0, 1)), 1)
-    return float(np.sqrt(np.max(np.nansum(rows**2, axis=(0, 1)) / count)))
+    count = np.isfinite(rows).sum(axis=(0, 1))
+    if not np.isfinite(fit.objective):
+        return float("inf")
+    return float(np.sqrt(np.max(np.nansum(rows**2, axis=(0, 1)) / np.maximum(count, 1))))
 
 
 def suitable_noise(experiment: Experiment, robot: Robot, noise: Noise) -> Noise:

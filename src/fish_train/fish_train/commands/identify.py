@@ -1,0 +1,59 @@
+"""Fit the robot's parameters to recordings, with standard errors, and judge them on trials left out of the fit.
+
+Writes robot.yaml (values with std), identification.json and report.html.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the verb."""
+    parser.add_argument(
+        "dataset", type=Path, nargs="+", help="folders of trials, or single recordings, of one robot"
+    )
+    parser.add_argument("--robot", type=Path, help="where the fit starts (default: the nominal robot)")
+    parser.add_argument("--out", type=Path, default=Path("identified"), help="folder (default: %(default)s)")
+    parser.add_argument(
+        "--hold-out",
+        type=int,
+        default=4,
+        metavar="N",
+        help="every N-th trial is left out, 0: none (default: %(default)s)",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify, print, write."""
+    from fish_train.identify.identification import identify
+    from fish_train.identify.record import write_identification
+    from fish_train.reports.identify_page import write_identify_page
+    from fish_train.reports.identify_tables import error_table, parameter_table
+    from fish_train.score_table import print_table
+
+    from .inputs import read_experiment, read_model, user_errors
+
+    console = Console()
+    robot = read_model(args.robot)
+    experiment, left_out = read_experiment(*args.dataset)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar, user_errors():
+        task = bar.add_task("identifying", total=None)
+        result = identify(
+            experiment, robot, hold_out=args.hold_out, report=lambda text: bar.update(task, description=text)
+        )
+    args.out.mkdir(parents=True, exist_ok=True)
+    write_identification(args.out, result, left_out)
+    write_identify_page(args.out / "report.html", result, left_out)
+    print_table(console, parameter_table(result))
+    print_table(console, error_table(result.errors))
+    for text in [*(f"left out: {text}" for text in left_out), *result.statements]:
+        console.print(f"- {text}", highlight=False, soft_wrap=True)
+    files = "robot.yaml, identification.json and report.html"
+    console.print(f"{result.seconds:.0f} s; {files} in {args.out}", highlight=False, soft_wrap=True)
+    return 0

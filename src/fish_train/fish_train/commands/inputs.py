@@ -1,0 +1,58 @@
+"""What several verbs read: a model file, and recordings as an experiment; errors are ones the user can mend."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fish_train.errors import UserError
+
+if TYPE_CHECKING:
+    from fish_sim.robot import Robot
+    from fish_train.identify.experiment import Experiment
+
+
+@contextmanager
+def user_errors() -> Iterator[None]:
+    """ValueErrors of the core, whose texts are made for the user, as UserErrors."""
+    try:
+        yield
+    except ValueError as error:
+        raise UserError(str(error)) from error
+
+
+def read_model(path: Path | None) -> Robot:
+    """robot.yaml or model.yaml; None: the nominal robot."""
+    from fish_sim.robot import Robot, load_robot
+
+    with user_errors():
+        return Robot() if path is None else load_robot(path)
+
+
+def read_experiment(*paths: Path) -> tuple[Experiment, list[str]]:
+    """All usable trials under the paths on the filter's grid, and what was left out and why.
+
+    Raises UserError when no trial can be used, or when the trials are not of one robot.
+    """
+    from fish_train.identify.experiment import ExperimentError, build_experiment
+    from fish_train.recordings import read_dataset
+
+    trials, left_out = [], []
+    for path in paths:
+        data = read_dataset(path, progress=True)
+        mixed = [problem.text for problem in data.problems if problem.kind == "mixed_robots"]
+        if mixed:
+            raise UserError(f"{path}: {mixed[0]}")
+        left_out += [problem.text for problem in data.problems if problem.kind == "unreadable_trial"]
+        for trial in data:
+            try:
+                build_experiment([trial])
+            except ExperimentError as error:
+                left_out.append(str(error))
+            else:
+                trials.append(trial)
+    if not trials:
+        raise UserError("no trial can be used: " + "; ".join(left_out))
+    return build_experiment(trials), left_out

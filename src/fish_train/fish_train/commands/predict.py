@@ -1,0 +1,56 @@
+"""Predict a recording: every HORIZON seconds the robot starts from its estimated state and swims on with the recorded inputs.
+
+The state is estimated by a Kalman filter with the same model from what was measured up to that moment. The table has one
+row for each camera pose; pose and heading are what the camera should show and what it showed. Body velocities, measured
+and predicted alike, are the slope of a straight line through the poses within half a second (Hann window), so that the
+swing of the strokes is averaged out.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the verb."""
+    parser.add_argument("recording", type=Path, help="one recording, or a folder of trials")
+    parser.add_argument("--model", type=Path, required=True, help="model.yaml or robot.yaml")
+    parser.add_argument(
+        "--horizon", type=float, default=2.0, help="s between start points (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("predictions.csv"), help="table (default: %(default)s)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the table, print the errors."""
+    from fish_train.identify.filter_types import Noise
+    from fish_train.identify.prediction import WARM_UP, predict, prediction_errors
+    from fish_train.identify.prediction_table import write_predictions
+    from fish_train.identify.settle import suitable_noise
+    from fish_train.reports.identify_tables import error_table
+    from fish_train.score_table import print_table
+
+    from .inputs import read_experiment, read_model, user_errors
+
+    console = Console()
+    model = read_model(args.model)
+    experiment, left_out = read_experiment(args.recording)
+    with user_errors():
+        noise = suitable_noise(experiment, model, Noise())
+        predictions = predict(experiment, model, noise, args.horizon)
+        rows = write_predictions(args.out, predictions)
+        horizons = tuple(h for h in (1.0, 2.0, 5.0) if h <= args.horizon) or (args.horizon,)
+        errors = prediction_errors(predict(experiment, model, noise, args.horizon, 1.0, WARM_UP), horizons)
+    for text in left_out:
+        console.print(f"left out: {text}", highlight=False, soft_wrap=True)
+    if errors.counts.any():
+        print_table(console, error_table({"model": errors}))
+    else:
+        console.print(f"no trial lasts {WARM_UP + args.horizon:g} s: errors at the horizon cannot be stated")
+    console.print(f"{rows} rows: {args.out}", highlight=False, soft_wrap=True)
+    return 0
