@@ -17,7 +17,16 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-freciprocal-math", "-fPIC", "-shared", "-std=gnu11", "-w")
+FLAGS = (
+    "-O3",
+    "-march=native",
+    "-fno-math-errno",
+    "-freciprocal-math",
+    "-fPIC",
+    "-shared",
+    "-std=gnu11",
+    "-w",
+)
 
 log = logging.getLogger(__name__)
 

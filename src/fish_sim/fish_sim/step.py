@@ -156,7 +156,9 @@ class Stepper:
         self._kernel(len(rate)).rates_jvp(*arrays, p, dp, rate, tangent)
         return rate, tangent
 
-    def memory_jvp(self, start: Array, commands: Array, parameters: Array, d_parameters: Array) -> tuple[Array, Array]:
+    def memory_jvp(
+        self, start: Array, commands: Array, parameters: Array, d_parameters: Array
+    ) -> tuple[Array, Array]:
         """Memory (T + 1, B, NM) under commands (T, B, 2), which needs no motion, and its derivative along d_parameters.
 
         start (B, NM); parameters and d_parameters (NP,) or (B, NP).

@@ -8,15 +8,17 @@ few optima; the shortlist is refitted with the noise adapted to each hypothesis.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from fish_train.identify.experiment import Experiment
+from fish_train.identify.experiment import Experiment, shorten
+from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, fit_hypothesis
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 
-RANK_STARTS = (0.3,)  # strengths, in typical ones, from which a candidate is tried
+RANK_START = 0.3  # strength, in typical ones, from which a candidate is tried
+RANK_STEPS = 1000  # of 10 ms: half a trial is enough to rank
 RANK_ITERATIONS = 2
 SHORTLIST = 4
 LOOK_ALIKES = (
@@ -58,27 +60,18 @@ class Round:
 
 
 def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Progress) -> tuple[Ranked, ...]:
-    """All candidates added to the base one at a time, a few iterations each at the base's noise."""
+    """All candidates added to the base one at a time, a few iterations each at the base's noise, on short trials."""
+    short = shorten(experiment, RANK_STEPS)
+    reference = climb(evaluate(base.hypothesis, base.theta, short, base.noise), short, RANK_ITERATIONS)
     found = []
     for name in names:
         progress(f"ranking {name}")
-        best: Fit | None = None
-        for start in RANK_STARTS:
-            trial = evaluate_start(base, name, start, experiment)
-            if best is None or trial.objective > best.objective:
-                best = trial
-        climbed = climb(best, experiment, RANK_ITERATIONS)
-        found.append(Ranked(name, climbed.objective - base.objective, climbed.theta))
+        hypothesis = extend(base, name, RANK_START)
+        own = Coordinates(hypothesis).origin()[len(base.theta) :]
+        start = evaluate(hypothesis, np.concatenate([base.theta, own]), short, base.noise)
+        climbed = climb(start, short, RANK_ITERATIONS)
+        found.append(Ranked(name, climbed.objective - reference.objective, climbed.theta))
     return tuple(sorted(found, key=lambda r: -r.gain))
-
-
-def evaluate_start(base: Fit, name: str, start: float, experiment: Experiment) -> Fit:
-    """The base with an effect at a start strength, after one Gauss-Newton iteration."""
-    hypothesis = extend(base, name, start)
-    origin = Coordinates(hypothesis).origin()
-    theta = np.concatenate([base.theta, origin[len(base.theta) :]])
-    first = evaluate(hypothesis, theta, experiment, base.noise)
-    return climb(first, experiment, 1)
 
 
 def extend(base: Fit, name: str, start: float) -> Hypothesis:
@@ -98,12 +91,12 @@ def shortlist(ranking: Sequence[Ranked]) -> list[str]:
 
 def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
     """A candidate with its noise adapted, from the ranking's optimum and cold; the better of the two."""
-    hypothesis = extend(base, ranked.name, 1.0)
-    warm = fit_hypothesis(hypothesis, experiment, base.noise, ranked.theta, iterations=8, rounds=2)
-    origin = Coordinates(hypothesis).origin()
+    hypothesis = extend(base, ranked.name, RANK_START)
+    warm = climb(evaluate(hypothesis, ranked.theta, experiment, base.noise), experiment, 6)
+    warm = climb(evaluate(hypothesis, warm.theta, experiment, adapt_noise(warm, experiment)), experiment, 6)
+    origin = Coordinates(extend(base, ranked.name, 1.0)).origin()
     cold_theta = np.concatenate([0.0 * base.theta, origin[len(base.theta) :]])
-    floor = replace(base.noise, wrench=tuple(0.3 * w for w in base.noise.wrench))
-    cold = fit_hypothesis(hypothesis, experiment, floor, cold_theta, iterations=8, rounds=2)
+    cold = fit_hypothesis(hypothesis, experiment, Noise(), cold_theta, iterations=8, rounds=2)
     return max(warm, cold, key=lambda f: f.objective)
 
 
@@ -126,7 +119,9 @@ def restart_base(base: Fit, rivals: Sequence[Fit], experiment: Experiment) -> Fi
     for rival in rivals:
         theta = rival.theta[: len(base.theta)]
         fit = climb(evaluate(base.hypothesis, theta, experiment, base.noise), experiment, 6)
-        fit = climb(replace(fit, noise=adapt_noise(fit, experiment)), experiment, 6)
+        fit = climb(
+            evaluate(base.hypothesis, fit.theta, experiment, adapt_noise(fit, experiment)), experiment, 6
+        )
         if fit.objective > best.objective:
             best = fit
     return best

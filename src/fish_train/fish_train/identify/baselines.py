@@ -91,7 +91,7 @@ Advance = Callable[
 
 def constant() -> Advance:
     """Speed and yaw rate stay."""
-    return lambda y, y_before, w, w_before: y
+    return lambda y, _y_before, _w, _w_before: y
 
 
 def fit_arx(data: list[Table]) -> Advance:
@@ -114,7 +114,7 @@ def fit_bilinear(data: list[Table]) -> Advance:
     b = _solve(rows, [d.y[1:, 2] for d in data])
     c = _solve([d.y[:, 2:] for d in data], [d.y[:, 1] for d in data])
 
-    def advance(y: Array, y_before: Array, w: Array, w_before: Array) -> Array:
+    def advance(y: Array, y_before: Array, w: Array, w_before: Array) -> Array:  # noqa: ARG001
         u = _surge(a, y[:, 0], w[:, 0], w_before[:, 0])
         r = b[0] + b[1] * w[:, 1] * u + b[2] * w_before[:, 1] * y[:, 0] + b[3] * y[:, 2]
         return np.column_stack([u, c[0] * r, r])

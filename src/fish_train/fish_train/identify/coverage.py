@@ -93,7 +93,7 @@ def study(
     trials: int,
     duration: float,
     seed: int = 0,
-    done: Callable[[Repetition], None] = lambda r: None,
+    done: Callable[[Repetition], None] = lambda _: None,
 ) -> list[Repetition]:
     """Repetitions one after the other (each uses all cores); `done` hears of each."""
     out = []

@@ -10,7 +10,13 @@ from fish_train.identify.filter_types import Array, FilterResult, Noise, SensorM
 
 
 def run_filter(
-    experiment: Experiment, stepper: Stepper, p: Array, dp: Array, sensors: SensorModel, noise: Noise, keep: bool = False
+    experiment: Experiment,
+    stepper: Stepper,
+    p: Array,
+    dp: Array,
+    sensors: SensorModel,
+    noise: Noise,
+    keep: bool = False,
 ) -> FilterResult:
     """Innovations, likelihood, score and Gauss-Newton matrix of all trials.
 

@@ -15,7 +15,16 @@ from fish_sim.model import DT, Structure
 from fish_sim.step import Scheme, Stepper, tangent_source
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
-    ENCODER_ROW, ROWS, WRENCH, Array, FilterResult, History, Noise, SensorModel, first_memory, first_state,
+    ENCODER_ROW,
+    ROWS,
+    WRENCH,
+    Array,
+    FilterResult,
+    History,
+    Noise,
+    SensorModel,
+    first_memory,
+    first_state,
     place_frames,
 )
 
@@ -33,7 +42,10 @@ class Settings(ctypes.Structure):
         ("links", ctypes.c_long),
         ("wrench_decay", ctypes.c_double),
         ("wrench_variance", ctypes.c_double * 3),
-        *((name, ctypes.c_double) for name in ("gyro", "accel", "position", "heading", "gate_imu", "gate_camera")),
+        *(
+            (name, ctypes.c_double)
+            for name in ("gyro", "accel", "position", "heading", "gate_imu", "gate_camera")
+        ),
     ]
 
 
@@ -59,7 +71,13 @@ def filter_library(structure: Structure, scheme: Scheme) -> ctypes.CDLL | None:
 
 
 def compiled_pass(
-    experiment: Experiment, stepper: Stepper, p: Array, dp: Array, sensors: SensorModel, noise: Noise, keep: bool
+    experiment: Experiment,
+    stepper: Stepper,
+    p: Array,
+    dp: Array,
+    sensors: SensorModel,
+    noise: Noise,
+    keep: bool,
 ) -> FilterResult | None:
     """The result of a pass, or None when it cannot be compiled here."""
     loaded = filter_library(stepper.layout.structure, stepper.scheme)

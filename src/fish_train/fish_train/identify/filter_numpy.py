@@ -12,7 +12,17 @@ from fish_sim.model import DT
 from fish_sim.step import Stepper
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
-    ENCODER_ROW, ROWS, WRENCH, Array, FilterResult, History, Noise, SensorModel, first_memory, first_state, place_frames,
+    ENCODER_ROW,
+    ROWS,
+    WRENCH,
+    Array,
+    FilterResult,
+    History,
+    Noise,
+    SensorModel,
+    first_memory,
+    first_state,
+    place_frames,
 )
 
 
@@ -20,7 +30,13 @@ class Filter:
     """One pass over an experiment for given parameters."""
 
     def __init__(
-        self, experiment: Experiment, stepper: Stepper, p: Array, dp: Array, sensors: SensorModel, noise: Noise
+        self,
+        experiment: Experiment,
+        stepper: Stepper,
+        p: Array,
+        dp: Array,
+        sensors: SensorModel,
+        noise: Noise,
     ) -> None:
         """p (NP,) parameters; dp (K, NP) derivative of p with respect to each free parameter."""
         self.experiment, self.stepper, self.sensors, self.noise = experiment, stepper, sensors, noise
@@ -60,7 +76,9 @@ class Filter:
             if history is not None:
                 history.transition[k] = F
         self._encoder(sums)
-        return FilterResult(sums.log_likelihood, sums.samples, sums.gradient, sums.normal, sums.whitened, history)
+        return FilterResult(
+            sums.log_likelihood, sums.samples, sums.gradient, sums.normal, sums.whitened, history
+        )
 
     def _follow_commands(self) -> tuple[Array, Array]:
         """Memory (T + 1, M, NM) and its derivatives (T + 1, M, NM, K): they need no motion."""
@@ -128,7 +146,9 @@ class Filter:
         if imu.any():
             h, H, dh = self._imu(xi, rate, tangent, D)
             R = np.diag([self.noise.gyro**2, self.noise.accel**2, self.noise.accel**2])
-            xi, P, D = _update(k, slice(0, 3), z_imu - h, H, dh, R, imu, self.noise.gate_imu, (xi, P, D), sums)
+            xi, P, D = _update(
+                k, slice(0, 3), z_imu - h, H, dh, R, imu, self.noise.gate_imu, (xi, P, D), sums
+            )
         if camera.any():
             h, H, dh = self._camera(xi, np.nan_to_num(offset), rate, D)
             position, heading = self.noise.camera_position, self.noise.camera_heading
@@ -146,7 +166,9 @@ class Filter:
         ds, dp = self._directions(D, nx)
         drive = np.stack([m0[:, 0], (m1 - m0)[:, 0] / DT, m0[:, 1], (m1 - m0)[:, 1] / DT], axis=-1)
         d_drive = np.zeros((M, R, 4))
-        d_drive[:, nx + 3 :] = np.stack([d0[:, 0], (d1 - d0)[:, 0] / DT, d0[:, 1], (d1 - d0)[:, 1] / DT], axis=-1)
+        d_drive[:, nx + 3 :] = np.stack(
+            [d0[:, 0], (d1 - d0)[:, 0] / DT, d0[:, 1], (d1 - d0)[:, 1] / DT], axis=-1
+        )
         rate, tangent = self.stepper.rates_jvp(
             np.repeat(xi[:, :nx], R, axis=0), np.repeat(drive, R, axis=0), np.repeat(self._parameters(xi), R, axis=0),
             ds.reshape(M * R, nx), d_drive.reshape(M * R, 4), dp.reshape(M * R, -1),
@@ -162,7 +184,9 @@ class Filter:
         forward, left = ax * cos + ay * sin, ay * cos - ax * sin
         h = np.stack([s.gyro_scale * xi[:, nq + 2], forward, left], axis=1) + xi[:, nx + 3 :]
         t_x, t_y = tangent[:, :, nq], tangent[:, :, nq + 1]
-        turn = np.concatenate([np.zeros((M, nx + 3)), D[:, 2]], axis=1)  # change of heading along each direction
+        turn = np.concatenate(
+            [np.zeros((M, nx + 3)), D[:, 2]], axis=1
+        )  # change of heading along each direction
         turn[:, 2] = 1.0
         spin = np.concatenate([np.zeros((M, nx + 3)), D[:, nq + 2]], axis=1)
         spin[:, nq + 2] = 1.0
@@ -188,7 +212,11 @@ class Filter:
         nq, s = self.nq, self.sensors
         gain = np.array([s.camera_scale, s.camera_scale, 1.0])
         velocity = xi[:, nq : nq + 3] + offset[:, None] * rate[:, nq : nq + 3]
-        here = xi[:, :3] + offset[:, None] * xi[:, nq : nq + 3] + 0.5 * offset[:, None] ** 2 * rate[:, nq : nq + 3]
+        here = (
+            xi[:, :3]
+            + offset[:, None] * xi[:, nq : nq + 3]
+            + 0.5 * offset[:, None] ** 2 * rate[:, nq : nq + 3]
+        )
         h = here * gain + np.array([0.0, 0.0, s.camera_heading_offset])
         H = np.zeros((self.trials, 3, self.n))
         H[:, range(3), range(3)] = gain
@@ -209,7 +237,9 @@ class Filter:
         good = np.isfinite(e) & (np.arange(T)[:, None] < self.experiment.steps)
         r = np.where(good, e, 0.0) / self.noise.encoder
         J = -np.where(good[..., None], self.d_memory[:T, :, 1], 0.0) / self.noise.encoder
-        sums.log_likelihood -= 0.5 * np.sum(r**2, axis=0) + good.sum(0) * np.log(self.noise.encoder * np.sqrt(2 * np.pi))
+        sums.log_likelihood -= 0.5 * np.sum(r**2, axis=0) + good.sum(0) * np.log(
+            self.noise.encoder * np.sqrt(2 * np.pi)
+        )
         sums.samples += good.sum(0)
         sums.gradient += np.einsum("tm,tmk->mk", r, J)
         sums.normal += np.einsum("tmj,tmk->mjk", J, J)
@@ -245,7 +275,9 @@ def _update(
     P = P - K @ PHt.transpose(0, 2, 1)
     log_det = 2.0 * np.sum(np.log(np.diagonal(L, axis1=1, axis2=2)), axis=1)
     size = e.shape[1]
-    sums.log_likelihood -= 0.5 * np.where(use, np.sum(white**2, axis=1) + log_det + size * np.log(2 * np.pi), 0.0)
+    sums.log_likelihood -= 0.5 * np.where(
+        use, np.sum(white**2, axis=1) + log_det + size * np.log(2 * np.pi), 0.0
+    )
     sums.samples += size * use
     sums.gradient += np.einsum("mi,mik->mk", white, J)
     sums.normal += J.transpose(0, 2, 1) @ J

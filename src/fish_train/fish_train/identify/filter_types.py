@@ -16,13 +16,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.model import DT
-from fish_sim.model import Layout
+from fish_sim.model import DT, Layout
 from fish_train.identify.experiment import Experiment
 
 Array = NDArray[np.float64]
 
-WRENCH = ("disturbance.surge", "disturbance.sway", "disturbance.yaw")  # parameters of the model the filter drives
+WRENCH = (
+    "disturbance.surge",
+    "disturbance.sway",
+    "disturbance.yaw",
+)  # parameters of the model the filter drives
 GYRO, ACCEL, CAMERA = slice(0, 1), slice(1, 3), slice(3, 6)  # rows of the innovations
 ROWS = ("gyro", "accel_forward", "accel_left", "camera_x", "camera_y", "camera_heading")
 ENCODER_ROW = 6
@@ -32,8 +35,8 @@ ENCODER_ROW = 6
 class Noise:
     """Standard deviations. Sensors: per sample; wrench: stationary values of its random walk back to zero."""
 
-    wrench: tuple[float, float, float] = (0.005, 0.02, 5e-4)  # N, N, N m
-    wrench_time: float = 0.3  # s, tau
+    wrench: tuple[float, float, float] = (0.004, 0.008, 2e-4)  # N, N, N m
+    wrench_time: float = 0.2  # s, tau
     gyro: float = 0.006  # rad/s
     accel: float = 0.05  # m/s^2
     camera_position: float = 0.002  # m
@@ -103,7 +106,9 @@ def first_memory(experiment: Experiment) -> Array:
     return np.column_stack([np.clip(experiment.commands[0, :, 1], -0.8, 0.8), experiment.commands[0, :, 0]])
 
 
-def first_state(experiment: Experiment, layout: Layout, sensors: SensorModel, noise: Noise) -> tuple[Array, Array]:
+def first_state(
+    experiment: Experiment, layout: Layout, sensors: SensorModel, noise: Noise
+) -> tuple[Array, Array]:
     """Prior of the state (M, N) and its covariance: at the first camera pose with a straight tail."""
     M, nq, nx = len(experiment.names), layout.links + 3, len(layout.motion)
     n, rest = nx + 6, experiment.start_at_rest

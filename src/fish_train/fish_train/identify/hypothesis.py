@@ -121,7 +121,9 @@ class Coordinates:
     def encode(self, values: Array) -> Array:
         """theta of physical values."""
         linear = (values - self.neutral) / self.scale
-        return np.where(self.is_log, np.log(np.maximum(values, 1e-300) / np.where(self.is_log, self.neutral, 1.0)), linear)
+        return np.where(
+            self.is_log, np.log(np.maximum(values, 1e-300) / np.where(self.is_log, self.neutral, 1.0)), linear
+        )
 
     def decode(self, theta: Array) -> Array:
         """Physical values of theta."""

@@ -67,7 +67,7 @@ class Identification:
 
 def identify(
     experiment: Experiment, robot: Robot, noise: Noise | None = None, hold_out: int = 4,
-    free: tuple[str, ...] = NOMINAL_FREE, report: Report = lambda text: None,
+    free: tuple[str, ...] = NOMINAL_FREE, report: Report = lambda _: None,
 ) -> Identification:  # fmt: skip
     """Fit the nominal parameters (and those of the robot's effects in `free`) and judge them on trials left out.
 

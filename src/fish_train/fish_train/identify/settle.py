@@ -24,7 +24,7 @@ def open_gates(noise: Noise) -> Noise:
 
 
 def worst_row(fit: Fit) -> float:
-    """Largest rms of whitened innovations over the rows of IMU and camera: 1 when the noise is right, inf when the filter diverged."""
+    """Largest rms of whitened innovations over IMU and camera: 1 when the noise is right, inf when it diverged."""
     rows = fit.result.whitened[..., SENSOR_ROWS]
     count = np.isfinite(rows).sum(axis=(0, 1))
     if not np.isfinite(fit.objective):

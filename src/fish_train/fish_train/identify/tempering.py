@@ -27,7 +27,7 @@ ROUNDS = 2  # of noise estimation and refits
 
 def fit_tempered(
     hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array | None = None,
-    report: Callable[[str], None] = lambda text: None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Fit:  # fmt: skip
     """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn.
 

@@ -1,0 +1,70 @@
+"""Say where recordings and model differ, which physics is missing, and write the corrected robot."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+from rich.console import Console
+
+from fish_sim.robot import Robot, RobotError, load_robot, save_robot
+from fish_train.errors import UserError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument(
+        "dataset", type=Path, nargs="+", help="recordings or folders of recordings of one robot and day"
+    )
+    parser.add_argument("--robot", type=Path, help="robot.yaml (default: the nominal fish)")
+    parser.add_argument(
+        "--out", type=Path, required=True, help="folder for diagnosis.json, model.yaml, report.html"
+    )
+    parser.add_argument(
+        "--false-alarms", type=float, default=0.02, help="tolerated share of false alarms (default 0.02)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, write the three files, print the verdict."""
+    from fish_train.diagnose.answer import answer
+    from fish_train.diagnose.decide import Level
+    from fish_train.diagnose.diagnosis import diagnose
+    from fish_train.identify.experiment import ExperimentError, build_experiment
+    from fish_train.recordings import read_dataset
+    from fish_train.reports.diagnosis_page import sentence, write_diagnosis_page
+
+    console, start = Console(stderr=True), time.monotonic()
+    try:
+        robot = load_robot(args.robot) if args.robot else Robot()
+        level = Level(args.false_alarms)
+        trials = [trial for path in args.dataset for trial in read_dataset(path)]
+        experiment = build_experiment(trials)
+    except (RobotError, ExperimentError, ValueError) as error:
+        raise UserError(str(error)) from error
+    args.out.mkdir(parents=True, exist_ok=True)
+    with console.status("diagnosing") as status:
+
+        def say(text: str) -> None:
+            status.update(f"{time.monotonic() - start:5.0f} s  {text}")
+            if not console.is_terminal:
+                console.print(f"{time.monotonic() - start:5.0f} s  {text}")
+
+        result = diagnose(experiment, robot, level, say)
+        content = answer(result)
+    (args.out / "diagnosis.json").write_text(json.dumps(content, indent=1, default=float))
+    save_robot(without_wrench(result.final.robot), args.out / "model.yaml", result.final.standard_errors,
+               notes=sentence(content))  # fmt: skip
+    write_diagnosis_page(args.out / "report.html", args.dataset[0].name, content, result)
+    print(sentence(content))
+    print(f"{args.out}/diagnosis.json, model.yaml, report.html ({time.monotonic() - start:.0f} s)")
+    return 0
+
+
+def without_wrench(robot: Robot) -> Robot:
+    """The robot less the filter's latent wrench."""
+    from dataclasses import replace
+
+    return replace(robot, effects={k: v for k, v in robot.effects.items() if k != "disturbance"})

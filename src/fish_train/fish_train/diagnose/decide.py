@@ -1,0 +1,63 @@
+"""From fits to statements: what counts as significant, how probable each name is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from fish_sim.effects import EFFECTS
+from fish_sim.sensors import SENSOR_EFFECTS
+from fish_train.identify.fit import Fit
+
+# One nat of innovations is worth 1/TEMPER nats of evidence: model errors too small to have a name, and the search
+# itself, make likelihood ratios over-confident. Set on this project's own synthetic null sets.
+TEMPER = 10.0
+# nats per scalar measurement below which a gain is no physics worth a name, whatever its significance
+SMALLEST_GAIN = 0.004
+SMALLEST_Z = 4.0  # standard errors between the strength and its neutral value
+PLAUSIBLE = 0.02  # rivals less probable than this are not named
+
+
+@dataclass(frozen=True)
+class Level:
+    """How much is enough: tolerated false alarms of the whole search."""
+
+    false_alarms: float = 0.02
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.false_alarms < 0.5:
+            raise ValueError(f"false_alarms: got {self.false_alarms}; expected a share in (0, 0.5)")
+
+    def enough(self, samples: float, parameters: int, candidates: int) -> float:
+        """Nats a candidate must gain: tempered likelihood-ratio test over all candidates, and not too small."""
+        quantile = 0.5 * chi2.isf(self.false_alarms / max(candidates, 1), parameters)
+        return max(TEMPER * float(quantile), SMALLEST_GAIN * samples)
+
+
+def p_value(gain: float, parameters: int, candidates: int) -> float:
+    """Of the tempered likelihood ratio, times the number of candidates tried (Bonferroni)."""
+    return float(min(1.0, candidates * chi2.sf(2.0 * max(gain, 0.0) / TEMPER, parameters)))
+
+
+def probabilities(objectives: dict[str, float]) -> dict[str, float]:
+    """Tempered softmax over competing hypotheses."""
+    values = np.array(list(objectives.values())) / TEMPER
+    weights = np.exp(values - values.max())
+    return dict(zip(objectives, (weights / weights.sum()).tolist(), strict=True))
+
+
+def strength_z(fit: Fit, name: str) -> float:
+    """Largest distance of a strength parameter from neutral, in standard errors."""
+    effect = {**EFFECTS, **SENSOR_EFFECTS}[name]
+    values, errors = fit.values, fit.standard_errors
+    keys = [f"{name}.{k}" for k in effect.strength]
+    return max(
+        abs(values[k] - effect.parameters[k.split(".")[1]].value) / max(errors[k], 1e-300) for k in keys
+    )
+
+
+def parameter_count(name: str) -> int:
+    """Free parameters of an effect."""
+    return len({**EFFECTS, **SENSOR_EFFECTS}[name].parameters)

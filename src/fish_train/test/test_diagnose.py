@@ -1,0 +1,118 @@
+"""The diagnosis finds what was hidden, and nothing where nothing is."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from fish_sim.robot import Robot, load_robot, save_robot
+from fish_train.commands.diagnose import without_wrench
+from fish_train.diagnose import diagnosis as module
+from fish_train.diagnose.answer import answer
+from fish_train.diagnose.decide import Level, probabilities
+from fish_train.diagnose.split import split_trials
+from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.synthetic import program, record
+from fish_train.reports.diagnosis_page import sentence, write_diagnosis_page
+
+VOCABULARY = """quadratic_drag current nonuniform_current wall_effect tip_slip wake_memory wave_drag sloshing hull_asymmetry
+tail_hardening tail_joint_damping dry_friction tether payload rotor_imbalance rudder_lag rudder_delay rudder_backlash
+rudder_offset rudder_saturation rudder_gain rudder_placement rotor_lag rotor_saturation battery_sag camera_latency
+camera_heading_offset camera_scale gyro_scale imu_misalignment""".split()
+FEW = ("quadratic_drag", "current", "rudder_offset", "camera_latency")  # enough rivals for a test of a minute
+
+
+def swim(robot: Robot, seed: int = 0, kinds=("sines", "steps", "random"), duration: float = 7.0):
+    random = np.random.default_rng(seed)
+    commands = np.stack([program(kind, duration, random) for kind in kinds], axis=1)
+    return record(robot, commands, Noise(), random)[0]
+
+
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(module, "candidates", lambda: FEW)
+
+
+def truth(**effects) -> Robot:
+    robot = Robot()
+    return Robot(
+        parameters={
+            **robot.parameters,
+            "head_drag_surge": 0.26,
+            "tail_stiffness": 0.11,
+            "head_drag_sway": 1.2,
+        },
+        effects=effects,
+    )
+
+
+def test_the_vocabulary_is_complete_and_every_name_has_a_kind():
+    assert set(VOCABULARY) == set(candidates())
+    assert {kind_of(name) for name in VOCABULARY} == {"physics", "actuator", "sensor"}
+
+
+def test_nothing_is_found_where_nothing_is(few, tmp_path):
+    result = module.diagnose(swim(truth()), Robot())
+    content = answer(result)
+    assert content["verdict"] == "no_mismatch"
+    assert content["effects"] == []
+    write_diagnosis_page(tmp_path / "report.html", "null", content, result)
+    assert "nothing is missing" in (tmp_path / "report.html").read_text()
+
+
+def test_a_hidden_current_is_named_with_its_size(few, tmp_path):
+    result = module.diagnose(swim(truth(current={"x": 0.03, "y": -0.02})), Robot())
+    content = json.loads(json.dumps(answer(result), default=float))
+    assert content["verdict"] == "missing_physics"
+    assert [e["name"] for e in content["effects"]] == ["current"]
+    found = content["effects"][0]["parameters"]
+    assert found["x"]["value"] == pytest.approx(0.03, abs=max(4 * found["x"]["std"], 0.004))
+    assert found["y"]["value"] == pytest.approx(-0.02, abs=max(4 * found["y"]["std"], 0.004))
+    assert sum(content["effects"][0]["where"]["dof"].values()) == pytest.approx(1.0)
+    assert (
+        content["fit"]["with_effects"]["log_density_per_sample"]
+        > content["fit"]["refitted"]["log_density_per_sample"]
+    )
+    save_robot(
+        without_wrench(result.final.robot),
+        tmp_path / "model.yaml",
+        result.final.standard_errors,
+        sentence(content),
+    )
+    assert load_robot(tmp_path / "model.yaml").effects["current"]["x"] == pytest.approx(found["x"]["value"])
+
+
+def test_a_late_camera_is_not_called_physics(few):
+    late = swim(truth())
+    shifted = tuple(type(f)(f.t + 0.05, f.pose) for f in late.frames)
+    result = module.diagnose(type(late)(**{**late.__dict__, "frames": shifted}), Robot())
+    assert [a.name for a in result.accepted] == ["camera_latency"]
+    assert answer(result)["verdict"] == "sensor_or_actuator"
+
+
+def test_what_the_data_cannot_say_is_said():
+    still = swim(Robot(), kinds=("straight", "straight"), duration=2.0)
+    reasons = out_of_reach(still)
+    assert reasons["rudder_lag"] == "the rudder never moved"
+    assert "current" not in reasons
+    blind = type(still)(**{**still.__dict__, "gyro": np.full_like(still.gyro, np.nan)})
+    assert out_of_reach(blind)["gyro_scale"] == "no IMU was recorded"
+
+
+def test_held_out_trials_take_no_part():
+    split = split_trials(swim(Robot(), kinds=("sines",) * 7, duration=1.0))
+    assert set(split.held_out).isdisjoint(split.training)
+    assert set(split.search) <= set(split.training)
+    assert sorted((*split.training, *split.held_out)) == list(range(7))
+
+
+def test_the_level_is_checked_and_probabilities_add_up():
+    with pytest.raises(ValueError, match="false_alarms: got 0.9"):
+        Level(0.9)
+    assert Level(0.001).enough(100, 1, 30) > Level(0.1).enough(100, 1, 30)
+    odds = probabilities({"a": -100.0, "b": -110.0, "c": -500.0})
+    assert sum(odds.values()) == pytest.approx(1.0)
+    assert odds["a"] > odds["b"] > odds["c"]

@@ -1,0 +1,112 @@
+"""The filter: the C pass against the NumPy pass, and its statistics where the truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_sim.robot import Robot
+from fish_train.identify.filter import run_filter
+from fish_train.identify.filter_compiled import compiled_pass
+from fish_train.identify.filter_numpy import Filter
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import evaluate
+from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
+from fish_train.identify.smoother import smooth
+from fish_train.identify.synthetic import program, record
+
+SENSORS = ("camera_latency", "camera_heading_offset", "camera_scale", "gyro_scale", "imu_misalignment")
+
+
+def experiment(robot: Robot, duration: float, kinds: tuple[str, ...], seed: int = 0):
+    random = np.random.default_rng(seed)
+    commands = np.stack([program(kind, duration, random) for kind in kinds], axis=1)
+    return record(robot, commands, Noise(), random)
+
+
+def with_sensors(robot: Robot):
+    hypothesis = nominal_hypothesis(robot)
+    for name in SENSORS:
+        hypothesis = hypothesis.with_effect(name, 0.1)
+    return hypothesis
+
+
+def test_compiled_and_numpy_passes_agree():
+    data, _ = experiment(Robot(), 1.5, ("sines", "steps"))
+    coordinates = Coordinates(with_sensors(Robot()))
+    inputs = coordinates.filter_inputs(coordinates.origin())
+    slow = Filter(data, coordinates.stepper, *inputs, Noise()).run(keep=True)
+    fast = compiled_pass(data, coordinates.stepper, *inputs, Noise(), keep=True)
+    if fast is None:
+        pytest.skip("no C compiler here")
+    for key in ("log_likelihood", "gradient", "normal", "whitened"):
+        a, b = getattr(slow, key), getattr(fast, key)
+        np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-8 * np.nanmax(np.abs(a)))
+    np.testing.assert_allclose(slow.history.filtered_P, fast.history.filtered_P, rtol=1e-6, atol=1e-12)
+
+
+def test_innovations_are_white_with_unit_variance_at_the_truth():
+    data, _ = experiment(Robot(), 10.0, ("sines", "steps", "random"))
+    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    result = run_filter(data, coordinates.stepper, *coordinates.filter_inputs(np.zeros(0)), Noise())
+    w = result.whitened[:, :, :3]
+    np.testing.assert_allclose(np.nanmean(w**2, axis=(0, 1)), 1.0, atol=0.08)  # 3000 samples: sd 0.026
+    lagged = np.nanmean(w[1:] * w[:-1], axis=(0, 1))
+    np.testing.assert_allclose(lagged, 0.0, atol=0.07)
+
+
+def test_gradient_is_zero_in_the_mean_and_a_missing_sensor_costs_nothing_but_its_samples():
+    data, _ = experiment(Robot(), 6.0, ("sines",))
+    blind = replace(data, accel=np.full_like(data.accel, np.nan), gyro=np.full_like(data.gyro, np.nan))
+    fit = evaluate(nominal_hypothesis(Robot()), np.zeros(16), blind, Noise())
+    assert np.isfinite(fit.objective)
+    assert fit.result.samples[0] < 0.5 * evaluate(fit.hypothesis, fit.theta, data, Noise()).result.samples[0]
+
+
+def test_smoother_finds_a_known_wrench():
+    """A constant push that the model does not know appears in the smoothed wrench."""
+    push = 0.05
+    robot = Robot().with_effect("disturbance", surge=push)
+    random = np.random.default_rng(1)
+    data, _ = record(Robot(), np.stack([program("sines", 6.0, random)], axis=1), Noise(), random)
+    pushed, _ = record_pushed(robot)
+    noise = replace(Noise(), wrench=(0.05, 0.02, 5e-4), wrench_time=2.0)
+    quiet = smoothed_surge(data, noise)
+    assert abs(quiet) < 0.01
+    assert smoothed_surge(pushed, noise) == pytest.approx(push, abs=0.012)
+
+
+def record_pushed(robot: Robot):
+    """The push as part of the water's wrench: added to the recorded motion through a current-free constant force."""
+    import fish_train.identify.synthetic as synthetic
+
+    random = np.random.default_rng(1)
+    commands = np.stack([program("sines", 6.0, random)], axis=1)
+    original = synthetic._swim
+
+    def swim(stepper, p, commands, noise, random):
+        at = stepper.layout.parameters.index("disturbance.surge")
+        states = np.empty((len(commands), commands.shape[1], len(stepper.layout.state)))
+        states[0] = stepper.rest()
+        p = p.copy()
+        p[at] = robot.effects["disturbance"]["surge"]
+        for k in range(len(commands) - 1):
+            states[k + 1] = stepper.step(states[k], commands[k], p)
+        wrench = np.zeros((*commands.shape[:2], 3))
+        wrench[..., 0] = p[at]
+        return states, wrench
+
+    synthetic._swim = swim
+    try:
+        return record(Robot(), commands, Noise(), random)
+    finally:
+        synthetic._swim = original
+
+
+def smoothed_surge(data, noise: Noise) -> float:
+    fit = evaluate(nominal_hypothesis(Robot(), ()), np.zeros(0), data, noise, keep=True)
+    xi, _ = smooth(fit.result.history)
+    nx = xi.shape[2] - 6
+    return float(np.mean(xi[200:-100, 0, nx]))
