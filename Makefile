@@ -21,14 +21,14 @@ SOURCES := $(shell find src -not -path '*/test*' -not -path '*/__pycache__*' -no
 PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help setup build demo test lint identify diagnose predict train evaluate prove paper clean distclean
+.PHONY: help setup build demo test lint identify diagnose predict train evaluate paper clean distclean
 
 help:
 	@echo "make demo       the whole robot swims the letter R, is recorded, scored and shown; options:"
 	@echo "                LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder"
 	@echo "make test       build, the tests of every package, the tests across packages"
 	@echo "make identify, diagnose, predict, train, evaluate ARGS='...'   the offline tools; ARGS=--help says more"
-	@echo "make prove      the blind study, short; make paper: the paper's figures"
+	@echo "make paper      the figures and the table of the paper"
 	@echo "make setup, build, lint, clean, distclean   the single steps"
 
 # --- set-up: virtual environment and wheels -----------------------------------------------------------------------------
@@ -69,8 +69,8 @@ demo: build
 	@$(FISH_TRAIN) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
 		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
 
-identify diagnose predict train evaluate prove paper: build $(VENV)/.train
-	@$(FISH_TRAIN) $@ $(ARGS)
+identify diagnose predict train evaluate paper: build $(VENV)/.train
+	@$(FISH_TRAIN) $@ $(DATASET) $(if $(DATASET),--out out/$@) $(ARGS)
 
 # --- tests ----------------------------------------------------------------------------------------------------------------
 test: setup build

@@ -2,7 +2,7 @@
 
 The tail's fastest mode is about 150 rad/s (n = 3). One RK4 step of 10 ms damps it by 8 %; DOP853 at the same 10 ms
 reproduces a 0.5 ms solution to better than 1e-4 in every driven state over 20 s; energy is lost at most at 6e-6 per second
-(1.4e-8 at 5 ms).
+(2.8e-8 in all at 5 ms).
 Source: DOP853, Hairer, Norsett and Wanner 1993, coefficients from SciPy's public class.
 """
 
