@@ -11,7 +11,6 @@ import json
 import time
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import Progress
 
 
@@ -33,9 +32,11 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.reports.page import Table
     from fish_train.score_table import print_table
 
+    from .inputs import terminal
+
     if args.study < 1 or args.trials < 1 or not args.duration >= 2.0:
         raise UserError("expected at least one repetition, one trial and 2 s")
-    console, began = Console(), time.monotonic()
+    console, began = terminal(), time.monotonic()
     with Progress(console=console, transient=True) as bar:
         task = bar.add_task("repetitions", total=args.study)
         found = study(args.study, args.trials, args.duration, args.seed, lambda _: bar.advance(task))

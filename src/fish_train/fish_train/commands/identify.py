@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 
@@ -36,9 +35,9 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.reports.identify_tables import error_table, parameter_table
     from fish_train.score_table import print_table
 
-    from .inputs import read_experiment, read_model, user_errors
+    from .inputs import read_experiment, read_model, terminal, user_errors
 
-    console = Console()
+    console = terminal()
     robot = read_model(args.robot)
     experiment, left_out = read_experiment(*args.dataset)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())

@@ -7,11 +7,23 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rich.console import Console
+
 from fish_train.errors import UserError
+
+FILE_WIDTH = 160  # columns when the output is not a terminal
 
 if TYPE_CHECKING:
     from fish_sim.robot import Robot
     from fish_train.identify.experiment import Experiment
+
+
+def terminal() -> Console:
+    """The console, wide enough for the tables where the output is no terminal."""
+    console = Console()
+    if not console.is_terminal:
+        console.width = FILE_WIDTH
+    return console
 
 
 @contextmanager

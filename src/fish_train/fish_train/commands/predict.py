@@ -11,8 +11,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
@@ -35,9 +33,9 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.reports.identify_tables import error_table
     from fish_train.score_table import print_table
 
-    from .inputs import read_experiment, read_model, user_errors
+    from .inputs import read_experiment, read_model, terminal, user_errors
 
-    console = Console()
+    console = terminal()
     model = read_model(args.model)
     experiment, left_out = read_experiment(args.recording)
     with user_errors():

@@ -81,7 +81,8 @@ def _solve(rows: list[Array], targets: list[Array]) -> Array:
             f"{len(A)} rows of stroke means for {A.shape[1]} numbers: the training trials are too short"
         )
     ridge = RIDGE * np.diag(np.sum(A**2, axis=0) + 1e-12)
-    return np.linalg.solve(A.T @ A + ridge, A.T @ b)
+    theta: Array = np.linalg.solve(A.T @ A + ridge, A.T @ b).astype(float)
+    return theta
 
 
 Advance = Callable[
@@ -124,7 +125,8 @@ def fit_bilinear(data: list[Table]) -> Advance:
 
 def _surge(a: Array, u: Array, throttle: Array, throttle_before: Array) -> Array:
     """Speed one STEP later: u' = a0 + a1 u + a2 sqrt(throttle)."""
-    return u + STEP * (a[0] + a[1] * u + a[2] * 0.5 * (throttle + throttle_before))
+    ahead: Array = u + STEP * (a[0] + a[1] * u + a[2] * 0.5 * (throttle + throttle_before))
+    return ahead
 
 
 def _fit_surge(data: list[Table]) -> Array:
@@ -145,7 +147,8 @@ def _fit_surge(data: list[Table]) -> Array:
             errors.append(now - u[k + 1])
         return np.concatenate(errors)
 
-    return least_squares(misfit, np.array([0.0, -0.5, 0.1]), bounds=([-1, -3, -3], [1, 0, 3])).x
+    found: Array = least_squares(misfit, np.array([0.0, -0.5, 0.1]), bounds=([-1, -3, -3], [1, 0, 3])).x
+    return found
 
 
 def fit_baselines(training: Experiment) -> dict[str, Advance]:

@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data say little
 ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
 STILL = 0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
+NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"
+NO_ENCODER = "the rotor is taken to follow its commands"
 Report = Callable[[str], None]  # told what is being done
 
 
@@ -62,7 +64,8 @@ class Identification:
     def correlation(self) -> Array:
         """(K, K) of the parameters' errors."""
         deviation = np.sqrt(np.diag(self.fit.covariance))
-        return self.fit.covariance / np.outer(deviation, deviation)
+        matrix: Array = self.fit.covariance / np.outer(deviation, deviation)
+        return matrix
 
 
 def identify(
@@ -139,14 +142,9 @@ def data_statements(experiment: Experiment, held_out: Experiment | None) -> list
         out.append(
             "no trial was held out: errors below are of trials that took part in the fit, unseen ones are worse"
         )
-    for what, rows in (("IMU", experiment.gyro), ("encoder", experiment.encoder)):
+    for what, rows, cost in (("IMU", experiment.gyro, NO_IMU), ("encoder", experiment.encoder, NO_ENCODER)):
         missing = [name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()]
         if missing:
-            cost = (
-                "its biases stay unknown, fast motion is seen by the camera only"
-                if what == "IMU"
-                else "the rotor is taken to follow its commands"
-            )
             out.append(f"no {what} in {', '.join(missing)}: {cost}")
     valid = np.arange(experiment.length)[:, None] < experiment.steps
     rotor, rudder = (experiment.commands[..., i][valid] for i in (0, 1))

@@ -66,7 +66,10 @@ class Predictions:
         after = _interpolate(self.pose[:, which], position[:, None] - self.start[which])
         pose = np.where((position[:, None] < self.start[which])[..., None], before, after)
         scale = self.sensors.camera_scale
-        return pose * np.array([scale, scale, 1.0]) + np.array([0.0, 0.0, self.sensors.camera_heading_offset])
+        shown: Array = pose * np.array([scale, scale, 1.0]) + np.array(
+            [0.0, 0.0, self.sensors.camera_heading_offset]
+        )
+        return shown
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def _rows(predictions: Predictions) -> Iterator[list[str]]:
         measured = stroke_mean(frames.t, frames.t)(frames.pose)
         for s, start in enumerate(starts):
             own = np.flatnonzero((frames.t >= start) & (frames.t < start + predictions.horizon))
-            known = np.isfinite(seen[:, s]).all(1)
+            known = np.isfinite(seen[:, s].sum(axis=1))
             velocity = np.full((len(frames.t), 3), np.nan)
             if known.sum() > 1:
                 velocity = stroke_mean(frames.t[known], frames.t)(seen[known, s])[:, 3:]

@@ -35,8 +35,9 @@ def worst_row(fit: Fit) -> float:
 def suitable_noise(experiment: Experiment, robot: Robot, noise: Noise) -> Noise:
     """The wrench noise of LADDER with the highest likelihood; sensor noise too when the sensors are noisier than `noise`."""
     fit = evaluate(nominal_hypothesis(robot, free=()), np.zeros(0), experiment, open_gates(noise))
-    scaled = [replace(fit.noise, wrench=tuple(f * w for w in noise.wrench)) for f in LADDER]
-    best = max(scaled, key=lambda n: likelihood(fit, experiment, n))
+    x, y, n = noise.wrench
+    scaled = [replace(fit.noise, wrench=(f * x, f * y, f * n)) for f in LADDER]
+    best = max(scaled, key=lambda tried: likelihood(fit, experiment, tried))
     fit = evaluate(fit.hypothesis, fit.theta, experiment, best)
     if worst_row(fit) < STRANGE and best is not scaled[-1]:
         return best

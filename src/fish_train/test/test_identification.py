@@ -1,0 +1,141 @@
+"""Identification on synthetic recordings: the truth comes back, and what the data cannot say is said."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_sim.robot import Robot, load_robot
+from fish_train.identify.coverage import Repetition, scored, summarise
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.identification import Identification, data_statements, identify, split
+from fish_train.identify.record import write_identification
+from fish_train.identify.synthetic import program, record
+from fish_train.reports.identify_page import write_identify_page
+
+FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness", "fin_length")
+NOISE = Noise(wrench=(0.003, 0.006, 1.5e-4))
+TRUTH = Robot().with_parameters(
+    head_drag_surge=0.26, head_drag_yaw=2.4e-3, tail_stiffness=0.08, fin_length=0.032
+)
+
+
+def experiment_of(kinds: tuple[str, ...], duration: float, seed: int = 1) -> Experiment:
+    random = np.random.default_rng(seed)
+    commands = np.stack([program(kind, duration, random) for kind in kinds], axis=1)
+    return record(TRUTH, commands, NOISE, random)[0]
+
+
+@pytest.fixture(scope="module")
+def found() -> Identification:
+    return identify(experiment_of(("sines", "random", "steps", "straight"), 9.0), Robot(), free=FREE)
+
+
+def test_truth_within_four_standard_errors(found: Identification) -> None:
+    for name, value in found.fit.values.items():
+        assert abs(value - TRUTH.parameters[name]) < 4.0 * found.fit.standard_errors[name], name
+        assert found.fit.standard_errors[name] < 0.2 * TRUTH.parameters[name]
+
+
+def test_held_out_trial_took_no_part(found: Identification) -> None:
+    assert found.held_out is not None
+    assert found.held_out.names == ("synthetic_03",)
+    assert found.training.names == ("synthetic_00", "synthetic_01", "synthetic_02")
+
+
+def test_identified_robot_predicts_better_than_start_and_baselines(found: Identification) -> None:
+    mine = found.errors["identified"].rms[0]
+    assert mine[0] < 0.008  # m after 1 s; the camera's noise is 2 mm
+    for other in ("start", "constant", "arx", "bilinear"):
+        assert np.all(mine[:2] < found.errors[other].rms[0, :2]), other
+
+
+def test_biases_come_back(found: Identification) -> None:
+    random = np.random.default_rng(1)
+    commands = np.stack([program(k, 9.0, random) for k in ("sines", "random", "steps", "straight")], axis=1)
+    bias = record(TRUTH, commands, NOISE, random)[1].bias[:3]
+    assert np.all(np.abs(found.estimates.bias - bias) < 4.5 * found.estimates.bias_std)
+
+
+def test_files_and_page(found: Identification, tmp_path) -> None:
+    write_identification(tmp_path, found, ["trial_09: no camera/pose"])
+    robot = load_robot(tmp_path / "robot.yaml")
+    assert robot.parameters["tail_stiffness"] == pytest.approx(found.fit.values["tail_stiffness"])
+    assert "std:" in (tmp_path / "robot.yaml").read_text()
+    content = json.loads((tmp_path / "identification.json").read_text())
+    assert set(content["parameters"]) == set(FREE)
+    assert content["held_out_trials"] == ["synthetic_03"]
+    write_identify_page(tmp_path / "report.html", found, content["left_out"])
+    page = (tmp_path / "report.html").read_text()
+    for word in (
+        "bilinear",
+        "Phase portrait",
+        "Autocorrelation",
+        "trial_09: no camera/pose",
+        "head_drag_surge",
+    ):
+        assert word in page
+    assert "<script src=" not in page
+
+
+def test_one_trial_without_imu_and_encoder() -> None:
+    one = experiment_of(("sines",), 6.0)
+    blind = replace(
+        one,
+        gyro=np.full_like(one.gyro, np.nan),
+        accel=np.full_like(one.accel, np.nan),
+        encoder=np.full_like(one.encoder, np.nan),
+        start_at_rest=False,
+    )
+    result = identify(blind, Robot(), free=("head_drag_surge", "tail_stiffness"))
+    text = " ".join(result.statements)
+    assert "no trial was held out" in text and "no IMU" in text and "no encoder" in text
+    error = np.log(result.fit.values["head_drag_surge"] / TRUTH.parameters["head_drag_surge"])
+    assert abs(error) < 0.5
+
+
+def test_still_fish_does_not_determine_drag() -> None:
+    still = record(TRUTH, np.zeros((400, 2, 2)), NOISE, np.random.default_rng(3))[0]
+    result = identify(still, Robot(), free=("tail_stiffness", "head_drag_surge"))
+    text = " ".join(result.statements)
+    assert "the rudder hardly moved" in text and "the rotor's speed hardly changed" in text
+    assert "head_drag_surge" in result.undetermined
+    assert "shorter than 7 s" in text
+
+
+def test_split() -> None:
+    assert split(12, 4) == ([0, 1, 2, 4, 5, 6, 8, 9, 10], [3, 7, 11])
+    assert split(3, 4) == ([0, 1], [2])
+    assert split(1, 4) == ([0], [])
+    assert split(5, 0) == ([0, 1, 2, 3, 4], [])
+    with pytest.raises(ValueError, match="hold-out 1"):
+        split(5, 1)
+
+
+def test_missing_imu_is_named_per_trial() -> None:
+    pair = experiment_of(("sines", "turn"), 3.0)
+    pair.gyro[:, 1] = np.nan
+    assert any(text.startswith("no IMU in synthetic_01") for text in data_statements(pair, pair))
+
+
+def test_coverage_counts() -> None:
+    names = ("a", "b")
+    made = [
+        Repetition(i, names, np.array([z, 0.0]), np.zeros(2)) for i, z in enumerate((0.5, -1.0, 2.5, 3.5))
+    ]
+    result = summarise(made)
+    assert result.inside95.tolist() == [0.5, 1.0]
+    assert result.within3.tolist() == [0.75, 1.0]
+    with pytest.raises(ValueError, match="no repetition"):
+        summarise([])
+
+
+def test_score_of_a_fit_is_its_error_over_its_standard_error(found: Identification) -> None:
+    score = scored(0, TRUTH, found.fit)
+    ratio = np.array([found.fit.values[n] / TRUTH.parameters[n] for n in FREE])
+    deviation = np.sqrt(np.diag(found.fit.covariance))
+    np.testing.assert_allclose(score.score, np.log(ratio) / deviation, rtol=1e-6)

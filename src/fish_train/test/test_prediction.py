@@ -1,0 +1,138 @@
+"""Predictions: exact without noise, causal, and as a table; stroke means; baselines on motion they can represent."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_sim.robot import Robot
+from fish_train.identify.baselines import constant, fit_baselines, predict_baseline
+from fish_train.identify.experiment import Experiment, Frames
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.motion import stroke_mean
+from fish_train.identify.prediction import predict, prediction_errors
+from fish_train.identify.prediction_table import COLUMNS, write_predictions
+from fish_train.identify.synthetic import program, record
+
+QUIET = Noise(
+    wrench=(1e-6, 1e-6, 1e-8), gyro=1e-4, accel=1e-3, camera_position=1e-5, camera_heading=1e-5, encoder=1e-3
+)
+ROBOT = Robot()
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Experiment:
+    random = np.random.default_rng(5)
+    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1)
+    experiment = record(ROBOT, commands, QUIET, random)[0]
+    return replace(experiment, gyro=experiment.gyro, steps=np.array([800, 800, 500]))
+
+
+def test_true_model_without_noise_predicts_exactly(quiet: Experiment) -> None:
+    errors = prediction_errors(predict(quiet, ROBOT, QUIET, 2.0, 1.0, 1.0), (1.0, 2.0))
+    assert np.all(errors.rms[:, 0] < 1e-3)
+    assert np.all(errors.rms[:, 1] < 5e-3)
+    assert errors.counts[2, 1] < errors.counts[0, 1]  # the third trial is shorter
+
+
+def test_later_measurements_change_nothing_before_them(quiet: Experiment) -> None:
+    cut = 4.0
+    frames = tuple(Frames(f.t, f.pose + np.where(f.t > cut, 1.0, 0.0)[:, None]) for f in quiet.frames)
+    gyro = quiet.gyro.copy()
+    gyro[int(cut / 0.01) + 1 :] += 1.0
+    a = predict(quiet, ROBOT, Noise(), 1.0)
+    b = predict(replace(quiet, frames=frames, gyro=gyro), ROBOT, Noise(), 1.0)
+    early = a.start * 0.01 <= cut - 0.01
+    np.testing.assert_array_equal(a.pose[:, early], b.pose[:, early])
+    assert not np.allclose(a.pose[0, ~early], b.pose[0, ~early], equal_nan=True)
+
+
+def test_starts_every_horizon_and_end_with_the_trial(quiet: Experiment) -> None:
+    found = predict(quiet, ROBOT, Noise(), 2.0)
+    assert (found.start[found.trial == 0] * 0.01).tolist() == [0.0, 2.0, 4.0, 6.0]
+    last = found.pose[:, np.flatnonzero(found.trial == 2)[-1], 0]
+    assert np.isfinite(last).sum() == 100  # 4.00 .. 4.99 s
+
+
+def test_camera_errors_of_the_model_are_in_what_it_predicts(quiet: Experiment) -> None:
+    wrong = _with_heading_offset(0.1)
+    turned = tuple(Frames(f.t, f.pose + np.array([0.0, 0.0, 0.1])) for f in quiet.frames)
+    errors = prediction_errors(predict(replace(quiet, frames=turned), wrong, QUIET, 1.0, 1.0, 1.0), (1.0,))
+    assert errors.rms[0, 1] < 5e-3
+
+
+def _with_heading_offset(value: float) -> Robot:
+    from fish_sim.sensors import SENSOR_EFFECTS
+
+    (key,) = SENSOR_EFFECTS["camera_heading_offset"].parameters
+    return ROBOT.with_effect("camera_heading_offset", **{key: value})
+
+
+def test_bad_horizon_is_refused(quiet: Experiment) -> None:
+    for horizon in (0.0, -1.0, np.nan):
+        with pytest.raises(ValueError, match="horizon"):
+            predict(quiet, ROBOT, Noise(), horizon)
+
+
+def test_horizon_longer_than_every_trial_has_no_error(quiet: Experiment) -> None:
+    errors = prediction_errors(predict(quiet, ROBOT, Noise(), 20.0, 20.0), (20.0,))
+    assert errors.counts.sum() == 0 and errors.as_table() == {}
+
+
+def test_table(quiet: Experiment, tmp_path) -> None:
+    path = tmp_path / "new" / "predictions.csv"
+    count = write_predictions(path, predict(quiet, ROBOT, Noise(), 2.0))
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == COLUMNS and len(rows) == count
+    inside = [f.t[f.t < 0.01 * (steps - 1)] for f, steps in zip(quiet.frames, quiet.steps, strict=True)]
+    assert count == sum(map(len, inside))
+    middle = [r for r in rows if r["trial"] == "synthetic_00" and 2.5 < float(r["time"]) < 3.5]
+    for row in middle:
+        assert abs(float(row["predicted_x"]) - float(row["measured_x"])) < 0.02
+        assert abs(float(row["predicted_u"]) - float(row["measured_u"])) < 0.02
+
+
+def test_stroke_mean_of_a_circle_and_of_a_swing() -> None:
+    t = np.arange(0.0, 4.0, 1 / 30)
+    speed, rate = 0.2, 0.5
+    circle = np.column_stack(
+        [speed / rate * np.sin(rate * t), speed / rate * (1 - np.cos(rate * t)), rate * t]
+    )
+    circle[:, 2] += 0.2 * np.sin(4 * np.pi * t)  # the swing of the strokes at 2 Hz
+    centres = np.array([1.0, 2.0, 3.0])
+    mean = stroke_mean(t, centres)(circle)
+    np.testing.assert_allclose(mean[:, 2], rate * centres, atol=2e-3)
+    np.testing.assert_allclose(mean[:, 3], speed, rtol=0.01)
+    assert np.all(np.abs(mean[:, 5] - rate) < 0.07 * 0.2 * 4 * np.pi)
+    assert np.isnan(stroke_mean(t, np.array([0.1]))(circle)).all()
+
+
+def circling(speed: float, rate: float, duration: float = 8.0) -> Experiment:
+    """One trial that turns steadily without strokes."""
+    steps, t = round(duration / 0.01), np.arange(0.0, duration - 0.01, 1 / 30)
+    pose = np.column_stack([speed / rate * np.sin(rate * t), speed / rate * (1 - np.cos(rate * t)), rate * t])
+    commands = np.zeros((steps, 1, 2))
+    nothing = np.full((steps, 1), np.nan)
+    accel = np.full((steps, 1, 2), np.nan)
+    return Experiment(
+        ("circle",), np.array([steps]), commands, nothing, accel, nothing, (Frames(t, pose),), False
+    )
+
+
+def test_constant_baseline_follows_a_circle() -> None:
+    experiment = circling(0.2, 0.5)
+    like = predict(
+        experiment, ROBOT, replace(Noise(), wrench=(1.0, 1.0, 0.1), gate_camera=1e9), 2.0, 1.0, 2.0
+    )
+    errors = prediction_errors(predict_baseline(constant(), like), (1.0, 2.0))
+    assert np.all(errors.rms[:, 0] < 2e-3)  # the chord of a second's window
+    assert np.all(errors.rms[:, 1:] < 1e-3)
+
+
+def test_baselines_need_some_data() -> None:
+    with pytest.raises(ValueError, match="too short|no training trial|without a gap"):
+        fit_baselines(circling(0.2, 0.5, 0.6))
