@@ -28,15 +28,15 @@ class TrainConfig:
     learning_rate: float = 1e-3  # of Adam
     clip: float = 1.0  # largest norm of the gradient
     max_updates: int = 20_000  # stop here if the curriculum is not finished
-    polish_updates: int = 1_000  # after the last level: all levels at once, learning rate falling to a tenth
+    polish_updates: int = 2_000  # after the last level: all levels at once, learning rate falling to a tenth
     # stage cost: weights of heading [1/rad^2], speed [s^2/m^2], cross-track [1/m^2], change of the set-points in
     # a control period, gains and change of gains as shares of their ranges
-    cost_heading: float = 1.0
-    cost_speed: float = 10.0
-    cost_cross_track: float = 50.0
-    cost_setpoint_change: float = 5.0
-    cost_gain_size: float = 0.002
-    cost_gain_change: float = 0.2
+    cost_heading: float = 0.5
+    cost_speed: float = 20.0
+    cost_cross_track: float = 200.0
+    cost_setpoint_change: float = 2.0
+    cost_gain_size: float = 0.0005
+    cost_gain_change: float = 0.05
     # curriculum
     amplitudes: tuple[float, ...] = (1.0, 1.5)  # m, of the sinusoids
     cycles: tuple[float, ...] = (0.5, 1.0, 2.0)  # over sinusoid_length
@@ -52,9 +52,9 @@ class TrainConfig:
     # episodes
     episode: float = 15.0  # s
     approach: float = 6.0  # s at the start of an episode that the criterion leaves out
-    start_offset: float = 0.1  # m, std of the start's distance from the path
-    start_heading: float = 0.3  # rad, std of the start's heading error
-    start_rest: float = 0.1  # share of fish that start at rest; the others at 0.5 to 1 of the wanted speed
+    start_offset: float = 0.03  # m, std of the start's distance from the path
+    start_heading: float = 0.1  # rad, std of the start's heading error
+    start_rest: float = 0.05  # share of fish that start at rest; the others at 0.5 to 1 of the wanted speed
     # robustness, all off in the default recipe
     randomise: float = 0.0  # relative half-width of the robot's drags, stiffness and added masses
     noise_position: float = 0.0  # m, std of what the loop sees
