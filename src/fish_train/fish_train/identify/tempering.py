@@ -1,7 +1,7 @@
 """A cold fit that finds the right optimum: the IMU is believed little at first and more and more.
 
 With the accelerometer's and gyro's full weight the likelihood has many optima, because a wrong phase of the tail's swing is
-as bad as no swing at all. With their standard deviations thirty times as large the camera leads, and the nominal values
+as bad as no swing at all. With their standard deviations a hundred times as large the camera leads, and the nominal values
 lead to the optimum from 30 % away; each further stage starts from the one before.
 """
 
@@ -21,7 +21,7 @@ from fish_train.identify.settle import STRANGE, open_gates, worst_row
 
 Array = NDArray[np.float64]
 
-STAGES = ((30.0, 25), (10.0, 15), (3.0, 15), (1.0, 15))  # factor of the IMU's noise, iterations
+STAGES = ((100.0, 25), (30.0, 25), (10.0, 15), (3.0, 15), (1.0, 15))  # factor of the IMU's noise, iterations
 ROUNDS = 2  # of noise estimation and refits
 
 
