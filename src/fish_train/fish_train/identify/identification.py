@@ -172,9 +172,7 @@ def fit_statements(fit: Fit) -> list[str]:
     """What the data do not determine."""
     out = []
     if names := undetermined(fit):
-        out.append(
-            f"the data do not determine {', '.join(names)}: their values are the starting file's, their errors the prior's"
-        )
+        out.append(f"the data do not determine {', '.join(names)}: values and errors rest on the prior")
     for first, second, value in entangled(fit):
         out.append(f"{first} and {second} are hardly told apart (correlation {value:+.3f})")
     if (worst := worst_row(fit)) > 1.5:
