@@ -1,6 +1,7 @@
 """Who may import whom, and the house style that tools can check."""
 
 import ast
+import importlib.util
 import shutil
 import subprocess
 import sys
@@ -68,3 +69,13 @@ def test_ruff(check):
     command = [program, *check, "--output-format", "concise", "."]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert result.returncode == 0, "\n" + result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("package", ["fish_sim", "fish_train"])
+def test_every_data_file_of_a_package_is_installed(package):
+    """C texts and page templates are read at run time: a file that setup.py forgets is missing only when installed."""
+    source = ROOT / "src" / package / package
+    wanted = {p.relative_to(source) for s in ("*.c", "*.h", "*.j2") for p in source.rglob(s)}
+    installed = Path(importlib.util.find_spec(package).origin).parent
+    assert wanted
+    assert [str(p) for p in sorted(wanted) if not (installed / p).exists()] == []

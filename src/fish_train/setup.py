@@ -17,7 +17,7 @@ setup(
         ("share/" + NAME + "/config", glob("config/*")),
         ("share/" + NAME + "/launch", glob("launch/*")),
     ],
-    package_data={NAME: ["py.typed", "reports/*.j2", "training/c/*"]},
+    package_data={NAME: ["py.typed", "reports/*.j2", "training/c/*", "identify/c/*"]},
     install_requires=["setuptools"],
     zip_safe=False,
     maintainer="Robot fish maintainers",

@@ -122,5 +122,7 @@ class NodeProcesses:
 
 def _die_with_parent() -> None:
     """In the child before it starts: SIGTERM when the parent dies, kill -9 of the starter leaves no node."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell's background job ignores it, and children inherit that
+    signal.signal(
+        signal.SIGINT, signal.SIG_DFL
+    )  # a shell's background job ignores it, and children inherit that
     _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
