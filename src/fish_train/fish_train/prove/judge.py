@@ -1,0 +1,146 @@
+"""After the labels are open: the oracle on every world, and what of an answer only the truth can judge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fish_train.diagnose.vocabulary import candidates
+from fish_train.prove.build import make_readings
+from fish_train.prove.oracle import Sight, as_experiment, detects, look
+from fish_train.prove.runner import spread
+from fish_train.prove.score import Score, vocabulary
+from fish_train.prove.study import Study, read_json, write_json
+from fish_train.prove.where import activity, regime_f1, time_overlap
+from fish_train.prove.world import World
+from fish_train.reports.page import Table
+
+HORIZON = 1  # index of 2 s among the oracle's horizons
+CLEAR = 0.8  # of the oracle's power, from which the tool's is compared with it
+
+
+@dataclass(frozen=True)
+class Task:
+    """One world to be judged."""
+
+    name: str
+    world: World
+    place: Path
+    diagnosis: Mapping[str, Any]
+
+
+def judge_world(task: Task) -> str:
+    """Write judged.json; returns the world's name."""
+    path = task.place / "judged.json"
+    if not path.exists():
+        write_json(path, judge(task.world, task.diagnosis))
+    return task.name
+
+
+def judge(world: World, diagnosis: Mapping[str, Any]) -> dict[str, Any]:
+    """The oracle's sight, time overlap and regime F1 (None where they have no meaning)."""
+    readings = make_readings(world)
+    experiment = as_experiment(readings, world.encoder)
+    truth = np.concatenate([r.truth for r in readings], axis=1)
+    held = diagnosis["fit"]["held_out_trials"]
+    names = [n for n in world.names if n in vocabulary()]
+    if not world.names:  # what an oracle that looks for something finds where nothing is
+        names = [str(np.random.default_rng(world.seed).choice(candidates()))]
+    content: dict[str, Any] = {"sight": None, "overlap": None, "f1": None}
+    if names and world.plant == "fish_sim" and world.links == 3:
+        content["sight"] = asdict(look(world, experiment, held, names))
+    acts = activity(world, truth)
+    effects = [e for e in diagnosis["effects"] if e["name"] in world.names] or diagnosis["effects"]
+    if acts is not None and effects:
+        covariate, strength = acts
+        trained = [i for i, name in enumerate(experiment.names) if name not in held]
+        where, own = effects[0]["where"], [experiment.names[i] for i in trained]
+        content["overlap"] = time_overlap(where["time"], own, strength[:, trained])
+        if covariate:
+            content["f1"] = regime_f1(where["covariates"], truth[:, trained], strength[:, trained])
+    return content
+
+
+def judge_study(
+    study: Study, scores: Sequence[Score], jobs: int, done: Callable[[str], None], cluster: str = ""
+) -> tuple[dict[int, bool], list[Table]]:
+    """(seed -> whether the oracle detects, tables) of a study whose labels are open."""
+    results = study.results
+    tasks = [
+        Task(name, world, study.place(name).resolve(), results[name]["diagnosis"])
+        for name, world in study.worlds.items()
+        if results[name]["diagnosis"] is not None
+    ]
+    for name in spread(judge_world, tasks, jobs, cluster):
+        done(name)
+    judged = {t.world.seed: read_json(t.place / "judged.json") for t in tasks}
+    sights = {seed: Sight(**content["sight"]) for seed, content in judged.items() if content["sight"]}
+    nulls = [sights[t.world.seed] for t in tasks if not t.world.names and t.world.seed in sights]
+    seen = {
+        t.world.seed: detects(sights[t.world.seed], nulls)
+        for t in tasks
+        if t.world.names and t.world.seed in sights
+    }
+    return seen, [judged_table(scores, judged, sights, seen)]
+
+
+def judged_table(
+    scores: Sequence[Score],
+    judged: Mapping[int, Mapping[str, Any]],
+    sights: Mapping[int, Sight],
+    seen: Mapping[int, bool],
+) -> Table:
+    """Against the oracle and the truth."""
+    own = [s for s in scores if s.world.seed in seen]
+    clear = [s for s in own if seen[s.world.seed]]
+    ratio = [
+        _rms(s, "with_effects") / sights[s.world.seed].rms_true[HORIZON][0]
+        for s in own
+        if s.exact and _rms(s, "with_effects")
+    ]
+    gain = [
+        _rms(s, "with_effects") / sights[s.world.seed].rms_nominal[HORIZON][0]
+        for s in own
+        if s.exact and _rms(s, "with_effects")
+    ]
+    overlap = _finite([judged[s.world.seed]["overlap"] for s in scores if s.top1 and s.world.seed in judged])
+    f1 = _finite([judged[s.world.seed]["f1"] for s in scores if s.top1 and s.world.seed in judged])
+    found = sum(s.in_set for s in clear) / len(clear) if clear else float("nan")
+    rows = [
+        [
+            "truth in the answered set where the oracle detects",
+            "at least 90 %",
+            f"{found:.0%} of {len(clear)}",
+        ],
+        [
+            "held-out position error at 2 s over that of the true structure fitted, median",
+            "at most 1.1",
+            _median(ratio),
+        ],
+        ["the same over the refitted nominal structure, median", "", _median(gain)],
+        ["time overlap (IoU) of localised effects", "at least 0.7", _median(overlap, "mean")],
+        ["regime F1", "at least 0.9", _median(f1, "mean")],
+    ]
+    note = "The oracle starts from the true values and knows the name; errors where exactly the hidden names were given."
+    return Table("Against the truth fitted", ["what", "asked", "measured"], rows, note)
+
+
+def _rms(score: Score, model: str) -> float:
+    """Held-out position error at 2 s [m]; 0 where not stated."""
+    rows = score.rms.get(model, {})
+    return float(rows.get("2 s", {}).get("position_m", 0.0))
+
+
+def _finite(values: Sequence[float | None]) -> list[float]:
+    return [v for v in values if v is not None and np.isfinite(v)]
+
+
+def _median(values: Sequence[float], kind: str = "median") -> str:
+    if not values:
+        return "–"
+    size = np.median(values) if kind == "median" else np.mean(values)
+    return f"{size:.2f} ({len(values)} worlds)"

@@ -1,0 +1,110 @@
+"""The oracle: it knows which effect to look for and where the parameters are, and may do no more than fit them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from fish_sim.robot import Robot
+from fish_train.identify.experiment import Experiment, Frames
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate
+from fish_train.identify.hypothesis import Coordinates, Hypothesis, nominal_hypothesis
+from fish_train.identify.prediction import predict, prediction_errors
+from fish_train.prove.swim import Readings
+from fish_train.prove.world import World
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 6
+HORIZONS = (1.0, 2.0, 5.0)  # s
+LEVEL = 0.02  # false alarms of the oracle's test
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What the oracle sees in one world."""
+
+    gain: float  # nats of the true structure over the nominal one, both fitted
+    parameters: int  # of the true structure beyond the nominal one
+    rms_nominal: list[
+        list[float]
+    ]  # (horizon, position m, heading rad, speed m/s), held out, refitted nominal structure
+    rms_true: list[list[float]]  # true structure fitted
+
+
+def as_experiment(readings: Sequence[Readings], encoder: bool) -> Experiment:
+    """Readings on the filter's grid, trials named as in the recordings."""
+    commands, gyro, accel, speed = (
+        np.concatenate([getattr(r, key) for r in readings], axis=1)
+        for key in ("commands", "gyro", "accel", "encoder")
+    )
+    count = commands.shape[1]
+    stamps = [t for r in readings for t in r.stamps]
+    poses = [p for r in readings for p in r.poses]
+    frames = tuple(Frames(t, p) for t, p in zip(stamps, poses, strict=True))
+    names = tuple(f"trial_{m:02d}" for m in range(count))
+    rotor = speed if encoder else np.full_like(speed, np.nan)
+    return Experiment(names, np.full(count, len(commands)), commands, gyro, accel, rotor, frames, True)
+
+
+def look(
+    world: World, experiment: Experiment, held_out: Sequence[str], names: Sequence[str] | None = None
+) -> Sight:
+    """Fit the structure with `names` (default: what is hidden) and the nominal one, from the true values."""
+    looked_for = tuple(world.names if names is None else names)
+    held = [i for i, name in enumerate(experiment.names) if name in held_out]
+    training = [i for i in range(len(experiment.names)) if i not in held]
+    data, unseen = experiment.select(training), experiment.select(held or training)
+    noise = Noise()
+    noise = replace(noise, wrench=tuple(world.noise * w for w in noise.wrench))
+    nominal = _fit(_with(world, ()), world, data, noise)
+    true = _fit(_with(world, looked_for), world, data, noise)
+    again = _from(nominal, true, data)
+    nominal = max(nominal, again, key=lambda f: f.objective)
+    extra = len(true.hypothesis.free) - len(nominal.hypothesis.free)
+    return Sight(true.objective - nominal.objective, extra, _rms(unseen, nominal), _rms(unseen, true))
+
+
+def detects(sight: Sight, nulls: Sequence[Sight]) -> bool:
+    """Likelihood-ratio test at LEVEL; where nulls show a heavier tail than chi square, theirs counts."""
+    threshold = 0.5 * float(chi2.isf(LEVEL, max(sight.parameters, 1)))
+    if len(nulls) >= 1.0 / LEVEL / 2.0:
+        threshold = max(threshold, float(np.quantile([s.gain for s in nulls], 1.0 - LEVEL)))
+    return sight.gain > threshold
+
+
+def _with(world: World, names: Sequence[str]) -> Hypothesis:
+    """The nominal robot with these effects free, at the true values where they are hidden."""
+    hypothesis = nominal_hypothesis(Robot())
+    for name in names:
+        hypothesis = hypothesis.with_effect(name, 1.0)
+        if name in world.effects:
+            robot = hypothesis.robot.with_effect(name, **world.effects[name])
+            hypothesis = replace(hypothesis, robot=robot)
+    return hypothesis
+
+
+def _fit(hypothesis: Hypothesis, world: World, data: Experiment, noise: Noise) -> Fit:
+    coordinates = Coordinates(hypothesis)
+    theta = coordinates.origin().copy()
+    for i, name in enumerate(hypothesis.free):
+        if name in world.parameters:
+            theta[i] = np.log(world.parameters[name])
+    fit = climb(evaluate(hypothesis, theta, data, noise), data, ITERATIONS)
+    return climb(evaluate(hypothesis, fit.theta, data, adapt_noise(fit, data)), data, ITERATIONS)
+
+
+def _from(base: Fit, rival: Fit, data: Experiment) -> Fit:
+    """The base's structure from the rival's nominal parameters."""
+    theta = rival.theta[: len(base.theta)]
+    return climb(evaluate(base.hypothesis, theta, data, base.noise), data, ITERATIONS)
+
+
+def _rms(unseen: Experiment, fit: Fit) -> list[list[float]]:
+    sizes = prediction_errors(predict(unseen, fit.robot, fit.noise, max(HORIZONS)), HORIZONS)
+    return [[float(v) for v in row] for row in sizes.rms]

@@ -1,0 +1,106 @@
+"""Make each world's recordings, run the tool on them as a process of its own, keep what it answers.
+
+The tool's process gets the folder of recordings and an output folder, whose names tell nothing.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fish_train.prove.build import make_world
+from fish_train.prove.study import Study, read_json, write_json
+from fish_train.prove.world import World
+
+DIAGNOSE = (sys.executable, "-m", "fish_train.commands.main", "diagnose")
+LONGEST = 3600.0  # s, one diagnosis
+TAIL = 2000  # characters kept of what a failed tool said
+
+Done = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One world to be run."""
+
+    name: str
+    world: World
+    place: Path
+    tool: tuple[str, ...] = DIAGNOSE
+    keep: bool = False  # the recordings
+    threads: int = 1  # of the tool
+
+
+def run_world(job: Job) -> str:
+    """Make, diagnose, write result.json; returns the world's name. A tool that fails is a result too."""
+    recordings, out = job.place / "recordings", job.place / "tool"
+    for left in (recordings, out):  # of a run that was killed
+        shutil.rmtree(left, ignore_errors=True)
+    job.place.mkdir(parents=True, exist_ok=True)
+    make_world(job.world, recordings)
+    began = time.monotonic()
+    answer = _run_tool(job, recordings, out)
+    result = {"seconds": time.monotonic() - began, **answer}
+    if not job.keep:
+        shutil.rmtree(recordings)
+    write_json(job.place / "result.json", result)
+    return job.name
+
+
+def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
+    environment = {
+        **os.environ,
+        **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), str(job.threads)),
+    }
+    command = [*job.tool, str(recordings), "--out", str(out)]
+    try:
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=LONGEST, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return {"diagnosis": None, "error": f"no answer within {LONGEST:g} s"}
+    if done.returncode != 0:
+        return {"diagnosis": None, "error": f"exit status {done.returncode}: {done.stderr[-TAIL:]}"}
+    return {"diagnosis": read_json(out / "diagnosis.json"), "error": ""}
+
+
+def run_study(
+    study: Study, jobs: int, done: Done, tool: Sequence[str] = DIAGNOSE, keep: bool = False, cluster: str = ""
+) -> None:
+    """Run every world without a result; `done` hears each name. cluster: address of a Dask scheduler."""
+    threads = max(1, len(os.sched_getaffinity(0)) // max(jobs, 1))
+    worlds = study.worlds
+    tasks = [
+        Job(n, worlds[n], study.place(n).resolve(), tuple(tool), keep, threads) for n in study.open_worlds
+    ]
+    for name in spread(run_world, tasks, jobs, cluster):
+        done(name)
+
+
+def spread(work: Callable[[Any], Any], tasks: Sequence[Any], jobs: int, cluster: str = "") -> Iterator[Any]:
+    """Results of work(task) as they come, from local processes or a Dask cluster with a shared file system."""
+    if cluster:
+        from dask.distributed import Client
+        from dask.distributed import as_completed as completed
+
+        with Client(cluster) as client:
+            for future in completed(client.map(work, tasks, pure=False)):
+                yield future.result()
+        return
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        futures: list[Future[Any]] = [pool.submit(work, task) for task in tasks]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            for future in futures:
+                future.cancel()

@@ -1,0 +1,102 @@
+"""A study on disk: sealed labels, one result per world, everything there to go on after a kill.
+
+study.json   what was asked for, thresholds, versions
+seals.json   world -> SHA-256 of salt and label; written before any run
+sealed.json  salts and labels (mode 0600); nothing passes it to the tool
+worlds/world_0001/{recordings, tool, result.json}
+labels.json  the opened labels; written when every world has a result
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fish_train.prove.seal import Sealed, broken_seals, seal_label
+from fish_train.prove.world import World
+
+
+class StudyError(ValueError):
+    """A study folder that cannot be used; the message says why."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A folder and what is in it."""
+
+    folder: Path
+
+    @classmethod
+    def create(cls, folder: Path, worlds: Sequence[World], about: Mapping[str, Any]) -> Study:
+        """Seal the labels of new worlds; seals are on disk when this returns. Raises StudyError if a study is there."""
+        if (folder / "study.json").exists():
+            raise StudyError(f"{folder}: holds a study already")
+        folder.mkdir(parents=True, exist_ok=True)
+        names = [f"world_{i:04d}" for i in range(len(worlds))]
+        sealed = {name: seal_label(world.label()) for name, world in zip(names, worlds, strict=True)}
+        write_json(folder / "sealed.json", {k: asdict(s) for k, s in sealed.items()}, private=True)
+        write_json(folder / "seals.json", {name: s.seal for name, s in sealed.items()})
+        write_json(folder / "study.json", about)
+        return cls(folder)
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What was asked for."""
+        return read_json(self.folder / "study.json")
+
+    @property
+    def worlds(self) -> dict[str, World]:
+        """Every world, from the sealed labels. For the runner and for the judge, never for the tool."""
+        return {name: World.of(s.label) for name, s in self._sealed().items()}
+
+    def place(self, name: str) -> Path:
+        """Folder of a world."""
+        return self.folder / "worlds" / name
+
+    @property
+    def open_worlds(self) -> list[str]:
+        """Names without a result."""
+        return [name for name in self.worlds if not (self.place(name) / "result.json").exists()]
+
+    @property
+    def results(self) -> dict[str, dict[str, Any]]:
+        """What the tool answered, for worlds that have a result."""
+        found = {name: self.place(name) / "result.json" for name in self.worlds}
+        return {name: read_json(path) for name, path in found.items() if path.exists()}
+
+    def reveal(self) -> dict[str, World]:
+        """Open the labels and check every seal. Raises StudyError if a world has no result or a seal is broken."""
+        if self.open_worlds:
+            raise StudyError(
+                f"{self.folder}: {len(self.open_worlds)} worlds have no result yet; labels stay sealed"
+            )
+        opened, seals = self._sealed(), read_json(self.folder / "seals.json")
+        broken = broken_seals(seals, opened)
+        if broken:
+            raise StudyError(f"{self.folder}: labels that are not what was sealed: {', '.join(broken)}")
+        write_json(self.folder / "labels.json", {k: asdict(s) for k, s in opened.items()})
+        return {name: World.of(s.label) for name, s in opened.items()}
+
+    def _sealed(self) -> dict[str, Sealed]:
+        return {name: Sealed(**content) for name, content in read_json(self.folder / "sealed.json").items()}
+
+
+def write_json(path: Path, content: Any, private: bool = False) -> None:
+    """In one step: a reader never sees half of it."""
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    if private:
+        part.chmod(0o600)
+    os.replace(part, path)
+
+
+def read_json(path: Path) -> Any:
+    """Content of a JSON file. Raises StudyError if it is not one."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError) as error:
+        raise StudyError(f"{path}: cannot be read ({error})") from error

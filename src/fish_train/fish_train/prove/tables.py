@@ -1,0 +1,244 @@
+"""The study's tables: one row per group, what was asked beside what came out, power, calibration, competitors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from statsmodels.stats.proportion import proportion_confint
+
+from fish_train.prove.groups import GROUPS
+from fish_train.prove.score import Score
+from fish_train.reports.page import Table
+
+CALIBRATION = (0.0, 0.5, 0.8, 0.95, 1.0)  # edges of the bins of stated probability
+
+
+@dataclass(frozen=True)
+class Share:
+    """k of n with its exact (Clopper-Pearson) 95 % interval."""
+
+    k: int
+    n: int
+
+    @classmethod
+    def of(cls, scores: Iterable[Score], what: Callable[[Score], bool]) -> Share:
+        """How many of the scores are so."""
+        flags = [bool(what(s)) for s in scores]
+        return cls(sum(flags), len(flags))
+
+    @property
+    def value(self) -> float:
+        """k / n; NaN without any."""
+        return self.k / self.n if self.n else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 %."""
+        if not self.n:
+            return float("nan"), float("nan")
+        low, high = proportion_confint(self.k, self.n, method="beta")
+        return float(np.nan_to_num(low)), float(high)
+
+    def __str__(self) -> str:
+        if not self.n:
+            return "–"
+        low, high = self.interval
+        return f"{self.k}/{self.n} = {self.value:.0%} ({low:.0%} to {high:.0%})"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A number the project asks for, fixed before the run."""
+
+    what: str
+    asked: str
+    among: Callable[[Score], bool]
+    is_so: Callable[[Score], bool]
+
+
+def _one(s: Score) -> bool:
+    """A single named effect at full strength and common noise."""
+    return len(s.truth) == 1 and s.world.group in ("single", "sensor")
+
+
+ASKED = (
+    Asked("right name first, single effects", "at least 90 %", _one, lambda s: s.top1),
+    Asked("truth in the answered set, single effects", "at least 98 %", _one, lambda s: s.in_set),
+    Asked("right name first, closed loop only", "at most 5 points below open loop", lambda s: s.world.group == "feedback",
+          lambda s: s.top1),
+    Asked("false alarms, nothing hidden", "at most 2 %", lambda s: s.world.group == "null", lambda s: s.alarm),
+    Asked("both of two effects", "at least 75 %", lambda s: s.world.group == "two", lambda s: set(s.truth) <= set(s.named)),
+    Asked("no false third name", "at least 95 %", lambda s: s.world.group == "two", lambda s: not s.false_names),
+    Asked("no name exists: called unexplained", "at least 85 %", lambda s: s.unnamed and s.world.group == "outside",
+          lambda s: s.verdict == "unexplained"),
+    Asked("no name exists: wrong name with confidence", "at most 5 %", lambda s: s.unnamed and s.world.group == "outside",
+          lambda s: s.confident_wrong),
+    Asked("sensor impostors called physics", "at most 3 %", lambda s: s.world.group == "sensor", lambda s: s.called_physics),
+)  # fmt: skip
+
+
+def asked_table(scores: Sequence[Score]) -> Table:
+    """What was asked, what came out."""
+    rows = [[a.what, a.asked, str(Share.of(filter(a.among, scores), a.is_so))] for a in ASKED]
+    sets = [len(s.answered) for s in scores if _one(s) and s.answered]
+    rows.append(
+        [
+            "mean size of the answered set, single effects",
+            "at most 1.5",
+            f"{np.mean(sets):.2f}" if sets else "–",
+        ]
+    )
+    errors = [p.within for s in scores if _one(s) and s.top1 for p in s.parameters]
+    good = Share(sum(errors), len(errors))
+    rows.append(["parameters within 3 standard errors or 20 %, right names", "all", str(good)])
+    seconds = [s.seconds for s in scores]
+    rows.append(
+        ["seconds per data set, median (longest)", "180", f"{np.median(seconds):.0f} ({max(seconds):.0f})"]
+    )
+    note = "Thresholds were fixed before the run. Intervals: exact, 95 %."
+    return Table("Asked and measured", ["what", "asked", "measured"], rows, note)
+
+
+def group_table(scores: Sequence[Score]) -> Table:
+    """One row per group."""
+    header = ["group", "worlds", "right name first", "truth in set", "set size", "all right", "a false name", "alarm",
+              "unexplained", "no answer", "s, median"]  # fmt: skip
+    rows = []
+    for group in GROUPS:
+        own = [s for s in scores if s.world.group == group]
+        if not own:
+            continue
+        named = [s for s in own if s.truth]
+        sizes = [len(s.answered) for s in own if s.answered]
+        rows.append([
+            group, str(len(own)), str(Share.of(named, lambda s: s.top1)), str(Share.of(named, lambda s: s.in_set)),
+            f"{np.mean(sizes):.2f}" if sizes else "–", str(Share.of(named, lambda s: s.exact)),
+            str(Share.of(own, lambda s: bool(s.false_names))), str(Share.of(own, lambda s: s.alarm)),
+            str(Share.of(own, lambda s: s.verdict == "unexplained")), str(sum(s.verdict == "failed" for s in own)),
+            f"{np.median([s.seconds for s in own]):.0f}",
+        ])  # fmt: skip
+    note = "; ".join(f"{name}: {(f.__doc__ or '').strip().rstrip('.')}" for name, f in GROUPS.items())
+    return Table("Groups", header, rows, note + ".")
+
+
+def name_table(scores: Sequence[Score]) -> Table:
+    """What was answered to each single hidden name."""
+    rows = []
+    for name in sorted({n for s in scores for n in s.world.names}):
+        own = [s for s in scores if s.world.names == (name,)]
+        answers = [", ".join(s.named) or s.verdict for s in own]
+        if answers:
+            counted = sorted({a: answers.count(a) for a in answers}.items(), key=lambda item: -item[1])
+            rows.append([name, str(len(own)), "; ".join(f"{a} ({n})" for a, n in counted)])
+    note = "All groups with one hidden thing, whatever its strength and noise."
+    return Table("Answers by what was hidden", ["hidden", "worlds", "answers"], rows, note)
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Answers whose first name was stated with a probability in [low, high)."""
+
+    low: float
+    high: float
+    stated: float  # mean
+    right: Share
+
+
+def calibration(scores: Sequence[Score]) -> list[Bin]:
+    """Stated probability of the first name against how often it is a hidden one."""
+    bins = []
+    for low, high in zip(CALIBRATION[:-1], CALIBRATION[1:], strict=True):
+        own = [s for s in scores if s.named and low <= s.probability < high + (high == 1.0)]
+        if own:
+            mean = float(np.mean([s.probability for s in own]))
+            bins.append(Bin(low, high, mean, Share.of(own, lambda s: s.top1)))
+    return bins
+
+
+def calibration_table(scores: Sequence[Score]) -> Table:
+    """Bins and the Brier score."""
+    rows = [[f"{b.low:g} to {b.high:g}", f"{b.stated:.2f}", str(b.right)] for b in calibration(scores)]
+    named = [s for s in scores if s.named]
+    brier = np.mean([(s.probability - s.top1) ** 2 for s in named]) if named else float("nan")
+    note = f"Over all worlds in which a name was given, whatever was hidden. Brier score {brier:.3f} (0 is best)."
+    return Table("Are the stated probabilities right?", ["stated", "mean", "first name right"], rows, note)
+
+
+@dataclass(frozen=True)
+class Power:
+    """At one strength."""
+
+    strength: float
+    found: Share  # truth in the answered set
+    oracle: Share | None
+
+
+def power(scores: Sequence[Score], oracle: dict[int, bool] | None = None) -> list[Power]:
+    """Over the ladder of strengths; oracle: seed of a world -> whether the test that knows the name sees it."""
+    ladder = [s for s in scores if s.world.group == "ladder"]
+    steps = []
+    for strength in sorted({s.world.strength for s in ladder}):
+        own = [s for s in ladder if s.world.strength == strength]
+        seen = [oracle[s.world.seed] for s in own if s.world.seed in oracle] if oracle else []
+        steps.append(
+            Power(strength, Share.of(own, lambda s: s.in_set), Share(sum(seen), len(seen)) if seen else None)
+        )
+    return steps
+
+
+def power_table(steps: Sequence[Power]) -> Table:
+    """Rows of the power curve."""
+    rows = [[f"{p.strength:g}", str(p.found), str(p.oracle) if p.oracle else "–"] for p in steps]
+    note = "Strength 1: as in the known data sets. Oracle: likelihood-ratio test of the true structure, which knows the name."
+    return Table(
+        "Detection power over strength",
+        ["strength", "truth in the answered set", "oracle detects"],
+        rows,
+        note,
+    )
+
+
+def criterion_table(scores: Sequence[Score]) -> Table:
+    """AIC and BIC over the tool's own quick refits of all candidates, on the same worlds."""
+    judged = [s for s in scores if s.ranking and not s.unnamed and len(s.truth) < 2]
+    hidden, nothing = [s for s in judged if s.truth], [s for s in judged if not s.truth]
+    rows = [
+        [name, str(Share.of(hidden, lambda s, f=f: choice(s, f) in s.truth)),
+         str(Share.of(nothing, lambda s, f=f: choice(s, f) is not None))]
+        for name, f in (("AIC", aic_cost), ("BIC", bic_cost))
+    ]  # fmt: skip
+    rows.insert(
+        0, ["this tool", str(Share.of(hidden, lambda s: s.top1)), str(Share.of(nothing, lambda s: s.alarm))]
+    )
+    note = (
+        "Worlds with one hidden name or none. AIC and BIC choose among the quick refits on the search trials."
+    )
+    return Table("Competitors", ["method", "right name first", "false alarms"], rows, note)
+
+
+def choice(score: Score, cost: Callable[[str, Score], float]) -> str | None:
+    """The name with the best penalised likelihood; None if the nominal model has it."""
+    best = max(score.ranking, key=lambda n: score.ranking[n] - cost(n, score))
+    return best if score.ranking[best] > cost(best, score) else None
+
+
+def aic_cost(name: str, score: Score) -> float:
+    """Nats for the free parameters of a name."""
+    del score
+    return float(_free(name))
+
+
+def bic_cost(name: str, score: Score) -> float:
+    """Nats: half the logarithm of the number of measurements for each parameter."""
+    samples = (
+        score.world.count * score.world.duration * (100.0 * (4 if score.world.encoder else 3) + 3 * 30.0)
+    )
+    return 0.5 * _free(name) * float(np.log(samples))
+
+
+def _free(name: str) -> int:
+    from fish_train.diagnose.decide import parameter_count
+
+    return parameter_count(name)

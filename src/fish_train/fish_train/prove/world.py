@@ -1,0 +1,45 @@
+"""A world: what is hidden in one data set. Its JSON is the label that is sealed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+Values = Mapping[str, Mapping[str, float]]  # name -> parameter -> value
+
+
+@dataclass(frozen=True)
+class World:
+    """Everything a data set is made from, numbers drawn; `seed` draws the rest (programs, noise)."""
+
+    group: str
+    seed: int
+    effects: Values = field(
+        default_factory=dict
+    )  # concealed: vocabulary, `outside.OUTSIDE` or the plant's own
+    strength: float = 1.0  # in typical ones
+    trials: str = "mixed"  # mixed (8 open loop, 4 closed), closed, one_speed
+    count: int = 12  # trials
+    duration: float = 20.0  # s of each
+    noise: float = 1.0  # factor on all standard deviations of water and sensors
+    encoder: bool = True  # recorded
+    plant: str = "fish_sim"  # or mujoco
+    links: int = 3
+    method: str = "dop853"
+    substeps: int = 1
+    parameters: Mapping[str, float] = field(default_factory=dict)  # factors on nominal parameters
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What is hidden."""
+        return tuple(self.effects)
+
+    def label(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+    @classmethod
+    def of(cls, label: Mapping[str, Any]) -> World:
+        """The world of a label."""
+        return cls(**label)

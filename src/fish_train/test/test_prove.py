@@ -1,0 +1,194 @@
+"""The blind study: labels that cannot be changed afterwards, runs that go on, scores that are right by hand."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fish_sim.effects import EFFECTS
+from fish_train.diagnose.vocabulary import candidates
+from fish_train.identify.experiment import build_experiment
+from fish_train.prove import groups
+from fish_train.prove.build import make_readings, make_world
+from fish_train.prove.oracle import as_experiment
+from fish_train.prove.outside import OUTSIDE, known_to_the_plant
+from fish_train.prove.runner import run_study
+from fish_train.prove.score import score_world
+from fish_train.prove.seal import Sealed, broken_seals, seal_label
+from fish_train.prove.study import Study, StudyError, read_json
+from fish_train.prove.tables import ASKED, Share, calibration, choice, power
+from fish_train.prove.where import activity, regime_f1, time_overlap
+from fish_train.prove.world import World
+from fish_train.recordings import read_dataset
+from fish_train.reports.prove_page import write_prove_page
+
+TOOL = (sys.executable, str(Path(__file__).with_name("fake_tool.py")))
+
+
+def small(group: str, number: int = 0, **changes) -> World:
+    world = groups.GROUPS[group](np.random.default_rng(5), number)
+    return replace(world, count=3, duration=4.0, **changes)
+
+
+def test_labels_cannot_be_changed_after_the_seal() -> None:
+    sealed = {"a": seal_label({"effects": {"current": {"x": 0.1}}}), "b": seal_label({"effects": {}})}
+    seals = {name: s.seal for name, s in sealed.items()}
+    assert broken_seals(seals, sealed) == []
+    assert seal_label({"effects": {}}).seal != sealed["b"].seal  # the salt hides equal labels
+    changed = {**sealed, "a": Sealed(sealed["a"].salt, {"effects": {"current": {"x": 0.2}}})}
+    assert broken_seals(seals, changed) == ["a"]
+    assert broken_seals(seals, {"a": sealed["a"]}) == ["b"]
+
+
+def test_worlds_are_drawn_from_the_seed_alone() -> None:
+    names = list(groups.GROUPS)
+    worlds = groups.draw_worlds(60, names, 7)
+    assert worlds == groups.draw_worlds(60, names, 7) != groups.draw_worlds(60, names, 8)
+    assert {w.group for w in worlds} == set(names)
+    assert all(World.of(w.label()) == w for w in worlds)
+    hidden = {groups.single(np.random.default_rng(0), k).names[0] for k in range(len(candidates()))}
+    assert hidden == set(candidates())
+    with pytest.raises(ValueError, match="known: single"):
+        groups.draw_worlds(3, ["nonsense"], 0)
+
+
+def test_no_outside_effect_is_in_the_vocabulary() -> None:
+    before = dict(EFFECTS)
+    assert not set(OUTSIDE) & set(candidates())
+    with known_to_the_plant():
+        assert set(OUTSIDE) < set(EFFECTS)
+    assert before == EFFECTS
+
+
+def test_a_study_is_sealed_first_goes_on_and_opens(tmp_path) -> None:
+    worlds = [small("single"), small("null"), small("outside", 4)]
+    study = Study.create(tmp_path / "study", worlds, {"seed": 1, "began": "today", "command": "test"})
+    seals = read_json(study.folder / "seals.json")
+    assert (study.folder / "sealed.json").stat().st_mode & 0o077 == 0
+    with pytest.raises(StudyError, match="3 worlds have no result"):
+        study.reveal()
+    with pytest.raises(StudyError, match="already"):
+        Study.create(tmp_path / "study", worlds, {})
+    left = study.place("world_0000") / "recordings" / "half"  # of a run that was killed
+    left.mkdir(parents=True)
+    done: list[str] = []
+    run_study(study, 1, done.append, TOOL)
+    assert sorted(done) == ["world_0000", "world_0001", "world_0002"]
+    run_study(study, 1, lambda name: pytest.fail(f"{name} ran twice"), TOOL)
+    results = study.results
+    told = results["world_0000"]["diagnosis"]["seen"]
+    assert told["trials"] == ["trial_00", "trial_01", "trial_02"]
+    place = study.place("world_0000").resolve()
+    assert told["arguments"] == [str(place / "recordings"), "--out", str(place / "tool")]
+    assert "exit status 3: cannot" in results["world_0001"]["error"]
+    opened = study.reveal()
+    assert list(opened.values()) == worlds
+    assert read_json(study.folder / "seals.json") == seals
+    scores = [score_world(world, results[name]) for name, world in opened.items()]
+    assert [s.verdict for s in scores] == ["no_mismatch", "failed", "no_mismatch"]
+    write_prove_page(tmp_path / "report.html", study.about, scores)
+    page = (tmp_path / "report.html").read_text()
+    assert "Asked and measured" in page and "http" not in page.split("plotly.js")[0].split("<script")[0]
+    (study.folder / "seals.json").write_text('{"world_0000": "0"}')
+    with pytest.raises(StudyError, match="not what was sealed"):
+        study.reveal()
+
+
+def test_recordings_say_what_the_instruments_read(tmp_path) -> None:
+    world = small("single", encoder=True)
+    make_world(world, tmp_path / "set")
+    data = read_dataset(tmp_path / "set")
+    assert not [p for trial in data for p in trial.problems if p.severity != "info"]
+    read, direct = build_experiment(list(data)), as_experiment(make_readings(world), True)
+    for key in ("commands", "gyro", "accel", "encoder"):
+        assert np.allclose(
+            getattr(read, key)[:-1], getattr(direct, key)[: len(read.commands) - 1], atol=1e-9, equal_nan=True
+        )
+    for a, b in zip(read.frames, direct.frames, strict=True):
+        assert np.allclose(a.t, b.t, atol=1e-8) and np.allclose(a.pose, b.pose, atol=1e-9)
+
+
+def test_the_hidden_effect_changes_the_motion_and_the_rest_stays() -> None:
+    hidden = small("outside", 4)
+    without = replace(hidden, effects={})
+    a, b, again = (make_readings(w)[0] for w in (hidden, without, hidden))
+    assert np.array_equal(a.truth, again.truth)
+    assert np.abs(a.truth - b.truth).max() > 1e-3
+
+
+def diagnosis(*effects, verdict="missing_physics", rivals=()) -> dict:
+    rows = [
+        {
+            "name": name,
+            "kind": kind,
+            "evidence": {"probability": p},
+            "rivals": [{"name": n, "probability": 0.1} for n in rivals],
+            "parameters": {"x": {"value": 0.031, "std": 0.0001}},
+        }
+        for name, kind, p in effects
+    ]
+    ranking = [{"name": "current", "gain": 9.0}, {"name": "quadratic_drag", "gain": 10.0}]
+    fit = {"with_effects": {"rms": {}}}
+    return {
+        "seconds": 60.0,
+        "diagnosis": {"verdict": verdict, "effects": rows, "fit": fit, "ranking": ranking},
+    }
+
+
+def test_scores_by_hand() -> None:
+    current = World("single", 1, {"current": {"x": 0.03, "y": 0.0}})
+    right = score_world(current, diagnosis(("current", "physics", 0.97), rivals=("tether",)))
+    assert right.top1 and right.in_set and right.exact and not right.confident_wrong
+    assert right.answered == {"current", "tether"}
+    assert [p.within for p in right.parameters] == [True]  # ten standard errors, but 3 %
+    wrong = score_world(current, diagnosis(("tether", "physics", 0.97), rivals=("current",)))
+    assert not wrong.top1 and wrong.in_set and wrong.confident_wrong and wrong.false_names == ("tether",)
+    nothing = score_world(World("null", 2), diagnosis(verdict="no_mismatch"))
+    assert not nothing.alarm and nothing.exact and not nothing.in_set
+    odd = score_world(World("outside", 3, {"jet": {"x": 0.1}}), diagnosis(verdict="unexplained"))
+    assert odd.unnamed and odd.alarm and not odd.truth
+    pair = World("two", 4, {"current": {}, "rudder_offset": {}})
+    half = score_world(pair, diagnosis(("current", "physics", 0.6)))
+    assert half.top1 and not half.in_set and not half.exact
+    lens = score_world(World("sensor", 5, {"camera_scale": {}}), diagnosis(("payload", "physics", 0.99)))
+    assert lens.called_physics
+    assert choice(right, lambda name, _: 3.0 if name == "quadratic_drag" else 1.0) == "current"
+    assert choice(right, lambda *_: 20.0) is None
+    bins = calibration([right, wrong, half])
+    assert [(b.low, b.right.k, b.right.n) for b in bins] == [(0.5, 1, 1), (0.95, 1, 2)]
+
+
+def test_share_has_the_exact_interval() -> None:
+    low, high = Share(0, 100).interval
+    assert low == 0.0 and np.isclose(high, 1.0 - 0.025 ** (1 / 100))
+    assert str(Share(0, 0)) == "–"
+    assert len({a.what for a in ASKED}) == len(ASKED)
+
+
+def test_power_counts_per_strength() -> None:
+    scores = []
+    for i, (strength, name) in enumerate([(0.5, "tether"), (0.5, "current"), (1.0, "current")]):
+        world = World("ladder", i, {"current": {"x": 0.03}}, strength)
+        scores.append(score_world(world, diagnosis((name, "physics", 0.9))))
+    steps = power(scores, {0: True, 1: True, 2: False})
+    assert [(p.strength, p.found.k, p.found.n, p.oracle.k) for p in steps] == [(0.5, 1, 2, 2), (1.0, 1, 1, 0)]
+
+
+def test_overlap_and_regime() -> None:
+    acts = np.zeros((800, 2))
+    acts[200:400, 1] = 1.0
+    names = ["trial_00", "trial_01"]
+    hit = [{"trial": "trial_01", "from": 2.0, "to": 4.0}]
+    assert time_overlap(hit, names, acts) == 1.0
+    assert time_overlap([{**hit[0], "trial": "trial_00"}], names, acts) == 0.0
+    truth = np.zeros((800, 1, 3))
+    truth[:, 0, 0] = np.linspace(0.0, 2.0, 800)  # towards the wall at 2.135 m
+    world = World("single", 1, {"wall_effect": {"k": 2.5, "length": 0.2}})
+    covariate, strength = activity(world, truth)
+    assert covariate == "wall_distance" and strength[-1, 0] > strength[0, 0]
+    whole = [{"name": "wall_distance", "range": [0.0, 0.1351 + 0.2 * np.log(1 / 0.3)]}]
+    assert regime_f1(whole, truth, strength) > 0.99
+    assert regime_f1([{"name": "wall_distance", "range": [1.0, 1.05]}], truth, strength) == 0.0
+    assert activity(World("single", 1, {"current": {"x": 1.0}}), truth) is None
