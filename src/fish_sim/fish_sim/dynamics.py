@@ -24,12 +24,16 @@ SLIP_DECAY = 100.0
 STIFF_GRIP = 8.0  # the blend of constraint and grip fades beyond 1/8 of the mobility A / SLIP_DECAY
 
 
-@dataclass(frozen=True)
-class Point:
-    """A material point as a sum of levers: r = (x, y) + sum_k along_k e(theta_k) + left_k e_perp(theta_k)."""
+Pair = tuple[Scalar, Scalar]
 
-    along: dict[int, Scalar]
-    left: dict[int, Scalar]
+
+@dataclass(frozen=True)
+class Place:
+    """A material point in the pool frame: where it is, how it moves, how it accelerates while q'' = 0."""
+
+    position: Pair  # m
+    velocity: Pair  # m/s
+    acceleration: Pair  # m/s^2, centripetal: -sum_k theta_k'^2 lever_k
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,8 @@ class Body:
 
     name: str
     angle: int  # index of its direction among the angles
-    point: Point
+    forward: Scalar  # m, its centre of mass from the joint that carries its angle
+    left: Scalar
     mass: Scalar
     added_surge: Scalar
     added_sway: Scalar
@@ -50,68 +55,60 @@ class Body:
 
 @dataclass(frozen=True)
 class Chain:
-    """Angles of head (0), links (1..n) and fin (n + 1), their rates, and the bodies that hang on them."""
+    """Angles of head (0), links (1..n) and fin (n + 1), the joints that carry them, and the bodies on them.
 
-    x: Scalar
-    y: Scalar
-    x_dot: Scalar
-    y_dot: Scalar
+    Joint 0 is the head's centre of mass, joint n + 2 the tip; arm k leads from joint k to joint k + 1.
+    """
+
     cos: list[Scalar]
     sin: list[Scalar]
     rate: list[Scalar]
+    arms: list[Pair]  # m, pool frame
+    joints: list[Place]
     bodies: list[Body]
-    tip: Point
 
     @property
     def links(self) -> int:
         return len(self.rate) - 2
 
-    def column(self, angle: int) -> int:
-        """Index among q of the coordinate that turns this angle; the fin turns with the last link."""
-        return 2 + min(angle, self.links)
+    @property
+    def tip(self) -> Place:
+        return self.joints[-1]
 
-    def position(self, point: Point) -> tuple[Scalar, Scalar]:
-        x, y = self.x, self.y
-        for k, arm in point.along.items():
-            x, y = x + arm * self.cos[k], y + arm * self.sin[k]
-        for k, arm in point.left.items():
-            x, y = x - arm * self.sin[k], y + arm * self.cos[k]
-        return x, y
+    def lever(self, body: Body) -> Pair:
+        """From the joint to the body's centre of mass [m], pool frame."""
+        return along(body.forward, body.left, self.cos[body.angle], self.sin[body.angle])
 
-    def velocity(self, point: Point) -> tuple[Scalar, Scalar]:
-        vx, vy = self.x_dot, self.y_dot
-        for k, (jx, jy) in self.lever(point).items():
-            vx, vy = vx + jx * self.rate[k], vy + jy * self.rate[k]
-        return vx, vy
+    def place(self, body: Body) -> Place:
+        return carried(self.joints[body.angle], self.lever(body), self.rate[body.angle])
 
-    def lever(self, point: Point) -> dict[int, tuple[Scalar, Scalar]]:
-        """d r / d theta_k for every angle k that moves the point."""
-        arms: dict[int, tuple[Scalar, Scalar]] = {}
-        for k in {**point.along, **point.left}:
-            a, b = point.along.get(k, 0.0), point.left.get(k, 0.0)
-            arms[k] = (-a * self.sin[k] - b * self.cos[k], a * self.cos[k] - b * self.sin[k])
-        return arms
 
-    def centripetal(self, point: Point) -> tuple[Scalar, Scalar]:
-        """Acceleration of the point with all second derivatives zero: -sum theta_k'^2 (r_k)."""
-        ax, ay = 0.0, 0.0
-        for k, arm in point.along.items():
-            ax, ay = ax - arm * self.rate[k] ** 2 * self.cos[k], ay - arm * self.rate[k] ** 2 * self.sin[k]
-        for k, arm in point.left.items():
-            ax, ay = ax + arm * self.rate[k] ** 2 * self.sin[k], ay - arm * self.rate[k] ** 2 * self.cos[k]
-        return ax, ay
+def along(forward: Scalar, left: Scalar, cos: Scalar, sin: Scalar) -> Pair:
+    """A vector of the frame that points along (cos, sin), in the pool frame."""
+    return forward * cos - left * sin, forward * sin + left * cos
 
-    def rows(self, point: Point, cos: Scalar, sin: Scalar) -> tuple[list[Scalar], list[Scalar]]:
-        """Jacobian of the point's velocity along (cos, sin) and to its left, over all of q."""
-        size = self.links + 3
-        along, left = [0.0] * size, [0.0] * size
-        along[0], along[1] = cos, sin
-        left[0], left[1] = -sin, cos
-        for k, (jx, jy) in self.lever(point).items():
-            column = self.column(k)
-            along[column] = along[column] + (jx * cos + jy * sin)
-            left[column] = left[column] + (jy * cos - jx * sin)
-        return along, left
+
+def turned(v: Pair) -> Pair:
+    """A quarter turn to the left: how a lever's end moves per rate of turn."""
+    return -v[1], v[0]
+
+
+def inner(a: Pair, b: Pair) -> Scalar:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def plus(a: Pair, b: Pair, factor: Scalar = 1.0) -> Pair:
+    """a + factor b."""
+    return a[0] + factor * b[0], a[1] + factor * b[1]
+
+
+def carried(joint: Place, lever: Pair, rate: Scalar) -> Place:
+    """The point at the end of a lever that turns about a joint."""
+    return Place(
+        plus(joint.position, lever),
+        plus(joint.velocity, turned(lever), rate),
+        plus(joint.acceleration, lever, -(rate**2)),
+    )
 
 
 @dataclass(frozen=True)
@@ -146,50 +143,46 @@ def build_chain(
     share = sum((e.effect.tip_share(e.p) for e in effects), 0.0)
     angles = [*q[2:], q[2 + n] - share * drive.alpha]
     rates = [*qd[2:], qd[2 + n] - share * drive.alpha_dot]
+    cos, sin = [xp.cos(a) for a in angles], [xp.sin(a) for a in angles]
+    lengths = [r.hinge_offset, *[r.link_length] * n, r.fin_length]
+    arms = [along(-length, 0.0, c, s) for length, c, s in zip(lengths, cos, sin, strict=True)]
+    joints = [Place((q[0], q[1]), (qd[0], qd[1]), (0.0, 0.0))]
+    for arm, rate in zip(arms, rates, strict=True):
+        joints.append(carried(joints[-1], arm, rate))
+    return Chain(cos, sin, rates, arms, joints, build_bodies(n, r, effects))
+
+
+def build_bodies(n: int, r: SimpleNamespace, effects: Sequence[EnabledEffect]) -> list[Body]:
+    """Head, links, fin, then what the effects fix to the head."""
+    link_inertia = (r.link_mass + r.link_added_mass_sway) * r.link_length**2 / 12
+    fin_inertia = (r.fin_mass + r.fin_added_mass_sway) * r.fin_length**2 / 12
     head = Body(
-        "head", 0, Point({}, {}), r.head_mass, r.head_added_mass_surge, r.head_added_mass_sway,
+        "head", 0, 0.0, 0.0, r.head_mass, r.head_added_mass_surge, r.head_added_mass_sway,
         r.head_inertia, r.head_drag_surge, r.head_drag_sway, r.head_drag_yaw,
     )  # fmt: skip
-    bodies, arms = [head], {0: -r.hinge_offset}
-    link_inertia = (r.link_mass + r.link_added_mass_sway) * r.link_length**2 / 12
-    for i in range(1, n + 1):
-        centre = Point({**arms, i: -r.link_length / 2}, {})
-        bodies.append(
-            Body(
-                f"link_{i}", i, centre, r.link_mass, 0.0, r.link_added_mass_sway,
-                link_inertia, r.link_drag_surge, r.link_drag_sway,
-            )
-        )  # fmt: skip
-        arms = {**arms, i: -r.link_length}
-    fin_inertia = (r.fin_mass + r.fin_added_mass_sway) * r.fin_length**2 / 12
-    centre = Point({**arms, n + 1: -r.fin_length / 2}, {})
-    bodies.append(
+    links = [
         Body(
-            "fin",
-            n + 1,
-            centre,
-            r.fin_mass,
-            0.0,
-            r.fin_added_mass_sway,
-            fin_inertia,
-            r.fin_drag_surge,
-            r.fin_drag_sway,
+            f"link_{i}", i, -r.link_length / 2, 0.0, r.link_mass, 0.0, r.link_added_mass_sway,
+            link_inertia, r.link_drag_surge, r.link_drag_sway,
         )
-    )
-    for e in effects:
-        for mass, forward, left in e.effect.point_masses(e.p):
-            bodies.append(Body(e.effect.name, 0, Point({0: forward}, {0: left}), mass, 0.0, 0.0, 0.0))
-    return Chain(
-        q[0], q[1], qd[0], qd[1],
-        [xp.cos(a) for a in angles], [xp.sin(a) for a in angles], rates, bodies,
-        Point({**arms, n + 1: -r.fin_length}, {}),
+        for i in range(1, n + 1)
+    ]  # fmt: skip
+    fin = Body(
+        "fin", n + 1, -r.fin_length / 2, 0.0, r.fin_mass, 0.0, r.fin_added_mass_sway,
+        fin_inertia, r.fin_drag_surge, r.fin_drag_sway,
     )  # fmt: skip
+    points = [
+        Body(e.effect.name, 0, forward, left, mass, 0.0, 0.0, 0.0)
+        for e in effects
+        for mass, forward, left in e.effect.point_masses(e.p)
+    ]
+    return [head, *links, fin, *points]
 
 
-def water_at(chain: Chain, point: Point, effects: Sequence[EnabledEffect], xp: Any) -> tuple[Any, Any] | None:
+def water_at(place: Place, effects: Sequence[EnabledEffect], xp: Any) -> tuple[Pair, Pair] | None:
     """Water velocity at a point and its rate of change along the point's path, or None in still water."""
-    x, y = chain.position(point)
-    vx, vy = chain.velocity(point)
+    x, y = place.position
+    vx, vy = place.velocity
     total: list[Scalar] | None = None
     for e in effects:
         field = e.effect.water(e.p, x, y, e.z, xp)
@@ -201,60 +194,104 @@ def water_at(chain: Chain, point: Point, effects: Sequence[EnabledEffect], xp: A
     return None if total is None else ((total[0], total[1]), (total[2], total[3]))
 
 
-def add_body(
-    M: list[list[Scalar]],
-    h: list[Scalar],
-    chain: Chain,
-    body: Body,
-    drive: Drive,
-    effects: Sequence[EnabledEffect],
-    xp: Any,
-) -> None:
-    """Add one body's inertia to M and its inertial bias minus its fluid wrench to h.
+@dataclass(frozen=True)
+class Inertia:
+    """m 1 + R diag(A_u, A_v) R^T in the pool frame [kg]: rigid mass and the body's anisotropic added mass."""
 
-    Rigid: m a. Added mass (A_u, A_v), velocity (u, v) and acceleration relative to the water, Kirchhoff:
-    X = A_u a_u + (A_u - A_v) w v, Y = A_v a_v + (A_u - A_v) w u, N = (A_v - A_u) u v (the Munk moment).
+    xx: Scalar = 0.0
+    xy: Scalar = 0.0
+    yy: Scalar = 0.0
+
+    def __add__(self, other: Inertia) -> Inertia:
+        return Inertia(self.xx + other.xx, self.xy + other.xy, self.yy + other.yy)
+
+    def times(self, v: Pair) -> Pair:
+        return self.xx * v[0] + self.xy * v[1], self.xy * v[0] + self.yy * v[1]
+
+
+def body_inertia(body: Body, cos: Scalar, sin: Scalar) -> Inertia:
+    """Rigid and added mass of a body that points along (cos, sin)."""
+    across, anisotropy = body.mass + body.added_sway, body.added_surge - body.added_sway
+    return Inertia(across + anisotropy * cos**2, anisotropy * (cos * sin), across + anisotropy * sin**2)
+
+
+def body_bias(
+    body: Body, inertia: Inertia, chain: Chain, drive: Drive, effects: Sequence[EnabledEffect], xp: Any
+) -> tuple[Pair, Scalar]:
+    """Force (pool frame) and moment about its centre of mass that a body's motion with q'' = 0 asks for, [N, N m].
+
+    Rigid mass and added mass (A_u, A_v) resist the acceleration; with velocity (u, v) through the water and rate of
+    turn w Kirchhoff's equations add, in the body's frame,
+    X = (A_u - A_v) w v, Y = (A_u - A_v) w u, N = (A_v - A_u) u v (the Munk moment); drag is c_u u, c_v v, c_w w.
     """
     cos, sin, w = chain.cos[body.angle], chain.sin[body.angle], chain.rate[body.angle]
-    along, left = chain.rows(body.point, cos, sin)
-    vx, vy = chain.velocity(body.point)
-    ax, ay = chain.centripetal(body.point)
-    X = body.mass * (ax * cos + ay * sin)
-    Y = body.mass * (ay * cos - ax * sin)
-    water = water_at(chain, body.point, effects, xp)
-    if water is not None:
+    place = chain.place(body)
+    (vx, vy), force = place.velocity, inertia.times(place.acceleration)
+    water = water_at(place, effects, xp)
+    if water is not None:  # only added mass and drag feel it
         (Vx, Vy), (Ax, Ay) = water
-        vx, vy, ax, ay = vx - Vx, vy - Vy, ax - Ax, ay - Ay
+        Fx, Fy = inertia.times((Ax, Ay))
+        vx, vy = vx - Vx, vy - Vy
+        force = force[0] - Fx + body.mass * Ax, force[1] - Fy + body.mass * Ay
     u, v = vx * cos + vy * sin, vy * cos - vx * sin
-    a_u, a_v = ax * cos + ay * sin, ay * cos - ax * sin
     anisotropy = body.added_surge - body.added_sway
-    X = X + body.added_surge * a_u + anisotropy * w * v + body.drag_surge * u
-    Y = Y + body.added_sway * a_v + anisotropy * w * u + body.drag_sway * v
+    X = anisotropy * w * v + body.drag_surge * u
+    Y = anisotropy * w * u + body.drag_sway * v
     N = -anisotropy * u * v + body.drag_yaw * w
     motion = BodyMotion(
-        body.name,
-        *chain.position(body.point),
-        cos,
-        sin,
-        u,
-        v,
-        w,
-        body.drag_surge,
-        body.drag_sway,
-        body.drag_yaw,
-    )
+        body.name, *place.position, cos, sin, u, v, w, body.drag_surge, body.drag_sway, body.drag_yaw
+    )  # fmt: skip
     for e in effects:
         extra = e.effect.wrench(e.p, motion, e.z, drive, xp)
         if extra is not None:
             X, Y, N = X - extra[0], Y - extra[1], N - extra[2]
-    mass_u, mass_v, turn = body.mass + body.added_surge, body.mass + body.added_sway, chain.column(body.angle)
-    moving = [0, 1, *sorted({chain.column(k) for k in {**body.point.along, **body.point.left}} | {turn})]
-    for i in moving:
-        h[i] = h[i] + along[i] * X + left[i] * Y
-        for j in moving:
-            M[i][j] = M[i][j] + mass_u * along[i] * along[j] + mass_v * left[i] * left[j]
-    M[turn][turn] = M[turn][turn] + body.inertia
-    h[turn] = h[turn] + N
+    return plus(force, along(X, Y, cos, sin)), N
+
+
+def assemble(
+    chain: Chain, drive: Drive, effects: Sequence[EnabledEffect], xp: Any
+) -> tuple[list[list[Scalar]], list[Scalar]]:
+    """Lower triangle of M and the bias h of all bodies over (x, y, theta_head, theta_1 .. theta_n).
+
+    Composite rigid bodies (Walker and Orin 1982), from the fin to the head: what angle k turns is its own bodies, and
+    everything behind joint k + 1 as one mass at that joint.
+    """
+    outer, outer_force = Inertia(), (0.0, 0.0)
+    size = len(chain.rate) + 2
+    M: list[list[Scalar]] = [[0.0] * size for _ in range(size)]
+    h: list[Scalar] = [0.0] * size
+    for k in reversed(range(len(chain.rate))):
+        arm = turned(chain.arms[k])
+        momentum = outer.times(arm)
+        turn, moment = inner(arm, momentum), inner(arm, outer_force)
+        for body in chain.bodies:
+            if body.angle != k:
+                continue
+            lever = turned(chain.lever(body))
+            inertia = body_inertia(body, chain.cos[k], chain.sin[k])
+            force, N = body_bias(body, inertia, chain, drive, effects, xp)
+            own = inertia.times(lever)
+            momentum = plus(momentum, own)
+            turn, moment = turn + inner(lever, own) + body.inertia, moment + inner(lever, force) + N
+            outer, outer_force = outer + inertia, plus(outer_force, force)
+        M[2 + k][:2] = momentum
+        M[2 + k][2 : 2 + k] = [inner(turned(a), momentum) for a in chain.arms[:k]]
+        M[2 + k][2 + k], h[2 + k] = turn, moment
+    M[0][0], M[1][0], M[1][1] = outer.xx, outer.xy, outer.yy
+    h[:2] = outer_force
+    return turn_fin_with_last_link(M, h)
+
+
+def turn_fin_with_last_link(
+    M: list[list[Scalar]], h: list[Scalar]
+) -> tuple[list[list[Scalar]], list[Scalar]]:
+    """The fin's angle is no coordinate: its row and column belong to the last link's."""
+    fin, bias = M.pop(), h.pop()
+    last = len(M) - 1
+    M[last][last] = M[last][last] + 2 * fin[last] + fin[last + 1]
+    M[last][:last] = [a + b for a, b in zip(M[last][:last], fin[:last], strict=True)]
+    h[last] = h[last] + bias
+    return M, h
 
 
 def add_springs(
@@ -275,31 +312,34 @@ def add_springs(
 
 
 def factorise(M: list[list[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """M = L D L^T of a symmetric positive definite matrix of scalars: (L strictly lower, 1/D)."""
+    """M = L D L^T of a symmetric positive definite matrix of scalars, given below its diagonal: (L, 1/D)."""
     size = len(M)
     L: list[list[Scalar]] = [[0.0] * size for _ in range(size)]
     D: list[Scalar] = []
     inverse: list[Scalar] = []
     for j in range(size):
         scaled = [L[j][k] * D[k] for k in range(j)]
-        D.append(M[j][j] - sum((scaled[k] * L[j][k] for k in range(j)), 0.0))
+        D.append(M[j][j] - dot(scaled, L[j][:j]))
         inverse.append(1.0 / D[j])
         for i in range(j + 1, size):
-            L[i][j] = (M[i][j] - sum((L[i][k] * scaled[k] for k in range(j)), 0.0)) * inverse[j]
+            L[i][j] = (M[i][j] - dot(L[i][:j], scaled)) * inverse[j]
     return L, inverse
 
 
-def back_substitute(factors: tuple[list[list[Scalar]], list[Scalar]], b: Sequence[Scalar]) -> list[Scalar]:
-    """Solve L D L^T x = b."""
-    L, inverse = factors
-    size = len(b)
+def reduce(L: list[list[Scalar]], b: Sequence[Scalar]) -> list[Scalar]:
+    """L^-1 b."""
     x = list(b)
-    for i in range(size):
+    for i in range(len(x)):
         for k in range(i):
             x[i] = x[i] - L[i][k] * x[k]
-    x = [x[i] * inverse[i] for i in range(size)]
-    for i in reversed(range(size)):
-        for k in range(i + 1, size):
+    return x
+
+
+def back_substitute(L: list[list[Scalar]], inverse: Sequence[Scalar], b: Sequence[Scalar]) -> list[Scalar]:
+    """(D L^T)^-1 b."""
+    x = [value * d for value, d in zip(b, inverse, strict=True)]
+    for i in reversed(range(len(x))):
+        for k in range(i + 1, len(x)):
             x[i] = x[i] - L[k][i] * x[k]
     return x
 
@@ -327,36 +367,38 @@ def solve(
     """Accelerations, tip force and effect state rates at one instant.
 
     q, qd: n + 3 scalars [m, rad], [m/s, rad/s]; r: nominal parameters by name; constrained=False frees the tip.
+    With M = L D L^T everything that M^-1 is needed for meets in the coordinates L^-1.
     """
-    size = len(q)
     chain = build_chain(q, qd, drive, r, effects, xp)
-    M: list[list[Scalar]] = [[0.0] * size for _ in range(size)]
-    h: list[Scalar] = [0.0] * size
-    for body in chain.bodies:
-        add_body(M, h, chain, body, drive, effects, xp)
+    M, h = assemble(chain, drive, effects, xp)
     add_springs(h, q, chain, drive, r, effects, xp)
     h[2] = h[2] + r.rotor_inertia * drive.rotor_acceleration
-    factors = factorise(M)
-    free = back_substitute(factors, [-value for value in h])
-    fin = chain.links + 1
-    cos, sin = chain.cos[fin], chain.sin[fin]
-    along, normal = chain.rows(chain.tip, cos, sin)
-    vx, vy = chain.velocity(chain.tip)
-    ax, ay = chain.centripetal(chain.tip)
-    water = water_at(chain, chain.tip, effects, xp)
+    L, inverse = factorise(M)
+    free = reduce(L, [-value for value in h])
+    ahead = chain.cos[-1], chain.sin[-1]
+    velocity, acceleration = chain.tip.velocity, chain.tip.acceleration
+    water = water_at(chain.tip, effects, xp)
     if water is not None:
-        (Vx, Vy), (Ax, Ay) = water
-        vx, vy, ax, ay = vx - Vx, vy - Vy, ax - Ax, ay - Ay
-    slip = vy * cos - vx * sin
+        velocity, acceleration = plus(velocity, water[0], -1.0), plus(acceleration, water[1], -1.0)
+    slip = inner(velocity, turned(ahead))
     rates = [rate for e in effects for rate in e.effect.derivative(e.p, e.z, slip, drive, xp)]
     if not constrained:
-        return Solution(free, 0.0, slip, rates)
-    response = back_substitute(factors, normal)
-    A = dot(normal, response)
-    b = dot(normal, free) + ay * cos - ax * sin - chain.rate[fin] * (vx * cos + vy * sin)
+        return Solution(back_substitute(L, inverse, free), 0.0, slip, rates)
+    response = reduce(L, tip_normal(chain))
+    weighted = [value * d for value, d in zip(response, inverse, strict=True)]
+    A = dot(weighted, response)
+    b = dot(weighted, free) + inner(acceleration, turned(ahead)) - chain.rate[-1] * inner(velocity, ahead)
     grips = [g for e in effects if (g := e.effect.grip(e.p, e.z, xp)) is not None]
     force = tip_force(slip, A, b, combine(grips), xp)
-    return Solution([f + force * m for f, m in zip(free, response, strict=True)], force, slip, rates)
+    held = [f + force * m for f, m in zip(free, response, strict=True)]
+    return Solution(back_substitute(L, inverse, held), force, slip, rates)
+
+
+def tip_normal(chain: Chain) -> list[Scalar]:
+    """N = d(slip)/d(q'): the fin's left normal against the motion that each coordinate gives the tip."""
+    normal = turned((chain.cos[-1], chain.sin[-1]))
+    angles = [inner(normal, turned(arm)) for arm in chain.arms]
+    return [*normal, *angles[:-2], angles[-2] + angles[-1]]
 
 
 def combine(grips: Sequence[Grip]) -> Grip | None:
@@ -379,7 +421,7 @@ def energy(q: Sequence[Scalar], qd: Sequence[Scalar], alpha: Scalar, r: SimpleNa
     total = 0.0
     for body in chain.bodies:
         cos, sin = chain.cos[body.angle], chain.sin[body.angle]
-        vx, vy = chain.velocity(body.point)
+        vx, vy = chain.place(body).velocity
         u, v = vx * cos + vy * sin, vy * cos - vx * sin
         total = total + 0.5 * ((body.mass + body.added_surge) * u**2 + (body.mass + body.added_sway) * v**2)
         total = total + 0.5 * body.inertia * chain.rate[body.angle] ** 2
