@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fish_sim.checks import stable_scheme
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.sensors.battery import Battery
@@ -51,7 +50,7 @@ class Simulation:
     def __init__(self, robot: Robot, config: SimulationConfig) -> None:
         self._config = config
         self._robot = robot.with_effect("disturbance", **robot.effects.get("disturbance", {}))
-        self._stepper = Stepper.of(self._robot, stable_scheme(self._robot))
+        self._stepper = Stepper.of(self._robot)
         self._parameters = self._stepper.parameters(self._robot)
         names = self._stepper.layout.parameters
         self._pushed = [names.index(f"disturbance.{key}") for key in ("surge", "sway", "yaw")]

@@ -7,7 +7,6 @@ Values, tangents (JVP) and adjoints (VJP) come from the same expressions.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
 from importlib.resources import files
 
 import numpy as np
@@ -15,38 +14,15 @@ from numpy.typing import NDArray
 
 from fish_sim.compiled import compiler, has_libmvec, lanes, library
 from fish_sim.emit import emit
+from fish_sim.finite import check_finite
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel
 from fish_sim.methods import METHODS
 from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, Structure, functions
 from fish_sim.robot import Robot
+from fish_sim.scheme import Scheme, default_scheme, stable_scheme
 
 Array = NDArray[np.float64]
-
-DEFAULT_METHOD = "dop853"
-
-
-@dataclass(frozen=True)
-class Scheme:
-    """How a period of 10 ms is integrated: a method of `methods.METHODS` and its number of steps in the period."""
-
-    method: str = DEFAULT_METHOD
-    substeps: int = 1
-
-    def __post_init__(self) -> None:
-        if self.method not in METHODS:
-            raise ValueError(f"method: got {self.method!r}; expected one of {', '.join(METHODS)}")
-        if (
-            isinstance(self.substeps, bool)
-            or not isinstance(self.substeps, int)
-            or not 1 <= self.substeps <= 100
-        ):
-            raise ValueError(f"substeps: got {self.substeps!r}; expected a whole number from 1 to 100")
-
-
-def default_scheme(links: int) -> Scheme:
-    """Steps fine enough for the tail's fastest mode, which grows with the number of links."""
-    return Scheme(DEFAULT_METHOD, 1 if links <= 3 else 4 if links <= 5 else 12)
 
 
 class Stepper:
@@ -59,8 +35,8 @@ class Stepper:
 
     @classmethod
     def of(cls, robot: Robot, scheme: Scheme | None = None) -> Stepper:
-        """The stepper of a robot; its parameters are `parameters(robot)`."""
-        return cls(robot.structure, scheme)
+        """The stepper of a robot, by default with steps that its own modes allow; see `parameters`."""
+        return cls(robot.structure, scheme or stable_scheme(robot))
 
     def parameters(self, robot: Robot) -> Array:
         """The robot's parameter vector (NP,)."""
@@ -80,11 +56,21 @@ class Stepper:
 
     def step(self, state: Array, command: Array, parameters: Array) -> Array:
         """The state 10 ms later."""
-        return self.rollout(state, np.asarray(command)[None], parameters)[1]
+        after: Array = self.rollout(state, np.asarray(command)[None], parameters)[1]
+        return after
 
     def rollout(self, start: Array, commands: Array, parameters: Array) -> Array:
-        """States (T + 1, ..., NS) from start (..., NS) under commands (T, ..., 2)."""
+        """States (T + 1, ..., NS) from start (..., NS) under commands (T, ..., 2).
+
+        Raises:
+            ValueError: a wrong shape; a command, a parameter or the one start state is not finite. Of a batch of start
+                states the bad ones stay bad (`checks.diverged`) and leave the others alone.
+        """
         start, commands, parameters, shape = self._arrange(start, commands, parameters)
+        check_finite("command", commands, COMMAND_NAMES)
+        check_finite("parameter", parameters, self.layout.parameters)
+        if not shape:
+            check_finite("state", start[0], self.layout.state)
         states = np.empty((len(commands) + 1, *start.shape))
         states[0] = start
         self._kernel(len(start)).rollout(states, commands, parameters)
@@ -147,13 +133,13 @@ class Stepper:
 
         motion (B, NX), drive (B, 4) as DRIVE_NAMES, parameters (NP,) or (B, NP); tangents likewise.
         """
-        arrays = [np.ascontiguousarray(a, dtype=float) for a in (motion, d_motion, drive, d_drive)]
+        x, dx, w, dw = (np.ascontiguousarray(a, dtype=float) for a in (motion, d_motion, drive, d_drive))
         p, dp = (np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters))
-        self._check_width("motion", arrays[0], len(self.layout.motion))
-        self._check_width("drive", arrays[2], len(DRIVE_NAMES))
+        self._check_width("motion", x, len(self.layout.motion))
+        self._check_width("drive", w, len(DRIVE_NAMES))
         self._check_width("parameters", p, len(self.layout.parameters))
-        rate, tangent = np.empty_like(arrays[0]), np.empty_like(arrays[0])
-        self._kernel(len(rate)).rates_jvp(*arrays, p, dp, rate, tangent)
+        rate, tangent = np.empty_like(x), np.empty_like(x)
+        self._kernel(len(rate)).rates_jvp(x, dx, w, dw, p, dp, rate, tangent)
         return rate, tangent
 
     def memory_jvp(

@@ -29,6 +29,14 @@ def typical(name):
     }
 
 
+def strongest(name):
+    """Every parameter at the upper end of its range, where it has one."""
+    effect = EFFECTS[name]
+    return {
+        k: p.highest if np.isfinite(p.highest) else typical(name)[k] for k, p in effect.parameters.items()
+    }
+
+
 def swim(effects, commands, poses=NEAR_WALL, links=1):
     """States of a fish with effects {name: parameters}, without a compiler; (T + 1, ..., NS)."""
     robot = Robot(links=links, effects=effects)
@@ -75,6 +83,14 @@ def test_typical_strength_changes_the_motion_and_stays_finite(name, strokes):
 def test_all_effects_together_stay_finite(strokes):
     states = swim({name: typical(name) for name in EFFECTS}, strokes(80), links=3)
     assert np.isfinite(states).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "links"), [*((name, 1) for name in EFFECTS), ("tail_hardening", 3), ("tail_joint_damping", 3)]
+)
+def test_the_upper_end_of_the_ranges_stays_finite(name, links, strokes):
+    commands = strokes(100) * [12 / 9, 1.6]  # full throttle, rudder from end to end
+    assert np.isfinite(swim({name: strongest(name)}, commands, (0.0, 0.0, 0.3), links)).all()
 
 
 @pytest.mark.parametrize("name", EFFECTS)

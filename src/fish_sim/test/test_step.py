@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,14 @@ import torch
 from scipy.integrate import solve_ivp
 
 from fish_sim import torch_step
-from fish_sim.checks import check_inputs, check_scheme, diverged, modes_at_rest, stable_scheme
+from fish_sim.checks import check_inputs, check_scheme, diverged
 from fish_sim.effects import EFFECTS
-from fish_sim.model import Layout, motion_rate
+from fish_sim.model import DT, Layout, motion_rate
 from fish_sim.ops import NUMPY
 from fish_sim.robot import Robot
-from fish_sim.step import Scheme, Stepper
+from fish_sim.scheme import Scheme, default_scheme, stable_scheme
+from fish_sim.stability import modes_at_rest
+from fish_sim.step import Stepper
 
 # together they use states, memory, grip, water, joint torques and every elementary function
 COLOURFUL = (
@@ -128,16 +131,21 @@ def test_wrong_shapes_and_other_robots_are_refused():
 
 def test_numbers_that_are_not_finite_are_named():
     stepper = Stepper(Robot().structure, compiled=False)
-    state, command, p = np.tile(stepper.rest(), (3, 1)), np.zeros(2), stepper.parameters(Robot())
-    check_inputs(stepper, state, command, p)
-    state[2, 3] = np.nan
-    with pytest.raises(ValueError, match=r"state theta_1 of batch element \(2,\): got nan"):
-        check_inputs(stepper, state, command, p)
-    with pytest.raises(ValueError, match="command rudder: got inf"):
-        check_inputs(stepper, state[0], np.array([0.0, np.inf]), p)
-    p[0] = np.inf
-    with pytest.raises(ValueError, match="parameter head_mass: got inf"):
-        check_inputs(stepper, state[0], command, p)
+    rest, command, p = stepper.rest(), np.zeros(2), stepper.parameters(Robot())
+    bad_state, bad_parameters = rest.copy(), p.copy()
+    bad_state[3], bad_parameters[0] = np.nan, np.inf
+    for entrance in (stepper.step, partial(check_inputs, stepper)):
+        entrance(rest, command, p)
+        with pytest.raises(ValueError, match="state theta_1.*: got nan; expected a finite number"):
+            entrance(bad_state, command, p)
+        with pytest.raises(ValueError, match="command rudder.*: got inf"):
+            entrance(rest, np.array([0.0, np.inf]), p)
+        with pytest.raises(ValueError, match="parameter head_mass.*: got inf"):
+            entrance(rest, command, bad_parameters)
+    with pytest.raises(ValueError, match="parameter head_mass.*: got inf"):
+        torch_step.step(*map(torch.from_numpy, (rest, command, bad_parameters)), stepper)
+    with pytest.raises(ValueError, match=r"state theta_1 of batch element \(1,\): got nan"):
+        check_inputs(stepper, np.stack([rest, bad_state]), command, p)
 
 
 def test_a_step_too_coarse_for_the_tail_is_refused_with_the_number_that_works():
@@ -155,20 +163,34 @@ def test_a_step_too_coarse_for_the_tail_is_refused_with_the_number_that_works():
 
 
 def test_fastest_mode_of_the_nominal_tail_is_about_150_per_second():
-    robot = Robot()
-    stepper = Stepper(robot.structure, compiled=False)
-    modes = modes_at_rest(stepper, stepper.parameters(robot))
+    modes = modes_at_rest((3, ()), np.array(Robot().vector()))
     assert np.abs(modes).max() == pytest.approx(150, rel=0.02)
     assert modes.real.max() < 1e-6  # at rest everything decays or stays
 
 
-@pytest.mark.parametrize("links", [1, 3, 5, 8])
-def test_the_stable_scheme_of_a_robot_is_stable_also_with_a_stiff_tail(links):
-    robot = Robot(links=links).with_effect("tail_joint_damping", c=1e-3)
-    stepper = Stepper(robot.structure, stable_scheme(robot), compiled=False)
+@pytest.mark.parametrize("links", [1, 2, 3, 4, 5])
+def test_a_default_step_turns_the_fastest_mode_by_less_than_a_radian(links):
+    robot = Robot(links=links)
+    modes = modes_at_rest(robot.structure, np.array(robot.vector()))
+    scheme = default_scheme(links)
+    assert np.abs(modes.imag).max() * DT / scheme.substeps < 0.87
+    assert stable_scheme(robot) == scheme == Stepper.of(robot).scheme
+
+
+@pytest.mark.parametrize("links", [1, 3, 5])
+def test_a_robot_with_a_stiff_tail_gets_steps_that_are_stable(links):
+    highest = EFFECTS["tail_joint_damping"].parameters["c"].highest
+    robot = Robot(links=links).with_effect("tail_joint_damping", c=highest)
+    stepper = Stepper.of(robot)
     check_scheme(stepper, stepper.parameters(robot))
-    nominal = stable_scheme(Robot(links=links))
-    assert nominal == Stepper.of(Robot(links=links)).scheme
+    if links == 5:
+        with pytest.raises(ValueError, match="unstable for this robot"):
+            check_scheme(Stepper.of(robot, default_scheme(links)), stepper.parameters(robot))
+
+
+def test_a_tail_too_stiff_for_any_step_is_refused():
+    with pytest.raises(ValueError, match=r"fastest mode, .* too fast for 100 substeps"):
+        Stepper.of(Robot(links=5).with_parameters(tail_stiffness=1e6))
 
 
 def test_the_comparison_with_the_reference_says_when_there_is_none(tmp_path):

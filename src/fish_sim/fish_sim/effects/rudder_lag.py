@@ -1,6 +1,9 @@
 """A servo that approaches its target gradually."""
 
-from fish_sim.effects.effect import Effect
+from typing import Any
+
+from fish_sim.effects.effect import Effect, Values
+from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "first-order servo; strength is an assumption (hobby servos: 0.02 to 0.15 s)"
@@ -21,5 +24,5 @@ class RudderLag(Effect):
     strength = ("time_constant",)
 
     @staticmethod
-    def servo(p, alpha, target, dt, xp):
+    def servo(p: Values, alpha: Scalar, target: Scalar, dt: float, xp: Any) -> Scalar:
         return alpha + (1.0 - xp.exp(-dt / xp.fmax(p.time_constant, SHORTEST))) * (target - alpha)

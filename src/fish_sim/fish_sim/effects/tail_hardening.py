@@ -19,7 +19,7 @@ class TailHardening(Effect):
     kind = "physics"
     equation = "torque = k3 phi^3 at every tail joint, beside tail_stiffness phi"
     source = SOURCE
-    parameters = {"k3": Parameter(0.0, "N m/rad^3", 0.0, 5.0, SOURCE, typical=0.3)}
+    parameters = {"k3": Parameter(0.0, "N m/rad^3", 0.0, 3.0, SOURCE, typical=0.3)}
     strength = ("k3",)
 
     @staticmethod

@@ -12,9 +12,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.checks import stable_scheme
 from fish_sim.model import DT
 from fish_sim.robot import Robot
+from fish_sim.scheme import stable_scheme
 from fish_sim.simulation import DISTURBANCE_ARM, DISTURBANCE_TIME
 from fish_sim.step import Stepper
 
