@@ -1,9 +1,10 @@
 """How the nominal fish swims: steady speed over throttle, and the limit cycle of a stroke.
 
-    python src/fish_sim/benchmarks/swimming.py [--out swimming.html]
+    python src/fish_sim/benchmarks/swimming.py [--out swimming.svg]
 
 Prints the steady surge speed against A^2 w^4 for several amplitudes and frequencies with a straight-line fit over
-0.1 to 0.3 m/s (the paper found it nearly linear there), and how well the stroke repeats; writes a page of plots.
+0.1 to 0.3 m/s (the paper found it nearly linear there), and how well the stroke repeats; draws both.
+The picture in the README, src/fish_sim/docs/swimming.svg, was drawn by it.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib
 import numpy as np
-import plotly.graph_objects as go
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from plotly.subplots import make_subplots
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
@@ -70,26 +71,25 @@ def straight_line(sweeps: list[Sweep]) -> tuple[float, float, float]:
     return slope, intercept, 1 - np.var(y - slope * x - intercept) / np.var(y)
 
 
-def page(sweeps: list[Sweep], cycle: Array, stroke: int) -> go.Figure:
+def picture(sweeps: list[Sweep], cycle: Array, stroke: int) -> Figure:
     """Speed over throttle; head and tail rates over angles in steady swimming."""
-    figure = make_subplots(1, 2, subplot_titles=("steady speed", "limit cycle at 2 Hz, throttle 0.5"))
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    speeds, phases = figure.subplots(1, 2)
     for s in sweeps:
-        figure.add_scatter(
-            x=s.throttle / S_MAX, y=s.speed, name=f"{s.frequency:.3g} Hz", mode="lines+markers"
-        )
-    motion = cycle[-5 * stroke - 1 :, 0]
-    size = 3 + 3
-    angles = {"head yaw": motion[:, 2] - motion[:, 2].mean()}
-    rates = {"head yaw": motion[:, size + 2]}
-    for i in (1, 2, 3):
-        angles[f"tail joint {i}"] = motion[:, 2 + i] - motion[:, 1 + i]
-        rates[f"tail joint {i}"] = motion[:, size + 2 + i] - motion[:, size + 1 + i]
-    for name in angles:
-        figure.add_scatter(x=angles[name], y=rates[name], name=name, mode="lines", row=1, col=2)
-    figure.update_xaxes(title="A^2 w^4 / S_max", row=1, col=1)
-    figure.update_yaxes(title="m/s", row=1, col=1)
-    figure.update_xaxes(title="angle, rad", row=1, col=2)
-    figure.update_yaxes(title="rate, rad/s", row=1, col=2)
+        speeds.plot(s.throttle / S_MAX, s.speed, ".-", linewidth=1, label=f"{s.frequency:.3g} Hz")
+    speeds.axhspan(*LINEAR, color="0.93", label="paper: nearly linear")
+    speeds.set(xlabel="$A^2 \\omega^4 / S_{max}$", ylabel="steady speed, m/s")
+    motion = cycle[-stroke - 1 :, 0]
+    links = motion.shape[1] // 2 - 4  # state: q, q', alpha, rotor speed
+    size = 3 + links
+    angles, rates = motion[:, 2:size], motion[:, size + 2 : 2 * size]
+    phases.plot(angles[:, 0] - angles[:, 0].mean(), rates[:, 0], label="head yaw")
+    for i, (angle, rate) in enumerate(zip(np.diff(angles).T, np.diff(rates).T, strict=True), 1):
+        phases.plot(angle, rate, label=f"tail joint {i}")
+    phases.set(xlabel="angle, rad", ylabel="rate, rad/s", title="limit cycle at 2 Hz, throttle 0.5")
+    for axes in (speeds, phases):
+        axes.grid(color="0.9")
+        axes.legend(fontsize="small")
     return figure
 
 
@@ -110,7 +110,9 @@ def repetition(cycle: Array, stroke: int) -> float:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description="steady speed and limit cycle of the nominal fish")
-    parser.add_argument("--out", type=Path, default=Path("swimming.html"), help="page of plots to write")
+    parser.add_argument(
+        "--out", type=Path, default=Path("swimming.svg"), help="picture to write (.svg or .png)"
+    )
     out = parser.parse_args().out
     sweeps = [sweep(f) for f in FREQUENCIES]
     for s in sweeps:
@@ -119,7 +121,8 @@ def main() -> int:
     print(f"all together: {intercept:.3f} + {slope:.3f} throttle, R^2 {r2:.4f}")
     cycle, stroke = swim(2.0, np.array([0.5 * S_MAX])), round(0.5 / DT)
     print(f"2 Hz, throttle 0.5: the stroke repeats to {repetition(cycle, stroke):.1e} of its largest rate")
-    page(sweeps, cycle, stroke).write_html(out, include_plotlyjs=True)
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "swimming"}):
+        picture(sweeps, cycle, stroke).savefig(out, metadata={"Date": None} if out.suffix == ".svg" else None)
     print(f"wrote {out}")
     return 0
 
