@@ -22,8 +22,8 @@ class ControlLimits:
 
     steering_scale: float = 2.0  # rad of rudder for a steering PID output of 1
     throttle_scale: float = 4.0  # throttle for a speed PID output of 1
-    curvature_gain: float = 0.222  # m, rudder for a path curvature: alpha = gain kappa; steady turns
-    curvature_lag: float = 0.025  # m, lag of that curvature along the path: a rudder step yaws at once
+    curvature_gain: float = 0.21  # m, rudder for a path curvature: alpha = gain kappa; steady turns
+    curvature_lag: float = 0.062  # m, lag of that curvature along the path: a rudder step yaws at once
     throttle_linear: float = 1.333  # s/m, throttle for a speed u: linear u + quadratic u^2; straight
     throttle_quadratic: float = 2.13  # s^2/m^2
     turn_linear: float = 1.2  # s/(m rad^2), and in turns: alpha^2 (linear u + quadratic u^2)
@@ -41,6 +41,8 @@ class ControlLimits:
             value = getattr(self, field.name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{field.name} is {value!r}, expected a finite number >= 0")
+        if self.curvature_gain == 0.0:
+            raise ValueError("curvature_gain is 0.0, expected a number > 0")
 
 
 class Gains(NamedTuple):
@@ -59,8 +61,8 @@ class Errors(NamedTuple):
 
     heading: Any  # rad, wanted minus actual course, within +-pi
     speed: Any  # m/s, wanted minus actual surge
-    curvature: Any  # 1/m, of the path where the rudder will act
-    speed_wanted: Any  # m/s
+    curvature: Any  # 1/m, of the way through the water where the rudder will act
+    speed_wanted: Any  # m/s, through the water
 
 
 class ControlState(NamedTuple):

@@ -17,7 +17,14 @@ from fish_control.control_law import (
     actuator_step,
     control_step,
 )
-from fish_control.line_of_sight import Motion, heading_error
+from fish_control.line_of_sight import (
+    GuidanceState,
+    Motion,
+    heading_error,
+    mean_heading,
+    observe,
+    through_water,
+)
 from fish_control.motion_observer import MotionObserver
 from fish_control.policy import Policy, policy_inputs
 
@@ -52,7 +59,7 @@ class Controller:
         self._limits = policy.contract.limits
         self._guidance = policy.contract.guidance
         self._motion: Motion | None = None
-        self._observer = MotionObserver(self._guidance)
+        self._observer = MotionObserver(GuidanceState(), self._observe)
         self._control = ControlState()
         self._setpoint = Setpoint(0.0, 0.0)
         self._actuators = ActuatorState()
@@ -63,20 +70,23 @@ class Controller:
         self._motion = motion
         self._observer.add(time, motion)
 
+    def _observe(self, state: GuidanceState, motion: Motion, dt: float) -> GuidanceState:
+        turn = self._setpoint.alpha / self._limits.curvature_gain
+        return observe(state, motion, turn, dt, self._guidance, np)
+
     def decide(self, wanted: Wanted) -> Gains:
         """One control period at a wanted speed above zero: errors, gains from the policy, new set-points."""
         if self._motion is None:
             raise ValueError("decide() before any odometry was observed")
         motion = self._motion
-        curvature = wanted.yaw_rate / wanted.speed
+        state, curvature = self._observer.state, wanted.yaw_rate / wanted.speed
+        water = through_water(state, wanted.course, curvature, wanted.speed, np)
         e_psi = continued(
-            self._control.heading_error,
-            float(heading_error(self._observer.state, motion, wanted.course, curvature, self._guidance, np)),
+            self._control.heading_error, float(heading_error(state, motion, water, self._guidance, np))
         )
         e_u = wanted.speed - motion.surge
-        mean_heading = motion.heading - self._observer.state.stroke.heading
         inputs = policy_inputs(
-            mean_heading,
+            mean_heading(state.stroke, motion),
             motion.surge,
             wanted.speed,
             e_psi,
@@ -86,7 +96,7 @@ class Controller:
             self._policy.contract.inputs,
         )
         gains = Gains(*map(float, self._policy.gains(np.array(inputs))))
-        errors = Errors(e_psi, e_u, curvature, wanted.speed)
+        errors = Errors(e_psi, e_u, water.curvature, water.speed)
         self._control, self._setpoint = control_step(
             self._control, errors, gains, self._policy.contract.control_period, self._limits, np
         )

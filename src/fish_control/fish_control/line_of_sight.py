@@ -2,14 +2,19 @@
 
     chi_los = atan2(y_t - y, x_t - x)                 towards the lookahead point (the paper's law)
     chi_d   = chi_los - gamma                         wanted course; gamma: share of the path's own curvature
-    psi_d   = chi_d + a kappa - beta                  wanted mean heading: slip in a turn, drift in a current
-    e_psi   = wrap(psi_d - psi_mean)
 
 On a curved path chi_los alone points inside the curve by gamma = asin(L kappa / 2), which makes any
 controller that tracks it cut corners (0.03 to 0.07 m on the letters); with gamma taken off, a robot on the
-path aims along the path. Written on generic scalars: training runs the same lines in CasADi.
+path aims along the path. From course to heading, in water that flows with c:
 
-Source: line of sight: Fossen 2021, sect. 12.3; corner compensation, slip and drift terms: this project.
+    w       = U t(chi_d) - c                          velocity through the water; t: unit vector, U: wanted speed
+    kappa_w = kappa U^2 (w . t) / |w|^3               curvature of the way through the water
+    psi_d   = atan2(w_y, w_x) + a(|w|) kappa_w        wanted mean heading; a(u) = a_0 + a_1 u: slip in a turn
+    e_psi   = wrap(psi_d - tau |w| kappa_w - psi_mean)   tau: by which psi_mean is late in a turn (stroke_mean)
+
+Written on generic scalars: training runs the same lines in CasADi.
+
+Source: line of sight: Fossen 2021, sect. 12.3; corner compensation, slip and current: this project.
 """
 
 from __future__ import annotations
@@ -18,21 +23,24 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from fish_control.stroke_mean import StrokeState, stroke_step
+from fish_control.stroke_mean import TURN_LAG, StrokeState, stroke_step
+
+LEAST_HEADWAY = 0.3  # of the wanted speed, through the water: a stronger current ahead is not believed
+SLOW = 0.02  # m/s, a robot that is slower has no course of its own: its heading stands for it
 
 
 @dataclass(frozen=True)
 class GuidanceConfig:
-    """Constants of the line of sight; part of a weights file's contract."""
+    """Constants of the line of sight; part of a weights file's contract. Slip: steady turns of the nominal fish."""
 
     compensate_curvature: bool = True  # take gamma off; False is the paper's law
-    slip_arm: float = 0.073  # m, a: in a curve the mean heading leads the course by a kappa; nominal fish
-    drift_time: float = 1.0  # s, low-pass of the drift angle; 0 switches it off
-    drift_speed: float = 0.05  # m/s, below this speed the drift angle fades out
-    drift_limit: float = 0.5  # rad
+    slip_arm: float = 0.041  # m, a_0: in a curve the mean heading leads the course by a kappa
+    slip_time: float = 0.196  # s, a_1
+    current_time: float = 0.5  # s, how fast the current is learned; 0: still water is assumed
+    current_limit: float = 0.1  # m/s, of each component
 
     def __post_init__(self) -> None:
-        for name in ("slip_arm", "drift_time", "drift_speed", "drift_limit"):
+        for name in ("slip_arm", "slip_time", "current_time", "current_limit"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} is {value!r}, expected a finite number >= 0")
@@ -62,58 +70,96 @@ class PathAhead(NamedTuple):
 
 
 class GuidanceState(NamedTuple):
-    """Memory: the stroke's swing and the drift angle."""
+    """Memory: the stroke's swing and the current in the pool frame."""
 
     stroke: StrokeState = StrokeState()
-    drift: Any = 0.0  # rad
+    current_x: Any = 0.0  # m/s
+    current_y: Any = 0.0  # m/s
 
 
 class TrackingErrors(NamedTuple):
     """Wanted minus actual."""
 
     cross_track: Any  # m, positive: robot left of the path
-    heading: Any  # rad, of the mean heading, within +-pi
+    heading: Any  # rad, of the way over ground (course), mean over a stroke, within +-pi
     speed: Any  # m/s
     course: Any  # rad, wanted course chi_d
 
 
-def observe(state: GuidanceState, motion: Motion, dt: Any, config: GuidanceConfig, xp: Any) -> GuidanceState:
-    """Update swing and drift with a motion that lasted dt [s].
+class WaterTrack(NamedTuple):
+    """The wanted motion as seen from the water."""
 
-        beta' = (fade (atan2(v_mean, u) + a r_mean / u) - beta) / T,   fade = u^2 / (u^2 + u_0^2)
+    heading: Any  # rad, of the velocity through the water
+    curvature: Any  # 1/m
+    speed: Any  # m/s
 
-    In still water a steady turn slips by v / u = -a kappa, so beta stays near zero; a current across makes it
-    the crab angle.
+
+def observe(
+    state: GuidanceState, motion: Motion, turn: Any, dt: Any, config: GuidanceConfig, xp: Any
+) -> GuidanceState:
+    """Update swing and current with a motion that lasted dt [s], its rudder set for a curvature `turn` [1/m].
+
+        c' = n (v_mean + a(u) u turn - n . c) / T,   n = (-sin psi, cos psi)
+
+    Only the current across the heading shows in the sway velocity; a robot that turns learns both components.
+    Slip follows the rudder at once and the yaw rate late: on the letter R at 0.2 m/s what remains in still water is
+    6 mm/s rms with the rudder's curvature, 25 mm/s with yaw rate over speed.
     """
     stroke = stroke_step(state.stroke, motion.yaw_rate, motion.sway, dt)
-    if config.drift_time == 0.0:
-        return GuidanceState(stroke, state.drift)
-    u2 = motion.surge * motion.surge
-    v_mean, r_mean = motion.sway - stroke.sway, motion.yaw_rate - stroke.heading_rate
-    slip = motion.surge * (v_mean + config.slip_arm * r_mean) / (u2 + config.drift_speed**2)
-    drift = state.drift + dt / (config.drift_time + dt) * (slip - state.drift)
-    return GuidanceState(stroke, xp.fmin(xp.fmax(drift, -config.drift_limit), config.drift_limit))
+    if config.current_time == 0.0:
+        return state._replace(stroke=stroke)
+    heading = mean_heading(stroke, motion)
+    sin, cos = xp.sin(heading), xp.cos(heading)
+    slip = -slip_lever(motion.surge, config) * motion.surge * turn
+    across = motion.sway - stroke.sway - slip
+    missing = dt / (config.current_time + dt) * (across + sin * state.current_x - cos * state.current_y)
+    limit = config.current_limit
+    return GuidanceState(
+        stroke,
+        xp.fmin(xp.fmax(state.current_x - sin * missing, -limit), limit),
+        xp.fmin(xp.fmax(state.current_y + cos * missing, -limit), limit),
+    )
+
+
+def slip_lever(speed: Any, config: GuidanceConfig) -> Any:
+    """a(u) [m] at a speed through the water [m/s]."""
+    return config.slip_arm + config.slip_time * speed
 
 
 def tracking_errors(
-    state: GuidanceState, motion: Motion, path: PathAhead, speed: Any, config: GuidanceConfig, xp: Any
+    stroke: StrokeState, motion: Motion, path: PathAhead, speed: Any, config: GuidanceConfig, xp: Any
 ) -> TrackingErrors:
-    """Errors of a robot against the path and the wanted surge speed [m/s]."""
-    course = xp.arctan2(path.target_y - motion.y, path.target_x - motion.x)
+    """Errors of a robot against the path and the wanted surge speed [m/s]; what the water does is not asked."""
+    wanted = xp.arctan2(path.target_y - motion.y, path.target_x - motion.x)
     if config.compensate_curvature:
-        course = course - path.chord
-    e_psi = heading_error(state, motion, course, path.curvature, config, xp)
+        wanted = wanted - path.chord
+    heading = mean_heading(stroke, motion)
+    course = heading + xp.arctan2(motion.sway - stroke.sway, xp.fmax(motion.surge, SLOW))
     along_x, along_y = xp.cos(path.heading), xp.sin(path.heading)
     e_y = along_x * (motion.y - path.y) - along_y * (motion.x - path.x)
-    return TrackingErrors(e_y, e_psi, speed - motion.surge, wrap(course, xp))
+    return TrackingErrors(e_y, wrap(wanted - course, xp), speed - motion.surge, wrap(wanted, xp))
+
+
+def through_water(state: GuidanceState, course: Any, curvature: Any, speed: Any, xp: Any) -> WaterTrack:
+    """What a wanted course [rad], curvature [1/m] and speed [m/s] over ground are in the water that flows."""
+    cos, sin = xp.cos(course), xp.sin(course)
+    ahead = xp.fmax(speed - cos * state.current_x - sin * state.current_y, LEAST_HEADWAY * speed)
+    left = sin * state.current_x - cos * state.current_y
+    through = xp.sqrt(ahead**2 + left**2)
+    return WaterTrack(course + xp.arctan2(left, ahead), curvature * speed**2 * ahead / through**3, through)
 
 
 def heading_error(
-    state: GuidanceState, motion: Motion, course: Any, curvature: Any, config: GuidanceConfig, xp: Any
+    state: GuidanceState, motion: Motion, water: WaterTrack, config: GuidanceConfig, xp: Any
 ) -> Any:
-    """e_psi = wrap(chi_d + a kappa - beta - psi_mean) [rad] for a course [rad] and curvature [1/m]."""
-    heading = course + config.slip_arm * curvature - state.drift
-    return wrap(heading - (motion.heading - state.stroke.heading), xp)
+    """e_psi = wrap(psi_d - tau |w| kappa_w - psi_mean) [rad]."""
+    lever = slip_lever(water.speed, config) - TURN_LAG * water.speed
+    return wrap(water.heading + lever * water.curvature - mean_heading(state.stroke, motion), xp)
+
+
+def mean_heading(stroke: StrokeState, motion: Motion) -> Any:
+    """psi_mean [rad], without the swing of the stroke."""
+    return motion.heading - stroke.heading
 
 
 def wrap(angle: Any, xp: Any) -> Any:

@@ -1,27 +1,29 @@
-"""The guidance memory of one robot, kept up to date from odometry messages."""
+"""A filter's memory of one robot's motion, kept up to date from odometry messages."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
+from typing import Generic, TypeVar
 
-from fish_control.line_of_sight import GuidanceConfig, GuidanceState, Motion, observe
+from fish_control.line_of_sight import Motion
 
 LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
+State = TypeVar("State")
 
 
-class MotionObserver:
-    """Feeds `observe` with the time that has passed between stamps."""
+class MotionObserver(Generic[State]):
+    """Feeds `advance(state, motion, dt)` with the time dt [s] that has passed between stamps."""
 
-    def __init__(self, config: GuidanceConfig) -> None:
-        self._config = config
+    def __init__(self, start: State, advance: Callable[[State, Motion, float], State]) -> None:
+        self._start, self._advance = start, advance
         self._time: float | None = None
-        self.state = GuidanceState()
+        self.state = start
 
     def add(self, time: float, motion: Motion) -> None:
         """Take in odometry stamped `time` [s]."""
         dt = 0.0 if self._time is None else time - self._time
         self._time = time
         if 0.0 < dt <= LONGEST_STEP:
-            self.state = observe(self.state, motion, dt, self._config, np)
+            self.state = self._advance(self.state, motion, dt)
         else:
-            self.state = GuidanceState()
+            self.state = self._start

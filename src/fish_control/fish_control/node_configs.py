@@ -42,10 +42,6 @@ class PlannerConfig:
     search_window: float = TrackerConfig.search_window  # m
     capture_distance: float = TrackerConfig.capture_distance  # m
     compensate_curvature: bool = GuidanceConfig.compensate_curvature  # False: the paper's law
-    slip_arm: float = GuidanceConfig.slip_arm  # m
-    drift_time: float = GuidanceConfig.drift_time  # s
-    drift_speed: float = GuidanceConfig.drift_speed  # m/s
-    drift_limit: float = GuidanceConfig.drift_limit  # rad
     state_file: str = (
         ""  # progress for a restart after a crash; empty: in the system's folder for temporary files
     )
@@ -59,7 +55,6 @@ class PlannerConfig:
         require_range("rate_hz", self.rate_hz, 1.0, 100.0, "Hz")
         require_range("resume_timeout", self.resume_timeout, 0.0, 3600.0, "s")
         self.tracker()
-        self.guidance()
 
     def ending(self) -> End | None:
         """What `end` says; None where the path decides."""
@@ -71,9 +66,7 @@ class PlannerConfig:
 
     def guidance(self) -> GuidanceConfig:
         """The part for the line of sight."""
-        return GuidanceConfig(
-            self.compensate_curvature, self.slip_arm, self.drift_time, self.drift_speed, self.drift_limit
-        )
+        return GuidanceConfig(compensate_curvature=self.compensate_curvature)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from fish_control.path_batch import TrackerConfig
 from fish_control.path_tracker import PathPoint, PathTracker
 from fish_control.pool import stopping_side
 from fish_control.reference_path import ReferencePath
+from fish_control.stroke_mean import StrokeState, stroke_step
 
 SLOWEST, FASTEST = 0.05, 0.5  # m/s, the range of speeds of the robot
 GLIDING_YAW_RATE = 0.5  # rad/s, wanted after the end; the rudder is hard over, so only its sign counts
@@ -52,7 +53,9 @@ class Planner:
         self.tracker = PathTracker(path, tracker)
         self.finished = False
         self._guidance = guidance or GuidanceConfig()
-        self._observer = MotionObserver(self._guidance)
+        self._observer = MotionObserver(
+            StrokeState(), lambda stroke, motion, dt: stroke_step(stroke, motion.yaw_rate, motion.sway, dt)
+        )
         self._side = 0.0  # +1 left, -1 right, chosen when the end is passed
 
     def start_nearest(self, x: float, y: float) -> None:

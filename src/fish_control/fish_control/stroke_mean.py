@@ -6,7 +6,8 @@ swing z of the heading is what a band-pass lets through of the integrated yaw ra
     z'' + 2 zeta w z' + w^2 z = 2 zeta w r        psi_mean = psi - z,  r_mean = r - z'
 
 and the same for the sway velocity, whose swing is taken off in the same way. No angle is unwrapped, and a
-steady turn is delayed by 2 zeta / w only (0.05 s at 2 Hz; a mean over one stroke would delay it by 0.25 s).
+steady turn is delayed by TURN_LAG = 2 zeta / w only (0.05 s at 2 Hz; a mean over one stroke would delay it by
+0.25 s).
 
 Measured in the closed loop with simulated sensors (letters R, S, I at 0.15 and 0.2 m/s): speed error 9 to 17 mm/s
 and rudder motion 0.35 to 0.6 rad/s with the mean heading; 30 to 73 mm/s and 2.7 to 2.9 rad/s with the heading as
@@ -17,10 +18,12 @@ Written on generic scalars: numpy and CasADi run the same lines.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 STROKE_FREQUENCY = 2.0  # Hz, fixed by the throttle map of MODEL (A carries the throttle)
 DAMPING = 0.3  # zeta, half the notch's width: wider delays turns, narrower learns a new swing slowly
+TURN_LAG = 2.0 * DAMPING / (2.0 * math.pi * STROKE_FREQUENCY)  # s, by which psi_mean is late in a steady turn
 
 
 class StrokeState(NamedTuple):
@@ -39,7 +42,7 @@ def stroke_step(
 
     Semi-implicit in z (stable for w dt < 2 / (1 + 2 zeta)).
     """
-    w = 2.0 * 3.141592653589793 * frequency
+    w = 2.0 * math.pi * frequency
     band = 2.0 * DAMPING * w
 
     def advance(z: Any, z_rate: Any, drive: Any) -> tuple[Any, Any]:

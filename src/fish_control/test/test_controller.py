@@ -5,8 +5,9 @@ import pytest
 
 from fish_control.control_law import Gains
 from fish_control.controller import Controller, Wanted, continued
-from fish_control.line_of_sight import Motion
+from fish_control.line_of_sight import Motion, slip_lever
 from fish_control.policy import Policy
+from fish_control.stroke_mean import TURN_LAG
 
 POLICY = Policy.constant(Gains(0.3, 0.4, 0.03, 0.6, 0.07, 0.0))
 STRAIGHT = Wanted(0.0, 0.2, 0.0, 0.0)
@@ -75,7 +76,8 @@ def test_gliding_straight_on_when_no_turn_is_wanted():
 
 
 def test_curvature_is_fed_forward():
-    made = controller(heading=POLICY.contract.guidance.slip_arm * 2.0)
+    lever = slip_lever(0.2, POLICY.contract.guidance) - TURN_LAG * 0.2
+    made = controller(heading=lever * 2.0)
     for _ in range(100):
         made.decide(Wanted(0.0, 0.2, 0.4, 0.0))
         command = made.command(0.02)

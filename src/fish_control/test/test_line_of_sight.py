@@ -9,12 +9,15 @@ from fish_control.line_of_sight import (
     GuidanceState,
     Motion,
     PathAhead,
+    heading_error,
     observe,
+    slip_lever,
+    through_water,
     tracking_errors,
 )
 from fish_control.path_tracker import PathTracker
 from fish_control.paths import make_path
-from fish_control.stroke_mean import StrokeState
+from fish_control.stroke_mean import TURN_LAG, StrokeState
 
 CONFIG = GuidanceConfig()
 
@@ -30,33 +33,42 @@ def ahead(path, position, s=None):
 def test_robot_on_a_straight_path_has_no_errors():
     path = make_path("straight", length=2.0, course=0.7)
     motion = Motion(*path.point(0.5), 0.7, 0.2, 0.0, 0.0)
-    errors = tracking_errors(GuidanceState(), motion, ahead(path, path.point(0.5)), 0.2, CONFIG, np)
+    errors = tracking_errors(StrokeState(), motion, ahead(path, path.point(0.5)), 0.2, CONFIG, np)
     np.testing.assert_allclose(errors, [0.0, 0.0, 0.0, 0.7], atol=1e-9)
 
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_robot_that_turns_steadily_on_a_circle_has_no_errors(direction):
-    path = make_path("circle", radius=0.5, direction=direction)
-    s = 1.0
-    slip = CONFIG.slip_arm * direction / 0.5
-    motion = Motion(*path.point(s), float(path.heading_at(s)) + slip, 0.2, 0.0, 0.0)
-    errors = tracking_errors(GuidanceState(), motion, ahead(path, path.point(s), s), 0.2, CONFIG, np)
+    """Neither over ground nor in heading; the stroke's filter has forgotten the start of the turn."""
+    path, u = make_path("circle", radius=0.5, direction=direction), 0.2
+    s, kappa = 1.0, direction / 0.5
+    lever = slip_lever(u, CONFIG)
+    motion = Motion(
+        *path.point(s), float(path.heading_at(s)) + lever * kappa, u, -lever * kappa * u, kappa * u
+    )
+    state = GuidanceState()
+    for _ in range(1000):
+        state = observe(state, motion, kappa, 0.01, CONFIG, np)
+    assert np.hypot(state.current_x, state.current_y) < 1e-4  # m/s
+    errors = tracking_errors(state.stroke, motion, ahead(path, path.point(s), s), u, CONFIG, np)
     assert errors.cross_track == pytest.approx(0.0, abs=1e-5)
-    assert errors.heading == pytest.approx(0.0, abs=2e-3)
+    assert errors.heading == pytest.approx(0.0, abs=TURN_LAG * u * abs(kappa) + 2e-3)
+    water = through_water(state, errors.course, kappa, u, np)
+    assert heading_error(state, motion, water, CONFIG, np) == pytest.approx(0.0, abs=2e-3)
 
 
 def test_the_papers_law_points_inside_the_circle_by_the_chord():
     path = make_path("circle", radius=0.5)
     motion = Motion(*path.point(1.0), float(path.heading_at(1.0)), 0.2, 0.0, 0.0)
-    config = GuidanceConfig(compensate_curvature=False, slip_arm=0.0)
-    errors = tracking_errors(GuidanceState(), motion, ahead(path, path.point(1.0), 1.0), 0.2, config, np)
+    config = GuidanceConfig(compensate_curvature=False)
+    errors = tracking_errors(StrokeState(), motion, ahead(path, path.point(1.0), 1.0), 0.2, config, np)
     assert errors.heading == pytest.approx(np.arcsin(0.4 / (2 * 0.5)), abs=2e-3)
 
 
 def test_a_robot_left_of_the_path_should_turn_right():
     path = make_path("straight", length=3.0)
     motion = Motion(0.0, 0.1, 0.0, 0.15, 0.0, 0.0)
-    errors = tracking_errors(GuidanceState(), motion, ahead(path, [0.0, 0.1], 1.5), 0.2, CONFIG, np)
+    errors = tracking_errors(StrokeState(), motion, ahead(path, [0.0, 0.1], 1.5), 0.2, CONFIG, np)
     assert errors.cross_track == pytest.approx(0.1)
     assert errors.heading == pytest.approx(-np.arcsin(0.1 / 0.4), abs=2e-3)
     assert errors.speed == pytest.approx(0.05)
@@ -65,40 +77,69 @@ def test_a_robot_left_of_the_path_should_turn_right():
 def test_heading_error_is_the_short_way_round():
     path = make_path("straight", length=3.0)
     motion = Motion(0.0, 0.0, 2.0 * np.pi + 0.1, 0.2, 0.0, 0.0)
-    errors = tracking_errors(GuidanceState(), motion, ahead(path, [0.0, 0.0], 1.5), 0.2, CONFIG, np)
+    errors = tracking_errors(StrokeState(), motion, ahead(path, [0.0, 0.0], 1.5), 0.2, CONFIG, np)
     assert errors.heading == pytest.approx(-0.1, abs=1e-9)
 
 
-def test_drift_of_a_cross_current_becomes_the_crab_angle():
-    state = GuidanceState()
-    for _ in range(1000):  # heading 0, the current carries the fish to its left with 0.03 m/s
-        state = observe(state, Motion(0.0, 0.0, 0.0, 0.2, 0.03, 0.0), 0.01, CONFIG, np)
-    assert state.drift == pytest.approx(0.03 * 0.2 / (0.2**2 + 0.05**2), rel=1e-3)
+def learned(current, heading, seconds=5.0, state=None, u=0.2):
+    """Memory after swimming straight ahead in a current (2,) [m/s]."""
+    state = state or GuidanceState()
+    n, t = np.array([-np.sin(heading), np.cos(heading)]), np.array([np.cos(heading), np.sin(heading)])
+    motion = Motion(0.0, 0.0, heading, u + t @ current, n @ current, 0.0)
+    for _ in range(int(100 * seconds)):
+        state = observe(state, motion, 0.0, 0.01, CONFIG, np)
+    return state
 
 
-def test_a_steady_turn_in_still_water_is_no_drift():
-    state, kappa, u = GuidanceState(), 2.0, 0.2
-    turn = Motion(0.0, 0.0, 0.0, u, -CONFIG.slip_arm * kappa * u, kappa * u)
-    for _ in range(1000):
-        state = observe(state, turn, 0.01, CONFIG, np)
-    assert state.drift == pytest.approx(0.0, abs=1e-9)
+def test_a_current_is_learned_across_the_heading_and_kept_through_a_turn():
+    current = np.array([-0.02, 0.03])
+    state = learned(current, 0.0)
+    assert (state.current_x, state.current_y) == pytest.approx((0.0, 0.03), abs=1e-3)
+    state = learned(current, np.pi / 2, state=state)
+    assert (state.current_x, state.current_y) == pytest.approx(tuple(current), abs=1e-3)
 
 
-def test_drift_is_switched_off_by_its_time():
-    state = observe(GuidanceState(), Motion(0, 0, 0, 0.2, 0.03, 0), 0.01, GuidanceConfig(drift_time=0.0), np)
-    assert state.drift == 0.0
+def test_a_current_is_believed_up_to_its_limit_and_not_at_all_when_switched_off():
+    assert learned(np.array([0.0, 0.5]), 0.0).current_y == CONFIG.current_limit
+    off = GuidanceConfig(current_time=0.0)
+    state = observe(GuidanceState(), Motion(0, 0, 0, 0.2, 0.03, 0), 0.0, 0.01, off, np)
+    assert (state.current_x, state.current_y) == (0.0, 0.0) and state.stroke.sway > 0.0
+
+
+def test_through_the_water_a_robot_keeps_its_course_and_curvature_over_ground():
+    """The velocity through the water plus the current is the wanted one, and so is its rate of turn."""
+    state, u, kappa = GuidanceState(current_x=-0.02, current_y=0.03), 0.15, 1.7
+    current = np.array([state.current_x, state.current_y])
+
+    def over_water(course):
+        return through_water(state, course, kappa, u, np)
+
+    course, step = 0.8, 1e-5
+    w = over_water(course)
+    ground = w.speed * np.array([np.cos(w.heading), np.sin(w.heading)]) + current
+    np.testing.assert_allclose(ground, u * np.array([np.cos(course), np.sin(course)]), atol=1e-12)
+    turning = (over_water(course + step).heading - over_water(course - step).heading) / (2 * step)
+    assert w.curvature * w.speed == pytest.approx(turning * kappa * u, rel=1e-6)
+
+
+def test_a_current_that_outruns_the_robot_is_not_believed_ahead():
+    w = through_water(GuidanceState(current_x=0.1), 0.0, 0.0, 0.1, np)
+    assert (w.heading, w.speed) == pytest.approx((0.0, 0.03))
 
 
 def test_casadi_and_numpy_give_the_same():
-    names = [*StrokeState._fields, "drift", *Motion._fields, *PathAhead._fields]
+    names = [*StrokeState._fields, "current_x", "current_y", *Motion._fields, *PathAhead._fields]
     symbols = casadi.SX.sym("s", len(names))
 
     def evaluate(v, xp):
-        state = GuidanceState(StrokeState(*(v[i] for i in range(4))), v[4])
-        motion = Motion(*(v[i] for i in range(5, 11)))
-        path = PathAhead(*(v[i] for i in range(11, 18)))
-        state = observe(state, motion, 0.02, CONFIG, xp)
-        return [*tracking_errors(state, motion, path, 0.2, CONFIG, xp), *state.stroke, state.drift]
+        state = GuidanceState(StrokeState(*(v[i] for i in range(4))), 0.01 * v[4], 0.01 * v[5])
+        motion = Motion(*(v[i] for i in range(6, 12)))
+        path = PathAhead(*(v[i] for i in range(12, 19)))
+        state = observe(state, motion, 1.5, 0.02, CONFIG, xp)
+        errors = tracking_errors(state.stroke, motion, path, 0.2, CONFIG, xp)
+        water = through_water(state, errors.course, path.curvature, 0.2, xp)
+        e_psi = heading_error(state, motion, water, CONFIG, xp)
+        return [*errors, *water, e_psi, *state.stroke, state.current_x, state.current_y]
 
     function = casadi.Function("errors", [symbols], [casadi.vertcat(*evaluate(symbols, casadi))])
     for seed in range(5):

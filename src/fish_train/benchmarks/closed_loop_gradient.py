@@ -197,7 +197,16 @@ class JaxLoop:
         x, y = (jax.lax.stop_gradient(v) for v in now[:2])
         place, near = self._locate(path, (carry["progress"], carry["captured"]), x, y)
         return place, sense(
-            [*carry["before"], *now], now, list(carry["guidance"]), near, near, speed, COST, self._law, XP
+            [*carry["before"], *now],
+            now,
+            list(carry["guidance"]),
+            carry["last"][SIZES["gains"]],
+            near,
+            near,
+            speed,
+            COST,
+            self._law,
+            XP,
         )
 
     def _motion(self, plant: jax.Array) -> list[jax.Array]:
@@ -217,7 +226,7 @@ class JaxLoop:
                 h = jax.nn.relu(W @ h + b[:, None])
             raw = weights[-1][0] @ h + weights[-1][1][:, None]
             rows = (list(carry["control"]), list(carry["last"]), list(raw))
-            acted = act(sensed["errors"], speed, *rows, COST, self._law, XP)
+            acted = act(sensed["errors"], *rows, COST, self._law, XP)
 
             def physics(moving: tuple, _: None) -> tuple[tuple, jax.Array]:
                 actuator, command = drive(list(moving[1]), acted["last"][SIZES["gains"] :], self._law, XP)

@@ -3,7 +3,7 @@
 control/target (50 Hz, frame pool): position of the lookahead point, orientation of the wanted course.
 control/twist (50 Hz, base_link): wanted surge speed (m/s; 0 after the end of the path) and yaw rate (rad/s,
 speed times the curvature of the path). tracking/error: x cross-track (m, positive: robot left of the path), y
-heading (rad, of the mean over the stroke), z speed (m/s); wanted minus actual. reference/path and
+heading (rad, of the way over ground, mean over the stroke), z speed (m/s); wanted minus actual. reference/path and
 reference/speed (transient local) on change; with path:=topic the path is taken from reference/path instead.
 Decisions are in Planner.
 """

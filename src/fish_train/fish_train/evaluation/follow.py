@@ -21,7 +21,16 @@ from fish_control.control_law import (
     actuator_step,
     control_step,
 )
-from fish_control.line_of_sight import GuidanceState, Motion, PathAhead, observe, tracking_errors
+from fish_control.line_of_sight import (
+    GuidanceState,
+    Motion,
+    PathAhead,
+    heading_error,
+    mean_heading,
+    observe,
+    through_water,
+    tracking_errors,
+)
 from fish_control.path_batch import PathBatch
 from fish_control.policy import policy_inputs
 from fish_control.reference_path import ReferencePath
@@ -64,7 +73,7 @@ class Follower:
         self._law, self._gains, self._speed = law, gains, np.asarray(speed, dtype=float)
         self._paths = PathBatch(paths, law.tracker)
         zeros = np.zeros(len(paths))
-        self._guidance = GuidanceState(StrokeState(*(zeros for _ in StrokeState._fields)), zeros)
+        self._guidance = GuidanceState(StrokeState(*(zeros for _ in StrokeState._fields)), zeros, zeros)
         self._control = ControlState(*(zeros for _ in ControlState._fields))
         self._actuator = ActuatorState(*(zeros for _ in ActuatorState._fields))
         self.setpoint = Setpoint(zeros, zeros)
@@ -73,27 +82,27 @@ class Follower:
     def observe(self, seen: Array, known: NDArray[np.bool_]) -> None:
         """Take in what is seen (B, 6); robots without an estimate yet keep their memory."""
         motion = Motion(*seen.T)
-        after = observe(self._guidance, motion, DT, self._law.guidance, np)
-        stroke = StrokeState(
-            *(np.where(known, a, b) for a, b in zip(after.stroke, self._guidance.stroke, strict=True))
-        )
-        self._guidance = GuidanceState(stroke, np.where(known, after.drift, self._guidance.drift))
+        turn = self.setpoint.alpha / self._law.limits.curvature_gain
+        before, after = self._guidance, observe(self._guidance, motion, turn, DT, self._law.guidance, np)
+        stroke = StrokeState(*_updated(known, after.stroke, before.stroke))
+        self._guidance = GuidanceState(stroke, *_updated(known, after[1:], before[1:]))
 
     def decide(self, seen: Array, known: NDArray[np.bool_]) -> None:
         """One control period of planner, policy and control law."""
         motion, at = Motion(*seen.T), self._paths.update(seen[:, :2])
         ahead = PathAhead(*at.point.T, at.heading, at.curvature, *at.target.T, at.chord)
-        errors = tracking_errors(self._guidance, motion, ahead, self._speed, self._law.guidance, np)
-        mean_heading = motion.heading - self._guidance.stroke.heading
+        state, guidance = self._guidance, self._law.guidance
+        errors = tracking_errors(state.stroke, motion, ahead, self._speed, guidance, np)
+        water = through_water(state, errors.course, at.curvature, self._speed, np)
+        e_psi = heading_error(state, motion, water, guidance, np)
+        heading = mean_heading(state.stroke, motion)
         inputs = policy_inputs(
-            mean_heading, motion.surge, self._speed, errors.heading, errors.speed, errors.cross_track, np
+            heading, motion.surge, self._speed, e_psi, errors.speed, errors.cross_track, np
         )
         gains = self._gains.gains(np.stack(inputs, axis=-1), self._speed, at.curvature)
-        wanted = Errors(errors.heading, errors.speed, at.curvature, self._speed)
+        wanted = Errors(e_psi, errors.speed, water.curvature, water.speed)
         control, setpoint = control_step(self._control, wanted, gains, CONTROL_PERIOD, self._law.limits, np)
-        self._control = ControlState(
-            *(np.where(known, a, b) for a, b in zip(control, self._control, strict=True))
-        )
+        self._control = ControlState(*_updated(known, control, self._control))
         self.setpoint = Setpoint(*(np.where(known, a, 0.0) for a in setpoint))
         self.gains = np.stack(gains, axis=-1)
 
@@ -101,6 +110,11 @@ class Follower:
         """Commands (B, 2) for the next 10 ms."""
         self._actuator, rotor_speed = actuator_step(self._actuator, self.setpoint, DT, self._law.limits, np)
         return np.column_stack([rotor_speed, self._actuator.alpha])
+
+
+def _updated(known: NDArray[np.bool_], new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
+    """New values (B,) of the robots that are known, old ones of the others."""
+    return [np.where(known, a, b) for a, b in zip(new, old, strict=True)]
 
 
 def follow(

@@ -18,27 +18,27 @@ ACT_OUTPUTS = ("control", "last", "cost")
 def expressions(law: Law) -> tuple[casadi.Function, ...]:
     """sense, act, drive and motion, each followed by its adjoint `NAME_vjp(inputs.., g) -> adjoints`.
 
-    sense(seen, true, guidance, geometry_seen, geometry_true, speed, weights): adjoints of the first three;
-    act(errors, speed, control, last, raw, weights): of errors, control, last, raw; drive(actuator, setpoint): of both;
+    sense(seen, true, guidance, rudder, geometry_seen, geometry_true, speed, weights): adjoints of the first four;
+    act(errors, control, last, raw, weights): of the first four; drive(actuator, setpoint): of both;
     motion(q3, qd3): of both. Outputs are stacked in the order of SENSE_OUTPUTS, ACT_OUTPUTS, (actuator, command).
     """
     return (*_sense(law), *_act(law), *_drive(law), *_motion())
 
 
 def _sense(law: Law) -> tuple[casadi.Function, casadi.Function]:
-    sizes = [SIZES[k] for k in ("motion", "guidance", "geometry", "geometry")]
-    arguments = _symbols([PHYSICS_STEPS * SIZES["motion"], *sizes, 1, len(COST_NAMES)])
-    seen, true, guidance, near, real, speed, weights = map(casadi.vertsplit, arguments)
-    values = sense(seen, true, guidance, near, real, speed[0], weights, law, CASADI)
-    return _with_adjoint("sense", arguments, [v for k in SENSE_OUTPUTS for v in values[k]], (0, 1, 2))
+    motions, geometry = SIZES["motion"], SIZES["geometry"]
+    sizes = [PHYSICS_STEPS * motions, motions, SIZES["guidance"], 1, geometry, geometry, 1, len(COST_NAMES)]
+    arguments = _symbols(sizes)
+    seen, true, guidance, rudder, near, real, speed, weights = map(casadi.vertsplit, arguments)
+    values = sense(seen, true, guidance, rudder[0], near, real, speed[0], weights, law, CASADI)
+    return _with_adjoint("sense", arguments, [v for k in SENSE_OUTPUTS for v in values[k]], (0, 1, 2, 3))
 
 
 def _act(law: Law) -> tuple[casadi.Function, casadi.Function]:
-    sizes = [SIZES["errors"], 1, *(SIZES[k] for k in ("control", "last", "gains")), len(COST_NAMES)]
-    arguments = _symbols(sizes)
-    errors, speed, control, last, raw, weights = map(casadi.vertsplit, arguments)
-    values = act(errors, speed[0], control, last, raw, weights, law, CASADI)
-    return _with_adjoint("act", arguments, [v for k in ACT_OUTPUTS for v in values[k]], (0, 2, 3, 4))
+    arguments = _symbols([*(SIZES[k] for k in ("errors", "control", "last", "gains")), len(COST_NAMES)])
+    errors, control, last, raw, weights = map(casadi.vertsplit, arguments)
+    values = act(errors, control, last, raw, weights, law, CASADI)
+    return _with_adjoint("act", arguments, [v for k in ACT_OUTPUTS for v in values[k]], (0, 1, 2, 3))
 
 
 def _drive(law: Law) -> tuple[casadi.Function, casadi.Function]:

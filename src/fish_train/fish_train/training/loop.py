@@ -32,7 +32,10 @@ from fish_control.line_of_sight import (
     Motion,
     PathAhead,
     TrackingErrors,
+    heading_error,
+    mean_heading,
     observe,
+    through_water,
     tracking_errors,
 )
 from fish_control.path_batch import TrackerConfig
@@ -44,7 +47,7 @@ from fish_sim.ops import Scalar
 CONTROL_PERIOD = 0.02  # s, the controller node's
 PHYSICS_STEPS = round(CONTROL_PERIOD / DT)
 
-GUIDANCE_NAMES = (*(f"stroke.{name}" for name in StrokeState._fields), "drift")
+GUIDANCE_NAMES = (*(f"stroke.{name}" for name in StrokeState._fields), "current_x", "current_y")
 SETPOINT_NAMES = Setpoint._fields
 LAST_NAMES = (*Gains._fields, *SETPOINT_NAMES)  # of the period before
 GEOMETRY_NAMES = (
@@ -55,7 +58,7 @@ GEOMETRY_NAMES = (
     # path segment on which the lookahead point lies
     "from_x", "from_y", "to_x", "to_y",
 )  # fmt: skip
-ERROR_NAMES = ("heading", "speed", "curvature")
+ERROR_NAMES = Errors._fields  # what the control law is told
 INPUT_COUNTS = {"policy": len(INPUTS), "schedule": 2, "none": 0}
 SPEED_MIDDLE, SPEED_SPAN = 0.2, 0.1  # m/s, of a schedule's first input
 CURVATURE_SPAN = 3.0  # 1/m, of its second
@@ -110,46 +113,59 @@ def path_ahead(x: Scalar, y: Scalar, geometry: Sequence[Scalar], lookahead: floa
 
 
 def sense(
-    seen: Sequence[Scalar], true: Sequence[Scalar], guidance: Sequence[Scalar], geometry_seen: Sequence[Scalar],
-    geometry_true: Sequence[Scalar], speed: Scalar, weights: Sequence[Scalar], law: Law, xp: Any,
+    seen: Sequence[Scalar], true: Sequence[Scalar], guidance: Sequence[Scalar], rudder: Scalar,
+    geometry_seen: Sequence[Scalar], geometry_true: Sequence[Scalar], speed: Scalar, weights: Sequence[Scalar],
+    law: Law, xp: Any,
 ) -> dict[str, list[Scalar]]:  # fmt: skip
     """Policy inputs, errors and guidance memory from the motion that is seen; cost and report from the true one.
 
     seen: the motions of the last PHYSICS_STEPS, oldest first, one after the other; the nodes observe at that rate, too.
+    rudder: set-point meanwhile [rad].
     """
     width, lookahead = len(Motion._fields), law.tracker.lookahead
-    state = GuidanceState(StrokeState(*guidance[:4]), guidance[4])
+    state = GuidanceState(StrokeState(*guidance[:4]), *guidance[4:])
     for k in range(PHYSICS_STEPS):
         moved = Motion(*seen[k * width : (k + 1) * width])
-        state = observe(state, moved, DT, law.guidance, xp)
+        state = observe(state, moved, rudder / law.limits.curvature_gain, DT, law.guidance, xp)
     path = path_ahead(moved.x, moved.y, geometry_seen, lookahead, xp)
-    errors = tracking_errors(state, moved, path, speed, law.guidance, xp)
+    told, errors = _wanted(state, moved, path, speed, law, xp)
     actual = Motion(*true)
     truth = path_ahead(actual.x, actual.y, geometry_true, lookahead, xp)
-    real = tracking_errors(state, actual, truth, speed, law.guidance, xp)
-    cost = weights[0] * real.heading**2 + weights[1] * real.speed**2 + weights[2] * real.cross_track**2
+    real, missed = _wanted(state, actual, truth, speed, law, xp)
+    cost = weights[0] * real.heading**2 + weights[1] * real.speed**2 + weights[2] * missed.cross_track**2
     return {
-        "inputs": _inputs(moved, state, errors, path.curvature, speed, law, xp),
-        "errors": [errors.heading, errors.speed, path.curvature],
-        "guidance": [*state.stroke, state.drift],
-        "report": [real.cross_track, real.heading, real.speed],
+        "inputs": _inputs(moved, state, told, errors.cross_track, path.curvature, speed, law, xp),
+        "errors": list(told),
+        "guidance": [*state.stroke, state.current_x, state.current_y],
+        "report": [missed.cross_track, real.heading, real.speed],
         "cost": [cost],
     }
+
+
+def _wanted(
+    state: GuidanceState, moved: Motion, path: PathAhead, speed: Scalar, law: Law, xp: Any
+) -> tuple[Errors, TrackingErrors]:
+    """What the control law is told, and what the planner says."""
+    errors = tracking_errors(state.stroke, moved, path, speed, law.guidance, xp)
+    water = through_water(state, errors.course, path.curvature, speed, xp)
+    e_psi = heading_error(state, moved, water, law.guidance, xp)
+    return Errors(e_psi, errors.speed, water.curvature, water.speed), errors
 
 
 def _inputs(
     moved: Motion,
     state: GuidanceState,
-    errors: TrackingErrors,
+    errors: Errors,
+    cross_track: Scalar,
     curvature: Scalar,
     speed: Scalar,
     law: Law,
     xp: Any,
 ) -> list[Scalar]:
     if law.inputs == "policy":
-        mean_heading = moved.heading - state.stroke.heading
-        values = moved.surge, speed, errors.heading, errors.speed, errors.cross_track
-        return list(policy_inputs(mean_heading, *values, xp))
+        heading = mean_heading(state.stroke, moved)
+        values = moved.surge, speed, errors.heading, errors.speed, cross_track
+        return list(policy_inputs(heading, *values, xp))
     if law.inputs == "schedule":
         return schedule_inputs(speed, curvature, xp)
     return []
@@ -168,15 +184,12 @@ def gains_of(raw: Sequence[Scalar], xp: Any) -> Gains:
 
 
 def act(
-    errors: Sequence[Scalar], speed: Scalar, control: Sequence[Scalar], last: Sequence[Scalar], raw: Sequence[Scalar],
+    errors: Sequence[Scalar], control: Sequence[Scalar], last: Sequence[Scalar], raw: Sequence[Scalar],
     weights: Sequence[Scalar], law: Law, xp: Any,
 ) -> dict[str, list[Scalar]]:  # fmt: skip
     """Gains, set-point and their cost; the changes of an episode's first period are free."""
     gains, before = gains_of(raw, xp), ControlState(*control)
-    heading, speed_error, curvature = errors
-    after, setpoint = control_step(
-        before, Errors(heading, speed_error, curvature, speed), gains, CONTROL_PERIOD, law.limits, xp
-    )
+    after, setpoint = control_step(before, Errors(*errors), gains, CONTROL_PERIOD, law.limits, xp)
     spans = [o.high - o.low for o in OUTPUTS]
     size = sum(((g - o.low) / s) ** 2 for g, o, s in zip(gains, OUTPUTS, spans, strict=True))
     change = sum(((g - old) / s) ** 2 for g, old, s in zip(gains, last[:6], spans, strict=True))

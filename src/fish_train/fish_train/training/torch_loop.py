@@ -115,7 +115,8 @@ class _Window:
             for back in reversed(range(PHYSICS_STEPS))
         ]
         near, real = (self._loop.find(fleet, k, o[:, :2]) for k, o in enumerate((seen[-1], true)))
-        rows = (torch.cat(seen, dim=-1).unbind(-1), true.unbind(-1), self._guidance, near, real)
+        rudder = self.last[SIZES["gains"]]
+        rows = (torch.cat(seen, dim=-1).unbind(-1), true.unbind(-1), self._guidance, rudder, near, real)
         return sense(*rows, self._speed, self._cost, self._loop.law, XP)
 
     def decide(self, sensed: dict[str, list[Tensor]]) -> None:
@@ -126,7 +127,7 @@ class _Window:
     def advance(self, sensed: dict[str, list[Tensor]]) -> Tensor:
         """Control law and physics of one period; the summed cost of gains and set-points."""
         law = self._loop.law
-        acted = act(sensed["errors"], self._speed, self._control, self.last, self._raw, self._cost, law, XP)
+        acted = act(sensed["errors"], self._control, self.last, self._raw, self._cost, law, XP)
         self._guidance, self._control, self.last = sensed["guidance"], acted["control"], acted["last"]
         for _ in range(PHYSICS_STEPS):
             self._actuator, command = drive(self._actuator, self.last[SIZES["gains"] :], law, XP)

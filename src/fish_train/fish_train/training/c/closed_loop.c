@@ -139,16 +139,16 @@ static void sense_period(const Window *w, const Path *paths, const Search *searc
     if (t == w->steps) /* the next window looks again at its first period */
       for (int k = 0; k < 4; ++k) place[k] = kept[4 * l + k];
   }
-  sense(now->seen, true_motion, now->guidance, now->near, now->real, speed, cost, now->sensed);
+  sense(now->seen, true_motion, now->guidance, now->last + NGAIN, now->near, now->real, speed, cost, now->sensed);
   scatter(now->sensed + NI + NE + NU, NR, first, w->batch, w->report + t * w->batch * NR);
 }
 
-static void advance_period(const Window *w, const Network *net, long first, long t, const V *speed, const V *cost,
-                           const V *p, V *work, Period *now, Period *next, V *motions_next)
+static void advance_period(const Window *w, const Network *net, long first, long t, const V *cost, const V *p, V *work,
+                           Period *now, Period *next, V *motions_next)
 {
   V driven[NA + NC];
   if (t % w->hold == 0) policy_forward(net, now->sensed, t / w->hold * LANES, work, now->raw);
-  act(now->sensed + NI, speed, now->control, now->last, now->raw, cost, now->acted);
+  act(now->sensed + NI, now->control, now->last, now->raw, cost, now->acted);
   copy(now->sensed + NI + NE, NU, next->guidance);
   copy(now->acted, NK, next->control);
   copy(now->acted + NK, NL, next->last);
@@ -180,17 +180,18 @@ static void motion_reverse(const V *plant, const V *g_motion, V *g_plant)
 static void sense_reverse(const Window *w, long first, long t, const V *motions, const V *speed, const V *cost,
                           const Period *now, const V *gs, V *g_motion, Adjoint *g)
 {
-  V g_seen[NSEEN], g_true[NO];
-  sense_vjp(now->seen, motions + (HISTORY + PHYSICS * t) * NO, now->guidance, now->near, now->real, speed, cost, gs, g_seen,
-            g_true, g->guidance);
+  V g_seen[NSEEN], g_true[NO], g_rudder[1];
+  sense_vjp(now->seen, motions + (HISTORY + PHYSICS * t) * NO, now->guidance, now->last + NGAIN, now->near, now->real, speed,
+            cost, gs, g_seen, g_true, g->guidance, g_rudder);
+  add(g_rudder, 1, g->last + NGAIN);
   add(g_true, NO, g_motion + PHYSICS * t * NO);
   look_adjoint(w, g_seen, t, first, g_motion);
 }
 
 /* reverse of advance_period: g of the period after becomes g of this period, before its sensing; gs receives the
    adjoint of what was sensed */
-static void advance_reverse(const Window *w, const Network *net, long first, long t, const V *speed, const V *cost,
-                            const V *p, const V *seed, const V *g_motion, V *work, const Period *now, Adjoint *g,
+static void advance_reverse(const Window *w, const Network *net, long first, long t, const V *cost, const V *p,
+                            const V *seed, const V *g_motion, V *work, const Period *now, Adjoint *g,
                             V *gs)
 {
   V g_command[NC], g_driven[NA + NC], g_actuator[NA], g_setpoint[NC], g_acted[ACT_OUT], g_raw[NGAIN], g_errors[NE],
@@ -209,7 +210,7 @@ static void advance_reverse(const Window *w, const Network *net, long first, lon
     copy(g_actuator, NA, g->actuator);
     add(g_setpoint, NC, g_acted + NK + NGAIN);
   }
-  act_vjp(now->sensed + NI, speed, now->control, now->last, now->raw, cost, g_acted, g_errors, g->control, g->last, g_raw);
+  act_vjp(now->sensed + NI, now->control, now->last, now->raw, cost, g_acted, g_errors, g->control, g->last, g_raw);
   add(g_raw, NGAIN, g->raw);
   zero(gs, NI);
   if (t % w->hold == 0) {
@@ -234,7 +235,7 @@ static void backward(const Window *w, const Network *net, long first, const V *m
   sense_reverse(w, first, w->steps, motions, speed, cost, periods + w->steps, gs, g_motion, &g);
   motion_reverse(periods[w->steps].plant[0], g_motion + PHYSICS * w->steps * NO, g.plant);
   for (long t = w->steps - 1; t >= 0; --t) {
-    advance_reverse(w, net, first, t, speed, cost, p, &seed, g_motion, work, periods + t, &g, gs);
+    advance_reverse(w, net, first, t, cost, p, &seed, g_motion, work, periods + t, &g, gs);
     if (t == 0) return; /* the window's start is given */
     gs[SENSE_OUT - 1] = seed;
     sense_reverse(w, first, t, motions, speed, cost, periods + t, gs, g_motion, &g);
@@ -300,7 +301,7 @@ void run_block(const Window *w, const Network *net, const Path *paths, const Sea
   for (long t = 0; t < w->steps; ++t) {
     V *motions_next = motions + (HISTORY + PHYSICS * t + 1) * NO;
     sense_period(w, paths, search, first, t, perfect, motions, speed, cost, periods + t);
-    advance_period(w, net, first, t, speed, cost, p, work, periods + t, periods + t + 1, motions_next);
+    advance_period(w, net, first, t, cost, p, work, periods + t, periods + t + 1, motions_next);
     if (t > 0) value += periods[t].sensed[SENSE_OUT - 1];
     value += periods[t].acted[ACT_OUT - 1];
   }
