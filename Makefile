@@ -21,13 +21,14 @@ SOURCES := $(shell find src -not -path '*/test*' -not -path '*/__pycache__*' -no
 PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help setup build demo test lint identify diagnose predict train evaluate paper clean distclean
+.PHONY: help setup build demo test lint identify diagnose prove predict train evaluate paper clean distclean
 
 help:
 	@echo "make demo       the whole robot swims the letter R, is recorded, scored and shown; options:"
 	@echo "                LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder"
 	@echo "make test       build, the tests of every package, the tests across packages"
 	@echo "make identify, diagnose, predict, train, evaluate ARGS='...'   the offline tools; ARGS=--help says more"
+	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--worlds 300' for the long one"
 	@echo "make paper      the figures and the table of the paper"
 	@echo "make setup, build, lint, clean, distclean   the single steps"
 
@@ -68,6 +69,10 @@ build: install/.built
 demo: build
 	@$(FISH_TRAIN) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
 		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
+
+# A few worlds in a few minutes; ARGS='--worlds 300 --oracle' is the study. The same OUT goes on where it was stopped.
+prove: build $(VENV)/.train
+	@$(FISH_TRAIN) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--worlds 4 --groups single sensor outside null --trials 6 --duration 8)
 
 identify diagnose predict train evaluate paper: build $(VENV)/.train
 	@$(FISH_TRAIN) $@ $(DATASET) $(if $(DATASET),--out out/$@) $(ARGS)

@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 
 from fish_sim.effects import EFFECTS
+from fish_sim.scheme import default_scheme
 from fish_train.diagnose.vocabulary import candidates
+from fish_train.evaluation.cells import Cell
+from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
+from fish_train.evaluation.study import Row
 from fish_train.identify.experiment import build_experiment
 from fish_train.prove import groups
 from fish_train.prove.build import make_readings, make_world
+from fish_train.prove.close_loop import loop_table
+from fish_train.prove.mujoco_plant import MujocoPlant, model_text
 from fish_train.prove.oracle import as_experiment
 from fish_train.prove.outside import OUTSIDE, known_to_the_plant
 from fish_train.prove.runner import run_study
@@ -29,6 +35,8 @@ TOOL = (sys.executable, str(Path(__file__).with_name("fake_tool.py")))
 
 def small(group: str, number: int = 0, **changes) -> World:
     world = groups.GROUPS[group](np.random.default_rng(5), number)
+    scheme = default_scheme(3)  # the kernel of other tests
+    changes = {"method": scheme.method, "substeps": scheme.substeps, **changes}
     return replace(world, count=3, duration=4.0, **changes)
 
 
@@ -192,3 +200,50 @@ def test_overlap_and_regime() -> None:
     assert regime_f1(whole, truth, strength) > 0.99
     assert regime_f1([{"name": "wall_distance", "range": [1.0, 1.05]}], truth, strength) == 0.0
     assert activity(World("single", 1, {"current": {"x": 1.0}}), truth) is None
+
+
+def test_the_gap_is_shared_out_by_hand() -> None:
+    def row(name: str, cross_track: float, speed: float) -> Row:
+        sizes = ErrorSizes(cross_track, *(0.0,) * 4, speed, *(0.0,) * 4)
+        return Row(name, "second plant", Cell("S", 0.1, 1), RunMetrics(sizes, sizes, 1.0, ""))
+
+    errors = {"nominal": (0.03, 0.02), "corrected": (0.014, 0.02), "true": (0.01, 0.02)}
+    table = loop_table([row(name, *sizes) for name, sizes in errors.items()])
+    assert [r[2] for r in table.rows] == ["0%", "80%", "100%"]
+    assert table.rows[1][4] == "no gap"
+
+
+@pytest.fixture(scope="module")
+def basin():
+    """The second plant, nothing concealed, still water."""
+    pytest.importorskip("mujoco")
+    return lambda count, **effects: MujocoPlant(
+        model_text(5, {}, effects), count, 0.0, np.random.default_rng(0)
+    )
+
+
+def drive(plant, rudder: np.ndarray, seconds: float) -> np.ndarray:
+    """(T, M, 6) motion at 10 to 15 % throttle."""
+    plant.reset(np.zeros((len(rudder), 3)))
+    rows = []
+    for k in range(round(100 * seconds)):
+        rotor = min(1.0, 0.01 * k) * 50.0 * np.sin(2.0 * np.pi * 2.0 * 0.01 * k)
+        plant.step(np.column_stack([np.full(len(rudder), rotor), rudder]))
+        rows.append(plant.motion)
+    return np.array(rows)
+
+
+@pytest.mark.slow
+def test_the_second_plant_swims_and_turns_as_the_rudder_says(basin) -> None:
+    motion = drive(basin(3), np.array([0.0, 0.5, -0.5]), 6.0)[-200:].mean(axis=0)
+    assert 0.05 < motion[0, 3] < 0.3 and abs(motion[0, 5]) < 0.02
+    assert motion[1, 5] > 0.05 and motion[2, 5] < -0.05  # a positive rudder steers left
+
+
+def test_the_second_plants_wind_carries_the_fish(basin) -> None:
+    plant = basin(1, wind={"x": 0.05, "y": 0.0})
+    plant.reset(np.zeros((1, 3)))
+    for _ in range(300):
+        felt = plant.step(np.zeros((1, 2)))
+    assert 1e-4 < plant.pose[0, 0] < 0.15 and abs(plant.pose[0, 1]) < 1e-6
+    assert abs(felt.left[0]) < 1e-6

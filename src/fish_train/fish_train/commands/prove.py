@@ -11,6 +11,8 @@ import os
 import secrets
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +31,7 @@ from fish_train.errors import UserError
 
 if TYPE_CHECKING:
     from fish_train.prove.study import Study
+    from fish_train.reports.page import Table
 
 GROUPS = ("single", "absorbed", "feedback", "noise", "ladder", "two", "sensor", "outside", "null")
 
@@ -52,7 +55,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--oracle", action="store_true", help="fit the true structure too: power and errors against it"
     )
+    parser.add_argument(
+        "--search", type=int, default=40, help="runs of the search on the plant (default: %(default)s)"
+    )
     parser.add_argument("--keep", action="store_true", help="keep the recordings (15 MB a world)")
+    parser.add_argument(
+        "--close-loop",
+        metavar="CONCEALED",
+        help="instead: gains from the nominal, refitted, corrected model and from the plant itself, judged on the second "
+        "plant with this concealed in it (nothing, wind, servo_filter, ballast, ...; needs mujoco)",
+    )
     parser.add_argument("--out", type=Path, default=Path("prove"), help="folder (default: %(default)s)")
 
 
@@ -70,21 +82,19 @@ def run(args: argparse.Namespace) -> int:
     if args.jobs < 1 or args.trials < 3 or not args.duration >= 4.0:
         raise UserError("expected at least one job, three trials and 4 s")
     console = terminal()
+    if args.close_loop:
+        return _close_loop(args, console)
     with user_errors():
         study = _study(args, console)
-        with _bar(console) as bar:
-            worlds = study.worlds
-            task = bar.add_task("worlds", total=len(worlds), completed=len(worlds) - len(study.open_worlds))
-            run_study(study, args.jobs, lambda _: bar.advance(task), keep=args.keep, cluster=args.cluster)
+        with _progress(console, "worlds", len(study.open_worlds)) as done:
+            run_study(study, args.jobs, done, keep=args.keep, cluster=args.cluster)
         opened, results = study.reveal(), study.results
         scores = [score_world(world, results[name], truths_of(world)) for name, world in opened.items()]
-        oracle, more = {}, []
+        oracle: dict[int, bool] = {}
+        more: list[Table] = []
         if args.oracle:
-            with _bar(console) as bar:
-                task = bar.add_task("true structures", total=len(opened))
-                oracle, more = judge_study(
-                    study, scores, args.jobs, lambda _: bar.advance(task), args.cluster
-                )
+            with _progress(console, "true structures", len(opened)) as done:
+                oracle, more = judge_study(study, scores, args.jobs, done, args.cluster)
     for table in tables(scores, oracle, more):
         print_table(console, table)
     write_prove_page(study.folder / "report.html", study.about, scores, oracle, more)
@@ -129,6 +139,54 @@ def _study(args: argparse.Namespace, console: Console) -> Study:
     return study
 
 
-def _bar(console: Console) -> Progress:
-    return Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-                    TextColumn("left"), TimeRemainingColumn(), console=console)  # fmt: skip
+def _close_loop(args: argparse.Namespace, console: Console) -> int:
+    """Recordings of the second plant, four trainings, one table and page."""
+    from fish_train.evaluation.study import write_rows
+    from fish_train.prove.build import make_world
+    from fish_train.prove.close_loop import Plan, close_loop, loop_table, loop_world
+    from fish_train.reports.page import write_page
+    from fish_train.score_table import print_table
+
+    from .inputs import user_errors
+
+    with user_errors():
+        world = loop_world(args.close_loop, 1 if args.seed is None else args.seed, args.trials, args.duration)
+        recordings = args.out / "recordings"
+        if not recordings.exists():
+            make_world(world, recordings)
+        rows = close_loop(Plan(world, recordings, args.out, search=args.search), args.jobs, console.print)
+    table = loop_table(rows)
+    print_table(console, table)
+    write_rows(args.out / "runs.csv", rows)
+    lead = f"The second plant with {args.close_loop} concealed in it, seed {world.seed}."
+    write_page(args.out / "loop.html", "Does a better model make better gains?", lead, [table])
+    console.print(f"{args.out}/loop.html, runs.csv", soft_wrap=True)
+    return 0
+
+
+@contextmanager
+def _progress(console: Console, what: str, total: int) -> Iterator[Callable[[str], None]]:
+    """To be called with each name that is done: a bar with the time left, or lines where there is no terminal."""
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    began, count = time.monotonic(), 0
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=total)
+
+        def done(name: str) -> None:
+            nonlocal count
+            count += 1
+            bar.advance(task)
+            if not console.is_terminal:
+                left = (time.monotonic() - began) / count * (total - count)
+                console.print(
+                    f"{name}: {count} of {total} {what}, about {left / 60.0:.0f} min left", soft_wrap=True
+                )
+
+        yield done

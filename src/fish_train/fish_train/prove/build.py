@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
+from fish_sim.scheme import Scheme
 from fish_sim.sensors import SENSOR_EFFECTS
-from fish_sim.step import Scheme
 from fish_train.prove.data_set import write_data_set
 from fish_train.prove.fish_sim_plant import FishSimPlant
 from fish_train.prove.instruments import Errors, Instruments

@@ -77,7 +77,7 @@ def serialise(template: Any, stamps_ns: NDArray[np.int64], columns: dict[str, Ar
 
 
 def _grid(r: Readings, start_ns: int) -> tuple[Array, NDArray[np.int64]]:
-    t = PERIOD * np.arange(len(r.commands))
+    t: Array = PERIOD * np.arange(len(r.commands), dtype=float)
     return t, start_ns + np.round(1e9 * t).astype(np.int64)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
-from fish_sim.step import Scheme, Stepper
+from fish_sim.scheme import Scheme
+from fish_sim.step import Stepper
 from fish_train.prove.swim import Inertial
 from fish_train.prove.trials import PERIOD
 
@@ -38,7 +39,7 @@ class FishSimPlant:
 
     def reset(self, poses: Array) -> None:
         """All at rest."""
-        self.state = np.array([self._stepper.rest(tuple(pose)) for pose in poses])
+        self.state = np.array([self._stepper.rest(tuple(pose), parameters=self._p[0]) for pose in poses])
         self._push = self._size * self._random.standard_normal((len(poses), 3))
 
     def step(self, commands: Array) -> Inertial:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from fish_sim.effects import EFFECTS
+from fish_sim.effects.effect import Effect
 from fish_sim.parameter import Parameter
 from fish_sim.sensors import SENSOR_EFFECTS
+from fish_sim.sensors.sensor_effect import SensorEffect
 from fish_train.diagnose.vocabulary import candidates
 from fish_train.prove.outside import OUTSIDE
 from fish_train.prove.world import World
 
 Random = np.random.Generator
+Item = TypeVar("Item")
 
 SPREAD = 0.25  # of the true fish's parameters about the nominal ones
 MEASURED = ("head_mass", "hinge_offset", "link_length", "link_mass", "fin_length", "fin_mass", "rudder_range",
@@ -50,17 +54,13 @@ PAIRS = (
 NOISES = (0.5, 1.0, 2.0, 4.0)
 STRENGTHS = (0.125, 0.25, 0.5, 1.0, 2.0)
 # number of links, integrator, its steps in 10 ms
-OTHER_PLANTS = ((3, "dop853", 1), (4, "dop853", 2), (5, "dop853", 4), (3, "rk4", 4), (5, "rk4", 10))
-
-
-def parameters_of(name: str) -> Mapping[str, Parameter]:
-    """Of a vocabulary or an outside effect."""
-    return {**EFFECTS, **SENSOR_EFFECTS, **OUTSIDE}[name].parameters
+OTHER_PLANTS = ((3, "dop853", 2), (4, "dop853", 4), (5, "dop853", 8), (3, "rk4", 8), (5, "rk4", 20))
 
 
 def draw_effect(name: str, strength: float, random: Random) -> dict[str, float]:
     """Values of an effect at `strength` typical ones, a little spread; where and when are drawn."""
-    effect = {**EFFECTS, **SENSOR_EFFECTS, **OUTSIDE}[name]
+    table: dict[str, type[Effect] | type[SensorEffect]] = {**EFFECTS, **SENSOR_EFFECTS, **OUTSIDE}
+    effect = table[name]
     sign = float(random.choice([-1.0, 1.0])) if name in SIGNED else 1.0
     values = {}
     for key, parameter in effect.parameters.items():
@@ -96,7 +96,7 @@ def _world(group: str, random: Random, names: tuple[str, ...], strength: float =
     return World(group, seed, effects, strength, encoder=encoder, parameters=factors)
 
 
-def _turn(items: tuple, number: int):
+def _turn(items: Sequence[Item], number: int) -> Item:
     return items[number % len(items)]
 
 

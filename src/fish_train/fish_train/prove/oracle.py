@@ -61,7 +61,8 @@ def look(
     training = [i for i in range(len(experiment.names)) if i not in held]
     data, unseen = experiment.select(training), experiment.select(held or training)
     noise = Noise()
-    noise = replace(noise, wrench=tuple(world.noise * w for w in noise.wrench))
+    surge, sway, yaw = (world.noise * w for w in noise.wrench)
+    noise = replace(noise, wrench=(surge, sway, yaw))
     nominal = _fit(_with(world, ()), world, data, noise)
     true = _fit(_with(world, looked_for), world, data, noise)
     again = _from(nominal, true, data)

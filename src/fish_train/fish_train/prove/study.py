@@ -46,7 +46,8 @@ class Study:
     @property
     def about(self) -> dict[str, Any]:
         """What was asked for."""
-        return read_json(self.folder / "study.json")
+        content: dict[str, Any] = read_json(self.folder / "study.json")
+        return content
 
     @property
     def worlds(self) -> dict[str, World]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_train.prove.instruments import TRANSPORT, Instruments
-from fish_train.prove.trials import PERIOD
+from fish_train.prove.trials import PERIOD, Pose
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class Driver(Protocol):
     def command(self, k: int) -> tuple[Array, Array]:
         """Commands (M, 2) and rotor phases (M,) at grid point k."""
 
-    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Array]]) -> None:
+    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
         """IMU samples of grid point k and camera poses (stamp, x, y, heading) that arrived in the period after it."""
 
 
@@ -83,7 +83,8 @@ def swim(plant: Plant, starts: Array, driver: Driver, instruments: Instruments, 
             new = int(np.searchsorted(instruments.stamps[m], PERIOD * (k + 1) - TRANSPORT, side="right"))
             frames = slice(shown[m], new)
             poses = instruments.poses(m, frames, truth[: k + 2, m]) if new > shown[m] else ()
-            arrived.append([(t, *p) for t, p in zip(instruments.stamps[m][frames], poses, strict=True)])
+            stamps = instruments.stamps[m][frames]
+            arrived.append([(float(t), x, y, psi) for t, (x, y, psi) in zip(stamps, poses, strict=True)])
             shown[m] = new
         driver.see(k, gyro[k], accel[k], arrived)
     everything = tuple(instruments.poses(m, slice(None), truth[:steps, m]) for m in range(count))

@@ -204,11 +204,11 @@ def criterion_table(scores: Sequence[Score]) -> Table:
     """AIC and BIC over the tool's own quick refits of all candidates, on the same worlds."""
     judged = [s for s in scores if s.ranking and not s.unnamed and len(s.truth) < 2]
     hidden, nothing = [s for s in judged if s.truth], [s for s in judged if not s.truth]
-    rows = [
-        [name, str(Share.of(hidden, lambda s, f=f: choice(s, f) in s.truth)),
-         str(Share.of(nothing, lambda s, f=f: choice(s, f) is not None))]
-        for name, f in (("AIC", aic_cost), ("BIC", bic_cost))
-    ]  # fmt: skip
+    rows = []
+    for name, cost in (("AIC", aic_cost), ("BIC", bic_cost)):
+        right = [choice(s, cost) in s.truth for s in hidden]
+        alarms = [choice(s, cost) is not None for s in nothing]
+        rows.append([name, str(Share(sum(right), len(right))), str(Share(sum(alarms), len(alarms)))])
     rows.insert(
         0, ["this tool", str(Share.of(hidden, lambda s: s.top1)), str(Share.of(nothing, lambda s: s.alarm))]
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from fish_control.reference_path import ReferencePath
 from fish_train.identify.synthetic import FULL_SPEED, STROKE, program
 
 Array = NDArray[np.float64]
+Pose = tuple[float, float, float, float]  # stamp [s], x, y [m], heading [rad]
 
 PERIOD = 0.01  # s, of the commands
 OPEN = ("straight", "steps", "sines", "turn", "random", "straight", "sines", "random")
@@ -42,7 +43,7 @@ class OpenLoop:
         phase = np.full(self.table.shape[1], np.remainder(2.0 * np.pi * STROKE * PERIOD * k, 2.0 * np.pi))
         return self.table[k], phase
 
-    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Array]]) -> None:
+    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
         """Nothing is done with it."""
 
 
@@ -63,7 +64,7 @@ class Feedback:
         rows = np.array([fish.command(k) for fish in self._fish])
         return rows[:, 1:], rows[:, 0]
 
-    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Array]]) -> None:
+    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
         """IMU samples of grid point k, and the camera poses (stamp, x, y, heading) that arrived until the next."""
         for m, fish in enumerate(self._fish):
             fish.see(k * PERIOD, float(gyro[m]), accel[m], poses[m])
@@ -74,7 +75,7 @@ class _Captain:
         self._planner, self._controller, self._fusion = planner, controller, Fusion()
         self._motion: Motion | None = None
 
-    def see(self, time: float, gyro: float, accel: Array, poses: Sequence[Array]) -> None:
+    def see(self, time: float, gyro: float, accel: Array, poses: Sequence[Pose]) -> None:
         for stamp, *pose in poses:
             self._fusion.add_pose(stamp, pose)
         self._fusion.add_imu(time, gyro, float(accel[0]), float(accel[1]))
@@ -96,7 +97,7 @@ class _Captain:
         return tuple(self._controller.command(PERIOD))
 
 
-def open_loop(kinds: Sequence[str], duration: float, random: np.random.Generator, calm: Array) -> Array:
+def open_loop(kinds: Iterable[str], duration: float, random: np.random.Generator, calm: Array) -> Array:
     """Commands (T, M, 2) of open-loop programs, rotor slowed by `calm` (M,)."""
     table = np.stack([program(kind, duration, random) for kind in kinds], axis=1)
     return table * np.stack([calm, np.ones_like(calm)], axis=-1)

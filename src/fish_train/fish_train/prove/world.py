@@ -26,8 +26,8 @@ class World:
     encoder: bool = True  # recorded
     plant: str = "fish_sim"  # or mujoco
     links: int = 3
-    method: str = "dop853"
-    substeps: int = 1
+    method: str = "dop853"  # not the integrator that the tool uses
+    substeps: int = 2
     parameters: Mapping[str, float] = field(default_factory=dict)  # factors on nominal parameters
 
     @property
