@@ -37,7 +37,11 @@ class ImuHistory:
             return None if only is None else self._samples[only]
         share = (time - self._times[before]) / (self._times[after] - self._times[before])
         a, b = self._samples[before], self._samples[after]
-        return InertialSample(*(p + share * (q - p) for p, q in zip(a, b, strict=True)))
+        return InertialSample(
+            a.yaw_rate + share * (b.yaw_rate - a.yaw_rate),
+            a.forward + share * (b.forward - a.forward),
+            a.left + share * (b.left - a.left),
+        )
 
     def forget(self, before: float) -> None:
         """Drop samples older than `before` [s]."""

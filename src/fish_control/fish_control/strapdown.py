@@ -68,20 +68,27 @@ class StrapdownFilter:
     def advance(self, dt: float, before: InertialSample | None, after: InertialSample | None) -> None:
         """Predict over dt [s] with the mean of the measurements at its ends; None: unknown."""
         known = before is not None and after is not None
-        w, a = 0.0, np.zeros(2)
+        w = forward = left = 0.0
+        x, F = self.x, np.eye(SIZE)
         if before is not None and after is not None:
-            mean = 0.5 * (np.array(before) + np.array(after)) - self.x[5:8]
-            w, a = float(mean[0]), mean[1:]
-        psi = self.x[2] + 0.5 * w * dt
+            w = 0.5 * (before.yaw_rate + after.yaw_rate) - x[5]
+            forward = 0.5 * (before.forward + after.forward) - x[6]
+            left = 0.5 * (before.left + after.left) - x[7]
+        psi = x[2] + 0.5 * w * dt
         c, s = math.cos(psi), math.sin(psi)
-        R = np.array([[c, -s], [s, c]])
-        accel = R @ a
-        F = self._jacobian(dt, R, accel) if known else self._coasting_jacobian(dt)
-        x = self.x
-        x[0:2] += dt * x[3:5] + 0.5 * dt * dt * accel
+        ax, ay = c * forward - s * left, s * forward + c * left
+        if known:
+            _fill_jacobian(F, dt, c, s, ax, ay)
+        else:
+            F[0, 3] = F[1, 4] = dt
+        x[0] += dt * x[3] + 0.5 * dt * dt * ax
+        x[1] += dt * x[4] + 0.5 * dt * dt * ay
         x[2] = math.remainder(x[2] + w * dt, 2.0 * math.pi)
-        x[3:5] += dt * accel
-        self._filter.P = F @ self.P @ F.T + self._process_noise(dt, known)
+        x[3] += dt * ax
+        x[4] += dt * ay
+        P = F @ self.P @ F.T
+        P.flat[:: SIZE + 1] += self._process_noise(dt, known)
+        self._filter.P = P
 
     def innovation(self, pose: Array, R: Array) -> tuple[Array, Array]:
         """z - h(x) of a camera pose (x, y, psi) and its covariance S."""
@@ -92,32 +99,27 @@ class StrapdownFilter:
         self._filter.update(pose, lambda _: H_CAMERA, lambda x: x[POSE], R, residual=pose_residual)
         self.x[2] = math.remainder(self.x[2], 2.0 * math.pi)
 
-    @staticmethod
-    def _coasting_jacobian(dt: float) -> Array:
-        F = np.eye(SIZE)
-        F[0, 3] = F[1, 4] = dt
-        return F
-
-    @classmethod
-    def _jacobian(cls, dt: float, R: Array, accel: Array) -> Array:
-        F = cls._coasting_jacobian(dt)
-        turned = np.array([-accel[1], accel[0]])  # d accel / d psi
-        F[2, 5] = -dt
-        F[0:2, 2], F[3:5, 2] = 0.5 * dt * dt * turned, dt * turned
-        F[0:2, 6:8], F[3:5, 6:8] = -0.5 * dt * dt * R, -dt * R
-        return F
-
-    def _process_noise(self, dt: float, known: bool) -> Array:
+    def _process_noise(self, dt: float, known: bool) -> tuple[float, ...]:
+        """Diagonal of Q."""
         n = self._noise
         rate, accel = (n.gyro_noise, n.accel_noise) if known else (n.coasting_yaw_rate, n.coasting_accel)
         correlation = dt * SAMPLE_PERIOD * (1.0 if known else COASTING_SAMPLES)
-        Q = np.zeros(SIZE)
-        Q[2] = rate**2 * correlation
-        Q[3:5] = accel**2 * correlation
-        Q[0:2] = Q[3:5] * dt * dt / 3.0
-        Q[5] = n.gyro_drift**2 * dt
-        Q[6:8] = n.accel_drift**2 * dt
-        return np.diag(Q)
+        speed = accel**2 * correlation
+        place, bias = speed * dt * dt / 3.0, n.accel_drift**2 * dt
+        return place, place, rate**2 * correlation, speed, speed, n.gyro_drift**2 * dt, bias, bias
+
+
+def _fill_jacobian(F: Array, dt: float, c: float, s: float, ax: float, ay: float) -> None:
+    """d x(t + dt) / d x(t) into an identity; (c, s): direction of the head, (ax, ay): acceleration in the pool.
+
+    Element by element: this runs for every IMU sample of a replay.
+    """
+    half = 0.5 * dt * dt
+    F[0, 3] = F[1, 4] = dt
+    F[2, 5] = -dt
+    F[0, 2], F[1, 2], F[3, 2], F[4, 2] = -half * ay, half * ax, -dt * ay, dt * ax  # d acceleration / d psi
+    F[0, 6], F[0, 7], F[1, 6], F[1, 7] = -half * c, half * s, -half * s, -half * c
+    F[3, 6], F[3, 7], F[4, 6], F[4, 7] = -dt * c, dt * s, -dt * s, -dt * c
 
 
 def pose_residual(z: Array, predicted: Array) -> Array:
