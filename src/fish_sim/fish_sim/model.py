@@ -116,13 +116,14 @@ def follow_command(
     """Memory at the end of a command's period: what servo, motor and the actuator effects make of it."""
     r, effects = unpack_effects(layout, p, m[2:], "memory")
     rotor, rudder = command
+    # the range is the command's; a horn that sits askew carries the rudder beyond it
+    rudder = xp.fmax(xp.fmin(rudder, r.rudder_range), -r.rudder_range)
     memory: list[Scalar] = []
     for e in effects:
         rudder, kept = e.effect.rudder(e.p, e.z, rudder, dt, xp)
         rotor, turned = e.effect.rotor(e.p, e.z, rotor, dt, xp)
         kept = {**kept, **turned}
         memory += [kept[key] for key in e.effect.memory]
-    rudder = xp.fmax(xp.fmin(rudder, r.rudder_range), -r.rudder_range)
     for e in effects:
         rudder = e.effect.servo(e.p, m[0], rudder, dt, xp)
     limit = r.servo_rate_limit * dt

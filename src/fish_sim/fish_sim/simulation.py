@@ -65,7 +65,9 @@ class Simulation:
         config = self._config
         random = np.random.default_rng(config.seed)
         self._random = random
-        self._state = self._stepper.rest((config.start_x, config.start_y, config.start_heading))
+        self._state = self._stepper.rest(
+            (config.start_x, config.start_y, config.start_heading), parameters=self._parameters
+        )
         self._push = np.zeros(3)
         self._rotor_angle = 0.0
         self._command, self._command_time = (0.0, 0.0), -math.inf

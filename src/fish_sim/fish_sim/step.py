@@ -24,6 +24,8 @@ from fish_sim.scheme import Scheme, default_scheme, stable_scheme
 
 Array = NDArray[np.float64]
 
+SETTLED = 300  # periods of 10 ms after which servo and motor have followed a constant command
+
 
 class Stepper:
     """The motion of one structure of robot (links, effects) under one integration scheme."""
@@ -46,13 +48,33 @@ class Stepper:
             )
         return np.array(robot.vector())
 
-    def rest(self, pose: tuple[float, float, float] = (0.0, 0.0, 0.0), rudder: float = 0.0) -> Array:
-        """State (NS,) at rest at a pose (x, y, heading) [m, m, rad] with a straight tail."""
+    def rest(
+        self,
+        pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        rudder: float = 0.0,
+        parameters: Array | None = None,
+    ) -> Array:
+        """State (NS,) at rest at a pose (x, y, heading) [m, m, rad] with a straight tail.
+
+        With parameters (NP,) the servo stands where a centred command leaves it, which an offset horn is not at 0.
+        """
         state = np.zeros(len(self.layout.state))
         state[:2] = pose[:2]
         state[2 : 3 + self.layout.links] = pose[2]
         state[len(self.layout.motion)] = rudder
+        if parameters is not None:
+            state[len(self.layout.motion) :] = self.settled_memory(np.zeros((1, 2)), parameters)[0][0]
         return state
+
+    def settled_memory(
+        self, command: Array, parameters: Array, d_parameters: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Memory (B, NM) long after a constant command (B, 2), and its derivative along d_parameters."""
+        start = np.zeros((len(command), len(self.layout.memory)))
+        commands = np.broadcast_to(command, (SETTLED, *np.shape(command)))
+        d_parameters = np.zeros_like(parameters) if d_parameters is None else d_parameters
+        memory, tangents = self.memory_jvp(start, commands, parameters, d_parameters)
+        return memory[-1], tangents[-1]
 
     def step(self, state: Array, command: Array, parameters: Array) -> Array:
         """The state 10 ms later."""
@@ -143,16 +165,21 @@ class Stepper:
         return rate, tangent
 
     def memory_jvp(
-        self, start: Array, commands: Array, parameters: Array, d_parameters: Array
+        self,
+        start: Array,
+        commands: Array,
+        parameters: Array,
+        d_parameters: Array,
+        d_start: Array | float = 0.0,
     ) -> tuple[Array, Array]:
         """Memory (T + 1, B, NM) under commands (T, B, 2), which needs no motion, and its derivative along d_parameters.
 
-        start (B, NM); parameters and d_parameters (NP,) or (B, NP).
+        start and d_start (B, NM); parameters and d_parameters (NP,) or (B, NP).
         """
         start = np.ascontiguousarray(start, dtype=float)
         memory = np.empty((len(commands) + 1, *start.shape))
         tangents = np.empty_like(memory)
-        memory[0], tangents[0] = start, 0.0
+        memory[0], tangents[0] = start, d_start
         p, dp = (np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters))
         self._check_width("memory", start, len(self.layout.memory))
         commands = np.ascontiguousarray(commands, dtype=float)

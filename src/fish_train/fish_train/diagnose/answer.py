@@ -12,6 +12,7 @@ from fish_train.diagnose import locate
 from fish_train.diagnose.decide import PLAUSIBLE, p_value, parameter_count, probabilities
 from fish_train.diagnose.diagnosis import UNEXPLAINED_R2, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
+from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.filter_types import ROWS
 from fish_train.identify.fit import Fit
@@ -71,7 +72,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
 
 def competition(accepted: Accepted) -> dict[str, float]:
     """Probability of each refitted name of the round, most probable first."""
-    objectives = {n: f.objective for n, f in accepted.round.refitted.items()}
+    objectives = {n: evidence(f) for n, f in accepted.round.refitted.items()}
     odds = probabilities(objectives)
     return dict(sorted(odds.items(), key=lambda item: -item[1]))
 

@@ -10,15 +10,17 @@ import numpy as np
 from fish_sim.robot import Robot
 from fish_train.diagnose.decide import SMALLEST_Z, Level, parameter_count, strength_z
 from fish_train.diagnose.locate import Description, MissingForce, describe, missing_force
-from fish_train.diagnose.search import Round, restart_base, search_round
+from fish_train.diagnose.search import RANK_STEPS, Round, evidence, look_alike, restart_base, search_round
 from fish_train.diagnose.split import Split, split_trials
 from fish_train.diagnose.vocabulary import candidates, out_of_reach
-from fish_train.identify.experiment import Experiment
+from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, fit_hypothesis, likelihood
+from fish_train.identify.fit import Fit, evaluate, settle, trial_likelihoods
 from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
+FAIR_SHARE = 0.25  # of the gain per sample that trials not fitted to must show
 UNEXPLAINED_R2 = 0.3  # cross-validated; above it the remaining wrench is a force with a law, not water noise
 
 Progress = Callable[[str], None]
@@ -60,11 +62,12 @@ def diagnose(
 ) -> Diagnosis:
     """Answer for one experiment; `progress` gets a line at every step."""
     level, split = level or Level(), split_trials(experiment)
-    searched = experiment.select(split.search)
     unreachable = out_of_reach(experiment)
+    searched = experiment.select(split.search)
+    check = experiment.select(split.check) if split.check else None
     progress("fitting the nominal model")
-    base = fit_hypothesis(nominal_hypothesis(robot), searched, Noise())
-    base, rounds, accepted = grow(base, searched, unreachable, level, progress)
+    base = fit_base(robot, searched)
+    base, rounds, accepted = grow(base, searched, check, unreachable, level, progress)
     progress("fitting all training trials")
     training = experiment.select(split.training)
     nominal, final = final_fits(base, rounds, training)
@@ -82,24 +85,30 @@ def diagnose(
     )  # fmt: skip
 
 
+def fit_base(robot: Robot, experiment: Experiment) -> Fit:
+    """The nominal model: a cold fit on half of every trial, continued on the whole."""
+    short = fit_tempered(nominal_hypothesis(robot), shorten(experiment, RANK_STEPS), Noise())
+    return settle(evaluate(short.hypothesis, short.theta, experiment, short.noise), experiment)
+
+
 def grow(
-    base: Fit, experiment: Experiment, unreachable: dict[str, str], level: Level, progress: Progress
-) -> tuple[Fit, list[Round], list[Accepted]]:
+    base: Fit, experiment: Experiment, check: Experiment | None, unreachable: dict[str, str], level: Level,
+    progress: Progress,
+) -> tuple[Fit, list[Round], list[Accepted]]:  # fmt: skip
     """Add one effect at a time while one is significant."""
     rounds: list[Round] = []
     accepted: list[Accepted] = []
-    samples = float(base.result.samples.sum())
     while len(accepted) < MOST_EFFECTS:
         names = [n for n in candidates() if n not in base.hypothesis.names and n not in unreachable]
-        enough = level.enough(samples, 1, len(names))
-        found = search_round(base, names, experiment, enough, progress)
+        samples = float(base.result.samples.sum())
+        found = search_round(base, names, experiment, level.enough(samples, 1, len(names)), progress)
         if found.best is not None:
-            found = _with_restarted_base(found, experiment)
+            progress("refitting without it, from where it led")
+            restarted = restart_base(found.base, found.refitted[found.best], experiment)
+            found = Round(restarted, found.ranking, found.refitted)
         rounds.append(found)
-        name = found.best
-        if name is None or not is_significant(
-            found.refitted[name], found.gain(name), name, samples, len(names), level
-        ):
+        name = choose(found, check, len(names), level)
+        if name is None:
             break
         accepted.append(Accepted(name, found))
         base = found.refitted[name]
@@ -107,9 +116,24 @@ def grow(
     return base, rounds, accepted
 
 
-def _with_restarted_base(found: Round, experiment: Experiment) -> Round:
-    base = restart_base(found.base, [found.refitted[found.best]], experiment)
-    return Round(base, found.ranking, found.refitted)
+def choose(found: Round, check: Experiment | None, tried: int, level: Level) -> str | None:
+    """The name to add: most evidence among the significant ones, the simplest of those that are as good."""
+    samples = float(found.base.result.samples.sum())
+    good = [
+        name
+        for name, fit in found.refitted.items()
+        if is_significant(fit, found.gain(name), name, samples, tried, level)
+        and (check is None or holds_elsewhere(found, name, check))
+    ]
+    if not good:
+        return None
+    best = max(good, key=lambda name: evidence(found.refitted[name]))
+    for name in good:
+        extra = parameter_count(best) - parameter_count(name)
+        lost = found.gain(best) - found.gain(name)
+        if extra > 0 and look_alike(name, best) and lost < level.enough(samples, extra, 1):
+            best = name
+    return best
 
 
 def is_significant(fit: Fit, gain: float, name: str, samples: float, tried: int, level: Level) -> bool:
@@ -118,19 +142,24 @@ def is_significant(fit: Fit, gain: float, name: str, samples: float, tried: int,
     return gain > enough and strength_z(fit, name) > SMALLEST_Z
 
 
+def holds_elsewhere(found: Round, name: str, check: Experiment) -> bool:
+    """On trials that it was not fitted to, an effect must gain a fair share of what it gained where it was."""
+    fit, base = found.refitted[name], found.base
+    here = trial_likelihoods(fit.hypothesis, fit.theta, check, fit.noise)
+    there = trial_likelihoods(base.hypothesis, base.theta, check, base.noise)
+    per_sample = (here.log_likelihood.sum() - there.log_likelihood.sum()) / here.samples.sum()
+    return bool(per_sample > FAIR_SHARE * found.gain(name) / base.result.samples.sum())
+
+
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:
     """Nominal and final structure on all training trials, from their optima on the search trials."""
     nominal = refine(rounds[0].base, training)
-    return nominal, (refine(base, training) if base is not rounds[0].base and len(rounds) > 1 else nominal)
+    return nominal, (refine(base, training) if base.hypothesis.names else nominal)
 
 
 def refine(fit: Fit, experiment: Experiment) -> Fit:
     """A fit carried over to other trials."""
-    start = evaluate(fit.hypothesis, fit.theta, experiment, fit.noise)
-    first = climb(start, experiment, 6)
-    return climb(
-        evaluate(fit.hypothesis, first.theta, experiment, adapt_noise(first, experiment)), experiment, 6
-    )
+    return settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment, rounds=1)
 
 
 def prune(
@@ -157,6 +186,3 @@ def held_out_density(held: Experiment, robot: Robot, nominal: Fit, final: Fit) -
         result = evaluate(fit.hypothesis, fit.theta, held, fit.noise).result
         density[name] = result.log_likelihood / result.samples
     return density
-
-
-__all__ = ["Accepted", "Diagnosis", "diagnose", "likelihood"]

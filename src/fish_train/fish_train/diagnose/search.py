@@ -1,26 +1,35 @@
-"""Which effect explains the mismatch: rank all candidates, refit the best, compare, add one, search again.
+"""Which effect explains the mismatch: rank all candidates, refit the best, compare.
 
-Every hypothesis refits all nominal parameters and the intensity of the latent wrench: an effect counts only for
-what they cannot absorb. The first ranking runs at the nominal model's own, inflated noise, where the likelihood has
-few optima; the shortlist is refitted with the noise adapted to each hypothesis.
+Every hypothesis refits all nominal parameters: an effect counts only for what they cannot absorb. The first ranking runs
+at the noise of the model without the effect, inflated by what that model lacks, with the IMU believed a tenth: there the
+likelihood has few optima. A structural effect (slip, hardening) may be absorbed so deeply that no path leads from
+the fitted base to the truth, so every candidate is tried from the base and from the nominal values, weak and strong.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fish_train.identify.experiment import Experiment, shorten
+from fish_train.identify.filter import prepare
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, fit_hypothesis
-from fish_train.identify.hypothesis import Coordinates, Hypothesis
+from fish_train.identify.fit import Fit, climb, evaluate, log_posterior, settle
+from fish_train.identify.hypothesis import Coordinates
+from fish_train.identify.settle import open_gates
 
-RANK_START = 0.3  # strength, in typical ones, from which a candidate is tried
+STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
+SCALE = 0.3  # strength at which the hypothesis is written down; sets the coordinates only
+IMU_DISTRUST = 10.0  # factor of the IMU's noise in the first part of the ranking
 RANK_STEPS = 1000  # of 10 ms: half a trial is enough to rank
-RANK_ITERATIONS = 2
+RANK_ITERATIONS = 6
+POLISH_ITERATIONS = 4
+POLISHED = 8  # candidates that are ranked with the IMU's own noise
 SHORTLIST = 4
+WORTH_A_REFIT = 0.2  # share of the best ranking gain
 LOOK_ALIKES = (
     ("tip_slip", "wake_memory", "tail_joint_damping"),
     ("rudder_lag", "rudder_delay"),
@@ -51,53 +60,90 @@ class Round:
 
     @property
     def best(self) -> str | None:
-        """Name of the best refitted candidate."""
-        return max(self.refitted, key=lambda name: self.refitted[name].objective, default=None)
+        """Name of the best refitted candidate by evidence."""
+        return max(self.refitted, key=lambda name: evidence(self.refitted[name]), default=None)
 
     def gain(self, name: str) -> float:
         """Nats over the base, both with their own noise."""
         return self.refitted[name].objective - self.base.objective
 
 
+def evidence(fit: Fit) -> float:
+    """Laplace approximation of the log evidence (MacKay 2003, ch. 27): an unneeded parameter costs its Occam factor."""
+    prior = Coordinates(fit.hypothesis).prior
+    return fit.objective - 0.5 * float(np.linalg.slogdet(fit.normal)[1]) - float(np.log(prior).sum())
+
+
 def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Progress) -> tuple[Ranked, ...]:
-    """All candidates added to the base one at a time, a few iterations each at the base's noise, on short trials."""
+    """All candidates added to the base one at a time, on short trials, the most promising polished."""
     short = shorten(experiment, RANK_STEPS)
-    reference = climb(evaluate(base.hypothesis, base.theta, short, base.noise), short, RANK_ITERATIONS)
+    own = base.noise
+    wide = replace(open_gates(own), gyro=IMU_DISTRUST * own.gyro, accel=IMU_DISTRUST * own.accel)
+    reference = climb(evaluate(base.hypothesis, base.theta, short, own), short, POLISH_ITERATIONS).objective
+    compile_all(base, names, progress)
     found = []
-    for name in names:
-        progress(f"ranking {name}")
-        hypothesis = extend(base, name, RANK_START)
-        own = Coordinates(hypothesis).origin()[len(base.theta) :]
-        start = evaluate(hypothesis, np.concatenate([base.theta, own]), short, base.noise)
-        climbed = climb(start, short, RANK_ITERATIONS)
-        found.append(Ranked(name, climbed.objective - reference.objective, climbed.theta))
-    return tuple(sorted(found, key=lambda r: -r.gain))
+    for i, name in enumerate(names):
+        progress(f"ranking {name} ({i + 1} of {len(names)})")
+        hypothesis = base.hypothesis.with_effect(name, SCALE)
+        start = max(starts(base, name), key=lambda theta: log_posterior(hypothesis, theta, short, wide))
+        fit = climb(evaluate(hypothesis, start, short, wide), short, RANK_ITERATIONS)
+        found.append(evaluate(hypothesis, fit.theta, short, own))
+    progress("ranking the most promising")
+    promising = sorted(range(len(found)), key=lambda i: -promise(found[i]))[:POLISHED]
+    for i in promising:
+        found[i] = climb(found[i], short, POLISH_ITERATIONS)
+    gains = [Ranked(n, f.objective - reference, f.theta) for n, f in zip(names, found, strict=True)]
+    return tuple(sorted(gains, key=lambda r: -r.gain))
 
 
-def extend(base: Fit, name: str, start: float) -> Hypothesis:
-    """The base's hypothesis (with its own start values, so that theta keeps its meaning) and one more effect."""
-    return base.hypothesis.with_effect(name, start)
+def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
+    """Build every candidate's kernel, which the first run on a machine has to do, on all cores."""
+    progress("compiling what is not in the cache yet")
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(lambda name: prepare(base.hypothesis.with_effect(name, SCALE).robot), names))
 
 
-def shortlist(ranking: Sequence[Ranked]) -> list[str]:
-    """The best few and the look-alikes of the very best."""
-    names = [r.name for r in ranking[:SHORTLIST]]
-    known = {r.name for r in ranking}
-    for group in LOOK_ALIKES:
-        if names and names[0] in group:
-            names += [n for n in group if n not in names and n in known]
-    return names
+def starts(base: Fit, name: str) -> list[np.ndarray]:
+    """theta from which a candidate is tried: from the base and from the nominal values, weak and strong."""
+    hypothesis = base.hypothesis.with_effect(name, SCALE)
+    coordinates, count = Coordinates(hypothesis), len(base.theta)
+    cold = np.where(Coordinates(base.hypothesis).is_log, 0.0, base.theta)
+    found = []
+    for strength in STRENGTHS:
+        robot = base.hypothesis.with_effect(name, strength).robot
+        own = coordinates.encode(coordinates.read(robot))[count:]
+        found += [np.concatenate([warm, own]) for warm in (base.theta, cold)]
+    return found
+
+
+def promise(fit: Fit) -> float:
+    """Objective that one Gauss-Newton step would reach, were the problem quadratic."""
+    gradient = fit.result.gradient.sum(0) + fit.theta / Coordinates(fit.hypothesis).prior ** 2
+    if not np.isfinite(fit.objective):
+        return -np.inf
+    return fit.objective + 0.5 * float(gradient @ np.linalg.solve(fit.normal, gradient))
+
+
+def look_alike(first: str, second: str) -> bool:
+    """Two names that are easily taken for each other."""
+    return any(first in group and second in group for group in LOOK_ALIKES)
+
+
+def shortlist(ranking: Sequence[Ranked]) -> list[Ranked]:
+    """The best few and the look-alikes of the very best, as far as they come near it."""
+    best = ranking[0]
+    near = [r for r in ranking if r.gain > WORTH_A_REFIT * best.gain]
+    return [r for i, r in enumerate(near) if i < SHORTLIST or look_alike(r.name, best.name)]
 
 
 def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
-    """A candidate with its noise adapted, from the ranking's optimum and cold; the better of the two."""
-    hypothesis = extend(base, ranked.name, RANK_START)
-    warm = climb(evaluate(hypothesis, ranked.theta, experiment, base.noise), experiment, 6)
-    warm = climb(evaluate(hypothesis, warm.theta, experiment, adapt_noise(warm, experiment)), experiment, 6)
-    origin = Coordinates(extend(base, ranked.name, 1.0)).origin()
-    cold_theta = np.concatenate([0.0 * base.theta, origin[len(base.theta) :]])
-    cold = fit_hypothesis(hypothesis, experiment, Noise(), cold_theta, iterations=8, rounds=2)
-    return max(warm, cold, key=lambda f: f.objective)
+    """A candidate on whole trials with its own noise, from the ranking's optimum."""
+    hypothesis = base.hypothesis.with_effect(ranked.name, SCALE)
+    # a base that lacks much may have taken the mismatch for sensor noise
+    sensors = {key: getattr(Noise(), key) for key in ("gyro", "accel", "camera_position", "camera_heading")}
+    noises = (base.noise, replace(base.noise, **sensors))
+    noise = max(noises, key=lambda n: log_posterior(hypothesis, ranked.theta, experiment, n))
+    return settle(evaluate(hypothesis, ranked.theta, experiment, noise), experiment)
 
 
 def search_round(
@@ -105,7 +151,8 @@ def search_round(
 ) -> Round:
     """Rank all names on top of the base and refit the shortlist; nothing is refitted if no rank gain is near `enough`."""
     ranking = rank(base, names, experiment, progress)
-    chosen = [r for r in ranking if r.name in shortlist(ranking)] if ranking[0].gain > 0.2 * enough else []
+    progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
+    chosen = shortlist(ranking) if ranking[0].gain > 0.1 * enough else []
     refitted = {}
     for r in chosen:
         progress(f"refitting {r.name}")
@@ -113,15 +160,8 @@ def search_round(
     return Round(base, ranking, refitted)
 
 
-def restart_base(base: Fit, rivals: Sequence[Fit], experiment: Experiment) -> Fit:
-    """The base refitted from every rival's nominal parameters: a base in a poor optimum looks like missing physics."""
-    best = base
-    for rival in rivals:
-        theta = rival.theta[: len(base.theta)]
-        fit = climb(evaluate(base.hypothesis, theta, experiment, base.noise), experiment, 6)
-        fit = climb(
-            evaluate(base.hypothesis, fit.theta, experiment, adapt_noise(fit, experiment)), experiment, 6
-        )
-        if fit.objective > best.objective:
-            best = fit
-    return best
+def restart_base(base: Fit, rival: Fit, experiment: Experiment) -> Fit:
+    """The base refitted from a rival's nominal parameters: a base in a poor optimum looks like missing physics."""
+    theta = rival.theta[: len(base.theta)]
+    fit = settle(evaluate(base.hypothesis, theta, experiment, base.noise), experiment, rounds=1)
+    return max(base, fit, key=lambda f: f.objective)

@@ -17,7 +17,8 @@ class Split:
 
     training: tuple[int, ...]
     held_out: tuple[int, ...]
-    search: tuple[int, ...]  # part of training
+    search: tuple[int, ...]  # part of training: names are ranked and fitted on these
+    check: tuple[int, ...]  # the rest of training: a name must help here as well, without being fitted again
 
 
 def split_trials(experiment: Experiment) -> Split:
@@ -29,4 +30,4 @@ def split_trials(experiment: Experiment) -> Split:
     rotor = experiment.commands[..., 0].std(axis=0)
     strength = rotor / (rotor.max() + 1e-12) * (0.2 + rudder / (rudder.max() + 1e-12))
     chosen = sorted(training, key=lambda i: -strength[i])[:SEARCH_TRIALS]
-    return Split(training, held, tuple(sorted(chosen)))
+    return Split(training, held, tuple(sorted(chosen)), tuple(i for i in training if i not in chosen))

@@ -51,7 +51,12 @@ class FishSimPlant:
 
     def reset(self, poses: Array) -> None:
         """All robots at rest."""
-        self._state = np.array([self._stepper.rest(tuple(pose)) for pose in poses])
+        self._state = np.array(
+            [
+                self._stepper.rest(tuple(pose), parameters=p)
+                for pose, p in zip(poses, self._still, strict=True)
+            ]
+        )
         self._push = np.zeros((len(poses), 3))
 
     def step(self, commands: Array) -> None:

@@ -106,8 +106,8 @@ class _Job:
         offset, pose = place_frames(experiment, sensors)
         self.offset, self.pose = _per_trial(offset), _per_trial(pose)
         self.start, self.start_P = first_state(experiment, layout, sensors, noise)
-        self.memory0 = np.zeros((M, self.memory_size))
-        self.memory0[:, :2] = first_memory(experiment)
+        self.memory0, d_memory0 = first_memory(experiment, stepper, self.p, self.dp)
+        self.d_memory0 = d_memory0 if K else np.zeros((M, 1, self.memory_size))
         self.sums, self.gradient, self.normal = np.zeros((M, 2)), np.zeros((M, K)), np.zeros((M, K, K))
         self.whitened = np.full((M, T, 6), np.nan)
         row = 3 * self.n**2 + 2 * self.n + self.memory_size
@@ -115,7 +115,8 @@ class _Job:
         repeated = np.tile(self.dp, (M, 1)) if K else np.zeros((M, len(p)))
         memory0 = np.repeat(self.memory0, max(K, 1), axis=0)
         commands = np.repeat(experiment.commands, max(K, 1), axis=1)
-        self.memory = stepper.memory_jvp(memory0, commands, self.p, repeated)
+        d_start = self.d_memory0.reshape(-1, self.memory_size)
+        self.memory = stepper.memory_jvp(memory0, commands, self.p, repeated, d_start)
 
     def run(self, m: int) -> None:
         """Filter trial m."""
@@ -125,7 +126,7 @@ class _Job:
         self.loaded.filter_trial(
             ctypes.c_long(int(self.experiment.steps[m])), ctypes.c_long(self.K), *(_at(a[m]) for a in arrays),
             _at(self.p), _at(self.dp), ctypes.byref(self.settings), _at(self.start[m]), _at(self.start_P[m]),
-            _at(self.memory0[m]), *(_at(a[m]) for a in results), history,
+            _at(self.memory0[m]), _at(self.d_memory0[m]), *(_at(a[m]) for a in results), history,
         )  # fmt: skip
 
     def result(self) -> FilterResult:

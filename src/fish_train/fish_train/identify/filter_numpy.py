@@ -53,7 +53,7 @@ class Filter:
         """Filter all trials; keep=True stores the history for the smoother."""
         T, M, K, n = self.experiment.length, self.trials, self.free, self.n
         xi, P = first_state(self.experiment, self.stepper.layout, self.sensors, self.noise)
-        D = np.zeros((M, n, K))
+        D = np.zeros((M, n, K))  # of motion, wrench and biases; that of the memory is self.d_memory
         sums = _Sums(M, K, T)
         history = _empty_history(T, M, n, self.memory) if keep else None
         decay = np.exp(-DT / self.noise.wrench_time)
@@ -83,11 +83,11 @@ class Filter:
     def _follow_commands(self) -> tuple[Array, Array]:
         """Memory (T + 1, M, NM) and its derivatives (T + 1, M, NM, K): they need no motion."""
         M, K, nm = self.trials, max(self.free, 1), len(self.stepper.layout.memory)
-        start = np.zeros((M, nm))
-        start[:, :2] = first_memory(self.experiment)
+        start, d_start = first_memory(self.experiment, self.stepper, self.p, self.dp)
+        d_start = d_start.reshape(-1, nm) if self.free else np.zeros((M, nm))
         commands = np.repeat(self.experiment.commands, K, axis=1)
         dp = np.tile(self.dp, (M, 1)) if self.free else np.zeros((M, len(self.p)))
-        memory, tangents = self.stepper.memory_jvp(np.repeat(start, K, axis=0), commands, self.p, dp)
+        memory, tangents = self.stepper.memory_jvp(np.repeat(start, K, axis=0), commands, self.p, dp, d_start)
         T = len(memory)
         memory = memory.reshape(T, M, K, nm)[:, :, 0]
         return memory, tangents.reshape(T, M, K, nm).transpose(0, 1, 3, 2)[..., : self.free]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT, Layout
+from fish_sim.step import Stepper
 from fish_train.identify.experiment import Experiment
 
 Array = NDArray[np.float64]
@@ -99,11 +100,17 @@ def place_frames(experiment: Experiment, sensors: SensorModel) -> tuple[Array, A
     return offset, pose
 
 
-def first_memory(experiment: Experiment) -> Array:
-    """alpha and rotor speed (M, 2) at the first grid point: zero at rest, else as commanded."""
-    if experiment.start_at_rest:
-        return np.zeros((len(experiment.names), 2))
-    return np.column_stack([np.clip(experiment.commands[0, :, 1], -0.8, 0.8), experiment.commands[0, :, 0]])
+def first_memory(experiment: Experiment, stepper: Stepper, p: Array, dp: Array) -> tuple[Array, Array]:
+    """Memory (M, NM) at the first grid point and its derivatives (M, K, NM).
+
+    At rest it is what a centred command has left (an offset horn stands askew from the start), else what the first one has.
+    """
+    M, K = len(experiment.names), len(dp)
+    command = np.zeros((M, 2)) if experiment.start_at_rest else experiment.commands[0]
+    repeated = np.repeat(command, max(K, 1), axis=0)
+    directions = np.tile(dp, (M, 1)) if K else np.zeros((M, len(p)))
+    memory, tangents = stepper.settled_memory(repeated, p, directions)
+    return memory.reshape(M, max(K, 1), -1)[:, 0], tangents.reshape(M, max(K, 1), -1)[:, :K]
 
 
 def first_state(

@@ -1,7 +1,6 @@
-"""Fit a hypothesis: Levenberg-Marquardt on the innovations' likelihood, then the noise, in turn.
+"""Fit a hypothesis: Levenberg-Marquardt on the innovations' likelihood; estimate the noise.
 
-Convergence is the hard part: with small process noise the likelihood has many optima. Every fit therefore starts with
-the wrench noise inflated, which makes the problem nearly convex, and ends with the noise that the data ask for.
+`tempering` puts the two together to a fit that converges from afar.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter import run_filter
-from fish_train.identify.filter_types import FilterResult, Noise, SensorModel
+from fish_train.identify.filter_types import FilterResult, Noise
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 
 Array = NDArray[np.float64]
@@ -23,7 +22,6 @@ NoiseMove = Callable[[Noise, float], Noise]
 
 LARGEST_STEP = 0.5  # of theta in one iteration
 SMALL_GAIN = 0.05  # nats; below it an iteration has converged
-INFLATION = 5.0  # of the wrench's standard deviations in the first phase
 
 
 @dataclass(frozen=True)
@@ -56,6 +54,15 @@ class Fit:
         slope = Coordinates(self.hypothesis).slope(self.theta)
         deviation = np.sqrt(np.diag(self.covariance)) * np.abs(slope)
         return dict(zip(self.hypothesis.free, deviation.tolist(), strict=True))
+
+
+def settle(fit: Fit, experiment: Experiment, rounds: int = 2, iterations: int = 6) -> Fit:
+    """Parameters and process noise in turn, from a fit that was evaluated on this experiment."""
+    fit = climb(fit, experiment, iterations)
+    for _ in range(rounds):
+        noise = adapt_noise(fit, experiment)
+        fit = climb(evaluate(fit.hypothesis, fit.theta, experiment, noise), experiment, iterations)
+    return fit
 
 
 def evaluate(
@@ -93,13 +100,29 @@ def climb(start: Fit, experiment: Experiment, iterations: int) -> Fit:
     return best
 
 
+def trial_likelihoods(
+    hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise
+) -> FilterResult:
+    """A pass without derivatives, half the work of `evaluate`."""
+    coordinates = Coordinates(hypothesis)
+    p, _, sensors = coordinates.filter_inputs(theta)
+    plain = replace(sensors, free={}, slope={})
+    return run_filter(experiment, coordinates.stepper, p, np.zeros((0, len(p))), plain, noise)
+
+
+def log_posterior(hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise) -> float:
+    """Log likelihood of all trials plus log prior of theta; -inf where the filter diverges."""
+    total = float(trial_likelihoods(hypothesis, theta, experiment, noise).log_likelihood.sum())
+    return (
+        total - 0.5 * float(np.sum((theta / Coordinates(hypothesis).prior) ** 2))
+        if np.isfinite(total)
+        else -np.inf
+    )
+
+
 def likelihood(fit: Fit, experiment: Experiment, noise: Noise) -> float:
     """Log likelihood at a fit's parameters under other noise; -inf where the filter diverges."""
-    coordinates = Coordinates(fit.hypothesis)
-    p, _, sensors = coordinates.filter_inputs(fit.theta)
-    plain = replace(sensors, free={}, slope={})
-    result = run_filter(experiment, coordinates.stepper, p, np.zeros((0, len(p))), plain, noise)
-    total = float(result.log_likelihood.sum())
+    total = float(trial_likelihoods(fit.hypothesis, fit.theta, experiment, noise).log_likelihood.sum())
     return total if np.isfinite(total) else -np.inf
 
 
@@ -139,23 +162,3 @@ def adapt_noise(
             if value > best:
                 noise, best = candidate, value
     return noise
-
-
-def fit_hypothesis(
-    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array | None = None,
-    iterations: int = 10, rounds: int = 2,
-) -> Fit:  # fmt: skip
-    """Cold fit: inflated wrench noise first, then `rounds` of noise estimation and refits."""
-    start = Coordinates(hypothesis).origin() if theta is None else theta
-    inflated = replace(noise, wrench=tuple(INFLATION * w for w in noise.wrench))
-    fit = climb(evaluate(hypothesis, start, experiment, inflated), experiment, iterations)
-    fit = replace(fit, noise=noise)
-    for _ in range(rounds):
-        adapted = adapt_noise(fit, experiment)
-        fit = climb(evaluate(hypothesis, fit.theta, experiment, adapted), experiment, iterations)
-    return fit
-
-
-def sensor_model(fit: Fit) -> SensorModel:
-    """The fitted sensors."""
-    return Coordinates(fit.hypothesis).filter_inputs(fit.theta)[2]

@@ -17,7 +17,7 @@ from fish_sim.effects import EFFECTS
 from fish_sim.parameter import Parameter
 from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
-from fish_sim.step import Stepper
+from fish_train.identify.filter import filter_stepper
 from fish_train.identify.filter_types import SensorModel
 
 Array = NDArray[np.float64]
@@ -108,8 +108,8 @@ class Coordinates:
 
     def __init__(self, hypothesis: Hypothesis) -> None:
         self.hypothesis = hypothesis
-        self.stepper = Stepper.of(hypothesis.robot)
-        self.start = self._read(hypothesis.robot)
+        self.stepper = filter_stepper(hypothesis.robot)
+        self.start = self.read(hypothesis.robot)
         self.is_log = np.array(["." not in name for name in hypothesis.free], dtype=bool)
         rows = np.array([self._row(name) for name in hypothesis.free]).reshape(-1, 5)
         self.neutral, self.scale, self.prior, self.lowest, self.highest = rows.T
@@ -143,7 +143,8 @@ class Coordinates:
         robot = self.hypothesis.robot
         parameters, effects = dict(robot.parameters), {k: dict(v) for k, v in robot.effects.items()}
         sensors = {k: dict(v) for k, v in robot.sensors.items()}
-        for name, value in zip(self.hypothesis.free, self.decode(theta), strict=True):
+        values = np.clip(self.decode(theta), self.lowest, self.highest)  # rounding may leave a range's edge
+        for name, value in zip(self.hypothesis.free, values, strict=True):
             if "." not in name:
                 parameters[name] = float(value)
                 continue
@@ -168,7 +169,8 @@ class Coordinates:
         slopes = {field: float(slope[j]) for field, j in sensor_free.items()}
         return p, dp, SensorModel(**values, free=sensor_free, slope=slopes)
 
-    def _read(self, robot: Robot) -> Array:
+    def read(self, robot: Robot) -> Array:
+        """Physical values of the free parameters in a robot of this structure."""
         values = {**robot.parameters}
         for table in (robot.effects, robot.sensors):
             values.update({f"{e}.{k}": v for e, own in table.items() for k, v in own.items()})

@@ -86,7 +86,7 @@ def _swim(
     for k in range(1, T):
         wrench[k] = kept * wrench[k - 1] + np.sqrt(1.0 - kept**2) * size * random.standard_normal((M, 3))
     states = np.empty((T, M, len(stepper.layout.state)))
-    states[0] = stepper.rest()
+    states[0] = stepper.rest(parameters=p)
     p = np.tile(p, (M, 1))
     for k in range(T - 1):
         p[:, at] = wrench[k]

@@ -247,13 +247,14 @@ static void measure_camera(const Settings *c, Work *f, long K, const double *z, 
 }
 
 /* Arrays: commands (steps, NC), imu (steps, 3) with NaN where missing, offset (steps) NaN without a frame,
-   pose (steps, 3), p (NP), dp (K, NP), start (N), start_P (N, N), memory0 (NM). Results: sums[2] = log likelihood,
+   pose (steps, 3), p (NP), dp (K, NP), start (N), start_P (N, N), memory0 (NM), d_memory0 (K, NM).
+   Results: sums[2] = log likelihood,
    samples; gradient (K); normal (K, K) lower triangle; whitened (steps, 6), NaN on entry. history NULL or
    (steps, 3 N N + 2 N + NM) rows: predicted xi, P, filtered xi, P, transition F to the next, memory. */
 void filter_trial(long steps, long K, const double *commands, const double *imu, const double *offset,
                   const double *pose, const double *p, const double *dp, const Settings *c, const double *start,
-                  const double *start_P, const double *memory0, double *sums_out, double *gradient, double *normal,
-                  double *whitened, double *history)
+                  const double *start_P, const double *memory0, const double *d_memory0, double *sums_out,
+                  double *gradient, double *normal, double *whitened, double *history)
 {
   Work f;
   Sums sums = {0.0, 0.0, gradient, normal};
@@ -264,6 +265,7 @@ void filter_trial(long steps, long K, const double *commands, const double *imu,
   memcpy(f.xi, start, sizeof f.xi);
   memcpy(f.P, start_P, sizeof f.P);
   memcpy(f.memory, memory0, sizeof f.memory);
+  for (long j = 0; j < K; ++j) memcpy(f.D + j * ND + NX, d_memory0 + j * NM, sizeof f.memory);
   for (long k = 0; k < steps; ++k) {
     double *h = history ? history + k * row : NULL;
     if (h) { memcpy(h, f.xi, sizeof f.xi); memcpy(h + N, f.P, sizeof f.P); }
