@@ -10,6 +10,9 @@ def main() -> int:
     if recordings.parent.name == "world_0001":
         print("cannot", file=sys.stderr)
         return 3
+    if recordings.parent.name == "world_0002" and not (recordings.parent / "stopped").exists():
+        (recordings.parent / "stopped").touch()
+        return 130
     trials = sorted(path.name for path in recordings.iterdir())
     rms = {"2 s": {"position_m": 0.01, "heading_rad": 0.01, "speed_m_s": 0.01}}
     answer = {

@@ -9,6 +9,7 @@ import pytest
 
 from fish_sim.effects import EFFECTS
 from fish_sim.scheme import default_scheme
+from fish_train.diagnose.locate import MissingForce
 from fish_train.diagnose.vocabulary import candidates
 from fish_train.evaluation.cells import Cell
 from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
@@ -17,8 +18,9 @@ from fish_train.identify.experiment import build_experiment
 from fish_train.prove import groups
 from fish_train.prove.build import make_readings, make_world
 from fish_train.prove.close_loop import loop_table
+from fish_train.prove.judge import judged_table, rivals_table
 from fish_train.prove.mujoco_plant import MujocoPlant, model_text
-from fish_train.prove.oracle import as_experiment
+from fish_train.prove.oracle import Sight, as_experiment, detects
 from fish_train.prove.outside import OUTSIDE, known_to_the_plant
 from fish_train.prove.runner import run_study
 from fish_train.prove.score import score_world
@@ -82,8 +84,11 @@ def test_a_study_is_sealed_first_goes_on_and_opens(tmp_path) -> None:
     left = study.place("world_0000") / "recordings" / "half"  # of a run that was killed
     left.mkdir(parents=True)
     done: list[str] = []
+    with pytest.raises(StudyError, match="world_0002: the tool was stopped"):
+        run_study(study, 1, done.append, TOOL)
+    assert done == ["world_0000", "world_0001"] and study.open_worlds == ["world_0002"]
     run_study(study, 1, done.append, TOOL)
-    assert sorted(done) == ["world_0000", "world_0001", "world_0002"]
+    assert done[2:] == ["world_0002"]
     run_study(study, 1, lambda name: pytest.fail(f"{name} ran twice"), TOOL)
     results = study.results
     told = results["world_0000"]["diagnosis"]["seen"]
@@ -202,6 +207,35 @@ def test_overlap_and_regime() -> None:
     assert activity(World("single", 1, {"current": {"x": 1.0}}), truth) is None
 
 
+def test_the_oracle_and_the_rivals_by_hand() -> None:
+    def sight(gain: float) -> Sight:
+        return Sight(gain, 1, [[0.02] * 3, [0.04] * 3, [0.1] * 3], [[0.01] * 3, [0.02] * 3, [0.05] * 3])
+
+    assert detects(sight(3.0), []) and not detects(
+        sight(2.6), []
+    )  # chi square, one parameter, 2 %: 2.71 nats
+    assert not detects(sight(3.0), [sight(100.0)] * 25)  # but not where nothing looks like that too
+    world = World("single", 1, {"current": {"x": 0.03}})
+    answer = diagnosis(("current", "physics", 0.9))
+    answer["diagnosis"]["fit"]["with_effects"]["rms"] = {"2 s": {"position_m": 0.022}}
+    right, null = score_world(world, answer), score_world(World("null", 2), diagnosis(verdict="no_mismatch"))
+    judged = {1: {"overlap": 0.5, "f1": None}, 2: {"overlap": None, "f1": None}}
+    table = judged_table([right, null], judged, {1: sight(9.0), 2: sight(0.0)}, {1: True})
+    assert [row[2] for row in table.rows] == [
+        "100% of 1",
+        "1.10 (1 worlds)",
+        "0.55 (1 worlds)",
+        "0.50 (1 worlds)",
+        "–",
+    ]
+    said = {
+        1: {"sindy": "tether", "sindy_r2": 0.4, "neural_r2": 0.3},
+        2: {"sindy": None, "sindy_r2": 0.0, "neural_r2": 0.0},
+    }
+    rows = rivals_table([right, null], said).rows
+    assert rows[0][1].startswith("1/1") and rows[1][1].startswith("0/1") and rows[1][2].startswith("0/1")
+
+
 def test_the_gap_is_shared_out_by_hand() -> None:
     def row(name: str, cross_track: float, speed: float) -> Row:
         sizes = ErrorSizes(cross_track, *(0.0,) * 4, speed, *(0.0,) * 4)
@@ -211,6 +245,34 @@ def test_the_gap_is_shared_out_by_hand() -> None:
     table = loop_table([row(name, *sizes) for name, sizes in errors.items()])
     assert [r[2] for r in table.rows] == ["0%", "80%", "100%"]
     assert table.rows[1][4] == "no gap"
+
+
+def test_a_competitor_finds_the_law_it_was_shown() -> None:
+    pytest.importorskip("pysindy")
+    from fish_train.prove.competitors import _sparse
+
+    random = np.random.default_rng(0)
+    names = (
+        "surge_speed",
+        "sway_speed",
+        "yaw_rate",
+        "rudder",
+        "rotor_speed",
+        "wall_distance",
+        "heading",
+        "x",
+        "y",
+    )
+
+    def force(size: float) -> MissingForce:
+        c = {name: random.standard_normal((6000, 2)) for name in names}
+        wrench = 1e-3 * random.standard_normal((6000, 2, 3))
+        wrench[..., 2] += size * np.cos(c["heading"])
+        return MissingForce(("a", "b"), wrench, np.ones_like(wrench), c)
+
+    name, share = _sparse(force(0.01), force(0.01))
+    assert name == "current" and share < 1.0
+    assert _sparse(force(0.0), force(0.0))[0] is None
 
 
 @pytest.fixture(scope="module")

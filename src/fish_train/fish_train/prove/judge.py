@@ -11,10 +11,12 @@ import numpy as np
 
 from fish_train.diagnose.vocabulary import candidates
 from fish_train.prove.build import make_readings
+from fish_train.prove.competitors import compete
 from fish_train.prove.oracle import Sight, as_experiment, detects, look
 from fish_train.prove.runner import spread
 from fish_train.prove.score import Score, vocabulary
 from fish_train.prove.study import Study, read_json, write_json
+from fish_train.prove.tables import Share
 from fish_train.prove.where import activity, regime_f1, time_overlap
 from fish_train.prove.world import World
 from fish_train.reports.page import Table
@@ -52,7 +54,9 @@ def judge(world: World, diagnosis: Mapping[str, Any]) -> dict[str, Any]:
         names = [str(np.random.default_rng(world.seed).choice(candidates()))]
     content: dict[str, Any] = {"sight": None, "overlap": None, "f1": None}
     if names and world.plant == "fish_sim" and world.links == 3:
-        content["sight"] = asdict(look(world, experiment, held, names))
+        looked = look(world, experiment, held, names)
+        content["sight"] = asdict(looked.sight)
+        content["rivals"] = asdict(compete(looked.nominal, looked.training, looked.held_out))
     acts = activity(world, truth)
     effects = [e for e in diagnosis["effects"] if e["name"] in world.names] or diagnosis["effects"]
     if acts is not None and effects:
@@ -85,7 +89,8 @@ def judge_study(
         for t in tasks
         if t.world.names and t.world.seed in sights
     }
-    return seen, [judged_table(scores, judged, sights, seen)]
+    rivals = {seed: content["rivals"] for seed, content in judged.items() if content.get("rivals")}
+    return seen, [judged_table(scores, judged, sights, seen), rivals_table(scores, rivals)]
 
 
 def judged_table(
@@ -144,3 +149,33 @@ def _median(values: Sequence[float], kind: str = "median") -> str:
         return "–"
     size = np.median(values) if kind == "median" else np.mean(values)
     return f"{size:.2f} ({len(values)} worlds)"
+
+
+def rivals_table(scores: Sequence[Score], rivals: Mapping[int, Mapping[str, Any]]) -> Table:
+    """Competitors on the residual force of the refitted nominal model."""
+    own = [s for s in scores if s.world.seed in rivals and len(s.truth) < 2]
+    said = {s.world.seed: rivals[s.world.seed]["sindy"] for s in own}
+    hidden, nothing = [s for s in own if s.truth], [s for s in own if not s.truth]
+    rows = [
+        ["this tool", str(Share.of(hidden, lambda s: s.top1)), str(Share.of(nothing, lambda s: s.alarm)), ""],
+        [
+            "PySINDy",
+            str(Share.of(hidden, lambda s: said[s.world.seed] in s.truth)),
+            str(Share.of(nothing, lambda s: said[s.world.seed] is not None)),
+            _median([rivals[s.world.seed]["sindy_r2"] for s in hidden]),
+        ],
+        [
+            "neural network (fit only)",
+            "gives none",
+            "gives none",
+            _median([rivals[s.world.seed]["neural_r2"] for s in hidden]),
+        ],
+    ]
+    header = [
+        "on the residual force",
+        "right name first",
+        "false alarms",
+        "R2 of that force, held out, median",
+    ]
+    note = "The residual force is that of the oracle's refit of the nominal model. A law is a name by its largest term."
+    return Table("Competitors on the residual force", header, rows, note)

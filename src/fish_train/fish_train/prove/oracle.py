@@ -26,6 +26,23 @@ LEVEL = 0.02  # false alarms of the oracle's test
 
 
 @dataclass(frozen=True)
+class Looked:
+    """The oracle's fits and the trials they were made and judged on."""
+
+    nominal: Fit
+    true: Fit
+    training: Experiment
+    held_out: Experiment
+
+    @property
+    def sight(self) -> Sight:
+        """What is kept of it."""
+        extra = len(self.true.hypothesis.free) - len(self.nominal.hypothesis.free)
+        gain = self.true.objective - self.nominal.objective
+        return Sight(gain, extra, _rms(self.held_out, self.nominal), _rms(self.held_out, self.true))
+
+
+@dataclass(frozen=True)
 class Sight:
     """What the oracle sees in one world."""
 
@@ -54,7 +71,7 @@ def as_experiment(readings: Sequence[Readings], encoder: bool) -> Experiment:
 
 def look(
     world: World, experiment: Experiment, held_out: Sequence[str], names: Sequence[str] | None = None
-) -> Sight:
+) -> Looked:
     """Fit the structure with `names` (default: what is hidden) and the nominal one, from the true values."""
     looked_for = tuple(world.names if names is None else names)
     held = [i for i, name in enumerate(experiment.names) if name in held_out]
@@ -67,8 +84,7 @@ def look(
     true = _fit(_with(world, looked_for), world, data, noise)
     again = _from(nominal, true, data)
     nominal = max(nominal, again, key=lambda f: f.objective)
-    extra = len(true.hypothesis.free) - len(nominal.hypothesis.free)
-    return Sight(true.objective - nominal.objective, extra, _rms(unseen, nominal), _rms(unseen, true))
+    return Looked(nominal, true, data, unseen)
 
 
 def detects(sight: Sight, nulls: Sequence[Sight]) -> bool:

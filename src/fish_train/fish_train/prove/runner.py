@@ -8,6 +8,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -18,11 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from fish_train.prove.build import make_world
-from fish_train.prove.study import Study, read_json, write_json
+from fish_train.prove.mujoco_plant import MujocoError
+from fish_train.prove.study import Study, StudyError, read_json, write_json
 from fish_train.prove.world import World
 
 DIAGNOSE = (sys.executable, "-m", "fish_train.commands.main", "diagnose")
 LONGEST = 3600.0  # s, one diagnosis
+STOPPED = (130, -signal.SIGINT, -signal.SIGTERM)  # exit status of a tool that somebody stopped
 TAIL = 2000  # characters kept of what a failed tool said
 
 Done = Callable[[str], None]
@@ -46,13 +49,18 @@ def run_world(job: Job) -> str:
     for left in (recordings, out):  # of a run that was killed
         shutil.rmtree(left, ignore_errors=True)
     job.place.mkdir(parents=True, exist_ok=True)
-    make_world(job.world, recordings)
     began = time.monotonic()
-    answer = _run_tool(job, recordings, out)
-    result = {"seconds": time.monotonic() - began, **answer}
+    try:
+        make_world(job.world, recordings)
+    except MujocoError as error:  # would happen again
+        answer: dict[str, Any] = {"diagnosis": None, "error": f"no world: {error}"}
+    else:
+        began = time.monotonic()
+        answer = _run_tool(job, recordings, out)
+    seconds = time.monotonic() - began
     if not job.keep:
-        shutil.rmtree(recordings)
-    write_json(job.place / "result.json", result)
+        shutil.rmtree(recordings, ignore_errors=True)
+    write_json(job.place / "result.json", {"seconds": seconds, **answer})
     return job.name
 
 
@@ -68,6 +76,8 @@ def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
         )
     except subprocess.TimeoutExpired:
         return {"diagnosis": None, "error": f"no answer within {LONGEST:g} s"}
+    if done.returncode in STOPPED:
+        raise StudyError(f"{job.name}: the tool was stopped; the same command goes on")
     if done.returncode != 0:
         return {"diagnosis": None, "error": f"exit status {done.returncode}: {done.stderr[-TAIL:]}"}
     return {"diagnosis": read_json(out / "diagnosis.json"), "error": ""}
