@@ -24,7 +24,7 @@ from fish_train.identify.settle import open_gates
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
 SCALE = 0.3  # strength at which the hypothesis is written down; sets the coordinates only
 IMU_DISTRUST = 10.0  # factor of the IMU's noise in the first part of the ranking
-RANK_STEPS = 1000  # of 10 ms: half a trial is enough to rank
+RANK_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to rank
 RANK_ITERATIONS = 6
 POLISH_ITERATIONS = 4
 POLISHED = 8  # candidates that are ranked with the IMU's own noise

@@ -67,7 +67,8 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
 def filter_library(structure: Structure, scheme: Scheme) -> ctypes.CDLL | None:
     """The compiled filter of a structure, or None without a compiler."""
     text = (files("fish_train") / "identify" / "c" / "filter.c").read_text()
-    return library(tangent_source(structure, scheme, lanes()) + text)
+    # a search compiles a kernel for every candidate: -O2 runs as fast as -O3 here and takes less than half as long to build
+    return library(tangent_source(structure, scheme, lanes()) + text, "-O2")
 
 
 def compiled_pass(
