@@ -1,5 +1,6 @@
 """Every node of the robot runs alone by hand, says how it is, and ends with 0 on SIGINT and on SIGTERM."""
 
+import importlib
 import signal
 import time
 from contextlib import ExitStack
@@ -50,6 +51,23 @@ def test_a_node_runs_alone_and_ends_with_0(spec, ended):
     assert spec in said, "no diagnostics"
     assert said[spec][1], "diagnostics without words"
     assert status[spec] == 0
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
+@pytest.mark.parametrize("spec", NODES, ids=lambda spec: spec.name)
+def test_a_signal_while_python_imports_a_node_ends_it_with_0(spec, number, monkeypatch):
+    entry = importlib.import_module(f"{spec.package}.nodes.entry")
+    before = signal.getsignal(signal.SIGTERM)
+
+    def interrupted(name):
+        assert name == f"{spec.package}.nodes.{spec.executable}"
+        signal.raise_signal(number)
+
+    monkeypatch.setattr(entry.importlib, "import_module", interrupted)
+    try:
+        assert getattr(entry, spec.executable)() == 0
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def free_domains(count):

@@ -24,9 +24,9 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
-            "fusion = fish_control.nodes.fusion:main",
-            "planner = fish_control.nodes.planner:main",
-            "controller = fish_control.nodes.controller:main",
+            "fusion = fish_control.nodes.entry:fusion",
+            "planner = fish_control.nodes.entry:planner",
+            "controller = fish_control.nodes.entry:controller",
         ],
     },
 )

@@ -24,10 +24,10 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
-            "rotor = fish_hw.nodes.rotor:main",
-            "rudder = fish_hw.nodes.rudder:main",
-            "imu = fish_hw.nodes.imu:main",
-            "camera = fish_hw.nodes.camera:main",
+            "rotor = fish_hw.nodes.entry:rotor",
+            "rudder = fish_hw.nodes.entry:rudder",
+            "imu = fish_hw.nodes.entry:imu",
+            "camera = fish_hw.nodes.entry:camera",
             "safe_stop = fish_hw.commands.safe_stop:main",
         ],
     },

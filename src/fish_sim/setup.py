@@ -24,8 +24,8 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
-            "simulator = fish_sim.nodes.simulator:main",
-            "camera = fish_sim.nodes.camera:main",
+            "simulator = fish_sim.nodes.entry:simulator",
+            "camera = fish_sim.nodes.entry:camera",
         ],
     },
 )

@@ -28,8 +28,8 @@ setup(
     entry_points={
         "console_scripts": [
             "fish_train = fish_train.commands.main:main",
-            "recorder = fish_train.nodes.recorder:main",
-            "replayer = fish_train.nodes.replayer:main",
+            "recorder = fish_train.nodes.entry:recorder",
+            "replayer = fish_train.nodes.entry:replayer",
             *(f"{verb} = fish_train.commands.main:{verb}" for verb in VERBS),
         ],
     },

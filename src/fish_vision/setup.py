@@ -24,7 +24,7 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
-            "tracker = fish_vision.nodes.tracker:main",
+            "tracker = fish_vision.nodes.entry:tracker",
             "calibrate = fish_vision.commands.calibrate:main",
             "check_image = fish_vision.commands.check_image:main",
         ],
