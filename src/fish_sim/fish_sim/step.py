@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from importlib.resources import files
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,20 @@ from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme, default_scheme, stable_scheme
 
 Array = NDArray[np.float64]
+Part = Literal["values", "tangents", "adjoints"]
+
+# what each part of a kernel consists of: functions of `model.Functions`, then texts in c/; compiled when first asked for
+PARTS: dict[Part, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "values": (("rate", "follow"), ("step.c", "rows.c", "rollout.c")),
+    "tangents": (
+        ("rate", "rate_jvp", "follow", "follow_jvp"),
+        ("step.c", "tangent.c", "rows.c", "rollout_jvp.c"),
+    ),
+    "adjoints": (
+        ("rate", "rate_vjp", "follow", "follow_vjp"),
+        ("step.c", "adjoint.c", "rows.c", "rollout_vjp.c"),
+    ),
+}
 
 SETTLED = 300  # periods of 10 ms after which servo and motor have followed a constant command
 
@@ -121,7 +136,7 @@ class Stepper:
         )
         states, tangents = (np.empty((len(commands) + 1, *start.shape)) for _ in range(2))
         states[0], tangents[0] = start, ds
-        self._kernel(len(start)).rollout_jvp(states, tangents, commands, dc, parameters, dp)
+        self._kernel(len(start), "tangents").rollout_jvp(states, tangents, commands, dc, parameters, dp)
         return tuple(a.reshape(len(a), *shape, -1) for a in (states, tangents))  # type: ignore[return-value]
 
     def rollout_vjp(
@@ -133,7 +148,7 @@ class Stepper:
         batch = len(start)
         g_start, g_commands = np.empty_like(start), np.empty((len(commands), batch, commands.shape[-1]))
         g_parameters = np.empty((batch, parameters.shape[-1]))
-        self._kernel(batch).rollout_vjp(
+        self._kernel(batch, "adjoints").rollout_vjp(
             flat[0], commands, parameters, flat[1], g_start, g_commands, g_parameters
         )
         return (
@@ -161,7 +176,7 @@ class Stepper:
         self._check_width("drive", w, len(DRIVE_NAMES))
         self._check_width("parameters", p, len(self.layout.parameters))
         rate, tangent = np.empty_like(x), np.empty_like(x)
-        self._kernel(len(rate)).rates_jvp(x, dx, w, dw, p, dp, rate, tangent)
+        self._kernel(len(rate), "tangents").rates_jvp(x, dx, w, dw, p, dp, rate, tangent)
         return rate, tangent
 
     def memory_jvp(
@@ -183,7 +198,7 @@ class Stepper:
         p, dp = (np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters))
         self._check_width("memory", start, len(self.layout.memory))
         commands = np.ascontiguousarray(commands, dtype=float)
-        self._kernel(start.shape[0]).memory_jvp(memory, tangents, commands, p, dp)
+        self._kernel(start.shape[0], "tangents").memory_jvp(memory, tangents, commands, p, dp)
         return memory, tangents
 
     def outputs(self, state: Array, drive_end: Array, parameters: Array) -> dict[str, Array]:
@@ -237,36 +252,42 @@ class Stepper:
                 f"{name}: got shape {array.shape}; expected (..., {width}) for {self.layout.structure}"
             )
 
-    def _kernel(self, batch: int) -> CompiledKernel | InterpretedKernel:
-        return kernel(self.layout.structure, self.scheme, 1 if batch == 1 else lanes(), self._compiled)
+    def _kernel(self, batch: int, part: Part = "values") -> CompiledKernel | InterpretedKernel:
+        width = 1 if batch == 1 else lanes()
+        return kernel(self.layout.structure, self.scheme, width, self._compiled, part)
 
 
 @functools.lru_cache(maxsize=256)
 def kernel(
-    structure: Structure, scheme: Scheme, width: int, compiled: bool
+    structure: Structure, scheme: Scheme, width: int, compiled: bool, part: Part
 ) -> CompiledKernel | InterpretedKernel:
-    """The kernel of a structure: compiled for `width` lanes, or interpreted."""
-    loaded = library(kernel_source(structure, scheme, width)) if compiled else None
+    """One part of a structure's kernel: compiled for `width` lanes, or interpreted."""
+    loaded = library(kernel_source(structure, scheme, width, part)) if compiled else None
     if loaded is None:
         return InterpretedKernel(structure, METHODS[scheme.method], scheme.substeps)
     return CompiledKernel(loaded)
 
 
-def kernel_source(structure: Structure, scheme: Scheme, width: int) -> str:
-    """Complete C text of the kernel of a structure."""
-    table, texts = functions(structure), files("fish_sim") / "c"
-    adjoints = [emit(f) for f in (table.rate_vjp, table.follow_vjp)]
-    parts = [(texts / name).read_text() for name in ("adjoint.c", "rollout.c")]
-    return "\n".join([tangent_source(structure, scheme, width), *adjoints, *parts])
+def kernel_source(structure: Structure, scheme: Scheme, width: int, part: Part) -> str:
+    """Complete C text of one part of a structure's kernel."""
+    return _source(structure, scheme, width, *PARTS[part])
 
 
 def tangent_source(structure: Structure, scheme: Scheme, width: int) -> str:
-    """The part of the kernel that steps and differentiates forward; filters build on it."""
-    table, texts = functions(structure), files("fish_sim") / "c"
-    emitted = [emit(f) for f in (table.rate, table.rate_jvp, table.follow, table.follow_jvp)]
-    parts = [(texts / name).read_text() for name in ("step.c", "tangent.c")]
-    head = _definitions(Layout(structure), scheme, width)
-    return "\n".join([*head, (texts / "vector.h").read_text(), *emitted, *parts])
+    """C text that steps and differentiates forward, exporting nothing; filters build on it."""
+    return _source(structure, scheme, width, PARTS["tangents"][0], ("step.c", "tangent.c"))
+
+
+def _source(
+    structure: Structure, scheme: Scheme, width: int, names: tuple[str, ...], texts: tuple[str, ...]
+) -> str:
+    folder, table = files("fish_sim") / "c", functions(structure)
+    return "\n".join([
+        *_definitions(Layout(structure), scheme, width),
+        (folder / "vector.h").read_text(),
+        *(emit(getattr(table, name)) for name in names),
+        *((folder / text).read_text() for text in texts),
+    ])  # fmt: skip
 
 
 def _definitions(layout: Layout, scheme: Scheme, width: int) -> list[str]:

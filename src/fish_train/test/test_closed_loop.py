@@ -30,10 +30,10 @@ def test_cost_gradient_and_state_agree_with_autograd() -> None:
     weights, fleet = make_weights("network", rng), make_fleet(stepper, bank, 5, rng)
     fleet.delay[:] = [0, 3, 1, 2, 30]
     for _ in range(2):  # the second window begins with a history and controllers that have run
-        noise = 0.01 * rng.standard_normal((11, 5, 6))
+        noise = 0.01 * rng.standard_normal((5, 5, 6))
         ours, theirs = fleet.copy(), fleet.copy()
-        a = kernel.window(weights, ours, 10, COST, noise, hold=5)
-        b = torch_loop.window(weights, theirs, 10, COST, noise, hold=5)
+        a = kernel.window(weights, ours, 4, COST, noise, hold=2)
+        b = torch_loop.window(weights, theirs, 4, COST, noise, hold=2)
         assert a.cost == pytest.approx(b.cost, rel=1e-12)
         assert relative(a.gradient, b.gradient) < 1e-10
         assert np.allclose(a.report, b.report, atol=1e-12)
@@ -49,8 +49,8 @@ def test_baseline_forms_agree_with_autograd(form: str) -> None:
     kernel, torch_loop, stepper, bank = both(form)
     rng = np.random.default_rng(2)
     weights, fleet = make_weights(form, rng), make_fleet(stepper, bank, 2, rng)
-    a = kernel.window(weights, fleet.copy(), 5, COST)
-    b = torch_loop.window(weights, fleet.copy(), 5, COST)
+    a = kernel.window(weights, fleet.copy(), 3, COST)
+    b = torch_loop.window(weights, fleet.copy(), 3, COST)
     assert len(weights) == weight_count(FORMS[form].layers)
     assert a.cost == pytest.approx(b.cost, rel=1e-12)
     assert relative(a.gradient, b.gradient) < 1e-10

@@ -71,7 +71,7 @@ def loop_source(stepper: Stepper, law: Law, width: int) -> str:
     }
     c = files("fish_train.training") / "c"
     return "\n".join([
-        kernel_source(stepper.layout.structure, stepper.scheme, width),
+        kernel_source(stepper.layout.structure, stepper.scheme, width, "adjoints"),
         *(f"#define {name} {value}" for name, value in sizes.items()),
         *(emit(function) for function in expressions(law)),
         *((c / name).read_text() for name in ("mlp.h", "path_search.h", "closed_loop.c")),
