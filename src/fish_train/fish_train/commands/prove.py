@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,6 +82,9 @@ def run(args: argparse.Namespace) -> int:
 
     if args.jobs < 1 or args.trials < 3 or not args.duration >= 4.0:
         raise UserError("expected at least one job, three trials and 4 s")
+    _need("pysindy", "--oracle", args.oracle)
+    _need("mujoco", "the second plant", bool(args.close_loop) or "mujoco" in args.groups)
+    _need("distributed", "--cluster", bool(args.cluster))
     console = terminal()
     if args.close_loop:
         return _close_loop(args, console)
@@ -102,6 +106,12 @@ def run(args: argparse.Namespace) -> int:
         f"{study.folder}/report.html, labels.json, seals.json; seed {study.about['seed']}", soft_wrap=True
     )
     return 0
+
+
+def _need(module: str, what: str, wanted: bool) -> None:
+    """Optional packages are asked for before anything starts."""
+    if wanted and find_spec(module) is None:
+        raise UserError(f"{what} needs {module}: pip install {module} (versions: requirements-bench.txt)")
 
 
 def _study(args: argparse.Namespace, console: Console) -> Study:
