@@ -27,7 +27,7 @@ from fish_train.prove.score import score_world
 from fish_train.prove.seal import Sealed, broken_seals, seal_label
 from fish_train.prove.study import Study, StudyError, read_json
 from fish_train.prove.tables import ASKED, Share, calibration, choice, power
-from fish_train.prove.where import activity, regime_f1, time_overlap
+from fish_train.prove.where import activity, dof_overlap, regime_f1, time_overlap
 from fish_train.prove.world import World
 from fish_train.recordings import read_dataset
 from fish_train.reports.prove_page import write_prove_page
@@ -195,6 +195,7 @@ def test_overlap_and_regime() -> None:
     names = ["trial_00", "trial_01"]
     hit = [{"trial": "trial_01", "from": 2.0, "to": 4.0}]
     assert time_overlap(hit, names, acts) == 1.0
+    assert dof_overlap({"surge": 0.7, "yaw": 0.3}, {"surge": 0.5, "sway": 0.5}) == 0.5
     assert time_overlap([{**hit[0], "trial": "trial_00"}], names, acts) == 0.0
     truth = np.zeros((800, 1, 3))
     truth[:, 0, 0] = np.linspace(0.0, 2.0, 800)  # towards the wall at 2.135 m
@@ -219,12 +220,13 @@ def test_the_oracle_and_the_rivals_by_hand() -> None:
     answer = diagnosis(("current", "physics", 0.9))
     answer["diagnosis"]["fit"]["with_effects"]["rms"] = {"2 s": {"position_m": 0.022}}
     right, null = score_world(world, answer), score_world(World("null", 2), diagnosis(verdict="no_mismatch"))
-    judged = {1: {"overlap": 0.5, "f1": None}, 2: {"overlap": None, "f1": None}}
+    judged = {1: {"overlap": 0.5, "f1": None, "dof": 0.7}, 2: {"overlap": None, "f1": None, "dof": None}}
     table = judged_table([right, null], judged, {1: sight(9.0), 2: sight(0.0)}, {1: True})
     assert [row[2] for row in table.rows] == [
         "100% of 1",
         "1.10 (1 worlds)",
         "0.55 (1 worlds)",
+        "0.70 (1 worlds)",
         "0.50 (1 worlds)",
         "–",
     ]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fish_train.diagnose.locate import dof_shares
 from fish_train.diagnose.vocabulary import candidates
 from fish_train.prove.build import make_readings
 from fish_train.prove.competitors import compete
@@ -17,7 +18,7 @@ from fish_train.prove.runner import spread
 from fish_train.prove.score import Score, vocabulary
 from fish_train.prove.study import Study, read_json, write_json
 from fish_train.prove.tables import Share
-from fish_train.prove.where import activity, regime_f1, time_overlap
+from fish_train.prove.where import activity, dof_overlap, regime_f1, time_overlap
 from fish_train.prove.world import World
 from fish_train.reports.page import Table
 
@@ -44,7 +45,7 @@ def judge_world(task: Task) -> str:
 
 
 def judge(world: World, diagnosis: Mapping[str, Any]) -> dict[str, Any]:
-    """The oracle's sight, time overlap and regime F1 (None where they have no meaning)."""
+    """The oracle's sight, overlap of degrees of freedom and of time, regime F1 (None where they have no meaning)."""
     readings = make_readings(world)
     experiment = as_experiment(readings, world.encoder)
     truth = np.concatenate([r.truth for r in readings], axis=1)
@@ -52,13 +53,15 @@ def judge(world: World, diagnosis: Mapping[str, Any]) -> dict[str, Any]:
     names = [n for n in world.names if n in vocabulary()]
     if not world.names:  # what an oracle that looks for something finds where nothing is
         names = [str(np.random.default_rng(world.seed).choice(candidates()))]
-    content: dict[str, Any] = {"sight": None, "overlap": None, "f1": None}
+    content: dict[str, Any] = {"sight": None, "dof": None, "overlap": None, "f1": None}
+    effects = [e for e in diagnosis["effects"] if e["name"] in world.names] or diagnosis["effects"]
     if names and world.plant == "fish_sim" and world.links == 3:
         looked = look(world, experiment, held, names)
         content["sight"] = asdict(looked.sight)
+        shares = dof_shares(looked.nominal, looked.true)
+        content["dof"] = dof_overlap(effects[0]["where"]["dof"], shares) if effects else None
         content["rivals"] = asdict(compete(looked.nominal, looked.training, looked.held_out))
     acts = activity(world, truth)
-    effects = [e for e in diagnosis["effects"] if e["name"] in world.names] or diagnosis["effects"]
     if acts is not None and effects:
         covariate, strength = acts
         trained = [i for i, name in enumerate(experiment.names) if name not in held]
@@ -114,6 +117,7 @@ def judged_table(
     ]
     overlap = _finite([judged[s.world.seed]["overlap"] for s in scores if s.top1 and s.world.seed in judged])
     f1 = _finite([judged[s.world.seed]["f1"] for s in scores if s.top1 and s.world.seed in judged])
+    dof = _finite([judged[s.world.seed].get("dof") for s in scores if s.top1 and s.world.seed in judged])
     found = sum(s.in_set for s in clear) / len(clear) if clear else float("nan")
     rows = [
         [
@@ -127,6 +131,11 @@ def judged_table(
             _median(ratio),
         ],
         ["the same over the refitted nominal structure, median", "", _median(gain)],
+        [
+            "degrees of freedom: overlap of their shares with those of the true structure fitted",
+            "",
+            _median(dof, "mean"),
+        ],
         ["time overlap (IoU) of localised effects", "at least 0.7", _median(overlap, "mean")],
         ["regime F1", "at least 0.9", _median(f1, "mean")],
     ]
@@ -155,7 +164,7 @@ def rivals_table(scores: Sequence[Score], rivals: Mapping[int, Mapping[str, Any]
     """Competitors on the residual force of the refitted nominal model."""
     own = [s for s in scores if s.world.seed in rivals and len(s.truth) < 2]
     said = {s.world.seed: rivals[s.world.seed]["sindy"] for s in own}
-    hidden, nothing = [s for s in own if s.truth], [s for s in own if not s.truth]
+    hidden, nothing = [s for s in own if s.truth], [s for s in own if s.world.group == "null"]
     rows = [
         ["this tool", str(Share.of(hidden, lambda s: s.top1)), str(Share.of(nothing, lambda s: s.alarm)), ""],
         [

@@ -41,6 +41,11 @@ class Share:
         low, high = proportion_confint(self.k, self.n, method="beta")
         return float(np.nan_to_num(low)), float(high)
 
+    @property
+    def short(self) -> str:
+        """k/n alone."""
+        return f"{self.k}/{self.n}" if self.n else "–"
+
     def __str__(self) -> str:
         if not self.n:
             return "–"
@@ -113,10 +118,10 @@ def group_table(scores: Sequence[Score]) -> Table:
         named = [s for s in own if s.truth]
         sizes = [len(s.answered) for s in own if s.answered]
         rows.append([
-            group, str(len(own)), str(Share.of(named, lambda s: s.top1)), str(Share.of(named, lambda s: s.in_set)),
-            f"{np.mean(sizes):.2f}" if sizes else "–", str(Share.of(named, lambda s: s.exact)),
-            str(Share.of(own, lambda s: bool(s.false_names))), str(Share.of(own, lambda s: s.alarm)),
-            str(Share.of(own, lambda s: s.verdict == "unexplained")), str(sum(s.verdict == "failed" for s in own)),
+            group, str(len(own)), Share.of(named, lambda s: s.top1).short, Share.of(named, lambda s: s.in_set).short,
+            f"{np.mean(sizes):.2f}" if sizes else "–", Share.of(named, lambda s: s.exact).short,
+            Share.of(own, lambda s: bool(s.false_names)).short, Share.of(own, lambda s: s.alarm).short,
+            Share.of(own, lambda s: s.verdict == "unexplained").short, str(sum(s.verdict == "failed" for s in own)),
             f"{np.median([s.seconds for s in own]):.0f}",
         ])  # fmt: skip
     note = "; ".join(f"{name}: {(f.__doc__ or '').strip().rstrip('.')}" for name, f in GROUPS.items())
@@ -203,7 +208,7 @@ def power_table(steps: Sequence[Power]) -> Table:
 def criterion_table(scores: Sequence[Score]) -> Table:
     """AIC and BIC over the tool's own quick refits of all candidates, on the same worlds."""
     judged = [s for s in scores if s.ranking and not s.unnamed and len(s.truth) < 2]
-    hidden, nothing = [s for s in judged if s.truth], [s for s in judged if not s.truth]
+    hidden, nothing = [s for s in judged if s.truth], [s for s in judged if s.world.group == "null"]
     rows = []
     for name, cost in (("AIC", aic_cost), ("BIC", bic_cost)):
         right = [choice(s, cost) in s.truth for s in hidden]
@@ -212,9 +217,7 @@ def criterion_table(scores: Sequence[Score]) -> Table:
     rows.insert(
         0, ["this tool", str(Share.of(hidden, lambda s: s.top1)), str(Share.of(nothing, lambda s: s.alarm))]
     )
-    note = (
-        "Worlds with one hidden name or none. AIC and BIC choose among the quick refits on the search trials."
-    )
+    note = "Worlds with one hidden name, and nulls. AIC and BIC choose among the quick refits on the search trials."
     return Table("Competitors", ["method", "right name first", "false alarms"], rows, note)
 
 

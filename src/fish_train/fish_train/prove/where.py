@@ -53,6 +53,11 @@ def activity(world: World, truth: Array) -> tuple[str, Array] | None:
     return None
 
 
+def dof_overlap(stated: Mapping[str, float], true: Mapping[str, float]) -> float:
+    """1 where two sets of shares over the degrees of freedom are equal, 0 where they have nothing in common."""
+    return float(sum(min(share, true.get(name, 0.0)) for name, share in stated.items()))
+
+
 def time_overlap(stated: Sequence[Mapping[str, Any]], names: Sequence[str], acts: Array) -> float:
     """Intersection over union, in time, of the windows stated and as many of the strongest true ones.
 

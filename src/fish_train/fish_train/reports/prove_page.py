@@ -100,7 +100,7 @@ def _reliability(bins: Sequence[Bin]) -> go.Figure:
 
 def _confusion(scores: Sequence[Score]) -> go.Figure:
     own = [s for s in scores if len(s.world.names) < 2]
-    hidden = [s.world.names[0] if s.world.names else "nothing" for s in own]
+    hidden = [s.world.names[0] if s.world.names else f"nothing ({s.world.plant})" for s in own]
     answered = [s.named[0] if s.named else s.verdict for s in own]
     rows, columns = sorted(set(hidden)), sorted(set(answered))
     counts = np.zeros((len(rows), len(columns)), dtype=int)
