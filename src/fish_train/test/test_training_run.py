@@ -142,10 +142,24 @@ def test_diverging_training_is_said_and_rolled_back(tmp_path: Path, monkeypatch:
     assert np.array_equal(weights, good.weights)
 
 
-def test_search_does_not_lose_against_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def short_search(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fish_train.training.search.GENERATIONS", {6: 2})
     monkeypatch.setattr("fish_train.training.search.POPULATION", 2)
     monkeypatch.setattr("fish_train.training.search.EPISODES", 1)
+
+
+def test_a_search_says_so_on_its_card(tmp_path: Path, short_search: None) -> None:
+    assert run(job(tmp_path, form="constant", search=True), lambda _: None).state == "finished"
+    assert read_gains_file(tmp_path / "gains.safetensors").contract.layers == ()
+    card = (tmp_path / "model_card.md").read_text()
+    assert (
+        "found by differential evolution" in card
+        and "training" not in card.split("## Recipe")[0].split("- ")[2]
+    )
+
+
+def test_search_does_not_lose_against_its_start(short_search: None) -> None:
     said: list[str] = []
     trainer = Trainer(short(), Robot(), 3, form=FORMS["constant"])
     bank = trainer.ladder_bank()

@@ -95,9 +95,10 @@ def path_figure(path: ReferencePath, traces: Sequence[tuple[str, Array]]) -> go.
 def gains_figure(trace: Trace, run: int) -> go.Figure:
     """The six gains of one run over time, steering left and speed right."""
     figure = make_subplots(cols=2, subplot_titles=("steering", "speed"))
+    swum = np.isfinite(trace.cross_track[:, run])
     for k, output in enumerate(OUTPUTS):
         figure.add_scatter(
-            x=trace.time, y=trace.gains[:, run, k], mode="lines", name=output.name, line={"color": COLOURS[k % 3]},
+            x=trace.time[swum], y=trace.gains[swum, run, k], mode="lines", name=output.name, line={"color": COLOURS[k % 3]},
             row=1, col=1 + k // 3,
         )  # fmt: skip
     figure.update_xaxes(title="time, s")

@@ -83,8 +83,8 @@ def letter_blocks(
     """Letters swum through the full chain, and the gains on R and S."""
     blocks: list[Block] = []
     for letter in paper.LETTERS:
-        chosen = [(c, t, k) for c, t, k in traces if c.path == letter and c.seed == 0]
-        lines = [(f"{cell.speed:g} m/s", trace.motion[:, k, :2]) for cell, trace, k in chosen]
+        chosen = [(c.speed, t.motion[:, k, :2]) for c, t, k in traces if c.path == letter and c.seed == 0]
+        lines = [(f"{speed:g} m/s", position) for speed, position in sorted(chosen, key=lambda item: item[0])]
         blocks.append(Figure(f"Letter {letter}", path_figure(read_path(letter), lines)))
     for letter in ("R", "S"):
         for cell, trace, k in traces:

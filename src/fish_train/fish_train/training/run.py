@@ -19,7 +19,7 @@ from fish_train.training.network import FORMS, LAYERS, Array, from_tensors
 from fish_train.training.run_log import RunLog
 from fish_train.training.search import search
 from fish_train.training.trainer import Progress, Trainer, TrainingDiverged
-from fish_train.training.weights_output import write_weights
+from fish_train.training.weights_output import training_state, write_weights
 
 CHECKPOINT = "checkpoint.npz"
 CHECKPOINT_PERIOD = 5.0  # s
@@ -83,7 +83,7 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
                 "weights are kept. Use a smaller learning_rate or clip"
             )
     last = session.progress
-    write_weights(job.folder, trainer, last, session.seconds, job.command)
+    write_weights(job.folder, trainer, training_state(trainer), last, session.seconds, job.command)
     status = session.status(state, message)
     report(status)
     return status
@@ -98,7 +98,8 @@ def _search(job: Job, trainer: Trainer, report: Callable[[Status], None]) -> Sta
 
     cost, weights = search(trainer, lambda text: report(status("training", text)))
     trainer.set_weights(weights)
-    write_weights(job.folder, trainer, None, time.monotonic() - began, job.command)
+    made = f"found by differential evolution, mean stage cost {cost:.5f}"
+    write_weights(job.folder, trainer, made, None, time.monotonic() - began, job.command)
     last = status("finished", f"mean stage cost {cost:.5f}")
     report(last)
     return last

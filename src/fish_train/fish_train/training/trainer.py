@@ -10,7 +10,8 @@ import torch
 from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
-from fish_sim.step import Scheme, Stepper
+from fish_sim.scheme import Scheme
+from fish_sim.step import Stepper
 from fish_train.training.compiled_loop import CompiledLoop
 from fish_train.training.config import TrainConfig
 from fish_train.training.curriculum import SlidingCriterion, make_levels

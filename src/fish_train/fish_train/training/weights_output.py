@@ -53,21 +53,26 @@ def make_policy(trainer: Trainer, note: str) -> Policy:
 
 
 def write_weights(
-    folder: Path, trainer: Trainer, last: Progress | None, seconds: float, command: str
+    folder: Path, trainer: Trainer, made: str, last: Progress | None, seconds: float, command: str
 ) -> None:
-    """Weights file (of a schedule, which no controller loads, its coefficients) and model card."""
+    """Weights file (of a schedule, which no controller loads, its coefficients) and model card; `made`: how."""
     if trainer.form.inputs == "schedule":
         content = {"form": "schedule", "command": command, "weights": trainer.weights.tolist()}
         (folder / SCHEDULE).write_text(json.dumps(content, indent=1), encoding="utf-8")
     else:
         write_gains_file(folder / WEIGHTS, make_policy(trainer, f"trained by: {command}"))
-    (folder / CARD).write_text(model_card(trainer, last, seconds, command), encoding="utf-8")
+    (folder / CARD).write_text(model_card(trainer, made, last, seconds, command), encoding="utf-8")
 
 
-def model_card(trainer: Trainer, last: Progress | None, seconds: float, command: str) -> str:
+def training_state(trainer: Trainer) -> str:
+    """How far training came."""
+    state = "finished" if trainer.finished else f"stopped at level {trainer.level} of {len(trainer.levels)}"
+    return f"training {state} after {trainer.update} updates"
+
+
+def model_card(trainer: Trainer, made: str, last: Progress | None, seconds: float, command: str) -> str:
     """Markdown: what it is, how it was made, what it is good for."""
     c, robot = trainer.config, trainer.robot
-    state = "finished" if trainer.finished else f"stopped at level {trainer.level} of {len(trainer.levels)}"
     effects = ", ".join(robot.effects) or "none"
     lines = [
         "# Gains policy of the robot fish",
@@ -75,7 +80,7 @@ def model_card(trainer: Trainer, last: Progress | None, seconds: float, command:
         *WHAT[trainer.form.inputs],
         "",
         f"- command: `{command}`",
-        f"- seed {trainer.seed}; training {state} after {trainer.update} updates, {seconds:.0f} s",
+        f"- seed {trainer.seed}; {made}, {seconds:.0f} s",
         f"- robot: {robot.name}, {robot.links} links, effects: {effects}; hash {robot.digest()}",
         f"- speeds {c.slowest} to {c.fastest} m/s; sinusoids {list(c.amplitudes)} m with {list(c.cycles)} cycles over "
         f"{c.sinusoid_length} m; circles {list(c.radii)} m",
