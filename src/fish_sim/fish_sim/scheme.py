@@ -9,7 +9,7 @@ import numpy as np
 from fish_sim.methods import METHODS
 from fish_sim.model import DT
 from fish_sim.robot import Robot
-from fish_sim.stability import MAX_SUBSTEPS, enough_substeps, modes_at_rest
+from fish_sim.stability import GROWTH, MAX_SUBSTEPS, enough_substeps, growth, modes_at_rest
 
 DEFAULT_METHOD = "cfmr7"
 # for 1, 2 .. 12 links: the fastest mode turns by at most 0.86 rad a step; n = 3 keeps its energy to 2e-7 per second
@@ -52,3 +52,21 @@ def stable_scheme(robot: Robot) -> Scheme:
             f" {scheme.method} in {DT} s"
         )
     return replace(scheme, substeps=max(scheme.substeps, enough))
+
+
+def check_scheme(scheme: Scheme, robot: Robot) -> None:
+    """Raise ValueError if a scheme blows up the robot's own modes about rest.
+
+    With the eigenvalues s of the linearised motion the growth per step of h is |R(h s)|, R the method's
+    stability function; modes that grow by themselves are not the scheme's fault.
+    """
+    method = METHODS[scheme.method]
+    modes = modes_at_rest(robot.structure, np.array(robot.vector()))
+    if growth(method, modes, scheme.substeps) <= 1.0 + GROWTH:
+        return
+    enough = enough_substeps(method, modes)
+    advice = f"use substeps >= {enough}" if enough else f"use another method ({DEFAULT_METHOD})"
+    raise ValueError(
+        f"substeps = {scheme.substeps} ({scheme.method}, {1e3 * DT / scheme.substeps:g} ms): unstable for"
+        f" this robot, whose fastest mode is at {np.abs(modes).max():.0f} 1/s; {advice}"
+    )

@@ -21,7 +21,7 @@ from fish_sim.kernel import CompiledKernel
 from fish_sim.methods import METHODS
 from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, Structure, functions
 from fish_sim.robot import Robot
-from fish_sim.scheme import Scheme, default_scheme, stable_scheme
+from fish_sim.scheme import Scheme, check_scheme, default_scheme, stable_scheme
 
 Array = NDArray[np.float64]
 Part = Literal["values", "tangents", "adjoints"]
@@ -52,7 +52,13 @@ class Stepper:
 
     @classmethod
     def of(cls, robot: Robot, scheme: Scheme | None = None) -> Stepper:
-        """The stepper of a robot, by default with steps that its own modes allow; see `parameters`."""
+        """The stepper of a robot, by default with steps that its own modes allow; see `parameters`.
+
+        Raises:
+            ValueError: the scheme's steps are too coarse for this robot.
+        """
+        if scheme is not None:
+            check_scheme(scheme, robot)
         return cls(robot.structure, scheme or stable_scheme(robot))
 
     def parameters(self, robot: Robot) -> Array:
