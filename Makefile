@@ -70,7 +70,7 @@ demo: build
 	@$(FISH_TRAIN) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
 		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
 
-# A few worlds in a few minutes; ARGS='--worlds 300 --oracle' is the study. The same OUT goes on where it was stopped.
+# A few small worlds; ARGS='--worlds 300 --oracle' is the study. The same OUT goes on where it was stopped.
 prove: build $(VENV)/.train
 	@$(FISH_TRAIN) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--worlds 4 --groups single sensor outside null --trials 6 --duration 8)
 
