@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write the three files, print the verdict."""
-    from fish_train.diagnose.answer import answer
+    from fish_train.diagnose.answer import answer, corrected
     from fish_train.diagnose.decide import Level
     from fish_train.diagnose.diagnosis import diagnose
     from fish_train.identify.experiment import ExperimentError, build_experiment
@@ -55,8 +55,8 @@ def run(args: argparse.Namespace) -> int:
         result = diagnose(experiment, robot, level, say)
         content = answer(result)
     (args.out / "diagnosis.json").write_text(json.dumps(content, indent=1, default=float))
-    save_robot(without_wrench(result.final.robot), args.out / "model.yaml", result.final.standard_errors,
-               notes=sentence(content))  # fmt: skip
+    fit = corrected(result)
+    save_robot(without_wrench(fit.robot), args.out / "model.yaml", fit.standard_errors, notes=sentence(content))
     write_diagnosis_page(args.out / "report.html", args.dataset[0].name, content, result)
     print(sentence(content))
     print(f"{args.out}/diagnosis.json, model.yaml, report.html ({time.monotonic() - start:.0f} s)")

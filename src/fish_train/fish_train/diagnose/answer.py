@@ -24,25 +24,45 @@ HORIZONS = (1.0, 2.0, 5.0)
 
 def verdict(d: Diagnosis) -> str:
     """no_mismatch, missing_physics, sensor_or_actuator or unexplained."""
-    if not d.accepted:
-        return "unexplained" if is_unexplained(d) else "no_mismatch"
-    kinds = {kind_of(a.name) for a in d.accepted}
+    found = named(d)
+    if not found:
+        return "unexplained" if has_law(d) else "no_mismatch"
+    kinds = {kind_of(a.name) for a in found}
     return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
 
 
-def is_unexplained(d: Diagnosis) -> bool:
+def has_law(d: Diagnosis) -> bool:
     """The wrench that remains follows a law on trials that the law was not fitted to."""
     return max(d.description.r2.values()) > UNEXPLAINED_R2
+
+
+def named(d: Diagnosis) -> tuple[Accepted, ...]:
+    """The accepted effects, or none where they leave more of a lawful force than they take away: nearest is not right."""
+    return () if has_law(d) and unexplained_share(d) > 0.5 else d.accepted
+
+
+def corrected(d: Diagnosis) -> Fit:
+    """The fit that model.yaml holds."""
+    return d.final if named(d) else d.nominal
+
+
+def unexplained_share(d: Diagnosis) -> float:
+    """Part of the mismatch that is lawful and still there: variances of the wrench in units of its unlawful rest."""
+    r2 = np.clip([d.description.r2[dof] for dof in locate.DOFS], 0.0, 0.99)
+    final, nominal = np.square(d.final.noise.wrench), np.square(d.nominal.noise.wrench)
+    rest = final * (1.0 - r2)
+    left, removed = np.sum(r2 * final / rest), np.sum(np.maximum(nominal - final, 0.0) / rest)
+    return float(left / (left + removed)) if left + removed > 0 else 0.0
 
 
 def answer(d: Diagnosis) -> dict[str, Any]:
     """The dictionary written to diagnosis.json."""
     return {
         "verdict": verdict(d),
-        "effects": [effect_entry(d, a) for a in d.accepted],
+        "effects": [effect_entry(d, a) for a in named(d)],
         "unexplained": unexplained_entry(d),
         "fit": fit_entry(d),
-        "next_experiment": next_experiment([a.name for a in d.accepted], rivals_of_last(d)),
+        "next_experiment": next_experiment([a.name for a in named(d)], rivals(d)),
         "out_of_reach": d.unreachable,
         "ranking": [{"name": r.name, "gain": r.gain} for r in d.rounds[0].ranking],
     }
@@ -77,9 +97,9 @@ def competition(accepted: Accepted) -> dict[str, float]:
     return dict(sorted(odds.items(), key=lambda item: -item[1]))
 
 
-def rivals_of_last(d: Diagnosis) -> list[str]:
+def rivals(d: Diagnosis) -> list[str]:
     """Names that the data cannot tell from what was found."""
-    return [n for a in d.accepted for n, p in competition(a).items() if n != a.name and p > PLAUSIBLE]
+    return [n for a in named(d) for n, p in competition(a).items() if n != a.name and p > PLAUSIBLE]
 
 
 def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:
@@ -105,8 +125,8 @@ def where_entry(force: locate.MissingForce, nominal: Fit, final: Fit) -> dict[st
 def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
     """What no name explains: size, place, and a sparse regression."""
     r2 = d.description.r2
-    share = max(0.0, *r2.values())
-    if not is_unexplained(d):
+    share = unexplained_share(d)
+    if not has_law(d):
         return {"share": share, "where": {}, "description": "the remaining force looks like water noise"}
     worst = max(r2, key=lambda dof: r2[dof])
     law = " + ".join(f"({c:.3g}) {term}" for term, c in d.description.terms[worst].items())
@@ -119,6 +139,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "time": locate.time_shares(d.remaining, scale),
             "place": locate.place_shares(d.remaining, scale),
         },
+        "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
         "description": f"{worst} = {law} (SI units; explains {r2[worst]:.0%} of it on unseen trials)",
     }
 

@@ -49,7 +49,7 @@ def write_trial(directory: Path, r: Readings, m: int, start_ns: int, encoder: bo
     which = np.repeat(np.arange(len(batches)), [len(a) for a in arrivals])[order]
     place = np.concatenate([np.arange(len(a)) for a in arrivals])[order]
     types = {"joint_command": "JointState", "joint_states": "JointState", "imu/data": "Imu"}
-    with McapRecording(directory, {"robot": "fish"}, chunk_s=5.0) as recording:
+    with McapRecording(directory, {"robot": "fish"}, chunk_s=5.0, compress=True) as recording:
         topics = [
             recording.add_topic(
                 f"/fish/{name}",

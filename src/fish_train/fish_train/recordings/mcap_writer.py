@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import yaml
+import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -75,12 +76,15 @@ class _OpenChunk:
 class McapRecording:
     """Writes one recording directory: `<directory>/<name>.mcap` and metadata.yaml."""
 
-    def __init__(self, directory: Path, custom: dict[str, str] | None = None, chunk_s: float = 0.5) -> None:
+    def __init__(
+        self, directory: Path, custom: dict[str, str] | None = None, chunk_s: float = 0.5, compress: bool = False
+    ) -> None:  # fmt: skip
         """Create the directory, which must not exist yet.
 
         Args:
             custom: stored with the recording ("robot" names the robot).
             chunk_s: age at which an open chunk is written [s], by the times given to `write`.
+            compress: chunks are packed with zstandard; costs time while recording.
         """
         if directory.exists():
             raise RecordingError(f"{directory}: exists already; recordings are never overwritten")
@@ -90,6 +94,7 @@ class McapRecording:
         self.topics: dict[tuple[str, str], Topic] = {}
         self._schemas: dict[str, Schema] = {}
         self._chunk_ns = int(chunk_s * 1e9)
+        self._compression = "zstd" if compress else ""
         self._chunk = _OpenChunk()
         self._chunks: list[ChunkIndex] = []
         self._range: tuple[int, int] | None = None
@@ -171,9 +176,10 @@ class McapRecording:
             return
         chunk, self._chunk = self._chunk, _OpenChunk()
         first, last, data = min(chunk.times), max(chunk.times), chunk.records.end()  # type: ignore[no-untyped-call]
+        packed = zstandard.compress(data) if self._compression else data
         body = _records(
             Chunk(
-                compression="", data=data, uncompressed_size=len(data), uncompressed_crc=zlib.crc32(data),
+                compression=self._compression, data=packed, uncompressed_size=len(data), uncompressed_crc=zlib.crc32(data),
                 message_start_time=first, message_end_time=last,
             )
         )  # fmt: skip
@@ -182,8 +188,8 @@ class McapRecording:
             offsets[channel] = self._file.size + len(body) + len(index)
             index += _records(MessageIndex(channel_id=channel, records=entries))
         entry = ChunkIndex(
-            chunk_start_offset=self._file.size, chunk_length=len(body), compression="",
-            compressed_size=len(data), uncompressed_size=len(data),
+            chunk_start_offset=self._file.size, chunk_length=len(body), compression=self._compression,
+            compressed_size=len(packed), uncompressed_size=len(data),
             message_index_offsets=offsets, message_index_length=len(index),
             message_start_time=first, message_end_time=last,
         )  # fmt: skip
