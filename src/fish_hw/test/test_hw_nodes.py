@@ -242,19 +242,32 @@ NODES = {
 }
 
 
+STARTED: list[subprocess.Popen] = []
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_running():
+    """Processes of a test that failed must not disturb the next."""
+    yield
+    while STARTED:
+        STARTED.pop().kill()
+
+
 def start(name: str, *arguments: str) -> subprocess.Popen:
     environment = os.environ | {
         "ROS_DOMAIN_ID": str(DOMAIN),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "PYTHONUNBUFFERED": "1",
     }
-    return subprocess.Popen(
+    process = subprocess.Popen(
         [sys.executable, "-m", f"fish_hw.nodes.{name}", "--ros-args", *arguments],
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
     )
+    STARTED.append(process)
+    return process
 
 
 def first_words(process: subprocess.Popen, words: str) -> None:
