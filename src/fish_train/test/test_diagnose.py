@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot, load_robot, save_robot
 from fish_train.commands.diagnose import without_wrench
 from fish_train.diagnose import diagnosis as module
@@ -31,11 +32,6 @@ def swim(robot: Robot, seed: int = 0, kinds=("sines", "steps", "random"), durati
     return record(robot, commands, Noise(), random)[0]
 
 
-@pytest.fixture
-def few(monkeypatch):
-    monkeypatch.setattr(module, "candidates", lambda: FEW)
-
-
 def truth(**effects) -> Robot:
     robot = Robot()
     return Robot(
@@ -54,8 +50,8 @@ def test_the_vocabulary_is_complete_and_every_name_has_a_kind():
     assert {kind_of(name) for name in VOCABULARY} == {"physics", "actuator", "sensor"}
 
 
-def test_nothing_is_found_where_nothing_is(few, tmp_path):
-    result = module.diagnose(swim(truth()), Robot())
+def test_nothing_is_found_where_nothing_is(tmp_path):
+    result = module.diagnose(swim(truth()), Robot(), names=FEW)
     content = answer(result)
     assert content["verdict"] == "no_mismatch"
     assert content["effects"] == []
@@ -63,8 +59,8 @@ def test_nothing_is_found_where_nothing_is(few, tmp_path):
     assert "nothing is missing" in (tmp_path / "report.html").read_text()
 
 
-def test_a_hidden_current_is_named_with_its_size(few, tmp_path):
-    result = module.diagnose(swim(truth(current={"x": 0.03, "y": -0.02})), Robot())
+def test_a_hidden_current_is_named_with_its_size(tmp_path):
+    result = module.diagnose(swim(truth(current={"x": 0.03, "y": -0.02})), Robot(), names=FEW)
     content = json.loads(json.dumps(answer(result), default=float))
     assert content["verdict"] == "missing_physics"
     assert [e["name"] for e in content["effects"]] == ["current"]
@@ -85,10 +81,10 @@ def test_a_hidden_current_is_named_with_its_size(few, tmp_path):
     assert load_robot(tmp_path / "model.yaml").effects["current"]["x"] == pytest.approx(found["x"]["value"])
 
 
-def test_a_late_camera_is_not_called_physics(few):
+def test_a_late_camera_is_not_called_physics():
     late = swim(truth())
     shifted = tuple(type(f)(f.t + 0.05, f.pose) for f in late.frames)
-    result = module.diagnose(type(late)(**{**late.__dict__, "frames": shifted}), Robot())
+    result = module.diagnose(type(late)(**{**late.__dict__, "frames": shifted}), Robot(), names=FEW)
     assert [a.name for a in result.accepted] == ["camera_latency"]
     assert answer(result)["verdict"] == "sensor_or_actuator"
 
@@ -102,10 +98,22 @@ def test_what_the_data_cannot_say_is_said():
     assert out_of_reach(blind)["gyro_scale"] == "no IMU was recorded"
 
 
+def test_an_effect_of_the_user_competes_with_the_others(monkeypatch):
+    monkeypatch.setitem(EFFECTS, "mine", EFFECTS["quadratic_drag"])
+    assert "mine" in candidates()
+    assert kind_of("mine") == "physics"
+
+
+def test_only_known_names_compete():
+    with pytest.raises(ValueError, match="unknown candidate 'magic'; known: quadratic_drag"):
+        module.diagnose(swim(Robot(), duration=1.0), Robot(), names=["magic"])
+
+
 def test_held_out_trials_take_no_part():
     split = split_trials(swim(Robot(), kinds=("sines",) * 7, duration=1.0))
     assert set(split.held_out).isdisjoint(split.training)
-    assert set(split.search) <= set(split.training)
+    assert {*split.search, *split.check} == set(split.training)
+    assert set(split.search).isdisjoint(split.check)
     assert sorted((*split.training, *split.held_out)) == list(range(7))
 
 

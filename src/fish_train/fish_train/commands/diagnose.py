@@ -25,6 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--false-alarms", type=float, default=0.02, help="tolerated share of false alarms (default 0.02)"
     )
+    parser.add_argument(
+        "--candidates", metavar="NAME,NAME", help="what competes (default: every name of the vocabulary)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -32,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.diagnose.answer import answer, corrected
     from fish_train.diagnose.decide import Level
     from fish_train.diagnose.diagnosis import diagnose
+    from fish_train.diagnose.vocabulary import known
     from fish_train.identify.experiment import ExperimentError, build_experiment
     from fish_train.recordings import read_dataset
     from fish_train.reports.diagnosis_page import sentence, write_diagnosis_page
@@ -40,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         robot = load_robot(args.robot) if args.robot else Robot()
         level = Level(args.false_alarms)
+        names = known(args.candidates.split(",")) if args.candidates else None
         trials = [trial for path in args.dataset for trial in read_dataset(path)]
         experiment = build_experiment(trials)
     except (RobotError, ExperimentError, ValueError) as error:
@@ -52,11 +57,13 @@ def run(args: argparse.Namespace) -> int:
             if not console.is_terminal:
                 console.print(f"{time.monotonic() - start:5.0f} s  {text}")
 
-        result = diagnose(experiment, robot, level, say)
+        result = diagnose(experiment, robot, level, say, names)
         content = answer(result)
     (args.out / "diagnosis.json").write_text(json.dumps(content, indent=1, default=float))
     fit = corrected(result)
-    save_robot(without_wrench(fit.robot), args.out / "model.yaml", fit.standard_errors, notes=sentence(content))
+    save_robot(
+        without_wrench(fit.robot), args.out / "model.yaml", fit.standard_errors, notes=sentence(content)
+    )
     write_diagnosis_page(args.out / "report.html", args.dataset[0].name, content, result)
     print(sentence(content))
     print(f"{args.out}/diagnosis.json, model.yaml, report.html ({time.monotonic() - start:.0f} s)")

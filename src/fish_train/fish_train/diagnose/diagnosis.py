@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from fish_train.diagnose.decide import SMALLEST_Z, Level, parameter_count, stren
 from fish_train.diagnose.locate import Description, MissingForce, describe, missing_force
 from fish_train.diagnose.search import RANK_STEPS, Round, evidence, look_alike, restart_base, search_round
 from fish_train.diagnose.split import Split, split_trials
-from fish_train.diagnose.vocabulary import candidates, out_of_reach
+from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate, settle, trial_likelihoods
@@ -58,16 +58,24 @@ class Diagnosis:
 
 
 def diagnose(
-    experiment: Experiment, robot: Robot, level: Level | None = None, progress: Progress = silent
-) -> Diagnosis:
-    """Answer for one experiment; `progress` gets a line at every step."""
+    experiment: Experiment, robot: Robot, level: Level | None = None, progress: Progress = silent,
+    names: Sequence[str] | None = None,
+) -> Diagnosis:  # fmt: skip
+    """Answer for one experiment; `progress` gets a line at every step.
+
+    names: what competes, by default every registered effect and sensor error; an effect of your own is registered by
+    `fish_sim.effects.EFFECTS[name] = YourEffect`. Raises ValueError for a name that is not known.
+    """
     level, split = level or Level(), split_trials(experiment)
-    unreachable = out_of_reach(experiment)
+    reasons = out_of_reach(experiment)
+    names = known(names or candidates())
+    unreachable = {name: reasons[name] for name in names if name in reasons}
+    names = tuple(name for name in names if name not in reasons)
     searched = experiment.select(split.search)
     check = experiment.select(split.check) if split.check else None
     progress("fitting the nominal model")
     base = fit_base(robot, searched)
-    base, rounds, accepted = grow(base, searched, check, unreachable, level, progress)
+    base, rounds, accepted = grow(base, searched, check, names, level, progress)
     progress("fitting all training trials")
     training = experiment.select(split.training)
     nominal, final = final_fits(base, rounds, training)
@@ -92,14 +100,14 @@ def fit_base(robot: Robot, experiment: Experiment) -> Fit:
 
 
 def grow(
-    base: Fit, experiment: Experiment, check: Experiment | None, unreachable: dict[str, str], level: Level,
+    base: Fit, experiment: Experiment, check: Experiment | None, candidates: Sequence[str], level: Level,
     progress: Progress,
 ) -> tuple[Fit, list[Round], list[Accepted]]:  # fmt: skip
     """Add one effect at a time while one is significant."""
     rounds: list[Round] = []
     accepted: list[Accepted] = []
-    while len(accepted) < MOST_EFFECTS:
-        names = [n for n in candidates() if n not in base.hypothesis.names and n not in unreachable]
+    while len(accepted) < min(MOST_EFFECTS, len(candidates)):
+        names = [n for n in candidates if n not in base.hypothesis.names]
         samples = float(base.result.samples.sum())
         found = search_round(base, names, experiment, level.enough(samples, 1, len(names)), progress)
         if found.best is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fish_sim.effects import EFFECTS
@@ -14,6 +16,14 @@ NOT_A_NAME = ("disturbance",)  # the latent wrench itself
 def candidates() -> tuple[str, ...]:
     """All names: every registered effect and sensor error. An effect a user registers competes like the others."""
     return (*(name for name in EFFECTS if name not in NOT_A_NAME), *SENSOR_EFFECTS)
+
+
+def known(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, checked. Raises ValueError for one that is no candidate."""
+    for name in names:
+        if name not in candidates():
+            raise ValueError(f"unknown candidate {name!r}; known: {', '.join(candidates())}")
+    return tuple(names)
 
 
 def kind_of(name: str) -> str:
