@@ -103,7 +103,11 @@ def test_a_study_is_sealed_first_goes_on_and_opens(tmp_path) -> None:
     assert [s.verdict for s in scores] == ["no_mismatch", "failed", "no_mismatch"]
     write_prove_page(tmp_path / "report.html", study.about, scores)
     page = (tmp_path / "report.html").read_text()
-    assert "Asked and measured" in page and "http" not in page.split("plotly.js")[0].split("<script")[0]
+    assert (
+        "exit status 3: cannot" in page
+        and "Asked and measured" in page
+        and "http" not in page.split("plotly.js")[0].split("<script")[0]
+    )
     (study.folder / "seals.json").write_text('{"world_0000": "0"}')
     with pytest.raises(StudyError, match="not what was sealed"):
         study.reveal()

@@ -48,6 +48,7 @@ class Score:
     rms: Mapping[str, Any]  # model -> horizon -> errors, as in diagnosis.json
     ranking: Mapping[str, float]  # name -> quick gain, nats
     seconds: float
+    error: str = ""  # why there is no answer
 
     @property
     def top1(self) -> bool:
@@ -97,8 +98,21 @@ def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] 
     unnamed = bool(world.names) and not names
     d = result.get("diagnosis")
     if d is None:
+        names_given, none = frozenset[str](), float("nan")
         return Score(
-            world, names, unnamed, "failed", (), frozenset(), float("nan"), (), (), {}, {}, result["seconds"]
+            world,
+            names,
+            unnamed,
+            "failed",
+            (),
+            names_given,
+            none,
+            (),
+            (),
+            {},
+            {},
+            result["seconds"],
+            result["error"],
         )
     effects = d["effects"]
     rivals = {rival["name"] for e in effects for rival in e["rivals"]}

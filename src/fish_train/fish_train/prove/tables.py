@@ -141,6 +141,21 @@ def name_table(scores: Sequence[Score]) -> Table:
     return Table("Answers by what was hidden", ["hidden", "worlds", "answers"], rows, note)
 
 
+def failure_table(scores: Sequence[Score]) -> Table:
+    """Worlds on which the tool gave no answer; they count as wrong everywhere."""
+    rows = [
+        [s.world.group, ", ".join(s.world.names) or "nothing", " ".join(s.error.split())[:200]]
+        for s in scores
+        if s.verdict == "failed"
+    ]
+    return Table(
+        "No answer",
+        ["group", "hidden", "what was said"],
+        rows,
+        "A world without an answer counts as not right.",
+    )
+
+
 @dataclass(frozen=True)
 class Bin:
     """Answers whose first name was stated with a probability in [low, high)."""

@@ -17,6 +17,7 @@ from fish_train.prove.tables import (
     calibration,
     calibration_table,
     criterion_table,
+    failure_table,
     group_table,
     name_table,
     power,
@@ -30,8 +31,9 @@ def tables(
 ) -> list[Table]:
     """Everything that is printed as well."""
     steps = power(scores, oracle)
+    failed = [failure_table(scores)] if any(s.verdict == "failed" for s in scores) else []
     shown = [asked_table(scores), group_table(scores), calibration_table(scores), criterion_table(scores)]
-    return [*shown, *([power_table(steps)] if steps else []), *more, name_table(scores)]
+    return [*shown, *([power_table(steps)] if steps else []), *more, name_table(scores), *failed]
 
 
 def write_prove_page(
