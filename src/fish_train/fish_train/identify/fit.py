@@ -142,6 +142,7 @@ def _field(name: str) -> NoiseMove:
     return change
 
 
+JUMPS = (0.25, 4.0)  # of the wrench's standard deviations
 NOISE_MOVES = (*(_wrench(i) for i in range(3)), _field("wrench_time"))
 SENSOR_MOVES = tuple(map(_field, ("gyro", "accel", "camera_position", "camera_heading")))
 
@@ -149,8 +150,15 @@ SENSOR_MOVES = tuple(map(_field, ("gyro", "accel", "camera_position", "camera_he
 def adapt_noise(
     fit: Fit, experiment: Experiment, rounds: int = 1, moves: Sequence[NoiseMove] = NOISE_MOVES
 ) -> Noise:
-    """Maximum-likelihood wrench intensities and their time constant: parabola through three points each, in turn."""
-    noise, best = fit.noise, likelihood(fit, experiment, fit.noise)
+    """Maximum-likelihood wrench intensities and their time constant: parabola through three points each, in turn.
+
+    The start is the best of a few far apart: a model that has just found its missing effect needs far less noise than
+    the one before, and from there the parabola stops half-way.
+    """
+    usual, old = Noise(), fit.noise
+    starts = [old, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
+    starts += [replace(old, wrench=tuple(f * w for w in old.wrench)) for f in JUMPS]
+    noise, best = max(((n, likelihood(fit, experiment, n)) for n in starts), key=lambda found: found[1])
     for _ in range(rounds):
         for change in moves:
             low, high = (likelihood(fit, experiment, change(noise, f)) for f in (0.5, 2.0))
