@@ -14,31 +14,45 @@ from fish_train.diagnose.diagnosis import UNEXPLAINED_R2, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
-from fish_train.identify.filter_types import ROWS
+from fish_train.identify.filter_types import ROWS, Noise
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import specification
 from fish_train.identify.prediction import predict, prediction_errors
 
 HORIZONS = (1.0, 2.0, 5.0)
+# times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
+TOO_STRONG = 30.0
+STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in surge, sway and yaw"
 
 
 def verdict(d: Diagnosis) -> str:
     """no_mismatch, missing_physics, sensor_or_actuator or unexplained."""
     found = named(d)
     if not found:
-        return "unexplained" if has_law(d) else "no_mismatch"
+        return "unexplained" if much_is_left(d) else "no_mismatch"
     kinds = {kind_of(a.name) for a in found}
     return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
 
 
+def much_is_left(d: Diagnosis) -> bool:
+    """The wrench that remains follows a law on trials that the law was not fitted to, or is far stronger than water."""
+    return has_law(d) or bool(excess(d.final).max() > TOO_STRONG)
+
+
 def has_law(d: Diagnosis) -> bool:
-    """The wrench that remains follows a law on trials that the law was not fitted to."""
+    """A sparse regression of the remaining wrench holds on trials that it was not fitted to."""
     return max(d.description.r2.values()) > UNEXPLAINED_R2
 
 
+def excess(fit: Fit) -> np.ndarray:
+    """(3,) spectral density 2 sigma^2 tau of a fit's wrench over that of usual water, which `Noise()` describes."""
+    density = [2.0 * np.square(n.wrench) * n.wrench_time for n in (fit.noise, Noise())]
+    return np.asarray(density[0] / density[1])
+
+
 def named(d: Diagnosis) -> tuple[Accepted, ...]:
-    """The accepted effects, or none where they leave more of a lawful force than they take away: nearest is not right."""
-    return () if has_law(d) and unexplained_share(d) > 0.5 else d.accepted
+    """The accepted effects, or none where they leave more than they take away: nearest is not right."""
+    return () if much_is_left(d) and unexplained_share(d) > 0.5 else d.accepted
 
 
 def corrected(d: Diagnosis) -> Fit:
@@ -47,11 +61,9 @@ def corrected(d: Diagnosis) -> Fit:
 
 
 def unexplained_share(d: Diagnosis) -> float:
-    """Part of the mismatch that is lawful and still there: variances of the wrench in units of its unlawful rest."""
-    r2 = np.clip([d.description.r2[dof] for dof in locate.DOFS], 0.0, 0.99)
-    final, nominal = np.square(d.final.noise.wrench), np.square(d.nominal.noise.wrench)
-    rest = final * (1.0 - r2)
-    left, removed = np.sum(r2 * final / rest), np.sum(np.maximum(nominal - final, 0.0) / rest)
+    """Part of the mismatch that is still there: densities of the wrench beyond those of usual water."""
+    final, nominal = excess(d.final), excess(d.nominal)
+    left, removed = np.sum(np.maximum(final - 1.0, 0.0)), np.sum(np.maximum(nominal - final, 0.0))
     return float(left / (left + removed)) if left + removed > 0 else 0.0
 
 
@@ -126,7 +138,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
     """What no name explains: size, place, and a sparse regression."""
     r2 = d.description.r2
     share = unexplained_share(d)
-    if not has_law(d):
+    if not much_is_left(d):
         return {"share": share, "where": {}, "description": "the remaining force looks like water noise"}
     worst = max(r2, key=lambda dof: r2[dof])
     law = " + ".join(f"({c:.3g}) {term}" for term, c in d.description.terms[worst].items())
@@ -134,13 +146,15 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
     return {
         "share": share,
         "where": {
-            "dof": {dof: max(v, 0.0) / sum(max(x, 0.0) for x in r2.values()) for dof, v in r2.items()},
+            "dof": dict(zip(locate.DOFS, (excess(d.final) / excess(d.final).sum()).tolist(), strict=True)),
             "covariates": locate.covariate_shares(d.remaining, scale),
             "time": locate.time_shares(d.remaining, scale),
             "place": locate.place_shares(d.remaining, scale),
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
-        "description": f"{worst} = {law} (SI units; explains {r2[worst]:.0%} of it on unseen trials)",
+        "description": f"{worst} = {law} (SI units; explains {r2[worst]:.0%} of it on unseen trials)"
+        if has_law(d)
+        else f"{STRONG.format(*excess(d.final))}; no law in place, speed, rudder or heading was found for it",
     }
 
 
