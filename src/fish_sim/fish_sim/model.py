@@ -55,8 +55,14 @@ class Layout:
 
     @cached_property
     def memory(self) -> tuple[str, ...]:
-        """What a command updates once: servo and motor, then the memory of the effects."""
-        return ("alpha", "rotor_speed", *self._own("memory"))
+        """What a command updates once: rudder and motor, the servo where it differs, then the memory of the effects."""
+        servo = ("servo",) if self.has_linkage else ()
+        return ("alpha", "rotor_speed", *servo, *self._own("memory"))
+
+    @cached_property
+    def has_linkage(self) -> bool:
+        """Something between servo and rudder makes the two angles differ."""
+        return any(EFFECTS[name].has_linkage for name in self.effects)
 
     @cached_property
     def state(self) -> tuple[str, ...]:
@@ -114,21 +120,26 @@ def follow_command(
     layout: Layout, m: Sequence[Scalar], command: Sequence[Scalar], p: Sequence[Scalar], dt: float, xp: Any
 ) -> list[Scalar]:
     """Memory at the end of a command's period: what servo, motor and the actuator effects make of it."""
-    r, effects = unpack_effects(layout, p, m[2:], "memory")
+    own = 3 if layout.has_linkage else 2
+    r, effects = unpack_effects(layout, p, m[own:], "memory")
     rotor, rudder = command
     # the range is the command's; a horn that sits askew carries the rudder beyond it
     rudder = xp.fmax(xp.fmin(rudder, r.rudder_range), -r.rudder_range)
-    memory: list[Scalar] = []
+    kept: list[dict[str, Scalar]] = []
     for e in effects:
-        rudder, kept = e.effect.rudder(e.p, e.z, rudder, dt, xp)
+        rudder, followed = e.effect.rudder(e.p, e.z, rudder, dt, xp)
         rotor, turned = e.effect.rotor(e.p, e.z, rotor, dt, xp)
-        kept = {**kept, **turned}
-        memory += [kept[key] for key in e.effect.memory]
+        kept.append({**followed, **turned})
+    before = m[2] if layout.has_linkage else m[0]
     for e in effects:
-        rudder = e.effect.servo(e.p, m[0], rudder, dt, xp)
+        rudder = e.effect.servo(e.p, before, rudder, dt, xp)
     limit = r.servo_rate_limit * dt
-    alpha = m[0] + xp.fmax(xp.fmin(rudder - m[0], limit), -limit)
-    return [alpha, rotor, *memory]
+    alpha = servo = before + xp.fmax(xp.fmin(rudder - before, limit), -limit)
+    for e, values in zip(effects, kept, strict=True):
+        alpha, linked = e.effect.linkage(e.p, e.z, alpha, dt, xp)
+        values.update(linked)
+    memory = [values[key] for e, values in zip(effects, kept, strict=True) for key in e.effect.memory]
+    return [alpha, rotor, *([servo] if layout.has_linkage else []), *memory]
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,8 @@ def servo(name, commands, **values):
     """What the rudder effect `name` makes of commands given every 10 ms."""
     effect, p = EFFECTS[name], namespace(name, **values)
     memory, out = SimpleNamespace(**dict.fromkeys(effect.memory, 0.0)), []
-    method = effect.rotor if name.startswith(("rotor", "battery")) else effect.rudder
+    rudder = effect.linkage if effect.has_linkage else effect.rudder
+    method = effect.rotor if name.startswith(("rotor", "battery")) else rudder
     for command in commands:
         value, kept = method(p, memory, command, 0.01, NUMPY)
         assert set(kept) == set(effect.memory)
@@ -283,13 +284,24 @@ def test_rudder_offset_gain_and_saturation():
     np.testing.assert_allclose(servo("rudder_saturation", [0.3, -0.1], limit=0.25), [0.25, -0.1])
 
 
-def test_rudder_effects_act_in_the_order_gain_offset_saturation_delay_backlash_lag():
+def test_rudder_effects_act_in_the_order_of_their_table():
     order = [n for n in EFFECTS if n.startswith("rudder_")]
     names = ("gain", "offset", "saturation", "delay", "backlash", "lag", "placement")
     assert order == [f"rudder_{n}" for n in names]
     robot = Robot().with_effect("rudder_offset", offset=0.1).with_effect("rudder_gain", factor=0.5)
     states = swim(robot, np.tile([0.0, 0.4], (40, 1)))
     assert states[-1, 12] == pytest.approx(0.5 * 0.4 + 0.1)
+    assert states[-1, 14] == pytest.approx(0.4)  # the servo's own position
+
+
+def test_a_linkage_sits_behind_the_servo_and_its_range():
+    robot = Robot().with_effect("rudder_offset", offset=0.1).with_effect("rudder_backlash", play=0.05)
+    states = swim(robot, np.tile([0.0, 2.0], (40, 1)))
+    assert states[-1, 14] == pytest.approx(0.8)  # the command's range
+    assert states[-1, 12] == pytest.approx(0.8 + 0.1 - 0.05)
+    stepper = Stepper.of(robot)
+    rest = stepper.rest(parameters=stepper.parameters(robot))
+    assert rest[12] == pytest.approx(0.1 - 0.05)  # askew, and dragged there against the play
 
 
 def test_left_rudder_turns_left_and_so_does_a_positive_offset(strokes):
@@ -298,4 +310,4 @@ def test_left_rudder_turns_left_and_so_does_a_positive_offset(strokes):
     left = swim(Robot(), commands + [0.0, 0.3], scheme=Scheme("rk4"))[-1, 2]
     offset = swim(Robot().with_effect("rudder_offset", offset=0.3), commands, scheme=Scheme("rk4"))[-1, 2]
     assert left > straight + 0.2
-    assert offset == pytest.approx(left, abs=1e-6)
+    assert offset == pytest.approx(left, abs=5e-3)  # but for the servo's way there, 0.05 s

@@ -72,6 +72,7 @@ class Effect:
     strength: ClassVar[tuple[str, ...]]  # parameters whose default (zero or neutral) value means: effect off
     states: ClassVar[tuple[str, ...]] = ()  # continuous, integrated with the motion; start at 0
     memory: ClassVar[tuple[str, ...]] = ()  # discrete, updated once per command; start at 0
+    has_linkage: ClassVar[bool] = False  # servo and rudder differ: the servo's position is remembered too
     dissipative: ClassVar[bool] = False  # its wrench never adds energy in still water
 
     @staticmethod
@@ -118,6 +119,11 @@ class Effect:
     def servo(p: Values, alpha: Scalar, target: Scalar, dt: float, xp: Any) -> Scalar:
         """Where a servo at alpha would be one period later but for its rate limit [rad]."""
         return target
+
+    @staticmethod
+    def linkage(p: Values, m: Values, servo: Scalar, dt: float, xp: Any) -> Followed:
+        """(rudder angle that a servo's position gives [rad], updated memory); effects with one set `has_linkage`."""
+        return servo, {}
 
     @staticmethod
     def rotor(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:

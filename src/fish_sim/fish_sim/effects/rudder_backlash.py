@@ -10,22 +10,23 @@ SOURCE = "play operator (Visintin 1994); strength is an assumption"
 
 
 class RudderBacklash(Effect):
-    """The rudder is dragged along by a command with free play of half-width `play` either side.
+    """The rudder is dragged along by the servo with free play of half-width `play` either side.
 
-        target <- max(command - play, min(command + play, target))
+        alpha <- max(servo - play, min(servo + play, alpha))
 
-    The target starts at 0 (centred).
+    It starts at 0 (centred).
     """
 
     name = "rudder_backlash"
     kind = "actuator"
-    equation = "target = clip(target, command - play, command + play)"
+    equation = "alpha = clip(alpha, servo - play, servo + play)"
     source = SOURCE
     parameters = {"play": Parameter(0.0, "rad", 0.0, 0.8, SOURCE, typical=0.06)}
     strength = ("play",)
-    memory = ("target",)
+    has_linkage = True
+    memory = ("dragged",)
 
     @staticmethod
-    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
-        target = xp.fmax(command - p.play, xp.fmin(command + p.play, m.target))
-        return target, {"target": target}
+    def linkage(p: Values, m: Values, servo: Scalar, dt: float, xp: Any) -> Followed:
+        dragged = xp.fmax(servo - p.play, xp.fmin(servo + p.play, m.dragged))
+        return dragged, {"dragged": dragged}

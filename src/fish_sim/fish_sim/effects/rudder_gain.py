@@ -10,15 +10,17 @@ SOURCE = "linkage ratio; strength is an assumption"
 
 
 class RudderGain(Effect):
-    """The rudder turns `factor` times as far as commanded: target = factor command. Neutral: 1."""
+    """The rudder turns `factor` times as far as the servo: alpha = factor servo. Neutral: 1."""
 
     name = "rudder_gain"
     kind = "actuator"
-    equation = "target = factor command"
+    equation = "alpha = factor servo"
     source = SOURCE
     parameters = {"factor": Parameter(1.0, "1", 0.0, 3.0, SOURCE, typical=0.8)}
     strength = ("factor",)
 
+    has_linkage = True
+
     @staticmethod
-    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
-        return p.factor * command, {}
+    def linkage(p: Values, m: Values, servo: Scalar, dt: float, xp: Any) -> Followed:
+        return p.factor * servo, {}

@@ -10,15 +10,17 @@ SOURCE = "mounting error, one spline tooth is 0.25 rad; strength is an assumptio
 
 
 class RudderOffset(Effect):
-    """A constant angle is added to every command: target = command + offset (positive steers left)."""
+    """The rudder stands at a constant angle from the servo: alpha = servo + offset (positive steers left)."""
 
     name = "rudder_offset"
     kind = "actuator"
-    equation = "target = command + offset"
+    equation = "alpha = servo + offset"
     source = SOURCE
     parameters = {"offset": Parameter(0.0, "rad", -0.8, 0.8, SOURCE, typical=0.06)}
     strength = ("offset",)
 
+    has_linkage = True
+
     @staticmethod
-    def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
-        return command + p.offset, {}
+    def linkage(p: Values, m: Values, servo: Scalar, dt: float, xp: Any) -> Followed:
+        return servo + p.offset, {}

@@ -16,8 +16,7 @@ import numpy as np
 
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
-from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, climb, evaluate, log_posterior, settle
+from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, log_posterior, settle
 from fish_train.identify.hypothesis import Coordinates
 from fish_train.identify.settle import open_gates
 
@@ -139,11 +138,10 @@ def shortlist(ranking: Sequence[Ranked]) -> list[Ranked]:
 def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
     """A candidate on whole trials with its own noise, from the ranking's optimum."""
     hypothesis = base.hypothesis.with_effect(ranked.name, SCALE)
-    # a base that lacks much may have taken the mismatch for sensor noise
-    sensors = {key: getattr(Noise(), key) for key in ("gyro", "accel", "camera_position", "camera_heading")}
-    noises = (base.noise, replace(base.noise, **sensors))
-    noise = max(noises, key=lambda n: log_posterior(hypothesis, ranked.theta, experiment, n))
-    return settle(evaluate(hypothesis, ranked.theta, experiment, noise), experiment)
+    start = evaluate(hypothesis, ranked.theta, experiment, base.noise)
+    # the base's noise has taken the mismatch in, also as sensor noise
+    start = evaluate(hypothesis, ranked.theta, experiment, adapt_noise(start, experiment))
+    return settle(start, experiment)
 
 
 def search_round(

@@ -142,6 +142,7 @@ def _field(name: str) -> NoiseMove:
     return change
 
 
+SHORTEST_WRENCH, LONGEST_WRENCH = 0.02, 5.0  # s; a step of the filter is 0.01 s
 JUMPS = (0.25, 4.0)  # of the wrench's standard deviations
 NOISE_MOVES = (*(_wrench(i) for i in range(3)), _field("wrench_time"))
 SENSOR_MOVES = tuple(map(_field, ("gyro", "accel", "camera_position", "camera_heading")))
@@ -155,8 +156,9 @@ def adapt_noise(
     The start is the best of a few far apart: a model that has just found its missing effect needs far less noise than
     the one before, and from there the parabola stops half-way.
     """
-    usual, old = Noise(), fit.noise
-    starts = [old, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
+    old = fit.noise
+    usual = replace(Noise(), gate_camera=old.gate_camera, gate_imu=old.gate_imu)  # of the sensors too
+    starts = [old, usual, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
     starts += [replace(old, wrench=tuple(f * w for w in old.wrench)) for f in JUMPS]
     noise, best = max(((n, likelihood(fit, experiment, n)) for n in starts), key=lambda found: found[1])
     for _ in range(rounds):
@@ -166,6 +168,8 @@ def adapt_noise(
             parabola = np.isfinite(curvature) and curvature < 0
             octaves = -slope / curvature if parabola else np.sign(np.nan_to_num(slope)) * 2.0
             candidate = change(noise, 2.0 ** float(np.clip(octaves, -2.0, 2.0)))
+            if not SHORTEST_WRENCH <= candidate.wrench_time <= LONGEST_WRENCH:
+                continue
             value = likelihood(fit, experiment, candidate)
             if value > best:
                 noise, best = candidate, value
