@@ -167,7 +167,7 @@ def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fi
 
 def refine(fit: Fit, experiment: Experiment) -> Fit:
     """A fit carried over to other trials."""
-    return settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment, rounds=1)
+    return settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment)
 
 
 def prune(

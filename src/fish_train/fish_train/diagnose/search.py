@@ -159,7 +159,9 @@ def search_round(
 
 
 def restart_base(base: Fit, rival: Fit, experiment: Experiment) -> Fit:
-    """The base refitted from a rival's nominal parameters: a base in a poor optimum looks like missing physics."""
+    """The base refitted from a rival's nominal parameters and noise: a base in a poor optimum looks like missing physics."""
     theta = rival.theta[: len(base.theta)]
-    fit = settle(evaluate(base.hypothesis, theta, experiment, base.noise), experiment, rounds=1)
+    noises = (base.noise, rival.noise)
+    noise = max(noises, key=lambda n: log_posterior(base.hypothesis, theta, experiment, n))
+    fit = settle(evaluate(base.hypothesis, theta, experiment, noise), experiment)
     return max(base, fit, key=lambda f: f.objective)

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 NoiseMove = Callable[[Noise, float], Noise]
 
 LARGEST_STEP = 0.5  # of theta in one iteration
+SETTLED_GAIN = 3.0  # nats; a round of noise and parameters that gains less is the last
 SMALL_GAIN = 0.05  # nats; below it an iteration has converged
 
 
@@ -56,12 +57,15 @@ class Fit:
         return dict(zip(self.hypothesis.free, deviation.tolist(), strict=True))
 
 
-def settle(fit: Fit, experiment: Experiment, rounds: int = 2, iterations: int = 6) -> Fit:
-    """Parameters and process noise in turn, from a fit that was evaluated on this experiment."""
+def settle(fit: Fit, experiment: Experiment, rounds: int = 5, iterations: int = 6) -> Fit:
+    """Parameters and process noise in turn, from a fit that was evaluated on this experiment, until neither helps."""
     fit = climb(fit, experiment, iterations)
     for _ in range(rounds):
+        before = fit.objective
         noise = adapt_noise(fit, experiment)
         fit = climb(evaluate(fit.hypothesis, fit.theta, experiment, noise), experiment, iterations)
+        if fit.objective - before < SETTLED_GAIN:
+            break
     return fit
 
 
