@@ -9,12 +9,12 @@ import numpy as np
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose import locate
-from fish_train.diagnose.decide import PLAUSIBLE, p_value, parameter_count, probabilities
+from fish_train.diagnose.decide import PLAUSIBLE, excess, p_value, parameter_count, probabilities
 from fish_train.diagnose.diagnosis import UNEXPLAINED_R2, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
-from fish_train.identify.filter_types import ROWS, Noise
+from fish_train.identify.filter_types import ROWS
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import specification
 from fish_train.identify.prediction import predict, prediction_errors
@@ -42,12 +42,6 @@ def much_is_left(d: Diagnosis) -> bool:
 def has_law(d: Diagnosis) -> bool:
     """A sparse regression of the remaining wrench holds on trials that it was not fitted to."""
     return max(d.description.r2.values()) > UNEXPLAINED_R2
-
-
-def excess(fit: Fit) -> np.ndarray:
-    """(3,) spectral density 2 sigma^2 tau of a fit's wrench over that of usual water, which `Noise()` describes."""
-    density = [2.0 * np.square(n.wrench) * n.wrench_time for n in (fit.noise, Noise())]
-    return np.asarray(density[0] / density[1])
 
 
 def named(d: Diagnosis) -> tuple[Accepted, ...]:

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
+from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
 
 # One nat of innovations is worth 1/TEMPER nats of evidence: model errors too small to have a name, and the search
@@ -61,3 +62,9 @@ def strength_z(fit: Fit, name: str) -> float:
 def parameter_count(name: str) -> int:
     """Free parameters of an effect."""
     return len({**EFFECTS, **SENSOR_EFFECTS}[name].parameters)
+
+
+def excess(fit: Fit) -> np.ndarray:
+    """(3,) spectral density 2 sigma^2 tau of a fit's wrench over that of usual water, which `Noise()` describes."""
+    density = [2.0 * np.square(n.wrench) * n.wrench_time for n in (fit.noise, Noise())]
+    return np.asarray(density[0] / density[1])

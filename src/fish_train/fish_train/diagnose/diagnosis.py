@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_train.diagnose.decide import SMALLEST_Z, Level, parameter_count, strength_z
+from fish_train.diagnose.decide import SMALLEST_Z, Level, excess, parameter_count, strength_z
 from fish_train.diagnose.locate import Description, MissingForce, describe, missing_force
 from fish_train.diagnose.search import RANK_STEPS, Round, evidence, look_alike, restart_base, search_round
 from fish_train.diagnose.split import Split, split_trials
@@ -21,6 +21,7 @@ from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
 FAIR_SHARE = 0.25  # of the gain per sample that trials not fitted to must show
+SUSPICIOUS = 3.0  # times the density of usual water: a poor optimum, or something else is missing
 UNEXPLAINED_R2 = 0.3  # cross-validated; above it the remaining wrench is a force with a law, not water noise
 
 Progress = Callable[[str], None]
@@ -119,9 +120,18 @@ def grow(
         if name is None:
             break
         accepted.append(Accepted(name, found))
-        base = found.refitted[name]
+        base = anneal(found.refitted[name], experiment)
         progress(f"found {name}: {found.gain(name):.0f} nats")
     return base, rounds, accepted
+
+
+def anneal(fit: Fit, experiment: Experiment) -> Fit:
+    """The fit, or where it needs far more than usual water a better optimum that the camera alone leads to."""
+    if excess(fit).max() < SUSPICIOUS:
+        return fit
+    short = fit_tempered(fit.hypothesis, shorten(experiment, RANK_STEPS), Noise(), fit.theta)
+    other = settle(evaluate(fit.hypothesis, short.theta, experiment, short.noise), experiment)
+    return max(fit, other, key=lambda f: f.objective)
 
 
 def choose(found: Round, check: Experiment | None, tried: int, level: Level) -> str | None:
