@@ -13,7 +13,12 @@ WORLD = World(
     effects={"quadratic_drag": {"surge": 0.6, "sway": 4.0, "yaw": 1.2e-3}},
     count=9,
     duration=12.0,
-    parameters={"head_drag_surge": 0.85, "head_drag_sway": 1.15, "tail_stiffness": 1.1, "rotor_inertia": 0.95},
+    parameters={
+        "head_drag_surge": 0.85,
+        "head_drag_sway": 1.15,
+        "tail_stiffness": 1.1,
+        "rotor_inertia": 0.95,
+    },
 )
 
 if __name__ == "__main__":
