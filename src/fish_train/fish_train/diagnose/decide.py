@@ -13,7 +13,7 @@ from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
 
 # One nat of innovations is worth 1/TEMPER nats of evidence: model errors too small to have a name, and the search
-# itself, make likelihood ratios over-confident. Set on this project's own synthetic null sets.
+# itself, make likelihood ratios over-confident. A judgement, not calibrated by a study yet.
 TEMPER = 10.0
 # nats per scalar measurement below which a gain is no physics worth a name, whatever its significance
 SMALLEST_GAIN = 0.004

@@ -95,20 +95,20 @@ def diagnose(
 
 
 def fit_base(robot: Robot, experiment: Experiment) -> Fit:
-    """The nominal model: a cold fit on half of every trial, continued on the whole."""
+    """The nominal model: a cold fit on the start of every trial, continued on the whole."""
     short = fit_tempered(nominal_hypothesis(robot), shorten(experiment, RANK_STEPS), Noise())
     return settle(evaluate(short.hypothesis, short.theta, experiment, short.noise), experiment)
 
 
 def grow(
-    base: Fit, experiment: Experiment, check: Experiment | None, candidates: Sequence[str], level: Level,
+    base: Fit, experiment: Experiment, check: Experiment | None, competing: Sequence[str], level: Level,
     progress: Progress,
 ) -> tuple[Fit, list[Round], list[Accepted]]:  # fmt: skip
     """Add one effect at a time while one is significant."""
     rounds: list[Round] = []
     accepted: list[Accepted] = []
-    while len(accepted) < min(MOST_EFFECTS, len(candidates)):
-        names = [n for n in candidates if n not in base.hypothesis.names]
+    while len(accepted) < min(MOST_EFFECTS, len(competing)):
+        names = [n for n in competing if n not in base.hypothesis.names]
         samples = float(base.result.samples.sum())
         found = search_round(base, names, experiment, level.enough(samples, 1, len(names)), progress)
         if found.best is not None:
