@@ -17,6 +17,7 @@ from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate, settle, trial_likelihoods
 from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.settle import suitable_noise
 from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
@@ -197,7 +198,8 @@ def prune(
 
 def held_out_density(held: Experiment, robot: Robot, nominal: Fit, final: Fit) -> dict[str, np.ndarray]:
     """Log density per scalar measurement of each held-out trial: model as given, refitted, with effects."""
-    given = evaluate(nominal_hypothesis(robot, ()), np.zeros(0), held, nominal.noise)
+    noise = suitable_noise(held, robot, nominal.noise)
+    given = evaluate(nominal_hypothesis(robot, ()), np.zeros(0), held, noise)
     fits = {"nominal": given, "refitted": nominal, "with_effects": final}
     density = {}
     for name, fit in fits.items():
