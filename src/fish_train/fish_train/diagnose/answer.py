@@ -185,6 +185,7 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
     return {
         "held_out_trials": [d.experiment.names[i] for i in d.split.held_out],
         **entries,
+        "tail_links": {"given": d.robot.links, "used": d.final.robot.links},
         "noise_floor": {"wrench_std": list(map(float, d.final.noise.wrench)), "unit": ["N", "N", "N m"],
                         "correlation_time_s": float(d.final.noise.wrench_time)},
         "improvement_ci95": bootstrap_interval(gain),

@@ -42,7 +42,11 @@ NOMINAL_FREE = (
     "fin_drag_sway",
     "servo_rate_limit",
 )
-LOG_PRIOR = {"servo_rate_limit": 0.2}  # others: WIDE_PRIOR
+LOG_PRIOR = {
+    "servo_rate_limit": 0.2,
+    "link_inertia_factor": 0.3,
+    "fin_inertia_factor": 0.3,
+}  # others: WIDE_PRIOR
 WIDE_PRIOR = 0.5  # of the logarithm: "tens of per cent"
 EFFECT_PRIOR = 4.0  # typical strengths
 
