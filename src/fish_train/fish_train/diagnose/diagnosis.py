@@ -10,7 +10,15 @@ import numpy as np
 from fish_sim.robot import Robot
 from fish_train.diagnose.decide import SMALLEST_Z, Level, excess, parameter_count, strength_z
 from fish_train.diagnose.locate import Description, MissingForce, describe, missing_force
-from fish_train.diagnose.search import RANK_STEPS, Round, evidence, look_alike, restart_base, search_round
+from fish_train.diagnose.search import (
+    RANK_STEPS,
+    SUSPICIOUS,
+    Round,
+    evidence,
+    look_alike,
+    restart_base,
+    search_round,
+)
 from fish_train.diagnose.split import Split, split_trials
 from fish_train.diagnose.tail import MORE, finer_tails
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
@@ -23,7 +31,6 @@ from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
 FAIR_SHARE = 0.25  # of the gain per sample that trials not fitted to must show
-SUSPICIOUS = 3.0  # times the density of usual water: a poor optimum, or something else is missing
 UNEXPLAINED_R2 = 0.3  # cross-validated; above it the remaining wrench is a force with a law, not water noise
 
 Progress = Callable[[str], None]
