@@ -24,6 +24,7 @@ WINDOW = 4.0  # s, of poses that are compared
 LEAST_FRAMES = 12  # in a window
 LARGEST = 1.0  # s, delay that is looked for
 STEP = 0.01  # s
+DELAYS = np.arange(0.0, LARGEST + 0.5 * STEP, STEP)
 CLIP = 0.5  # rad; windows in which the markers were swapped count no more than this
 CLEAR = 0.7  # rms at the best delay over rms at none, below which a delay is stated
 SMALLEST = 0.03  # s, about a frame; below it the filter's own parameter finds it
@@ -40,22 +41,28 @@ class Alignment:
 
 def align(experiment: Experiment) -> Alignment:
     """The delay common to all trials; 0 with rms NaN where no trial has a gyro and enough poses."""
-    delays = np.arange(0.0, LARGEST + 0.5 * STEP, STEP)
-    squares, count = np.zeros(len(delays)), 0
+    squares, count = misfits(experiment)
+    if not count.any():
+        return Alignment(0.0, np.nan, np.nan)
+    rms = np.sqrt(np.nansum(squares * count[:, None], axis=0) / count.sum())
+    best = int(rms.argmin())
+    clear = rms[best] < CLEAR * rms[0] and DELAYS[best] >= SMALLEST and best < len(DELAYS) - 1
+    best = best if clear else 0
+    return Alignment(float(DELAYS[best]), float(rms[best]), float(rms[0]))
+
+
+def misfits(experiment: Experiment) -> tuple[Array, NDArray[np.int64]]:
+    """Mean squares (M, D) [rad^2] at each of DELAYS, NaN without a gyro, and the number of windows (M,) behind them."""
+    squares = np.full((len(experiment.names), len(DELAYS)), np.nan)
+    count = np.zeros(len(squares), dtype=np.int64)
     for m, frames in enumerate(experiment.frames):
         turned = _turned(experiment, m)
-        if turned is None:
+        picks = [] if turned is None else _windows(frames, experiment.steps[m] * DT)
+        if turned is None or not picks:
             continue
-        for pick in _windows(frames, experiment.steps[m] * DT):
-            squares += _misfit(frames.t[pick], frames.pose[pick, 2], turned, delays)
-            count += 1
-    if not count:
-        return Alignment(0.0, np.nan, np.nan)
-    rms = np.sqrt(squares / count)
-    best = int(rms.argmin())
-    clear = rms[best] < CLEAR * rms[0] and delays[best] >= SMALLEST and best < len(delays) - 1
-    best = best if clear else 0
-    return Alignment(float(delays[best]), float(rms[best]), float(rms[0]))
+        rows = [_misfit(frames.t[pick], frames.pose[pick, 2], turned, DELAYS) for pick in picks]
+        squares[m], count[m] = np.mean(rows, axis=0), len(rows)
+    return squares, count
 
 
 def _turned(experiment: Experiment, m: int) -> Array | None:

@@ -60,6 +60,14 @@ class Identification:
     errors: dict[str, ErrorSizes]  # "start", "identified", then the baselines that could be fitted
     statements: tuple[str, ...]  # what is wrong with the data or the result, and what can still be said
     seconds: float
+    camera_delay: float = 0.0  # s, taken out of all trials above
+
+    @property
+    def robot(self) -> Robot:
+        """The identified robot, with the delay that its camera has in the recordings as they are."""
+        effects = {name: values for name, values in self.fit.robot.effects.items() if name != "disturbance"}
+        plain = replace(self.fit.robot, effects=effects)
+        return plain.with_effect("camera_latency", delay=self.camera_delay) if self.camera_delay else plain
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -103,11 +111,9 @@ def identify(
     estimates = estimate(training, fit.robot, fit.noise)
     statements = [*data_statements(experiment, held_out), *lag_statements(lag), *fit_statements(fit)]
     statements += [*([FITTED_FOR_OUTLOOK] if wrong else []), *lacking, *verdict(errors)]
-    if lag.delay:
-        fit = replace(fit, robot=fit.robot.with_effect("camera_latency", delay=lag.delay))
     seconds = time.monotonic() - began
     return Identification(
-        fit, robot, training, held_out, judged, estimates, errors, tuple(statements), seconds
+        fit, robot, training, held_out, judged, estimates, errors, tuple(statements), seconds, lag.delay
     )
 
 
