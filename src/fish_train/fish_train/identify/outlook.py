@@ -216,7 +216,8 @@ def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] 
     if not outlook.targets:
         return fit
     usual = Noise()
-    calm = replace(fit.noise, wrench=tuple(CALM * w for w in usual.wrench), wrench_time=usual.wrench_time)
+    x, y, n = usual.wrench
+    calm = replace(fit.noise, wrench=(CALM * x, CALM * y, CALM * n), wrench_time=usual.wrench_time)
     noises, starts = (fit.noise, calm), (outlook.coordinates.origin(), fit.theta)
 
     def judged(theta: Array, noise: Noise) -> float:
