@@ -11,7 +11,7 @@ from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose import locate
 from fish_train.diagnose.decide import PLAUSIBLE, excess, p_value, parameter_count, probabilities
-from fish_train.diagnose.diagnosis import UNEXPLAINED_R2, Accepted, Diagnosis
+from fish_train.diagnose.diagnosis import TOO_STRONG, UNEXPLAINED_R2, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
@@ -23,8 +23,7 @@ from fish_train.identify.prediction import predict, prediction_errors
 from fish_train.identify.settle import suitable_noise
 
 HORIZONS = (1.0, 2.0, 5.0)
-# times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
-TOO_STRONG = 30.0
+STRONG = 30.0
 STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in surge, sway and yaw"
 
 

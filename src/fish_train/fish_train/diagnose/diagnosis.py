@@ -31,6 +31,8 @@ from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
 FAIR_SHARE = 0.25  # of the gain per sample that trials not fitted to must show
+# times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
+TOO_STRONG = 30.0
 UNEXPLAINED_R2 = 0.3  # cross-validated; above it the remaining wrench is a force with a law, not water noise
 
 Progress = Callable[[str], None]
@@ -141,8 +143,8 @@ def finer_tail(
     nominal: Fit, best: Fit, robot: Robot, experiment: Experiment, check: Experiment | None, level: Level,
     progress: Progress,
 ) -> Fit | None:  # fmt: skip
-    """The nominal model with more tail links, where the best fit leaves a strong force and this explains more of it."""
-    if excess(best).max() < SUSPICIOUS:
+    """The nominal model with more tail links, where the best fit leaves too strong a force and this explains more of it."""
+    if excess(best).max() < TOO_STRONG:
         return None
     short = shorten(experiment, RANK_STEPS)
     finer = max(finer_tails(robot, best, experiment, short, progress), key=evidence, default=None)
