@@ -61,7 +61,9 @@ def test_nothing_is_found_where_nothing_is(tmp_path):
 
 
 def test_a_tail_of_more_links_is_no_missing_physics(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "TOO_STRONG", 3.0)  # what 4 links leave to 3 in these short trials is less than 30
+    monkeypatch.setattr(
+        module, "TOO_STRONG", 3.0
+    )  # what 4 links leave to 3 in these short trials is less than 30
     fish = swim(with_links(truth(), 4), duration=5.0)
     result = module.diagnose(fish, Robot(), names=("quadratic_drag", "payload"))
     content = answer(result)
