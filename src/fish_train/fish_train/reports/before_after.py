@@ -41,7 +41,9 @@ def before_after(d: Diagnosis) -> Figure:
         figure.update_xaxes(title="time (s)", row=2, col=m + 1)
     figure.update_yaxes(title="y (m)", row=1, col=1)
     figure.update_yaxes(title="surge speed (m/s)", row=2, col=1)
-    return Figure("Held-out trials, measured and simulated, before and after", styled(figure, 620), NOTE)
+    return Figure(
+        "Held-out trials, measured and simulated, before and after", styled(figure, 660, titled=True), NOTE
+    )
 
 
 def _lines(figure, swim: Swim, measured: bool, label: str, colour: str, column: int) -> None:

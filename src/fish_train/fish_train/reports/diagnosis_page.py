@@ -16,6 +16,7 @@ from fish_train.diagnose.search import Ranked, Round
 from fish_train.reports.before_after import before_after
 from fish_train.reports.page import Figure, Table, Text, styled, write_page
 
+COLOURS = {"surge": "#5b6bd6", "sway": "#1fa774", "yaw": "#e07b39"}
 SHOWN = 4000  # points of a scatter
 Content = dict[str, Any]
 
@@ -136,9 +137,8 @@ def _time(d: Diagnosis) -> go.Figure:
     t = DT * np.arange(len(d.force.wrench))
     for i, dof in enumerate(DOFS):
         unit = "N m" if dof == "yaw" else "N"
-        figure.add_scatter(
-            x=t, y=d.force.wrench[:, 0, i], name=f"{dof}, {unit}", visible=True if i < 2 else "legendonly"
-        )
+        figure.add_scatter(x=t, y=d.force.wrench[:, 0, i], name=f"{dof}, {unit}", line={"color": COLOURS[dof]},
+                           visible=True if i < 2 else "legendonly")  # fmt: skip
         figure.add_scatter(x=t, y=d.remaining.wrench[:, 0, i], name=f"{dof} remaining", line={"color": "#999"},
                            visible=True if i == 0 else "legendonly")  # fmt: skip
     figure.update_xaxes(title="t, s")
@@ -158,10 +158,12 @@ def _covariates(d: Diagnosis) -> go.Figure:
             edges = np.quantile(v[good], np.linspace(0, 1, 16))
             index = np.clip(np.searchsorted(edges, v[good]) - 1, 0, 14)
             mean = np.bincount(index, w[good], 15) / np.maximum(np.bincount(index, minlength=15), 1)
-            figure.add_scatter(x=0.5 * (edges[1:] + edges[:-1]), y=mean / d.final.noise.wrench[i], name=dof,
-                               legendgroup=dof, showlegend=column == 1, row=1, col=column)  # fmt: skip
+            figure.add_scatter(
+                x=0.5 * (edges[1:] + edges[:-1]), y=mean / d.final.noise.wrench[i], name=dof, legendgroup=dof,
+                line={"color": COLOURS[dof]}, showlegend=column == 1, row=1, col=column,
+            )  # fmt: skip
     figure.update_yaxes(title="mean missing wrench / water noise", col=1)
-    return styled(figure)
+    return styled(figure, 360, titled=True)
 
 
 def _program(content: Content) -> go.Figure:

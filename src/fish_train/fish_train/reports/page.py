@@ -64,13 +64,13 @@ def write_page(path: Path, title: str, lead: str, blocks: Sequence[Block]) -> No
     path.write_text(page, encoding="utf-8")
 
 
-def styled(figure: go.Figure, height: int = 320) -> go.Figure:
-    """The look all figures share; returns the same figure."""
+def styled(figure: go.Figure, height: int = 320, titled: bool = False) -> go.Figure:
+    """The look all figures share; returns the same figure. titled: its panels have titles, which the legend must not cover."""
     figure.update_layout(
         template="plotly_white",
         height=height,
         font={"family": FONT, "size": 13},
-        margin={"l": 60, "r": 20, "t": 20, "b": 45},
-        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
+        margin={"l": 60, "r": 20, "t": 70 if titled else 20, "b": 45},
+        legend={"orientation": "h", "y": 1.0 + (30 if titled else 5) / height, "yanchor": "bottom", "x": 0},
     )
     return figure
