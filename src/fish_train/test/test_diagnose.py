@@ -102,6 +102,16 @@ def test_a_hidden_current_is_named_with_its_size(tmp_path):
     assert load_robot(tmp_path / "model.yaml").effects["current"]["x"] == pytest.approx(found["x"]["value"])
 
 
+def test_a_payload_is_found_on_the_side_where_it_is():
+    """The fit starts on all sides; only mass times place is determined, which must not count against the name."""
+    hidden = {"mass": 0.12, "forward": -0.08, "left": 0.02}
+    result = module.diagnose(swim(truth(payload=hidden)), Robot(), names=("payload", "camera_scale"))
+    assert [a.name for a in result.accepted] == ["payload"]
+    found = result.final.values
+    moment = found["payload.mass"] * found["payload.forward"]
+    assert moment == pytest.approx(hidden["mass"] * hidden["forward"], rel=0.15)
+
+
 def test_a_late_camera_is_not_called_physics():
     late = swim(truth())
     shifted = tuple(type(f)(f.t + 0.05, f.pose) for f in late.frames)

@@ -11,6 +11,7 @@ from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
+from fish_train.identify.hypothesis import Coordinates
 
 # One nat of innovations is worth 1/TEMPER nats of evidence: model errors too small to have a name, and the search
 # itself, make likelihood ratios over-confident. A judgement, not calibrated by a study yet.
@@ -50,12 +51,22 @@ def probabilities(objectives: dict[str, float]) -> dict[str, float]:
 
 
 def strength_z(fit: Fit, name: str) -> float:
-    """Largest distance of a strength parameter from neutral, in standard errors."""
+    """Largest distance of a strength parameter from neutral, in standard errors at the effect's own place.
+
+    Where and when an effect acts is kept fixed: of a payload the data may tell the moment mass times place alone, so that
+    its mass is uncertain beside its place, but not whether there is one.
+    """
     effect = {**EFFECTS, **SENSOR_EFFECTS}[name]
-    values, errors = fit.values, fit.standard_errors
-    keys = [f"{name}.{k}" for k in effect.strength]
+    strengths = [f"{name}.{key}" for key in effect.strength]
+    places = [f"{name}.{key}" for key in effect.parameters if key not in effect.strength]
+    kept = [i for i, free in enumerate(fit.hypothesis.free) if free not in places]
+    deviation = np.sqrt(np.diag(np.linalg.inv(fit.normal[np.ix_(kept, kept)])))
+    coordinates, names = Coordinates(fit.hypothesis), [fit.hypothesis.free[i] for i in kept]
+    slope, values = coordinates.slope(fit.theta), fit.values
     return max(
-        abs(values[k] - effect.parameters[k.split(".")[1]].value) / max(errors[k], 1e-300) for k in keys
+        abs(values[key] - effect.parameters[key.split(".")[1]].value)
+        / max(deviation[names.index(key)] * abs(slope[fit.hypothesis.free.index(key)]), 1e-300)
+        for key in strengths
     )
 
 

@@ -12,14 +12,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
+from fish_sim.effects import EFFECTS
+from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose.decide import excess
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, log_posterior, settle
-from fish_train.identify.hypothesis import Coordinates
+from fish_train.identify.hypothesis import Coordinates, specification
 from fish_train.identify.settle import open_gates
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
@@ -125,11 +128,24 @@ def starts(base: Fit, name: str) -> list[np.ndarray]:
 
 
 def warm_starts(base: Fit, name: str) -> list[np.ndarray]:
-    """theta of the base with a candidate, weak and strong."""
+    """theta of the base with a candidate, weak and strong, on either side where it has a place."""
     coordinates = Coordinates(base.hypothesis.with_effect(name, SCALE))
-    robots = [base.hypothesis.with_effect(name, strength).robot for strength in STRENGTHS]
-    own = [coordinates.encode(coordinates.read(robot))[len(base.theta) :] for robot in robots]
-    return [np.concatenate([base.theta, values]) for values in own]
+    found = []
+    for strength in STRENGTHS:
+        robot = base.hypothesis.with_effect(name, strength).robot
+        own = coordinates.read(robot)[len(base.theta) :]
+        for signs in product(
+            *((1.0, -1.0) if has_sides(name, key) else (1.0,) for key in specification(name))
+        ):
+            start = coordinates.encode(np.concatenate([np.ones(len(base.theta)), own * signs]))
+            found.append(np.concatenate([base.theta, start[len(base.theta) :]]))
+    return found
+
+
+def has_sides(name: str, key: str) -> bool:
+    """A parameter that says where: not a strength, and as well negative as positive."""
+    parameter, effect = specification(name)[key], {**EFFECTS, **SENSOR_EFFECTS}[name]
+    return key not in effect.strength and parameter.value != 0.0 and parameter.lowest == -parameter.highest
 
 
 def promise(fit: Fit) -> float:
