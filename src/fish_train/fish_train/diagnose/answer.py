@@ -15,15 +15,12 @@ from fish_train.diagnose.diagnosis import TOO_STRONG, UNEXPLAINED_R2, Accepted, 
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
-from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import ROWS, Noise
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import specification
 from fish_train.identify.prediction import predict, prediction_errors
-from fish_train.identify.settle import suitable_noise
 
 HORIZONS = (1.0, 2.0, 5.0)
-STRONG = 30.0
 STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in surge, sway and yaw"
 
 
@@ -79,12 +76,11 @@ def answer(d: Diagnosis) -> dict[str, Any]:
 
 def refitted_entry(d: Diagnosis, name: str, fit: Fit) -> dict[str, Any]:
     """A candidate of the first round that was refitted on the search trials, whether it was chosen or not."""
-    errors = held_out_errors(d, fit.robot, fit.noise)
     return {
         "name": name,
         "gain": d.rounds[0].gain(name),
         "parameters": effect_parameters(fit, name),
-        "held_out_rms": errors,
+        "held_out_rms": held_out_errors(d, fit.robot, fit.noise),
     }
 
 
@@ -168,10 +164,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
 
 def fit_entry(d: Diagnosis) -> dict[str, Any]:
     """Prediction errors and log density on held-out trials, before and after."""
-    given = suitable_noise(
-        unseen(d), d.robot, d.nominal.noise
-    )  # at the refitted noise its filter would lose the fish
-    robots = {"nominal": (d.robot, given), "refitted": (d.nominal.robot, d.nominal.noise),
+    robots = {"nominal": (d.robot, d.given_noise), "refitted": (d.nominal.robot, d.nominal.noise),
               "with_effects": (d.final.robot, d.final.noise)}  # fmt: skip
     entries = {
         name: {
@@ -192,14 +185,9 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def unseen(d: Diagnosis) -> Experiment:
-    """The held-out trials, or where there are too few the training trials."""
-    return d.experiment.select(d.split.held_out or d.split.training)
-
-
 def held_out_errors(d: Diagnosis, robot: Robot, noise: Noise) -> dict[str, dict[str, float]]:
     """Prediction errors of a robot on the held-out trials: horizon -> position, heading, speed."""
-    sizes = prediction_errors(predict(unseen(d), robot, noise, max(HORIZONS)), HORIZONS)
+    sizes = prediction_errors(predict(d.unseen, robot, noise, max(HORIZONS)), HORIZONS)
     return {
         f"{h:g} s": dict(zip(("position_m", "heading_rad", "speed_m_s"), map(float, row), strict=True))
         for h, row in zip(sizes.horizons, sizes.rms, strict=True)

@@ -66,7 +66,13 @@ class Diagnosis:
     force: MissingForce  # that the nominal model lacks
     remaining: MissingForce  # that the final model lacks
     description: Description  # of the remaining force
+    given_noise: Noise  # that suits the robot as given: at the refitted noise its filter would lose the fish
     held_out: dict[str, np.ndarray]  # log density per sample and held-out trial: given, nominal, final
+
+    @property
+    def unseen(self) -> Experiment:
+        """The held-out trials, or where there are too few the training trials."""
+        return self.experiment.select(self.split.held_out or self.split.training)
 
 
 def diagnose(
@@ -99,12 +105,12 @@ def diagnose(
     force = missing_force(nominal, training)
     remaining = missing_force(final, training) if accepted else force
     progress("scoring held-out trials")
-    held = held_out_density(
-        experiment.select(split.held_out) if split.held_out else training, robot, nominal, final
-    )
+    unseen = experiment.select(split.held_out or split.training)
+    given_noise = suitable_noise(unseen, robot, nominal.noise)
+    held = held_out_density(unseen, robot, given_noise, nominal, final)
     return Diagnosis(
         experiment, split, robot, nominal, final, tuple(rounds), tuple(accepted), unreachable, level,
-        force, remaining, describe(remaining), held,
+        force, remaining, describe(remaining), given_noise, held,
     )  # fmt: skip
 
 
@@ -229,10 +235,11 @@ def prune(
     return final, accepted
 
 
-def held_out_density(held: Experiment, robot: Robot, nominal: Fit, final: Fit) -> dict[str, np.ndarray]:
+def held_out_density(
+    held: Experiment, robot: Robot, given_noise: Noise, nominal: Fit, final: Fit
+) -> dict[str, np.ndarray]:
     """Log density per scalar measurement of each held-out trial: model as given, refitted, with effects."""
-    noise = suitable_noise(held, robot, nominal.noise)
-    given = evaluate(nominal_hypothesis(robot, ()), np.zeros(0), held, noise)
+    given = evaluate(nominal_hypothesis(robot, ()), np.zeros(0), held, given_noise)
     fits = {"nominal": given, "refitted": nominal, "with_effects": final}
     density = {}
     for name, fit in fits.items():

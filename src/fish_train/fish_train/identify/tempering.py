@@ -22,10 +22,8 @@ from fish_train.identify.settle import STRANGE, open_gates, worst_row
 Array = NDArray[np.float64]
 
 STAGES = ((100.0, 25), (30.0, 25), (10.0, 15), (3.0, 15), (1.0, 15))  # factor of the IMU's noise, iterations
-HELD_AT_FIRST = (
-    "link_inertia_factor",
-    "fin_inertia_factor",
-)  # far from the optimum they imitate a wrong phase of the tail
+# far from the optimum they imitate a wrong phase of the tail
+HELD_AT_FIRST = ("link_inertia_factor", "fin_inertia_factor")
 ROUNDS = 2  # of noise estimation and refits
 
 

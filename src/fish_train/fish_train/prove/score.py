@@ -51,9 +51,8 @@ class Score:
     ranking: Mapping[str, float]  # name -> quick gain, nats
     seconds: float
     error: str = ""  # why there is no answer
-    held_out: Mapping[str, float] = field(
-        default_factory=dict
-    )  # refitted name -> position error 2 s ahead [m]
+    # refitted name -> position error 2 s ahead on held-out trials [m]
+    held_out: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def top1(self) -> bool:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from plotly.subplots import make_subplots
 
-from fish_sim.model import DT
 from fish_train.diagnose.diagnosis import Diagnosis
-from fish_train.identify.prediction import WARM_UP, predict
-from fish_train.reports.identify_page_figures import MEASURED, Swim, swim_of
+from fish_train.reports.identify_page_figures import MEASURED, SIMULATED, Swim, whole_swims
 from fish_train.reports.page import Figure, styled
 
 MOST_TRIALS = 4
-REFITTED, WITH_EFFECTS = "#8fbcbb", "#e07b39"
+REFITTED = "#8fbcbb"
 NOTE = (
     "Simulated from the first estimate to the trial's end with the recorded inputs, without correction by measurements. "
     "Averaged over strokes. Grey: measured."
@@ -22,16 +20,12 @@ def before_after(d: Diagnosis) -> Figure:
     """Paths (upper row) and surge speeds (lower row) of up to MOST_TRIALS held-out trials."""
     which = (d.split.held_out or d.split.training)[:MOST_TRIALS]
     experiment = d.experiment.select(which)
-    whole = DT * int(experiment.steps.max())
-    first = 0.0 if experiment.start_at_rest else min(WARM_UP, 0.25 * DT * int(experiment.steps.min()))
     shown = {"refitted": (d.nominal, REFITTED)}
     if d.accepted:
-        shown["with effects"] = (d.final, WITH_EFFECTS)
+        shown["with effects"] = (d.final, SIMULATED)
     figure = make_subplots(2, len(which), subplot_titles=experiment.names, horizontal_spacing=0.05)
     for label, (fit, colour) in shown.items():
-        run = predict(experiment, fit.robot, fit.noise, whole, whole, first)
-        for m in range(len(which)):
-            swim = swim_of(run, m)
+        for m, swim in enumerate(whole_swims(experiment, fit)):
             if label == "refitted":
                 _lines(figure, swim, measured=True, label="measured", colour=MEASURED, column=m + 1)
             _lines(figure, swim, measured=False, label=label, colour=colour, column=m + 1)

@@ -12,7 +12,9 @@ from statsmodels.stats.diagnostic import acorr_ljungbox
 from statsmodels.tsa.stattools import acf
 
 from fish_sim.model import DT
+from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import ROWS
+from fish_train.identify.fit import Fit
 from fish_train.identify.identification import Identification
 from fish_train.identify.motion import stroke_mean
 from fish_train.identify.prediction import WARM_UP, Predictions, predict
@@ -47,14 +49,18 @@ def swims(result: Identification) -> list[Swim]:
     """Held-out trials (or the training ones) simulated from their first estimate to their end without correction."""
     experiment = result.judged.estimates.experiment
     experiment = experiment.select(range(min(MOST_TRIALS, len(experiment.names))))
+    return whole_swims(experiment, result.fit)
+
+
+def whole_swims(experiment: Experiment, fit: Fit) -> list[Swim]:
+    """Every trial simulated with a fitted robot from its first estimate to its end, without correction."""
     first = 0.0 if experiment.start_at_rest else min(WARM_UP, 0.25 * DT * int(experiment.steps.min()))
     whole = DT * int(experiment.steps.max())
-    run = predict(experiment, result.fit.robot, result.fit.noise, whole, whole, first)
-    return [swim_of(run, m) for m in range(len(experiment.names))]
+    run = predict(experiment, fit.robot, fit.noise, whole, whole, first)
+    return [_swim(run, m) for m in range(len(experiment.names))]
 
 
-def swim_of(run: Predictions, m: int) -> Swim:
-    """Trial m of predictions that have one start point per trial."""
+def _swim(run: Predictions, m: int) -> Swim:
     experiment, frames = run.estimates.experiment, run.estimates.experiment.frames[m]
     seen = run.seen(m)[:, 0]
     known = np.isfinite(seen).all(1) & (frames.t >= run.start[run.trial == m][0] * DT)
