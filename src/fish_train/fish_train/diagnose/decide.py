@@ -11,7 +11,6 @@ from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
-from fish_train.identify.hypothesis import Coordinates
 
 # One nat of innovations is worth 1/TEMPER nats of evidence: model errors too small to have a name, and the search
 # itself, make likelihood ratios over-confident. A judgement, not calibrated by a study yet.
@@ -57,17 +56,11 @@ def strength_z(fit: Fit, name: str) -> float:
     its mass is uncertain beside its place, but not whether there is one.
     """
     effect = {**EFFECTS, **SENSOR_EFFECTS}[name]
-    strengths = [f"{name}.{key}" for key in effect.strength]
     places = [f"{name}.{key}" for key in effect.parameters if key not in effect.strength]
     kept = [i for i, free in enumerate(fit.hypothesis.free) if free not in places]
     deviation = np.sqrt(np.diag(np.linalg.inv(fit.normal[np.ix_(kept, kept)])))
-    coordinates, names = Coordinates(fit.hypothesis), [fit.hypothesis.free[i] for i in kept]
-    slope, values = coordinates.slope(fit.theta), fit.values
-    return max(
-        abs(values[key] - effect.parameters[key.split(".")[1]].value)
-        / max(deviation[names.index(key)] * abs(slope[fit.hypothesis.free.index(key)]), 1e-300)
-        for key in strengths
-    )
+    z = np.abs(fit.theta[kept]) / deviation  # an effect's theta is 0 where it is neutral
+    return float(max(z[i] for i, k in enumerate(kept) if fit.hypothesis.free[k].startswith(f"{name}.")))
 
 
 def parameter_count(name: str) -> int:

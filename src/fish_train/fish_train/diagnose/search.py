@@ -129,16 +129,13 @@ def starts(base: Fit, name: str) -> list[np.ndarray]:
 
 def warm_starts(base: Fit, name: str) -> list[np.ndarray]:
     """theta of the base with a candidate, weak and strong, on either side where it has a place."""
-    coordinates = Coordinates(base.hypothesis.with_effect(name, SCALE))
+    coordinates, count = Coordinates(base.hypothesis.with_effect(name, SCALE)), len(base.theta)
+    sides = [(1.0, -1.0) if has_sides(name, key) else (1.0,) for key in specification(name)]
     found = []
-    for strength in STRENGTHS:
-        robot = base.hypothesis.with_effect(name, strength).robot
-        own = coordinates.read(robot)[len(base.theta) :]
-        for signs in product(
-            *((1.0, -1.0) if has_sides(name, key) else (1.0,) for key in specification(name))
-        ):
-            start = coordinates.encode(np.concatenate([np.ones(len(base.theta)), own * signs]))
-            found.append(np.concatenate([base.theta, start[len(base.theta) :]]))
+    for strength, signs in product(STRENGTHS, product(*sides)):
+        values = coordinates.read(base.hypothesis.with_effect(name, strength).robot)
+        values[count:] *= signs
+        found.append(np.concatenate([base.theta, coordinates.encode(values)[count:]]))
     return found
 
 
