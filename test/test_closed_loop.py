@@ -2,6 +2,8 @@
 
 import math
 import signal
+import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 from conftest import CONTROLLER, FUSION, PLANNER, RECORDER, Run, parameters, running
 from rosbags.highlevel import AnyReader
 
-from fish_train.bringup import REPLAYER
+from fish_train.bringup import REPLAYER, NodeSpec
 from fish_train.recordings import read_trial
 from fish_train.score import RunScore, score_trial
 
@@ -19,6 +21,7 @@ FACTOR = 0.5  # simulated seconds in a second: time enough on a computer that do
 CROSS_TRACK_RMSE, SPEED_RMSE = 0.03, 0.04  # m, m/s; on a quiet computer 0.010 and 0.024
 SAME_POSITION, SAME_HEADING = 0.006, 0.03  # m, rad, at worst; the camera's noise is 0.002 m and 0.012 rad
 STOP_WITHIN = 0.8  # s from the last estimate: 0.15 s until it is stale, 0.5 s in which the rotor runs down
+GLIDE = 1.0  # m at most without estimates and until the planner speaks again
 RESUMED_WITHIN = 0.3  # m off the path at most, while a node is being started again and the fish glides
 
 
@@ -88,9 +91,11 @@ def test_a_replay_through_fusion_gives_the_same_odometry(swum, tmp_path):
 
 @pytest.mark.parametrize("spec", [PLANNER, FUSION, CONTROLLER], ids=lambda spec: spec.executable)
 def test_a_killed_node_resumes(spec, resumed):
-    before, planned, true = resumed.places[spec]  # m
-    assert before - 0.05 < planned  # goes on where it was, not from the beginning
-    assert abs(planned - true) < 0.15  # and leaves nothing out
+    places = resumed.places[spec]
+    assert (
+        places.lowest > places.before - 0.3
+    )  # goes on where it was, not from the beginning; its last word may be old
+    assert places.planned < places.before + GLIDE  # and leaves nothing out
 
 
 def test_a_run_with_kills_ends_where_the_path_ends(resumed):
@@ -100,22 +105,33 @@ def test_a_run_with_kills_ends_where_the_path_ends(resumed):
 
 
 def test_rotor_stops_and_rudder_centres_while_there_is_no_estimate(resumed):
-    t, _ = messages(resumed.recording, "/fish/odometry/filtered")
-    longest = int(np.argmax(np.diff(t)))  # fusion is being started again
-    stopped, again = t[longest] + STOP_WITHIN, t[longest + 1]
-    assert again > stopped + 0.2, "fusion was back too soon to see anything"
-    stamps, commands = messages(resumed.recording, "/fish/joint_command")
-    meanwhile = [c for stamp, c in zip(stamps, commands, strict=True) if stopped < stamp < again]
+    t, estimates = messages(resumed.recording, "/fish/odometry/filtered")
+    last = t[np.array([e.arrival for e in estimates]) < resumed.places[FUSION].restarted].max()
+    meanwhile = [
+        command.message
+        for stamp, command in zip(*messages(resumed.recording, "/fish/joint_command"), strict=True)
+        if stamp > last + STOP_WITHIN and command.arrival < resumed.places[FUSION].restarted
+    ]
     assert len(meanwhile) > 10  # they do not just cease
     assert all(c.velocity[0] == 0.0 and c.position[1] == 0.0 for c in meanwhile)
 
 
+@dataclass(frozen=True)
+class Places:
+    """Progress along the path [m] around the restart of a node."""
+
+    before: float  # true, at the kill
+    lowest: float  # that the planner spoke of until it was further on
+    planned: float  # by the planner, when fish and planner were further on and agreed
+    restarted: float  # time of the computer [s] when the node was started again
+
+
+@dataclass(frozen=True)
 class Resumed:
     """What was seen of a run in which nodes were killed."""
 
-    def __init__(self, recording: Path) -> None:
-        self.recording = recording
-        self.places: dict[object, tuple[float, float, float]] = {}
+    recording: Path
+    places: dict[NodeSpec, Places] = field(default_factory=dict)
 
 
 @pytest.fixture(scope="module")
@@ -126,44 +142,64 @@ def resumed(tmp_path_factory) -> Resumed:
     with running(folder, parameters(folder, "sinusoid", LONG, LONG_START, FACTOR)) as run:
         for spec, place in ((PLANNER, 0.4), (FUSION, 0.9), (CONTROLLER, 1.4)):
             run.until(lambda place=place: run.progress() > place, f"progress of {place} m")
-            # on a fast computer fusion would be back before the fish could stop
-            seen.places[spec] = kill_and_restart(run, spec, pause=1.5 if spec is FUSION else 0.0)
+            # without estimates the fish is to stop, which takes a while
+            seen.places[spec] = kill_and_restart(run, spec, pause=3.0 if spec is FUSION else 0.0)
         run.until(run.finished, "the end of the path")
         run.listen(0.5)  # the estimate may be there a little before the fish
         run.nodes.stop([RECORDER])
     return seen
 
 
-def kill_and_restart(run: Run, spec, pause: float) -> tuple[float, float, float]:
-    """Progress [m] at the kill; 0.1 m further on, restarted after `pause` [s], the planner's and the true one."""
+def kill_and_restart(run: Run, spec, pause: float) -> Places:
+    """Kill a node, start it again after `pause` [s] and swim on until the planner is 0.1 m further."""
     process = run.nodes.running[spec]
     process.signal(signal.SIGKILL)
     assert process.wait(5.0) == -signal.SIGKILL
-    before = run.progress()
-    run.watch.diagnostics.clear()
+    before, words = run.progress(), []
     run.listen(pause)
+    restarted = time.time()
     run.start(spec)
-    run.until(lambda: run.progress() > before + 0.1, f"swimming on after the end of {spec.name}")
-    run.watch.diagnostics.clear()  # what it said on the way here is old
-    run.until(lambda: "progress_m" in run.watch.diagnostics.get("fish/planner", {}), "the planner's word")
-    return before, float(run.watch.diagnostics["fish/planner"]["progress_m"]), run.progress()
+
+    def further() -> (
+        bool
+    ):  # this test may hear a new estimate before the planner does, and the planner speaks once a second
+        words.append(planned(run))
+        return words[-1] > before + 0.1 and abs(words[-1] - run.progress()) < 0.15
+
+    run.until(further, f"the planner being where the fish is after the end of {spec.name}")
+    return Places(before, float(np.nanmin(words)), words[-1], restarted)
 
 
-def messages(recording: Path, topic: str) -> tuple[np.ndarray, list]:
+def planned(run: Run) -> float:
+    """Arc length [m] of which the planner spoke last."""
+    return float(run.watch.diagnostics.get("fish/planner", {}).get("progress_m", "nan"))
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A recorded message."""
+
+    stamp: float  # s, of its header
+    arrival: float  # s, time of the computer
+    message: object
+
+
+def messages(recording: Path, topic: str) -> tuple[np.ndarray, list[Heard]]:
     """Header stamps (N,) [s] and messages of a topic in order of stamp, read with rosbags alone."""
-    stamped = []
+    heard = []
     with AnyReader([recording]) as reader:
         connections = [c for c in reader.connections if c.topic == topic]
-        for connection, _, data in reader.messages(connections=connections):
+        for connection, arrival, data in reader.messages(connections=connections):
             message = reader.deserialize(data, connection.msgtype)
-            stamped.append((message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec, message))
-    stamped.sort(key=lambda pair: pair[0])
-    return np.array([stamp for stamp, _ in stamped]), [message for _, message in stamped]
+            stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+            heard.append(Heard(stamp, 1e-9 * arrival, message))
+    heard.sort(key=lambda h: h.stamp)
+    return np.array([h.stamp for h in heard]), heard
 
 
 def odometry(recording: Path, topic: str) -> tuple[np.ndarray, np.ndarray]:
     """Stamps (N,) [s] and x, y, heading (N, 3), unwrapped."""
     t, found = messages(recording, topic)
-    poses = [message.pose.pose for message in found]
+    poses = [heard.message.pose.pose for heard in found]
     heading = np.unwrap([2.0 * math.atan2(pose.orientation.z, pose.orientation.w) for pose in poses])
     return t, np.column_stack([[(pose.position.x, pose.position.y) for pose in poses], heading])
