@@ -273,6 +273,7 @@ def test_a_competitor_finds_the_law_it_was_shown() -> None:
         "rotor_speed",
         "wall_distance",
         "heading",
+        "time",
         "x",
         "y",
     )

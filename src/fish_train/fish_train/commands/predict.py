@@ -26,9 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the table, print the errors."""
-    from fish_train.identify.filter_types import Noise
     from fish_train.identify.prediction import WARM_UP, predict, prediction_errors
     from fish_train.identify.prediction_table import write_predictions
+    from fish_train.identify.sensor_noise import usual_noise
     from fish_train.identify.settle import suitable_noise
     from fish_train.reports.identify_tables import error_table
     from fish_train.score_table import print_table
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     model = read_model(args.model)
     experiment, left_out = read_experiment(args.recording)
     with user_errors():
-        noise = suitable_noise(experiment, model, Noise())
+        noise = suitable_noise(experiment, model, usual_noise(experiment))
         predictions = predict(experiment, model, noise, args.horizon)
         rows = write_predictions(args.out, predictions)
         horizons = tuple(h for h in (1.0, 2.0, 5.0) if h <= args.horizon) or (args.horizon,)

@@ -11,7 +11,7 @@ from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose import locate
 from fish_train.diagnose.decide import PLAUSIBLE, excess, p_value, parameter_count, probabilities
-from fish_train.diagnose.diagnosis import TOO_STRONG, UNEXPLAINED_R2, Accepted, Diagnosis
+from fish_train.diagnose.diagnosis import TOO_STRONG, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
@@ -39,8 +39,9 @@ def much_is_left(d: Diagnosis) -> bool:
 
 
 def has_law(d: Diagnosis) -> bool:
-    """A sparse regression of the remaining wrench holds on trials that it was not fitted to."""
-    return max(d.description.r2.values()) > UNEXPLAINED_R2
+    """A sparse regression of the remaining wrench would be as good as a name, on trials that it was not fitted to."""
+    samples, gain = float(d.final.result.samples.sum()), max(d.description.gain.values())
+    return gain > d.level.enough(samples, locate.REGRESSORS, len(d.description.gain) * d.description.tried)
 
 
 def named(d: Diagnosis) -> tuple[Accepted, ...]:
@@ -144,7 +145,8 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
     share = unexplained_share(d)
     if not much_is_left(d):
         return {"share": share, "where": {}, "description": "the remaining force looks like water noise"}
-    worst = max(r2, key=lambda dof: r2[dof])
+    gain = d.description.gain
+    worst = max(gain, key=lambda dof: gain[dof])
     law = " + ".join(f"({c:.3g}) {term}" for term, c in d.description.terms[worst].items())
     scale = np.array(d.final.noise.wrench)
     return {
@@ -156,7 +158,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "place": locate.place_shares(d.remaining, scale),
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
-        "description": f"{worst} = {law} (SI units; explains {r2[worst]:.0%} of it on unseen trials)"
+        "description": f"{worst} = {law} (SI units; {gain[worst]:.0f} nats, {r2[worst]:.0%} of it on unseen trials)"
         if has_law(d)
         else f"{STRONG.format(*excess(d.final))}; no law in place, speed, rudder or heading was found for it",
     }

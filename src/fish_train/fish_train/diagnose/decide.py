@@ -18,6 +18,7 @@ TEMPER = 10.0
 # nats per scalar measurement below which a gain is no physics worth a name, whatever its significance
 SMALLEST_GAIN = 0.004
 SMALLEST_Z = 4.0  # standard errors between the strength and its neutral value
+SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
 PLAUSIBLE = 0.02  # rivals less probable than this are not named
 
 

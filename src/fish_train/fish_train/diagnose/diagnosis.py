@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_train.diagnose.decide import SMALLEST_Z, Level, excess, parameter_count, strength_z
+from fish_train.diagnose.base import fit_cold
+from fish_train.diagnose.decide import SMALLEST_Z, SUSPICIOUS, Level, excess, parameter_count, strength_z
 from fish_train.diagnose.locate import Description, MissingForce, describe, missing_force
 from fish_train.diagnose.search import (
     RANK_STEPS,
-    SUSPICIOUS,
     Round,
     evidence,
     look_alike,
-    restart_base,
-    search_round,
+    settled_round,
 )
 from fish_train.diagnose.split import Split, split_trials
 from fish_train.diagnose.tail import MORE, finer_tails
@@ -26,6 +25,7 @@ from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate, settle, trial_likelihoods
 from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.settle import suitable_noise
 from fish_train.identify.tempering import fit_tempered
 
@@ -33,7 +33,7 @@ MOST_EFFECTS = 3
 FAIR_SHARE = 0.25  # of the gain per sample that trials not fitted to must show
 # times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
 TOO_STRONG = 30.0
-UNEXPLAINED_R2 = 0.3  # cross-validated; above it the remaining wrench is a force with a law, not water noise
+ROUNDS_OF_A_WRONG_MODEL = 2  # it goes on and on, for the noise has taken in what it lacks
 
 Progress = Callable[[str], None]
 
@@ -110,14 +110,14 @@ def diagnose(
     held = held_out_density(unseen, robot, given_noise, nominal, final)
     return Diagnosis(
         experiment, split, robot, nominal, final, tuple(rounds), tuple(accepted), unreachable, level,
-        force, remaining, describe(remaining), given_noise, held,
+        force, remaining, describe(remaining, final.noise), given_noise, held,
     )  # fmt: skip
 
 
 def fit_base(robot: Robot, experiment: Experiment) -> Fit:
-    """The nominal model: a cold fit on the start of every trial, continued on the whole."""
-    short = fit_tempered(nominal_hypothesis(robot), shorten(experiment, RANK_STEPS), Noise())
-    return settle(evaluate(short.hypothesis, short.theta, experiment, short.noise), experiment)
+    """The nominal model: cold fit on the start of every trial, continued on the whole."""
+    cold = fit_cold(robot, shorten(experiment, RANK_STEPS))
+    return settle(evaluate(cold.hypothesis, cold.theta, experiment, cold.noise), experiment)
 
 
 def grow(
@@ -130,11 +130,7 @@ def grow(
     while len(accepted) < min(MOST_EFFECTS, len(competing)):
         names = [n for n in competing if n not in base.hypothesis.names]
         samples = float(base.result.samples.sum())
-        found = search_round(base, names, experiment, level.enough(samples, 1, len(names)), progress)
-        if found.best is not None:
-            progress("refitting without it, from where it led")
-            restarted = restart_base(found.base, found.refitted[found.best], experiment)
-            found = Round(restarted, found.ranking, found.refitted)
+        found = settled_round(base, names, experiment, level.enough(samples, 1, len(names)), progress)
         rounds.append(found)
         name = choose(found, check, len(names), level)
         if name is None:
@@ -169,8 +165,9 @@ def anneal(fit: Fit, experiment: Experiment) -> Fit:
     """The fit, or where it needs far more than usual water a better optimum that the camera alone leads to."""
     if excess(fit).max() < SUSPICIOUS:
         return fit
-    short = fit_tempered(fit.hypothesis, shorten(experiment, RANK_STEPS), Noise(), fit.theta)
-    other = settle(evaluate(fit.hypothesis, short.theta, experiment, short.noise), experiment)
+    noise, short = usual_noise(experiment), shorten(experiment, RANK_STEPS)
+    short_fit = fit_tempered(fit.hypothesis, short, noise, fit.theta, held=())
+    other = settle(evaluate(fit.hypothesis, short_fit.theta, experiment, short_fit.noise), experiment)
     return max(fit, other, key=lambda f: f.objective)
 
 
@@ -211,13 +208,15 @@ def holds_elsewhere(base: Fit, fit: Fit, check: Experiment) -> bool:
 
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:
     """Nominal and final structure on all training trials, from their optima on the search trials."""
-    nominal = refine(rounds[0].base, training)
-    return nominal, (refine(base, training) if base.hypothesis.names else nominal)
+    if not base.hypothesis.names:
+        nominal = refine(base, training)
+        return nominal, nominal
+    return refine(rounds[0].base, training, ROUNDS_OF_A_WRONG_MODEL), refine(base, training)
 
 
-def refine(fit: Fit, experiment: Experiment) -> Fit:
+def refine(fit: Fit, experiment: Experiment, rounds: int = 5) -> Fit:
     """A fit carried over to other trials."""
-    return settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment)
+    return settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment, rounds)
 
 
 def prune(

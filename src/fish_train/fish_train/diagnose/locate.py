@@ -10,7 +10,7 @@ from sklearn.linear_model import OrthogonalMatchingPursuit
 from fish_sim.model import DT
 from fish_sim.pool import LENGTH, WIDTH
 from fish_train.identify.experiment import Experiment
-from fish_train.identify.filter_types import Array
+from fish_train.identify.filter_types import Array, Noise
 from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.smoother import smooth
 
@@ -48,6 +48,7 @@ def missing_force(fit: Fit, experiment: Experiment) -> MissingForce:
         "rotor_speed": memory[..., 1],
         "wall_distance": np.minimum(LENGTH / 2 - np.abs(xi[..., 0]), WIDTH / 2 - np.abs(xi[..., 1])),
         "heading": np.arctan2(sin, cos),
+        "time": np.where(valid, DT * np.arange(len(xi))[:, None], np.nan),
         "x": xi[..., 0],
         "y": xi[..., 1],
     }
@@ -107,6 +108,8 @@ def covariate_shares(force: MissingForce, scale: Array) -> list[dict[str, object
     e = energy(force, scale).ravel()
     rows = []
     for name, values in force.covariates.items():
+        if name == "time":  # time_shares tells
+            continue
         v = values.ravel()
         good = np.isfinite(e) & np.isfinite(v)
         if np.ptp(v[good]) < 1e-6:
@@ -130,32 +133,49 @@ class Description:
     """A sparse regression of the missing wrench, judged on trials it has not seen."""
 
     r2: dict[str, float]  # per degree of freedom, cross-validated by trial
+    gain: dict[str, float]  # nats that the law would gain as a force of the model, cross-validated, at least
     terms: dict[str, dict[str, float]]  # degree of freedom -> regressor -> coefficient (SI)
+    tried: int  # regressors that it could choose from
 
 
-def describe(force: MissingForce) -> Description:
-    """What the missing force looks like: at most REGRESSORS products of covariates per degree of freedom."""
+def describe(force: MissingForce, noise: Noise) -> Description:
+    """What the missing force looks like: at most REGRESSORS products of covariates per degree of freedom.
+
+    A known force f added to the model raises the log likelihood by at least (w' K^-1 w - (w - f)' K^-1 (w - f)) / 2, where
+    w is the smoothed wrench and K the covariance that the filter assumes for it (from Gaussian conditioning, as in
+    Rasmussen and Williams 2006, appendix A.2; the posterior's covariance, left out, would add to it).
+    """
     library = regressors(force.covariates)
     trials = np.arange(len(force.names))
-    r2, terms = {}, {}
+    r2, gain, terms = {}, {}, {}
     for i, dof in enumerate(DOFS):
-        scores, weights = [], []
+        wrench, scores, weights, nats = force.wrench[..., i], [], [], 0.0
         for held in trials:
             inside = [t for t in trials if t != held]
             if not inside:
                 continue
-            model, names, A, y = _sparse(library, force.wrench[..., i], inside)
-            B, z = _columns(library, force.wrench[..., i], [held])
-            scores.append(1.0 - np.sum((z - model(B)) ** 2) / np.sum((z - z.mean()) ** 2))
+            model, names, _, _ = _sparse(library, wrench, inside)
+            B, z = _columns(library, wrench, [held])
+            left = z - model(B)
+            scores.append(1.0 - np.sum(left**2) / np.sum((z - z.mean()) ** 2))
             weights.append(len(z))
+            nats += prior_cost(z, noise.wrench[i], noise) - prior_cost(left, noise.wrench[i], noise)
         r2[dof] = float(np.average(scores, weights=weights)) if scores else 0.0
-        _, names, coefficients, _ = _sparse(library, force.wrench[..., i], list(trials))
+        gain[dof] = nats
+        _, names, coefficients, _ = _sparse(library, wrench, list(trials))
         terms[dof] = dict(zip(names, coefficients, strict=True))
-    return Description(r2, terms)
+    return Description(r2, gain, terms, len(library))
+
+
+def prior_cost(w: Array, deviation: float, noise: Noise) -> float:
+    """w' K^-1 w / 2 of a first-order Gauss-Markov process (T,) with this stationary standard deviation."""
+    decay = np.exp(-DT / noise.wrench_time)
+    steps = (w[1:] - decay * w[:-1]) / np.sqrt(1.0 - decay**2)
+    return 0.5 * float(w[0] ** 2 + np.sum(steps**2)) / deviation**2
 
 
 def regressors(c: dict[str, Array]) -> dict[str, Array]:
-    """Candidate terms: covariates, signed squares, products, place."""
+    """Candidate terms: covariates, signed squares, products, place, what grows during a trial, induced drag."""
     base = {k: c[k] for k in ("surge_speed", "sway_speed", "yaw_rate", "rudder")}
     library = dict(base)
     library |= {f"{k} |{k}|": v * np.abs(v) for k, v in base.items()}
@@ -163,6 +183,8 @@ def regressors(c: dict[str, Array]) -> dict[str, Array]:
     library |= {f"{a} {b}": base[a] * base[b] for i, a in enumerate(keys) for b in keys[i + 1 :]}
     library |= {"cos(heading)": np.cos(c["heading"]), "sin(heading)": np.sin(c["heading"])}
     library |= {"surge_speed^2": base["surge_speed"] ** 2, "x": c["x"], "y": c["y"]}
+    library |= {"time": c["time"], "time surge_speed": c["time"] * base["surge_speed"]}
+    library["surge_speed rudder^2"] = base["surge_speed"] * base["rudder"] ** 2
     library["surge_speed exp(-wall_distance/0.2 m)"] = base["surge_speed"] * np.exp(-c["wall_distance"] / 0.2)
     return library
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
-from fish_train.diagnose.decide import excess
+from fish_train.diagnose.decide import SUSPICIOUS, excess
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, log_posterior, settle
@@ -33,7 +33,8 @@ RANK_ITERATIONS = 6
 POLISH_ITERATIONS = 4
 POLISHED = 8  # candidates that are ranked with the IMU's own noise
 SHORTLIST = 4
-SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
+MOST_SEARCHES = 3  # with one base after the other, each a better optimum
+POOR_BASE = 0.5  # share of the best candidate's gain that a better optimum of the base has as well
 WORTH_A_REFIT = 0.2  # share of the best ranking gain
 LOOK_ALIKES = (
     ("tip_slip", "wake_memory", "tail_joint_damping"),
@@ -67,6 +68,13 @@ class Round:
     def best(self) -> str | None:
         """Name of the best refitted candidate by evidence."""
         return max(self.refitted, key=lambda name: evidence(self.refitted[name]), default=None)
+
+    def near_best(self, name: str, enough: float) -> bool:
+        """Whether a candidate was refitted and came as near the best as makes no difference."""
+        return name == self.best or (
+            name in self.refitted
+            and self.refitted[self.best].objective - self.refitted[name].objective < enough
+        )
 
     def gain(self, name: str) -> float:
         """Nats over the base, both with their own noise."""
@@ -174,6 +182,14 @@ def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
     return settle(start, experiment)
 
 
+def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment) -> Fit:
+    """A rival from the nominal parameters and the noise of the best: what looks alike has its optimum near."""
+    hypothesis = base.hypothesis.with_effect(name, SCALE)
+    starts = warm_starts(replace(base, theta=best.theta[: len(base.theta)]), name)
+    start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, experiment, best.noise))
+    return settle(evaluate(hypothesis, start, experiment, best.noise), experiment)
+
+
 def search_round(
     base: Fit, names: Sequence[str], experiment: Experiment, enough: float, progress: Progress
 ) -> Round:
@@ -185,7 +201,31 @@ def search_round(
     for r in chosen:
         progress(f"refitting {r.name}")
         refitted[r.name] = refit(base, r, experiment)
-    return Round(base, ranking, refitted)
+    found = Round(base, ranking, refitted)
+    for name in names if found.best else ():
+        if look_alike(name, found.best) and not found.near_best(name, enough):
+            progress(f"refitting {name} from where {found.best} led")
+            fit = refit_beside(refitted[found.best], base, name, experiment)
+            refitted[name] = max(fit, refitted.get(name, fit), key=lambda f: f.objective)
+    return found
+
+
+def settled_round(
+    base: Fit, names: Sequence[str], experiment: Experiment, enough: float, progress: Progress
+) -> Round:
+    """`search_round` from a base that the best candidate cannot lead to a better optimum: that would imitate its effect."""
+    for _ in range(MOST_SEARCHES):
+        found = search_round(base, names, experiment, enough, progress)
+        if found.best is None:
+            return found
+        best = found.refitted[found.best]
+        progress("refitting without it, from where it led")
+        restarted = restart_base(base, best, experiment)
+        found = replace(found, base=restarted)
+        if restarted.objective - base.objective < POOR_BASE * (best.objective - base.objective):
+            return found
+        base = restarted
+    return found
 
 
 def restart_base(base: Fit, rival: Fit, experiment: Experiment) -> Fit:

@@ -9,11 +9,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
+from fish_train.diagnose.base import fit_cold
 from fish_train.identify.experiment import Experiment
-from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate, log_posterior, settle
-from fish_train.identify.hypothesis import nominal_hypothesis
-from fish_train.identify.tempering import fit_tempered
 
 MORE = (1, 2)  # links that are tried beyond the robot's
 
@@ -36,7 +34,7 @@ def finer_tails(
         if links > MAX_LINKS:
             break
         progress(f"fitting the nominal model with {links} tail links")
-        fit = fit_tempered(nominal_hypothesis(with_links(robot, links)), short, Noise())
+        fit = fit_cold(with_links(robot, links), short)
         if fit.objective > beaten:
             found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
     return found

@@ -16,6 +16,7 @@ from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter import run_filter
 from fish_train.identify.filter_types import FilterResult, Noise
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
+from fish_train.identify.sensor_noise import usual_noise
 
 Array = NDArray[np.float64]
 NoiseMove = Callable[[Noise, float], Noise]
@@ -82,8 +83,8 @@ def evaluate(
     return Fit(hypothesis, theta, robot, noise, result.log_likelihood, objective, result, normal)
 
 
-def climb(start: Fit, experiment: Experiment, iterations: int) -> Fit:
-    """Levenberg-Marquardt with fixed noise from a fit that was evaluated on this experiment."""
+def climb(start: Fit, experiment: Experiment, iterations: int, small_gain: float = SMALL_GAIN) -> Fit:
+    """Levenberg-Marquardt with fixed noise from a fit that was evaluated on this experiment, until it gains little."""
     coordinates = Coordinates(start.hypothesis)
     best, noise = start, start.noise
     damping, small = 1e-3, 0
@@ -95,10 +96,10 @@ def climb(start: Fit, experiment: Experiment, iterations: int) -> Fit:
         gain = trial.objective - best.objective
         if np.isfinite(gain) and gain > 0:
             best, damping = trial, max(damping / 10.0, 1e-9)
-            small = small + 1 if gain < SMALL_GAIN else 0
+            small = small + 1 if gain < small_gain else 0
         else:
             damping *= 10.0
-            small += np.isfinite(gain) and gain > -SMALL_GAIN
+            small += np.isfinite(gain) and gain > -small_gain
         if small >= 1 or damping > 1e4:
             break
     return best
@@ -161,7 +162,9 @@ def adapt_noise(
     the one before, and from there the parabola stops half-way.
     """
     old = fit.noise
-    usual = replace(Noise(), gate_camera=old.gate_camera, gate_imu=old.gate_imu)  # of the sensors too
+    usual = replace(
+        usual_noise(experiment), gate_camera=old.gate_camera, gate_imu=old.gate_imu
+    )  # of the sensors too
     starts = [old, usual, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
     starts += [replace(old, wrench=tuple(f * w for w in old.wrench)) for f in JUMPS]
     noise, best = max(((n, likelihood(fit, experiment, n)) for n in starts), key=lambda found: found[1])

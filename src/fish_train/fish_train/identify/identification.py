@@ -28,6 +28,7 @@ from fish_train.identify.prediction import (
     predict,
     prediction_errors,
 )
+from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.settle import STRANGE, suitable_noise, worst_row
 from fish_train.identify.tempering import fit_tempered
 
@@ -92,7 +93,7 @@ def identify(
     effects: names added to the robot's, their parameters free. A delay of the camera that the gyro shows is taken out of
     all trials first, so that horizons count from the moment an image was taken, and goes into the robot that comes back.
     """
-    began, noise = time.monotonic(), noise or Noise()
+    began, noise = time.monotonic(), noise or usual_noise(experiment)
     train, held = split(len(experiment.names), hold_out)
     lag = Alignment(0.0, np.nan, np.nan)
     if "camera_latency" not in (*robot.sensors, *effects):

@@ -24,25 +24,27 @@ Array = NDArray[np.float64]
 STAGES = ((100.0, 25), (30.0, 25), (10.0, 15), (3.0, 15), (1.0, 15))  # factor of the IMU's noise, iterations
 # far from the optimum they imitate a wrong phase of the tail
 HELD_AT_FIRST = ("link_inertia_factor", "fin_inertia_factor")
+FAR_GAIN = 3.0  # nats; an iteration of a stage that is not the last and gains less is its last
 ROUNDS = 2  # of noise estimation and refits
 
 
 def fit_tempered(
     hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array | None = None,
-    report: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], None] = lambda _: None, held: tuple[str, ...] = HELD_AT_FIRST,
 ) -> Fit:  # fmt: skip
     """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn.
 
+    The parameters `held` are free only when the camera has led the others.
     Where the first stage leaves innovations that the sensors' noise cannot explain, that noise is estimated as well.
     The last steps leave out outliers by the gates of `noise`.
     """
     theta = Coordinates(hypothesis).origin() if theta is None else theta.copy()
-    first = [i for i, name in enumerate(hypothesis.free) if name not in HELD_AT_FIRST]
-    coarse = _fixing(hypothesis, theta)
+    first = [i for i, name in enumerate(hypothesis.free) if name not in held]
+    coarse = _fixing(hypothesis, theta, held)
     for factor, iterations in STAGES:
         report(f"fitting, IMU noise x {factor:g}")
         wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
-        fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations)
+        fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN)
         theta[first] = fit.theta
         if worst_row(fit) > STRANGE:
             return _fit_with_sensor_noise(evaluate(hypothesis, theta, experiment, wide), experiment, report)
@@ -56,12 +58,12 @@ def fit_tempered(
     return fit
 
 
-def _fixing(hypothesis: Hypothesis, theta: Array) -> Hypothesis:
-    """The hypothesis with the parameters of HELD_AT_FIRST fixed at theta."""
+def _fixing(hypothesis: Hypothesis, theta: Array, held: tuple[str, ...]) -> Hypothesis:
+    """The hypothesis with the parameters `held` fixed at theta."""
     robot = Coordinates(hypothesis).robot(theta)
-    held = {name: robot.parameters[name] for name in hypothesis.free if name in HELD_AT_FIRST}
-    free = tuple(name for name in hypothesis.free if name not in HELD_AT_FIRST)
-    return Hypothesis(hypothesis.robot.with_parameters(**held), free)
+    fixed = {name: robot.parameters[name] for name in hypothesis.free if name in held}
+    free = tuple(name for name in hypothesis.free if name not in held)
+    return Hypothesis(hypothesis.robot.with_parameters(**fixed), free)
 
 
 def _fit_with_sensor_noise(fit: Fit, experiment: Experiment, report: Callable[[str], None]) -> Fit:

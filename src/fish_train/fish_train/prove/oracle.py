@@ -15,6 +15,7 @@ from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate
 from fish_train.identify.hypothesis import Coordinates, Hypothesis, nominal_hypothesis
 from fish_train.identify.prediction import predict, prediction_errors
+from fish_train.identify.sensor_noise import usual_noise
 from fish_train.prove.swim import Readings
 from fish_train.prove.world import World
 
@@ -77,7 +78,7 @@ def look(
     held = [i for i, name in enumerate(experiment.names) if name in held_out]
     training = [i for i in range(len(experiment.names)) if i not in held]
     data, unseen = experiment.select(training), experiment.select(held or training)
-    noise = Noise()
+    noise = usual_noise(data)
     surge, sway, yaw = (world.noise * w for w in noise.wrench)
     noise = replace(noise, wrench=(surge, sway, yaw))
     nominal = _fit(_with(world, ()), world, data, noise)

@@ -1,0 +1,40 @@
+"""Sensor noise from the signals' roughness: what the sensors were made with, whatever the fish does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_sim.robot import Robot
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.sensor_noise import FEWEST, ORDER, SMALLEST, difference_noise, usual_noise
+from fish_train.identify.synthetic import program, record
+
+SENSORS = ("gyro", "accel", "camera_position", "camera_heading", "encoder")
+
+
+@pytest.fixture(scope="module", params=[1.0, 3.0])
+def factor(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def swum(factor):
+    random, usual = np.random.default_rng(4), Noise()
+    noisy = replace(usual, **{name: factor * getattr(usual, name) for name in SENSORS})
+    commands = np.stack([program(kind, 10.0, random) for kind in ("sines", "random")], axis=1)
+    return record(Robot(), commands, noisy, random)[0]
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_noise_is_that_of_the_sensors(swum, factor, sensor):
+    found = getattr(usual_noise(swum), sensor) / getattr(Noise(), sensor)
+    assert found == pytest.approx(factor, rel=0.12)  # 600 poses
+
+
+def test_a_smooth_signal_and_a_short_one():
+    t = np.linspace(0.0, 5.0, 500)
+    swing = np.diff(2.0 * np.sin(2.0 * np.pi * 2.0 * t), ORDER)
+    assert difference_noise(swing, 0.006) == SMALLEST * 0.006
+    assert difference_noise(swing[: FEWEST - 1], 0.006) == 0.006
+    assert difference_noise(np.full(500, np.nan), 0.006) == 0.006
