@@ -7,7 +7,7 @@ import pytest
 
 from fish_sim.robot import Robot
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.sensor_noise import FEWEST, ORDER, SMALLEST, difference_noise, usual_noise
+from fish_train.identify.sensor_noise import FEWEST, SMALLEST, usual_noise, white_noise
 from fish_train.identify.synthetic import program, record
 
 SENSORS = ("gyro", "accel", "camera_position", "camera_heading", "encoder")
@@ -34,7 +34,13 @@ def test_noise_is_that_of_the_sensors(swum, factor, sensor):
 
 def test_a_smooth_signal_and_a_short_one():
     t = np.linspace(0.0, 5.0, 500)
-    swing = np.diff(2.0 * np.sin(2.0 * np.pi * 2.0 * t), ORDER)
-    assert difference_noise(swing, 0.006) == SMALLEST * 0.006
-    assert difference_noise(swing[: FEWEST - 1], 0.006) == 0.006
-    assert difference_noise(np.full(500, np.nan), 0.006) == 0.006
+    swing = 2.0 * np.sin(2.0 * np.pi * 2.0 * t)
+    assert white_noise([swing], 0.006) == SMALLEST * 0.006
+    assert white_noise([swing[:FEWEST]], 0.006) == 0.006
+    assert white_noise([np.full(500, np.nan)], 0.006) == 0.006
+
+
+def test_a_sensor_slower_than_the_grid_is_measured_too():
+    signal = np.full(1000, np.nan)
+    signal[::2] = 0.02 * np.random.default_rng(5).standard_normal(500)
+    assert white_noise([signal], 0.006) == pytest.approx(0.02, rel=0.15)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_train.diagnose.base import fit_cold
+from fish_train.diagnose.base import better, fit_cold, settle_base
 from fish_train.diagnose.decide import SMALLEST_Z, SUSPICIOUS, Level, excess, parameter_count, strength_z
 from fish_train.diagnose.locate import Description, MissingForce, describe, missing_force
 from fish_train.diagnose.search import (
@@ -33,7 +33,6 @@ MOST_EFFECTS = 3
 FAIR_SHARE = 0.25  # of the gain per sample that trials not fitted to must show
 # times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
 TOO_STRONG = 30.0
-ROUNDS_OF_A_WRONG_MODEL = 2  # it goes on and on, for the noise has taken in what it lacks
 
 Progress = Callable[[str], None]
 
@@ -117,7 +116,7 @@ def diagnose(
 def fit_base(robot: Robot, experiment: Experiment) -> Fit:
     """The nominal model: cold fit on the start of every trial, continued on the whole."""
     cold = fit_cold(robot, shorten(experiment, RANK_STEPS))
-    return settle(evaluate(cold.hypothesis, cold.theta, experiment, cold.noise), experiment)
+    return settle_base(evaluate(cold.hypothesis, cold.theta, experiment, cold.noise), experiment)
 
 
 def grow(
@@ -168,7 +167,7 @@ def anneal(fit: Fit, experiment: Experiment) -> Fit:
     noise, short = usual_noise(experiment), shorten(experiment, RANK_STEPS)
     short_fit = fit_tempered(fit.hypothesis, short, noise, fit.theta, held=())
     other = settle(evaluate(fit.hypothesis, short_fit.theta, experiment, short_fit.noise), experiment)
-    return max(fit, other, key=lambda f: f.objective)
+    return better(fit, other)
 
 
 def choose(found: Round, check: Experiment | None, tried: int, level: Level) -> str | None:
@@ -211,12 +210,12 @@ def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fi
     if not base.hypothesis.names:
         nominal = refine(base, training)
         return nominal, nominal
-    return refine(rounds[0].base, training, ROUNDS_OF_A_WRONG_MODEL), refine(base, training)
+    return refine(rounds[0].base, training), refine(base, training)
 
 
-def refine(fit: Fit, experiment: Experiment, rounds: int = 5) -> Fit:
+def refine(fit: Fit, experiment: Experiment) -> Fit:
     """A fit carried over to other trials."""
-    return settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment, rounds)
+    return settle_base(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment)
 
 
 def prune(

@@ -18,6 +18,7 @@ import numpy as np
 
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
+from fish_train.diagnose.base import better, settle_base
 from fish_train.diagnose.decide import SUSPICIOUS, excess
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
@@ -182,12 +183,18 @@ def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
     return settle(start, experiment)
 
 
-def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment) -> Fit:
-    """A rival from the nominal parameters and the noise of the best: what looks alike has its optimum near."""
-    hypothesis = base.hypothesis.with_effect(name, SCALE)
+def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough: float) -> Fit | None:
+    """A rival from the nominal parameters and the noise of the best, where what looks alike has its optimum.
+
+    None where it stays more than `enough` behind on shortened trials.
+    """
+    hypothesis, short = base.hypothesis.with_effect(name, SCALE), shorten(experiment, RANK_STEPS)
     starts = warm_starts(replace(base, theta=best.theta[: len(base.theta)]), name)
-    start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, experiment, best.noise))
-    return settle(evaluate(hypothesis, start, experiment, best.noise), experiment)
+    start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, best.noise))
+    near = climb(evaluate(hypothesis, start, short, best.noise), short, RANK_ITERATIONS)
+    if not near.objective > log_posterior(best.hypothesis, best.theta, short, best.noise) - enough:
+        return None
+    return settle(evaluate(hypothesis, near.theta, experiment, best.noise), experiment)
 
 
 def search_round(
@@ -205,8 +212,9 @@ def search_round(
     for name in names if found.best else ():
         if look_alike(name, found.best) and not found.near_best(name, enough):
             progress(f"refitting {name} from where {found.best} led")
-            fit = refit_beside(refitted[found.best], base, name, experiment)
-            refitted[name] = max(fit, refitted.get(name, fit), key=lambda f: f.objective)
+            fit = refit_beside(refitted[found.best], base, name, experiment, enough)
+            if fit is not None:
+                refitted[name] = better(fit, refitted.get(name, fit))
     return found
 
 
@@ -233,5 +241,5 @@ def restart_base(base: Fit, rival: Fit, experiment: Experiment) -> Fit:
     theta = rival.theta[: len(base.theta)]
     noises = (base.noise, rival.noise)
     noise = max(noises, key=lambda n: log_posterior(base.hypothesis, theta, experiment, n))
-    fit = settle(evaluate(base.hypothesis, theta, experiment, noise), experiment)
-    return max(base, fit, key=lambda f: f.objective)
+    fit = settle_base(evaluate(base.hypothesis, theta, experiment, noise), experiment)
+    return better(base, fit)

@@ -5,6 +5,8 @@ A fit that is told too small a sensor noise takes the rest for a rough force on 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from math import comb
 
 import numpy as np
@@ -21,27 +23,25 @@ NORMAL_MAD = 0.6745  # median of |x| over the standard deviation of a normal dis
 
 def usual_noise(experiment: Experiment) -> Noise:
     """`Noise()` with sensors as noisy as they are in these recordings."""
-    usual = Noise()
-    poses = [np.diff(f.pose, ORDER, axis=0) for f in experiment.frames if len(f.pose) > ORDER]
-    frames = np.concatenate(poses) if poses else np.zeros((0, 3))
-    rough = {
-        "gyro": np.diff(experiment.gyro, ORDER, axis=0),
-        "accel": np.diff(experiment.accel, ORDER, axis=0),
-        "camera_position": frames[:, :2],
-        "camera_heading": frames[:, 2],
-        "encoder": np.diff(experiment.encoder, ORDER, axis=0),
+    poses = [f.pose for f in experiment.frames]
+    signals = {
+        "gyro": list(experiment.gyro.T),
+        "accel": [*experiment.accel[..., 0].T, *experiment.accel[..., 1].T],
+        "camera_position": [pose[:, axis] for pose in poses for axis in (0, 1)],
+        "camera_heading": [pose[:, 2] for pose in poses],
+        "encoder": list(experiment.encoder.T),
     }
-    found = {name: difference_noise(values, getattr(usual, name)) for name, values in rough.items()}
-    return Noise(**found)
+    usual = Noise()
+    return replace(usual, **{name: white_noise(own, getattr(usual, name)) for name, own in signals.items()})
 
 
-def difference_noise(differences: Array, usual: float) -> float:
-    """Standard deviation of white noise from its ORDER-th differences, by their median (Hall, Kay and Titterington 1990).
+def white_noise(signals: Sequence[Array], usual: float) -> float:
+    """Standard deviation of the noise of signals, NaN where there is no sample, by the median of their differences.
 
-    The median leaves out jumps of the signal. Never below half the usual value; the usual one where there are too few.
+    Hall, Kay and Titterington 1990; the median leaves out the signal's jumps. Never below half the usual value; the usual
+    one where there are too few samples.
     """
-    size = np.abs(differences[np.isfinite(differences)])
+    size = np.abs(np.concatenate([np.diff(s[np.isfinite(s)], ORDER) for s in signals]))
     if len(size) < FEWEST:
         return usual
-    white = float(np.median(size)) / NORMAL_MAD / comb(2 * ORDER, ORDER) ** 0.5
-    return max(white, SMALLEST * usual)
+    return max(float(np.median(size)) / NORMAL_MAD / comb(2 * ORDER, ORDER) ** 0.5, SMALLEST * usual)

@@ -1,0 +1,48 @@
+"""The search does not mistake a poor optimum for missing physics, and refits what looks like the winner."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fish_sim.robot import Robot
+from fish_train.diagnose import search
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import evaluate, settle
+from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.synthetic import program, record
+
+
+def quiet(_: str) -> None:
+    pass
+
+
+@pytest.mark.parametrize(("restarted", "searches"), [(90.0, 2), (10.0, 1)])
+def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, restarted, searches):
+    bases = []
+
+    def searched(base, *_):
+        bases.append(base.objective)
+        return search.Round(base, (), {"current": SimpleNamespace(objective=100.0)})
+
+    better = SimpleNamespace(objective=restarted)
+    monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)
+    monkeypatch.setattr(search, "search_round", searched)
+    monkeypatch.setattr(search, "restart_base", lambda base, *_: search.better(base, better))
+    found = search.settled_round(SimpleNamespace(objective=0.0), ["current"], None, 1.0, quiet)
+    assert bases == [0.0, restarted][:searches]
+    assert found.base.objective == restarted
+
+
+def test_a_look_alike_is_refitted_from_where_the_winner_led():
+    random = np.random.default_rng(2)
+    truth = Robot().with_effect("tip_slip", mobility=1.0 / 6.0)
+    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps")], axis=1)
+    experiment = record(truth, commands, Noise(), random)[0]
+    base = evaluate(nominal_hypothesis(Robot(), ("tail_stiffness",)), np.zeros(1), experiment, Noise())
+    wake = base.hypothesis.with_effect("wake_memory", search.SCALE)
+    best = settle(evaluate(wake, np.array([0.0, 1.0, 0.0, 0.0]), experiment, Noise()), experiment)
+    slip = search.refit_beside(best, base, "tip_slip", experiment, 20.0)
+    assert slip is not None and slip.objective > best.objective - 10.0  # wake_memory holds tip_slip within it
+    assert slip.values["tip_slip.mobility"] == pytest.approx(1.0 / 6.0, rel=0.05)
+    assert search.refit_beside(best, base, "tail_joint_damping", experiment, 20.0) is None
