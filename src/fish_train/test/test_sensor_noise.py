@@ -35,12 +35,13 @@ def test_noise_is_that_of_the_sensors(swum, factor, sensor):
 def test_a_smooth_signal_and_a_short_one():
     t = np.linspace(0.0, 5.0, 500)
     swing = 2.0 * np.sin(2.0 * np.pi * 2.0 * t)
-    assert white_noise([swing], 0.006) == SMALLEST * 0.006
-    assert white_noise([swing[:FEWEST]], 0.006) == 0.006
-    assert white_noise([np.full(500, np.nan)], 0.006) == 0.006
+    assert white_noise([(t, swing)], 0.006) == SMALLEST * 0.006
+    assert white_noise([(t[:FEWEST], swing[:FEWEST])], 0.006) == 0.006
+    assert white_noise([(t, np.full(500, np.nan))], 0.006) == 0.006
 
 
-def test_a_sensor_slower_than_the_grid_is_measured_too():
-    signal = np.full(1000, np.nan)
-    signal[::2] = 0.02 * np.random.default_rng(5).standard_normal(500)
-    assert white_noise([signal], 0.006) == pytest.approx(0.02, rel=0.15)
+@pytest.mark.parametrize(("every", "expected"), [(2, 0.02), (5, 0.006)])
+def test_a_slow_sensor_is_measured_as_long_as_it_follows_the_motion(every, expected):
+    t, signal = 0.01 * np.arange(3000), np.full(3000, np.nan)
+    signal[::every] = 0.02 * np.random.default_rng(5).standard_normal(3000 // every)
+    assert white_noise([(t, signal)], 0.006) == pytest.approx(expected, rel=0.15)

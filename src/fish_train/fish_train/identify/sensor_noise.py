@@ -11,11 +11,12 @@ from math import comb
 
 import numpy as np
 
+from fish_sim.model import DT
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Array, Noise
 
-# A tail beat of 2 Hz seen by a camera at 30 Hz is weakened 5000 times against white noise, at 100 Hz far more.
-ORDER = 6
+ORDER = 6  # of the differences: at 30 Hz they weaken a tail beat of 2 Hz 5000 times against white noise
+SLOWEST = 0.04  # s between samples; in the differences of slower ones the motion itself is left
 FEWEST = 50  # differences that an estimate needs
 SMALLEST = 0.5  # of the usual noise: a signal that somebody has smoothed tells nothing
 NORMAL_MAD = 0.6745  # median of |x| over the standard deviation of a normal distribution
@@ -23,25 +24,31 @@ NORMAL_MAD = 0.6745  # median of |x| over the standard deviation of a normal dis
 
 def usual_noise(experiment: Experiment) -> Noise:
     """`Noise()` with sensors as noisy as they are in these recordings."""
-    poses = [f.pose for f in experiment.frames]
+    grid = DT * np.arange(experiment.length)
+    frames = experiment.frames
     signals = {
-        "gyro": list(experiment.gyro.T),
-        "accel": [*experiment.accel[..., 0].T, *experiment.accel[..., 1].T],
-        "camera_position": [pose[:, axis] for pose in poses for axis in (0, 1)],
-        "camera_heading": [pose[:, 2] for pose in poses],
-        "encoder": list(experiment.encoder.T),
+        "gyro": [(grid, s) for s in experiment.gyro.T],
+        "accel": [(grid, s) for axis in (0, 1) for s in experiment.accel[..., axis].T],
+        "camera_position": [(f.t, f.pose[:, axis]) for f in frames for axis in (0, 1)],
+        "camera_heading": [(f.t, f.pose[:, 2]) for f in frames],
+        "encoder": [(grid, s) for s in experiment.encoder.T],
     }
     usual = Noise()
     return replace(usual, **{name: white_noise(own, getattr(usual, name)) for name, own in signals.items()})
 
 
-def white_noise(signals: Sequence[Array], usual: float) -> float:
-    """Standard deviation of the noise of signals, NaN where there is no sample, by the median of their differences.
+def white_noise(signals: Sequence[tuple[Array, Array]], usual: float) -> float:
+    """Standard deviation of the noise of (times [s], values; NaN: no sample) by the median of their differences.
 
     Hall, Kay and Titterington 1990; the median leaves out the signal's jumps. Never below half the usual value; the usual
-    one where there are too few samples.
+    one where there are too few samples or they come too slowly.
     """
-    size = np.abs(np.concatenate([np.diff(s[np.isfinite(s)], ORDER) for s in signals]))
+    sizes = [np.zeros(0)]
+    for t, values in signals:
+        there = np.isfinite(values)
+        if there.sum() > ORDER and np.median(np.diff(t[there])) < SLOWEST:
+            sizes.append(np.abs(np.diff(values[there], ORDER)))
+    size = np.concatenate(sizes)
     if len(size) < FEWEST:
         return usual
     return max(float(np.median(size)) / NORMAL_MAD / comb(2 * ORDER, ORDER) ** 0.5, SMALLEST * usual)
