@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
-from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose import locate
 from fish_train.diagnose.decide import PLAUSIBLE, excess, p_value, parameter_count, probabilities
 from fish_train.diagnose.diagnosis import TOO_STRONG, Accepted, Diagnosis
@@ -17,7 +15,7 @@ from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.filter_types import ROWS, Noise
 from fish_train.identify.fit import Fit
-from fish_train.identify.hypothesis import specification
+from fish_train.identify.hypothesis import effect_class, specification
 from fish_train.identify.prediction import predict, prediction_errors
 
 HORIZONS = (1.0, 2.0, 5.0)
@@ -94,7 +92,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     return {
         "name": name,
         "kind": kind_of(name),
-        "equation": {**EFFECTS, **SENSOR_EFFECTS}[name].equation,
+        "equation": effect_class(name).equation,
         "parameters": effect_parameters(d.final, name),
         "evidence": {
             "log_likelihood_gain": gains[name],

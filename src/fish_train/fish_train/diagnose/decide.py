@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from fish_sim.effects import EFFECTS
-from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
+from fish_train.identify.hypothesis import effect_class, specification
 
 # One nat of innovations is worth 1/TEMPER nats of evidence: model errors too small to have a name, and the search
 # itself, make likelihood ratios over-confident. A judgement, not calibrated by a study yet.
@@ -56,7 +55,7 @@ def strength_z(fit: Fit, name: str) -> float:
     Where and when an effect acts is kept fixed: of a payload the data may tell the moment mass times place alone, so that
     its mass is uncertain beside its place, but not whether there is one.
     """
-    effect = {**EFFECTS, **SENSOR_EFFECTS}[name]
+    effect = effect_class(name)
     places = [f"{name}.{key}" for key in effect.parameters if key not in effect.strength]
     kept = [i for i, free in enumerate(fit.hypothesis.free) if free not in places]
     deviation = np.sqrt(np.diag(np.linalg.inv(fit.normal[np.ix_(kept, kept)])))
@@ -66,7 +65,7 @@ def strength_z(fit: Fit, name: str) -> float:
 
 def parameter_count(name: str) -> int:
     """Free parameters of an effect."""
-    return len({**EFFECTS, **SENSOR_EFFECTS}[name].parameters)
+    return len(specification(name))
 
 
 def excess(fit: Fit) -> np.ndarray:

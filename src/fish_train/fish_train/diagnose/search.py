@@ -16,14 +16,12 @@ from itertools import product
 
 import numpy as np
 
-from fish_sim.effects import EFFECTS
-from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose.base import better, settle_base
 from fish_train.diagnose.decide import SUSPICIOUS, excess
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, log_posterior, settle
-from fish_train.identify.hypothesis import Coordinates, specification
+from fish_train.identify.hypothesis import Coordinates, effect_class, specification
 from fish_train.identify.settle import open_gates
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
@@ -72,10 +70,8 @@ class Round:
 
     def near_best(self, name: str, enough: float) -> bool:
         """Whether a candidate was refitted and came as near the best as makes no difference."""
-        return name == self.best or (
-            name in self.refitted
-            and self.refitted[self.best].objective - self.refitted[name].objective < enough
-        )
+        best = max(fit.objective for fit in self.refitted.values())
+        return name in self.refitted and best - self.refitted[name].objective < enough
 
     def gain(self, name: str) -> float:
         """Nats over the base, both with their own noise."""
@@ -150,7 +146,8 @@ def warm_starts(base: Fit, name: str) -> list[np.ndarray]:
 
 def has_sides(name: str, key: str) -> bool:
     """A parameter that says where: not a strength, and as well negative as positive."""
-    parameter, effect = specification(name)[key], {**EFFECTS, **SENSOR_EFFECTS}[name]
+    effect = effect_class(name)
+    parameter = effect.parameters[key]
     return key not in effect.strength and parameter.value != 0.0 and parameter.lowest == -parameter.highest
 
 
@@ -209,10 +206,13 @@ def search_round(
         progress(f"refitting {r.name}")
         refitted[r.name] = refit(base, r, experiment)
     found = Round(base, ranking, refitted)
-    for name in names if found.best else ():
-        if look_alike(name, found.best) and not found.near_best(name, enough):
-            progress(f"refitting {name} from where {found.best} led")
-            fit = refit_beside(refitted[found.best], base, name, experiment, enough)
+    for name in names:
+        best = found.best
+        if best is None or name == best or found.near_best(name, enough):
+            continue
+        if look_alike(name, best):
+            progress(f"refitting {name} from where {best} led")
+            fit = refit_beside(refitted[best], base, name, experiment, enough)
             if fit is not None:
                 refitted[name] = better(fit, refitted.get(name, fit))
     return found

@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.effects import EFFECTS
+from fish_sim.effects.effect import Effect
 from fish_sim.parameter import Parameter
 from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
+from fish_sim.sensors.sensor_effect import SensorEffect
 from fish_train.identify.filter import filter_stepper
 from fish_train.identify.filter_types import SensorModel
 
@@ -60,12 +62,27 @@ SENSOR_FIELDS = {
 }
 
 
-def specification(name: str) -> Mapping[str, Parameter]:
-    """Parameters of an effect, physics, actuator or sensor."""
-    table = {**EFFECTS, **SENSOR_EFFECTS}
+def effect_class(name: str) -> type[Effect] | type[SensorEffect]:
+    """The class of an effect, physics, actuator or sensor. Raises ValueError for an unknown name."""
+    table: dict[str, type[Effect] | type[SensorEffect]] = {**EFFECTS, **SENSOR_EFFECTS}
     if name not in table:
         raise ValueError(f"unknown effect {name!r}; known: {', '.join(table)}")
-    return table[name].parameters
+    return table[name]
+
+
+def specification(name: str) -> Mapping[str, Parameter]:
+    """Parameters of an effect, physics, actuator or sensor."""
+    return effect_class(name).parameters
+
+
+def start_values(name: str, fraction: float) -> dict[str, float]:
+    """Every strength parameter at `fraction` of the way from neutral to typical, the others at plausible values."""
+    effect, values = effect_class(name), {}
+    for key, parameter in effect.parameters.items():
+        typical = parameter.value if parameter.typical is None else parameter.typical
+        strong = key in effect.strength
+        values[key] = parameter.value + fraction * (typical - parameter.value) if strong else typical
+    return values
 
 
 def scale_of(parameter: Parameter) -> float:
@@ -89,8 +106,6 @@ class Hypothesis:
 
     def with_effect(self, name: str, start: float = 0.1) -> Hypothesis:
         """One more effect, free, its strength at `start` times the typical one."""
-        from fish_train.identify.start import start_values
-
         values = start_values(name, start)
         free = tuple(f"{name}.{key}" for key in values)
         return Hypothesis(self.robot.with_effect(name, **values), self.free + free)
