@@ -11,6 +11,7 @@ from fish_train.diagnose import locate
 from fish_train.diagnose.decide import PLAUSIBLE, excess, p_value, parameter_count, probabilities
 from fish_train.diagnose.diagnosis import TOO_STRONG, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
+from fish_train.diagnose.law import REGRESSORS
 from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.filter_types import ROWS, Noise
@@ -39,7 +40,7 @@ def much_is_left(d: Diagnosis) -> bool:
 def has_law(d: Diagnosis) -> bool:
     """A sparse regression of the remaining wrench would be as good as a name, on trials that it was not fitted to."""
     samples, gain = float(d.final.result.samples.sum()), max(d.description.gain.values())
-    return gain > d.level.enough(samples, locate.REGRESSORS, len(d.description.gain) * d.description.tried)
+    return gain > d.level.enough(samples, REGRESSORS, len(d.description.gain) * d.description.tried)
 
 
 def named(d: Diagnosis) -> tuple[Accepted, ...]:

@@ -10,7 +10,8 @@ import numpy as np
 from fish_sim.robot import Robot
 from fish_train.diagnose.base import better, fit_cold, settle_base
 from fish_train.diagnose.decide import SMALLEST_Z, SUSPICIOUS, Level, excess, parameter_count, strength_z
-from fish_train.diagnose.locate import Description, MissingForce, describe, missing_force
+from fish_train.diagnose.law import Description, describe
+from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.diagnose.search import (
     RANK_STEPS,
     Round,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-Segment = dict[str, float]
+Plan = tuple[str, list[tuple[float, float, float, float]]]  # why; s, rad, Hz, rad
 
-STRAIGHT_STEPS = (
+STRAIGHT_STEPS: Plan = (
     "straight runs at several speeds",
     [(0, 6, 2, 0), (10, 8, 2, 0), (20, 10, 2, 0), (30, 11.5, 2, 0)],
 )
-RUDDER_STEPS = (
+RUDDER_STEPS: Plan = (
     "rudder steps of several sizes: lag, delay, backlash, offset and gain answer differently",
     [
         (0, 8, 2, 0),
@@ -22,15 +22,15 @@ RUDDER_STEPS = (
         (24, 8, 2, -0.8),
     ],
 )
-CIRCLES = (
+CIRCLES: Plan = (
     "slow circles both ways: a current drifts them, an asymmetry or an offset makes the two unequal",
     [(0, 7, 2, 0.5), (20, 7, 2, -0.5)],
 )
-STROKES = (
+STROKES: Plan = (
     "strokes at several frequencies: tail stiffness, damping, slip and wake differ in their phase",
     [(0, 9, 1.2, 0), (8, 9, 2, 0), (16, 8, 2.8, 0), (24, 9, 2, 0.4)],
 )
-COAST = (
+COAST: Plan = (
     "swim fast, then let it coast: drag laws differ at the end",
     [(0, 11, 2, 0), (8, 0, 2, 0), (20, 11, 2, 0), (28, 0, 2, 0)],
 )

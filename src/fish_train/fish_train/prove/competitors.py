@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_train.diagnose.locate import MissingForce, missing_force, regressors
+from fish_train.diagnose.law import regressors
+from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from fish_sim.model import DT
-from fish_train.diagnose.locate import MissingForce, describe, prior_cost
+from fish_train.diagnose.law import describe, prior_cost
+from fish_train.diagnose.locate import MissingForce
 from fish_train.identify.filter_types import Noise
 
 NOISE = Noise(wrench=(0.004, 0.008, 2e-4), wrench_time=0.2)
