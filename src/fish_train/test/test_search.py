@@ -17,13 +17,15 @@ def quiet(_: str) -> None:
     pass
 
 
-@pytest.mark.parametrize(("restarted", "searches"), [(90.0, 2), (10.0, 1)])
-def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, restarted, searches):
+@pytest.mark.parametrize(
+    ("gain", "restarted", "searches"), [(100.0, 90.0, 2), (100.0, 10.0, 1), (-5.0, 0.0, 1)]
+)
+def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, restarted, searches):
     bases = []
 
     def searched(base, *_):
         bases.append(base.objective)
-        return search.Round(base, (), {"current": SimpleNamespace(objective=100.0)})
+        return search.Round(base, (), {"current": SimpleNamespace(objective=gain)})
 
     better = SimpleNamespace(objective=restarted)
     monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)

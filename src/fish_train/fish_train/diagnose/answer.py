@@ -159,7 +159,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
         "description": f"{worst} = {law} (SI units; {gain[worst]:.0f} nats, {r2[worst]:.0%} of it on unseen trials)"
         if has_law(d)
-        else f"{STRONG.format(*excess(d.final))}; no law in place, speed, rudder or heading was found for it",
+        else f"{STRONG.format(*excess(d.final))}; no law in place, time, speed, rudder or heading was found for it",
     }
 
 

@@ -205,16 +205,23 @@ def search_round(
     for r in chosen:
         progress(f"refitting {r.name}")
         refitted[r.name] = refit(base, r, experiment)
-    found = Round(base, ranking, refitted)
+    return with_look_alikes(Round(base, ranking, refitted), names, experiment, enough, progress)
+
+
+def with_look_alikes(
+    found: Round, names: Sequence[str], experiment: Experiment, enough: float, progress: Progress
+) -> Round:
+    """The round with every look-alike of the best that is not as good yet refitted from where the best led."""
     for name in names:
         best = found.best
-        if best is None or name == best or found.near_best(name, enough):
+        if best is None or name == best or not look_alike(name, best) or found.near_best(name, enough):
             continue
-        if look_alike(name, best):
-            progress(f"refitting {name} from where {best} led")
-            fit = refit_beside(refitted[best], base, name, experiment, enough)
-            if fit is not None:
-                refitted[name] = better(fit, refitted.get(name, fit))
+        progress(f"refitting {name} from where {best} led")
+        fit = refit_beside(found.refitted[best], found.base, name, experiment, enough)
+        if fit is not None:
+            found = replace(
+                found, refitted={**found.refitted, name: better(fit, found.refitted.get(name, fit))}
+            )
     return found
 
 
@@ -230,7 +237,7 @@ def settled_round(
         progress("refitting without it, from where it led")
         restarted = restart_base(base, best, experiment)
         found = replace(found, base=restarted)
-        if restarted.objective - base.objective < POOR_BASE * (best.objective - base.objective):
+        if restarted.objective - base.objective <= max(POOR_BASE * (best.objective - base.objective), enough):
             return found
         base = restarted
     return found
