@@ -59,6 +59,7 @@ def test_description_is_complete(name):
         assert p.lowest <= p.value <= p.highest and p.unit and p.source, key
         assert (p.typical is not None) == (key in effect.strength), key
         assert p.typical is None or (p.lowest <= p.typical <= p.highest and p.typical != p.value), key
+        assert all(p.lowest <= tried <= p.highest for tried in p.tries), key
 
 
 @pytest.mark.parametrize("name", EFFECTS)

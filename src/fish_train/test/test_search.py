@@ -1,5 +1,6 @@
 """The search does not mistake a poor optimum for missing physics, and refits what looks like the winner."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -48,3 +49,33 @@ def test_a_look_alike_is_refitted_from_where_the_winner_led():
     assert slip is not None and slip.objective > best.objective - 10.0  # wake_memory holds tip_slip within it
     assert slip.values["tip_slip.mobility"] == pytest.approx(1.0 / 6.0, rel=0.05)
     assert search.refit_beside(best, base, "tail_joint_damping", experiment, 20.0) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "hidden", "near"),
+    [("sloshing", "frequency", {"sine": -0.02, "cosine": 0.01, "frequency": 0.77}, 0.8),
+     ("wave_drag", "speed", {"amplitude": 0.03, "speed": 0.13, "width": 0.03}, 0.12)],
+)  # fmt: skip
+def test_an_effect_is_found_from_afar_at_the_place_that_promises_most(name, key, hidden, near):
+    """From the one start value that both had before, a search does not walk there."""
+    random = np.random.default_rng(4)
+    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "straight", "steps")], axis=1)
+    experiment = record(Robot().with_effect(name, **hidden), commands, Noise(), random)[0]
+    drags = nominal_hypothesis(Robot(), ("head_drag_surge", "head_drag_sway"))
+    base = settle(evaluate(drags, np.zeros(2), experiment, Noise()), experiment)
+    assert search.best_place(base, name, experiment, base.noise)[key] == pytest.approx(near)
+    for look in (search.look_near, search.look_afar):
+        fit = settle(look(base, name, experiment), experiment)
+        assert fit.values[f"{name}.{key}"] == pytest.approx(hidden[key], rel=0.1)
+
+
+def test_images_half_a_second_old_are_found():
+    """A stroke is half a second: the heading fits again without a delay."""
+    random = np.random.default_rng(6)
+    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1)
+    experiment = record(Robot(), commands, Noise(), random)[0]
+    late = replace(experiment, frames=tuple(replace(f, t=f.t + 0.47) for f in experiment.frames))
+    drags = nominal_hypothesis(Robot(), ("head_drag_surge", "head_drag_yaw", "fin_drag_sway"))
+    base = settle(evaluate(drags, np.zeros(3), late, Noise()), late)
+    fit = settle(search.look_afar(base, "camera_latency", late), late)
+    assert fit.values["camera_latency.delay"] == pytest.approx(0.47, abs=0.005)

@@ -16,8 +16,8 @@ class Payload(Effect):
     source = SOURCE
     parameters = {
         "mass": Parameter(0.0, "kg", 0.0, 2.0, SOURCE, typical=0.06),
-        "forward": Parameter(0.04, "m", -0.15, 0.15, SOURCE),
-        "left": Parameter(0.02, "m", -0.15, 0.15, SOURCE),
+        "forward": Parameter(0.04, "m", -0.15, 0.15, SOURCE, tries=(-0.04, 0.04)),
+        "left": Parameter(0.02, "m", -0.15, 0.15, SOURCE, tries=(-0.02, 0.02)),
     }
     strength = ("mass",)
 

@@ -10,6 +10,8 @@ from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "first longitudinal seiche mode (Lamb 1932); strength is an assumption"
+# a tenth apart: what ten seconds can tell from each other
+FREQUENCIES = tuple(0.1 * k for k in range(1, 13))
 
 
 class Sloshing(Effect):
@@ -29,7 +31,7 @@ class Sloshing(Effect):
     parameters = {
         "sine": Parameter(0.0, "N", -1.0, 1.0, SOURCE, typical=0.02),
         "cosine": Parameter(0.0, "N", -1.0, 1.0, SOURCE, typical=0.01),
-        "frequency": Parameter(0.4, "Hz", 0.05, 3.0, SOURCE),
+        "frequency": Parameter(0.4, "Hz", 0.05, 3.0, SOURCE, tries=FREQUENCIES),
     }
     strength = ("sine", "cosine")
     states = ("phase",)

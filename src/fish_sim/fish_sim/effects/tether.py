@@ -25,8 +25,8 @@ class Tether(Effect):
     parameters = {
         "stiffness": Parameter(0.0, "N/m", 0.0, 100.0, SOURCE, typical=0.2),
         "length": Parameter(0.5, "m", 0.0, 5.0, SOURCE),
-        "x": Parameter(0.0, "m", -5.0, 5.0, SOURCE),
-        "y": Parameter(0.0, "m", -5.0, 5.0, SOURCE),
+        "x": Parameter(0.0, "m", -5.0, 5.0, SOURCE, tries=(-1.2, 0.0, 1.2)),
+        "y": Parameter(0.0, "m", -5.0, 5.0, SOURCE, tries=(-0.6, 0.0, 0.6)),
     }
     strength = ("stiffness",)
 

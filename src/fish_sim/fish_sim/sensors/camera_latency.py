@@ -7,6 +7,8 @@ from fish_sim.parameter import Parameter
 from fish_sim.sensors.sensor_effect import SensorEffect
 
 SOURCE = "transport and exposure of the camera; strength is an assumption"
+# a stroke of half a second repeats the heading: a search does not walk over a quarter of it
+DELAYS = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55)
 
 
 class CameraLatency(SensorEffect):
@@ -15,7 +17,7 @@ class CameraLatency(SensorEffect):
     name = "camera_latency"
     equation = "pose(t) shows the fish at t - delay"
     source = SOURCE
-    parameters = {"delay": Parameter(0.0, "s", 0.0, 1.0, SOURCE, typical=0.05)}
+    parameters = {"delay": Parameter(0.0, "s", 0.0, 1.0, SOURCE, typical=0.05, tries=DELAYS)}
     strength = ("delay",)
 
     @staticmethod

@@ -9,7 +9,7 @@ Where the base already leaves no more than water does, one step from it is enoug
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
@@ -20,8 +20,9 @@ from fish_train.diagnose.base import better, settle_base
 from fish_train.diagnose.decide import SUSPICIOUS, excess
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
+from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, log_posterior, settle
-from fish_train.identify.hypothesis import Coordinates, effect_class, specification
+from fish_train.identify.hypothesis import Coordinates, specification, start_values
 from fish_train.identify.settle import open_gates
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
@@ -30,6 +31,7 @@ IMU_DISTRUST = 10.0  # factor of the IMU's noise in the first part of the rankin
 RANK_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to rank
 RANK_ITERATIONS = 6
 POLISH_ITERATIONS = 4
+PROMISING_PLACES = 3  # of those that are tried
 POLISHED = 8  # candidates that are ranked with the IMU's own noise
 SHORTLIST = 4
 MOST_SEARCHES = 3  # with one base after the other, each a better optimum
@@ -107,7 +109,9 @@ def look_afar(base: Fit, name: str, short: Experiment) -> Fit:
     own = base.noise
     wide = replace(open_gates(own), gyro=IMU_DISTRUST * own.gyro, accel=IMU_DISTRUST * own.accel)
     hypothesis = base.hypothesis.with_effect(name, SCALE)
-    start = max(starts(base, name), key=lambda theta: log_posterior(hypothesis, theta, short, wide))
+    cold = replace(base, theta=np.where(Coordinates(base.hypothesis).is_log, 0.0, base.theta))
+    starts = [*warm_starts(base, name, short, wide), *warm_starts(cold, name, short, wide)]
+    start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, wide))
     fit = climb(evaluate(hypothesis, start, short, wide), short, RANK_ITERATIONS)
     return evaluate(hypothesis, fit.theta, short, own)
 
@@ -115,7 +119,8 @@ def look_afar(base: Fit, name: str, short: Experiment) -> Fit:
 def look_near(base: Fit, name: str, short: Experiment) -> Fit:
     """A candidate where the base leaves no more than water does: what is missing is small, so one step tells its gain."""
     hypothesis = base.hypothesis.with_effect(name, SCALE)
-    fits = [evaluate(hypothesis, theta, short, base.noise) for theta in warm_starts(base, name)]
+    starts = warm_starts(base, name, short, base.noise)
+    fits = [evaluate(hypothesis, theta, short, base.noise) for theta in starts]
     return max(fits, key=promise)
 
 
@@ -126,37 +131,42 @@ def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
         list(pool.map(lambda name: prepare(base.hypothesis.with_effect(name, SCALE).robot), names))
 
 
-def starts(base: Fit, name: str) -> list[np.ndarray]:
-    """theta from which a candidate is tried: from the base and from the nominal values, weak and strong."""
-    cold = np.where(Coordinates(base.hypothesis).is_log, 0.0, base.theta)
-    return warm_starts(base, name) + warm_starts(replace(base, theta=cold), name)
+def warm_starts(base: Fit, name: str, experiment: Experiment, noise: Noise) -> list[np.ndarray]:
+    """theta of the base with a candidate at its best place, weak and strong."""
+    place = best_place(base, name, experiment, noise)
+    return [started(base, name, strength, place) for strength in STRENGTHS]
 
 
-def warm_starts(base: Fit, name: str) -> list[np.ndarray]:
-    """theta of the base with a candidate, weak and strong, on either side where it has a place."""
-    coordinates, count = Coordinates(base.hypothesis.with_effect(name, SCALE)), len(base.theta)
-    sides = [(1.0, -1.0) if has_sides(name, key) else (1.0,) for key in specification(name)]
-    found = []
-    for strength, signs in product(STRENGTHS, product(*sides)):
-        values = coordinates.read(base.hypothesis.with_effect(name, strength).robot)
-        values[count:] *= signs
-        found.append(np.concatenate([base.theta, coordinates.encode(values)[count:]]))
-    return found
+def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -> np.ndarray:
+    """theta of the base with a candidate of this strength, in typical ones, at this place."""
+    coordinates = Coordinates(base.hypothesis.with_effect(name, SCALE))
+    values = {**start_values(name, strength), **place}
+    theta = coordinates.encode(np.concatenate([np.ones(len(base.theta)), list(values.values())]))
+    return np.concatenate([base.theta, theta[len(base.theta) :]])
 
 
-def has_sides(name: str, key: str) -> bool:
-    """A parameter that says where: not a strength, and as well negative as positive."""
-    effect = effect_class(name)
-    parameter = effect.parameters[key]
-    return key not in effect.strength and parameter.value != 0.0 and parameter.lowest == -parameter.highest
+def best_place(base: Fit, name: str, experiment: Experiment, noise: Noise) -> dict[str, float]:
+    """Values of the parameters that say where or how fast, of those to be tried, from which the effect gains most.
+
+    The few that promise most take one step: far from the base a promise is not kept.
+    """
+    keys = [key for key, parameter in specification(name).items() if parameter.tries]
+    places = [dict(zip(keys, v, strict=True)) for v in product(*(specification(name)[k].tries for k in keys))]
+    if len(places) == 1:
+        return places[0]
+    hypothesis = base.hypothesis.with_effect(name, SCALE)
+    kept = np.array([free not in {f"{name}.{key}" for key in keys} for free in hypothesis.free])
+    fits = [evaluate(hypothesis, started(base, name, SCALE, p), experiment, noise) for p in places]
+    promising = sorted(range(len(places)), key=lambda i: -promise(fits[i], kept))[:PROMISING_PLACES]
+    return places[max(promising, key=lambda i: climb(fits[i], experiment, 1).objective)]
 
 
-def promise(fit: Fit) -> float:
-    """Objective that one Gauss-Newton step would reach, were the problem quadratic."""
-    gradient = fit.result.gradient.sum(0) + fit.theta / Coordinates(fit.hypothesis).prior ** 2
+def promise(fit: Fit, moving: np.ndarray | slice = slice(None)) -> float:
+    """Objective that one Gauss-Newton step of the parameters `moving` would reach, were the problem quadratic."""
+    gradient = (fit.result.gradient.sum(0) + fit.theta / Coordinates(fit.hypothesis).prior ** 2)[moving]
     if not np.isfinite(fit.objective):
         return -np.inf
-    return fit.objective + 0.5 * float(gradient @ np.linalg.solve(fit.normal, gradient))
+    return fit.objective + 0.5 * float(gradient @ np.linalg.solve(fit.normal[moving][:, moving], gradient))
 
 
 def look_alike(first: str, second: str) -> bool:
@@ -186,7 +196,8 @@ def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough
     None where it stays more than `enough` behind on shortened trials.
     """
     hypothesis, short = base.hypothesis.with_effect(name, SCALE), shorten(experiment, RANK_STEPS)
-    starts = warm_starts(replace(base, theta=best.theta[: len(base.theta)]), name)
+    beside = replace(base, theta=best.theta[: len(base.theta)])
+    starts = warm_starts(beside, name, short, best.noise)
     start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, best.noise))
     near = climb(evaluate(hypothesis, start, short, best.noise), short, RANK_ITERATIONS)
     if not near.objective > log_posterior(best.hypothesis, best.theta, short, best.noise) - enough:

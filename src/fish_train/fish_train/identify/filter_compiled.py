@@ -13,6 +13,7 @@ import numpy as np
 from fish_sim.compiled import lanes, library
 from fish_sim.model import DT, Structure
 from fish_sim.step import Scheme, Stepper, tangent_source
+from fish_train.identify.encoder import encoder_terms
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
     ENCODER_ROW,
@@ -135,20 +136,15 @@ class _Job:
         T, M, K = self.experiment.length, len(self.experiment.names), self.K
         normal = self.normal + np.tril(self.normal, -1).transpose(0, 2, 1)
         memory, d_memory = (a.reshape(T + 1, M, max(K, 1), -1) for a in self.memory)
-        rotor, d_rotor = memory[:T, :, 0, 1], d_memory[:T, :, :K, 1]
-        sd = self.noise.encoder
-        e = (self.experiment.encoder - rotor) / sd
-        good = np.isfinite(e) & (np.arange(T)[:, None] < self.experiment.steps)
-        r, J = np.where(good, e, 0.0), -np.where(good[..., None], d_rotor, 0.0) / sd
+        terms = encoder_terms(self.experiment, self.noise, memory[:T, :, 0, 1], d_memory[:T, :, :K, 1])
         whitened = np.full((T, M, len(ROWS) + 1), np.nan)
         whitened[..., :6] = self.whitened.transpose(1, 0, 2)
-        whitened[..., ENCODER_ROW] = np.where(good, e, np.nan)
-        encoder = -0.5 * np.sum(r**2, axis=0) - good.sum(0) * np.log(sd * np.sqrt(2 * np.pi))
+        whitened[..., ENCODER_ROW] = terms.whitened
         return FilterResult(
-            self.sums[:, 0] + encoder,
-            self.sums[:, 1] + good.sum(0),
-            self.gradient + np.einsum("tm,tmk->mk", r, J),
-            normal + np.einsum("tmj,tmk->mjk", J, J),
+            self.sums[:, 0] + terms.log_likelihood,
+            self.sums[:, 1] + terms.samples,
+            self.gradient + terms.gradient,
+            normal + terms.normal,
             whitened,
             None if self.history is None else self._history(memory[:, :, 0]),
         )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sim.step import Stepper
+from fish_train.identify.encoder import encoder_terms
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
     ENCODER_ROW,
@@ -232,18 +233,13 @@ class Filter:
 
     def _encoder(self, sums: _Sums) -> None:
         """The encoder reads the rotor's speed, which follows from the commands alone."""
-        T, M = self.experiment.encoder.shape
-        e = self.experiment.encoder - self.memory[:T, :, 1]
-        good = np.isfinite(e) & (np.arange(T)[:, None] < self.experiment.steps)
-        r = np.where(good, e, 0.0) / self.noise.encoder
-        J = -np.where(good[..., None], self.d_memory[:T, :, 1], 0.0) / self.noise.encoder
-        sums.log_likelihood -= 0.5 * np.sum(r**2, axis=0) + good.sum(0) * np.log(
-            self.noise.encoder * np.sqrt(2 * np.pi)
-        )
-        sums.samples += good.sum(0)
-        sums.gradient += np.einsum("tm,tmk->mk", r, J)
-        sums.normal += np.einsum("tmj,tmk->mjk", J, J)
-        sums.whitened[..., ENCODER_ROW] = np.where(good, r, np.nan)
+        T = self.experiment.length
+        terms = encoder_terms(self.experiment, self.noise, self.memory[:T, :, 1], self.d_memory[:T, :, 1])
+        sums.log_likelihood += terms.log_likelihood
+        sums.samples += terms.samples
+        sums.gradient += terms.gradient
+        sums.normal += terms.normal
+        sums.whitened[..., ENCODER_ROW] = terms.whitened
 
 
 class _Sums:

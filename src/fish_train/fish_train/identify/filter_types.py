@@ -48,6 +48,7 @@ class Noise:
     start_speed: float = 0.3  # m/s and rad/s x 10, prior of motion that does not start at rest
     gate_camera: float = 60.0  # poses whose squared normalised innovation exceeds this are left out
     gate_imu: float = 400.0  # likewise IMU samples
+    gate_encoder: float = 25.0  # squared residual beyond which an encoder's sample costs no more
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
+from fish_train.identify.encoder import encoder_noise
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter import run_filter
-from fish_train.identify.filter_types import FilterResult, Noise
+from fish_train.identify.filter_types import ENCODER_ROW, FilterResult, Noise
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 from fish_train.identify.sensor_noise import usual_noise
 
@@ -158,12 +159,18 @@ def adapt_noise(
 ) -> Noise:
     """Maximum-likelihood wrench intensities and their time constant: parabola through three points each, in turn.
 
+    The encoder's noise is that of what the fit leaves of it.
+
     The start is the best of a few far apart: a model that has just found its missing effect needs far less noise than
     the one before, and from there the parabola stops half-way.
     """
-    old = fit.noise
+    residual = fit.noise.encoder * fit.result.whitened[..., ENCODER_ROW]
+    old = replace(fit.noise, encoder=encoder_noise(residual, Noise().encoder))
     usual = replace(
-        usual_noise(experiment), gate_camera=old.gate_camera, gate_imu=old.gate_imu
+        usual_noise(experiment),
+        gate_camera=old.gate_camera,
+        gate_imu=old.gate_imu,
+        encoder=old.encoder,
     )  # of the sensors too
     starts = [old, usual, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
     starts += [replace(old, wrench=tuple(f * w for w in old.wrench)) for f in JUMPS]

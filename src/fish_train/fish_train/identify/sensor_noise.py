@@ -12,18 +12,17 @@ from math import comb
 import numpy as np
 
 from fish_sim.model import DT
+from fish_train.identify.encoder import NORMAL_MAD, SMALLEST, commanded_residual, encoder_noise
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Array, Noise
 
 ORDER = 6  # of the differences: at 30 Hz they weaken a tail beat of 2 Hz 5000 times against white noise
 SLOWEST = 0.04  # s between samples; in the differences of slower ones the motion itself is left
 FEWEST = 50  # differences that an estimate needs
-SMALLEST = 0.5  # of the usual noise: a signal that somebody has smoothed tells nothing
-NORMAL_MAD = 0.6745  # median of |x| over the standard deviation of a normal distribution
 
 
 def usual_noise(experiment: Experiment) -> Noise:
-    """`Noise()` with sensors as noisy as they are in these recordings."""
+    """`Noise()` with sensors as noisy as they are in these recordings; the encoder by its distance from the command."""
     grid = DT * np.arange(experiment.length)
     frames = experiment.frames
     signals = {
@@ -31,17 +30,17 @@ def usual_noise(experiment: Experiment) -> Noise:
         "accel": [(grid, s) for axis in (0, 1) for s in experiment.accel[..., axis].T],
         "camera_position": [(f.t, f.pose[:, axis]) for f in frames for axis in (0, 1)],
         "camera_heading": [(f.t, f.pose[:, 2]) for f in frames],
-        "encoder": [(grid, s) for s in experiment.encoder.T],
     }
     usual = Noise()
-    return replace(usual, **{name: white_noise(own, getattr(usual, name)) for name, own in signals.items()})
+    measured = {name: white_noise(own, getattr(usual, name)) for name, own in signals.items()}
+    return replace(usual, **measured, encoder=encoder_noise(commanded_residual(experiment), usual.encoder))
 
 
 def white_noise(signals: Sequence[tuple[Array, Array]], usual: float) -> float:
     """Standard deviation of the noise of (times [s], values; NaN: no sample) by the median of their differences.
 
-    Hall, Kay and Titterington 1990; the median leaves out the signal's jumps. Never below half the usual value; the usual
-    one where there are too few samples or they come too slowly.
+    Hall, Kay and Titterington 1990; the median leaves out the signal's jumps. Never below half the usual value (a signal
+    that somebody has smoothed tells nothing); the usual one where there are too few samples or they come too slowly.
     """
     sizes = [np.zeros(0)]
     for t, values in signals:
