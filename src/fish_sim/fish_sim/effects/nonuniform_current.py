@@ -10,7 +10,8 @@ from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "linear expansion and first stream-function modes of a basin; strengths are an assumption"
-MODES = tuple(product((1, 2, 3), (1, 2)))  # half waves along and across the pool
+LONG, WIDE = (1, 2, 3), (1, 2)  # half waves along and across the pool
+MODES = tuple(product(LONG, WIDE))
 
 
 def _gyre(strength: float) -> Parameter:
@@ -49,19 +50,27 @@ class NonuniformCurrent(Effect):
 
     @staticmethod
     def water(p: Values, x: Scalar, y: Scalar, z: Values, xp: Any) -> Flow:
-        L, W = pool.LENGTH, pool.WIDTH
+        kx, ky = math.pi / pool.LENGTH, math.pi / pool.WIDTH
+        along = harmonics(xp.sin(kx * x + math.pi / 2), xp.cos(kx * x + math.pi / 2), len(LONG))
+        across = harmonics(xp.sin(ky * y + math.pi / 2), xp.cos(ky * y + math.pi / 2), len(WIDE))
         # V_x, V_y, dV_x/dx, dV_x/dy, dV_y/dx, dV_y/dy
         total = (
             p.mean_x + p.strain * x + p.shear_x * y, p.mean_y + p.shear_y * x - p.strain * y,
             p.strain, p.shear_x, p.shear_y, -p.strain,
         )  # fmt: skip
-        for m, n in MODES:
-            gyre, kx, ky = getattr(p, f"gyre_{m}{n}"), m * math.pi / L, n * math.pi / W
-            sx, cx = xp.sin(kx * (x + L / 2)), xp.cos(kx * (x + L / 2))
-            sy, cy = xp.sin(ky * (y + W / 2)), xp.cos(ky * (y + W / 2))
-            mode = (
-                sx * cy, -kx / ky * cx * sy,
-                kx * cx * cy, -ky * sx * sy, kx**2 / ky * sx * sy, -kx * cx * cy,
-            )  # fmt: skip
-            total = tuple(t + gyre * part for t, part in zip(total, mode, strict=True))
+        for n, (sy, cy) in enumerate(across, 1):
+            gyres = [(m * kx, getattr(p, f"gyre_{m}{n}"), *along[m - 1]) for m in LONG]
+            f, q = sum(g * sx for _, g, sx, _ in gyres), n * ky
+            df, ddf = sum(k * g * cx for k, g, _, cx in gyres), sum(-(k**2) * g * sx for k, g, sx, _ in gyres)
+            modes = (f * cy, -df * sy / q, df * cy, -q * f * sy, -ddf * sy / q, -df * cy)
+            total = tuple(t + part for t, part in zip(total, modes, strict=True))
         return total[:2], (total[2:4], total[4:])
+
+
+def harmonics(sine: Scalar, cosine: Scalar, count: int) -> list[tuple[Scalar, Scalar]]:
+    """(sin k a, cos k a) for k = 1 .. count from those of a: additions are cheaper than sines."""
+    found = [(sine, cosine)]
+    for _ in range(count - 1):
+        s, c = found[-1]
+        found.append((s * cosine + c * sine, c * cosine - s * sine))
+    return found

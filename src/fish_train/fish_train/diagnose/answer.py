@@ -62,12 +62,14 @@ def unexplained_share(d: Diagnosis) -> float:
 
 def answer(d: Diagnosis) -> dict[str, Any]:
     """The dictionary written to diagnosis.json."""
+    unexplained = unexplained_entry(d)
+    grows_with = next((c["name"] for c in unexplained["where"].get("covariates", [])), None)
     return {
         "verdict": verdict(d),
         "effects": [effect_entry(d, a) for a in named(d)],
-        "unexplained": unexplained_entry(d),
+        "unexplained": unexplained,
         "fit": fit_entry(d),
-        "next_experiment": next_experiment([a.name for a in named(d)], rivals(d)),
+        "next_experiment": next_experiment([a.name for a in named(d)], rivals(d), grows_with),
         "out_of_reach": d.unreachable,
         "ranking": [{"name": r.name, "gain": r.gain} for r in d.rounds[0].ranking],
         "refitted": [refitted_entry(d, name, fit) for name, fit in d.rounds[0].refitted.items()],

@@ -43,14 +43,28 @@ PLANS = {
 }  # fmt: skip
 
 
-def next_experiment(found: list[str], rivals: list[str]) -> dict[str, Any]:
-    """The manoeuvre that tells the found effects from their rivals; without rivals, one that tightens the estimate."""
+# what shows best where a force without a name grows, by the covariate that it depends on most
+UNEXPLAINED_PLANS = {
+    "surge_speed": STRAIGHT_STEPS,
+    "rotor_speed": STROKES,
+    "rudder": RUDDER_STEPS,
+}  # turning, heading and place: CIRCLES
+
+
+def next_experiment(found: list[str], rivals: list[str], grows_with: str | None = None) -> dict[str, Any]:
+    """The manoeuvre that tells the found effects from their rivals; without rivals, one that tightens the estimate.
+
+    grows_with: covariate of a force that no name explains, if there is one and no effect was found.
+    """
     names = rivals or found
-    if not names:
+    if not names and grows_with is None:
         why, program = (
             "nothing is missing; to see more, swim faster than these data do: " + STRAIGHT_STEPS[0],
             STRAIGHT_STEPS[1],
         )
+    elif not names:
+        plan = UNEXPLAINED_PLANS.get(str(grows_with), CIRCLES)
+        why, program = f"see on what the unexplained force depends besides {grows_with}: {plan[0]}", plan[1]
     else:
         plan = PLANS.get(names[0], RUDDER_STEPS if names[0].startswith("rudder") else STRAIGHT_STEPS)
         aim = f"tell {', '.join(found)} from {', '.join(rivals)}" if rivals else f"tighten {', '.join(found)}"

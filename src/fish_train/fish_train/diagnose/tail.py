@@ -35,6 +35,7 @@ def finer_tails(
             break
         progress(f"fitting the nominal model with {links} tail links")
         fit = fit_cold(with_links(robot, links), short)
-        if fit.objective > beaten:
-            found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
+        if not fit.objective > beaten:
+            break  # a link that does not help is not helped by another
+        found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
     return found

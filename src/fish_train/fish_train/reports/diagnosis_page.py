@@ -37,7 +37,9 @@ def _verdict(content: Content) -> str:
         ]
         return f"{content['verdict']}: the model lacks {' and '.join(parts)}."
     if content["verdict"] == "unexplained":
-        return f"unexplained: {content['unexplained']['description']}."
+        nearest = ", ".join(content["unexplained"]["nearest"])
+        aside = f" Without explaining the most of it, {nearest} would help." if nearest else ""
+        return f"unexplained: {content['unexplained']['description']}.{aside}"
     return "no_mismatch: with refitted parameters the model explains these recordings; nothing is missing."
 
 
