@@ -13,6 +13,7 @@ from fish_train.commands.diagnose import without_wrench
 from fish_train.diagnose import diagnosis as module
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
+from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.split import split_trials
 from fish_train.diagnose.tail import with_links
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
@@ -155,3 +156,11 @@ def test_the_level_is_checked_and_probabilities_add_up():
     odds = probabilities({"a": -100.0, "b": -110.0, "c": -500.0})
     assert sum(odds.values()) == pytest.approx(1.0)
     assert odds["a"] > odds["b"] > odds["c"]
+
+
+def test_the_next_experiment_follows_what_is_open():
+    assert "nothing is missing" in next_experiment([], [])["why"]
+    turning = next_experiment([], [], grows_with="yaw_rate")
+    assert "unexplained" in turning["why"] and {row["rudder"] for row in turning["program"]} == {0.5, -0.5}
+    rivals = next_experiment(["rudder_lag"], ["rudder_delay"])
+    assert rivals["why"].startswith("tell rudder_lag from rudder_delay")

@@ -8,6 +8,7 @@ import pytest
 
 from fish_sim.robot import Robot
 from fish_train.diagnose import search
+from fish_train.diagnose.decide import TEMPER, probabilities
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate, settle
 from fish_train.identify.hypothesis import nominal_hypothesis
@@ -49,6 +50,8 @@ def test_a_look_alike_is_refitted_from_where_the_winner_led():
     assert slip is not None and slip.objective > best.objective - 10.0  # wake_memory holds tip_slip within it
     assert slip.values["tip_slip.mobility"] == pytest.approx(1.0 / 6.0, rel=0.05)
     assert search.refit_beside(best, base, "tail_joint_damping", experiment, 20.0) is None
+    odds = probabilities({"slip": search.evidence(slip, TEMPER), "wake": search.evidence(best, TEMPER)})
+    assert odds["slip"] > 0.7  # two numbers more that nothing asks for
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 
 from fish_sim.robot import Robot
 from fish_train.diagnose import locate
-from fish_train.diagnose.decide import PLAUSIBLE, excess, p_value, parameter_count, probabilities
+from fish_train.diagnose.decide import PLAUSIBLE, TEMPER, excess, p_value, parameter_count, probabilities
 from fish_train.diagnose.diagnosis import TOO_STRONG, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.law import REGRESSORS
@@ -110,8 +110,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
 
 def competition(accepted: Accepted) -> dict[str, float]:
     """Probability of each refitted name of the round, most probable first."""
-    objectives = {n: evidence(f) for n, f in accepted.round.refitted.items()}
-    odds = probabilities(objectives)
+    odds = probabilities({n: evidence(f, TEMPER) for n, f in accepted.round.refitted.items()})
     return dict(sorted(odds.items(), key=lambda item: -item[1]))
 
 

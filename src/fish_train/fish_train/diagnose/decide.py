@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import softmax
 from scipy.stats import chi2
 
 from fish_train.identify.filter_types import Noise
@@ -42,11 +43,10 @@ def p_value(gain: float, parameters: int, candidates: int) -> float:
     return float(min(1.0, candidates * chi2.sf(2.0 * max(gain, 0.0) / TEMPER, parameters)))
 
 
-def probabilities(objectives: dict[str, float]) -> dict[str, float]:
-    """Tempered softmax over competing hypotheses."""
-    values = np.array(list(objectives.values())) / TEMPER
-    weights = np.exp(values - values.max())
-    return dict(zip(objectives, (weights / weights.sum()).tolist(), strict=True))
+def probabilities(log_evidence: dict[str, float]) -> dict[str, float]:
+    """Of competing hypotheses, equally probable beforehand."""
+    odds = softmax(list(log_evidence.values()))
+    return dict(zip(log_evidence, map(float, odds), strict=True))
 
 
 def strength_z(fit: Fit, name: str) -> float:

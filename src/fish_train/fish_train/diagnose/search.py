@@ -80,10 +80,15 @@ class Round:
         return self.refitted[name].objective - self.base.objective
 
 
-def evidence(fit: Fit) -> float:
-    """Laplace approximation of the log evidence (MacKay 2003, ch. 27): an unneeded parameter costs its Occam factor."""
-    prior = Coordinates(fit.hypothesis).prior
-    return fit.objective - 0.5 * float(np.linalg.slogdet(fit.normal)[1]) - float(np.log(prior).sum())
+def evidence(fit: Fit, temper: float = 1.0) -> float:
+    """Laplace approximation of the log evidence (MacKay 2003, ch. 27): an unneeded parameter costs its Occam factor.
+
+    temper: nats of innovations that are worth one nat of evidence; the prior counts in full.
+    """
+    weight = 1.0 / Coordinates(fit.hypothesis).prior ** 2
+    log_prior = 0.5 * float(np.log(weight).sum() - np.sum(weight * fit.theta**2))
+    normal = (fit.normal - np.diag(weight)) / temper + np.diag(weight)
+    return float(fit.log_likelihood.sum()) / temper + log_prior - 0.5 * float(np.linalg.slogdet(normal)[1])
 
 
 def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Progress) -> tuple[Ranked, ...]:
