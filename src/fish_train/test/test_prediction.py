@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
+from fish_train.identify import prediction
 from fish_train.identify.baselines import constant, fit_baselines, predict_baseline
 from fish_train.identify.experiment import Experiment, Frames
-from fish_train.identify.filter_types import Noise
+from fish_train.identify.filter import run_filter
+from fish_train.identify.filter_types import FilterResult, Noise
 from fish_train.identify.motion import stroke_mean
 from fish_train.identify.prediction import predict, prediction_errors
 from fish_train.identify.prediction_table import COLUMNS, write_predictions
@@ -55,6 +57,22 @@ def test_starts_every_horizon_and_end_with_the_trial(quiet: Experiment) -> None:
     assert (found.start[found.trial == 0] * 0.01).tolist() == [0.0, 2.0, 4.0, 6.0]
     last = found.pose[:, np.flatnonzero(found.trial == 2)[-1], 0]
     assert np.isfinite(last).sum() == 100  # 4.00 .. 4.99 s
+
+
+def test_a_filter_that_diverges_begins_anew(quiet: Experiment, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = prediction.estimate(quiet, ROBOT, Noise())
+
+    def diverging(experiment: Experiment, *args: object, **keywords: object) -> FilterResult:
+        result = run_filter(experiment, *args, **keywords)
+        if experiment.start_at_rest:  # the first time, not when it begins anew
+            result.history.filtered[200:, 1] = np.nan
+        return result
+
+    monkeypatch.setattr(prediction, "run_filter", diverging)
+    broken = prediction.estimate(quiet, ROBOT, Noise())
+    np.testing.assert_array_equal(broken.pose[:, [0, 2]], whole.pose[:, [0, 2]])
+    np.testing.assert_allclose(broken.pose[400:800, 1], whole.pose[400:800, 1], atol=0.03)
+    np.testing.assert_allclose(broken.velocity[400:800, 1, 0], whole.velocity[400:800, 1, 0], atol=0.03)
 
 
 def test_camera_errors_of_the_model_are_in_what_it_predicts(quiet: Experiment) -> None:

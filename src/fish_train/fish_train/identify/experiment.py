@@ -52,6 +52,14 @@ class Experiment:
         names, frames = tuple(self.names[i] for i in which), tuple(self.frames[i] for i in which)
         return replace(self, names=names, frames=frames, steps=self.steps[index], **arrays)
 
+    def rest_of(self, trial: int, first: int) -> Experiment:
+        """One trial from a grid point on, with the fish in motion."""
+        one, start = self.select([trial]), first * DT
+        arrays = {k: getattr(one, k)[first:] for k in ("commands", "gyro", "accel", "encoder")}
+        seen = one.frames[0].t >= start
+        frames = (Frames(one.frames[0].t[seen] - start, one.frames[0].pose[seen]),)
+        return replace(one, steps=one.steps - first, frames=frames, start_at_rest=False, **arrays)
+
     @property
     def length(self) -> int:
         return len(self.commands)

@@ -27,6 +27,7 @@ HORIZONS = (1.0, 2.0, 5.0)  # s, at which errors are stated
 WARM_UP = 2.0  # s, until the filter has settled; no start point for errors before it
 EVERY = 1.0  # s, between start points for errors
 TRIALS_AT_ONCE = 4  # in the filter, whose history is large
+SHORTEST_PIECE = 10  # steps until a filter that diverged at once is begun anew
 CHUNK = 10  # steps with a constant wrench, while it decays
 
 
@@ -95,24 +96,43 @@ class ErrorSizes:
 
 
 def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
-    """Filter all trials with the robot's model, its effects and sensor errors."""
+    """Filter all trials with the robot's model, its effects and sensor errors.
+
+    A filter that diverges begins anew from the next image, as often as it has to.
+    """
     coordinates = Coordinates(nominal_hypothesis(robot, free=()))
     p, dp, sensors = coordinates.filter_inputs(np.zeros(0))
     stepper, nx = coordinates.stepper, len(coordinates.stepper.layout.motion)
     T, M = experiment.length, len(experiment.names)
     state, wrench = np.full((T, M, len(stepper.layout.state)), np.nan), np.full((T, M, 3), np.nan)
     bias, bias_std = np.zeros((M, 3)), np.zeros((M, 3))
-    for first in range(0, M, TRIALS_AT_ONCE):
-        part = list(range(first, min(first + TRIALS_AT_ONCE, M)))
-        chosen = experiment.select(part)
+
+    def fill(chosen: Experiment, part: list[int], begin: int) -> NDArray[np.bool_]:
+        """Results of trials `part` from grid point `begin` on; (steps, trials) where the filter is lost."""
         history = run_filter(chosen, stepper, p, dp, sensors, noise, keep=True).history
         assert history is not None
-        n = chosen.length
-        state[:n, part, :nx], state[:n, part, nx:] = history.filtered[..., :nx], history.memory[:n]
-        wrench[:n, part] = history.filtered[..., nx : nx + 3]
+        end = begin + chosen.length
+        state[begin:end, part, :nx] = history.filtered[..., :nx]
+        state[begin:end, part, nx:] = history.memory[: chosen.length]
+        wrench[begin:end, part] = history.filtered[..., nx : nx + 3]
         last = (chosen.steps - 1, np.arange(len(part)))
         bias[part] = history.filtered[last][:, nx + 3 :]
         bias_std[part] = np.sqrt(np.diagonal(history.filtered_P[last], axis1=1, axis2=2)[:, nx + 3 :])
+        within = np.arange(chosen.length)[:, None] < chosen.steps
+        return within & ~np.isfinite(history.filtered).all(axis=2)
+
+    for first in range(0, M, TRIALS_AT_ONCE):
+        part = list(range(first, min(first + TRIALS_AT_ONCE, M)))
+        lost = fill(experiment.select(part), part, 0)
+        for m, column in zip(part, lost.T, strict=True):
+            begin = 0
+            while column.any():
+                begin += max(int(np.argmax(column)), SHORTEST_PIECE)
+                if begin >= experiment.steps[m] or not len(
+                    (rest := experiment.rest_of(m, begin)).frames[0].t
+                ):
+                    break
+                column = fill(rest, [m], begin)[:, 0]
     beyond = np.arange(T)[:, None] >= experiment.steps
     state[beyond], wrench[beyond] = np.nan, np.nan
     return Estimates(experiment, state, wrench, body_velocity(state, stepper.layout.links), bias, bias_std)
