@@ -20,6 +20,7 @@ from fish_train.identify.filter import run_filter
 from fish_train.identify.filter_types import WRENCH, Noise, SensorModel
 from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.motion import HALF_WINDOW, stroke_mean
+from fish_train.identify.settle import open_gates
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,8 @@ class ErrorSizes:
 def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
     """Filter all trials with the robot's model, its effects and sensor errors.
 
-    A filter that diverges begins anew from the next image, as often as it has to.
+    A filter that diverges begins anew from the next image, as often as it has to, without gates: they would keep out
+    what puts a wrong start right.
     """
     coordinates = Coordinates(nominal_hypothesis(robot, free=()))
     p, dp, sensors = coordinates.filter_inputs(np.zeros(0))
@@ -107,7 +109,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
     state, wrench = np.full((T, M, len(stepper.layout.state)), np.nan), np.full((T, M, 3), np.nan)
     bias, bias_std = np.zeros((M, 3)), np.zeros((M, 3))
 
-    def fill(chosen: Experiment, part: list[int], begin: int) -> NDArray[np.bool_]:
+    def fill(chosen: Experiment, part: list[int], begin: int, noise: Noise) -> NDArray[np.bool_]:
         """Results of trials `part` from grid point `begin` on; (steps, trials) where the filter is lost."""
         history = run_filter(chosen, stepper, p, dp, sensors, noise, keep=True).history
         assert history is not None
@@ -123,7 +125,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
 
     for first in range(0, M, TRIALS_AT_ONCE):
         part = list(range(first, min(first + TRIALS_AT_ONCE, M)))
-        lost = fill(experiment.select(part), part, 0)
+        lost = fill(experiment.select(part), part, 0, noise)
         for m, column in zip(part, lost.T, strict=True):
             begin = 0
             while column.any():
@@ -132,7 +134,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
                     (rest := experiment.rest_of(m, begin)).frames[0].t
                 ):
                     break
-                column = fill(rest, [m], begin)[:, 0]
+                column = fill(rest, [m], begin, open_gates(noise))[:, 0]
     beyond = np.arange(T)[:, None] >= experiment.steps
     state[beyond], wrench[beyond] = np.nan, np.nan
     return Estimates(experiment, state, wrench, body_velocity(state, stepper.layout.links), bias, bias_std)
