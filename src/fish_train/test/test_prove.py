@@ -3,11 +3,13 @@
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fish_sim.effects import EFFECTS
+from fish_sim.ops import NUMPY
 from fish_sim.scheme import default_scheme
 from fish_train.diagnose.locate import MissingForce
 from fish_train.diagnose.vocabulary import candidates
@@ -21,12 +23,14 @@ from fish_train.prove.close_loop import loop_table
 from fish_train.prove.judge import judged_table, rivals_table
 from fish_train.prove.mujoco_plant import MujocoPlant, model_text
 from fish_train.prove.oracle import Sight, as_experiment, detects
+from fish_train.prove.other_forms import OTHER_FORMS
 from fish_train.prove.outside import OUTSIDE, known_to_the_plant
 from fish_train.prove.runner import run_study
 from fish_train.prove.score import score_world
 from fish_train.prove.seal import Sealed, broken_seals, seal_label
 from fish_train.prove.study import Study, StudyError, read_json
 from fish_train.prove.tables import ASKED, Share, calibration, choice, power, smallest_error
+from fish_train.prove.truths import truths_of
 from fish_train.prove.where import activity, dof_overlap, regime_f1, time_overlap
 from fish_train.prove.world import World
 from fish_train.recordings import read_dataset
@@ -58,8 +62,8 @@ def test_worlds_are_drawn_from_the_seed_alone() -> None:
     assert worlds == groups.draw_worlds(60, names, 7) != groups.draw_worlds(60, names, 8)
     assert {w.group for w in worlds} == set(names)
     assert all(World.of(w.label()) == w for w in worlds)
-    hidden = {groups.single(np.random.default_rng(0), k).names[0] for k in range(len(candidates()))}
-    assert hidden == set(candidates())
+    hidden = {groups.single(np.random.default_rng(0), k).names[0] for k in range(len(candidates()) + 1)}
+    assert hidden == {*candidates(), *OTHER_FORMS}
     with pytest.raises(ValueError, match="known: single"):
         groups.draw_worlds(3, ["nonsense"], 0)
 
@@ -70,6 +74,21 @@ def test_no_outside_effect_is_in_the_vocabulary() -> None:
     with known_to_the_plant():
         assert set(OUTSIDE) < set(EFFECTS)
     assert before == EFFECTS
+
+
+def test_another_form_of_a_name_counts_as_that_name() -> None:
+    flow, p = OTHER_FORMS["vortex"].water, SimpleNamespace(speed=0.04, at_x=0.3, at_y=-0.1, core=0.5)
+    velocity, ((a, b), (c, d)) = flow(p, 0.3, 0.4, None, NUMPY)  # a core above its middle
+    assert velocity == pytest.approx((-0.04, 0.0), abs=1e-15) and a + d == pytest.approx(0.0, abs=1e-15)
+    h = 1e-6
+    up, right = (flow(p, 0.2 + dx, 0.1 + dy, None, NUMPY)[0] for dx, dy in ((0.0, h), (h, 0.0)))
+    down, left = (flow(p, 0.2 - dx, 0.1 - dy, None, NUMPY)[0] for dx, dy in ((0.0, h), (h, 0.0)))
+    (a, b), (c, d) = flow(p, 0.2, 0.1, None, NUMPY)[1]
+    slopes = [(u - v) / (2 * h) for u, v in zip((*right, *up), (*left, *down), strict=True)]
+    assert slopes == pytest.approx([a, c, b, d], abs=1e-9)
+    world = groups.single(np.random.default_rng(0), len(candidates()))
+    assert world.names == ("vortex",) and truths_of(world) == ("nonuniform_current",)
+    assert truths_of(small("single")) is None
 
 
 def test_a_study_is_sealed_first_goes_on_and_opens(tmp_path) -> None:

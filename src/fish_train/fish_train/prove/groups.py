@@ -14,6 +14,7 @@ from fish_sim.parameter import Parameter
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_sim.sensors.sensor_effect import SensorEffect
 from fish_train.diagnose.vocabulary import candidates
+from fish_train.prove.other_forms import OTHER_FORMS
 from fish_train.prove.outside import OUTSIDE
 from fish_train.prove.world import World
 
@@ -32,10 +33,11 @@ ELSEWHERE = {  # parameters that say where or when; drawn afresh in every world
     "wall_effect": {"length": (0.15, 0.25)},
     "wake_memory": {"time_constant": (0.2, 0.4)},
     "battery_sag": {"time_constant": (0.5, 2.0)},
+    "vortex": {"at_x": (-0.8, 0.8), "at_y": (-0.4, 0.4), "core": (0.3, 0.8)},
     "jet": {"at_x": (-0.8, 0.8), "at_y": (-0.4, 0.4), "width": (0.25, 0.4)},
 }
 SIGNED = ("current", "nonuniform_current", "hull_asymmetry", "rudder_offset", "camera_heading_offset", "imu_misalignment",
-          "rotor_imbalance", "compass", "jet")  # fmt: skip
+          "rotor_imbalance", "compass", "jet", "vortex")  # fmt: skip
 HIDDEN_BY_THE_ENCODER = ("rotor_lag", "rotor_saturation", "battery_sag")
 ABSORBED = (
     "quadratic_drag",
@@ -59,7 +61,12 @@ OTHER_PLANTS = ((3, "dop853", 2), (4, "dop853", 4), (5, "dop853", 8), (3, "rk4",
 
 def draw_effect(name: str, strength: float, random: Random) -> dict[str, float]:
     """Values of an effect at `strength` typical ones, a little spread; where and when are drawn."""
-    table: dict[str, type[Effect] | type[SensorEffect]] = {**EFFECTS, **SENSOR_EFFECTS, **OUTSIDE}
+    table: dict[str, type[Effect] | type[SensorEffect]] = {
+        **EFFECTS,
+        **SENSOR_EFFECTS,
+        **OUTSIDE,
+        **OTHER_FORMS,
+    }
     effect = table[name]
     sign = float(random.choice([-1.0, 1.0])) if name in SIGNED else 1.0
     values = {}
@@ -101,8 +108,8 @@ def _turn(items: Sequence[Item], number: int) -> Item:
 
 
 def single(random: Random, number: int) -> World:
-    """One effect of the vocabulary after the other at the strengths of the known sets, mixed trials."""
-    return _world("single", random, (_turn(candidates(), number),))
+    """One effect of the vocabulary (or another form of it) after the other at the strengths of the known sets, mixed trials."""
+    return _world("single", random, (_turn((*candidates(), *OTHER_FORMS), number),))
 
 
 def absorbed(random: Random, number: int) -> World:

@@ -13,6 +13,7 @@ from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
+from fish_train.prove.other_forms import OTHER_FORMS
 
 SOURCE = "invented for the blind study; not in the vocabulary"
 
@@ -170,10 +171,11 @@ OUTSIDE: dict[str, type[Effect]] = {
 
 @contextmanager
 def known_to_the_plant() -> Iterator[None]:
-    """EFFECTS with OUTSIDE added, so that a plant can have them; the tool's process never does this."""
-    EFFECTS.update(OUTSIDE)
+    """EFFECTS with OUTSIDE and OTHER_FORMS added, so that a plant can have them; the tool's process never does this."""
+    added = {**OUTSIDE, **OTHER_FORMS}
+    EFFECTS.update(added)
     try:
         yield
     finally:
-        for name in OUTSIDE:
+        for name in added:
             EFFECTS.pop(name, None)
