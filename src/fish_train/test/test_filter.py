@@ -110,3 +110,27 @@ def smoothed_surge(data, noise: Noise) -> float:
     xi, _ = smooth(fit.result.history)
     nx = xi.shape[2] - 6
     return float(np.mean(xi[200:-100, 0, nx]))
+
+
+def test_a_short_trial_is_smoothed_beside_a_long_one_as_alone():
+    data, _ = experiment(Robot(), 1.5, ("sines", "steps"))
+    uneven = replace(data, steps=np.array([150, 90]))
+    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    inputs = coordinates.filter_inputs(np.zeros(0))
+
+    def smoothed(some):
+        return smooth(run_filter(some, coordinates.stepper, *inputs, Noise(), keep=True).history)[0]
+
+    np.testing.assert_allclose(smoothed(uneven)[:90, 1], smoothed(uneven.select([1]))[:, 0], atol=1e-9)
+
+
+def test_a_filter_that_diverges_says_from_where():
+    data, _ = experiment(Robot(), 1.0, ("sines", "steps"))
+    commands = data.commands.copy()
+    commands[40:, 1, 0] = 1e9  # rad/s
+    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    inputs = coordinates.filter_inputs(np.zeros(0))
+    result = run_filter(replace(data, commands=commands), coordinates.stepper, *inputs, Noise(), keep=True)
+    lost = ~np.isfinite(result.history.filtered).all(axis=2)
+    assert not lost[:, 0].any() and not lost[:41, 1].any() and lost[50:, 1].all()
+    assert np.isfinite(result.log_likelihood[0]) and not np.isfinite(result.log_likelihood[1])

@@ -113,7 +113,7 @@ class _Job:
         self.sums, self.gradient, self.normal = np.zeros((M, 2)), np.zeros((M, K)), np.zeros((M, K, K))
         self.whitened = np.full((M, T, 6), np.nan)
         row = 3 * self.n**2 + 2 * self.n + self.memory_size
-        self.history = np.full((M, T, row), np.nan) if keep else None
+        self.history = np.zeros((M, T, row)) if keep else None
         repeated = np.tile(self.dp, (M, 1)) if K else np.zeros((M, len(p)))
         memory0 = np.repeat(self.memory0, max(K, 1), axis=0)
         commands = np.repeat(experiment.commands, max(K, 1), axis=1)

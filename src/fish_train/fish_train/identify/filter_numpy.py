@@ -55,7 +55,7 @@ class Filter:
         T, M, K, n = self.experiment.length, self.trials, self.free, self.n
         xi, P = first_state(self.experiment, self.stepper.layout, self.sensors, self.noise)
         D = np.zeros((M, n, K))  # of motion, wrench and biases; that of the memory is self.d_memory
-        sums = _Sums(M, K, T)
+        sums, lost = _Sums(M, K, T), np.zeros(M, dtype=bool)
         history = _empty_history(T, M, n, self.memory) if keep else None
         decay = np.exp(-DT / self.noise.wrench_time)
         Q = np.zeros((n, n))
@@ -72,11 +72,13 @@ class Filter:
             if k == T - 1:
                 break
             xi, F, D = self._predict(k, xi, D, decay)
+            lost |= (k + 1 < self.experiment.steps) & ~np.isfinite(xi[:, 0])
             P = F @ P @ F.transpose(0, 2, 1) + Q
             P = 0.5 * (P + P.transpose(0, 2, 1))
             if history is not None:
                 history.transition[k] = F
         self._encoder(sums)
+        sums.log_likelihood[lost] = -np.inf
         return FilterResult(
             sums.log_likelihood, sums.samples, sums.gradient, sums.normal, sums.whitened, history
         )

@@ -78,7 +78,7 @@ class FilterResult:
 
 @dataclass(frozen=True)
 class History:
-    """Filtered and predicted moments for the smoother; NaN beyond a trial's end and from where the filter diverged."""
+    """Filtered and predicted moments for the smoother; `filtered` is NaN from where a trial's filter diverged."""
 
     predicted: Array  # (T, M, N)
     predicted_P: Array  # (T, M, N, N)

@@ -280,7 +280,12 @@ void filter_trial(long steps, long K, const double *commands, const double *imu,
     }
     if (k + 1 < steps) predict(c, &f, K, p, dp, commands + k * NC);
     if (h) memcpy(h + 2 * N + 2 * N * N, f.F, sizeof f.F);
-    if (!isfinite(f.xi[0])) { sums.log_likelihood = -INFINITY; break; }
+    if (!isfinite(f.xi[0])) {
+      sums.log_likelihood = -INFINITY;
+      for (h = history ? history + (k + 1) * row : NULL; h && h < history + steps * row; h += row)
+        for (int i = 0; i < N; ++i) h[N + N * N + i] = NAN;
+      break;
+    }
   }
   sums_out[0] = sums.log_likelihood;
   sums_out[1] = sums.samples;
