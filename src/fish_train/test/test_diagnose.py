@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,10 +15,13 @@ from fish_train.diagnose import diagnosis as module
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
 from fish_train.diagnose.experiment_plan import next_experiment
+from fish_train.diagnose.locate import dof_shares
 from fish_train.diagnose.split import split_trials
 from fish_train.diagnose.tail import with_links
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
 from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import evaluate, settle
+from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.synthetic import program, record
 from fish_train.reports.diagnosis_page import sentence, write_diagnosis_page
 
@@ -164,3 +168,20 @@ def test_the_next_experiment_follows_what_is_open():
     assert "unexplained" in turning["why"] and {row["rudder"] for row in turning["program"]} == {0.5, -0.5}
     rivals = next_experiment(["rudder_lag"], ["rudder_delay"])
     assert rivals["why"].startswith("tell rudder_lag from rudder_delay")
+
+
+def test_of_two_effects_each_has_its_own_place():
+    experiment = swim(
+        truth(hull_asymmetry={"sway": 0.0, "yaw": 0.2}, tether={"stiffness": 0.6, "length": 0.0})
+    )
+    robot = truth(hull_asymmetry={"sway": 0.0, "yaw": 0.2}, tether={"stiffness": 0.6, "length": 0.0})
+    experiment = swim(robot)
+    final = settle(evaluate(nominal_hypothesis(robot, ()), np.zeros(0), experiment, Noise()), experiment)
+    accepted = [SimpleNamespace(name="hull_asymmetry"), SimpleNamespace(name="tether")]
+    parts = module.shares(final, accepted, experiment)
+    yaw = {name: dof_shares(less, final)["yaw"] for name, (less, _) in parts.items()}
+    assert yaw["hull_asymmetry"] > 0.5 and yaw["tether"] < 0.2
+    assert set(parts["tether"][0].hypothesis.names) == {"hull_asymmetry"}
+    assert (
+        module.shares(final, accepted[:1], experiment) == {}
+    )  # one effect: what the refitted nominal model lacks

@@ -92,6 +92,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     gains = {a.name: a.round.gain(a.name) for a in d.accepted}
     tried = len(found.ranking)
     odds = competition(accepted)
+    without, force = d.parts.get(name, (d.nominal, d.force))
     return {
         "name": name,
         "kind": kind_of(name),
@@ -104,7 +105,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         },
         "share": gains[name] / sum(gains.values()),
         "rivals": [{"name": n, "probability": p} for n, p in odds.items() if n != name and p > PLAUSIBLE],
-        "where": where_entry(d.force, d.nominal, d.final),
+        "where": where_entry(force, without, d.final),
     }
 
 

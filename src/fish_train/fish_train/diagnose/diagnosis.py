@@ -24,7 +24,7 @@ from fish_train.diagnose.tail import MORE, finer_tails
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, evaluate, settle, trial_likelihoods
+from fish_train.identify.fit import Fit, adapt_noise, evaluate, settle, trial_likelihoods
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.settle import suitable_noise
@@ -64,6 +64,9 @@ class Diagnosis:
     unreachable: dict[str, str]
     level: Level
     force: MissingForce  # that the nominal model lacks
+    parts: dict[
+        str, tuple[Fit, MissingForce]
+    ]  # of several effects: the final model less one, and what it then lacks
     remaining: MissingForce  # that the final model lacks
     description: Description  # of the remaining force
     given_noise: Noise  # that suits the robot as given: at the refitted noise its filter would lose the fish
@@ -104,13 +107,14 @@ def diagnose(
     progress("locating the missing force")
     force = missing_force(nominal, training)
     remaining = missing_force(final, training) if accepted else force
+    parts = shares(final, accepted, training)
     progress("scoring held-out trials")
     unseen = experiment.select(split.held_out or split.training)
     given_noise = suitable_noise(unseen, robot, nominal.noise)
     held = held_out_density(unseen, robot, given_noise, nominal, final)
     return Diagnosis(
         experiment, split, robot, nominal, final, tuple(rounds), tuple(accepted), unreachable, level,
-        force, remaining, describe(remaining, final.noise), given_noise, held,
+        force, parts, remaining, describe(remaining, final.noise), given_noise, held,
     )  # fmt: skip
 
 
@@ -225,13 +229,30 @@ def prune(
     """Take effects out again that the others have made superfluous."""
     for candidate in list(accepted)[:-1] if len(accepted) > 1 else []:
         progress(f"without {candidate.name}?")
-        smaller = final.hypothesis.without(candidate.name)
-        keep = [i for i, f in enumerate(final.hypothesis.free) if f in smaller.free]
-        fit = refine(evaluate(smaller, final.theta[keep], training, final.noise), training)
+        fit = refine(switched_off(final, candidate.name, training), training)
         samples = float(final.result.samples.sum())
         if final.objective - fit.objective < level.enough(samples, parameter_count(candidate.name), 1):
             final, accepted = fit, [a for a in accepted if a is not candidate]
     return final, accepted
+
+
+def switched_off(fit: Fit, name: str, experiment: Experiment) -> Fit:
+    """The fit less one effect, its other parameters as they are."""
+    smaller = fit.hypothesis.without(name)
+    keep = [i for i, free in enumerate(fit.hypothesis.free) if free in smaller.free]
+    return evaluate(smaller, fit.theta[keep], experiment, fit.noise)
+
+
+def shares(
+    final: Fit, accepted: Sequence[Accepted], training: Experiment
+) -> dict[str, tuple[Fit, MissingForce]]:
+    """Of several effects each one's part: the model less it, with the noise it then needs, and the force that it lacks."""
+    found = {}
+    for name in [a.name for a in accepted] if len(accepted) > 1 else []:
+        less = switched_off(final, name, training)
+        less = evaluate(less.hypothesis, less.theta, training, adapt_noise(less, training))
+        found[name] = less, missing_force(less, training)
+    return found
 
 
 def held_out_density(
