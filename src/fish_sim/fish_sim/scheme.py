@@ -41,9 +41,9 @@ def default_scheme(links: int) -> Scheme:
     return Scheme(DEFAULT_METHOD, DEFAULT_SUBSTEPS[links - 1])
 
 
-def stable_scheme(robot: Robot) -> Scheme:
-    """The default scheme of a robot, with more substeps if its own modes need them."""
-    scheme = default_scheme(robot.links)
+def stable_scheme(robot: Robot, scheme: Scheme | None = None) -> Scheme:
+    """A scheme (by default that of the robot's links), with more substeps if the robot's own modes need them."""
+    scheme = scheme or default_scheme(robot.links)
     modes = modes_at_rest(robot.structure, np.array(robot.vector()))
     enough = enough_substeps(METHODS[scheme.method], modes)
     if enough is None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
-from fish_train.identify.filter import run_filter
+from fish_train.identify.filter import filter_stepper, run_filter
 from fish_train.identify.filter_compiled import compiled_pass
 from fish_train.identify.filter_numpy import Filter
 from fish_train.identify.filter_types import Noise
@@ -134,3 +134,9 @@ def test_a_filter_that_diverges_says_from_where():
     lost = ~np.isfinite(result.history.filtered).all(axis=2)
     assert not lost[:, 0].any() and not lost[:41, 1].any() and lost[50:, 1].all()
     assert np.isfinite(result.log_likelihood[0]) and not np.isfinite(result.log_likelihood[1])
+
+
+def test_a_fast_tail_gets_the_steps_it_needs():
+    robot = Robot().with_parameters(tail_stiffness=1.5).with_effect("disturbance")
+    assert filter_stepper(Robot().with_effect("disturbance")).scheme.substeps == 1
+    assert filter_stepper(robot).scheme.substeps > 1

@@ -8,12 +8,13 @@ import numpy as np
 
 from fish_sim.robot import Robot
 from fish_train.diagnose import locate
-from fish_train.diagnose.decide import PLAUSIBLE, TEMPER, excess, p_value, parameter_count, probabilities
+from fish_train.diagnose.decide import PLAUSIBLE, TEMPER, p_value, parameter_count, probabilities
 from fish_train.diagnose.diagnosis import TOO_STRONG, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.law import REGRESSORS
 from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
+from fish_train.identify.cold import excess
 from fish_train.identify.filter_types import ROWS, Noise
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import effect_class, specification

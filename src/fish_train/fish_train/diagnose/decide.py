@@ -8,7 +8,6 @@ import numpy as np
 from scipy.special import softmax
 from scipy.stats import chi2
 
-from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import effect_class, specification
 
@@ -18,7 +17,6 @@ TEMPER = 10.0
 # nats per scalar measurement below which a gain is no physics worth a name, whatever its significance
 SMALLEST_GAIN = 0.004
 SMALLEST_Z = 4.0  # standard errors between the strength and its neutral value
-SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
 PLAUSIBLE = 0.02  # rivals less probable than this are not named
 
 
@@ -66,9 +64,3 @@ def strength_z(fit: Fit, name: str) -> float:
 def parameter_count(name: str) -> int:
     """Free parameters of an effect."""
     return len(specification(name))
-
-
-def excess(fit: Fit) -> np.ndarray:
-    """(3,) spectral density 2 sigma^2 tau of a fit's wrench over that of usual water, which `Noise()` describes."""
-    density = [2.0 * np.square(n.wrench) * n.wrench_time for n in (fit.noise, Noise())]
-    return np.asarray(density[0] / density[1])

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_train.diagnose.base import better, fit_cold, settle_base
-from fish_train.diagnose.decide import SMALLEST_Z, SUSPICIOUS, Level, excess, parameter_count, strength_z
+from fish_train.diagnose.base import settle_base
+from fish_train.diagnose.decide import SMALLEST_Z, TEMPER, Level, parameter_count, strength_z
 from fish_train.diagnose.law import Description, describe
 from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.diagnose.search import (
@@ -22,16 +22,19 @@ from fish_train.diagnose.search import (
 from fish_train.diagnose.split import Split, split_trials
 from fish_train.diagnose.tail import MORE, finer_tails
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
+from fish_train.identify.cold import SUSPICIOUS, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, adapt_noise, evaluate, settle, trial_likelihoods
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
-from fish_train.identify.settle import suitable_noise
+from fish_train.identify.settle import open_gates, suitable_noise
 from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
-FAIR_SHARE = 0.25  # of the gain per sample that trials not fitted to must show
+FAIR_SHARE = (
+    0.5  # of the gain that a true effect shows on trials not fitted to: half-way from none to all of it
+)
 # times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
 TOO_STRONG = 30.0
 
@@ -120,7 +123,8 @@ def diagnose(
 
 def fit_base(robot: Robot, experiment: Experiment) -> Fit:
     """The nominal model: cold fit on the start of every trial, continued on the whole."""
-    cold = fit_cold(robot, shorten(experiment, RANK_STEPS))
+    short = shorten(experiment, RANK_STEPS)
+    cold = fit_cold(nominal_hypothesis(robot), short, usual_noise(short))
     return settle_base(evaluate(cold.hypothesis, cold.theta, experiment, cold.noise), experiment)
 
 
@@ -202,12 +206,17 @@ def is_significant(fit: Fit, gain: float, name: str, samples: float, tried: int,
 
 
 def holds_elsewhere(base: Fit, fit: Fit, check: Experiment) -> bool:
-    """On trials that it was not fitted to, a fit must gain a fair share of what it gained where it was."""
-    here = trial_likelihoods(fit.hypothesis, fit.theta, check, fit.noise)
-    there = trial_likelihoods(base.hypothesis, base.theta, check, base.noise)
-    per_sample = (here.log_likelihood.sum() - there.log_likelihood.sum()) / here.samples.sum()
-    gain = fit.objective - base.objective
-    return bool(per_sample > FAIR_SHARE * gain / base.result.samples.sum())
+    """On trials that it was not fitted to, a fit must gain a fair share of what it would gain there if it were true.
+
+    With r the whitened innovations of the fit, white if it is true, and r + d those of the base under the same noise, the gain
+    sum((r + d)^2 - r^2) / 2 is sum(d^2) / 2 in the mean: much where the effect acts, little on trials that do not excite it.
+    """
+    noise = open_gates(fit.noise)
+    here = trial_likelihoods(fit.hypothesis, fit.theta, check, noise)
+    there = trial_likelihoods(base.hypothesis, base.theta, check, noise)
+    gain = float(here.log_likelihood.sum() - there.log_likelihood.sum())
+    expected = 0.5 * float(np.nansum((here.whitened - there.whitened) ** 2))
+    return gain > max(FAIR_SHARE * expected, TEMPER)
 
 
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:

@@ -9,9 +9,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
-from fish_train.diagnose.base import fit_cold
+from fish_train.identify.cold import fit_cold
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit, evaluate, log_posterior, settle
+from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.sensor_noise import usual_noise
 
 MORE = (1, 2)  # links that are tried beyond the robot's
 
@@ -34,7 +36,7 @@ def finer_tails(
         if links > MAX_LINKS:
             break
         progress(f"fitting the nominal model with {links} tail links")
-        fit = fit_cold(with_links(robot, links), short)
+        fit = fit_cold(nominal_hypothesis(with_links(robot, links)), short, usual_noise(short))
         if not fit.objective > beaten:
             break  # a link that does not help is not helped by another
         found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
