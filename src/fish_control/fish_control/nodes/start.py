@@ -47,7 +47,9 @@ def run(make_node: Callable[[], Node], name: str) -> None:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (ValueError, OSError, RCLError) as error:
-        failure = " ".join(str(error).split())
+        # a callback may publish after the signal has shut the context down
+        if node is None or rclpy.ok():
+            failure = " ".join(str(error).split())
     finally:
         if node is not None:
             node.destroy_node()
