@@ -19,7 +19,7 @@ from fish_train.swim import check_running
 
 SIMULATOR, CAMERA = SIMULATED
 TRACKER, FUSION, PLANNER, CONTROLLER = CONTROL
-PATIENCE = 60.0  # s of real time in which anything waited for must happen
+PATIENCE = 120.0  # s of real time in which anything waited for must happen
 
 
 def pytest_configure() -> None:
@@ -60,7 +60,12 @@ class Run:
 
 
 def parameters(
-    folder: Path, path: str, path_args: str, start: tuple[float, float, float], factor: float
+    folder: Path,
+    path: str,
+    path_args: str,
+    start: tuple[float, float, float],
+    factor: float,
+    lockstep: float = 0.0,
 ) -> dict[NodeSpec, dict[str, object]]:
     """Nodes of a run without images, `factor` times real time: camera poses come from the simulator."""
     x, y, heading = start
@@ -70,6 +75,7 @@ def parameters(
         SIMULATOR: {
             "camera": "pose",
             "real_time_factor": factor,
+            "lockstep": lockstep,
             **{"start_x": x, "start_y": y, "start_heading": heading},
         },
         FUSION: dict(sim_time),

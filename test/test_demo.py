@@ -37,7 +37,7 @@ def shown(tmp_path_factory):
 def test_the_fish_swims_on_its_path(shown):
     output, *_ = shown
     rmse = float(re.search(r"cross-track, m +([\d.]+)", output)[1])
-    assert rmse < 0.05  # m; on a quiet computer below 0.015
+    assert rmse < 0.1  # m, in real time; on a quiet computer below 0.015, with an idle rudder 0.3 and more
 
 
 def test_latency_and_cpu_of_every_node_are_shown(shown):

@@ -45,10 +45,13 @@ class SimulatorConfig(SimulationConfig):
     real_time_factor: float = 1.0  # simulated per real second; 0 = as fast as possible
     camera: str = "image"  # image: the camera node renders; pose: publish camera/pose from the sensor model
     paused: bool = False  # start paused
+    lockstep: float = 0.0  # s of real time to wait for estimates and commands that lag; 0 = do not wait
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0.0 <= self.real_time_factor <= 100.0:
             raise ValueError(f"real_time_factor = {self.real_time_factor}: expected 0 to 100")
+        if not 0.0 <= self.lockstep <= 60.0:
+            raise ValueError(f"lockstep = {self.lockstep}: expected 0 to 60 s")
         if self.camera not in ("image", "pose"):
             raise ValueError(f"camera = {self.camera!r}: expected 'image' or 'pose'")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import rclpy
 import yaml
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
@@ -72,10 +73,10 @@ class Bench:
         self.until(future.done)
         return future.result()
 
-    def command(self, rotor: float, rudder: float) -> None:
-        self.commands.publish(
-            JointState(name=["rotor", "rudder"], position=[0.0, rudder], velocity=[rotor, 0.0])
-        )
+    def command(self, rotor: float, rudder: float, stamp: Time | None = None) -> None:
+        command = JointState(name=["rotor", "rudder"], position=[0.0, rudder], velocity=[rotor, 0.0])
+        command.header.stamp = stamp or Time()
+        self.commands.publish(command)
 
     def close(self) -> None:
         self.executor.shutdown()
@@ -140,6 +141,19 @@ def test_pause_stops_time_and_reset_brings_the_fish_back_without_turning_time_ba
     message = bench.collect("sim/odometry", 3)[-1]
     assert seconds(message.header.stamp) > stopped
     assert abs(message.pose.pose.position.x) < 1e-6 and abs(message.twist.twist.angular.z) < 1e-6
+
+
+@pytest.mark.parametrize("bench", [{"lockstep": 60.0}], indirect=True)
+def test_in_lockstep_time_stands_until_the_command_is_answered(bench):
+    bench.command(0.0, 0.0, bench.collect("sim/odometry", 1)[0].header.stamp)
+    bench.collect("/diagnostics", 2)  # seconds in which thousands of periods would have run
+    stands = bench.got["sim/odometry"][-1].header.stamp
+    bench.collect("/diagnostics", 1)
+    assert bench.got["sim/odometry"][-1].header.stamp == stands
+    bench.command(0.0, 0.0, stands)
+    assert len(bench.collect("sim/odometry", 3)) == 3
+    bench.collect("/diagnostics", 1)
+    assert 0.02 < seconds(bench.got["sim/odometry"][-1].header.stamp) - seconds(stands) < 0.05
 
 
 def test_bad_commands_are_refused_and_said_in_the_diagnostics(bench):

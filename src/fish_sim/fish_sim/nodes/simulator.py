@@ -7,6 +7,8 @@ pool -> base_link), sim/joint_states (tail_1 .. relative angles, rad), /clock; 1
 
 Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
 nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause.
+With lockstep it stands still while joint_command or odometry/filtered are behind it (Lockstep), so that a run
+does not depend on how busy the computer is.
 """
 
 import time
@@ -25,6 +27,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
+from fish_sim.nodes.lockstep import Lockstep
 from fish_sim.nodes.pacer import Pacer
 from fish_sim.nodes.start import read_parameters, run
 from fish_sim.robot import Robot, load_robot
@@ -43,10 +46,15 @@ class SimulatorNode(Node):
         self._config = config = read_parameters(self, SimulatorConfig)
         robot = load_robot(config.robot_file) if config.robot_file else Robot()
         self._simulation = Simulation(robot, config)
-        self._follows_wall = not self.get_parameter("use_sim_time").value and config.real_time_factor == 1.0
+        self._follows_wall = (
+            config.real_time_factor == 1.0
+            and not config.lockstep
+            and not self.get_parameter("use_sim_time").value
+        )
         self._paused = config.paused
         self._refused = self._divergences = 0
         self._refusal = ""
+        self._lockstep = Lockstep(config.lockstep)
         self._create_interfaces(config.camera == "pose")
         self._start_ns = time.time_ns()
         self._pacer = Pacer(config.real_time_factor, DT, time.monotonic())
@@ -70,6 +78,8 @@ class SimulatorNode(Node):
             self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE) if camera_pose else None
         )
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
+        if self._config.lockstep:
+            self.create_subscription(Odometry, "odometry/filtered", self._on_estimate, QUEUE)
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Trigger, "reset", self._on_reset)
 
@@ -79,6 +89,10 @@ class SimulatorNode(Node):
         except ValueError as error:
             self._refused += 1
             self._refusal = str(error)
+        self._lockstep.answered("joint_command", self._simulated(msg.header.stamp))
+
+    def _on_estimate(self, msg: Odometry) -> None:
+        self._lockstep.answered("odometry/filtered", self._simulated(msg.header.stamp))
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if self._paused and not request.data:
@@ -100,11 +114,14 @@ class SimulatorNode(Node):
     def _tick(self) -> None:
         if self._paused:
             return
+        if not self._lockstep.may_advance(self._simulation.time, time.monotonic()):
+            self._restart_pace()
+            return
         lost = self._pacer.lost
         periods = self._pacer.due(time.monotonic())
         if self._pacer.lost > lost:
             self._restart_pace()
-        for _ in range(periods):
+        for _ in range(min(periods, 1) if self._config.lockstep else periods):
             try:
                 self._publish(self._simulation.advance())
             except FloatingPointError as error:
@@ -114,6 +131,12 @@ class SimulatorNode(Node):
     def _stamp(self, simulated: float) -> Time:
         seconds, nanoseconds = divmod(self._start_ns + round(simulated * 1e9), 1_000_000_000)
         return Time(sec=seconds, nanosec=nanoseconds)
+
+    def _simulated(self, stamp: Time) -> float:
+        """Simulated time [s] of a stamp; a message without one is of now."""
+        if stamp == Time():
+            return self._simulation.time
+        return 1e-9 * (stamp.sec * 1_000_000_000 + stamp.nanosec - self._start_ns)
 
     def _publish(self, readings: Readings) -> None:
         stamp = self._stamp(readings.time)
