@@ -8,7 +8,7 @@ import numpy as np
 
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit
+from fish_train.identify.fit import Fit, settle
 from fish_train.identify.hypothesis import Hypothesis
 from fish_train.identify.tempering import fit_tempered
 
@@ -20,18 +20,21 @@ Report = Callable[[str], None]
 def fit_cold(
     hypothesis: Hypothesis, experiment: Experiment, noise: Noise, report: Report = lambda _: None
 ) -> Fit:
-    """The best of a few ways: inertias held at first or not, then the camera leads a second time."""
-    return other_ways(fit_tempered(hypothesis, experiment, noise, report=report), experiment, noise, report)
+    """The camera leads from several values of the tail's inertias; a fit that leaves much is looked at again."""
+    return second_look(fit_tempered(hypothesis, experiment, noise, report=report), experiment, report)
 
 
-def other_ways(held: Fit, experiment: Experiment, noise: Noise, report: Report = lambda _: None) -> Fit:
-    """The fit, or where it leaves more than water does the best of it and two more ways."""
-    if excess(held).max() < SUSPICIOUS:
-        return held
-    report("fitting another way")
-    best = better(held, fit_tempered(held.hypothesis, experiment, noise, report=report, held=()))
-    again = fit_tempered(held.hypothesis, experiment, best.noise, best.theta, report, held=())
-    return better(best, again)
+def second_look(fit: Fit, experiment: Experiment, report: Report = lambda _: None) -> Fit:
+    """The fit, or where it leaves more than water does: settled, and then led by the camera once more from there."""
+    if excess(fit).max() < SUSPICIOUS:
+        return fit
+    report("fitting, process noise and parameters in turn")
+    settled = settle(fit, experiment)
+    if excess(settled).max() < SUSPICIOUS:
+        return settled
+    report("fitting once more from there")
+    again = fit_tempered(settled.hypothesis, experiment, settled.noise, settled.theta, report, held=())
+    return better(settled, again)
 
 
 def excess(fit: Fit) -> np.ndarray:

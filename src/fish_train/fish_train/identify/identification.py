@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_train.identify.alignment import Alignment, align, moved_back
 from fish_train.identify.baselines import fit_baselines, predict_baseline
-from fish_train.identify.cold import other_ways
+from fish_train.identify.cold import second_look
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
@@ -106,7 +106,7 @@ def identify(
         hypothesis = hypothesis.with_effect(name, EFFECT_START)
     fit = fit_tempered(hypothesis, training, noise, report=report)
     wrong = is_wrong(fit, noise)
-    fit = fit_outlook(fit, training, report) if wrong else other_ways(fit, training, noise, report)
+    fit = fit_outlook(fit, training, report) if wrong else second_look(fit, training, report)
     report("predicting trials left out")
     judged, errors, lacking = judge(training, held_out, robot, fit)
     estimates = estimate(training, fit.robot, fit.noise)

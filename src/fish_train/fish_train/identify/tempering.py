@@ -21,9 +21,11 @@ from fish_train.identify.settle import STRANGE, open_gates, worst_row
 
 Array = NDArray[np.float64]
 
-STAGES = ((100.0, 25), (30.0, 25), (10.0, 15), (3.0, 15), (1.0, 15))  # factor of the IMU's noise, iterations
-# far from the optimum they imitate a wrong phase of the tail
+LEADING = ((100.0, 25), (30.0, 25), (10.0, 15))  # factor of the IMU's noise, iterations: the camera leads
+CLOSING = ((3.0, 15), (1.0, 15))
+# the tail's: far from the optimum they imitate a wrong phase of its swing, so they are held at several values first
 HELD_AT_FIRST = ("link_inertia_factor", "fin_inertia_factor")
+HELD_AT = (0.0, 0.25, -0.25)  # of theta
 FAR_GAIN = 3.0  # nats; an iteration of a stage that is not the last and gains less is its last
 ROUNDS = 2  # of noise estimation and refits
 
@@ -34,21 +36,24 @@ def fit_tempered(
 ) -> Fit:  # fmt: skip
     """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn.
 
-    The parameters `held` are free only when the camera has led the others.
-    Where the first stage leaves innovations that the sensors' noise cannot explain, that noise is estimated as well.
+    The parameters `held` are free only when the camera has led the others, with these at several values; the best goes on.
+    Where a stage leaves innovations that the sensors' noise cannot explain, that noise is estimated as well.
     The last steps leave out outliers by the gates of `noise`.
     """
     theta = Coordinates(hypothesis).origin() if theta is None else theta.copy()
-    first = [i for i, name in enumerate(hypothesis.free) if name not in held]
-    coarse = _fixing(hypothesis, theta, held)
-    for factor, iterations in STAGES:
-        report(f"fitting, IMU noise x {factor:g}")
-        wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
-        fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN)
-        theta[first] = fit.theta
-        if worst_row(fit) > STRANGE:
-            return _fit_with_sensor_noise(evaluate(hypothesis, theta, experiment, wide), experiment, report)
-    fit = climb(evaluate(hypothesis, theta, experiment, noise), experiment, STAGES[-1][1])
+    held = tuple(name for name in held if name in hypothesis.free)
+    report("fitting, the camera leads")
+    leads = [
+        _stages(hypothesis, experiment, noise, _with(hypothesis, theta, held, value), held, LEADING)
+        for value in (HELD_AT if held else HELD_AT[:1])
+    ]
+    fit = max(leads, key=lambda lead: lead.objective)
+    if worst_row(fit) <= STRANGE:
+        report("fitting, the IMU is believed more and more")
+        fit = _stages(hypothesis, experiment, noise, fit.theta, held, CLOSING)
+    if worst_row(fit) > STRANGE:
+        return _fit_with_sensor_noise(fit, experiment, report)
+    fit = climb(evaluate(hypothesis, fit.theta, experiment, noise), experiment, CLOSING[-1][1])
     for _ in range(ROUNDS):
         report("fitting, process noise")
         adapted = replace(
@@ -56,6 +61,30 @@ def fit_tempered(
         )
         fit = climb(evaluate(hypothesis, fit.theta, experiment, adapted), experiment, 8)
     return fit
+
+
+def _with(hypothesis: Hypothesis, theta: Array, names: tuple[str, ...], value: float) -> Array:
+    """Theta with some of its entries moved by `value`."""
+    moved = theta.copy()
+    moved[[hypothesis.free.index(name) for name in names]] += value
+    return moved
+
+
+def _stages(
+    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array, held: tuple[str, ...],
+    stages: tuple[tuple[float, int], ...],
+) -> Fit:  # fmt: skip
+    """The whole hypothesis where stages of falling IMU noise lead all but `held`; it ends at what is strange."""
+    theta = theta.copy()
+    first = [i for i, name in enumerate(hypothesis.free) if name not in held]
+    coarse = _fixing(hypothesis, theta, held)
+    for factor, iterations in stages:
+        wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
+        fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN)
+        theta[first] = fit.theta
+        if worst_row(fit) > STRANGE:
+            break
+    return evaluate(hypothesis, theta, experiment, wide)
 
 
 def _fixing(hypothesis: Hypothesis, theta: Array, held: tuple[str, ...]) -> Hypothesis:
