@@ -14,7 +14,7 @@ from fish_train.identify.baselines import constant, fit_baselines, predict_basel
 from fish_train.identify.experiment import Experiment, Frames
 from fish_train.identify.filter import run_filter
 from fish_train.identify.filter_types import FilterResult, Noise
-from fish_train.identify.motion import stroke_mean
+from fish_train.identify.motion import HALF_WINDOW, stroke_mean
 from fish_train.identify.prediction import predict, prediction_errors
 from fish_train.identify.prediction_table import COLUMNS, write_predictions
 from fish_train.identify.synthetic import program, record
@@ -141,14 +141,31 @@ def circling(speed: float, rate: float, duration: float = 8.0) -> Experiment:
     )
 
 
-def test_constant_baseline_follows_a_circle() -> None:
+@pytest.mark.parametrize("lead", [0.0, HALF_WINDOW])
+def test_constant_baseline_follows_a_circle(lead: float) -> None:
     experiment = circling(0.2, 0.5)
     like = predict(
         experiment, ROBOT, replace(Noise(), wrench=(1.0, 1.0, 0.1), gate_camera=1e9), 2.0, 1.0, 2.0
     )
-    errors = prediction_errors(predict_baseline(constant(), like), (1.0, 2.0))
+    errors = prediction_errors(predict_baseline(constant(), like, lead), (1.0, 2.0))
     assert np.all(errors.rms[:, 0] < 2e-3)  # the chord of a second's window
     assert np.all(errors.rms[:, 1:] < 1e-3)
+
+
+def test_on_equal_terms_a_baseline_knows_nothing_of_what_comes() -> None:
+    experiment = circling(0.2, 0.5)
+    like = predict(
+        experiment, ROBOT, replace(Noise(), wrench=(1.0, 1.0, 0.1), gate_camera=1e9), 2.0, 1.0, 2.0
+    )
+    frames = experiment.frames[0]
+    pose = np.where((frames.t > 2.0)[:, None], 9.0, frames.pose)  # the first prediction starts at 2 s
+    other = replace(
+        like,
+        estimates=replace(like.estimates, experiment=replace(experiment, frames=(Frames(frames.t, pose),))),
+    )
+    first = [predict_baseline(constant(), p, HALF_WINDOW).pose[:, 0] for p in (like, other)]
+    np.testing.assert_array_equal(*first)
+    assert not np.array_equal(*(predict_baseline(constant(), p).pose[:, 0] for p in (like, other)))
 
 
 def test_baselines_need_some_data() -> None:

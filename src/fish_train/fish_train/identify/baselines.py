@@ -5,7 +5,8 @@
     bilinear    u' = a0 + a1 u + a2 sqrt(throttle),  r_k = b0 + b1 (alpha u)_k + b2 (alpha u)_k-1 + b3 r_k-1,  v = c r
 
 fitted to stroke means of the training trials by least squares. They start from the camera's stroke means, which know half
-a second of what comes: an advantage over the physics model, whose estimates know only what was measured before.
+a second of what comes: an advantage over the physics model, whose estimates know only what was measured before. On equal
+terms (`lead` = HALF_WINDOW) they start from the last mean that ends at the start point and run half a second longer.
 """
 
 from __future__ import annotations
@@ -159,21 +160,27 @@ def fit_baselines(training: Experiment) -> dict[str, Advance]:
     return {"constant": constant(), "arx": fit_arx(data), "bilinear": fit_bilinear(data)}
 
 
-def predict_baseline(advance: Advance, like: Predictions) -> Predictions:
-    """The baseline's predictions from the start points of `like`."""
-    experiment, length = like.estimates.experiment, len(like.pose) - 1
+def predict_baseline(advance: Advance, like: Predictions, lead: float = 0.0) -> Predictions:
+    """The baseline's predictions from the start points of `like`, begun from stroke means `lead` [s] before them.
+
+    lead: a multiple of STEP.
+    """
+    experiment, early = like.estimates.experiment, round(lead / STEP) * STRIDE
+    length = len(like.pose) - 1 + early
     w = inputs(experiment)
-    measured = _measured(like, 0)
-    y, y_before = measured[:, 3:], _measured(like, STRIDE)[:, 3:]
-    pose = np.empty_like(like.pose)
+    measured = _measured(like, early)
+    y, y_before = measured[:, 3:], _measured(like, early + STRIDE)[:, 3:]
+    pose = np.empty((length + 1, *like.pose.shape[1:]))
     pose[0] = measured[:, :3]
     for begin in range(0, length, STRIDE):
         now, then = (
-            w[np.minimum(like.start + k, experiment.length - 1), like.trial] for k in (begin, begin + STRIDE)
+            w[np.clip(like.start - early + k, 0, experiment.length - 1), like.trial]
+            for k in (begin, begin + STRIDE)
         )
         y, y_before = advance(y, y_before, then, now), y
         count = min(STRIDE, length - begin)
         pose[begin + 1 : begin + count + 1] = _travel(pose[begin], y_before, y)[:count]
+    pose = pose[early:]
     pose[np.isnan(like.pose)] = np.nan
     return replace(like, pose=pose)
 

@@ -17,6 +17,7 @@ from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, nominal_hypothesis
+from fish_train.identify.motion import HALF_WINDOW
 from fish_train.identify.outlook import fit_outlook
 from fish_train.identify.prediction import (
     EVERY,
@@ -39,6 +40,7 @@ UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data s
 ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
 STILL = 0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
 BASELINES = ("constant", "arx", "bilinear")
+EQUAL_TERMS = "_equal"  # suffix of a baseline that knows what the physics knows
 EFFECT_START = 0.3  # typical strengths, at which the fit of an effect starts
 FITTED_FOR_OUTLOOK = (
     "the model needs sensors far noisier than they are: it lacks something, so that it was fitted to predictions over 0.5 "
@@ -160,9 +162,11 @@ def judge(
         baselines = fit_baselines(training)
     except ValueError as error:
         return judged, errors, [f"no baselines: {error}"]
-    errors |= {
-        name: prediction_errors(predict_baseline(advance, judged)) for name, advance in baselines.items()
-    }
+    for suffix, lead in (("", 0.0), (EQUAL_TERMS, HALF_WINDOW)):
+        errors |= {
+            name + suffix: prediction_errors(predict_baseline(advance, judged, lead))
+            for name, advance in baselines.items()
+        }
     return judged, errors, []
 
 
@@ -232,10 +236,18 @@ def fit_statements(fit: Fit) -> list[str]:
 
 
 def verdict(errors: dict[str, ErrorSizes]) -> list[str]:
-    """Whether the physics beats the baselines, horizon by horizon: each number against the best of them."""
-    names = [name for name in BASELINES if name in errors]
-    if not names:
+    """Whether the physics beats the baselines, as they are and on equal terms."""
+    known = [name for name in BASELINES if name in errors]
+    if not known:
         return []
+    return [
+        _against(errors, known, ""),
+        _against(errors, [name + EQUAL_TERMS for name in known], " on equal terms"),
+    ]
+
+
+def _against(errors: dict[str, ErrorSizes], names: list[str], terms: str) -> str:
+    """Horizon by horizon: each number against the best of some baselines."""
     mine = errors["identified"]
     lost = []
     for i, h in enumerate(mine.horizons):
@@ -244,5 +256,5 @@ def verdict(errors: dict[str, ErrorSizes]) -> list[str]:
             if mine.rms[i, j] >= (theirs := errors[best].rms[i, j]):
                 lost.append(f"{quantity} at {h:g} s ({mine.rms[i, j]:.3g} against {theirs:.3g}, {best})")
     if lost:
-        return [f"the physics model does NOT beat the baselines in {', '.join(lost)}"]
-    return ["the physics model beats all baselines in position, heading and speed at every horizon"]
+        return f"the physics model does NOT beat the baselines{terms} in {', '.join(lost)}"
+    return f"the physics model beats all baselines{terms} in position, heading and speed at every horizon"

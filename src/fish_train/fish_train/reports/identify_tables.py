@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fish_sim.robot import nominal_parameters
-from fish_train.identify.identification import Identification, entangled
+from fish_train.identify.identification import EQUAL_TERMS, Identification, entangled
 from fish_train.identify.prediction import ErrorSizes
 from fish_train.reports.page import Table
 
@@ -26,7 +26,7 @@ def error_table(errors: Mapping[str, ErrorSizes], title: str = "Prediction error
     header = ["predictor", *(f"{q} {h:g} s" for h in horizons for q in ("mm", "mrad", "mm/s")), "predictions"]
     rows = [
         [
-            NAMES.get(name, name),
+            _label(name),
             *(_cell(1e3 * v) for v in e.rms.ravel()),
             " / ".join(map(str, e.counts.sum(0))),
         ]
@@ -34,10 +34,15 @@ def error_table(errors: Mapping[str, ErrorSizes], title: str = "Prediction error
     ]
     note = (
         "Rms errors of position, heading and surge speed after 1, 2 and 5 s, averaged over strokes in measurement and "
-        "prediction alike. The baselines start from the camera's stroke means, which know half a second of what comes; "
-        "the physics starts from what was measured before."
+        "prediction alike. The physics starts from what was measured before. The baselines start from the camera's stroke "
+        "means, which know half a second of what comes; on equal terms from means that end at the start."
     )
     return Table(title, header, rows, note)
+
+
+def _label(name: str) -> str:
+    plain = name.removesuffix(EQUAL_TERMS)
+    return NAMES.get(plain, plain) + (", on equal terms" if plain != name else "")
 
 
 def _cell(value: float) -> str:
