@@ -72,7 +72,7 @@ def test_files_and_page(found: Identification, tmp_path) -> None:
     write_identify_page(tmp_path / "report.html", found, content["left_out"])
     page = (tmp_path / "report.html").read_text()
     for word in (
-        "bilinear, on equal terms",
+        "bilinear, with 0.5 s of what comes",
         "Phase portrait",
         "Autocorrelation",
         "trial_09: no camera/pose",

@@ -40,14 +40,15 @@ def test_true_model_without_noise_predicts_exactly(quiet: Experiment) -> None:
     assert errors.counts[2, 1] < errors.counts[0, 1]  # the third trial is shorter
 
 
-def test_later_measurements_change_nothing_before_them(quiet: Experiment) -> None:
+@pytest.mark.parametrize("ahead", [0.0, 0.5])
+def test_later_measurements_change_nothing_before_them(quiet: Experiment, ahead: float) -> None:
     cut = 4.0
     frames = tuple(Frames(f.t, f.pose + np.where(f.t > cut, 1.0, 0.0)[:, None]) for f in quiet.frames)
     gyro = quiet.gyro.copy()
     gyro[int(cut / 0.01) + 1 :] += 1.0
-    a = predict(quiet, ROBOT, Noise(), 1.0)
-    b = predict(replace(quiet, frames=frames, gyro=gyro), ROBOT, Noise(), 1.0)
-    early = a.start * 0.01 <= cut - 0.01
+    a = predict(quiet, ROBOT, Noise(), 1.0, ahead=ahead)
+    b = predict(replace(quiet, frames=frames, gyro=gyro), ROBOT, Noise(), 1.0, ahead=ahead)
+    early = a.start * 0.01 <= cut - ahead - 0.01
     np.testing.assert_array_equal(a.pose[:, early], b.pose[:, early])
     assert not np.allclose(a.pose[0, ~early], b.pose[0, ~early], equal_nan=True)
 
@@ -152,7 +153,7 @@ def test_constant_baseline_follows_a_circle(lead: float) -> None:
     assert np.all(errors.rms[:, 1:] < 1e-3)
 
 
-def test_on_equal_terms_a_baseline_knows_nothing_of_what_comes() -> None:
+def test_a_baseline_with_a_lead_knows_nothing_of_what_comes() -> None:
     experiment = circling(0.2, 0.5)
     like = predict(
         experiment, ROBOT, replace(Noise(), wrench=(1.0, 1.0, 0.1), gate_camera=1e9), 2.0, 1.0, 2.0
@@ -166,6 +167,15 @@ def test_on_equal_terms_a_baseline_knows_nothing_of_what_comes() -> None:
     first = [predict_baseline(constant(), p, HALF_WINDOW).pose[:, 0] for p in (like, other)]
     np.testing.assert_array_equal(*first)
     assert not np.array_equal(*(predict_baseline(constant(), p).pose[:, 0] for p in (like, other)))
+
+
+def test_a_state_that_knows_a_little_of_what_comes_is_better() -> None:
+    random = np.random.default_rng(6)
+    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps")], axis=1)
+    experiment, truth = record(ROBOT, commands, Noise(), random)
+    past, more = (predict(experiment, ROBOT, Noise(), 1.0, 0.5, 2.0, ahead) for ahead in (0.0, 0.5))
+    error = [np.mean(np.abs(p.pose[0] - truth.state[p.start, p.trial, :3]), axis=0) for p in (past, more)]
+    assert np.all(error[1] < [0.8, 0.8, 0.95] * error[0])
 
 
 def test_baselines_need_some_data() -> None:

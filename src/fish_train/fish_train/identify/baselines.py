@@ -4,9 +4,9 @@
     arx         linear: y_k = A1 y_k-1 + A2 y_k-2 + B1 w_k + B2 w_k-1 + c, y = (u, v, r), w = (sqrt(throttle), alpha)
     bilinear    u' = a0 + a1 u + a2 sqrt(throttle),  r_k = b0 + b1 (alpha u)_k + b2 (alpha u)_k-1 + b3 r_k-1,  v = c r
 
-fitted to stroke means of the training trials by least squares. They start from the camera's stroke means, which know half
-a second of what comes: an advantage over the physics model, whose estimates know only what was measured before. On equal
-terms (`lead` = HALF_WINDOW) they start from the last mean that ends at the start point and run half a second longer.
+fitted to stroke means of the training trials by least squares. They start from the camera's stroke means. One at the start
+point would know half a second of what comes; to be judged in earnest they start from the last mean that ends there (`lead` =
+HALF_WINDOW) and run half a second longer.
 """
 
 from __future__ import annotations

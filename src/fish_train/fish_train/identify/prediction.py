@@ -18,6 +18,7 @@ from fish_sim.step import Stepper
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter import run_filter
 from fish_train.identify.filter_types import WRENCH, Noise, SensorModel
+from fish_train.identify.fixed_lag import smoothed_at
 from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.motion import HALF_WINDOW, stroke_mean
 from fish_train.identify.settle import open_gates
@@ -154,11 +155,13 @@ def predict(
     horizon: float,
     every: float | None = None,
     first: float = 0.0,
+    ahead: float = 0.0,
 ) -> Predictions:
     """Predictions over `horizon` [s] from start points every `every` (default: horizon), the first at `first` [s].
 
     The robot is the whole model: its effects and sensor errors count. The wrench of the estimate dies away with the
-    noise's time constant. Raises ValueError when horizon or every is no positive number of seconds.
+    noise's time constant. ahead: s of measurements after each start point that its state may know; 0: a prediction in
+    earnest. Raises ValueError when horizon or every is no positive number of seconds.
     """
     every = horizon if every is None else every
     if not (np.isfinite(horizon) and horizon >= DT and every >= DT):
@@ -168,7 +171,10 @@ def predict(
     trial, start = starts[:, 0], starts[:, 1]
     sensors = Coordinates(nominal_hypothesis(robot, free=())).filter_inputs(np.zeros(0))[2]
     length = int(np.ceil((horizon + HALF_WINDOW) / DT)) + 1
-    pose = _simulate(estimates, robot, noise, trial, start, length)
+    state, wrench = estimates.state[start, trial], estimates.wrench[start, trial]
+    if ahead:
+        state, wrench = _knowing_more(experiment, robot, noise, starts, ahead, state, wrench)
+    pose = _simulate(experiment, robot, noise, starts, state, wrench, length)
     return Predictions(estimates, sensors, trial, start, pose, horizon)
 
 
@@ -182,21 +188,35 @@ def start_points(experiment: Experiment, every: float, first: float) -> NDArray[
     return np.array(rows, dtype=np.int64).reshape(-1, 2)
 
 
+def _knowing_more(
+    experiment: Experiment, robot: Robot, noise: Noise, starts: NDArray[np.int64], ahead: float,
+    state: Array, wrench: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """State (S, NS) and wrench (S, 3) at the start points, smoothed with `ahead` [s] of what comes, where that can be had."""
+    coordinates = Coordinates(nominal_hypothesis(robot, free=()))
+    p, dp, sensors = coordinates.filter_inputs(np.zeros(0))
+    nx, state, wrench = len(coordinates.stepper.layout.motion), state.copy(), wrench.copy()
+    for m in np.unique(starts[:, 0]).tolist():
+        alone, rows = experiment.select([m]), np.flatnonzero(starts[:, 0] == m)
+        history = run_filter(alone, coordinates.stepper, p, dp, sensors, noise, keep=True).history
+        assert history is not None
+        own = np.column_stack([np.zeros(len(rows), dtype=np.int64), starts[rows, 1]])
+        found = smoothed_at(history, own, alone.steps, ahead)
+        good = np.isfinite(found).all(axis=1)
+        state[rows[good], :nx], wrench[rows[good]] = found[good, :nx], found[good, nx : nx + 3]
+    return state, wrench
+
+
 def _simulate(
-    estimates: Estimates,
-    robot: Robot,
-    noise: Noise,
-    trial: NDArray[np.int64],
-    start: NDArray[np.int64],
+    experiment: Experiment, robot: Robot, noise: Noise, starts: NDArray[np.int64], state: Array, wrench: Array,
     length: int,
-) -> Array:
-    """(length + 1, S, 3) poses, NaN beyond the end of the trial."""
-    experiment = estimates.experiment
+) -> Array:  # fmt: skip
+    """(length + 1, S, 3) poses from state (S, NS) at the start points, NaN beyond the end of the trial."""
+    trial, start = starts.T
     stepper = Stepper.of(nominal_hypothesis(robot).robot)
     p = np.tile(stepper.parameters(nominal_hypothesis(robot).robot), (len(trial), 1))
     at = [stepper.layout.parameters.index(name) for name in WRENCH]
-    constant, wrench = p[:, at].copy(), estimates.wrench[start, trial]
-    state, pose = estimates.state[start, trial], np.full((length + 1, len(trial), 3), np.nan)
+    constant, pose = p[:, at].copy(), np.full((length + 1, len(trial), 3), np.nan)
     k = start + np.arange(length + 1)[:, None]
     commands = experiment.commands[np.minimum(k[:-1], experiment.length - 1), trial]
     pose[0] = state[:, :3]

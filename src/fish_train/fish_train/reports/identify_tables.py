@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fish_sim.robot import nominal_parameters
-from fish_train.identify.identification import EQUAL_TERMS, Identification, entangled
+from fish_train.identify.identification import AHEAD, PEEK, Identification, entangled
 from fish_train.identify.prediction import ErrorSizes
 from fish_train.reports.page import Table
 
@@ -34,15 +34,15 @@ def error_table(errors: Mapping[str, ErrorSizes], title: str = "Prediction error
     ]
     note = (
         "Rms errors of position, heading and surge speed after 1, 2 and 5 s, averaged over strokes in measurement and "
-        "prediction alike. The physics starts from what was measured before. The baselines start from the camera's stroke "
-        "means, which know half a second of what comes; on equal terms from means that end at the start."
+        f"prediction alike. All start from what was measured before; below the same with {PEEK:g} s of what comes: the "
+        "camera's stroke means at the start, which the baselines are usually given, and for the physics a smoothed state."
     )
     return Table(title, header, rows, note)
 
 
 def _label(name: str) -> str:
-    plain = name.removesuffix(EQUAL_TERMS)
-    return NAMES.get(plain, plain) + (", on equal terms" if plain != name else "")
+    plain = name.removesuffix(AHEAD)
+    return NAMES.get(plain, plain) + (f", with {PEEK:g} s of what comes" if plain != name else "")
 
 
 def _cell(value: float) -> str:
