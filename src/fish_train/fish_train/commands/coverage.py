@@ -7,11 +7,12 @@ from the nominal values. Asked: 95 % intervals hold the truth in 90 to 98 % of c
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 
 from rich.progress import Progress
+
+from fish_train.json_file import write_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,5 +59,5 @@ def run(args: argparse.Namespace) -> int:
     scores = {str(r.seed): dict(zip(r.names, r.score.tolist(), strict=True)) for r in found}
     content = {"inside95": inside, "within3": within, "seconds": spent, "scores": scores}
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_json(args.out, content)
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from rich.console import Console
 
 from fish_sim.robot import Robot, RobotError, load_robot, save_robot
 from fish_train.errors import UserError
+from fish_train.json_file import write_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
         result = diagnose(experiment, robot, level, say, names)
         content = answer(result)
-    (args.out / "diagnosis.json").write_text(json.dumps(content, indent=1, default=float))
+    write_json(args.out / "diagnosis.json", content)
     fit = corrected(result)
     save_robot(
         without_wrench(fit.robot), args.out / "model.yaml", fit.standard_errors, notes=sentence(content)

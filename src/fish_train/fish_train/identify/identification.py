@@ -113,6 +113,7 @@ def identify(
     judged, errors, lacking = judge(training, held_out, robot, fit)
     estimates = estimate(training, fit.robot, fit.noise)
     statements = [*data_statements(experiment, held_out), *lag_statements(lag), *fit_statements(fit)]
+    statements += lost_statements(training, fit)
     statements += [*([FITTED_FOR_OUTLOOK] if wrong else []), *lacking, *verdict(errors)]
     seconds = time.monotonic() - began
     return Identification(
@@ -234,6 +235,14 @@ def fit_statements(fit: Fit) -> list[str]:
         )
     out.append("rigid masses and lengths are taken as measured; all else scales with them")
     return out
+
+
+def lost_statements(training: Experiment, fit: Fit) -> list[str]:
+    """Trials on which the filter diverged with the fitted model."""
+    lost = [n for n, value in zip(training.names, fit.log_likelihood, strict=True) if not np.isfinite(value)]
+    if not lost:
+        return []
+    return [f"the filter loses the fish in {', '.join(lost)} with these values and begins anew there"]
 
 
 def verdict(errors: dict[str, ErrorSizes]) -> list[str]:

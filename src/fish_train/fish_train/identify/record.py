@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,14 +11,14 @@ import numpy as np
 
 from fish_sim.robot import save_robot
 from fish_train.identify.identification import Identification
+from fish_train.json_file import write_json
 
 
 def write_identification(folder: Path, result: Identification, left_out: Sequence[str]) -> None:
     """Write robot.yaml and identification.json into an existing folder."""
     notes = f"Identified from {', '.join(result.training.names)}."
     save_robot(result.robot, folder / "robot.yaml", result.fit.standard_errors, notes)
-    text = json.dumps(as_record(result, left_out), indent=1, allow_nan=False)
-    (folder / "identification.json").write_text(text + "\n", encoding="utf-8")
+    write_json(folder / "identification.json", as_record(result, left_out))
 
 
 def as_record(result: Identification, left_out: Sequence[str]) -> dict[str, Any]:
