@@ -154,6 +154,12 @@ def feedforward_throttle(speed: Any, alpha: Any, limits: ControlLimits) -> Any:
     return straight + alpha**2 * (limits.turn_linear * speed + limits.turn_quadratic * speed**2)
 
 
+def feedforward_slope(speed: Any, alpha: Any, limits: ControlLimits) -> Any:
+    """Derivative of `feedforward_throttle` with the speed [s/m]."""
+    straight = limits.throttle_linear + 2.0 * limits.throttle_quadratic * speed
+    return straight + alpha**2 * (limits.turn_linear + 2.0 * limits.turn_quadratic * speed)
+
+
 def amplitude_of_throttle(throttle: Any, limits: ControlLimits, xp: Any) -> Any:
     """A [rad] from A^2 w^4 = s S_max, S_max = (12 w_0^2)^2; smooth at s = 0, where the root is not."""
     ratio = (STROKE_FREQUENCY / limits.frequency) ** 2 if limits.frequency > 0.0 else 0.0

@@ -71,8 +71,7 @@ class Controller:
         self._observer.add(time, motion)
 
     def _observe(self, state: GuidanceState, motion: Motion, dt: float) -> GuidanceState:
-        turn = self._setpoint.alpha / self._limits.curvature_gain
-        return observe(state, motion, turn, dt, self._guidance, np)
+        return observe(state, motion, self._setpoint, dt, self._limits, self._guidance, np)
 
     def decide(self, wanted: Wanted) -> Gains:
         """One control period at a wanted speed above zero: errors, gains from the policy, new set-points."""
