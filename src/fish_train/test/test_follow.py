@@ -38,7 +38,10 @@ def node_swim(policy: Policy, path, stepper) -> np.ndarray:
     state, parameters, rows = stepper.rest(START), stepper.parameters(Robot()), []
     size = stepper.layout.links + 3
     start = motion_of(state, size)
-    for observer in (controller, planner):  # the first message only sets the clock; training sees the other two
+    for observer in (
+        controller,
+        planner,
+    ):  # the first message only sets the clock; training sees the other two
         for time in (-2.0 * DT, -DT, 0.0):
             observer.observe(time, start)
     for k in range(STEPS * 2):

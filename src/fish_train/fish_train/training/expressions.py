@@ -27,7 +27,16 @@ def expressions(law: Law) -> tuple[casadi.Function, ...]:
 
 def _sense(law: Law) -> tuple[casadi.Function, casadi.Function]:
     motions, geometry = SIZES["motion"], SIZES["geometry"]
-    sizes = [PHYSICS_STEPS * motions, motions, SIZES["guidance"], SIZES["setpoint"], geometry, geometry, 1, len(COST_NAMES)]
+    sizes = [
+        PHYSICS_STEPS * motions,
+        motions,
+        SIZES["guidance"],
+        SIZES["setpoint"],
+        geometry,
+        geometry,
+        1,
+        len(COST_NAMES),
+    ]
     arguments = _symbols(sizes)
     seen, true, guidance, setpoint, near, real, speed, weights = map(casadi.vertsplit, arguments)
     values = sense(seen, true, guidance, setpoint, near, real, speed[0], weights, law, CASADI)
