@@ -154,8 +154,8 @@ def build_chain(
 
 def build_bodies(n: int, r: SimpleNamespace, effects: Sequence[EnabledEffect]) -> list[Body]:
     """Head, links, fin, then what the effects fix to the head."""
-    link_inertia = (r.link_mass + r.link_added_mass_sway) * r.link_length**2 / 12
-    fin_inertia = (r.fin_mass + r.fin_added_mass_sway) * r.fin_length**2 / 12
+    link_inertia = r.link_inertia_factor * (r.link_mass + r.link_added_mass_sway) * r.link_length**2 / 12
+    fin_inertia = r.fin_inertia_factor * (r.fin_mass + r.fin_added_mass_sway) * r.fin_length**2 / 12
     head = Body(
         "head", 0, 0.0, 0.0, r.head_mass, r.head_added_mass_surge, r.head_added_mass_sway,
         r.head_inertia, r.head_drag_surge, r.head_drag_sway, r.head_drag_yaw,

@@ -44,6 +44,7 @@ def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
         "assumption; reproduces 0.1 to 0.5 m/s and 0.3 body lengths",
     )
     strip = "slender-body strip, rho pi/4 h^2 per length, h = 0.075 m"
+    rod = "1 is a uniform rod: inertia = factor (mass + added mass) length^2 / 12; a real tail's is spread unevenly"
 
     def p(value: float, unit: str, source: str, lowest: float = 0.0, highest: float = math.inf) -> Parameter:
         return Parameter(value=value, unit=unit, lowest=lowest, highest=highest, source=source)
@@ -57,9 +58,11 @@ def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
         "link_length": p(0.07 / n, "m", measured, 1e-6),
         "link_mass": p(0.05 / n, "kg", measured, 1e-9),
         "link_added_mass_sway": p(STRIP_ADDED_MASS * 0.07 / n, "kg", strip),
+        "link_inertia_factor": p(1.0, "1", rod),
         "fin_length": p(0.03, "m", measured, 1e-6),
         "fin_mass": p(0.02, "kg", measured, 1e-9),
         "fin_added_mass_sway": p(STRIP_ADDED_MASS * 0.03, "kg", strip),
+        "fin_inertia_factor": p(1.0, "1", rod),
         "tail_stiffness": p(0.10 * n / 3, "N m/rad", assumed),
         "rotor_inertia": p(1.0e-4, "kg m^2", assumed),
         "head_drag_surge": p(0.20, "N s/m", assumed),

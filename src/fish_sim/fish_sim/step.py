@@ -136,6 +136,7 @@ class Stepper:
             np.shape(d_commands)[1:-1],
         )
         start = np.broadcast_to(start, (*lead, np.shape(start)[-1]))
+        d_commands = np.broadcast_to(d_commands, (len(commands), *np.shape(d_commands)[1:]))
         start, commands, parameters, shape = self._arrange(start, commands, parameters)
         ds, dc, dp, _ = self._arrange(
             np.broadcast_to(d_start, (*shape, start.shape[-1])), d_commands, d_parameters

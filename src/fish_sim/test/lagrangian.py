@@ -44,13 +44,14 @@ def table(r, n):
         [
             r["link_mass"],
             link,
-            link * r["link_length"] ** 2 / 12,
+            r["link_inertia_factor"] * link * r["link_length"] ** 2 / 12,
             r["link_drag_surge"],
             r["link_drag_sway"],
             0.0,
         ]
     ] * n
-    end = [r["fin_mass"], fin, fin * r["fin_length"] ** 2 / 12, r["fin_drag_surge"], r["fin_drag_sway"], 0.0]
+    inertia = r["fin_inertia_factor"] * fin * r["fin_length"] ** 2 / 12
+    end = [r["fin_mass"], fin, inertia, r["fin_drag_surge"], r["fin_drag_sway"], 0.0]
     return torch.tensor([head, *links, end], dtype=torch.float64).T
 
 

@@ -106,3 +106,13 @@ def test_gradcheck_of_a_short_rollout(strokes):
     assert torch.autograd.gradcheck(
         lambda s, c, q: torch_step.rollout(s, c, q, stepper)[-1], values, eps=1e-6, atol=1e-5, rtol=1e-5
     )
+
+
+def test_one_row_of_command_tangents_stands_for_all():
+    stepper = Stepper.of(Robot())
+    p, start, commands = stepper.parameters(Robot()), stepper.rest(), np.full((7, 2), 0.3)
+    one, all_ = (
+        stepper.rollout_jvp(start, commands, p, np.zeros_like(start), np.ones((rows, 2)), np.zeros_like(p))[1]
+        for rows in (1, 7)
+    )
+    np.testing.assert_array_equal(one, all_)

@@ -109,7 +109,8 @@ def _bodies(p: dict[str, jax.Array]) -> tuple[jax.Array, ...]:
 
     mass, sway = each(p["head_mass"], "mass"), each(p["head_added_mass_sway"], "added_mass_sway")
     lengths = jnp.stack([zero, *[p["link_length"]] * 3, p["fin_length"]])
-    inertia = ((mass + sway) * lengths**2 / 12).at[0].set(p["head_inertia"])
+    factor = jnp.stack([zero, *[p["link_inertia_factor"]] * 3, p["fin_inertia_factor"]])
+    inertia = (factor * (mass + sway) * lengths**2 / 12).at[0].set(p["head_inertia"])
     surge = jnp.stack([p["head_added_mass_surge"], *[zero] * 4])
     drags = each(p["head_drag_surge"], "drag_surge"), each(p["head_drag_sway"], "drag_sway")
     return mass, surge, sway, inertia, *drags, jnp.stack([p["head_drag_yaw"], *[zero] * 4])

@@ -14,6 +14,7 @@ from fish_train.diagnose import diagnosis as module
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
 from fish_train.diagnose.split import split_trials
+from fish_train.diagnose.tail import with_links
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.synthetic import program, record
@@ -57,6 +58,23 @@ def test_nothing_is_found_where_nothing_is(tmp_path):
     assert content["effects"] == []
     write_diagnosis_page(tmp_path / "report.html", "null", content, result)
     assert "nothing is missing" in (tmp_path / "report.html").read_text()
+
+
+def test_a_tail_of_more_links_is_no_missing_physics(tmp_path):
+    fish = swim(with_links(truth(), 4), duration=5.0)
+    result = module.diagnose(fish, Robot(), names=("quadratic_drag", "payload"))
+    content = answer(result)
+    assert content["verdict"] == "no_mismatch"
+    assert content["fit"]["tail_links"] == {"given": 3, "used": 4}
+    write_diagnosis_page(tmp_path / "report.html", "finer", content, result)
+    assert "modelled with 4 links instead of 3" in (tmp_path / "report.html").read_text()
+
+
+def test_a_tail_cut_finer_weighs_and_bends_as_before():
+    fine = with_links(truth(), 5)
+    for name in ("link_length", "link_mass", "link_drag_sway"):
+        assert 5 * fine.parameters[name] == pytest.approx(3 * truth().parameters[name])
+    assert fine.parameters["tail_stiffness"] / 5 == pytest.approx(truth().parameters["tail_stiffness"] / 3)
 
 
 def test_a_hidden_current_is_named_with_its_size(tmp_path):

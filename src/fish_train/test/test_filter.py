@@ -13,7 +13,7 @@ from fish_train.identify.filter_compiled import compiled_pass
 from fish_train.identify.filter_numpy import Filter
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
-from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
+from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, nominal_hypothesis
 from fish_train.identify.smoother import smooth
 from fish_train.identify.synthetic import program, record
 
@@ -60,7 +60,7 @@ def test_innovations_are_white_with_unit_variance_at_the_truth():
 def test_gradient_is_zero_in_the_mean_and_a_missing_sensor_costs_nothing_but_its_samples():
     data, _ = experiment(Robot(), 6.0, ("sines",))
     blind = replace(data, accel=np.full_like(data.accel, np.nan), gyro=np.full_like(data.gyro, np.nan))
-    fit = evaluate(nominal_hypothesis(Robot()), np.zeros(16), blind, Noise())
+    fit = evaluate(nominal_hypothesis(Robot()), np.zeros(len(NOMINAL_FREE)), blind, Noise())
     assert np.isfinite(fit.objective)
     assert fit.result.samples[0] < 0.5 * evaluate(fit.hypothesis, fit.theta, data, Noise()).result.samples[0]
 

@@ -15,7 +15,7 @@ class CameraLatency(SensorEffect):
     name = "camera_latency"
     equation = "pose(t) shows the fish at t - delay"
     source = SOURCE
-    parameters = {"delay": Parameter(0.0, "s", 0.0, 0.5, SOURCE, typical=0.05)}
+    parameters = {"delay": Parameter(0.0, "s", 0.0, 1.0, SOURCE, typical=0.05)}
     strength = ("delay",)
 
     @staticmethod

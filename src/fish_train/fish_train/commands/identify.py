@@ -25,6 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="every N-th trial is left out, 0: none (default: %(default)s)",
     )
+    parser.add_argument(
+        "--effects",
+        default="",
+        metavar="NAME,NAME",
+        help="effects that the model gets besides, their parameters free (default: none); see diagnose",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -44,7 +50,11 @@ def run(args: argparse.Namespace) -> int:
     with Progress(*columns, console=console, transient=True) as bar, user_errors():
         task = bar.add_task("identifying", total=None)
         result = identify(
-            experiment, robot, hold_out=args.hold_out, report=lambda text: bar.update(task, description=text)
+            experiment,
+            robot,
+            hold_out=args.hold_out,
+            report=lambda text: bar.update(task, description=text),
+            effects=tuple(name for name in args.effects.split(",") if name),
         )
     args.out.mkdir(parents=True, exist_ok=True)
     write_identification(args.out, result, left_out)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fish_sim.effects import EFFECTS
+from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose import locate
 from fish_train.diagnose.decide import PLAUSIBLE, excess, p_value, parameter_count, probabilities
@@ -14,10 +15,12 @@ from fish_train.diagnose.diagnosis import UNEXPLAINED_R2, Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.search import evidence
 from fish_train.diagnose.vocabulary import kind_of
-from fish_train.identify.filter_types import ROWS
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import ROWS, Noise
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import specification
 from fish_train.identify.prediction import predict, prediction_errors
+from fish_train.identify.settle import suitable_noise
 
 HORIZONS = (1.0, 2.0, 5.0)
 # times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
@@ -71,6 +74,18 @@ def answer(d: Diagnosis) -> dict[str, Any]:
         "next_experiment": next_experiment([a.name for a in named(d)], rivals(d)),
         "out_of_reach": d.unreachable,
         "ranking": [{"name": r.name, "gain": r.gain} for r in d.rounds[0].ranking],
+        "refitted": [refitted_entry(d, name, fit) for name, fit in d.rounds[0].refitted.items()],
+    }
+
+
+def refitted_entry(d: Diagnosis, name: str, fit: Fit) -> dict[str, Any]:
+    """A candidate of the first round that was refitted on the search trials, whether it was chosen or not."""
+    errors = held_out_errors(d, fit.robot, fit.noise)
+    return {
+        "name": name,
+        "gain": d.rounds[0].gain(name),
+        "parameters": effect_parameters(fit, name),
+        "held_out_rms": errors,
     }
 
 
@@ -154,27 +169,42 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
 
 def fit_entry(d: Diagnosis) -> dict[str, Any]:
     """Prediction errors and log density on held-out trials, before and after."""
-    which = d.split.held_out or d.split.training
-    held = d.experiment.select(which)
-    robots = {"nominal": (d.robot, d.nominal.noise), "refitted": (d.nominal.robot, d.nominal.noise),
+    given = suitable_noise(
+        unseen(d), d.robot, d.nominal.noise
+    )  # at the refitted noise its filter would lose the fish
+    robots = {"nominal": (d.robot, given), "refitted": (d.nominal.robot, d.nominal.noise),
               "with_effects": (d.final.robot, d.final.noise)}  # fmt: skip
-    entries = {}
-    for name, (robot, noise) in robots.items():
-        sizes = prediction_errors(predict(held, robot, noise, max(HORIZONS)), HORIZONS)
-        rms = {
-            f"{h:g} s": dict(zip(("position_m", "heading_rad", "speed_m_s"), map(float, row), strict=True))
-            for h, row in zip(sizes.horizons, sizes.rms, strict=True)
+    entries = {
+        name: {
+            "rms": held_out_errors(d, robot, noise),
+            "log_density_per_sample": float(np.mean(d.held_out[name])),
         }
-        entries[name] = {"rms": rms, "log_density_per_sample": float(np.mean(d.held_out[name]))}
+        for name, (robot, noise) in robots.items()
+    }
     gain = d.held_out["with_effects"] - d.held_out["refitted"]
     return {
         "held_out_trials": [d.experiment.names[i] for i in d.split.held_out],
         **entries,
+        "tail_links": {"given": d.robot.links, "used": d.final.robot.links},
         "noise_floor": {"wrench_std": list(map(float, d.final.noise.wrench)), "unit": ["N", "N", "N m"],
                         "correlation_time_s": float(d.final.noise.wrench_time)},
         "improvement_ci95": bootstrap_interval(gain),
         "residual_whiteness_p": {"before": whiteness(d.nominal), "after": whiteness(d.final)},
     }  # fmt: skip
+
+
+def unseen(d: Diagnosis) -> Experiment:
+    """The held-out trials, or where there are too few the training trials."""
+    return d.experiment.select(d.split.held_out or d.split.training)
+
+
+def held_out_errors(d: Diagnosis, robot: Robot, noise: Noise) -> dict[str, dict[str, float]]:
+    """Prediction errors of a robot on the held-out trials: horizon -> position, heading, speed."""
+    sizes = prediction_errors(predict(unseen(d), robot, noise, max(HORIZONS)), HORIZONS)
+    return {
+        f"{h:g} s": dict(zip(("position_m", "heading_rad", "speed_m_s"), map(float, row), strict=True))
+        for h, row in zip(sizes.horizons, sizes.rms, strict=True)
+    }
 
 
 def bootstrap_interval(gain: np.ndarray) -> list[float]:

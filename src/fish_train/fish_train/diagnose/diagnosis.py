@@ -10,18 +10,27 @@ import numpy as np
 from fish_sim.robot import Robot
 from fish_train.diagnose.decide import SMALLEST_Z, Level, excess, parameter_count, strength_z
 from fish_train.diagnose.locate import Description, MissingForce, describe, missing_force
-from fish_train.diagnose.search import RANK_STEPS, Round, evidence, look_alike, restart_base, search_round
+from fish_train.diagnose.search import (
+    RANK_STEPS,
+    SUSPICIOUS,
+    Round,
+    evidence,
+    look_alike,
+    restart_base,
+    search_round,
+)
 from fish_train.diagnose.split import Split, split_trials
+from fish_train.diagnose.tail import MORE, finer_tails
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate, settle, trial_likelihoods
 from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.settle import suitable_noise
 from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
 FAIR_SHARE = 0.25  # of the gain per sample that trials not fitted to must show
-SUSPICIOUS = 3.0  # times the density of usual water: a poor optimum, or something else is missing
 UNEXPLAINED_R2 = 0.3  # cross-validated; above it the remaining wrench is a force with a law, not water noise
 
 Progress = Callable[[str], None]
@@ -77,6 +86,9 @@ def diagnose(
     progress("fitting the nominal model")
     base = fit_base(robot, searched)
     base, rounds, accepted = grow(base, searched, check, names, level, progress)
+    finer = finer_tail(rounds[0].base, base, robot, searched, check, level, progress)
+    if finer is not None:
+        base, rounds, accepted = grow(finer, searched, check, names, level, progress)
     progress("fitting all training trials")
     training = experiment.select(split.training)
     nominal, final = final_fits(base, rounds, training)
@@ -125,6 +137,26 @@ def grow(
     return base, rounds, accepted
 
 
+def finer_tail(
+    nominal: Fit, best: Fit, robot: Robot, experiment: Experiment, check: Experiment | None, level: Level,
+    progress: Progress,
+) -> Fit | None:  # fmt: skip
+    """The nominal model with more tail links, where the best fit leaves a strong force and this explains more of it."""
+    if excess(best).max() < SUSPICIOUS:
+        return None
+    short = shorten(experiment, RANK_STEPS)
+    finer = max(finer_tails(robot, best, experiment, short, progress), key=evidence, default=None)
+    if finer is None or evidence(finer) < evidence(best):
+        return None
+    gain = finer.objective - nominal.objective
+    if gain < level.enough(float(nominal.result.samples.sum()), 1, len(MORE)):
+        return None
+    if check is not None and not holds_elsewhere(nominal, finer, check):
+        return None
+    progress(f"the tail needs {finer.robot.links} links: {gain:.0f} nats")
+    return finer
+
+
 def anneal(fit: Fit, experiment: Experiment) -> Fit:
     """The fit, or where it needs far more than usual water a better optimum that the camera alone leads to."""
     if excess(fit).max() < SUSPICIOUS:
@@ -141,7 +173,7 @@ def choose(found: Round, check: Experiment | None, tried: int, level: Level) -> 
         name
         for name, fit in found.refitted.items()
         if is_significant(fit, found.gain(name), name, samples, tried, level)
-        and (check is None or holds_elsewhere(found, name, check))
+        and (check is None or holds_elsewhere(found.base, fit, check))
     ]
     if not good:
         return None
@@ -160,13 +192,13 @@ def is_significant(fit: Fit, gain: float, name: str, samples: float, tried: int,
     return gain > enough and strength_z(fit, name) > SMALLEST_Z
 
 
-def holds_elsewhere(found: Round, name: str, check: Experiment) -> bool:
-    """On trials that it was not fitted to, an effect must gain a fair share of what it gained where it was."""
-    fit, base = found.refitted[name], found.base
+def holds_elsewhere(base: Fit, fit: Fit, check: Experiment) -> bool:
+    """On trials that it was not fitted to, a fit must gain a fair share of what it gained where it was."""
     here = trial_likelihoods(fit.hypothesis, fit.theta, check, fit.noise)
     there = trial_likelihoods(base.hypothesis, base.theta, check, base.noise)
     per_sample = (here.log_likelihood.sum() - there.log_likelihood.sum()) / here.samples.sum()
-    return bool(per_sample > FAIR_SHARE * found.gain(name) / base.result.samples.sum())
+    gain = fit.objective - base.objective
+    return bool(per_sample > FAIR_SHARE * gain / base.result.samples.sum())
 
 
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:
@@ -197,7 +229,8 @@ def prune(
 
 def held_out_density(held: Experiment, robot: Robot, nominal: Fit, final: Fit) -> dict[str, np.ndarray]:
     """Log density per scalar measurement of each held-out trial: model as given, refitted, with effects."""
-    given = evaluate(nominal_hypothesis(robot, ()), np.zeros(0), held, nominal.noise)
+    noise = suitable_noise(held, robot, nominal.noise)
+    given = evaluate(nominal_hypothesis(robot, ()), np.zeros(0), held, noise)
     fits = {"nominal": given, "refitted": nominal, "with_effects": final}
     density = {}
     for name, fit in fits.items():

@@ -4,6 +4,7 @@ Every hypothesis refits all nominal parameters: an effect counts only for what t
 at the noise of the model without the effect, inflated by what that model lacks, with the IMU believed a tenth: there the
 likelihood has few optima. A structural effect (slip, hardening) may be absorbed so deeply that no path leads from
 the fitted base to the truth, so every candidate is tried from the base and from the nominal values, weak and strong.
+Where the base already leaves no more than water does, one step from it is enough.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fish_train.diagnose.decide import excess
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, log_posterior, settle
@@ -28,6 +30,7 @@ RANK_ITERATIONS = 6
 POLISH_ITERATIONS = 4
 POLISHED = 8  # candidates that are ranked with the IMU's own noise
 SHORTLIST = 4
+SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
 WORTH_A_REFIT = 0.2  # share of the best ranking gain
 LOOK_ALIKES = (
     ("tip_slip", "wake_memory", "tail_joint_damping"),
@@ -76,23 +79,36 @@ def evidence(fit: Fit) -> float:
 def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Progress) -> tuple[Ranked, ...]:
     """All candidates added to the base one at a time, on short trials, the most promising polished."""
     short = shorten(experiment, RANK_STEPS)
-    own = base.noise
-    wide = replace(open_gates(own), gyro=IMU_DISTRUST * own.gyro, accel=IMU_DISTRUST * own.accel)
-    reference = climb(evaluate(base.hypothesis, base.theta, short, own), short, POLISH_ITERATIONS).objective
+    reference = climb(evaluate(base.hypothesis, base.theta, short, base.noise), short, POLISH_ITERATIONS)
     compile_all(base, names, progress)
+    near = excess(base).max() < SUSPICIOUS
     found = []
     for i, name in enumerate(names):
         progress(f"ranking {name} ({i + 1} of {len(names)})")
-        hypothesis = base.hypothesis.with_effect(name, SCALE)
-        start = max(starts(base, name), key=lambda theta: log_posterior(hypothesis, theta, short, wide))
-        fit = climb(evaluate(hypothesis, start, short, wide), short, RANK_ITERATIONS)
-        found.append(evaluate(hypothesis, fit.theta, short, own))
+        found.append(look_near(reference, name, short) if near else look_afar(base, name, short))
     progress("ranking the most promising")
     promising = sorted(range(len(found)), key=lambda i: -promise(found[i]))[:POLISHED]
     for i in promising:
         found[i] = climb(found[i], short, POLISH_ITERATIONS)
-    gains = [Ranked(n, f.objective - reference, f.theta) for n, f in zip(names, found, strict=True)]
+    gains = [Ranked(n, f.objective - reference.objective, f.theta) for n, f in zip(names, found, strict=True)]
     return tuple(sorted(gains, key=lambda r: -r.gain))
+
+
+def look_afar(base: Fit, name: str, short: Experiment) -> Fit:
+    """A candidate where the base is far from the truth: from the best of all starts, the IMU believed little at first."""
+    own = base.noise
+    wide = replace(open_gates(own), gyro=IMU_DISTRUST * own.gyro, accel=IMU_DISTRUST * own.accel)
+    hypothesis = base.hypothesis.with_effect(name, SCALE)
+    start = max(starts(base, name), key=lambda theta: log_posterior(hypothesis, theta, short, wide))
+    fit = climb(evaluate(hypothesis, start, short, wide), short, RANK_ITERATIONS)
+    return evaluate(hypothesis, fit.theta, short, own)
+
+
+def look_near(base: Fit, name: str, short: Experiment) -> Fit:
+    """A candidate where the base leaves no more than water does: what is missing is small, so one step tells its gain."""
+    hypothesis = base.hypothesis.with_effect(name, SCALE)
+    fits = [evaluate(hypothesis, theta, short, base.noise) for theta in warm_starts(base, name)]
+    return max(fits, key=promise)
 
 
 def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
@@ -104,15 +120,16 @@ def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
 
 def starts(base: Fit, name: str) -> list[np.ndarray]:
     """theta from which a candidate is tried: from the base and from the nominal values, weak and strong."""
-    hypothesis = base.hypothesis.with_effect(name, SCALE)
-    coordinates, count = Coordinates(hypothesis), len(base.theta)
     cold = np.where(Coordinates(base.hypothesis).is_log, 0.0, base.theta)
-    found = []
-    for strength in STRENGTHS:
-        robot = base.hypothesis.with_effect(name, strength).robot
-        own = coordinates.encode(coordinates.read(robot))[count:]
-        found += [np.concatenate([warm, own]) for warm in (base.theta, cold)]
-    return found
+    return warm_starts(base, name) + warm_starts(replace(base, theta=cold), name)
+
+
+def warm_starts(base: Fit, name: str) -> list[np.ndarray]:
+    """theta of the base with a candidate, weak and strong."""
+    coordinates = Coordinates(base.hypothesis.with_effect(name, SCALE))
+    robots = [base.hypothesis.with_effect(name, strength).robot for strength in STRENGTHS]
+    own = [coordinates.encode(coordinates.read(robot))[len(base.theta) :] for robot in robots]
+    return [np.concatenate([base.theta, values]) for values in own]
 
 
 def promise(fit: Fit) -> float:

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
+from fish_train.identify.coasting import driven
+from fish_train.identify.level import level
 from fish_train.recordings.trial import Trial
 
 Array = NDArray[np.float64]
@@ -36,8 +38,8 @@ class Experiment:
     names: tuple[str, ...]  # M trials
     steps: NDArray[np.int64]  # (M,) grid points with data
     commands: Array  # (T, M, 2) rotor speed [rad/s], rudder [rad]
-    gyro: Array  # (T, M) rad/s, about z
-    accel: Array  # (T, M, 2) m/s^2, forward and left
+    gyro: Array  # (T, M) rad/s, about the vertical
+    accel: Array  # (T, M, 2) m/s^2, level forward and left
     encoder: Array  # (T, M) rad/s
     frames: tuple[Frames, ...]
     start_at_rest: bool  # fish and rotor still, rudder centred, at the first grid point
@@ -105,11 +107,14 @@ def _grid(trial: Trial) -> dict[str, Array]:
             f"{trial.name}: {seen.sum()} camera poses between the first and the last command; at least three are needed"
         )
     nothing = np.full(count, np.nan)
+    rate, force = (None, None) if imu is None else level(imu)
+    measured = nothing if encoder is None else _nearest(encoder.t, encoder.speed, t)
+    speed, measured = driven(c.rotor_speed[held], measured)
     return {
-        "commands": np.column_stack([c.rotor_speed, c.rudder])[held],
-        "gyro": nothing if imu is None else _nearest(imu.t, imu.gyro[:, 2], t),
-        "accel": np.full((count, 2), np.nan) if imu is None else _nearest(imu.t, imu.accel[:, :2], t),
-        "encoder": nothing if encoder is None else _nearest(encoder.t, encoder.speed, t),
+        "commands": np.column_stack([speed, c.rudder[held]]),
+        "gyro": nothing if imu is None else _nearest(imu.t, rate, t),
+        "accel": np.full((count, 2), np.nan) if imu is None else _nearest(imu.t, force, t),
+        "encoder": measured,
         "frame_t": camera.t[seen] - start,
         "frame_pose": np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])[seen],
     }

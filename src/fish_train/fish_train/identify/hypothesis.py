@@ -22,14 +22,15 @@ from fish_train.identify.filter_types import SensorModel
 
 Array = NDArray[np.float64]
 
-# What a ruler and scales do not give. fin_length stands for the effective contact point of the tip.
+# What a ruler and scales do not give.
 NOMINAL_FREE = (
     "head_added_mass_surge",
     "head_added_mass_sway",
     "head_inertia",
     "link_added_mass_sway",
+    "link_inertia_factor",
     "fin_added_mass_sway",
-    "fin_length",
+    "fin_inertia_factor",
     "tail_stiffness",
     "rotor_inertia",
     "head_drag_surge",
@@ -41,7 +42,11 @@ NOMINAL_FREE = (
     "fin_drag_sway",
     "servo_rate_limit",
 )
-LOG_PRIOR = {"fin_length": 0.1, "servo_rate_limit": 0.2}  # others: WIDE_PRIOR
+LOG_PRIOR = {
+    "servo_rate_limit": 0.2,
+    "link_inertia_factor": 0.3,
+    "fin_inertia_factor": 0.3,
+}  # others: WIDE_PRIOR
 WIDE_PRIOR = 0.5  # of the logarithm: "tens of per cent"
 EFFECT_PRIOR = 4.0  # typical strengths
 

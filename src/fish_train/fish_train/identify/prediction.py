@@ -200,7 +200,10 @@ def _interpolate(values: Array, position: Array) -> Array:
 
 
 def prediction_errors(predictions: Predictions, horizons: Sequence[float] = HORIZONS) -> ErrorSizes:
-    """Errors of stroke means of position, heading and surge speed at the horizons that the predictions reach."""
+    """Errors of stroke means of position, heading and surge speed at the horizons that the predictions reach.
+
+    Horizons count from the start to the moment an image was taken, not to its stamp.
+    """
     experiment = predictions.estimates.experiment
     reached = tuple(h for h in horizons if h <= predictions.horizon + 1e-9)
     M, H = len(experiment.names), len(reached)
@@ -208,7 +211,8 @@ def prediction_errors(predictions: Predictions, horizons: Sequence[float] = HORI
     for m, frames in enumerate(experiment.frames):
         starts, seen = predictions.start[predictions.trial == m] * DT, predictions.seen(m)
         for i, h in enumerate(reached):
-            squares[m, i], counts[m, i] = _squares(frames.t, frames.pose, seen, starts + h)
+            taken = frames.t - predictions.sensors.camera_latency
+            squares[m, i], counts[m, i] = _squares(taken, frames.pose, seen, starts + h)
     with np.errstate(invalid="ignore"):
         rms = np.sqrt(squares.sum(0) / counts.sum(0)[:, None])
     return ErrorSizes(reached, rms, squares, counts)

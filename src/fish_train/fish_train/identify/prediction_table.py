@@ -37,8 +37,9 @@ def _rows(predictions: Predictions) -> Iterator[list[str]]:
     for m, frames in enumerate(experiment.frames):
         seen, starts = predictions.seen(m), predictions.start[predictions.trial == m] * DT
         measured = stroke_mean(frames.t, frames.t)(frames.pose)
+        taken = frames.t - predictions.sensors.camera_latency  # earlier ones show the estimate, no prediction
         for s, start in enumerate(starts):
-            own = np.flatnonzero((frames.t >= start) & (frames.t < start + predictions.horizon))
+            own = np.flatnonzero((taken >= start) & (taken < start + predictions.horizon))
             known = np.isfinite(seen[:, s].sum(axis=1))
             velocity = np.full((len(frames.t), 3), np.nan)
             if known.sum() > 1:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,8 @@ from fish_train.identify.identification import Identification
 
 def write_identification(folder: Path, result: Identification, left_out: Sequence[str]) -> None:
     """Write robot.yaml and identification.json into an existing folder."""
-    effects = {name: values for name, values in result.fit.robot.effects.items() if name != "disturbance"}
-    robot = replace(result.fit.robot, effects=effects)
     notes = f"Identified from {', '.join(result.training.names)}."
-    save_robot(robot, folder / "robot.yaml", result.fit.standard_errors, notes)
+    save_robot(result.robot, folder / "robot.yaml", result.fit.standard_errors, notes)
     text = json.dumps(as_record(result, left_out), indent=1, allow_nan=False)
     (folder / "identification.json").write_text(text + "\n", encoding="utf-8")
 
@@ -46,6 +44,7 @@ def as_record(result: Identification, left_out: Sequence[str]) -> dict[str, Any]
         },
         "biases": {"order": ["gyro_z", "accel_forward", "accel_left"], "trials": biases},
         "noise": asdict(fit.noise),
+        "camera_delay": result.camera_delay,
         "log_likelihood": float(fit.log_likelihood.sum()),
         "samples": float(fit.result.samples.sum()),
         "errors": {name: sizes.as_table() for name, sizes in result.errors.items()},

@@ -22,6 +22,10 @@ from fish_train.identify.settle import STRANGE, open_gates, worst_row
 Array = NDArray[np.float64]
 
 STAGES = ((100.0, 25), (30.0, 25), (10.0, 15), (3.0, 15), (1.0, 15))  # factor of the IMU's noise, iterations
+HELD_AT_FIRST = (
+    "link_inertia_factor",
+    "fin_inertia_factor",
+)  # far from the optimum they imitate a wrong phase of the tail
 ROUNDS = 2  # of noise estimation and refits
 
 
@@ -34,14 +38,17 @@ def fit_tempered(
     Where the first stage leaves innovations that the sensors' noise cannot explain, that noise is estimated as well.
     The last steps leave out outliers by the gates of `noise`.
     """
-    theta = Coordinates(hypothesis).origin() if theta is None else theta
+    theta = Coordinates(hypothesis).origin() if theta is None else theta.copy()
+    first = [i for i, name in enumerate(hypothesis.free) if name not in HELD_AT_FIRST]
+    coarse = _fixing(hypothesis, theta)
     for factor, iterations in STAGES:
         report(f"fitting, IMU noise x {factor:g}")
         wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
-        fit = climb(evaluate(hypothesis, theta, experiment, wide), experiment, iterations)
-        theta = fit.theta
+        fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations)
+        theta[first] = fit.theta
         if worst_row(fit) > STRANGE:
-            return _fit_with_sensor_noise(fit, experiment, report)
+            return _fit_with_sensor_noise(evaluate(hypothesis, theta, experiment, wide), experiment, report)
+    fit = climb(evaluate(hypothesis, theta, experiment, noise), experiment, STAGES[-1][1])
     for _ in range(ROUNDS):
         report("fitting, process noise")
         adapted = replace(
@@ -49,6 +56,14 @@ def fit_tempered(
         )
         fit = climb(evaluate(hypothesis, fit.theta, experiment, adapted), experiment, 8)
     return fit
+
+
+def _fixing(hypothesis: Hypothesis, theta: Array) -> Hypothesis:
+    """The hypothesis with the parameters of HELD_AT_FIRST fixed at theta."""
+    robot = Coordinates(hypothesis).robot(theta)
+    held = {name: robot.parameters[name] for name in hypothesis.free if name in HELD_AT_FIRST}
+    free = tuple(name for name in hypothesis.free if name not in HELD_AT_FIRST)
+    return Hypothesis(hypothesis.robot.with_parameters(**held), free)
 
 
 def _fit_with_sensor_noise(fit: Fit, experiment: Experiment, report: Callable[[str], None]) -> Fit:

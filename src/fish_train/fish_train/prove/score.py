@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
@@ -49,6 +51,9 @@ class Score:
     ranking: Mapping[str, float]  # name -> quick gain, nats
     seconds: float
     error: str = ""  # why there is no answer
+    held_out: Mapping[str, float] = field(
+        default_factory=dict
+    )  # refitted name -> position error 2 s ahead [m]
 
     @property
     def top1(self) -> bool:
@@ -130,7 +135,13 @@ def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] 
         rms={k: fit[k]["rms"] for k in ("nominal", "refitted", "with_effects") if k in fit},
         ranking={r["name"]: r["gain"] for r in d.get("ranking", ())},
         seconds=result["seconds"],
+        held_out={r["name"]: _position(r["held_out_rms"]) for r in d.get("refitted", ())},
     )
+
+
+def _position(rms: Mapping[str, Any]) -> float:
+    """Position error 2 s ahead [m]; infinite where no trial is that long."""
+    return float(rms.get("2 s", {}).get("position_m", np.inf))
 
 
 def _parameter_errors(world: World, effect: Mapping[str, Any]) -> list[ParameterError]:

@@ -13,6 +13,7 @@ from fish_sim.pool import LENGTH, WIDTH
 from fish_train.diagnose.diagnosis import Diagnosis
 from fish_train.diagnose.locate import DOFS
 from fish_train.diagnose.search import Ranked, Round
+from fish_train.reports.before_after import before_after
 from fish_train.reports.page import Figure, Table, Text, styled, write_page
 
 SHOWN = 4000  # points of a scatter
@@ -20,7 +21,14 @@ Content = dict[str, Any]
 
 
 def sentence(content: Content) -> str:
-    """The verdict in one sentence."""
+    """The verdict in one sentence, and in a second one whether the tail needed more links."""
+    links = content["fit"]["tail_links"]
+    if links["given"] == links["used"]:
+        return _verdict(content)
+    return f"{_verdict(content)} The tail is modelled with {links['used']} links instead of {links['given']}."
+
+
+def _verdict(content: Content) -> str:
     found = content["effects"]
     if found:
         parts = [
@@ -41,6 +49,7 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
     """Write report.html."""
     blocks = [
         _fit_table(content),
+        before_after(d),
         Figure(
             "Missing force over the pool", _map(d), "darker: more force missing in the refitted nominal model"
         ),

@@ -50,10 +50,11 @@ def swims(result: Identification) -> list[Swim]:
     first = 0.0 if experiment.start_at_rest else min(WARM_UP, 0.25 * DT * int(experiment.steps.min()))
     whole = DT * int(experiment.steps.max())
     run = predict(experiment, result.fit.robot, result.fit.noise, whole, whole, first)
-    return [_swim(run, m) for m in range(len(experiment.names))]
+    return [swim_of(run, m) for m in range(len(experiment.names))]
 
 
-def _swim(run: Predictions, m: int) -> Swim:
+def swim_of(run: Predictions, m: int) -> Swim:
+    """Trial m of predictions that have one start point per trial."""
     experiment, frames = run.estimates.experiment, run.estimates.experiment.frames[m]
     seen = run.seen(m)[:, 0]
     known = np.isfinite(seen).all(1) & (frames.t >= run.start[run.trial == m][0] * DT)

@@ -1,0 +1,42 @@
+"""How many links stand for the tail: a choice of the discretisation, so it competes with the candidates but is no name.
+
+A tail that bends continuously, described by too few links, leaves a force behind that candidates would take up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import Fit, evaluate, log_posterior, settle
+from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.tempering import fit_tempered
+
+MORE = (1, 2)  # links that are tried beyond the robot's
+
+Progress = Callable[[str], None]
+
+
+def with_links(robot: Robot, links: int) -> Robot:
+    """The same fish with its tail cut into another number of equal links: totals and ratios to nominal values stay."""
+    old, new = nominal_parameters(robot.links), nominal_parameters(links)
+    values = {name: robot.parameters[name] * new[name].value / old[name].value for name in new}
+    return replace(robot, links=links, parameters=values)
+
+
+def finer_tails(
+    robot: Robot, best: Fit, experiment: Experiment, short: Experiment, progress: Progress
+) -> list[Fit]:
+    """Nominal models with more links, as far as they are better than the best fit so far on the shortened trials."""
+    found, beaten = [], log_posterior(best.hypothesis, best.theta, short, best.noise)
+    for links in (robot.links + more for more in MORE):
+        if links > MAX_LINKS:
+            break
+        progress(f"fitting the nominal model with {links} tail links")
+        fit = fit_tempered(nominal_hypothesis(with_links(robot, links)), short, Noise())
+        if fit.objective > beaten:
+            found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
+    return found

@@ -1,0 +1,39 @@
+"""The rotor when nobody commands it any more: what its encoder measured takes the command's place.
+
+A controller that has ended leaves its last command standing while the motor is off and the rotor runs down. The model must
+be driven by what the rotor did, and the encoder's distance from such a command says nothing about the robot.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+
+Array = NDArray[np.float64]
+
+STANDING = 0.5  # s; a command unchanged for longer may be a forgotten one
+APART = 5.0  # rad/s, median distance of the encoder that says it was
+
+
+def driven(command: Array, encoder: Array) -> tuple[Array, Array]:
+    """(rotor speed (T,) that drives the model, encoder (T,) less what was used for it), both [rad/s] on the grid of 10 ms.
+
+    encoder: NaN at grid points without a sample.
+    """
+    speed, left = command.copy(), encoder.copy()
+    for first, last in standing(command):
+        inside = np.flatnonzero(np.isfinite(encoder[first:last])) + first
+        if len(inside) < 2 or np.median(np.abs(encoder[inside] - command[inside])) < APART:
+            continue
+        speed[first:last] = np.interp(np.arange(first, last), inside, encoder[inside])
+        left[first:last] = np.nan
+    return speed, left
+
+
+def standing(command: Array) -> list[tuple[int, int]]:
+    """(first, last) grid points, last excluded, of stretches in which a speed other than 0 stays the same."""
+    edges = np.flatnonzero(np.diff(command, prepend=np.nan, append=np.nan) != 0)
+    pairs = zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+    return [(a, b) for a, b in pairs if (b - a) * DT > STANDING and command[a] != 0.0]

@@ -1,0 +1,242 @@
+"""Fit for the outlook: parameters that predict best over seconds, for a model that is known to be wrong.
+
+The likelihood asks how well the next sample is foretold. A model that lacks something needs a strong unexplained force for
+that, which then takes in what the parameters should explain: they drift to where the next 50 ms are right and the next 5 s
+are not. Here the prediction errors over HORIZONS themselves are made small (simulation error minimisation; Farina and
+Piroddi 2010; the robust weights are Huber's):
+
+    min over theta  sum of rho(e),  e = (x / s_p, y / s_p, psi / s_psi, u / s_u) of stroke means after h seconds
+                    + 1/2 |theta / prior|^2
+
+from the filter's states at start points every second, by Gauss-Newton with forward sensitivities. The states are estimated
+anew with the parameters found, a few times; sensor errors keep their values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_train.identify.alignment import moved_back
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import WRENCH, Noise
+from fish_train.identify.fit import Fit, evaluate
+from fish_train.identify.hypothesis import Coordinates, Hypothesis
+from fish_train.identify.motion import HALF_WINDOW, stroke_mean
+from fish_train.identify.prediction import CHUNK, EVERY, WARM_UP, estimate, start_points
+
+Array = NDArray[np.float64]
+
+HORIZONS = (0.5, 1.0, 2.0, 3.5, 5.0)  # s
+POSITION = (0.008, 0.02)  # m, and m per s of horizon: what counts as one
+HEADING = (0.06, 0.04)  # rad, and rad per s
+SPEED = 0.02  # m/s
+ROBUST = 3.0  # beyond it an error counts linearly
+STEEPEST = 300.0  # of an error's derivative; beyond it the motion is unstable and its slope says nothing
+CALM = 5.0  # times usual water: an unexplained force that leaves slow motion to the parameters
+ROUNDS = 4  # of states and parameters
+ITERATIONS = 10
+LARGEST_STEP = 0.5  # of theta
+SMALL_GAIN = 0.5  # of the cost
+LOST = 30.0  # error of a prediction that diverged
+
+
+@dataclass(frozen=True)
+class Target:
+    """One stroke mean to be foretold."""
+
+    start: int  # row of the start points
+    position: Array  # (F,) grid points after the start, of the frames in the window
+    value: Array  # (F,) weights of the mean
+    slope: Array  # (F,) 1/s, weights of the rate
+    measured: Array  # (4,) x, y [m], psi [rad], u [m/s]
+    scale: Array  # (4,)
+
+
+class Outlook:
+    """Prediction errors of a hypothesis on an experiment as functions of theta."""
+
+    def __init__(self, experiment: Experiment, hypothesis: Hypothesis) -> None:
+        self.coordinates = Coordinates(hypothesis)
+        self.experiment = experiment
+        self.starts = start_points(experiment, EVERY, WARM_UP)
+        self.targets: dict[int, list[Target]] = {}
+        sensors = self.coordinates.filter_inputs(self.coordinates.origin())[2]
+        seen = moved_back(experiment, sensors.camera_latency)
+        shown = np.array([sensors.camera_scale, sensors.camera_scale, 1.0])
+        for row, (m, k) in enumerate(self.starts.tolist()):
+            frames = seen.frames[m]
+            truth = (frames.pose - [0.0, 0.0, sensors.camera_heading_offset]) / shown
+            found = [
+                target
+                for h in HORIZONS
+                if (target := _target(row, frames.t, truth, k, h, int(experiment.steps[m])))
+            ]
+            if found:
+                self.targets.setdefault(m, []).extend(found)
+
+    def start_from(self, theta: Array, noise: Noise) -> None:
+        """Take the start states from the filter with theta."""
+        robot = self.coordinates.robot(theta)
+        plain = {k: v for k, v in robot.effects.items() if k != "disturbance"}
+        self.estimates, self.noise = estimate(self.experiment, replace(robot, effects=plain), noise), noise
+
+    def cost(self, theta: Array) -> float:
+        """What is made small."""
+        return self._cost(self.errors(theta, False)[0], theta)
+
+    def _cost(self, e: Array, theta: Array) -> float:
+        size = np.abs(e)
+        rho = np.where(size < ROBUST, 0.5 * e**2, ROBUST * size - 0.5 * ROBUST**2)
+        return float(rho.sum() + 0.5 * np.sum((theta / self.coordinates.prior) ** 2))
+
+    def errors(self, theta: Array, slopes: bool = True) -> tuple[Array, Array]:
+        """Scaled errors (R,) and their derivatives (R, K), K = 0 without slopes."""
+        p, dp, _ = self.coordinates.filter_inputs(theta)
+        parts = [self._trial(m, p, dp if slopes else dp[:0]) for m in self.targets]
+        e, J = np.concatenate([a for a, _ in parts]), np.concatenate([b for _, b in parts])
+        wild = ~np.isfinite(e) | ~np.isfinite(J).all(1) | (np.abs(J) > STEEPEST).any(1)
+        return np.clip(np.nan_to_num(e, nan=LOST), -LOST, LOST), np.where(wild[:, None], 0.0, J)
+
+    def minimise(self, theta: Array) -> Array:
+        """Damped Gauss-Newton from theta, with the start states as they are."""
+        damping = 1e-2
+        e, J = self.errors(theta)
+        best = self._cost(e, theta)
+        for _ in range(ITERATIONS):
+            gradient, normal = self._normal(e, J, theta)
+            for _ in range(6):
+                damped = normal + damping * np.diag(np.diag(normal))
+                move = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
+                tried = self.coordinates.clip(theta + move)
+                cost = self.cost(tried)
+                if cost < best:
+                    break
+                damping *= 5.0
+            if not cost < best:
+                break
+            gain, best, theta, damping = best - cost, cost, tried, max(damping / 5.0, 1e-6)
+            if gain < SMALL_GAIN:
+                break
+            e, J = self.errors(theta)
+        return theta
+
+    def _normal(self, e: Array, J: Array, theta: Array) -> tuple[Array, Array]:
+        prior = self.coordinates.prior
+        weight = np.minimum(1.0, ROBUST / np.maximum(np.abs(e), 1e-9))
+        gradient = J.T @ (weight * e) + theta / prior**2
+        return gradient, J.T @ (weight[:, None] * J) + np.diag(1.0 / prior**2)
+
+    def normal(self, theta: Array) -> Array:
+        """(K, K) Gauss-Newton matrix of the cost, in units of the errors' own variance."""
+        e, J = self.errors(theta)
+        return self._normal(e, J, theta)[1] / max(float(np.mean(np.minimum(e**2, ROBUST**2))), 1e-12)
+
+    def _trial(self, m: int, p: Array, dp: Array) -> tuple[Array, Array]:
+        """Errors and slopes of one trial's targets."""
+        targets, K = self.targets[m], len(dp)
+        rows = sorted({t.start for t in targets})
+        pose, d_pose = self._simulate(m, self.starts[rows, 1], p, dp)
+        column = {row: i for i, row in enumerate(rows)}
+        e, J = np.empty((len(targets), 4)), np.empty((len(targets), 4, K))
+        for i, target in enumerate(targets):
+            j = column[target.start]
+            e[i], J[i] = _error(target, pose[:, j], d_pose[:, j])
+        return e.ravel(), J.reshape(e.size, K)
+
+    def _simulate(self, m: int, starts: NDArray[np.int64], p: Array, dp: Array) -> tuple[Array, Array]:
+        """Poses (L + 1, S, 3) and their derivatives (L + 1, S, 3, K), as `prediction` simulates."""
+        S, K, stepper = len(starts), max(len(dp), 1), self.coordinates.stepper
+        length = int(np.ceil((max(HORIZONS) + HALF_WINDOW) / DT)) + 1
+        at = [stepper.layout.parameters.index(name) for name in WRENCH]
+        wrench = np.repeat(
+            np.nan_to_num(self.estimates.wrench[starts, m]), K, axis=0
+        )  # NaN: the filter diverged
+        state = np.repeat(self.estimates.state[starts, m], K, axis=0)
+        k = np.minimum(starts + np.arange(length)[:, None], self.experiment.steps[m] - 1)
+        commands = np.repeat(self.experiment.commands[k, m], K, axis=1)
+        P, d_state = np.tile(p, (S * K, 1)), np.zeros_like(state)
+        dP = np.tile(dp, (S, 1)) if len(dp) else np.zeros_like(P)
+        pose, d_pose = np.empty((length + 1, S * K, 3)), np.zeros((length + 1, S * K, 3))
+        pose[0] = state[:, :3]
+        for begin in range(0, length, CHUNK):
+            end = min(begin + CHUNK, length)
+            P[:, at] = p[at] + wrench * np.exp(-(begin + end) * DT / 2.0 / self.noise.wrench_time)
+            if len(dp):
+                still = np.zeros((end - begin, 1, 2))
+                x, dx = stepper.rollout_jvp(state, commands[begin:end], P, d_state, still, dP)
+                d_pose[begin + 1 : end + 1], d_state = dx[1:, :, :3], dx[-1]
+            else:
+                x = stepper.rollout(state, commands[begin:end], P)
+            pose[begin + 1 : end + 1], state = x[1:, :, :3], x[-1]
+        pose = pose.reshape(length + 1, S, K, 3)[:, :, 0]
+        return pose, d_pose.reshape(length + 1, S, K, 3).transpose(0, 1, 3, 2)[..., : len(dp)]
+
+
+def _target(row: int, t: Array, pose: Array, k: int, horizon: float, steps: int) -> Target | None:
+    """The stroke mean `horizon` after grid point k; None where the frames do not cover it."""
+    centre = k * DT + horizon
+    near = np.flatnonzero(np.abs(t - centre) < HALF_WINDOW)
+    if len(near) < 2 or t[near[-1]] / DT > steps - 2:
+        return None
+    mean, position = stroke_mean(t[near], np.array([centre])), t[near] / DT - k
+    measured = mean(pose[near])[0, :4]
+    if not np.isfinite(measured).all() or position[0] < 0.0:
+        return None
+    p, psi = (a + b * horizon for a, b in (POSITION, HEADING))
+    return Target(row, position, mean.value[0], mean.slope[0], measured, np.array([p, p, psi, SPEED]))
+
+
+def _error(target: Target, pose: Array, d_pose: Array) -> tuple[Array, Array]:
+    """Scaled error (4,) and slope (4, K) of one target; pose (L + 1, 3), d_pose (L + 1, 3, K) of its prediction."""
+    low = target.position.astype(int)
+    share = target.position - low
+    q = pose[low] + share[:, None] * (pose[low + 1] - pose[low])
+    dq = d_pose[low] + share[:, None, None] * (d_pose[low + 1] - d_pose[low])
+    mean, rate = target.value @ q, target.slope @ q
+    d_mean, d_rate = np.tensordot(target.value, dq, 1), np.tensordot(target.slope, dq, 1)
+    cos, sin = np.cos(mean[2]), np.sin(mean[2])
+    u, v = rate[0] * cos + rate[1] * sin, rate[1] * cos - rate[0] * sin
+    e = np.append(mean, u) - target.measured
+    e[2] = (e[2] + np.pi) % (2.0 * np.pi) - np.pi
+    d_u = d_rate[0] * cos + d_rate[1] * sin + v * d_mean[2]
+    return e / target.scale, np.concatenate([d_mean, d_u[None]]) / target.scale[:, None]
+
+
+def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] = lambda _: None) -> Fit:
+    """The fit that predicts best over seconds, from the better of a fit's values and its hypothesis's start values.
+
+    The states come from its noise, or one with a calm unexplained force, whichever predicts better.
+    """
+    outlook = Outlook(experiment, fit.hypothesis)
+    if not outlook.targets:
+        return fit
+    usual = Noise()
+    x, y, n = usual.wrench
+    calm = replace(fit.noise, wrench=(CALM * x, CALM * y, CALM * n), wrench_time=usual.wrench_time)
+    noises, starts = (fit.noise, calm), (outlook.coordinates.origin(), fit.theta)
+
+    def judged(theta: Array, noise: Noise) -> float:
+        outlook.start_from(theta, noise)
+        return outlook.cost(theta)
+
+    best, theta, noise = min(
+        ((judged(t, n), t, n) for t in starts for n in noises), key=lambda found: found[0]
+    )
+    for i in range(ROUNDS):
+        report(f"fitting the outlook, round {i + 1} of {ROUNDS}, cost {best:.0f}")
+        outlook.start_from(theta, noise)
+        moved = outlook.minimise(theta)
+        cost = judged(moved, noise)
+        if not cost < best:
+            break
+        theta, gain, best = moved, best - cost, cost
+        if gain < 0.01 * best:
+            break
+    best, noise = min(((judged(theta, n), n) for n in noises), key=lambda found: found[0])
+    outlook.start_from(theta, noise)
+    return replace(evaluate(fit.hypothesis, theta, experiment, noise), normal=outlook.normal(theta))

@@ -1,0 +1,52 @@
+"""Held-out trials, measured and simulated in one go: the refitted nominal model beside the one with the effects found."""
+
+from __future__ import annotations
+
+from plotly.subplots import make_subplots
+
+from fish_sim.model import DT
+from fish_train.diagnose.diagnosis import Diagnosis
+from fish_train.identify.prediction import WARM_UP, predict
+from fish_train.reports.identify_page_figures import MEASURED, Swim, swim_of
+from fish_train.reports.page import Figure, styled
+
+MOST_TRIALS = 4
+REFITTED, WITH_EFFECTS = "#8fbcbb", "#e07b39"
+NOTE = (
+    "Simulated from the first estimate to the trial's end with the recorded inputs, without correction by measurements. "
+    "Averaged over strokes. Grey: measured."
+)
+
+
+def before_after(d: Diagnosis) -> Figure:
+    """Paths (upper row) and surge speeds (lower row) of up to MOST_TRIALS held-out trials."""
+    which = (d.split.held_out or d.split.training)[:MOST_TRIALS]
+    experiment = d.experiment.select(which)
+    whole = DT * int(experiment.steps.max())
+    first = 0.0 if experiment.start_at_rest else min(WARM_UP, 0.25 * DT * int(experiment.steps.min()))
+    shown = {"refitted": (d.nominal, REFITTED)}
+    if d.accepted:
+        shown["with effects"] = (d.final, WITH_EFFECTS)
+    figure = make_subplots(2, len(which), subplot_titles=experiment.names, horizontal_spacing=0.05)
+    for label, (fit, colour) in shown.items():
+        run = predict(experiment, fit.robot, fit.noise, whole, whole, first)
+        for m in range(len(which)):
+            swim = swim_of(run, m)
+            if label == "refitted":
+                _lines(figure, swim, measured=True, label="measured", colour=MEASURED, column=m + 1)
+            _lines(figure, swim, measured=False, label=label, colour=colour, column=m + 1)
+    for m in range(len(which)):
+        figure.update_yaxes(scaleanchor="x" if m == 0 else f"x{m + 1}", row=1, col=m + 1)
+        figure.update_xaxes(title="x (m)", row=1, col=m + 1)
+        figure.update_xaxes(title="time (s)", row=2, col=m + 1)
+    figure.update_yaxes(title="y (m)", row=1, col=1)
+    figure.update_yaxes(title="surge speed (m/s)", row=2, col=1)
+    return Figure("Held-out trials, measured and simulated, before and after", styled(figure, 620), NOTE)
+
+
+def _lines(figure, swim: Swim, measured: bool, label: str, colour: str, column: int) -> None:
+    """Path and speed of one trial in its column."""
+    values, line = (swim.measured if measured else swim.simulated), {"color": colour, "width": 1.5}
+    shared = {"name": label, "legendgroup": label, "line": line, "mode": "lines", "col": column}
+    figure.add_scatter(x=values[:, 0], y=values[:, 1], showlegend=column == 1, row=1, **shared)
+    figure.add_scatter(x=swim.t, y=values[:, 3], showlegend=False, row=2, **shared)
