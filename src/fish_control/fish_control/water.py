@@ -33,7 +33,7 @@ MOVE_TIME = 0.3  # s, for which a move of the rudder counts; also in which the r
 # spreads at the start
 SPEED_SPREAD = 0.2  # m/s, of w
 CURRENT_SPREAD = 0.03  # m/s, of each component
-THRUST_SPREAD = 0.15  # of e
+THRUST_SPREAD = 1.0  # of e: wide, as a robot that is not the nominal one must not swim against a current that is none
 # drifts, per root s
 CURRENT_DRIFT = 0.012  # m/s, of each component
 THRUST_DRIFT = 0.005  # of e
@@ -42,9 +42,9 @@ TURN_DRIFT = 0.1  # m/s for each rad of rudder, of w
 MOVE_DRIFT = 1.0  # m/s for each rad that the rudder has just moved, of w
 # noises, times root s
 SURGE_NOISE = 0.002  # m/s, of u: ripple of the stroke
-SWAY_NOISE = 0.012  # m/s, of v: what the slip leaves; with CURRENT_DRIFT: a current across is learned in 1 s
+SWAY_NOISE = 0.004  # m/s, of v: with CURRENT_DRIFT, a current across is learned in a third of a second
 MOVE_NOISE = 0.1  # m/s for each rad that the rudder has just moved, of v
-THRUST_LIMIT = 0.5  # e stays within
+THRUST_LIMIT = 2.0  # e stays within
 SIZE = 4  # of the estimate
 
 
