@@ -11,7 +11,7 @@ from fish_control.control_law import ControlLimits, Gains
 from fish_control.line_of_sight import GuidanceConfig
 
 FORMAT = "fish_control/gains"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 HIDDEN = (6, 128, 128, 64, 6)  # the paper's policy; () in a contract means constant gains
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from fish_control.stroke_mean import STROKE_FREQUENCY
 
 TINY = 1e-9  # m, keeps a share of nothing at zero
+LEAST_THRUST = 0.5  # of the nominal robot's; a weaker one is not believed
 AMPLITUDE_AT_FULL_THROTTLE = 12.0  # rad, MODEL: S_max = (12 rad (2 pi 2 Hz)^2)^2
 
 
@@ -63,6 +64,9 @@ class Errors(NamedTuple):
     speed: Any  # m/s, wanted minus actual surge
     curvature: Any  # 1/m, of the way through the water where the rudder will act
     speed_wanted: Any  # m/s, through the water
+    thrust: Any = (
+        0.0  # what the robot's own thrust is found to be beyond the nominal robot's, a share (water)
+    )
 
 
 class ControlState(NamedTuple):
@@ -99,7 +103,7 @@ def control_step(
     """One period of both PIDs, dt [s].
 
     alpha    = sat[ k_kappa kappa_lag + c_a (Kp e + I + Kd e') ],  I' = Ki e + k_w (sat - unsat) / c_a
-    throttle = sat[ ff(u_wanted, alpha) + c_s (Kp e_u + I_u + Kd e_u') ]
+    throttle = sat[ ff(u_wanted, alpha) / (1 + e) + c_s (Kp e_u + I_u + Kd e_u') ],  e: thrust beyond the nominal
     """
     heading_rate = _filtered_rate(
         state.heading_error_rate, state.heading_error, errors.heading, state.primed, dt, limits
@@ -121,7 +125,7 @@ def control_step(
         xp,
     )
     throttle, speed_integral = _pid(
-        feedforward_throttle(errors.speed_wanted, alpha, limits),
+        feedforward_throttle(errors.speed_wanted, alpha, limits) / xp.fmax(1.0 + errors.thrust, LEAST_THRUST),
         (errors.speed, state.speed_integral, speed_rate),
         (gains.speed_kp, gains.speed_ki, gains.speed_kd),
         limits.throttle_scale,
@@ -152,6 +156,12 @@ def feedforward_throttle(speed: Any, alpha: Any, limits: ControlLimits) -> Any:
     """
     straight = limits.throttle_linear * speed + limits.throttle_quadratic * speed**2
     return straight + alpha**2 * (limits.turn_linear * speed + limits.turn_quadratic * speed**2)
+
+
+def feedforward_slope(speed: Any, alpha: Any, limits: ControlLimits) -> Any:
+    """Derivative of `feedforward_throttle` with the speed [s/m]."""
+    straight = limits.throttle_linear + 2.0 * limits.throttle_quadratic * speed
+    return straight + alpha**2 * (limits.turn_linear + 2.0 * limits.turn_quadratic * speed)
 
 
 def amplitude_of_throttle(throttle: Any, limits: ControlLimits, xp: Any) -> Any:

@@ -20,6 +20,7 @@ from fish_control.control_law import (
 from fish_control.line_of_sight import (
     GuidanceState,
     Motion,
+    has_listened,
     heading_error,
     mean_heading,
     observe,
@@ -64,6 +65,7 @@ class Controller:
         self._setpoint = Setpoint(0.0, 0.0)
         self._actuators = ActuatorState()
         self._glides = True
+        self._listened, self._swims = 0.0, False
 
     def observe(self, time: float, motion: Motion) -> None:
         """Take in odometry stamped `time` [s]; call it with every message."""
@@ -71,11 +73,14 @@ class Controller:
         self._observer.add(time, motion)
 
     def _observe(self, state: GuidanceState, motion: Motion, dt: float) -> GuidanceState:
-        turn = self._setpoint.alpha / self._limits.curvature_gain
-        return observe(state, motion, turn, dt, self._guidance, np)
+        self._listened += dt
+        return observe(state, motion, self._setpoint, dt, self._limits, self._guidance, np)
 
     def decide(self, wanted: Wanted) -> Gains:
-        """One control period at a wanted speed above zero: errors, gains from the policy, new set-points."""
+        """One control period at a wanted speed above zero: errors, gains from the policy, new set-points.
+
+        Before the first stroke the set-points stay at rest until the fish `has_listened`.
+        """
         if self._motion is None:
             raise ValueError("decide() before any odometry was observed")
         motion = self._motion
@@ -96,7 +101,11 @@ class Controller:
             self._policy.contract.inputs,
         )
         gains = Gains(*map(float, self._policy.gains(np.array(inputs))))
-        errors = Errors(e_psi, e_u, water.curvature, water.speed)
+        self._swims = self._swims or bool(has_listened(self._listened, motion, self._guidance, np))
+        if not self._swims:
+            self.rest()
+            return gains
+        errors = Errors(e_psi, e_u, water.curvature, water.speed, state.water.thrust)
         self._control, self._setpoint = control_step(
             self._control, errors, gains, self._policy.contract.control_period, self._limits, np
         )

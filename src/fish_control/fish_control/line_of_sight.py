@@ -5,7 +5,7 @@
 
 On a curved path chi_los alone points inside the curve by gamma = asin(L kappa / 2), which makes any
 controller that tracks it cut corners (0.03 to 0.07 m on the letters); with gamma taken off, a robot on the
-path aims along the path. From course to heading, in water that flows with c:
+path aims along the path. From course to heading, in water that flows with c (learned on the way, see water):
 
     w       = U t(chi_d) - c                          velocity through the water; t: unit vector, U: wanted speed
     kappa_w = kappa U^2 (w . t) / |w|^3               curvature of the way through the water
@@ -20,10 +20,13 @@ Source: line of sight: Fossen 2021, sect. 12.3; corner compensation, slip and cu
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from fish_control.control_law import ControlLimits, Setpoint
 from fish_control.stroke_mean import TURN_LAG, StrokeState, stroke_step
+from fish_control.water import WaterState, bounded, see_across, see_ahead, swim
 
 LEAST_HEADWAY = 0.3  # of the wanted speed, through the water: a stronger current ahead is not believed
 SLOW = 0.02  # m/s, a robot that is slower has no course of its own: its heading stands for it
@@ -36,11 +39,14 @@ class GuidanceConfig:
     compensate_curvature: bool = True  # take gamma off; False is the paper's law
     slip_arm: float = 0.041  # m, a_0: in a curve the mean heading leads the course by a kappa
     slip_time: float = 0.196  # s, a_1
-    current_time: float = 0.5  # s, how fast the current is learned; 0: still water is assumed
+    learn_current: bool = True  # False: still water is assumed
     current_limit: float = 0.1  # m/s, of each component
+    listen_time: float = (
+        3.0  # s at rest before the first stroke, in which the water shows its current; 0: none
+    )
 
     def __post_init__(self) -> None:
-        for name in ("slip_arm", "slip_time", "current_time", "current_limit"):
+        for name in ("slip_arm", "slip_time", "current_limit", "listen_time"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} is {value!r}, expected a finite number >= 0")
@@ -73,8 +79,21 @@ class GuidanceState(NamedTuple):
     """Memory: the stroke's swing and the current in the pool frame."""
 
     stroke: StrokeState = StrokeState()
-    current_x: Any = 0.0  # m/s
-    current_y: Any = 0.0  # m/s
+    water: WaterState = WaterState()
+
+    @classmethod
+    def of(cls, values: Sequence[Any]) -> GuidanceState:
+        """From the values in the order of `flat`."""
+        count = len(StrokeState._fields)
+        return cls(StrokeState(*values[:count]), WaterState(*values[count:]))
+
+    @property
+    def flat(self) -> list[Any]:
+        """All values, in the order of GUIDANCE_NAMES."""
+        return [*self.stroke, *self.water]
+
+
+GUIDANCE_NAMES = (*(f"stroke.{n}" for n in StrokeState._fields), *(f"water.{n}" for n in WaterState._fields))
 
 
 class TrackingErrors(NamedTuple):
@@ -95,30 +114,39 @@ class WaterTrack(NamedTuple):
 
 
 def observe(
-    state: GuidanceState, motion: Motion, turn: Any, dt: Any, config: GuidanceConfig, xp: Any
+    state: GuidanceState,
+    motion: Motion,
+    setpoint: Setpoint,
+    dt: Any,
+    limits: ControlLimits,
+    config: GuidanceConfig,
+    xp: Any,
 ) -> GuidanceState:
-    """Update swing and current with a motion that lasted dt [s], its rudder set for a curvature `turn` [1/m].
+    """Update swing and water with a motion that lasted dt [s] under a set-point of rudder and throttle.
 
-        c' = n (v_mean + a(u) u turn - n . c) / T,   n = (-sin psi, cos psi)
-
-    Only the current across the heading shows in the sway velocity; a robot that turns learns both components.
     Slip follows the rudder at once and the yaw rate late: on the letter R at 0.2 m/s what remains in still water is
     6 mm/s rms with the rudder's curvature, 25 mm/s with yaw rate over speed.
     """
     stroke = stroke_step(state.stroke, motion.yaw_rate, motion.sway, dt)
-    if config.current_time == 0.0:
+    if not config.learn_current:
         return state._replace(stroke=stroke)
     heading = mean_heading(stroke, motion)
     sin, cos = xp.sin(heading), xp.cos(heading)
-    slip = -slip_lever(motion.surge, config) * motion.surge * turn
-    across = motion.sway - stroke.sway - slip
-    missing = dt / (config.current_time + dt) * (across + sin * state.current_x - cos * state.current_y)
-    limit = config.current_limit
-    return GuidanceState(
-        stroke,
-        xp.fmin(xp.fmax(state.current_x - sin * missing, -limit), limit),
-        xp.fmin(xp.fmax(state.current_y + cos * missing, -limit), limit),
-    )
+    water = see_ahead(swim(state.water, setpoint, dt, limits), motion.surge, cos, sin, dt)
+    slip = -slip_lever(water.speed, config) * water.speed * setpoint.alpha / limits.curvature_gain
+    water = see_across(water, motion.sway - stroke.sway - slip, setpoint.alpha, cos, sin, dt)
+    return GuidanceState(stroke, bounded(water, config.current_limit, xp))
+
+
+def has_listened(listened: Any, motion: Motion, config: GuidanceConfig, xp: Any) -> Any:
+    """Whether a robot that was seen at rest for `listened` [s] may swim: long enough, or it is under way already.
+
+    While it does nothing, water that flows takes it along within seconds (drag over mass), ahead as well as aside; once it
+    swims, a current ahead and a thrust that is not the nominal one look alike until the heading changes. Who is faster
+    than any current that is believed is under way.
+    """
+    listens = config.learn_current * config.listen_time
+    return (listened >= listens) | (xp.hypot(motion.surge, motion.sway) > config.current_limit)
 
 
 def slip_lever(speed: Any, config: GuidanceConfig) -> Any:
@@ -143,8 +171,8 @@ def tracking_errors(
 def through_water(state: GuidanceState, course: Any, curvature: Any, speed: Any, xp: Any) -> WaterTrack:
     """What a wanted course [rad], curvature [1/m] and speed [m/s] over ground are in the water that flows."""
     cos, sin = xp.cos(course), xp.sin(course)
-    ahead = xp.fmax(speed - cos * state.current_x - sin * state.current_y, LEAST_HEADWAY * speed)
-    left = sin * state.current_x - cos * state.current_y
+    ahead = xp.fmax(speed - cos * state.water.current_x - sin * state.water.current_y, LEAST_HEADWAY * speed)
+    left = sin * state.water.current_x - cos * state.water.current_y
     through = xp.sqrt(ahead**2 + left**2)
     return WaterTrack(course + xp.arctan2(left, ahead), curvature * speed**2 * ahead / through**3, through)
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from fish_control.control_law import (
+    LEAST_THRUST,
     ActuatorState,
     ControlLimits,
     ControlState,
@@ -55,10 +56,20 @@ def test_casadi_actuators_are_the_numpy_actuators():
 
 def test_a_batch_gives_what_singles_give():
     rng = np.random.default_rng(1)
-    state, errors = rng.normal(size=(8, 10)), rng.normal(size=(4, 10))
+    state, errors = rng.normal(size=(8, 10)), rng.normal(size=(5, 10))
     batch = control_step(ControlState(*state), Errors(*errors), GAINS, 0.02, LIMITS, np)[1]
     single = control_step(ControlState(*state[:, 3]), Errors(*errors[:, 3]), GAINS, 0.02, LIMITS, np)[1]
     assert (batch.alpha[3], batch.throttle[3]) == pytest.approx(single)
+
+
+def test_a_robot_twice_as_strong_gets_half_the_feed_forward_and_a_dead_one_not_all_there_is():
+    def throttle(thrust):
+        errors = Errors(0.0, 0.0, 0.0, 0.2, thrust)
+        return control_step(ControlState(), errors, GAINS, 0.02, LIMITS, np)[1].throttle
+
+    assert throttle(0.0) == pytest.approx(feedforward_throttle(0.2, 0.0, LIMITS))
+    assert throttle(1.0) == pytest.approx(0.5 * throttle(0.0))
+    assert throttle(-2.0) == pytest.approx(throttle(0.0) / LEAST_THRUST)
 
 
 def test_proportional_part_has_the_stated_units():

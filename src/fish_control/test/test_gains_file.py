@@ -114,7 +114,7 @@ def test_file_without_contract(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda c: c.update(format_version=1), "version 1, expected 'fish_control/gains' version 2"),
+        (lambda c: c.update(format_version=1), "version 1, expected 'fish_control/gains' version 3"),
         (lambda c: c.pop("lookahead"), "contract lacks lookahead"),
         (lambda c: c.update(colour="red"), "contract has unknown colour"),
         (lambda c: c["limits"].pop("rudder_range"), "limits lacks rudder_range"),

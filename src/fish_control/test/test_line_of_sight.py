@@ -4,11 +4,14 @@ import casadi
 import numpy as np
 import pytest
 
+from fish_control.control_law import ControlLimits, Setpoint, feedforward_throttle
 from fish_control.line_of_sight import (
+    GUIDANCE_NAMES,
     GuidanceConfig,
     GuidanceState,
     Motion,
     PathAhead,
+    has_listened,
     heading_error,
     observe,
     slip_lever,
@@ -18,8 +21,10 @@ from fish_control.line_of_sight import (
 from fish_control.path_tracker import PathTracker
 from fish_control.paths import make_path
 from fish_control.stroke_mean import TURN_LAG, StrokeState
+from fish_control.water import LAG, WaterState
 
 CONFIG = GuidanceConfig()
+LIMITS = ControlLimits()
 
 
 def ahead(path, position, s=None):
@@ -46,15 +51,16 @@ def test_robot_that_turns_steadily_on_a_circle_has_no_errors(direction):
     motion = Motion(
         *path.point(s), float(path.heading_at(s)) + lever * kappa, u, -lever * kappa * u, kappa * u
     )
-    state = GuidanceState()
+    state, alpha = GuidanceState(), LIMITS.curvature_gain * kappa
+    setpoint = Setpoint(alpha, feedforward_throttle(u, alpha, LIMITS))
     for _ in range(1000):
-        state = observe(state, motion, kappa, 0.01, CONFIG, np)
-    assert np.hypot(state.current_x, state.current_y) < 1e-4  # m/s
+        state = observe(state, motion, setpoint, 0.01, LIMITS, CONFIG, np)
+    assert np.hypot(state.water.current_x, state.water.current_y) < 5e-3  # m/s, left of the start
     errors = tracking_errors(state.stroke, motion, ahead(path, path.point(s), s), u, CONFIG, np)
     assert errors.cross_track == pytest.approx(0.0, abs=1e-5)
     assert errors.heading == pytest.approx(0.0, abs=TURN_LAG * u * abs(kappa) + 2e-3)
     water = through_water(state, errors.course, kappa, u, np)
-    assert heading_error(state, motion, water, CONFIG, np) == pytest.approx(0.0, abs=2e-3)
+    assert heading_error(state, motion, water, CONFIG, np) == pytest.approx(0.0, abs=8e-3)
 
 
 def test_the_papers_law_points_inside_the_circle_by_the_chord():
@@ -86,30 +92,58 @@ def learned(current, heading, seconds=5.0, state=None, u=0.2):
     state = state or GuidanceState()
     n, t = np.array([-np.sin(heading), np.cos(heading)]), np.array([np.cos(heading), np.sin(heading)])
     motion = Motion(0.0, 0.0, heading, u + t @ current, n @ current, 0.0)
+    setpoint = Setpoint(0.0, feedforward_throttle(u, 0.0, LIMITS))
     for _ in range(int(100 * seconds)):
-        state = observe(state, motion, 0.0, 0.01, CONFIG, np)
+        state = observe(state, motion, setpoint, 0.01, LIMITS, CONFIG, np)
     return state
 
 
-def test_a_current_is_learned_across_the_heading_and_kept_through_a_turn():
+def test_a_current_is_learned_and_kept_through_a_turn():
     current = np.array([-0.02, 0.03])
     state = learned(current, 0.0)
-    assert (state.current_x, state.current_y) == pytest.approx((0.0, 0.03), abs=1e-3)
+    assert state.water.current_y == pytest.approx(0.03, abs=1e-3)
+    assert abs(state.water.current_x) < 0.025  # ahead or a weak robot? nothing tells before the turn
     state = learned(current, np.pi / 2, state=state)
-    assert (state.current_x, state.current_y) == pytest.approx(tuple(current), abs=1e-3)
+    assert (state.water.current_x, state.water.current_y) == pytest.approx(tuple(current), abs=3e-3)
+
+
+def drifted(current, heading, seconds):
+    """Memory after a fish that floats was let go in a current (2,) [m/s]: drag takes it along."""
+    state, velocity = GuidanceState(), np.zeros(2)
+    n, t = np.array([-np.sin(heading), np.cos(heading)]), np.array([np.cos(heading), np.sin(heading)])
+    for _ in range(round(100 * seconds)):
+        ahead = t @ (current - velocity)
+        velocity = velocity + 0.01 * feedforward_throttle(ahead, 0.0, LIMITS) / LAG * t
+        velocity = velocity + (n @ (current - velocity)) * n  # sideways the drag is large
+        motion = Motion(0.0, 0.0, heading, t @ velocity, n @ velocity, 0.0)
+        state = observe(state, motion, Setpoint(0.0, 0.0), 0.01, LIMITS, CONFIG, np)
+    return state
+
+
+@pytest.mark.parametrize("current", [(0.03, 0.0), (-0.02, 0.02), (0.0, 0.0)])
+def test_a_fish_that_listens_knows_the_current_ahead_before_it_swims(current):
+    water = drifted(np.array(current), 0.3, CONFIG.listen_time).water
+    assert (water.current_x, water.current_y) == pytest.approx(current, abs=8e-3)
+
+
+def test_a_fish_listens_at_rest_and_does_not_when_it_is_under_way():
+    still, moving = Motion(0, 0, 0, 0.01, 0.0, 0), Motion(0, 0, 0, 0.15, 0.0, 0)
+    assert not has_listened(1.0, still, CONFIG, np) and has_listened(CONFIG.listen_time, still, CONFIG, np)
+    assert has_listened(0.0, moving, CONFIG, np)
+    assert has_listened(0.0, still, GuidanceConfig(learn_current=False), np)
 
 
 def test_a_current_is_believed_up_to_its_limit_and_not_at_all_when_switched_off():
-    assert learned(np.array([0.0, 0.5]), 0.0).current_y == CONFIG.current_limit
-    off = GuidanceConfig(current_time=0.0)
-    state = observe(GuidanceState(), Motion(0, 0, 0, 0.2, 0.03, 0), 0.0, 0.01, off, np)
-    assert (state.current_x, state.current_y) == (0.0, 0.0) and state.stroke.sway > 0.0
+    assert learned(np.array([0.0, 0.5]), 0.0).water.current_y == CONFIG.current_limit
+    off, motion = GuidanceConfig(learn_current=False), Motion(0, 0, 0, 0.2, 0.03, 0)
+    state = observe(GuidanceState(), motion, Setpoint(0.0, 0.3), 0.01, LIMITS, off, np)
+    assert state.water == WaterState() and state.stroke.sway > 0.0
 
 
 def test_through_the_water_a_robot_keeps_its_course_and_curvature_over_ground():
     """The velocity through the water plus the current is the wanted one, and so is its rate of turn."""
-    state, u, kappa = GuidanceState(current_x=-0.02, current_y=0.03), 0.15, 1.7
-    current = np.array([state.current_x, state.current_y])
+    state, u, kappa = GuidanceState(water=WaterState(0.0, -0.02, 0.03)), 0.15, 1.7
+    current = np.array([state.water.current_x, state.water.current_y])
 
     def over_water(course):
         return through_water(state, course, kappa, u, np)
@@ -123,27 +157,27 @@ def test_through_the_water_a_robot_keeps_its_course_and_curvature_over_ground():
 
 
 def test_a_current_that_outruns_the_robot_is_not_believed_ahead():
-    w = through_water(GuidanceState(current_x=0.1), 0.0, 0.0, 0.1, np)
+    w = through_water(GuidanceState(water=WaterState(0.0, 0.1)), 0.0, 0.0, 0.1, np)
     assert (w.heading, w.speed) == pytest.approx((0.0, 0.03))
 
 
 def test_casadi_and_numpy_give_the_same():
-    names = [*StrokeState._fields, "current_x", "current_y", *Motion._fields, *PathAhead._fields]
-    symbols = casadi.SX.sym("s", len(names))
+    sizes = [len(GUIDANCE_NAMES), len(Motion._fields), len(PathAhead._fields)]
+    symbols = casadi.SX.sym("s", sum(sizes))
 
     def evaluate(v, xp):
-        state = GuidanceState(StrokeState(*(v[i] for i in range(4))), 0.01 * v[4], 0.01 * v[5])
-        motion = Motion(*(v[i] for i in range(6, 12)))
-        path = PathAhead(*(v[i] for i in range(12, 19)))
-        state = observe(state, motion, 1.5, 0.02, CONFIG, xp)
+        memory, moved, ahead = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
+        start = GuidanceState().flat
+        state = GuidanceState.of([value + 0.001 * v[int(i)] for value, i in zip(start, memory, strict=True)])
+        motion, path = Motion(*(v[int(i)] for i in moved)), PathAhead(*(v[int(i)] for i in ahead))
+        state = observe(state, motion, Setpoint(0.3, 0.4), 0.02, LIMITS, CONFIG, xp)
         errors = tracking_errors(state.stroke, motion, path, 0.2, CONFIG, xp)
         water = through_water(state, errors.course, path.curvature, 0.2, xp)
-        e_psi = heading_error(state, motion, water, CONFIG, xp)
-        return [*errors, *water, e_psi, *state.stroke, state.current_x, state.current_y]
+        return [*errors, *water, heading_error(state, motion, water, CONFIG, xp), *state.flat]
 
     function = casadi.Function("errors", [symbols], [casadi.vertcat(*evaluate(symbols, casadi))])
     for seed in range(5):
-        values = np.random.default_rng(seed).normal(size=len(names))
+        values = np.random.default_rng(seed).normal(size=sum(sizes))
         np.testing.assert_allclose(
             function(values).full().ravel(),
             np.array(evaluate(values, np), dtype=float),

@@ -202,7 +202,7 @@ class JaxLoop:
             [*carry["before"], *now],
             now,
             list(carry["guidance"]),
-            carry["last"][SIZES["gains"]],
+            list(carry["last"][SIZES["gains"] :]),
             near,
             near,
             speed,

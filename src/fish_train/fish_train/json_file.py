@@ -15,7 +15,7 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def plain(value: Any) -> Any:
-    """The same with null for NaN and infinities, lists for sequences; raises TypeError for what is no number, text or container."""
+    """The same with null for NaN and infinities, lists for sequences; raises TypeError for anything else."""
     if value is None or isinstance(value, (bool, int, str)):
         return value
     if isinstance(value, Mapping):

@@ -6,7 +6,7 @@ from training_setup import COST, make_stepper
 
 from fish_control.contract import Contract
 from fish_control.controller import Controller, Wanted
-from fish_control.line_of_sight import Motion
+from fish_control.line_of_sight import GuidanceConfig, Motion
 from fish_control.paths import make_path
 from fish_control.planner import Planner
 from fish_control.policy import Policy
@@ -38,9 +38,12 @@ def node_swim(policy: Policy, path, stepper) -> np.ndarray:
     state, parameters, rows = stepper.rest(START), stepper.parameters(Robot()), []
     size = stepper.layout.links + 3
     start = motion_of(state, size)
-    for observer in (controller, planner):  # the first message only sets the clock
-        observer.observe(-DT, start)
-        observer.observe(0.0, start)
+    for observer in (
+        controller,
+        planner,
+    ):  # the first message only sets the clock; training sees the other two
+        for time in (-2.0 * DT, -DT, 0.0):
+            observer.observe(time, start)
     for k in range(STEPS * 2):
         if k % 2 == 0:
             plan = planner.plan(motion_of(state, size))
@@ -54,22 +57,27 @@ def node_swim(policy: Policy, path, stepper) -> np.ndarray:
     return np.array(rows)
 
 
+def law_of(listen_time: float) -> Law:
+    return Law(guidance=GuidanceConfig(listen_time=listen_time))
+
+
 @pytest.fixture(scope="module")
 def setting():
+    """Weights, policy, path, stepper; the node's states by how long the fish listens before it swims."""
     rng = np.random.default_rng(9)
     start = dict(
         steering_kp=0.4, steering_ki=0.3, steering_kd=0.03, speed_kp=0.6, speed_ki=0.05, speed_kd=0.01
     )
     weights = initial_weights(rng, start)
     weights += 0.02 * rng.standard_normal(weights.shape)
-    policy = Policy(Contract(), to_tensors(weights))
     path, stepper = make_path("straight", length=3.0, x=1.5), make_stepper()
-    return weights, policy, path, stepper, node_swim(policy, path, stepper)
+    policies = {t: Policy(Contract(guidance=law_of(t).guidance), to_tensors(weights)) for t in (0.0, 0.5)}
+    return weights, policies, path, stepper, {t: node_swim(p, path, stepper) for t, p in policies.items()}
 
 
 def test_training_runs_the_nodes_laws(setting) -> None:
     weights, _, path, stepper, expected = setting
-    law = Law()
+    law = law_of(0.0)
     bank = PathBank([path], law.tracker)
     kind = CompiledLoop if CompiledLoop.available() else TorchLoop
     seen = np.array([[*START, 0.0, 0.0, 0.0]])
@@ -79,22 +87,25 @@ def test_training_runs_the_nodes_laws(setting) -> None:
     loop = kind(stepper, law, bank)
     for k in range(0, STEPS, 20):
         loop.window(weights, fleet, 20, COST, gradient=False)
-        assert np.allclose(fleet.plant[0], expected[k + 19], atol=1e-9)
+        assert np.allclose(fleet.plant[0], expected[0.0][k + 19], atol=1e-9)
 
 
-def test_the_follower_runs_the_nodes_laws(setting) -> None:
-    _, policy, path, stepper, expected = setting
-    law, known = Law(), np.ones(2, dtype=bool)
-    follower = Follower([path, path], np.array([SPEED, 0.3]), PolicyGains(policy), law)
+@pytest.mark.parametrize("listen_time", [0.0, 0.5])
+def test_the_follower_runs_the_nodes_laws(setting, listen_time) -> None:
+    _, policies, path, stepper, node = setting
+    law, known, expected = law_of(listen_time), np.ones(2, dtype=bool), node[listen_time]
+    follower = Follower([path, path], np.array([SPEED, 0.3]), PolicyGains(policies[listen_time]), law)
     state, parameters = np.array([stepper.rest(START)] * 2), stepper.parameters(Robot())
     size = stepper.layout.links + 3
     seen = np.array([motion_of(row, size) for row in state])
     for k in range(STEPS * 2):
         if k % 2 == 0:
-            follower.observe(seen, known) if k == 0 else None
+            for _ in range(2 if k == 0 else 0):
+                follower.observe(seen, known)
             follower.decide(seen, known)
         state = stepper.step(state, follower.command(), parameters)
         seen = np.array([motion_of(row, size) for row in state])
         follower.observe(seen, known)
         if k % 2:
             assert np.allclose(state[0], expected[k // 2], atol=1e-9)
+    assert abs(state[0, size]) > 0.01  # it swims

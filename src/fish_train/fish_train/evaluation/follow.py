@@ -25,6 +25,7 @@ from fish_control.line_of_sight import (
     GuidanceState,
     Motion,
     PathAhead,
+    has_listened,
     heading_error,
     mean_heading,
     observe,
@@ -34,7 +35,6 @@ from fish_control.line_of_sight import (
 from fish_control.path_batch import PathBatch
 from fish_control.policy import policy_inputs
 from fish_control.reference_path import ReferencePath
-from fish_control.stroke_mean import StrokeState
 from fish_sim.model import DT
 from fish_train.evaluation.gains_source import GainsSource
 from fish_train.evaluation.plant import Plant
@@ -73,19 +73,19 @@ class Follower:
         self._law, self._gains, self._speed = law, gains, np.asarray(speed, dtype=float)
         self._paths = PathBatch(paths, law.tracker)
         zeros = np.zeros(len(paths))
-        self._guidance = GuidanceState(StrokeState(*(zeros for _ in StrokeState._fields)), zeros, zeros)
+        self._guidance = GuidanceState.of([zeros + value for value in GuidanceState().flat])
         self._control = ControlState(*(zeros for _ in ControlState._fields))
         self._actuator = ActuatorState(*(zeros for _ in ActuatorState._fields))
         self.setpoint = Setpoint(zeros, zeros)
+        self._listened, self._swims = zeros, np.zeros(len(paths), dtype=bool)
         self.gains = np.full((len(paths), 6), np.nan)
 
     def observe(self, seen: Array, known: NDArray[np.bool_]) -> None:
         """Take in what is seen (B, 6); robots without an estimate yet keep their memory."""
-        motion = Motion(*seen.T)
-        turn = self.setpoint.alpha / self._law.limits.curvature_gain
-        before, after = self._guidance, observe(self._guidance, motion, turn, DT, self._law.guidance, np)
-        stroke = StrokeState(*_updated(known, after.stroke, before.stroke))
-        self._guidance = GuidanceState(stroke, *_updated(known, after[1:], before[1:]))
+        law, before = self._law, self._guidance
+        after = observe(before, Motion(*seen.T), self.setpoint, DT, law.limits, law.guidance, np)
+        self._guidance = GuidanceState.of(_updated(known, after.flat, before.flat))
+        self._listened = self._listened + DT * known
 
     def decide(self, seen: Array, known: NDArray[np.bool_]) -> None:
         """One control period of planner, policy and control law."""
@@ -100,10 +100,12 @@ class Follower:
             heading, motion.surge, self._speed, e_psi, errors.speed, errors.cross_track, np
         )
         gains = self._gains.gains(np.stack(inputs, axis=-1), self._speed, at.curvature)
-        wanted = Errors(e_psi, errors.speed, water.curvature, water.speed)
+        wanted = Errors(e_psi, errors.speed, water.curvature, water.speed, state.water.thrust)
         control, setpoint = control_step(self._control, wanted, gains, CONTROL_PERIOD, self._law.limits, np)
-        self._control = ControlState(*_updated(known, control, self._control))
-        self.setpoint = Setpoint(*(np.where(known, a, 0.0) for a in setpoint))
+        self._swims = self._swims | (known & has_listened(self._listened, motion, guidance, np))
+        swims = known & self._swims
+        self._control = ControlState(*_updated(swims, control, self._control))
+        self.setpoint = Setpoint(*(np.where(swims, a, 0.0) for a in setpoint))
         self.gains = np.stack(gains, axis=-1)
 
     def command(self) -> Array:

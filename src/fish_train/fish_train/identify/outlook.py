@@ -42,6 +42,7 @@ ROUNDS = 4  # of states and parameters
 ITERATIONS = 10
 LARGEST_STEP = 0.5  # of theta
 SMALL_GAIN = 0.5  # of the cost
+SETTLED = 0.01  # of the cost; a round that gains less is the last
 LOST = 30.0  # error of a prediction that diverged
 
 
@@ -208,7 +209,7 @@ def _error(target: Target, pose: Array, d_pose: Array) -> tuple[Array, Array]:
 
 
 def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] = lambda _: None) -> Fit:
-    """The fit that predicts best over seconds, from the better of a fit's values and its hypothesis's start values.
+    """The fit that predicts best over seconds, from a fit's values or its hypothesis's start values: both go one round.
 
     The states come from its noise, or one with a calm unexplained force, whichever predicts better.
     """
@@ -218,25 +219,29 @@ def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] 
     usual = Noise()
     x, y, n = usual.wrench
     calm = replace(fit.noise, wrench=(CALM * x, CALM * y, CALM * n), wrench_time=usual.wrench_time)
-    noises, starts = (fit.noise, calm), (outlook.coordinates.origin(), fit.theta)
+    noises = (fit.noise, calm)
 
     def judged(theta: Array, noise: Noise) -> float:
         outlook.start_from(theta, noise)
         return outlook.cost(theta)
 
-    best, theta, noise = min(
-        ((judged(t, n), t, n) for t in starts for n in noises), key=lambda found: found[0]
-    )
-    for i in range(ROUNDS):
-        report(f"fitting the outlook, round {i + 1} of {ROUNDS}, cost {best:.0f}")
+    def better_noise(theta: Array) -> tuple[float, Array, Noise]:
+        return min(((judged(theta, noise), theta, noise) for noise in noises), key=lambda found: found[0])
+
+    def one_round(best: float, theta: Array, noise: Noise) -> tuple[float, Array, Noise]:
         outlook.start_from(theta, noise)
         moved = outlook.minimise(theta)
-        cost = judged(moved, noise)
-        if not cost < best:
+        return min((best, theta, noise), (judged(moved, noise), moved, noise), key=lambda found: found[0])
+
+    report("fitting the outlook from two starts")
+    starts = (outlook.coordinates.origin(), fit.theta)
+    best, theta, noise = min((one_round(*better_noise(t)) for t in starts), key=lambda found: found[0])
+    for i in range(1, ROUNDS):
+        report(f"fitting the outlook, round {i + 1} of {ROUNDS}, cost {best:.0f}")
+        before = best
+        best, theta, noise = one_round(best, theta, noise)
+        if before - best < SETTLED * before:
             break
-        theta, gain, best = moved, best - cost, cost
-        if gain < 0.01 * best:
-            break
-    best, noise = min(((judged(theta, n), n) for n in noises), key=lambda found: found[0])
+    best, theta, noise = better_noise(theta)
     outlook.start_from(theta, noise)
     return replace(evaluate(fit.hypothesis, theta, experiment, noise), normal=outlook.normal(theta))

@@ -18,7 +18,7 @@ ACT_OUTPUTS = ("control", "last", "cost")
 def expressions(law: Law) -> tuple[casadi.Function, ...]:
     """sense, act, drive and motion, each followed by its adjoint `NAME_vjp(inputs.., g) -> adjoints`.
 
-    sense(seen, true, guidance, rudder, geometry_seen, geometry_true, speed, weights): adjoints of the first four;
+    sense(seen, true, guidance, setpoint, geometry_seen, geometry_true, speed, weights): adjoints of the first four;
     act(errors, control, last, raw, weights): of the first four; drive(actuator, setpoint): of both;
     motion(q3, qd3): of both. Outputs are stacked in the order of SENSE_OUTPUTS, ACT_OUTPUTS, (actuator, command).
     """
@@ -27,10 +27,19 @@ def expressions(law: Law) -> tuple[casadi.Function, ...]:
 
 def _sense(law: Law) -> tuple[casadi.Function, casadi.Function]:
     motions, geometry = SIZES["motion"], SIZES["geometry"]
-    sizes = [PHYSICS_STEPS * motions, motions, SIZES["guidance"], 1, geometry, geometry, 1, len(COST_NAMES)]
+    sizes = [
+        PHYSICS_STEPS * motions,
+        motions,
+        SIZES["guidance"],
+        SIZES["setpoint"],
+        geometry,
+        geometry,
+        1,
+        len(COST_NAMES),
+    ]
     arguments = _symbols(sizes)
-    seen, true, guidance, rudder, near, real, speed, weights = map(casadi.vertsplit, arguments)
-    values = sense(seen, true, guidance, rudder[0], near, real, speed[0], weights, law, CASADI)
+    seen, true, guidance, setpoint, near, real, speed, weights = map(casadi.vertsplit, arguments)
+    values = sense(seen, true, guidance, setpoint, near, real, speed[0], weights, law, CASADI)
     return _with_adjoint("sense", arguments, [v for k in SENSE_OUTPUTS for v in values[k]], (0, 1, 2, 3))
 
 

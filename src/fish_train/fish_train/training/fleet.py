@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_control.line_of_sight import GuidanceState
 from fish_train.training.loop import PHYSICS_STEPS, SIZES
 
 Array = NDArray[np.float64]
 HISTORY = 32  # physics steps of 10 ms kept for delayed vision
 LONGEST_DELAY = HISTORY - PHYSICS_STEPS + 1
+START = GuidanceState().flat  # memory of the guidance before the first period; all else starts at zero
 MEMORY_SIZE = SIZES["guidance"] + SIZES["control"] + SIZES["actuator"] + SIZES["last"]
 
 
@@ -46,7 +48,7 @@ class Fleet:
         batch = len(plant)
         return cls(
             plant=np.array(plant, dtype=float, order="C"),
-            memory=np.zeros((batch, MEMORY_SIZE)),
+            memory=np.repeat([[*START, *np.zeros(MEMORY_SIZE - len(START))]], batch, axis=0),
             place=np.zeros((batch, 4)),
             history=np.repeat(np.asarray(motion, dtype=float)[:, None], HISTORY, axis=1).copy(),
             parameters=np.ascontiguousarray(

@@ -27,6 +27,7 @@ from fish_control.control_law import (
     control_step,
 )
 from fish_control.line_of_sight import (
+    GUIDANCE_NAMES,
     GuidanceConfig,
     GuidanceState,
     Motion,
@@ -40,14 +41,12 @@ from fish_control.line_of_sight import (
 )
 from fish_control.path_batch import TrackerConfig
 from fish_control.policy import policy_inputs
-from fish_control.stroke_mean import StrokeState
 from fish_sim.model import DT
 from fish_sim.ops import Scalar
 
 CONTROL_PERIOD = 0.02  # s, the controller node's
 PHYSICS_STEPS = round(CONTROL_PERIOD / DT)
 
-GUIDANCE_NAMES = (*(f"stroke.{name}" for name in StrokeState._fields), "current_x", "current_y")
 SETPOINT_NAMES = Setpoint._fields
 LAST_NAMES = (*Gains._fields, *SETPOINT_NAMES)  # of the period before
 GEOMETRY_NAMES = (
@@ -113,20 +112,20 @@ def path_ahead(x: Scalar, y: Scalar, geometry: Sequence[Scalar], lookahead: floa
 
 
 def sense(
-    seen: Sequence[Scalar], true: Sequence[Scalar], guidance: Sequence[Scalar], rudder: Scalar,
+    seen: Sequence[Scalar], true: Sequence[Scalar], guidance: Sequence[Scalar], setpoint: Sequence[Scalar],
     geometry_seen: Sequence[Scalar], geometry_true: Sequence[Scalar], speed: Scalar, weights: Sequence[Scalar],
     law: Law, xp: Any,
 ) -> dict[str, list[Scalar]]:  # fmt: skip
     """Policy inputs, errors and guidance memory from the motion that is seen; cost and report from the true one.
 
     seen: the motions of the last PHYSICS_STEPS, oldest first, one after the other; the nodes observe at that rate, too.
-    rudder: set-point meanwhile [rad].
+    setpoint: of rudder [rad] and throttle meanwhile.
     """
     width, lookahead = len(Motion._fields), law.tracker.lookahead
-    state = GuidanceState(StrokeState(*guidance[:4]), *guidance[4:])
+    state = GuidanceState.of(guidance)
     for k in range(PHYSICS_STEPS):
         moved = Motion(*seen[k * width : (k + 1) * width])
-        state = observe(state, moved, rudder / law.limits.curvature_gain, DT, law.guidance, xp)
+        state = observe(state, moved, Setpoint(*setpoint), DT, law.limits, law.guidance, xp)
     path = path_ahead(moved.x, moved.y, geometry_seen, lookahead, xp)
     told, errors = _wanted(state, moved, path, speed, law, xp)
     actual = Motion(*true)
@@ -136,7 +135,7 @@ def sense(
     return {
         "inputs": _inputs(moved, state, told, errors.cross_track, path.curvature, speed, law, xp),
         "errors": list(told),
-        "guidance": [*state.stroke, state.current_x, state.current_y],
+        "guidance": state.flat,
         "report": [missed.cross_track, real.heading, real.speed],
         "cost": [cost],
     }
@@ -149,7 +148,7 @@ def _wanted(
     errors = tracking_errors(state.stroke, moved, path, speed, law.guidance, xp)
     water = through_water(state, errors.course, path.curvature, speed, xp)
     e_psi = heading_error(state, moved, water, law.guidance, xp)
-    return Errors(e_psi, errors.speed, water.curvature, water.speed), errors
+    return Errors(e_psi, errors.speed, water.curvature, water.speed, state.water.thrust), errors
 
 
 def _inputs(
@@ -211,6 +210,7 @@ SIZES = {
     "guidance": len(GUIDANCE_NAMES),
     "control": len(ControlState._fields),
     "actuator": len(ActuatorState._fields),
+    "setpoint": len(SETPOINT_NAMES),
     "last": len(LAST_NAMES),
     "geometry": len(GEOMETRY_NAMES),
     "errors": len(ERROR_NAMES),

@@ -115,8 +115,8 @@ class _Window:
             for back in reversed(range(PHYSICS_STEPS))
         ]
         near, real = (self._loop.find(fleet, k, o[:, :2]) for k, o in enumerate((seen[-1], true)))
-        rudder = self.last[SIZES["gains"]]
-        rows = (torch.cat(seen, dim=-1).unbind(-1), true.unbind(-1), self._guidance, rudder, near, real)
+        setpoint = self.last[SIZES["gains"] :]
+        rows = (torch.cat(seen, dim=-1).unbind(-1), true.unbind(-1), self._guidance, setpoint, near, real)
         return sense(*rows, self._speed, self._cost, self._loop.law, XP)
 
     def decide(self, sensed: dict[str, list[Tensor]]) -> None:

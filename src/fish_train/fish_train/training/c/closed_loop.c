@@ -180,10 +180,10 @@ static void motion_reverse(const V *plant, const V *g_motion, V *g_plant)
 static void sense_reverse(const Window *w, long first, long t, const V *motions, const V *speed, const V *cost,
                           const Period *now, const V *gs, V *g_motion, Adjoint *g)
 {
-  V g_seen[NSEEN], g_true[NO], g_rudder[1];
+  V g_seen[NSEEN], g_true[NO], g_setpoint[NC];
   sense_vjp(now->seen, motions + (HISTORY + PHYSICS * t) * NO, now->guidance, now->last + NGAIN, now->near, now->real, speed,
-            cost, gs, g_seen, g_true, g->guidance, g_rudder);
-  add(g_rudder, 1, g->last + NGAIN);
+            cost, gs, g_seen, g_true, g->guidance, g_setpoint);
+  add(g_setpoint, NC, g->last + NGAIN);
   add(g_true, NO, g_motion + PHYSICS * t * NO);
   look_adjoint(w, g_seen, t, first, g_motion);
 }
