@@ -150,18 +150,19 @@ def control_step(
 def feedforward_throttle(speed: Any, alpha: Any, limits: ControlLimits) -> Any:
     """Throttle that holds `speed` [m/s] with the rudder at alpha [rad].
 
-        s = a u + b u^2 + alpha^2 (c u + d u^2)
+        s = a u + b u |u| + alpha^2 (c u + d u |u|)
 
     Source: this project, steady swimming of the nominal fish; within 0.05 for u to 0.3 m/s.
     """
-    straight = limits.throttle_linear * speed + limits.throttle_quadratic * speed**2
-    return straight + alpha**2 * (limits.turn_linear * speed + limits.turn_quadratic * speed**2)
+    square = speed * abs(speed)  # water that overtakes the fish drags it ahead
+    straight = limits.throttle_linear * speed + limits.throttle_quadratic * square
+    return straight + alpha**2 * (limits.turn_linear * speed + limits.turn_quadratic * square)
 
 
 def feedforward_slope(speed: Any, alpha: Any, limits: ControlLimits) -> Any:
     """Derivative of `feedforward_throttle` with the speed [s/m]."""
-    straight = limits.throttle_linear + 2.0 * limits.throttle_quadratic * speed
-    return straight + alpha**2 * (limits.turn_linear + 2.0 * limits.turn_quadratic * speed)
+    straight = limits.throttle_linear + 2.0 * limits.throttle_quadratic * abs(speed)
+    return straight + alpha**2 * (limits.turn_linear + 2.0 * limits.turn_quadratic * abs(speed))
 
 
 def amplitude_of_throttle(throttle: Any, limits: ControlLimits, xp: Any) -> Any:

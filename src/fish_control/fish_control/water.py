@@ -50,8 +50,12 @@ SWAY_NOISE = (
     0.004  # m/s, of v: with CURRENT_DRIFT, a current across that changes is learned in a second and a half
 )
 MOVE_NOISE = 0.1  # m/s for each rad that the rudder has just moved, of v
+EARLY_NOISE = (
+    0.1  # m/s, times root s, of u and v at first: fusion starts with errors of 5 cm/s that last half a second
+)
+EARLY_TIME = 0.3  # s, in which it fades
 THRUST_LIMIT = 2.0  # e stays within
-SIZE = 4  # of the estimate
+SIZE, LAGGED = 4, 3  # numbers of the estimate; and those beside it and its covariance
 
 
 class WaterState(NamedTuple):
@@ -63,6 +67,7 @@ class WaterState(NamedTuple):
     thrust: Any = 0.0  # e
     rudder: Any = 0.0  # rad, lagged by MOVE_TIME
     throttle: Any = 0.0  # lagged likewise
+    early: Any = 1.0  # fades while the velocity over ground, an estimate itself, settles
     P00: Any = SPEED_SPREAD**2
     P01: Any = 0.0
     P02: Any = 0.0
@@ -93,19 +98,22 @@ def swim(state: WaterState, setpoint: Setpoint, dt: Any, limits: ControlLimits) 
     drift = (SPEED_DRIFT * throttle) ** 2 + (TURN_DRIFT * setpoint.alpha) ** 2 + (MOVE_DRIFT * moved) ** 2
     for k, variance in enumerate((drift, CURRENT_DRIFT**2, CURRENT_DRIFT**2, THRUST_DRIFT**2)):
         P[k][k] = P[k][k] + dt * variance
-    return _state([state.speed + gain * push, *state[1:SIZE]], [rudder, throttle], P)
+    early = state.early * (1.0 - dt / (EARLY_TIME + dt))
+    return _state([state.speed + gain * push, *state[1:SIZE]], [rudder, throttle, early], P)
 
 
 def see_ahead(state: WaterState, surge: Any, cos: Any, sin: Any, dt: Any) -> WaterState:
     """Correct with the surge over ground [m/s] of dt [s] at the mean heading (cos, sin)."""
     missing = surge - state.speed - cos * state.current_x - sin * state.current_y
-    return _correct(state, (1.0, cos, sin, 0.0), missing, SURGE_NOISE**2 / dt)
+    variance = (SURGE_NOISE**2 + (EARLY_NOISE * state.early) ** 2) / dt
+    return _correct(state, (1.0, cos, sin, 0.0), missing, variance)
 
 
 def see_across(state: WaterState, sway: Any, alpha: Any, cos: Any, sin: Any, dt: Any) -> WaterState:
     """Correct with the mean sway over ground less the slip [m/s] of dt [s] with the rudder's set-point at alpha [rad]."""
     missing = sway + sin * state.current_x - cos * state.current_y
-    variance = (SWAY_NOISE**2 + (MOVE_NOISE * (alpha - state.rudder)) ** 2) / dt
+    early = (EARLY_NOISE * state.early) ** 2
+    variance = (SWAY_NOISE**2 + (MOVE_NOISE * (alpha - state.rudder)) ** 2 + early) / dt
     return _correct(state, (0.0, -sin, cos, 0.0), missing, variance)
 
 
@@ -130,12 +138,12 @@ def _correct(state: WaterState, h: tuple[Any, ...], missing: Any, variance: Any)
     K = [value / S for value in Ph]
     P = [[P[i][j] - K[i] * Ph[j] for j in range(SIZE)] for i in range(SIZE)]
     x = [value + k * missing for value, k in zip(state[:SIZE], K, strict=True)]
-    return _state(x, [state.rudder, state.throttle], P)
+    return _state(x, [state.rudder, state.throttle, state.early], P)
 
 
 def _matrix(state: WaterState) -> list[list[Any]]:
     """The full covariance."""
-    upper = iter(state[SIZE + 2 :])
+    upper = iter(state[SIZE + LAGGED :])
     P = [[0.0] * SIZE for _ in range(SIZE)]
     for i in range(SIZE):
         for j in range(i, SIZE):

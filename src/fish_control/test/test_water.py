@@ -13,7 +13,7 @@ LIMITS, DT = ControlLimits(), 0.01
 def matrices(state):
     """Estimate (4,) and covariance (4, 4)."""
     P = np.zeros((SIZE, SIZE))
-    P[np.triu_indices(SIZE)] = state[SIZE + 2 :]
+    P[np.triu_indices(SIZE)] = state[SIZE + water.LAGGED :]
     return np.array(state[:SIZE]), P + P.T - np.diag(np.diag(P))
 
 
@@ -21,7 +21,7 @@ def some_state(seed):
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(SIZE, SIZE)) * [0.05, 0.02, 0.02, 0.1]
     x = [0.15, *rng.normal(0.0, 0.02, 2), 0.1]
-    return WaterState(*x, 0.1, 0.25, *(root.T @ root)[np.triu_indices(SIZE)])
+    return WaterState(*x, 0.1, 0.25, 0.0, *(root.T @ root)[np.triu_indices(SIZE)])
 
 
 @pytest.mark.parametrize("seed", range(3))
