@@ -64,9 +64,7 @@ class Errors(NamedTuple):
     speed: Any  # m/s, wanted minus actual surge
     curvature: Any  # 1/m, of the way through the water where the rudder will act
     speed_wanted: Any  # m/s, through the water
-    thrust: Any = (
-        0.0  # what the robot's own thrust is found to be beyond the nominal robot's, a share (water)
-    )
+    thrust: Any = 0.0  # e, own thrust beyond the nominal robot's, a share (water)
 
 
 class ControlState(NamedTuple):

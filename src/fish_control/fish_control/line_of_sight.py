@@ -41,9 +41,7 @@ class GuidanceConfig:
     slip_time: float = 0.196  # s, a_1
     learn_current: bool = True  # False: still water is assumed
     current_limit: float = 0.1  # m/s, of each component
-    listen_time: float = (
-        3.0  # s at rest before the first stroke, in which the water shows its current; 0: none
-    )
+    listen_time: float = 3.0  # s at rest before the first stroke; the water shows its current
 
     def __post_init__(self) -> None:
         for name in ("slip_arm", "slip_time", "current_limit", "listen_time"):
@@ -76,7 +74,7 @@ class PathAhead(NamedTuple):
 
 
 class GuidanceState(NamedTuple):
-    """Memory: the stroke's swing and the current in the pool frame."""
+    """Memory: the stroke's swing and what the water does."""
 
     stroke: StrokeState = StrokeState()
     water: WaterState = WaterState()

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 
-def write_json(path: Path, content: Any) -> None:
-    """Write indented JSON with a last newline."""
-    path.write_text(json.dumps(plain(content), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+def write_json(path: Path, content: Any, private: bool = False) -> None:
+    """Write indented JSON in one step: a reader never sees half of it. private: for the owner's eyes only."""
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(plain(content), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if private:
+        part.chmod(0o600)
+    os.replace(part, path)
+
+
+def number(value: float | None, absent: float = math.nan) -> float:
+    """A number of such a file; `absent` for null."""
+    return absent if value is None else float(value)
 
 
 def plain(value: Any) -> Any:

@@ -195,6 +195,13 @@ def test_scores_by_hand() -> None:
     assert half.top1 and not half.in_set and not half.exact
     lens = score_world(World("sensor", 5, {"camera_scale": {}}), diagnosis(("payload", "physics", 0.99)))
     assert lens.called_physics
+    lost = diagnosis(("current", "physics", 0.97))  # what is not finite is null in the file
+    lost["diagnosis"]["ranking"][1]["gain"] = lost["diagnosis"]["refitted"][1]["held_out_rms"]["2 s"][
+        "position_m"
+    ] = None
+    assert choice(score_world(current, lost), lambda *_: 1.0) == "current"
+    lost["diagnosis"]["fit"]["refitted"]["rms"]["2 s"]["position_m"] = None
+    assert smallest_error(score_world(current, lost)) == "current"
     assert choice(right, lambda name, _: 3.0 if name == "quadratic_drag" else 1.0) == "current"
     assert choice(right, lambda *_: 20.0) is None
     assert smallest_error(right) == "wall_effect"

@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--paths", nargs="+", default=["I", "R", "O", "S"], help="R, circle:radius=0.6, ...")
     parser.add_argument("--speeds", nargs="+", type=float, default=[0.1, 0.15, 0.2, 0.25], help="m/s")
     parser.add_argument("--seeds", type=int, default=3, help="runs of each cell (default: %(default)s)")
+    parser.add_argument("--first-seed", type=int, default=0, help="of these runs (default: %(default)s)")
     parser.add_argument("--plant", type=Path, help="robot.yaml or model.yaml (default: the nominal robot)")
     parser.add_argument(
         "--off", type=float, default=0.0, help="uncertain parameters wrong by up to this share"
@@ -67,8 +68,9 @@ def run(args: argparse.Namespace) -> int:
     candidates = [*map(read_candidate, args.weights), *map(constant_candidate, args.constant)]
     if not candidates:
         raise UserError("nothing to evaluate: give --weights FILE or --constant KP,KI,KD,KP,KI,KD")
-    if args.seeds < 1 or args.jobs < 1:
-        raise UserError(f"--seeds {args.seeds} --jobs {args.jobs}: expected at least 1")
+    if args.seeds < 1 or args.jobs < 1 or args.first_seed < 0:
+        given = f"--seeds {args.seeds} --jobs {args.jobs} --first-seed {args.first_seed}"
+        raise UserError(f"{given}: expected at least 1, 1 and 0")
     for path in args.paths:
         read_path(path)
     robot = read_robot(args.plant)
@@ -76,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
         conditions = robust_conditions(robot)
     else:
         conditions = [make_condition(robot, args.off, args.current, args.latency, args.perfect)]
-    cells = make_cells(args.paths, args.speeds, range(args.seeds))
+    cells = make_cells(args.paths, args.speeds, range(args.first_seed, args.first_seed + args.seeds))
     console, began = Console(), time.monotonic()
     if not console.is_terminal:
         console = Console(width=LOG_WIDTH)

@@ -8,18 +8,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
-from fish_train.identify.filter_types import Array, History
+from fish_sim.robot import Robot
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter import run_filter
+from fish_train.identify.filter_types import Array, History, Noise
+from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.smoother import smooth
 
 
-def smoothed_at(history: History, starts: NDArray[np.int64], steps: NDArray[np.int64], ahead: float) -> Array:
-    """(S, N) moments at starts (S, 2) of trial and grid point, given all up to `ahead` [s] after each (fixed-lag smoother).
+def smoothed(
+    experiment: Experiment, robot: Robot, noise: Noise, starts: NDArray[np.int64], ahead: float
+) -> Array:
+    """(S, N) filter states at starts (S, 2) of trial and grid point, given all up to `ahead` [s] after each.
 
-    steps: (M,) grid points of each trial, which nothing is taken from beyond. NaN where the filter diverged.
+    NaN where the filter diverged. Trials are filtered one at a time, as histories are large.
     """
-    trial, first = starts.T
-    rows = np.minimum(first + np.arange(round(ahead / DT) + 1)[:, None], steps[trial] - 1)
-    windows = {f.name: getattr(history, f.name)[rows, trial] for f in fields(History)}
+    coordinates = Coordinates(nominal_hypothesis(robot, free=()))
+    p, dp, sensors = coordinates.filter_inputs(np.zeros(0))
+    parts = {}
+    for m in np.unique(starts[:, 0]).tolist():
+        alone = experiment.select([m])
+        history = run_filter(alone, coordinates.stepper, p, dp, sensors, noise, keep=True).history
+        assert history is not None
+        parts[m] = _at(history, starts[starts[:, 0] == m, 1], int(alone.steps[0]), ahead)
+    out = np.full((len(starts), next(iter(parts.values())).shape[1] if parts else 0), np.nan)
+    for m, states in parts.items():
+        out[starts[:, 0] == m] = states
+    return out
+
+
+def _at(history: History, starts: NDArray[np.int64], steps: int, ahead: float) -> Array:
+    """(S, N) of one trial: the smoother runs back from `ahead` after each start, or from the trial's end."""
+    rows = np.minimum(starts + np.arange(round(ahead / DT) + 1)[:, None], steps - 1)
+    windows = {f.name: getattr(history, f.name)[rows, 0] for f in fields(History)}
     good = np.isfinite(windows["filtered"]).all(axis=(0, 2))
     out = np.full((len(starts), history.filtered.shape[2]), np.nan)
     out[good] = smooth(History(**{name: values[:, good] for name, values in windows.items()}))[0][0]

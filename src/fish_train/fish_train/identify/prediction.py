@@ -18,7 +18,7 @@ from fish_sim.step import Stepper
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter import run_filter
 from fish_train.identify.filter_types import WRENCH, Noise, SensorModel
-from fish_train.identify.fixed_lag import smoothed_at
+from fish_train.identify.fixed_lag import smoothed
 from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.motion import HALF_WINDOW, stroke_mean
 from fish_train.identify.settle import open_gates
@@ -173,7 +173,10 @@ def predict(
     length = int(np.ceil((horizon + HALF_WINDOW) / DT)) + 1
     state, wrench = estimates.state[start, trial], estimates.wrench[start, trial]
     if ahead:
-        state, wrench = _knowing_more(experiment, robot, noise, starts, ahead, state, wrench)
+        nx = len(Coordinates(nominal_hypothesis(robot, free=())).stepper.layout.motion)
+        known = smoothed(experiment, robot, noise, starts, ahead)
+        good = np.isfinite(known).all(axis=1)
+        state[good, :nx], wrench[good] = known[good, :nx], known[good, nx : nx + 3]
     pose = _simulate(experiment, robot, noise, starts, state, wrench, length)
     return Predictions(estimates, sensors, trial, start, pose, horizon)
 
@@ -186,25 +189,6 @@ def start_points(experiment: Experiment, every: float, first: float) -> NDArray[
         for k in np.round(np.arange(first, (steps - 1) * DT, every) / DT).astype(int).tolist()
     ]
     return np.array(rows, dtype=np.int64).reshape(-1, 2)
-
-
-def _knowing_more(
-    experiment: Experiment, robot: Robot, noise: Noise, starts: NDArray[np.int64], ahead: float,
-    state: Array, wrench: Array,
-) -> tuple[Array, Array]:  # fmt: skip
-    """State (S, NS) and wrench (S, 3) at the start points, smoothed with `ahead` [s] of what comes, where that can be had."""
-    coordinates = Coordinates(nominal_hypothesis(robot, free=()))
-    p, dp, sensors = coordinates.filter_inputs(np.zeros(0))
-    nx, state, wrench = len(coordinates.stepper.layout.motion), state.copy(), wrench.copy()
-    for m in np.unique(starts[:, 0]).tolist():
-        alone, rows = experiment.select([m]), np.flatnonzero(starts[:, 0] == m)
-        history = run_filter(alone, coordinates.stepper, p, dp, sensors, noise, keep=True).history
-        assert history is not None
-        own = np.column_stack([np.zeros(len(rows), dtype=np.int64), starts[rows, 1]])
-        found = smoothed_at(history, own, alone.steps, ahead)
-        good = np.isfinite(found).all(axis=1)
-        state[rows[good], :nx], wrench[rows[good]] = found[good, :nx], found[good, nx : nx + 3]
-    return state, wrench
 
 
 def _simulate(

@@ -11,12 +11,13 @@ import numpy as np
 
 from fish_train.diagnose.locate import dof_shares
 from fish_train.diagnose.vocabulary import candidates
+from fish_train.json_file import number, write_json
 from fish_train.prove.build import make_readings
 from fish_train.prove.competitors import compete
 from fish_train.prove.oracle import Sight, as_experiment, detects, look
 from fish_train.prove.runner import spread
 from fish_train.prove.score import Score, vocabulary
-from fish_train.prove.study import Study, read_json, write_json
+from fish_train.prove.study import Study, read_json
 from fish_train.prove.tables import Share
 from fish_train.prove.where import activity, dof_overlap, regime_f1, time_overlap
 from fish_train.prove.world import World
@@ -85,7 +86,7 @@ def judge_study(
     for name in spread(judge_world, tasks, jobs, cluster):
         done(name)
     judged = {t.world.seed: read_json(t.place / "judged.json") for t in tasks}
-    sights = {seed: Sight(**content["sight"]) for seed, content in judged.items() if content["sight"]}
+    sights = {seed: Sight.read(content["sight"]) for seed, content in judged.items() if content["sight"]}
     nulls = [sights[t.world.seed] for t in tasks if not t.world.names and t.world.seed in sights]
     seen = {
         t.world.seed: detects(sights[t.world.seed], nulls)
@@ -146,7 +147,7 @@ def judged_table(
 def _rms(score: Score, model: str) -> float:
     """Held-out position error at 2 s [m]; 0 where not stated."""
     rows = score.rms.get(model, {})
-    return float(rows.get("2 s", {}).get("position_m", 0.0))
+    return number(rows.get("2 s", {}).get("position_m"), 0.0)
 
 
 def _finite(values: Sequence[float | None]) -> list[float]:
@@ -171,13 +172,13 @@ def rivals_table(scores: Sequence[Score], rivals: Mapping[int, Mapping[str, Any]
             "PySINDy",
             str(Share.of(hidden, lambda s: said[s.world.seed] in s.truth)),
             str(Share.of(nothing, lambda s: said[s.world.seed] is not None)),
-            _median([rivals[s.world.seed]["sindy_r2"] for s in hidden]),
+            _median(_finite([rivals[s.world.seed]["sindy_r2"] for s in hidden])),
         ],
         [
             "neural network (fit only)",
             "gives none",
             "gives none",
-            _median([rivals[s.world.seed]["neural_r2"] for s in hidden]),
+            _median(_finite([rivals[s.world.seed]["neural_r2"] for s in hidden])),
         ],
     ]
     header = [

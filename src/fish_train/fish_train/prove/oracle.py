@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate
 from fish_train.identify.hypothesis import Coordinates, Hypothesis, nominal_hypothesis
 from fish_train.identify.prediction import predict, prediction_errors
 from fish_train.identify.sensor_noise import usual_noise
+from fish_train.json_file import number
 from fish_train.prove.swim import Readings
 from fish_train.prove.world import World
 
@@ -53,6 +55,12 @@ class Sight:
         list[float]
     ]  # (horizon, position m, heading rad, speed m/s), held out, refitted nominal structure
     rms_true: list[list[float]]  # true structure fitted
+
+    @classmethod
+    def read(cls, content: Mapping[str, Any]) -> Sight:
+        """From JSON, in which what is not finite is null."""
+        tables = ([[number(v) for v in row] for row in content[key]] for key in ("rms_nominal", "rms_true"))
+        return cls(number(content["gain"], -np.inf), content["parameters"], *tables)
 
 
 def as_experiment(readings: Sequence[Readings], encoder: bool) -> Experiment:

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fish_train.json_file import write_json
 from fish_train.prove.build import make_world
 from fish_train.prove.mujoco_plant import MujocoError
-from fish_train.prove.study import Study, StudyError, read_json, write_json
+from fish_train.prove.study import Study, StudyError, read_json
 from fish_train.prove.world import World
 
 DIAGNOSE = (sys.executable, "-m", "fish_train.commands.main", "diagnose")

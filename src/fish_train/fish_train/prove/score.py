@@ -10,6 +10,7 @@ import numpy as np
 
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
+from fish_train.json_file import number
 from fish_train.prove.world import World
 
 CONFIDENT = (
@@ -132,7 +133,7 @@ def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] 
         kinds=tuple(e["kind"] for e in effects),
         parameters=tuple(p for e in effects for p in _parameter_errors(world, e)),
         rms={k: fit[k]["rms"] for k in ("nominal", "refitted", "with_effects") if k in fit},
-        ranking={r["name"]: r["gain"] for r in d.get("ranking", ())},
+        ranking={r["name"]: number(r["gain"], -np.inf) for r in d.get("ranking", ())},
         seconds=result["seconds"],
         held_out={r["name"]: _position(r["held_out_rms"]) for r in d.get("refitted", ())},
     )
@@ -140,13 +141,13 @@ def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] 
 
 def _position(rms: Mapping[str, Any]) -> float:
     """Position error 2 s ahead [m]; infinite where no trial is that long."""
-    return float(rms.get("2 s", {}).get("position_m", np.inf))
+    return number(rms.get("2 s", {}).get("position_m"), np.inf)
 
 
 def _parameter_errors(world: World, effect: Mapping[str, Any]) -> list[ParameterError]:
     hidden = world.effects.get(effect["name"], {})
     return [
-        ParameterError(f"{effect['name']}.{key}", hidden[key], p["value"], p["std"])
+        ParameterError(f"{effect['name']}.{key}", hidden[key], number(p["value"]), number(p["std"]))
         for key, p in effect["parameters"].items()
         if key in hidden
     ]

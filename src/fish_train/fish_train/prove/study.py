@@ -10,12 +10,12 @@ labels.json  the opened labels; written when every world has a result
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from fish_train.json_file import write_json
 from fish_train.prove.seal import Sealed, broken_seals, seal_label
 from fish_train.prove.world import World
 
@@ -84,15 +84,6 @@ class Study:
 
     def _sealed(self) -> dict[str, Sealed]:
         return {name: Sealed(**content) for name, content in read_json(self.folder / "sealed.json").items()}
-
-
-def write_json(path: Path, content: Any, private: bool = False) -> None:
-    """In one step: a reader never sees half of it."""
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if private:
-        part.chmod(0o600)
-    os.replace(part, path)
 
 
 def read_json(path: Path) -> Any:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
+from fish_train.json_file import number
 from fish_train.prove.groups import GROUPS
 from fish_train.prove.score import Score
 from fish_train.reports.page import Table
@@ -253,7 +254,7 @@ def choice(score: Score, cost: Callable[[str, Score], float]) -> str | None:
 
 def smallest_error(score: Score) -> str | None:
     """The refitted name that predicts best on trials held out; None if the refitted nominal model does."""
-    nominal = score.rms.get("refitted", {}).get("2 s", {}).get("position_m", np.inf)
+    nominal = number(score.rms.get("refitted", {}).get("2 s", {}).get("position_m"), np.inf)
     best = min(score.held_out, key=lambda n: score.held_out[n], default=None)
     return best if best is not None and score.held_out[best] < nominal else None
 
