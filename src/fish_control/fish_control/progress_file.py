@@ -10,6 +10,7 @@ import hashlib
 import json
 import math
 import os
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from fish_control.reference_path import ReferencePath
@@ -24,11 +25,16 @@ def path_digest(path: ReferencePath) -> str:
 
 
 class ProgressFile:
-    """Keeps the progress along one path at a time."""
+    """Keeps the progress along one path at a time.
+
+    Written beside the caller: a disk that is busy with other files holds up a write by half a second at times.
+    """
 
     def __init__(self, file: Path) -> None:
         self._file = file
         self._next_save = -math.inf
+        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="progress")
+        self._writing: Future[None] | None = None
         self.problem = ""  # why it could not be written, if so
 
     def recall(self, digest: str, time: float, oldest: float) -> tuple[float, float] | None:
@@ -46,18 +52,31 @@ class ProgressFile:
         return progress, time - kept
 
     def keep(self, digest: str, time: float, progress: float) -> None:
-        """Write, at most every SAVE_PERIOD of `time` [s]; the file is replaced in one step."""
+        """Have it written, at most every SAVE_PERIOD of `time` [s] and not while the disk still writes the last."""
         if self._next_save - 10.0 * SAVE_PERIOD < time < self._next_save:  # a clock set back writes at once
             return
+        if self._writing is not None and not self._writing.done():
+            return
         self._next_save = time + SAVE_PERIOD
+        content = json.dumps({"path": digest, "time": time, "progress": progress})
+        self._writing = self._writer.submit(self._replace, content)
+
+    def settle(self) -> None:
+        """Wait until what is being written is on disk."""
+        if self._writing is not None:
+            self._writing.result()
+
+    def forget(self) -> None:
+        """Remove the file."""
+        self.settle()
+        self._file.unlink(missing_ok=True)
+
+    def _replace(self, content: str) -> None:
+        """In one step: a reader finds the old or the new content."""
         new = self._file.with_name(self._file.name + ".new")
         try:
-            new.write_text(json.dumps({"path": digest, "time": time, "progress": progress}), encoding="utf-8")
+            new.write_text(content, encoding="utf-8")
             os.replace(new, self._file)
             self.problem = ""
         except OSError as error:
             self.problem = f"progress cannot be kept in {self._file}: {error.strerror}"
-
-    def forget(self) -> None:
-        """Remove the file."""
-        self._file.unlink(missing_ok=True)
