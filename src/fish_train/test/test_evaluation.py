@@ -24,7 +24,7 @@ from fish_train.evaluation.paper_page import better_cells
 from fish_train.evaluation.plant import FishSimPlant
 from fish_train.evaluation.sensing import FusedSensing
 from fish_train.evaluation.study import Row, detuned, evaluate, write_rows
-from fish_train.evaluation.tables import cell_ratios, summary_table
+from fish_train.evaluation.tables import cell_ratios, ratio_table, summary_table
 
 GAINS = "0.3,0.3,0.03,0.6,0.05,0"
 SHORT = "straight:length=0.8"
@@ -136,9 +136,22 @@ def test_cells_better_than_the_papers() -> None:
 
 def test_ratios_to_the_nominal_condition() -> None:
     rows = [*rows_of(1.0, "nominal"), *rows_of(1.5, "worse")]
-    cross_track, speed = cell_ratios(rows, "a", "worse", "nominal")
-    assert cross_track == pytest.approx([1.5] * 16)
-    assert speed == pytest.approx([1.5] * 16)
+    ratios = cell_ratios(rows, "a", "worse", "nominal")
+    assert len(ratios) == 16
+    assert list(ratios.values()) == [pytest.approx((1.5, 1.5))] * 16
+
+
+def test_the_table_of_ratios_names_the_worst_cell_and_leaves_failed_runs_out() -> None:
+    worse = rows_of(1.5, "worse")
+    third = worse[2].metrics.settled
+    worse[2] = replace(
+        worse[2], metrics=replace(worse[2].metrics, settled=replace(third, speed_rmse=3.0 * third.speed_rmse))
+    )
+    worse[5] = replace(worse[5], metrics=replace(worse[5].metrics, failure="lost"))
+    (line,) = ratio_table([*rows_of(1.0, "nominal"), *worse], "nominal", "t").rows
+    cell = worse[2].cell
+    assert line[2] == "1" and line[-1] == "1 of 15"
+    assert line[4].endswith(f"4.50 ({cell.path} {cell.speed:g} m/s)")
 
 
 def test_detuned_robots_keep_what_is_measured() -> None:

@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.evaluation.conditions import make_condition, robust_conditions
     from fish_train.evaluation.page import write_study_page
     from fish_train.evaluation.study import run_study, write_rows
-    from fish_train.evaluation.tables import summary_table
+    from fish_train.evaluation.tables import ratio_table, summary_table
     from fish_train.score_table import print_table
 
     from .train import read_robot
@@ -95,6 +95,8 @@ def run(args: argparse.Namespace) -> int:
     write_rows(args.out / "runs.csv", rows)
     write_study_page(args.out / "evaluation.html", rows)
     print_table(console, summary_table(rows, "Tracking"))
+    if args.robust:
+        print_table(console, ratio_table(rows, conditions[0].name, "Robustness"))
     failed = [row for row in rows if row.metrics.failure]
     for row in failed[:20]:
         cell = f"{row.cell.path} at {row.cell.speed:g} m/s, seed {row.cell.seed}"

@@ -70,38 +70,51 @@ def ratio_table(rows: Sequence[Row], nominal: str, title: str) -> Table:
                 continue
             ratios = cell_ratios(rows, candidate, condition, nominal)
             failed = _failures([r for r in rows if (r.candidate, r.condition) == (candidate, condition)])
-            cells = [f"{np.mean(v):.2f} / {np.max(v):.2f}" if len(v) else "" for v in ratios]
-            over = sum(int(np.sum(np.array(v) > 2.0)) for v in ratios)
-            lines.append([candidate, condition, str(failed), *cells, str(over)])
+            sizes = [_mean_and_worst({cell: pair[k] for cell, pair in ratios.items()}) for k in range(2)]
+            over = sum(max(pair) > 2.0 for pair in ratios.values())
+            lines.append([candidate, condition, str(failed), *sizes, f"{over} of {len(ratios)}"])
     header = [
         "gains",
         "condition",
         "failed",
-        "cross-track, mean / worst",
-        "speed, mean / worst",
+        "cross-track: mean, worst",
+        "speed: mean, worst",
         "cells above twice",
     ]
-    return Table(title, header, lines, f"Ratios of RMSE to the same cell under: {nominal}.")
+    note = (
+        f"RMSE of each path and speed, mean of its runs that did not fail, against the same under: {nominal}."
+    )
+    return Table(title, header, lines, note)
 
 
 def cell_ratios(
     rows: Sequence[Row], candidate: str, condition: str, nominal: str
-) -> tuple[list[float], list[float]]:
-    """Ratios of cross-track and of speed RMSE, cell by cell (means over seeds)."""
+) -> dict[tuple[str, float], tuple[float, float]]:
+    """Ratios of cross-track and of speed RMSE by path and speed, means over the runs that did not fail."""
 
     def means(name: str) -> dict[tuple[str, float], ErrorSizes]:
-        mine = [r for r in rows if (r.candidate, r.condition) == (candidate, name)]
+        mine = [r for r in rows if (r.candidate, r.condition) == (candidate, name) and not r.metrics.failure]
         keys = unique(mine, lambda r: (r.cell.path, r.cell.speed))
         return {
             k: mean_sizes([r.metrics.settled for r in mine if (r.cell.path, r.cell.speed) == k]) for k in keys
         }
 
     worse, base = means(condition), means(nominal)
-    shared = [k for k in worse if k in base]
-    return (
-        [worse[k].cross_track_rmse / base[k].cross_track_rmse for k in shared],
-        [worse[k].speed_rmse / base[k].speed_rmse for k in shared],
-    )
+    return {
+        k: (
+            worse[k].cross_track_rmse / base[k].cross_track_rmse,
+            worse[k].speed_rmse / base[k].speed_rmse,
+        )
+        for k in worse
+        if k in base
+    }
+
+
+def _mean_and_worst(ratios: dict[tuple[str, float], float]) -> str:
+    if not ratios:
+        return ""
+    path, speed = max(ratios, key=lambda cell: ratios[cell])
+    return f"{np.mean(list(ratios.values())):.2f}, {ratios[path, speed]:.2f} ({path} {speed:g} m/s)"
 
 
 def _failures(runs: Sequence[Row]) -> int:
