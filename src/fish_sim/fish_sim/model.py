@@ -111,8 +111,12 @@ def motion_rate(
     layout: Layout, x: Sequence[Scalar], drive: Sequence[Scalar], p: Sequence[Scalar], xp: Any
 ) -> list[Scalar]:
     """Time derivative of the motion vector."""
+    return solution_rate(layout, x, motion_solution(layout, x, drive, p, xp))
+
+
+def solution_rate(layout: Layout, x: Sequence[Scalar], solution: Solution) -> list[Scalar]:
+    """Time derivative of the motion vector, of the solved equations."""
     size = layout.links + 3
-    solution = motion_solution(layout, x, drive, p, xp)
     return [*x[size : 2 * size], *solution.acceleration, *solution.state_rates]
 
 
@@ -142,56 +146,77 @@ def follow_command(
     return [alpha, rotor, *([servo] if layout.has_linkage else []), *memory]
 
 
-@dataclass(frozen=True)
 class Functions:
     """CasADi functions of a structure; arguments are columns, a matrix argument maps over its columns.
 
     rate(x, w, p) -> x'; rate_jvp(x, w, p, dx, dw, dp) -> (x', dx'); rate_vjp(x, w, p, g) -> (gx, gw, gp);
     follow, follow_jvp, follow_vjp likewise of (m, c, p) -> m'; outputs(x, w, p) -> (q'', tip_force, slip).
+    Each is built when it is first asked for: a search takes dozens of structures and needs little of each.
     """
 
-    rate: casadi.Function
-    rate_jvp: casadi.Function
-    rate_vjp: casadi.Function
-    follow: casadi.Function
-    follow_jvp: casadi.Function
-    follow_vjp: casadi.Function
-    outputs: casadi.Function
+    def __init__(self, structure: Structure, dt: float) -> None:
+        layout = Layout(structure)
+        x = casadi.SX.sym("x", len(layout.motion))
+        w = casadi.SX.sym("w", len(DRIVE_NAMES))
+        p = casadi.SX.sym("p", len(layout.parameters))
+        m = casadi.SX.sym("m", len(layout.memory))
+        c = casadi.SX.sym("c", len(COMMAND_NAMES))
+        xs, ws, ps, ms, cs = (casadi.vertsplit(v) for v in (x, w, p, m, c))
+        self._solution = motion_solution(layout, xs, ws, ps, CASADI)
+        self._motion = Expression(
+            "rate", [x, w, p], casadi.vertcat(*solution_rate(layout, xs, self._solution))
+        )
+        followed = follow_command(layout, ms, cs, ps, dt, CASADI)
+        self._memory = Expression("follow", [m, c, p], casadi.vertcat(*followed))
+
+    rate = cached_property(lambda self: self._motion.function())
+    rate_jvp = cached_property(lambda self: self._motion.jvp())
+    rate_vjp = cached_property(lambda self: self._motion.vjp())
+    follow = cached_property(lambda self: self._memory.function())
+    follow_jvp = cached_property(lambda self: self._memory.jvp())
+    follow_vjp = cached_property(lambda self: self._memory.vjp())
+
+    @cached_property
+    def outputs(self) -> casadi.Function:
+        """Accelerations, the force that holds the tip and its slip."""
+        found = self._solution
+        values = [casadi.vertcat(*found.acceleration), found.tip_force, found.slip]
+        return casadi.Function("outputs", self._motion.inputs, casadi.cse(values))
 
 
 @lru_cache(maxsize=64)
 def functions(structure: Structure, dt: float = DT) -> Functions:
-    """Build (once) the symbolic functions of a structure."""
-    layout = Layout(structure)
-    x = casadi.SX.sym("x", len(layout.motion))
-    w = casadi.SX.sym("w", len(DRIVE_NAMES))
-    p = casadi.SX.sym("p", len(layout.parameters))
-    m = casadi.SX.sym("m", len(layout.memory))
-    c = casadi.SX.sym("c", len(COMMAND_NAMES))
-    xs, ws, ps, ms, cs = (casadi.vertsplit(v) for v in (x, w, p, m, c))
-    rate = casadi.vertcat(*motion_rate(layout, xs, ws, ps, CASADI))
-    follow = casadi.vertcat(*follow_command(layout, ms, cs, ps, dt, CASADI))
-    solution = motion_solution(layout, xs, ws, ps, CASADI)
-    outputs = [casadi.vertcat(*solution.acceleration), solution.tip_force, solution.slip]
-    return Functions(
-        *derivatives("rate", [x, w, p], rate),
-        *derivatives("follow", [m, c, p], follow),
-        casadi.Function("outputs", [x, w, p], casadi.cse(outputs)),
-    )
+    """The symbolic functions of a structure, built once."""
+    return Functions(structure, dt)
 
 
-def derivatives(name: str, inputs: list[casadi.SX], value: casadi.SX) -> tuple[casadi.Function, ...]:
-    """(function, JVP, VJP) of an expression."""
-    together = casadi.vertcat(*inputs)
-    tangents = [casadi.SX.sym(f"d{i}", *v.shape) for i, v in enumerate(inputs)]
-    adjoint = casadi.SX.sym("g", *value.shape)
-    forward = casadi.jtimes(value, together, casadi.vertcat(*tangents))
-    reverse = casadi.jtimes(value, together, adjoint, True)
-    cuts = [0]
-    for v in inputs:
-        cuts.append(cuts[-1] + v.shape[0])
-    return (
-        casadi.Function(name, inputs, casadi.cse([value])),
-        casadi.Function(f"{name}_jvp", [*inputs, *tangents], casadi.cse([value, forward])),
-        casadi.Function(f"{name}_vjp", [*inputs, adjoint], casadi.cse(casadi.vertsplit(reverse, cuts))),
-    )
+@dataclass(frozen=True)
+class Expression:
+    """A column of expressions of some columns of symbols, and its derivatives."""
+
+    name: str
+    inputs: list[casadi.SX]
+    value: Any  # casadi.SX, one column
+
+    def function(self) -> casadi.Function:
+        """inputs -> value."""
+        return casadi.Function(self.name, self.inputs, casadi.cse([self.value]))
+
+    def jvp(self) -> casadi.Function:
+        """(inputs, their tangents) -> (value, its tangent)."""
+        tangents = [casadi.SX.sym(f"d{i}", *v.shape) for i, v in enumerate(self.inputs)]
+        forward = casadi.jtimes(self.value, casadi.vertcat(*self.inputs), casadi.vertcat(*tangents))
+        return casadi.Function(
+            f"{self.name}_jvp", [*self.inputs, *tangents], casadi.cse([self.value, forward])
+        )
+
+    def vjp(self) -> casadi.Function:
+        """(inputs, adjoint of the value) -> adjoints of the inputs."""
+        adjoint = casadi.SX.sym("g", *self.value.shape)
+        reverse = casadi.jtimes(self.value, casadi.vertcat(*self.inputs), adjoint, True)
+        cuts = [0]
+        for v in self.inputs:
+            cuts.append(cuts[-1] + v.shape[0])
+        return casadi.Function(
+            f"{self.name}_vjp", [*self.inputs, adjoint], casadi.cse(casadi.vertsplit(reverse, cuts))
+        )
