@@ -11,6 +11,7 @@ import pytest
 from fish_sim.effects import EFFECTS
 from fish_sim.ops import NUMPY
 from fish_sim.scheme import default_scheme
+from fish_train.commands.main import main
 from fish_train.diagnose.locate import MissingForce
 from fish_train.diagnose.vocabulary import candidates
 from fish_train.evaluation.cells import Cell
@@ -120,13 +121,22 @@ def test_a_study_is_sealed_first_goes_on_and_opens(tmp_path) -> None:
     assert read_json(study.folder / "seals.json") == seals
     scores = [score_world(world, results[name]) for name, world in opened.items()]
     assert [s.verdict for s in scores] == ["no_mismatch", "failed", "no_mismatch"]
-    write_prove_page(tmp_path / "report.html", study.about, scores)
+    write_prove_page(tmp_path / "report.html", [study.about], scores)
     page = (tmp_path / "report.html").read_text()
     assert (
         "exit status 3: cannot" in page
         and "Asked and measured" in page
         and "http" not in page.split("plotly.js")[0].split("<script")[0]
     )
+    other = Study.create(tmp_path / "other", worlds, {"seed": 2, "began": "later", "command": "again"})
+    pool = ["prove", "--pool", str(study.folder), str(other.folder), "--out", str(tmp_path / "pooled")]
+    assert main(pool) == 1  # nothing is said before every label may be opened
+    with pytest.raises(StudyError, match="stopped"):
+        run_study(other, 1, done.append, TOOL)
+    run_study(other, 1, done.append, TOOL)
+    assert main(pool) == 0
+    page = (tmp_path / "pooled" / "report.html").read_text()
+    assert "6 worlds, 4 of them with something hidden; seed 1, today; seed 2, later" in page
     (study.folder / "seals.json").write_text('{"world_0000": "0"}')
     with pytest.raises(StudyError, match="not what was sealed"):
         study.reveal()

@@ -1,7 +1,7 @@
 """Blind study: worlds with something hidden, the whole tool on each without the label, labels opened afterwards.
 
 Writes seals before the first run, results as they come, and at the end scores, opened labels and report.html. The same
-command on the same folder goes on where it was stopped.
+command on the same folder goes on where it was stopped; --pool puts finished studies of one version together.
 """
 
 from __future__ import annotations
@@ -66,14 +66,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="instead: gains from the nominal, refitted, corrected model and from the plant itself, judged on the second "
         "plant with this concealed in it (nothing, wind, servo_filter, ballast, ...; needs mujoco)",
     )
+    parser.add_argument(
+        "--pool", nargs="+", type=Path, default=[], metavar="STUDY",
+        help="instead: tables and page over these finished studies together, in OUT",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path("prove"), help="folder (default: %(default)s)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Create or go on, run, open, print, write."""
-    from fish_train.prove.judge import judge_study
-    from fish_train.prove.runner import run_study
+    from fish_train.prove.judge import judge_studies
     from fish_train.prove.score import score_world
+    from fish_train.prove.study import Study
     from fish_train.prove.truths import truths_of
     from fish_train.reports.prove_page import tables, write_prove_page
     from fish_train.score_table import print_table
@@ -89,21 +93,23 @@ def run(args: argparse.Namespace) -> int:
     if args.close_loop:
         return _close_loop(args, console)
     with user_errors():
-        study = _study(args, console)
-        with _progress(console, "worlds", len(study.open_worlds)) as done:
-            run_study(study, args.jobs, done, keep=args.keep, cluster=args.cluster)
-        opened, results = study.reveal(), study.results
-        scores = [score_world(world, results[name], truths_of(world)) for name, world in opened.items()]
-        oracle: dict[int, bool] = {}
+        studies = [Study(folder) for folder in args.pool] or [_ran(args, console)]
+        scores, oracle = [], {}
+        for study in studies:
+            results = study.results
+            scores += [score_world(w, results[n], truths_of(w)) for n, w in study.reveal().items()]
         more: list[Table] = []
         if args.oracle:
-            with _progress(console, "true structures", len(opened)) as done:
-                oracle, more = judge_study(study, scores, args.jobs, done, args.cluster)
+            with _progress(console, "true structures", len(scores)) as done:
+                oracle, more = judge_studies(studies, scores, args.jobs, done, args.cluster)
     for table in tables(scores, oracle, more):
         print_table(console, table)
-    write_prove_page(study.folder / "report.html", study.about, scores, oracle, more)
+    args.out.mkdir(parents=True, exist_ok=True)
+    about = [study.about for study in studies]
+    write_prove_page(args.out / "report.html", about, scores, oracle, more)
+    seeds = ", ".join(str(a["seed"]) for a in about)
     console.print(
-        f"{study.folder}/report.html, labels.json, seals.json; seed {study.about['seed']}", soft_wrap=True
+        f"{args.out}/report.html; seed {seeds}; labels.json, seals.json in each study", soft_wrap=True
     )
     return 0
 
@@ -112,6 +118,16 @@ def _need(module: str, what: str, wanted: bool) -> None:
     """Optional packages are asked for before anything starts."""
     if wanted and find_spec(module) is None:
         raise UserError(f"{what} needs {module}: pip install {module} (versions: requirements-bench.txt)")
+
+
+def _ran(args: argparse.Namespace, console: Console) -> Study:
+    """The study of these arguments, every world with a result."""
+    from fish_train.prove.runner import run_study
+
+    study = _study(args, console)
+    with _progress(console, "worlds", len(study.open_worlds)) as done:
+        run_study(study, args.jobs, done, keep=args.keep, cluster=args.cluster)
+    return study
 
 
 def _study(args: argparse.Namespace, console: Console) -> Study:

@@ -73,16 +73,22 @@ def judge(world: World, diagnosis: Mapping[str, Any]) -> dict[str, Any]:
     return content
 
 
-def judge_study(
-    study: Study, scores: Sequence[Score], jobs: int, done: Callable[[str], None], cluster: str = ""
+def judge_studies(
+    studies: Sequence[Study],
+    scores: Sequence[Score],
+    jobs: int,
+    done: Callable[[str], None],
+    cluster: str = "",
 ) -> tuple[dict[int, bool], list[Table]]:
-    """(seed -> whether the oracle detects, tables) of a study whose labels are open."""
-    results = study.results
-    tasks = [
-        Task(name, world, study.place(name).resolve(), results[name]["diagnosis"])
-        for name, world in study.worlds.items()
-        if results[name]["diagnosis"] is not None
-    ]
+    """(seed -> whether the oracle detects, tables) of studies whose labels are open."""
+    tasks = []
+    for study in studies:
+        results = study.results
+        tasks += [
+            Task(name, world, study.place(name).resolve(), results[name]["diagnosis"])
+            for name, world in study.worlds.items()
+            if results[name]["diagnosis"] is not None
+        ]
     for name in spread(judge_world, tasks, jobs, cluster):
         done(name)
     judged = {t.world.seed: read_json(t.place / "judged.json") for t in tasks}

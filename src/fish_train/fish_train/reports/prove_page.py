@@ -37,13 +37,14 @@ def tables(
 
 
 def write_prove_page(
-    path: Path, about: Mapping[str, Any], scores: Sequence[Score], oracle: dict[int, bool] | None = None,
+    path: Path, about: Sequence[Mapping[str, Any]], scores: Sequence[Score], oracle: dict[int, bool] | None = None,
     more: Sequence[Table] = (),
 ) -> None:  # fmt: skip
-    """Write report.html."""
+    """Write report.html; about: what was asked for, of each study."""
+    which = "; ".join(f"seed {a['seed']}, {a['began']}" for a in about)
     lead = (
-        f"{len(scores)} worlds, {sum(bool(s.truth) or s.unnamed for s in scores)} of them with something hidden; seed "
-        f"{about['seed']}, {about['began']}. Labels were sealed before the run, and the opened ones fit their seals."
+        f"{len(scores)} worlds, {sum(bool(s.truth) or s.unnamed for s in scores)} of them with something hidden; "
+        f"{which}. Labels were sealed before the run, and the opened ones fit their seals."
     )
     blocks: list[Block] = list(tables(scores, oracle, more))
     steps = power(scores, oracle)
@@ -61,7 +62,7 @@ def write_prove_page(
             "worlds with one hidden thing or none; first name or verdict",
         )
     )
-    blocks.append(Text("How", HOW + f" Command: {about['command']}."))
+    blocks.append(Text("How", HOW + " ".join(f" Command: {a['command']}." for a in about)))
     write_page(path, "Blind study of the diagnosis", lead, blocks)
 
 
