@@ -31,6 +31,7 @@ from rich.progress import (
 from fish_train.errors import UserError
 
 if TYPE_CHECKING:
+    from fish_train.prove.score import Score
     from fish_train.prove.study import Study
     from fish_train.reports.page import Table
 
@@ -94,7 +95,8 @@ def run(args: argparse.Namespace) -> int:
         return _close_loop(args, console)
     with user_errors():
         studies = [Study(folder) for folder in args.pool] or [_ran(args, console)]
-        scores, oracle = [], {}
+        scores: list[Score] = []
+        oracle: dict[int, bool] = {}
         for study in studies:
             results = study.results
             scores += [score_world(w, results[n], truths_of(w)) for n, w in study.reveal().items()]

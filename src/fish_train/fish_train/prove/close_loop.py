@@ -108,7 +108,9 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
     condition = Condition(name="second plant", plant=SecondPlant(plan.world))
     cells = make_cells(plan.paths, plan.speeds, range(1, plan.seeds + 1))
     say("searching gains on the plant itself")
-    candidates.append(Candidate("true", PolicyGains(Policy.constant(search(condition, cells, plan.search)))))
+    candidates.append(
+        Candidate("true", PolicyGains(Policy.constant(search(condition, cells, plan.search, say))))
+    )
     say("swimming")
     return run_study(candidates, [condition], cells, jobs)
 
@@ -151,9 +153,9 @@ def _verb(*arguments: str) -> None:
         raise UserError(f"fish_train {arguments[0]} ended with {done.returncode}: {said}")
 
 
-def search(condition: Condition, cells: Sequence[Cell], runs: int) -> Gains:
+def search(condition: Condition, cells: Sequence[Cell], runs: int, say: Say) -> Gains:
     """Constant gains by a simplex search on the plant, perfect state, from the hand-tuned ones."""
-    seen = replace(condition, fused=False)
+    seen, costs = replace(condition, fused=False), list[float]()
 
     def gains(x: Array) -> Gains:
         wanted = HAND_TUNED._asdict()
@@ -161,10 +163,10 @@ def search(condition: Condition, cells: Sequence[Cell], runs: int) -> Gains:
         return Gains(*(float(np.clip(wanted[o.name], o.low, o.high)) for o in OUTPUTS))
 
     def cost(x: Array) -> float:
-        policy = Policy.constant(gains(x))
-        return float(
-            np.mean([_cost(row) for row in evaluate(Candidate("", PolicyGains(policy)), seen, cells)])
-        )
+        candidate = Candidate("", PolicyGains(Policy.constant(gains(x))))
+        costs.append(float(np.mean([_cost(row) for row in evaluate(candidate, seen, cells)])))
+        say(f"gains {len(costs)} of {runs}: cost {costs[-1]:.2f}, best {min(costs):.2f}")
+        return costs[-1]
 
     start = np.vstack([np.zeros(len(SEARCHED)), WIDE * np.eye(len(SEARCHED))])
     found = minimize(cost, start[0], method="Nelder-Mead", options={"maxfev": runs, "initial_simplex": start})
