@@ -177,11 +177,14 @@ def dict_of(message: DiagnosticArray) -> dict[str, str]:
 
 @pytest.mark.parametrize("bench", [{"real_time_factor": 1.0}], indirect=True)
 def test_at_factor_1_stamps_keep_to_the_wall_clock(bench):
-    bench.collect("sim/odometry", 100)
-    now = bench.peer.get_clock().now().nanoseconds * 1e-9
-    assert seconds(bench.got["sim/odometry"][-1].header.stamp) == pytest.approx(now, abs=0.3)
-    bench.collect("/diagnostics", 1)
-    assert float(dict_of(bench.got["/diagnostics"][-1])["simulated_s"]) > 0.9
+    behind = []
+    for _ in range(20):  # a busy computer may hold up a message, not all of them
+        stamp = seconds(bench.collect("sim/odometry", 5)[-1].header.stamp)
+        behind.append(bench.peer.get_clock().now().nanoseconds * 1e-9 - stamp)
+    said = dict_of(bench.collect("/diagnostics", 1)[-1])
+    assert float(said["simulated_s"]) > 0.9
+    skipped = float(said["lost_s"])  # of what it could not keep up with
+    assert -0.01 < min(behind) < 0.3 + skipped
 
 
 def test_a_robot_file_is_used_and_a_broken_one_refused(tmp_path):
