@@ -23,6 +23,7 @@ from fish_train.prove.build import make_readings, make_world
 from fish_train.prove.close_loop import loop_table
 from fish_train.prove.judge import judged_table, rivals_table
 from fish_train.prove.mujoco_plant import MujocoPlant, model_text
+from fish_train.prove.nulls import null_table
 from fish_train.prove.oracle import Sight, as_experiment, detects
 from fish_train.prove.other_forms import OTHER_FORMS
 from fish_train.prove.outside import OUTSIDE, known_to_the_plant
@@ -218,6 +219,16 @@ def test_scores_by_hand() -> None:
     assert smallest_error(replace(right, held_out={"current": 0.011})) is None
     bins = calibration([right, wrong, half])
     assert [(b.low, b.right.k, b.right.n) for b in bins] == [(0.5, 1, 1), (0.95, 1, 2)]
+
+
+def test_gains_of_null_worlds_by_hand() -> None:
+    worlds = [World("null", k, links=links) for k, links in enumerate((3, 3, 5))]
+    scores = [score_world(w, diagnosis(verdict="no_mismatch")) for w in worlds]
+    scores[0] = replace(scores[0], ranking={"current": 2.0, "tether": -np.inf})
+    table = null_table([*scores, score_world(World("single", 9, {"current": {}}), diagnosis())])
+    assert table.rows == [["3", "1", "2", "6.0", "10.0"], ["5", "1", "1", "10.0", "10.0"]]
+    assert "0.6 in the median" in table.note  # the larger of two chi square / 2 with one degree of freedom
+    assert null_table([]) is None
 
 
 def test_share_has_the_exact_interval() -> None:

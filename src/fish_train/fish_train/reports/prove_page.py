@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from fish_train.prove.nulls import null_table
 from fish_train.prove.score import Score
 from fish_train.prove.tables import (
     Bin,
@@ -32,8 +33,10 @@ def tables(
     """Everything that is printed as well."""
     steps = power(scores, oracle)
     failed = [failure_table(scores)] if any(s.verdict == "failed" for s in scores) else []
+    nulls = null_table(scores)
     shown = [asked_table(scores), group_table(scores), calibration_table(scores), criterion_table(scores)]
-    return [*shown, *([power_table(steps)] if steps else []), *more, name_table(scores), *failed]
+    shown += [power_table(steps)] if steps else []
+    return [*shown, *more, *([nulls] if nulls else []), name_table(scores), *failed]
 
 
 def write_prove_page(
