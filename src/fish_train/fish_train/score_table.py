@@ -27,7 +27,8 @@ def print_table(console: Console, table: Table) -> None:
     """Show a table in the terminal."""
     shown = TerminalTable(title=table.title, title_justify="left", box=SIMPLE, pad_edge=False)
     for k, name in enumerate(table.header):
-        shown.add_column(name, justify="left" if k == 0 else "right", overflow="fold")
+        numbers = any(row[k][-1:].isdigit() for row in table.rows)
+        shown.add_column(name, justify="right" if k and numbers else "left", overflow="fold")
     for row in table.rows:
         shown.add_row(*row)
     console.print(shown)
