@@ -65,7 +65,7 @@ def write_prove_page(
             "worlds with one hidden thing or none; first name or verdict",
         )
     )
-    blocks.append(Text("How", HOW + " ".join(f" Command: {a['command']}." for a in about)))
+    blocks.append(Text("How", " ".join([HOW, *(f"Command: {a['command']}." for a in about)])))
     write_page(path, "Blind study of the diagnosis", lead, blocks)
 
 
