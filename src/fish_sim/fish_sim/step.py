@@ -281,8 +281,8 @@ def kernel_source(structure: Structure, scheme: Scheme, width: int, part: Part) 
 
 
 def tangent_source(structure: Structure, scheme: Scheme, width: int) -> str:
-    """C text that steps and differentiates forward, exporting nothing; filters build on it."""
-    return _source(structure, scheme, width, PARTS["tangents"][0], ("step.c", "tangent.c"))
+    """C text of the step and of rates with tangents, exporting nothing; filters build on it."""
+    return _source(structure, scheme, width, PARTS["tangents"][0], ("step.c",))
 
 
 def _source(

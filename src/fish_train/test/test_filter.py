@@ -57,6 +57,28 @@ def test_innovations_are_white_with_unit_variance_at_the_truth():
     np.testing.assert_allclose(lagged, 0.0, atol=0.07)
 
 
+def test_the_transition_is_the_derivative_of_the_simulators_step():
+    """Linearised in the middle of a step against the integrator's own derivative; both motions swim."""
+    data, _ = experiment(Robot(), 3.0, ("sines", "steps"))
+    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    stepper, (p, dp, sensors) = coordinates.stepper, coordinates.filter_inputs(np.zeros(0))
+    history = run_filter(data, stepper, p, dp, sensors, Noise(), keep=True).history
+    nx = len(stepper.layout.motion)
+    for k in (100, 150, 250):
+        for m in range(2):
+            state = np.concatenate([history.filtered[k, m, :nx], history.memory[k, m]])
+            wrench = dict(zip(("surge", "sway", "yaw"), history.filtered[k, m, nx : nx + 3], strict=True))
+            here = coordinates.hypothesis.robot.with_effect("disturbance", **wrench)
+            exact = stepper.rollout_jvp(
+                state, data.commands[k, m][None], stepper.parameters(here),
+                np.eye(len(state))[:nx], np.zeros((1, 2)), np.zeros(len(p)),
+            )[1][1]  # fmt: skip
+            scale = np.abs(exact[:, :nx]).max(axis=0)
+            np.testing.assert_allclose(
+                history.transition[k, m, :nx, :nx].T / scale, exact[:, :nx] / scale, atol=5e-3
+            )
+
+
 def test_gradient_is_zero_in_the_mean_and_a_missing_sensor_costs_nothing_but_its_samples():
     data, _ = experiment(Robot(), 6.0, ("sines",))
     blind = replace(data, accel=np.full_like(data.accel, np.nan), gyro=np.full_like(data.gyro, np.nan))

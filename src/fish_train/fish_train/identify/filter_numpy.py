@@ -26,6 +26,8 @@ from fish_train.identify.filter_types import (
     place_frames,
 )
 
+SERIES = 8  # terms of the matrix exponential, as in c/filter.c
+
 
 class Filter:
     """One pass over an experiment for given parameters."""
@@ -95,12 +97,16 @@ class Filter:
         memory = memory.reshape(T, M, K, nm)[:, :, 0]
         return memory, tangents.reshape(T, M, K, nm).transpose(0, 1, 3, 2)[..., : self.free]
 
-    def _directions(self, D: Array, width: int) -> tuple[Array, Array]:
-        """Tangent directions (M, directions, width) of the motion and (M, directions, NP) of the parameters."""
+    def _directions(self, D: Array, moving: bool) -> tuple[Array, Array]:
+        """Tangent directions (M, directions, nx) of the motion and (M, directions, NP) of the parameters.
+
+        moving False: of the free parameters' directions only what they do to a given motion.
+        """
         M, nx = self.trials, self.nx
-        ds = np.zeros((M, self.directions, width))
+        ds = np.zeros((M, self.directions, nx))
         ds[:, range(nx), range(nx)] = 1.0
-        ds[:, nx + 3 :, :nx] = D[:, :nx].transpose(0, 2, 1)
+        if moving:
+            ds[:, nx + 3 :] = D[:, :nx].transpose(0, 2, 1)
         dp = np.zeros((M, self.directions, len(self.p)))
         dp[:, range(nx, nx + 3), self.wrench_at] = 1.0
         dp[:, nx + 3 :] = self.dp
@@ -113,27 +119,39 @@ class Filter:
         return p
 
     def _predict(self, k: int, xi: Array, D: Array, decay: float) -> tuple[Array, Array, Array]:
-        """One step of 10 ms: (xi, F, D)."""
-        M, nx, n, R = self.trials, self.nx, self.n, self.directions
-        width = len(self.stepper.layout.state)
-        state = np.concatenate([xi[:, :nx], self.memory[k]], axis=1)
-        ds, dp = self._directions(D, width)
-        ds[:, nx + 3 :, nx:] = self.d_memory[k].transpose(0, 2, 1)
-        command = np.repeat(self.experiment.commands[k], R, axis=0)
-        values, tangents = self.stepper.rollout_jvp(
-            np.repeat(state, R, axis=0), command[None], np.repeat(self._parameters(xi), R, axis=0),
-            ds.reshape(M * R, width), np.zeros((1, 1, 2)), dp.reshape(M * R, -1),
-        )  # fmt: skip
-        values, tangents = values[1].reshape(M, R, width), tangents[1].reshape(M, R, width)
+        """One step of 10 ms: (xi, F, D). The estimate takes the simulator's step.
+
+        Its tangents follow x' = A x + b, the Jacobian A taken in the middle of the step and the parameters' b in the middle
+        of each half: a few rates with tangents instead of one at every stage of the integrator.
+        """
+        M, nx, n, columns = self.trials, self.nx, self.n, self.nx + 3
+        start = np.concatenate([xi[:, :nx], self.memory[k]], axis=1)
+        end = self.stepper.rollout(start, self.experiment.commands[k][None], self._parameters(xi))[1]
+        ends = [self._rates(k, x[:, :nx], xi, D, c)[0] for x, c in ((start, 0.0), (end, 1.0))]
+
+        def own(fraction: float) -> Array:
+            motion = between(start[:, :nx], end[:, :nx], ends[0], ends[1], fraction)
+            tangent = self._rates(k, motion, xi, D, fraction, moving=False)[1]
+            return tangent.transpose(0, 2, 1)
+
+        A = own(0.5)
+        moving = np.zeros((M, nx, self.directions))
+        moving[:, range(nx), range(nx)] = 1.0
+        moving[:, :, columns:] = D[:, :nx]
+        for half in range(2):
+            b = own(0.25 + 0.5 * half)
+            b[:, :, :nx], b[:, :, nx:columns] = 0.0, A[:, :, nx:columns]
+            for _ in range(self.stepper.scheme.substeps):
+                moving = flow(A[:, :, :nx], b, 0.5 * DT / self.stepper.scheme.substeps, moving)
         moved = xi.copy()
-        moved[:, :nx] = values[:, 0, :nx]
-        moved[:, nx : nx + 3] *= decay
+        moved[:, :nx] = end[:, :nx]
+        moved[:, nx:columns] *= decay
         F = np.tile(np.eye(n), (M, 1, 1))
-        F[:, :nx, : nx + 3] = tangents[:, : nx + 3, :nx].transpose(0, 2, 1)
-        F[:, range(nx, nx + 3), range(nx, nx + 3)] = decay
+        F[:, :nx, :columns] = moving[:, :, :columns]
+        F[:, range(nx, columns), range(nx, columns)] = decay
         D = D.copy()
-        D[:, :nx] = tangents[:, nx + 3 :, :nx].transpose(0, 2, 1)
-        D[:, nx : nx + 3] *= decay
+        D[:, :nx] = moving[:, :, columns:]
+        D[:, nx:columns] *= decay
         return moved, F, D
 
     def _measure(
@@ -145,7 +163,7 @@ class Filter:
         imu, camera = active & np.isfinite(z_imu).all(1), active & np.isfinite(offset)
         if not imu.any() and not camera.any():
             return xi, P, D
-        rate, tangent = self._rates(k, xi, D)
+        rate, tangent = self._rates(k, xi[:, : self.nx], xi, D, 0.0)
         if imu.any():
             h, H, dh = self._imu(xi, rate, tangent, D)
             R = np.diag([self.noise.gyro**2, self.noise.accel**2, self.noise.accel**2])
@@ -161,19 +179,19 @@ class Filter:
             xi, P, D = _update(k, slice(3, 6), e, H, dh, R, camera, self.noise.gate_camera, (xi, P, D), sums)
         return xi, P, D
 
-    def _rates(self, k: int, xi: Array, D: Array) -> tuple[Array, Array]:
-        """Rates of motion (M, nx) and their tangents (M, directions, nx) just after the grid point."""
+    def _rates(
+        self, k: int, motion: Array, xi: Array, D: Array, fraction: float, moving: bool = True
+    ) -> tuple[Array, Array]:
+        """Rates (M, nx) of a motion at a fraction of the period after grid point k, and their tangents (M, directions, nx)."""
         M, nx, R = self.trials, self.nx, self.directions
-        m0, m1 = self.memory[k, :, :2], self.memory[k + 1, :, :2]
-        d0, d1 = self.d_memory[k, :, :2], self.d_memory[k + 1, :, :2]
-        ds, dp = self._directions(D, nx)
-        drive = np.stack([m0[:, 0], (m1 - m0)[:, 0] / DT, m0[:, 1], (m1 - m0)[:, 1] / DT], axis=-1)
+        ds, dp = self._directions(D, moving)
+        drive = _drive(self.memory[k, :, :2], self.memory[k + 1, :, :2], fraction)
         d_drive = np.zeros((M, R, 4))
-        d_drive[:, nx + 3 :] = np.stack(
-            [d0[:, 0], (d1 - d0)[:, 0] / DT, d0[:, 1], (d1 - d0)[:, 1] / DT], axis=-1
+        d_drive[:, nx + 3 :] = _drive(
+            *(d.transpose(0, 2, 1) for d in self.d_memory[k : k + 2, :, :2]), fraction
         )
         rate, tangent = self.stepper.rates_jvp(
-            np.repeat(xi[:, :nx], R, axis=0), np.repeat(drive, R, axis=0), np.repeat(self._parameters(xi), R, axis=0),
+            np.repeat(motion, R, axis=0), np.repeat(drive, R, axis=0), np.repeat(self._parameters(xi), R, axis=0),
             ds.reshape(M * R, nx), d_drive.reshape(M * R, 4), dp.reshape(M * R, -1),
         )  # fmt: skip
         return rate.reshape(M, R, nx)[:, 0], tangent.reshape(M, R, nx)
@@ -242,6 +260,29 @@ class Filter:
         sums.gradient += terms.gradient
         sums.normal += terms.normal
         sums.whitened[..., ENCODER_ROW] = terms.whitened
+
+
+def _drive(start: Array, end: Array, fraction: float) -> Array:
+    """Rudder, its rate, rotor speed, its rate (..., 4) at a fraction of a period between two memories (..., 2)."""
+    rate = (end - start) / DT
+    now = start + fraction * (end - start)
+    return np.stack([now[..., 0], rate[..., 0], now[..., 1], rate[..., 1]], axis=-1)
+
+
+def between(x0: Array, x1: Array, rate0: Array, rate1: Array, c: float) -> Array:
+    """Motion at a fraction c of the period from x0 to x1 with these rates at its ends: Hermite's cubic."""
+    bend = (1.0 - c) * DT * rate0 - c * DT * rate1
+    blended: Array = x0 + (x1 - x0) * c * c * (3.0 - 2.0 * c) + c * (1.0 - c) * bend
+    return blended
+
+
+def flow(A: Array, b: Array, h: float, y: Array) -> Array:
+    """exp(A h) y + (integral of exp(A s) over 0 .. h) b by the series; A (M, nx, nx), b and y (M, nx, R)."""
+    total, term = y, y
+    for m in range(1, SERIES + 1):
+        term = h / m * (A @ term + (b if m == 1 else 0.0))
+        total = total + term
+    return total
 
 
 class _Sums:

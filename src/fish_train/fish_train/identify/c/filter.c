@@ -1,6 +1,7 @@
 /* Extended Kalman filter of one trial with forward sensitivities; see filter.py for the model.
 
-   Stands behind fish_sim's kernel text: V, LANES, NX, NM, NS, NP, NC, NW, DT, step_jvp, rate_jvp, follow_jvp.
+   Stands behind fish_sim's kernel text: V, LANES, NX, NM, NS, NP, NC, NW, DT, SUBSTEPS, step, drive_at, rate, rate_jvp,
+   follow_jvp.
    N = NX + 6: motion, wrench on the head, biases of gyro and accelerometer. Directions: N - 3 columns of the
    Jacobian (motion, wrench), then K free parameters; each carries NS + 6 numbers (state, wrench, biases). */
 #include <stdlib.h>
@@ -8,6 +9,7 @@
 
 #define N (NX + 6)
 #define ND (NS + 6)
+#define SERIES 8 /* terms of the matrix exponential: 3e-6 where the fastest mode turns by 1 rad in half a substep */
 
 typedef struct {
   double camera_latency, camera_heading_offset, camera_scale, gyro_scale, imu_misalignment; /* sensors */
@@ -20,8 +22,13 @@ typedef struct {
   double gate_imu, gate_camera;            /* squared normalised innovation */
 } Settings;
 
+/* a row of a matrix of N columns, padded to whole vectors with zeros */
+#define WIDTH ((N + LANES - 1) / LANES)
+typedef union { double at[WIDTH * LANES]; V v[WIDTH]; } Row;
+
 typedef struct {
-  double xi[N], P[N][N], F[N][N], memory[NM];
+  Row P[N], F[N];
+  double xi[N], memory[NM];
   double *D; /* (K, ND) derivatives of state, wrench and biases */
 } Work;
 
@@ -30,14 +37,10 @@ typedef struct {
   double *gradient, *normal;
 } Sums;
 
-/* lanes of directions first .. first + LANES - 1: tangents of state and parameters at the current estimate */
-static void fill(const Settings *c, const Work *f, long K, const double *p, const double *dp, long first, V *s, V *ds,
-                 V *pv, V *dpv)
+/* tangents of state and parameters along the directions first .. first + LANES - 1; `moving`: those of the motion too,
+   without them what parameters and wrench do to a given motion */
+static void seed(const Settings *c, const Work *f, long K, const double *dp, long first, int moving, V *ds, V *dpv)
 {
-  for (int k = 0; k < NX; ++k) s[k] = v_constant(f->xi[k]);
-  for (int k = 0; k < NM; ++k) s[NX + k] = v_constant(f->memory[k]);
-  for (int k = 0; k < NP; ++k) pv[k] = v_constant(p[k]);
-  for (int i = 0; i < 3; ++i) pv[c->wrench_at[i]] = v_constant(f->xi[NX + i]);
   for (int k = 0; k < NS; ++k) ds[k] = v_constant(0.0);
   for (int k = 0; k < NP; ++k) dpv[k] = v_constant(0.0);
   for (int l = 0; l < LANES; ++l) {
@@ -46,75 +49,169 @@ static void fill(const Settings *c, const Work *f, long K, const double *p, cons
     else if (j < NX + 3) LANE(dpv[c->wrench_at[j - NX]], l) = 1.0;
     else if (j < NX + 3 + K) {
       const double *D = f->D + (j - NX - 3) * ND, *row = dp + (j - NX - 3) * NP;
-      for (int k = 0; k < NS; ++k) LANE(ds[k], l) = D[k];
+      for (int k = moving ? 0 : NX; k < NS; ++k) LANE(ds[k], l) = D[k];
       for (int k = 0; k < NP; ++k) LANE(dpv[k], l) = row[k];
       for (int i = 0; i < 3; ++i) LANE(dpv[c->wrench_at[i]], l) = D[NS + i];
     }
   }
 }
 
-/* rates of motion just after the grid point, and along every direction (directions, NX) */
-static void rates(const Settings *c, const Work *f, long K, const double *p, const double *dp, const double *command,
-                  double *rate, double *tangent)
+/* parameters with the wrench at the current estimate */
+static void load_parameters(const Settings *c, const Work *f, const double *p, V *pv)
 {
-  V s[NS], ds[NS], pv[NP], dpv[NP], cmd[NC], zero[NC], m1[NM], dm1[NM], w[NW], dw[NW], out[NX], d_out[NX];
+  for (int k = 0; k < NP; ++k) pv[k] = v_constant(p[k]);
+  for (int i = 0; i < 3; ++i) pv[c->wrench_at[i]] = v_constant(f->xi[NX + i]);
+}
+
+/* rates of a motion at a fraction of the command period, and along the directions first .. last - 1 (directions, NX) */
+static void rates(const Settings *c, const Work *f, long K, const double *p, const double *dp, const double *command,
+                  const double *motion, double fraction, int moving, long first, long last, double *rate,
+                  double *tangent)
+{
+  V x[NX], m0[NM], ds[NS], pv[NP], dpv[NP], cmd[NC], zero[NC], m1[NM], dm1[NM], w[NW], dw[NW], out[NX], d_out[NX];
   for (int i = 0; i < NC; ++i) { cmd[i] = v_constant(command[i]); zero[i] = v_constant(0.0); }
-  for (long first = 0; first < NX + 3 + K; first += LANES) {
-    fill(c, f, K, p, dp, first, s, ds, pv, dpv);
-    follow_jvp(s + NX, cmd, pv, ds + NX, zero, dpv, m1, dm1);
-    drive_at(s + NX, m1, 0.0, w);
-    drive_at(ds + NX, dm1, 0.0, dw);
-    rate_jvp(s, w, pv, ds, dw, dpv, out, d_out);
+  for (int k = 0; k < NX; ++k) x[k] = v_constant(motion[k]);
+  for (int k = 0; k < NM; ++k) m0[k] = v_constant(f->memory[k]);
+  load_parameters(c, f, p, pv);
+  for (; first < last; first += LANES) {
+    seed(c, f, K, dp, first, moving, ds, dpv);
+    follow_jvp(m0, cmd, pv, ds + NX, zero, dpv, m1, dm1);
+    drive_at(m0, m1, fraction, w);
+    drive_at(ds + NX, dm1, fraction, dw);
+    rate_jvp(x, w, pv, ds, dw, dpv, out, d_out);
     for (int k = 0; k < NX; ++k) rate[k] = LANE(out[k], 0);
-    for (int l = 0; l < LANES && first + l < NX + 3 + K; ++l)
+    for (int l = 0; l < LANES && first + l < last; ++l)
       for (int k = 0; k < NX; ++k) tangent[(first + l) * NX + k] = LANE(d_out[k], l);
   }
 }
 
-/* one step of 10 ms: estimate, covariance, derivatives */
+/* y <- exp(A h) y + (integral of exp(A s) over 0 .. h) b: the series; A is stored column by column */
+static void flow(const double *A, const V *b, double h, V *y)
+{
+  V term[NX], next[NX];
+  for (int k = 0; k < NX; ++k) term[k] = y[k];
+  for (int m = 1; m <= SERIES; ++m) {
+    for (int k = 0; k < NX; ++k) {
+      V sum = m == 1 ? b[k] : v_constant(0.0);
+#pragma GCC unroll 32
+      for (int j = 0; j < NX; ++j) sum += v_constant(A[j * NX + k]) * term[j];
+      next[k] = v_constant(h / m) * sum;
+    }
+    for (int k = 0; k < NX; ++k) { term[k] = next[k]; y[k] += next[k]; }
+  }
+}
+
+/* out = a b for matrices of N rows */
+static void multiply(const Row *a, const Row *b, Row *out)
+{
+  for (int i = 0; i < N; ++i) {
+    V sum[WIDTH];
+    for (int w = 0; w < WIDTH; ++w) sum[w] = v_constant(0.0);
+    for (int k = 0; k < N; ++k)
+#pragma GCC unroll 32
+      for (int w = 0; w < WIDTH; ++w) sum[w] += v_constant(a[i].at[k]) * b[k].v[w];
+    for (int w = 0; w < WIDTH; ++w) out[i].v[w] = sum[w];
+  }
+}
+
+/* P <- F P F^T, exactly symmetric */
+static void spread(Work *f)
+{
+  Row T[N], Ft[N];
+  for (int i = 0; i < N; ++i) {
+    for (int w = 0; w < WIDTH; ++w) Ft[i].v[w] = v_constant(0.0);
+    for (int j = 0; j < N; ++j) Ft[i].at[j] = f->F[j].at[i];
+  }
+  multiply(f->F, f->P, T);
+  multiply(T, Ft, f->P);
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j < i; ++j) f->P[j].at[i] = f->P[i].at[j];
+}
+
+/* motion at a fraction of the period that led from x0 to x1 with these rates at its ends: Hermite's cubic */
+static void between(const V *x0, const V *x1, const V *rate0, const V *rate1, double c, double *motion)
+{
+  for (int k = 0; k < NX; ++k) {
+    const double a = LANE(x0[k], 0), b = LANE(x1[k], 0), va = DT * LANE(rate0[k], 0), vb = DT * LANE(rate1[k], 0);
+    motion[k] = a + (b - a) * c * c * (3.0 - 2.0 * c) + c * (1.0 - c) * ((1.0 - c) * va - c * vb);
+  }
+}
+
+/* half a step of tangents along the directions first .. last - 1: x' = A x + b, b their own rates (0 for the motion's) */
+static void carry(const double *A, const double *own, long first, long last, V *moving)
+{
+  for (; first < last; first += LANES, moving += NX) {
+    V b[NX];
+    for (int k = 0; k < NX; ++k) b[k] = v_constant(0.0);
+    for (int l = first < NX ? NX - first : 0; l < LANES && first + l < last; ++l)
+      for (int k = 0; k < NX; ++k) LANE(b[k], l) = own[(first + l) * NX + k];
+    for (int sub = 0; sub < SUBSTEPS; ++sub) flow(A, b, 0.5 * DT / SUBSTEPS, moving);
+  }
+}
+
+/* One step of 10 ms: estimate, covariance, derivatives. The estimate takes the simulator's step. Its tangents follow
+   x' = A x + b, the Jacobian A taken in the middle of the step and the parameters' b in the middle of each half, instead of
+   the integrator's stages. Against these: 0.1 nats in 90,000, standard errors to 2 %, at half the time. */
 static void predict(const Settings *c, Work *f, long K, const double *p, const double *dp, const double *command)
 {
-  V s[NS], ds[NS], pv[NP], dpv[NP], cmd[NC], zero[NC];
-  double next[NS] = {0}, T[N][N];
-  double *D = malloc(sizeof(double) * (K ? K : 1) * ND);
-  memset(f->F, 0, sizeof f->F);
-  memcpy(D, f->D, sizeof(double) * K * ND);
+  V s0[NS], s1[NS], rate0[NX], rate1[NX], w[NW], pv[NP], cmd[NC], zero[NC], m1[NM], dm1[NM], ds[NS], dpv[NP];
+  V moving[(NX + 3 + LANES) / LANES * NX]; /* of the columns of the Jacobian */
+  double at[NX], unused[NX], A[(NX + 3) * NX];
+  const long columns = NX + 3, last = columns + K;
+  double *own = malloc(sizeof(double) * (last + 1) * NX);
+  V *d_moving = aligned_alloc(sizeof(V), sizeof(V) * (K + LANES) / LANES * NX); /* of the parameters' directions */
   for (int i = 0; i < NC; ++i) { cmd[i] = v_constant(command[i]); zero[i] = v_constant(0.0); }
-  for (long first = 0; first < NX + 3 + K; first += LANES) {
-    fill(c, f, K, p, dp, first, s, ds, pv, dpv);
-    step_jvp(s, ds, cmd, zero, pv, dpv);
-    for (int k = 0; k < NS; ++k) next[k] = LANE(s[k], 0);
-    for (int l = 0; l < LANES; ++l) {
-      const long j = first + l;
-      if (j < NX + 3) for (int k = 0; k < NX; ++k) f->F[k][j] = LANE(ds[k], l);
-      else if (j < NX + 3 + K) for (int k = 0; k < NS; ++k) D[(j - NX - 3) * ND + k] = LANE(ds[k], l);
+  load_parameters(c, f, p, pv);
+  for (int k = 0; k < NX; ++k) s0[k] = s1[k] = v_constant(f->xi[k]);
+  for (int k = 0; k < NM; ++k) s0[NX + k] = s1[NX + k] = v_constant(f->memory[k]);
+  step(s1, cmd, pv);
+  drive_at(s0 + NX, s1 + NX, 0.0, w);
+  rate(s0, w, pv, rate0);
+  drive_at(s0 + NX, s1 + NX, 1.0, w);
+  rate(s1, w, pv, rate1);
+
+  between(s0, s1, rate0, rate1, 0.5, at);
+  rates(c, f, K, p, dp, command, at, 0.5, 0, 0, columns, unused, A);
+  for (long j = 0; j < columns; j += LANES) {
+    seed(c, f, 0, dp, j, 1, ds, dpv);
+    memcpy(moving + j / LANES * NX, ds, sizeof(V) * NX);
+  }
+  for (int half = 0; half < 2; ++half) carry(A, A, 0, columns, moving);
+  memset(f->F, 0, sizeof f->F);
+  for (long j = 0; j < columns; ++j)
+    for (int k = 0; k < NX; ++k) f->F[k].at[j] = LANE(moving[j / LANES * NX + k], j % LANES);
+
+  for (long j = 0; j < K; j += LANES) {
+    seed(c, f, K, dp, columns + j, 1, ds, dpv);
+    memcpy(d_moving + j / LANES * NX, ds, sizeof(V) * NX);
+  }
+  for (int half = 0; K && half < 2; ++half) {
+    const double fraction = 0.25 + 0.5 * half;
+    between(s0, s1, rate0, rate1, fraction, at);
+    rates(c, f, K, p, dp, command, at, fraction, 0, columns, last, unused, own);
+    carry(A, own, columns, last, d_moving);
+  }
+  for (long first = 0; first < K; first += LANES) {
+    seed(c, f, K, dp, columns + first, 1, ds, dpv);
+    follow_jvp(s0 + NX, cmd, pv, ds + NX, zero, dpv, m1, dm1);
+    for (int l = 0; l < LANES && first + l < K; ++l) {
+      double *D = f->D + (first + l) * ND;
+      for (int k = 0; k < NX; ++k) D[k] = LANE(d_moving[first / LANES * NX + k], l);
+      for (int k = 0; k < NM; ++k) D[NX + k] = LANE(dm1[k], l);
+      for (int i = 0; i < 3; ++i) D[NS + i] *= c->wrench_decay;
     }
   }
-  for (long j = 0; j < K; ++j)
-    for (int i = 0; i < 3; ++i) D[j * ND + NS + i] *= c->wrench_decay;
-  memcpy(f->D, D, sizeof(double) * K * ND);
-  free(D);
-  memcpy(f->xi, next, sizeof(double) * NX);
-  memcpy(f->memory, next + NX, sizeof(double) * NM);
+  free(own); free(d_moving);
+  for (int k = 0; k < NX; ++k) f->xi[k] = LANE(s1[k], 0);
+  for (int k = 0; k < NM; ++k) f->memory[k] = LANE(s1[NX + k], 0);
   for (int i = 0; i < 3; ++i) {
     f->xi[NX + i] *= c->wrench_decay;
-    f->F[NX + i][NX + i] = c->wrench_decay;
-    f->F[NX + 3 + i][NX + 3 + i] = 1.0;
+    f->F[NX + i].at[NX + i] = c->wrench_decay;
+    f->F[NX + 3 + i].at[NX + 3 + i] = 1.0;
   }
-  for (int i = 0; i < N; ++i)
-    for (int j = 0; j < N; ++j) {
-      double sum = 0.0;
-      for (int k = 0; k < N; ++k) sum += f->F[i][k] * f->P[k][j];
-      T[i][j] = sum;
-    }
-  for (int i = 0; i < N; ++i)
-    for (int j = 0; j <= i; ++j) {
-      double sum = 0.0;
-      for (int k = 0; k < N; ++k) sum += T[i][k] * f->F[j][k];
-      f->P[i][j] = f->P[j][i] = sum;
-    }
-  for (int k = 0; k < NX; ++k) f->P[k][k] += 1e-14; /* keeps the covariance regular on the constraint */
-  for (int i = 0; i < 3; ++i) f->P[NX + i][NX + i] += c->wrench_variance[i];
+  spread(f);
+  for (int k = 0; k < NX; ++k) f->P[k].at[k] += 1e-14; /* keeps the covariance regular on the constraint */
+  for (int i = 0; i < 3; ++i) f->P[NX + i].at[NX + i] += c->wrench_variance[i];
 }
 
 /* Kalman update with three rows: innovation e, Jacobian H, derivatives dh (3, K), standard deviations sd */
@@ -125,7 +222,7 @@ static int update(Work *f, long K, const double *e, double H[3][N], const double
   for (int i = 0; i < N; ++i)
     for (int a = 0; a < 3; ++a) {
       double sum = 0.0;
-      for (int k = 0; k < N; ++k) sum += f->P[i][k] * H[a][k];
+      for (int k = 0; k < N; ++k) sum += f->P[i].at[k] * H[a][k];
       PH[i][a] = sum;
     }
   for (int a = 0; a < 3; ++a)
@@ -165,9 +262,9 @@ static int update(Work *f, long K, const double *e, double H[3][N], const double
     for (int a = 0; a < 3; ++a) f->xi[i] += G[i][a] * e[a];
   for (int i = 0; i < N; ++i)
     for (int j = 0; j <= i; ++j) {
-      double sum = f->P[i][j];
+      double sum = f->P[i].at[j];
       for (int a = 0; a < 3; ++a) sum -= G[i][a] * PH[j][a];
-      f->P[i][j] = f->P[j][i] = sum;
+      f->P[i].at[j] = f->P[j].at[i] = sum;
     }
   double J[3][K ? K : 1];
   for (long j = 0; j < K; ++j) {
@@ -246,6 +343,12 @@ static void measure_camera(const Settings *c, Work *f, long K, const double *z, 
   update(f, K, e, H, dh, sd, c->gate_camera, sums, whitened);
 }
 
+/* a matrix without its padding */
+static void keep(const Row *from, double *to)
+{
+  for (int i = 0; i < N; ++i) memcpy(to + i * N, from[i].at, sizeof(double) * N);
+}
+
 /* Arrays: commands (steps, NC), imu (steps, 3) with NaN where missing, offset (steps) NaN without a frame,
    pose (steps, 3), p (NP), dp (K, NP), start (N), start_P (N, N), memory0 (NM), d_memory0 (K, NM).
    Results: sums[2] = log likelihood,
@@ -263,23 +366,24 @@ void filter_trial(long steps, long K, const double *commands, const double *imu,
   const long row = 3 * N * N + 2 * N + NM;
   f.D = calloc((K ? K : 1) * ND, sizeof(double));
   memcpy(f.xi, start, sizeof f.xi);
-  memcpy(f.P, start_P, sizeof f.P);
+  memset(f.P, 0, sizeof f.P);
+  for (int i = 0; i < N; ++i) memcpy(f.P[i].at, start_P + i * N, sizeof(double) * N);
   memcpy(f.memory, memory0, sizeof f.memory);
   for (long j = 0; j < K; ++j) memcpy(f.D + j * ND + NX, d_memory0 + j * NM, sizeof f.memory);
   for (long k = 0; k < steps; ++k) {
     double *h = history ? history + k * row : NULL;
-    if (h) { memcpy(h, f.xi, sizeof f.xi); memcpy(h + N, f.P, sizeof f.P); }
+    if (h) { memcpy(h, f.xi, sizeof f.xi); keep(f.P, h + N); }
     const int has_imu = isfinite(imu[3 * k] + imu[3 * k + 1] + imu[3 * k + 2]), has_camera = isfinite(offset[k]);
-    if (has_imu || has_camera) rates(c, &f, K, p, dp, commands + k * NC, rate, tangent);
+    if (has_imu || has_camera) rates(c, &f, K, p, dp, commands + k * NC, f.xi, 0.0, 1, 0, NX + 3 + K, rate, tangent);
     if (has_imu) measure_imu(c, &f, K, imu + 3 * k, rate, tangent, dh, &sums, whitened + 6 * k);
     if (has_camera) measure_camera(c, &f, K, pose + 3 * k, offset[k], rate, dh, &sums, whitened + 6 * k + 3);
     if (h) {
       memcpy(h + N + N * N, f.xi, sizeof f.xi);
-      memcpy(h + 2 * N + N * N, f.P, sizeof f.P);
+      keep(f.P, h + 2 * N + N * N);
       memcpy(h + 2 * N + 3 * N * N, f.memory, sizeof f.memory);
     }
     if (k + 1 < steps) predict(c, &f, K, p, dp, commands + k * NC);
-    if (h) memcpy(h + 2 * N + 2 * N * N, f.F, sizeof f.F);
+    if (h) keep(f.F, h + 2 * N + 2 * N * N);
     if (!isfinite(f.xi[0])) {
       sums.log_likelihood = -INFINITY;
       for (h = history ? history + (k + 1) * row : NULL; h && h < history + steps * row; h += row)
