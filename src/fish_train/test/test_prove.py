@@ -13,18 +13,21 @@ from fish_sim.ops import NUMPY
 from fish_sim.scheme import default_scheme
 from fish_train.commands.main import main
 from fish_train.diagnose.locate import MissingForce
+from fish_train.diagnose.own_force import acting, f1, own_force, regimes
 from fish_train.diagnose.vocabulary import candidates
 from fish_train.evaluation.cells import Cell
 from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
 from fish_train.evaluation.study import Row
 from fish_train.identify.experiment import build_experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import evaluate
 from fish_train.prove import groups
 from fish_train.prove.build import make_readings, make_world
 from fish_train.prove.close_loop import loop_table
 from fish_train.prove.judge import judged_table, rivals_table
 from fish_train.prove.mujoco_plant import MujocoPlant, model_text
 from fish_train.prove.nulls import null_table
-from fish_train.prove.oracle import Sight, as_experiment, detects
+from fish_train.prove.oracle import Sight, as_experiment, detects, with_truth
 from fish_train.prove.other_forms import OTHER_FORMS
 from fish_train.prove.outside import OUTSIDE, known_to_the_plant
 from fish_train.prove.runner import run_study
@@ -33,7 +36,7 @@ from fish_train.prove.seal import Sealed, broken_seals, seal_label
 from fish_train.prove.study import Study, StudyError, read_json
 from fish_train.prove.tables import ASKED, Share, calibration, choice, power, smallest_error
 from fish_train.prove.truths import truths_of
-from fish_train.prove.where import activity, dof_overlap, regime_f1, time_overlap
+from fish_train.prove.where import dof_overlap, overlap, stated_range, stated_times, true_push
 from fish_train.prove.world import World
 from fish_train.recordings import read_dataset
 from fish_train.reports.prove_page import write_prove_page
@@ -247,23 +250,42 @@ def test_power_counts_per_strength() -> None:
     assert [(p.strength, p.found.k, p.found.n, p.oracle.k) for p in steps] == [(0.5, 1, 2, 2), (1.0, 1, 1, 0)]
 
 
-def test_overlap_and_regime() -> None:
-    acts = np.zeros((800, 2))
-    acts[200:400, 1] = 1.0
-    names = ["trial_00", "trial_01"]
-    hit = [{"trial": "trial_01", "from": 2.0, "to": 4.0}]
-    assert time_overlap(hit, names, acts) == 1.0
+def test_overlap_of_times_and_degrees_of_freedom() -> None:
+    acts, names = np.zeros((800, 2), dtype=bool), ["trial_00", "trial_01"]
+    acts[200:400, 1] = True
+    hit = [{"trial": "trial_01", "from": 2.0, "to": 4.0}, {"trial": "elsewhere", "from": 0.0, "to": 8.0}]
+    assert overlap(stated_times(hit, names, 800), acts) == 1.0
+    assert overlap(stated_times([{**hit[0], "to": 6.0}], names, 800), acts) == 0.5
+    assert overlap(stated_times([{**hit[0], "trial": "trial_00"}], names, 800), acts) == 0.0
+    assert f1(stated_times([{**hit[0], "to": 6.0}], names, 800), acts) == pytest.approx(2.0 / 3.0)
     assert dof_overlap({"surge": 0.7, "yaw": 0.3}, {"surge": 0.5, "sway": 0.5}) == 0.5
-    assert time_overlap([{**hit[0], "trial": "trial_00"}], names, acts) == 0.0
-    truth = np.zeros((800, 1, 3))
-    truth[:, 0, 0] = np.linspace(0.0, 2.0, 800)  # towards the wall at 2.135 m
-    world = World("single", 1, {"wall_effect": {"k": 2.5, "length": 0.2}})
-    covariate, strength = activity(world, truth)
-    assert covariate == "wall_distance" and strength[-1, 0] > strength[0, 0]
-    whole = [{"name": "wall_distance", "range": [0.0, 0.1351 + 0.2 * np.log(1 / 0.3)]}]
-    assert regime_f1(whole, truth, strength) > 0.99
-    assert regime_f1([{"name": "wall_distance", "range": [1.0, 1.05]}], truth, strength) == 0.0
-    assert activity(World("single", 1, {"current": {"x": 1.0}}), truth) is None
+
+
+def test_a_localised_effect_is_seen_where_it_acts() -> None:
+    """A fish that swims to a wall, with drag there: the interval before the wall, and the distance as what tells it."""
+    effects = {"wall_effect": {"k": 2.5, "length": 0.2}}
+    world = World("single", 3, effects, count=3, duration=10.0)
+    experiment = as_experiment(make_readings(world), True)
+    push = true_push(world, experiment)
+    assert push is not None
+    acts = acting(push, np.array(Noise().wrench))
+    near = push.covariates["wall_distance"]
+    assert 0.02 < acts.mean() < 0.8 and near[acts].mean() < near[~acts].mean()
+    assert stated_range(regimes(push, np.array(Noise().wrench)), push.covariates)[acts].mean() > 0.5
+    assert true_push(World("single", 1, {"current": {"x": 0.03}}), experiment) is None
+
+
+def test_the_own_force_of_a_drag_is_its_equation() -> None:
+    """-k |u| u on the head, from the accelerations with and without it."""
+    world = World(
+        "single", 3, {"quadratic_drag": {"surge": 0.5, "sway": 0.0, "yaw": 0.0}}, count=2, duration=4.0
+    )
+    experiment = as_experiment(make_readings(world), True)
+    hypothesis, theta = with_truth(world, world.names)
+    push = own_force(evaluate(hypothesis, theta, experiment, Noise()), "quadratic_drag", experiment)
+    u = push.covariates["surge_speed"]
+    np.testing.assert_allclose(push.wrench[..., 0], -0.5 * np.abs(u) * u, atol=1e-6)
+    np.testing.assert_allclose(push.wrench[..., 1:], 0.0, atol=1e-6)
 
 
 def test_the_oracle_and_the_rivals_by_hand() -> None:
@@ -278,7 +300,10 @@ def test_the_oracle_and_the_rivals_by_hand() -> None:
     answer = diagnosis(("current", "physics", 0.9))
     answer["diagnosis"]["fit"]["with_effects"]["rms"] = {"2 s": {"position_m": 0.022}}
     right, null = score_world(world, answer), score_world(World("null", 2), diagnosis(verdict="no_mismatch"))
-    judged = {1: {"overlap": 0.5, "f1": None, "dof": 0.7}, 2: {"overlap": None, "f1": None, "dof": None}}
+    judged = {
+        1: {"overlap": 0.5, "f1": 0.6, "range_f1": None, "dof": 0.7},
+        2: {"overlap": None, "f1": None, "dof": None},
+    }
     table = judged_table([right, null], judged, {1: sight(9.0), 2: sight(0.0)}, {1: True})
     assert [row[2] for row in table.rows] == [
         "100% of 1",
@@ -286,6 +311,7 @@ def test_the_oracle_and_the_rivals_by_hand() -> None:
         "0.55 (1 worlds)",
         "0.70 (1 worlds)",
         "0.50 (1 worlds)",
+        "0.60 (1 worlds)",
         "–",
     ]
     said = {

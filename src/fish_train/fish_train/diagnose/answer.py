@@ -9,10 +9,11 @@ import numpy as np
 from fish_sim.robot import Robot
 from fish_train.diagnose import locate
 from fish_train.diagnose.decide import PLAUSIBLE, TEMPER, p_value, parameter_count, probabilities
-from fish_train.diagnose.diagnosis import TOO_STRONG, Accepted, Diagnosis
+from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
-from fish_train.diagnose.law import REGRESSORS
+from fish_train.diagnose.own_force import intervals, regimes
 from fish_train.diagnose.search import evidence
+from fish_train.diagnose.verdict import has_law, much_is_left, named, unexplained_share, verdict
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.cold import excess
 from fish_train.identify.filter_types import ROWS, Noise
@@ -22,43 +23,6 @@ from fish_train.identify.prediction import predict, prediction_errors
 
 HORIZONS = (1.0, 2.0, 5.0)
 STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in surge, sway and yaw"
-
-
-def verdict(d: Diagnosis) -> str:
-    """no_mismatch, missing_physics, sensor_or_actuator or unexplained."""
-    found = named(d)
-    if not found:
-        return "unexplained" if much_is_left(d) else "no_mismatch"
-    kinds = {kind_of(a.name) for a in found}
-    return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
-
-
-def much_is_left(d: Diagnosis) -> bool:
-    """The wrench that remains follows a law on trials that the law was not fitted to, or is far stronger than water."""
-    return has_law(d) or bool(excess(d.final).max() > TOO_STRONG)
-
-
-def has_law(d: Diagnosis) -> bool:
-    """A sparse regression of the remaining wrench would be as good as a name, on trials that it was not fitted to."""
-    samples, gain = float(d.final.result.samples.sum()), max(d.description.gain.values())
-    return gain > d.level.enough(samples, REGRESSORS, len(d.description.gain) * d.description.tried)
-
-
-def named(d: Diagnosis) -> tuple[Accepted, ...]:
-    """The accepted effects, or none where they leave more than they take away: nearest is not right."""
-    return () if much_is_left(d) and unexplained_share(d) > 0.5 else d.accepted
-
-
-def corrected(d: Diagnosis) -> Fit:
-    """The fit that model.yaml holds."""
-    return d.final if named(d) else d.nominal
-
-
-def unexplained_share(d: Diagnosis) -> float:
-    """Part of the mismatch that is still there: densities of the wrench beyond those of usual water."""
-    final, nominal = excess(d.final), excess(d.nominal)
-    left, removed = np.sum(np.maximum(final - 1.0, 0.0)), np.sum(np.maximum(nominal - final, 0.0))
-    return float(left / (left + removed)) if left + removed > 0 else 0.0
 
 
 def answer(d: Diagnosis) -> dict[str, Any]:
@@ -93,7 +57,6 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     gains = {a.name: a.round.gain(a.name) for a in d.accepted}
     tried = len(found.ranking)
     odds = competition(accepted)
-    without, force = d.parts.get(name, (d.nominal, d.force))
     return {
         "name": name,
         "kind": kind_of(name),
@@ -106,7 +69,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         },
         "share": gains[name] / sum(gains.values()),
         "rivals": [{"name": n, "probability": p} for n, p in odds.items() if n != name and p > PLAUSIBLE],
-        "where": where_entry(force, without, d.final),
+        "where": where_entry(d, name),
     }
 
 
@@ -130,14 +93,15 @@ def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:
     }
 
 
-def where_entry(force: locate.MissingForce, nominal: Fit, final: Fit) -> dict[str, Any]:
-    """Degrees of freedom, covariates, times and places."""
-    scale = np.array(final.noise.wrench)
+def where_entry(d: Diagnosis, name: str) -> dict[str, Any]:
+    """Degrees of freedom, covariates, times and places of an effect: of what it does, or else of what is missing without."""
+    without, missing = d.parts.get(name, (d.nominal, d.force))
+    scale, push = np.array(d.final.noise.wrench), d.pushes.get(name)
     return {
-        "dof": locate.dof_shares(nominal, final),
-        "covariates": locate.covariate_shares(force, scale),
-        "time": locate.time_shares(force, scale),
-        "place": locate.place_shares(force, scale),
+        "dof": locate.dof_shares(without, d.final),
+        "covariates": locate.covariate_shares(missing, scale) if push is None else regimes(push, scale),
+        "time": locate.time_shares(missing, scale) if push is None else intervals(push, scale),
+        "place": locate.place_shares(push or missing, scale),
     }
 
 
@@ -170,6 +134,7 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
     """Prediction errors and log density on held-out trials, before and after."""
     robots = {"nominal": (d.robot, d.given_noise), "refitted": (d.nominal.robot, d.nominal.noise),
               "with_effects": (d.final.robot, d.final.noise)}  # fmt: skip
+    outlook = {"rms": held_out_errors(d, d.outlook.robot, d.outlook.noise)} if d.outlook is not None else None
     entries = {
         name: {
             "rms": held_out_errors(d, robot, noise),
@@ -181,6 +146,7 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
     return {
         "held_out_trials": [d.experiment.names[i] for i in d.split.held_out],
         **entries,
+        "model_yaml": outlook,  # where no name fits: the refitted structure that predicts best over seconds
         "tail_links": {"given": d.robot.links, "used": d.final.robot.links},
         "noise_floor": {"wrench_std": list(map(float, d.final.noise.wrench)), "unit": ["N", "N", "N m"],
                         "correlation_time_s": float(d.final.noise.wrench_time)},

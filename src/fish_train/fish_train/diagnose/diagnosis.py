@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fish_sim.robot import Robot
 from fish_train.diagnose.base import settle_base
-from fish_train.diagnose.decide import SMALLEST_Z, TEMPER, Level, parameter_count, strength_z
+from fish_train.diagnose.decide import SMALLEST_CHECK, SMALLEST_Z, Level, parameter_count, strength_z
 from fish_train.diagnose.law import Description, describe
 from fish_train.diagnose.locate import MissingForce, missing_force
+from fish_train.diagnose.own_force import has_own_force, own_force
 from fish_train.diagnose.search import (
     RANK_STEPS,
     Round,
@@ -21,12 +22,14 @@ from fish_train.diagnose.search import (
 )
 from fish_train.diagnose.split import Split, split_trials
 from fish_train.diagnose.tail import MORE, finer_tails
+from fish_train.diagnose.verdict import TOO_STRONG, much_is_left, named
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
 from fish_train.identify.cold import SUSPICIOUS, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, adapt_noise, evaluate, settle, trial_likelihoods
 from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.outlook import fit_outlook
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.settle import open_gates, suitable_noise
 from fish_train.identify.tempering import fit_tempered
@@ -35,8 +38,6 @@ MOST_EFFECTS = 3
 FAIR_SHARE = (
     0.5  # of the gain that a true effect shows on trials not fitted to: half-way from none to all of it
 )
-# times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
-TOO_STRONG = 30.0
 
 Progress = Callable[[str], None]
 
@@ -70,10 +71,14 @@ class Diagnosis:
     parts: dict[
         str, tuple[Fit, MissingForce]
     ]  # of several effects: the final model less one, and what it then lacks
+    pushes: dict[str, MissingForce]  # of the accepted effects that push: what they do in the final model
     remaining: MissingForce  # that the final model lacks
     description: Description  # of the remaining force
     given_noise: Noise  # that suits the robot as given: at the refitted noise its filter would lose the fish
     held_out: dict[str, np.ndarray]  # log density per sample and held-out trial: given, nominal, final
+    outlook: Fit | None = (
+        None  # where much is left and no name fits: the nominal structure that predicts best
+    )
 
     @property
     def unseen(self) -> Experiment:
@@ -111,14 +116,20 @@ def diagnose(
     force = missing_force(nominal, training)
     remaining = missing_force(final, training) if accepted else force
     parts = shares(final, accepted, training)
+    pushes = {a.name: own_force(final, a.name, training) for a in accepted if has_own_force(a.name)}
     progress("scoring held-out trials")
     unseen = experiment.select(split.held_out or split.training)
     given_noise = suitable_noise(unseen, robot, nominal.noise)
     held = held_out_density(unseen, robot, given_noise, nominal, final)
-    return Diagnosis(
+    found = Diagnosis(
         experiment, split, robot, nominal, final, tuple(rounds), tuple(accepted), unreachable, level,
-        force, parts, remaining, describe(remaining, final.noise), given_noise, held,
+        force, parts, pushes, remaining, describe(remaining, final.noise), given_noise, held,
     )  # fmt: skip
+    if named(found) or not much_is_left(found):
+        return found
+    # a likelihood misleads about a model that lacks something without a name: its parameters go where the next 50 ms are right
+    progress("no name fits: fitting the nominal model to predict over seconds")
+    return replace(found, outlook=fit_outlook(nominal, training, progress))
 
 
 def fit_base(robot: Robot, experiment: Experiment) -> Fit:
@@ -216,7 +227,7 @@ def holds_elsewhere(base: Fit, fit: Fit, check: Experiment) -> bool:
     there = trial_likelihoods(base.hypothesis, base.theta, check, noise)
     gain = float(here.log_likelihood.sum() - there.log_likelihood.sum())
     expected = 0.5 * float(np.nansum((here.whitened - there.whitened) ** 2))
-    return gain > max(FAIR_SHARE * expected, TEMPER)
+    return gain > max(FAIR_SHARE * expected, SMALLEST_CHECK)
 
 
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:

@@ -23,7 +23,7 @@ STRONGEST = 5  # windows and cells reported
 
 @dataclass(frozen=True)
 class MissingForce:
-    """Smoothed latent wrench of a fit with the covariates it may depend on; arrays (T, M), NaN beyond a trial's end."""
+    """Wrench on the head with the covariates it may depend on; arrays (T, M), NaN beyond a trial's end."""
 
     names: tuple[str, ...]
     wrench: Array  # (T, M, 3) N, N, N m
@@ -33,19 +33,31 @@ class MissingForce:
 
 def missing_force(fit: Fit, experiment: Experiment) -> MissingForce:
     """Smooth the latent wrench that a fit needs to reproduce the recordings."""
+    xi, deviation, memory = smoothed(fit, experiment)
+    wrench = slice(xi.shape[2] - 6, xi.shape[2] - 3)
+    return located(fit, experiment, xi, memory, xi[..., wrench], deviation[..., wrench])
+
+
+def smoothed(fit: Fit, experiment: Experiment) -> tuple[Array, Array, Array]:
+    """State (T, M, N), its standard deviations, and memory (T + 1, M, NM) given all measurements."""
     history = evaluate(fit.hypothesis, fit.theta, experiment, fit.noise, keep=True).result.history
     assert history is not None  # kept
-    xi, deviation = smooth(history)
-    nx, nq = xi.shape[2] - 6, fit.robot.links + 3
+    return *smooth(history), history.memory
+
+
+def located(
+    fit: Fit, experiment: Experiment, xi: Array, memory: Array, wrench: Array, deviation: Array
+) -> MissingForce:
+    """A wrench (T, M, 3) with what it may depend on."""
+    nq = fit.robot.links + 3
     valid = np.arange(len(xi))[:, None] < experiment.steps
     cos, sin = np.cos(xi[..., 2]), np.sin(xi[..., 2])
-    memory = history.memory[: len(xi)]
     covariates = {
         "surge_speed": xi[..., nq] * cos + xi[..., nq + 1] * sin,
         "sway_speed": xi[..., nq + 1] * cos - xi[..., nq] * sin,
         "yaw_rate": xi[..., nq + 2],
-        "rudder": memory[..., 0],
-        "rotor_speed": memory[..., 1],
+        "rudder": memory[: len(xi), :, 0],
+        "rotor_speed": memory[: len(xi), :, 1],
         "wall_distance": np.minimum(LENGTH / 2 - np.abs(xi[..., 0]), WIDTH / 2 - np.abs(xi[..., 1])),
         "heading": np.arctan2(sin, cos),
         "time": np.where(valid, DT * np.arange(len(xi))[:, None], np.nan),
@@ -53,8 +65,8 @@ def missing_force(fit: Fit, experiment: Experiment) -> MissingForce:
         "y": xi[..., 1],
     }
     masked = {k: np.where(valid, v, np.nan) for k, v in covariates.items()}
-    wrench = np.where(valid[..., None], xi[..., nx : nx + 3], np.nan)
-    return MissingForce(experiment.names, wrench, deviation[..., nx : nx + 3], masked)
+    force = np.where(valid[..., None], wrench, np.nan)
+    return MissingForce(experiment.names, force, deviation, masked)
 
 
 def dof_shares(nominal: Fit, final: Fit) -> dict[str, float]:

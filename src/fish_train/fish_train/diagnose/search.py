@@ -36,7 +36,7 @@ POLISHED = 8  # candidates that are ranked with the IMU's own noise
 SHORTLIST = 4
 MOST_SEARCHES = 3  # with one base after the other, each a better optimum
 POOR_BASE = 0.5  # share of the best candidate's gain that a better optimum of the base has as well
-WORTH_A_REFIT = 0.2  # share of the best ranking gain
+WORTH_A_REFIT = 0.2  # share of the best ranking gain, and of a gain that is enough: a refit on whole trials gains more
 LOOK_ALIKES = (
     ("tip_slip", "wake_memory", "tail_joint_damping"),
     ("rudder_lag", "rudder_delay"),
@@ -213,10 +213,10 @@ def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough
 def search_round(
     base: Fit, names: Sequence[str], experiment: Experiment, enough: float, progress: Progress
 ) -> Round:
-    """Rank all names on top of the base and refit the shortlist; nothing is refitted if no rank gain is near `enough`."""
+    """Rank all names on top of the base and refit the shortlist; nothing that gains far less than `enough`."""
     ranking = rank(base, names, experiment, progress)
     progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
-    chosen = shortlist(ranking) if ranking[0].gain > 0.1 * enough else []
+    chosen = [r for r in shortlist(ranking) if r.gain > WORTH_A_REFIT * enough]
     refitted = {}
     for r in chosen:
         progress(f"refitting {r.name}")

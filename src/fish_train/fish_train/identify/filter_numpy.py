@@ -185,9 +185,9 @@ class Filter:
         """Rates (M, nx) of a motion at a fraction of the period after grid point k, and their tangents (M, directions, nx)."""
         M, nx, R = self.trials, self.nx, self.directions
         ds, dp = self._directions(D, moving)
-        drive = _drive(self.memory[k, :, :2], self.memory[k + 1, :, :2], fraction)
+        drive = drive_at(self.memory[k, :, :2], self.memory[k + 1, :, :2], fraction)
         d_drive = np.zeros((M, R, 4))
-        d_drive[:, nx + 3 :] = _drive(
+        d_drive[:, nx + 3 :] = drive_at(
             *(d.transpose(0, 2, 1) for d in self.d_memory[k : k + 2, :, :2]), fraction
         )
         rate, tangent = self.stepper.rates_jvp(
@@ -262,7 +262,7 @@ class Filter:
         sums.whitened[..., ENCODER_ROW] = terms.whitened
 
 
-def _drive(start: Array, end: Array, fraction: float) -> Array:
+def drive_at(start: Array, end: Array, fraction: float) -> Array:
     """Rudder, its rate, rotor speed, its rate (..., 4) at a fraction of a period between two memories (..., 2)."""
     rate = (end - start) / DT
     now = start + fraction * (end - start)

@@ -89,8 +89,8 @@ def look(
     noise = usual_noise(data)
     surge, sway, yaw = (world.noise * w for w in noise.wrench)
     noise = replace(noise, wrench=(surge, sway, yaw))
-    nominal = _fit(_with(world, ()), world, data, noise)
-    true = _fit(_with(world, looked_for), world, data, noise)
+    nominal = _fit(*with_truth(world, ()), data, noise)
+    true = _fit(*with_truth(world, looked_for), data, noise)
     again = _from(nominal, true, data)
     nominal = max(nominal, again, key=lambda f: f.objective)
     return Looked(nominal, true, data, unseen)
@@ -104,23 +104,22 @@ def detects(sight: Sight, nulls: Sequence[Sight]) -> bool:
     return sight.gain > threshold
 
 
-def _with(world: World, names: Sequence[str]) -> Hypothesis:
-    """The nominal robot with these effects free, at the true values where they are hidden."""
+def with_truth(world: World, names: Sequence[str]) -> tuple[Hypothesis, Array]:
+    """The nominal robot with these effects free, and theta at the true values of all that is hidden."""
     hypothesis = nominal_hypothesis(Robot())
     for name in names:
         hypothesis = hypothesis.with_effect(name, 1.0)
         if name in world.effects:
             robot = hypothesis.robot.with_effect(name, **world.effects[name])
             hypothesis = replace(hypothesis, robot=robot)
-    return hypothesis
-
-
-def _fit(hypothesis: Hypothesis, world: World, data: Experiment, noise: Noise) -> Fit:
-    coordinates = Coordinates(hypothesis)
-    theta = coordinates.origin().copy()
+    theta = Coordinates(hypothesis).origin().copy()
     for i, name in enumerate(hypothesis.free):
         if name in world.parameters:
             theta[i] = np.log(world.parameters[name])
+    return hypothesis, theta
+
+
+def _fit(hypothesis: Hypothesis, theta: Array, data: Experiment, noise: Noise) -> Fit:
     fit = climb(evaluate(hypothesis, theta, data, noise), data, ITERATIONS)
     return climb(evaluate(hypothesis, fit.theta, data, adapt_noise(fit, data)), data, ITERATIONS)
 

@@ -1,0 +1,57 @@
+"""What a diagnosis comes to: which names stand, whether much is left, which robot to go on with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fish_train.diagnose.law import REGRESSORS
+from fish_train.diagnose.vocabulary import kind_of
+from fish_train.identify.cold import excess
+from fish_train.identify.fit import Fit
+
+if TYPE_CHECKING:  # it holds the answer to `fit_without_a_name`
+    from fish_train.diagnose.diagnosis import Accepted, Diagnosis
+
+# times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
+TOO_STRONG = 30.0
+
+
+def verdict(d: Diagnosis) -> str:
+    """no_mismatch, missing_physics, sensor_or_actuator or unexplained."""
+    found = named(d)
+    if not found:
+        return "unexplained" if much_is_left(d) else "no_mismatch"
+    kinds = {kind_of(a.name) for a in found}
+    return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
+
+
+def much_is_left(d: Diagnosis) -> bool:
+    """The wrench that remains follows a law on trials that the law was not fitted to, or is far stronger than water."""
+    return has_law(d) or bool(excess(d.final).max() > TOO_STRONG)
+
+
+def has_law(d: Diagnosis) -> bool:
+    """A sparse regression of the remaining wrench would be as good as a name, on trials that it was not fitted to."""
+    samples, gain = float(d.final.result.samples.sum()), max(d.description.gain.values())
+    return gain > d.level.enough_of_a_law(samples, REGRESSORS, len(d.description.gain) * d.description.tried)
+
+
+def named(d: Diagnosis) -> tuple[Accepted, ...]:
+    """The accepted effects, or none where they leave more than they take away: nearest is not right."""
+    return () if much_is_left(d) and unexplained_share(d) > 0.5 else d.accepted
+
+
+def unexplained_share(d: Diagnosis) -> float:
+    """Part of the mismatch that is still there: densities of the wrench beyond those of usual water."""
+    final, nominal = excess(d.final), excess(d.nominal)
+    left, removed = np.sum(np.maximum(final - 1.0, 0.0)), np.sum(np.maximum(nominal - final, 0.0))
+    return float(left / (left + removed)) if left + removed > 0 else 0.0
+
+
+def corrected(d: Diagnosis) -> Fit:
+    """The fit that model.yaml holds."""
+    if d.outlook is not None:
+        return d.outlook
+    return d.final if named(d) else d.nominal
