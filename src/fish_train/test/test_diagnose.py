@@ -98,6 +98,8 @@ def test_a_hidden_current_is_named_with_its_size(tmp_path):
         content["fit"]["with_effects"]["log_density_per_sample"]
         > content["fit"]["refitted"]["log_density_per_sample"]
     )
+    write_diagnosis_page(tmp_path / "report.html", "current", content, result)
+    assert "When current acts" in (tmp_path / "report.html").read_text()
     save_robot(
         without_wrench(result.final.robot),
         tmp_path / "model.yaml",

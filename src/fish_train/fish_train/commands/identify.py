@@ -29,12 +29,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--effects",
         default="",
         metavar="NAME,NAME",
-        help="effects that the model gets besides, their parameters free (default: none); see diagnose",
+        help="effects that the model gets besides, their parameters free (default: none; see diagnose), or 'choose': those "
+        "that predict training trials better that are left out in turn",
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Identify, print, write."""
+    from fish_sim.effects import EFFECTS
+    from fish_train.diagnose.vocabulary import NOT_A_NAME
     from fish_train.identify.identification import identify
     from fish_train.identify.record import write_identification
     from fish_train.reports.identify_page import write_identify_page
@@ -43,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
     from .inputs import read_experiment, read_model, terminal, user_errors
 
-    console = terminal()
+    console, chosen = terminal(), args.effects == "choose"
     robot = read_model(args.robot)
     experiment, left_out = read_experiment(*args.dataset)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -54,7 +57,8 @@ def run(args: argparse.Namespace) -> int:
             robot,
             hold_out=args.hold_out,
             report=lambda text: bar.update(task, description=text),
-            effects=tuple(name for name in args.effects.split(",") if name),
+            effects=() if chosen else tuple(name for name in args.effects.split(",") if name),
+            choose_from=tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else (),
         )
     args.out.mkdir(parents=True, exist_ok=True)
     write_identification(args.out, result, left_out)

@@ -36,7 +36,9 @@ POLISHED = 8  # candidates that are ranked with the IMU's own noise
 SHORTLIST = 4
 MOST_SEARCHES = 3  # with one base after the other, each a better optimum
 POOR_BASE = 0.5  # share of the best candidate's gain that a better optimum of the base has as well
-WORTH_A_REFIT = 0.2  # share of the best ranking gain, and of a gain that is enough: a refit on whole trials gains more
+WORTH_A_REFIT = (
+    0.2  # share of the best ranking gain, and of a gain that is enough: a refit on whole trials gains more
+)
 LOOK_ALIKES = (
     ("tip_slip", "wake_memory", "tail_joint_damping"),
     ("rudder_lag", "rudder_delay"),

@@ -32,6 +32,7 @@ from fish_train.identify.prediction import (
 )
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.settle import STRANGE, suitable_noise, worst_row
+from fish_train.identify.structure import Step, choose_effects
 from fish_train.identify.tempering import fit_tempered
 
 Array = NDArray[np.float64]
@@ -89,12 +90,15 @@ class Identification:
 def identify(
     experiment: Experiment, robot: Robot, noise: Noise | None = None, hold_out: int = 4,
     free: tuple[str, ...] = NOMINAL_FREE, report: Report = lambda _: None, effects: tuple[str, ...] = (),
+    choose_from: tuple[str, ...] = (),
 ) -> Identification:  # fmt: skip
     """Fit the nominal parameters (and those of the robot's effects in `free`) and judge them on trials left out.
 
     hold_out: every so-manieth trial takes no part in fitting; 0: none. Raises ValueError when it is negative or 1.
-    effects: names added to the robot's, their parameters free. A delay of the camera that the gyro shows is taken out of
-    all trials first, so that horizons count from the moment an image was taken, and goes into the robot that comes back.
+    effects: names added to the robot's, their parameters free. choose_from: where the model is wrong beyond its noise, those
+    of these effects are added that let it predict training trials better when they are left out in turn.
+    A delay of the camera that the gyro shows is taken out of all trials first, so that horizons count from the moment an
+    image was taken, and goes into the robot that comes back.
     """
     began, noise = time.monotonic(), noise or usual_noise(experiment)
     train, held = split(len(experiment.names), hold_out)
@@ -109,12 +113,21 @@ def identify(
     fit = fit_tempered(hypothesis, training, noise, report=report)
     wrong = is_wrong(fit, noise)
     fit = fit_outlook(fit, training, report) if wrong else second_look(fit, training, report)
+    steps: tuple[Step, ...] = ()
+    if wrong and choose_from:
+        fit, steps = choose_effects(fit, training, choose_from, report)
+        fit = fit_outlook(fit, training, report) if steps else fit
     report("predicting trials left out")
     judged, errors, lacking = judge(training, held_out, robot, fit)
     estimates = estimate(training, fit.robot, fit.noise)
     statements = [*data_statements(experiment, held_out), *lag_statements(lag), *fit_statements(fit)]
     statements += lost_statements(training, fit)
-    statements += [*([FITTED_FOR_OUTLOOK] if wrong else []), *lacking, *verdict(errors)]
+    statements += [
+        *([FITTED_FOR_OUTLOOK] if wrong else []),
+        *map(step_statement, steps),
+        *lacking,
+        *verdict(errors),
+    ]
     seconds = time.monotonic() - began
     return Identification(
         fit, robot, training, held_out, judged, estimates, errors, tuple(statements), seconds, lag.delay
@@ -128,6 +141,15 @@ def is_wrong(fit: Fit, noise: Noise) -> bool:
         for key in ("gyro", "camera_position", "camera_heading")
     ]
     return any(needed > STRANGE * said for needed, said in told)
+
+
+def step_statement(step: Step) -> str:
+    """What a candidate did to training trials left out in turn."""
+    gain = 1.0 - step.after / step.before
+    return (
+        f"{step.name}: {'added' if step.added else 'not added'}; it changes the cost of predicting training trials left out "
+        f"by {-gain:+.1%} ({step.deviation / step.before:.1%})"
+    )
 
 
 def lag_statements(lag: Alignment) -> list[str]:

@@ -42,6 +42,7 @@ ROUNDS = 4  # of states and parameters
 ITERATIONS = 10
 LARGEST_STEP = 0.5  # of theta
 SMALL_GAIN = 0.5  # of the cost
+SHARES = (1.0, 0.3, 0.1)  # of the way to what a round found
 SETTLED = 0.01  # of the cost; a round that gains less is the last
 LOST = 30.0  # error of a prediction that diverged
 
@@ -90,10 +91,17 @@ class Outlook:
         """What is made small."""
         return self._cost(self.errors(theta, False)[0], theta)
 
+    def mean_costs(self, theta: Array) -> Array:
+        """(M,) cost per prediction of each trial, without the prior; NaN for a trial too short to predict."""
+        p, dp, _ = self.coordinates.filter_inputs(theta)
+        costs = np.full(len(self.experiment.names), np.nan)
+        for m in self.targets:
+            e = np.clip(np.nan_to_num(self._trial(m, p, dp[:0])[0], nan=LOST), -LOST, LOST)
+            costs[m] = _huber(e).sum() / len(self.targets[m])
+        return costs
+
     def _cost(self, e: Array, theta: Array) -> float:
-        size = np.abs(e)
-        rho = np.where(size < ROBUST, 0.5 * e**2, ROBUST * size - 0.5 * ROBUST**2)
-        return float(rho.sum() + 0.5 * np.sum((theta / self.coordinates.prior) ** 2))
+        return float(_huber(e).sum() + 0.5 * np.sum((theta / self.coordinates.prior) ** 2))
 
     def errors(self, theta: Array, slopes: bool = True) -> tuple[Array, Array]:
         """Scaled errors (R,) and their derivatives (R, K), K = 0 without slopes."""
@@ -103,12 +111,12 @@ class Outlook:
         wild = ~np.isfinite(e) | ~np.isfinite(J).all(1) | (np.abs(J) > STEEPEST).any(1)
         return np.clip(np.nan_to_num(e, nan=LOST), -LOST, LOST), np.where(wild[:, None], 0.0, J)
 
-    def minimise(self, theta: Array) -> Array:
+    def minimise(self, theta: Array, iterations: int = ITERATIONS) -> Array:
         """Damped Gauss-Newton from theta, with the start states as they are."""
         damping = 1e-2
         e, J = self.errors(theta)
         best = self._cost(e, theta)
-        for _ in range(ITERATIONS):
+        for _ in range(iterations):
             gradient, normal = self._normal(e, J, theta)
             for _ in range(6):
                 damped = normal + damping * np.diag(np.diag(normal))
@@ -125,6 +133,21 @@ class Outlook:
                 break
             e, J = self.errors(theta)
         return theta
+
+    def improve(self, theta: Array, noise: Noise, iterations: int = ITERATIONS) -> tuple[float, Array]:
+        """(cost, theta) of one round: parameters found with the states of theta, judged with states of their own.
+
+        Where those predict worse, a part of the way is tried, then none of it.
+        """
+        self.start_from(theta, noise)
+        best, moved = self.cost(theta), self.minimise(theta, iterations)
+        for share in SHARES:
+            tried = self.coordinates.clip(theta + share * (moved - theta))
+            self.start_from(tried, noise)
+            cost = self.cost(tried)
+            if cost < best:
+                return cost, tried
+        return best, theta
 
     def _normal(self, e: Array, J: Array, theta: Array) -> tuple[Array, Array]:
         prior = self.coordinates.prior
@@ -176,6 +199,12 @@ class Outlook:
             pose[begin + 1 : end + 1], state = x[1:, :, :3], x[-1]
         pose = pose.reshape(length + 1, S, K, 3)[:, :, 0]
         return pose, d_pose.reshape(length + 1, S, K, 3).transpose(0, 1, 3, 2)[..., : len(dp)]
+
+
+def _huber(e: Array) -> Array:
+    """Quadratic up to ROBUST, linear beyond."""
+    size = np.abs(e)
+    return np.where(size < ROBUST, 0.5 * e**2, ROBUST * size - 0.5 * ROBUST**2)
 
 
 def _target(row: int, t: Array, pose: Array, k: int, horizon: float, steps: int) -> Target | None:

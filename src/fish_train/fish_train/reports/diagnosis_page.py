@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from fish_sim.model import DT
 from fish_sim.pool import LENGTH, WIDTH
 from fish_train.diagnose.diagnosis import Diagnosis
 from fish_train.diagnose.locate import DOFS
+from fish_train.diagnose.own_force import ACTIVE
 from fish_train.diagnose.search import Ranked, Round
 from fish_train.reports.before_after import before_after
 from fish_train.reports.page import Figure, Table, Text, styled, write_page
@@ -50,7 +52,7 @@ def _parameters(effect: Content) -> str:
 
 def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) -> None:
     """Write report.html."""
-    blocks = [
+    blocks: list[Text | Table | Figure] = [
         _fit_table(content),
         before_after(d),
         Figure(
@@ -62,6 +64,7 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
             "first training trial; grey: what remains with the effects found",
         ),
         Figure("Missing force against covariates", _covariates(d)),
+        *(_when(entry) for entry in content["effects"] if entry["name"] in d.pushes),
         *_evidence(d),
         _whiteness(content),
         Text("Next experiment", content["next_experiment"]["why"]),
@@ -76,17 +79,21 @@ def _fit_table(content: Content) -> Table:
     fit, rows = content["fit"], []
     for label in ("nominal", "refitted", "with_effects"):
         entry = fit[label]
-        cells = [
-            f"{v['position_m']:.3f} / {v['heading_rad']:.3f} / {v['speed_m_s']:.3f}"
-            for v in entry["rms"].values()
-        ]
+        cells = [_errors(v) for v in entry["rms"].values()]
         rows.append([label.replace("_", " "), *cells, f"{entry['log_density_per_sample']:.3f}"])
+    if fit["model_yaml"]:
+        cells = [_errors(v) for v in fit["model_yaml"]["rms"].values()]
+        rows.append(["model.yaml: refitted to predict over seconds", *cells, ""])
     header = ["model", *(f"{h}: m / rad / m/s" for h in fit["nominal"]["rms"]), "log density per sample"]
     low, high = fit["improvement_ci95"]
     held = ", ".join(fit["held_out_trials"]) or "none"
     gain = f"{low:.3f} to {high:.3f} nats per sample"
     note = f"Held out: {held}. Gain of the effects over the refitted model: 95 % interval {gain}."
     return Table("Prediction errors on held-out trials, before and after", header, rows, note)
+
+
+def _errors(rms: Mapping[str, float]) -> str:
+    return f"{rms['position_m']:.3f} / {rms['heading_rad']:.3f} / {rms['speed_m_s']:.3f}"
 
 
 EVIDENCE_HEADER = ("name", "quick gain, nats", "refitted gain, nats", "parameters")
@@ -166,6 +173,26 @@ def _covariates(d: Diagnosis) -> go.Figure:
             )  # fmt: skip
     figure.update_yaxes(title="mean missing wrench / water noise", col=1)
     return styled(figure, 360, titled=True)
+
+
+def _when(effect: Content) -> Figure:
+    """The intervals in which an effect acts, a row per trial."""
+    figure, times = go.Figure(), sorted(effect["where"]["time"], key=lambda row: row["trial"])
+    figure.add_bar(
+        y=[row["trial"] for row in times], base=[row["from"] for row in times],
+        x=[row["to"] - row["from"] for row in times], orientation="h", marker={"color": COLOURS["surge"]},
+        hovertext=[f"{row['share']:.0%} of its push" for row in times],
+    )  # fmt: skip
+    figure.update_xaxes(title="t, s")
+    tells = effect["where"]["covariates"][0]
+    low, high = tells["range"]
+    note = (
+        f"intervals in which its own force in the final model is above {ACTIVE:.0%} of what it is at its strongest; "
+        f"{tells['name']} from {low:.3g} to {high:.3g} tells them best (F1 {tells['f1']:.2f})"
+    )
+    return Figure(
+        f"When {effect['name']} acts", styled(figure, 120 + 26 * len({r["trial"] for r in times})), note
+    )
 
 
 def _program(content: Content) -> go.Figure:

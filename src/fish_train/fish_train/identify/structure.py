@@ -1,0 +1,133 @@
+"""Which effects let a wrong model predict trials better that it was not fitted to: forward selection by cross-validation.
+
+For a robot whose recordings no likelihood explains (see `outlook`). Every candidate is fitted for the outlook on all trials;
+the few that promise most are judged by trials left out in turn, each predicted by parameters fitted without it. The best is
+added if it improves on the model without it by more than one standard error over the trials (Breiman et al. 1984, ch. 3.4),
+and so on. Trials that are held out of the whole identification take no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import Fit, evaluate
+from fish_train.identify.hypothesis import Coordinates, Hypothesis, start_values
+from fish_train.identify.outlook import SETTLED, Outlook
+
+Array = NDArray[np.float64]
+
+MOST_EFFECTS = 3
+FOLDS = 4
+JUDGED = 4  # candidates a round that are cross-validated
+STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is fitted
+SCALE = 0.3  # strength at which a hypothesis is written down; sets the coordinates only
+SCREENING_STEPS = 4  # of Gauss-Newton
+ROUNDS, ROUNDS_TO_THE_END = 2, 6  # of states and parameters: without a fold, on all trials
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one candidate does to trials left out."""
+
+    name: str
+    before: float  # mean cost per prediction of trials left out, without it
+    after: float  # with it
+    deviation: float  # standard error of the difference over trials
+    added: bool
+
+
+@dataclass(frozen=True)
+class _Tried:
+    name: str
+    hypothesis: Hypothesis
+    theta: Array
+    cost: float
+
+
+def choose_effects(
+    fit: Fit, experiment: Experiment, names: Sequence[str], report: Report = lambda _: None
+) -> tuple[Fit, tuple[Step, ...]]:
+    """(the fit with the effects added, not settled yet; every candidate that was cross-validated).
+
+    fit: of the model without them, for the outlook (`fit_outlook`).
+    """
+    steps: list[Step] = []
+    if len(experiment.names) < 2 * FOLDS:
+        return fit, ()
+    without = left_out_costs(fit, fit.hypothesis, fit.theta, experiment)
+    for number in range(MOST_EFFECTS):
+        tried = []
+        for i, name in enumerate(n for n in names if n not in fit.hypothesis.names):
+            report(f"effect {number + 1}: trying {name} ({i + 1} of {len(names) - number})")
+            tried.append(_screen(fit, name, experiment))
+        best, best_costs, judged = None, without, []
+        for promising in sorted(tried, key=lambda t: t.cost)[:JUDGED]:
+            report(f"effect {number + 1}: leaving trials out to judge {promising.name}")
+            candidate = _settled(promising, fit.noise, experiment)
+            costs = left_out_costs(fit, candidate.hypothesis, candidate.theta, experiment)
+            gain = (without - costs)[np.isfinite(without - costs)]  # trials too short to predict say nothing
+            deviation = float(np.std(gain, ddof=1) / np.sqrt(len(gain)))
+            judged.append(
+                Step(candidate.name, float(np.nanmean(without)), float(np.nanmean(costs)), deviation, False)
+            )
+            if gain.mean() > deviation and np.nanmean(costs) < np.nanmean(best_costs):
+                best, best_costs = candidate, costs
+        steps += [replace(s, added=best is not None and s.name == best.name) for s in judged]
+        if best is None:
+            break
+        fit = evaluate(best.hypothesis, best.theta, experiment, fit.noise)
+        without = best_costs
+    return fit, tuple(steps)
+
+
+def _screen(fit: Fit, name: str, experiment: Experiment) -> _Tried:
+    """A candidate fitted for the outlook on all trials, in a few steps."""
+    hypothesis = fit.hypothesis.with_effect(name, SCALE)
+    outlook, coordinates = Outlook(experiment, hypothesis), Coordinates(hypothesis)
+
+    def start(strength: float) -> Array:
+        values = np.concatenate([np.ones(len(fit.theta)), list(start_values(name, strength).values())])
+        return np.concatenate([fit.theta, coordinates.encode(values)[len(fit.theta) :]])
+
+    def judged(theta: Array) -> tuple[float, Array]:
+        outlook.start_from(theta, fit.noise)
+        return outlook.cost(theta), theta
+
+    _, theta = min((judged(start(strength)) for strength in STRENGTHS), key=lambda found: found[0])
+    cost, theta = outlook.improve(theta, fit.noise, SCREENING_STEPS)
+    return _Tried(name, hypothesis, theta, cost)
+
+
+def _settled(tried: _Tried, noise: Noise, experiment: Experiment) -> _Tried:
+    """The candidate's fit on all trials, to the end: what it gains shall not be what the next one gains by going on."""
+    outlook, cost, theta = Outlook(experiment, tried.hypothesis), tried.cost, tried.theta
+    for _ in range(ROUNDS_TO_THE_END):
+        before = cost
+        cost, theta = outlook.improve(theta, noise)
+        if before - cost < SETTLED * before:
+            break
+    return replace(tried, theta=theta, cost=cost)
+
+
+def left_out_costs(fit: Fit, hypothesis: Hypothesis, theta: Array, experiment: Experiment) -> Array:
+    """(M,) mean cost per prediction of each trial by parameters that were fitted, from theta, without its fold."""
+    count = len(experiment.names)
+    costs = np.empty(count)
+    for fold in range(FOLDS):
+        left_out = [m for m in range(count) if m % FOLDS == fold]
+        others = Outlook(experiment.select([m for m in range(count) if m not in left_out]), hypothesis)
+        fitted = theta
+        for _ in range(ROUNDS):
+            _, fitted = others.improve(fitted, fit.noise)
+        unseen = Outlook(experiment.select(left_out), hypothesis)
+        unseen.start_from(fitted, fit.noise)
+        costs[left_out] = unseen.mean_costs(fitted)
+    return costs
