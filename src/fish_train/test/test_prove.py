@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fish_control.hand_tuned import HAND_TUNED
 from fish_sim.effects import EFFECTS
 from fish_sim.ops import NUMPY
 from fish_sim.scheme import default_scheme
@@ -21,9 +22,9 @@ from fish_train.evaluation.study import Row
 from fish_train.identify.experiment import build_experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
-from fish_train.prove import groups
+from fish_train.prove import close_loop, groups
 from fish_train.prove.build import make_readings, make_world
-from fish_train.prove.close_loop import loop_table
+from fish_train.prove.close_loop import Plan, loop_table, loop_world, searched
 from fish_train.prove.judge import judged_table, rivals_table
 from fish_train.prove.mujoco_plant import MujocoPlant, model_text
 from fish_train.prove.nulls import null_table
@@ -248,6 +249,14 @@ def test_power_counts_per_strength() -> None:
         scores.append(score_world(world, diagnosis((name, "physics", 0.9))))
     steps = power(scores, {0: True, 1: True, 2: False})
     assert [(p.strength, p.found.k, p.found.n, p.oracle.k) for p in steps] == [(0.5, 1, 2, 2), (1.0, 1, 1, 0)]
+
+
+def test_gains_searched_on_the_plant_are_searched_once(tmp_path, monkeypatch) -> None:
+    calls = []
+    monkeypatch.setattr(close_loop, "search", lambda *_: calls.append(1) or HAND_TUNED)
+    plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path / "out")
+    found = [searched(plan, None, (), lambda _: None) for _ in range(2)]
+    assert found == [HAND_TUNED, HAND_TUNED] and len(calls) == 1
 
 
 def test_overlap_of_times_and_degrees_of_freedom() -> None:

@@ -29,8 +29,10 @@ from fish_train.evaluation.cells import Cell, make_cells
 from fish_train.evaluation.gains_source import PolicyGains
 from fish_train.evaluation.plant import Plant
 from fish_train.evaluation.study import Candidate, Condition, Row, evaluate, run_study
+from fish_train.json_file import write_json
 from fish_train.prove.mujoco_effects import CONCEALED
 from fish_train.prove.mujoco_plant import MujocoPlant
+from fish_train.prove.study import read_json
 from fish_train.prove.world import World
 from fish_train.reports.page import Table
 
@@ -107,10 +109,7 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
         candidates.append(read_policy(name, _train(plan, name, robot)))
     condition = Condition(name="second plant", plant=SecondPlant(plan.world))
     cells = make_cells(plan.paths, plan.speeds, range(1, plan.seeds + 1))
-    say("searching gains on the plant itself")
-    candidates.append(
-        Candidate("true", PolicyGains(Policy.constant(search(condition, cells, plan.search, say))))
-    )
+    candidates.append(Candidate("true", PolicyGains(Policy.constant(searched(plan, condition, cells, say)))))
     say("swimming")
     return run_study(candidates, [condition], cells, jobs)
 
@@ -151,6 +150,18 @@ def _verb(*arguments: str) -> None:
     if done.returncode != 0:
         said = (done.stderr.strip() or done.stdout.strip())[-500:]
         raise UserError(f"fish_train {arguments[0]} ended with {done.returncode}: {said}")
+
+
+def searched(plan: Plan, condition: Condition, cells: Sequence[Cell], say: Say) -> Gains:
+    """Gains searched on the plant itself, from out/search/gains.json if they are there already."""
+    file = plan.out / "search" / "gains.json"
+    if file.exists():
+        return Gains(**read_json(file))
+    say("searching gains on the plant itself")
+    found = search(condition, cells, plan.search, say)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_json(file, found._asdict())
+    return found
 
 
 def search(condition: Condition, cells: Sequence[Cell], runs: int, say: Say) -> Gains:
