@@ -6,6 +6,7 @@ Writes robot.yaml (values with std), identification.json and report.html.
 from __future__ import annotations
 
 import argparse
+import time
 from pathlib import Path
 
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -51,12 +52,18 @@ def run(args: argparse.Namespace) -> int:
     experiment, left_out = read_experiment(*args.dataset)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar, user_errors():
-        task = bar.add_task("identifying", total=None)
+        task, began = bar.add_task("identifying", total=None), time.monotonic()
+
+        def say(text: str) -> None:
+            bar.update(task, description=text)
+            if not console.is_terminal:
+                console.print(f"{time.monotonic() - began:5.0f} s  {text}", highlight=False)
+
         result = identify(
             experiment,
             robot,
             hold_out=args.hold_out,
-            report=lambda text: bar.update(task, description=text),
+            report=say,
             effects=() if chosen else tuple(name for name in args.effects.split(",") if name),
             choose_from=tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else (),
         )
