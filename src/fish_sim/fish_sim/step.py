@@ -18,7 +18,7 @@ from fish_sim.emit import emit
 from fish_sim.finite import check_finite
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel
-from fish_sim.methods import METHODS
+from fish_sim.methods import METHODS, Method
 from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, Structure, functions
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme, check_scheme, default_scheme, stable_scheme
@@ -277,29 +277,39 @@ def kernel(
 
 def kernel_source(structure: Structure, scheme: Scheme, width: int, part: Part) -> str:
     """Complete C text of one part of a structure's kernel."""
-    return _source(structure, scheme, width, *PARTS[part])
+    return _source(structure, scheme.method, str(scheme.substeps), width, *PARTS[part])
 
 
-def tangent_source(structure: Structure, scheme: Scheme, width: int) -> str:
-    """C text of the step and of rates with tangents, exporting nothing; filters build on it."""
-    return _source(structure, scheme, width, PARTS["tangents"][0], ("step.c",))
+def tangent_source(structure: Structure, method: str, width: int) -> str:
+    """C text of the step and of rates with tangents, exporting nothing; filters build on it.
+
+    Every thread sets `substeps`, the integrator's steps in a period, before it steps: one text serves every robot.
+    """
+    names, texts = PARTS["tangents"][0], ("step.c",)
+    return (
+        f"static _Thread_local int substeps;\n{_source(structure, method, 'substeps', width, names, texts)}"
+    )
 
 
 def _source(
-    structure: Structure, scheme: Scheme, width: int, names: tuple[str, ...], texts: tuple[str, ...]
+    structure: Structure,
+    method: str,
+    substeps: str,
+    width: int,
+    names: tuple[str, ...],
+    texts: tuple[str, ...],
 ) -> str:
     folder, table = files("fish_sim") / "c", functions(structure)
     return "\n".join([
-        *_definitions(Layout(structure), scheme, width),
+        *_definitions(Layout(structure), METHODS[method], substeps, width),
         (folder / "vector.h").read_text(),
         *(emit(getattr(table, name)) for name in names),
         *((folder / text).read_text() for text in texts),
     ])  # fmt: skip
 
 
-def _definitions(layout: Layout, scheme: Scheme, width: int) -> list[str]:
+def _definitions(layout: Layout, method: Method, substeps: str, width: int) -> list[str]:
     """Sizes and the tableau as C text."""
-    method = METHODS[scheme.method]
     sizes = {
         "LANES": width,
         "NX": len(layout.motion),
@@ -309,7 +319,7 @@ def _definitions(layout: Layout, scheme: Scheme, width: int) -> list[str]:
         "NC": len(COMMAND_NAMES),
         "NW": len(DRIVE_NAMES),
         "STAGES": len(method.B),
-        "SUBSTEPS": scheme.substeps,
+        "SUBSTEPS": substeps,
         "DT": repr(DT),
     }
     if has_libmvec():

@@ -33,9 +33,11 @@ def with_sensors(robot: Robot):
     return hypothesis
 
 
-def test_compiled_and_numpy_passes_agree():
+@pytest.mark.parametrize("stiffness", [None, 1.5], ids=["nominal", "a tail that needs more steps"])
+def test_compiled_and_numpy_passes_agree(stiffness):
     data, _ = experiment(Robot(), 1.5, ("sines", "steps"))
-    coordinates = Coordinates(with_sensors(Robot()))
+    robot = Robot() if stiffness is None else Robot().with_parameters(tail_stiffness=stiffness)
+    coordinates = Coordinates(with_sensors(robot))
     inputs = coordinates.filter_inputs(coordinates.origin())
     slow = Filter(data, coordinates.stepper, *inputs, Noise()).run(keep=True)
     fast = compiled_pass(data, coordinates.stepper, *inputs, Noise(), keep=True)

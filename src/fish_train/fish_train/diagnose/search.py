@@ -22,7 +22,7 @@ from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, log_posterior, settle
-from fish_train.identify.hypothesis import Coordinates, specification, start_values
+from fish_train.identify.hypothesis import Coordinates, extend, specification
 from fish_train.identify.settle import open_gates
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
@@ -146,10 +146,7 @@ def warm_starts(base: Fit, name: str, experiment: Experiment, noise: Noise) -> l
 
 def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -> np.ndarray:
     """theta of the base with a candidate of this strength, in typical ones, at this place."""
-    coordinates = Coordinates(base.hypothesis.with_effect(name, SCALE))
-    values = {**start_values(name, strength), **place}
-    theta = coordinates.encode(np.concatenate([np.ones(len(base.theta)), list(values.values())]))
-    return np.concatenate([base.theta, theta[len(base.theta) :]])
+    return extend(base.theta, base.hypothesis.with_effect(name, SCALE), name, strength, place)
 
 
 def best_place(base: Fit, name: str, experiment: Experiment, noise: Noise) -> dict[str, float]:

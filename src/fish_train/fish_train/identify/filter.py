@@ -41,4 +41,4 @@ def filter_stepper(robot: Robot) -> Stepper:
 def prepare(robot: Robot) -> None:
     """Compile the filter of a robot's structure unless it is in the cache: seconds that a caller may want to show."""
     stepper = filter_stepper(robot)
-    filter_library(stepper.layout.structure, stepper.scheme)
+    filter_library(stepper.layout.structure, stepper.scheme.method)

@@ -12,7 +12,7 @@ import numpy as np
 
 from fish_sim.compiled import lanes, library
 from fish_sim.model import DT, Structure
-from fish_sim.step import Scheme, Stepper, tangent_source
+from fish_sim.step import Stepper, tangent_source
 from fish_train.identify.encoder import encoder_terms
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
@@ -41,6 +41,7 @@ class Settings(ctypes.Structure):
         *((f"free_{name}", ctypes.c_long) for name in SENSORS),
         ("wrench_at", ctypes.c_long * 3),
         ("links", ctypes.c_long),
+        ("substeps", ctypes.c_long),
         ("wrench_decay", ctypes.c_double),
         ("wrench_variance", ctypes.c_double * 3),
         *(
@@ -59,17 +60,17 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
         *(sensors.slope.get(name, 1.0) for name in SENSORS),
         *(sensors.free.get(name, -1) for name in SENSORS),
         (ctypes.c_long * 3)(*(stepper.layout.parameters.index(name) for name in WRENCH)),
-        stepper.layout.links, decay, (ctypes.c_double * 3)(*variance),
+        stepper.layout.links, stepper.scheme.substeps, decay, (ctypes.c_double * 3)(*variance),
         noise.gyro, noise.accel, noise.camera_position, noise.camera_heading, noise.gate_imu, noise.gate_camera,
     )  # fmt: skip
 
 
 @functools.lru_cache(maxsize=128)
-def filter_library(structure: Structure, scheme: Scheme) -> ctypes.CDLL | None:
-    """The compiled filter of a structure, or None without a compiler."""
+def filter_library(structure: Structure, method: str) -> ctypes.CDLL | None:
+    """The compiled filter of a structure under an integrator, or None without a compiler."""
     text = (files("fish_train") / "identify" / "c" / "filter.c").read_text()
     # a search compiles a kernel for every candidate: -O2 runs as fast as -O3 here and takes less than half as long to build
-    return library(tangent_source(structure, scheme, lanes()) + text, "-O2")
+    return library(tangent_source(structure, method, lanes()) + text, "-O2")
 
 
 def compiled_pass(
@@ -82,7 +83,7 @@ def compiled_pass(
     keep: bool,
 ) -> FilterResult | None:
     """The result of a pass, or None when it cannot be compiled here."""
-    loaded = filter_library(stepper.layout.structure, stepper.scheme)
+    loaded = filter_library(stepper.layout.structure, stepper.scheme.method)
     if loaded is None:
         return None
     job = _Job(loaded, experiment, stepper, p, dp, sensors, noise, keep)

@@ -123,6 +123,18 @@ def nominal_hypothesis(robot: Robot, free: tuple[str, ...] = NOMINAL_FREE) -> Hy
     return Hypothesis(robot.with_effect("disturbance"), free)
 
 
+def extend(
+    theta: Array, hypothesis: Hypothesis, name: str, strength: float, place: Mapping[str, float] | None = None
+) -> Array:
+    """theta (K,) of a hypothesis whose last effect is `name`, from that of the one without it.
+
+    strength: of the effect, in typical ones; place: values of its parameters that say where or how fast.
+    """
+    values = list({**start_values(name, strength), **(place or {})}.values())
+    own = Coordinates(hypothesis).encode(np.concatenate([np.ones(len(theta)), values]))[len(theta) :]
+    return np.concatenate([theta, own])
+
+
 class Coordinates:
     """theta <-> robot for one hypothesis."""
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate
-from fish_train.identify.hypothesis import Coordinates, Hypothesis, start_values
+from fish_train.identify.hypothesis import Hypothesis, extend
 from fish_train.identify.outlook import SETTLED, Outlook
 
 Array = NDArray[np.float64]
@@ -91,17 +91,14 @@ def choose_effects(
 def _screen(fit: Fit, name: str, experiment: Experiment) -> _Tried:
     """A candidate fitted for the outlook on all trials, in a few steps."""
     hypothesis = fit.hypothesis.with_effect(name, SCALE)
-    outlook, coordinates = Outlook(experiment, hypothesis), Coordinates(hypothesis)
-
-    def start(strength: float) -> Array:
-        values = np.concatenate([np.ones(len(fit.theta)), list(start_values(name, strength).values())])
-        return np.concatenate([fit.theta, coordinates.encode(values)[len(fit.theta) :]])
+    outlook = Outlook(experiment, hypothesis)
+    starts = (extend(fit.theta, hypothesis, name, strength) for strength in STRENGTHS)
 
     def judged(theta: Array) -> tuple[float, Array]:
         outlook.start_from(theta, fit.noise)
         return outlook.cost(theta), theta
 
-    _, theta = min((judged(start(strength)) for strength in STRENGTHS), key=lambda found: found[0])
+    _, theta = min(map(judged, starts), key=lambda found: found[0])
     cost, theta = outlook.improve(theta, fit.noise, SCREENING_STEPS)
     return _Tried(name, hypothesis, theta, cost)
 

@@ -1,7 +1,7 @@
 /* Extended Kalman filter of one trial with forward sensitivities; see filter.py for the model.
 
-   Stands behind fish_sim's kernel text: V, LANES, NX, NM, NS, NP, NC, NW, DT, SUBSTEPS, step, drive_at, rate, rate_jvp,
-   follow_jvp.
+   Stands behind fish_sim's kernel text: V, LANES, NX, NM, NS, NP, NC, NW, DT, SUBSTEPS (each thread's `substeps`), step,
+   drive_at, rate, rate_jvp, follow_jvp.
    N = NX + 6: motion, wrench on the head, biases of gyro and accelerometer. Directions: N - 3 columns of the
    Jacobian (motion, wrench), then K free parameters; each carries NS + 6 numbers (state, wrench, biases). */
 #include <stdlib.h>
@@ -16,7 +16,7 @@ typedef struct {
   double slope_latency, slope_heading, slope_scale, slope_gyro, slope_misalignment; /* d sensor / d parameter */
   long free_latency, free_heading, free_scale, free_gyro, free_misalignment; /* index of the free parameter or -1 */
   long wrench_at[3];                                                         /* places in p */
-  long links;
+  long links, substeps;
   double wrench_decay, wrench_variance[3]; /* per step of 10 ms */
   double gyro, accel, position, heading;   /* standard deviations */
   double gate_imu, gate_camera;            /* squared normalised innovation */
@@ -364,6 +364,7 @@ void filter_trial(long steps, long K, const double *commands, const double *imu,
   double rate[NX];
   double *tangent = malloc(sizeof(double) * (NX + 3 + K) * NX), *dh = malloc(sizeof(double) * 3 * (K ? K : 1));
   const long row = 3 * N * N + 2 * N + NM;
+  substeps = (int)c->substeps;
   f.D = calloc((K ? K : 1) * ND, sizeof(double));
   memcpy(f.xi, start, sizeof f.xi);
   memset(f.P, 0, sizeof f.P);
