@@ -32,7 +32,7 @@ from fish_train.identify.prediction import (
 )
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.settle import STRANGE, suitable_noise, worst_row
-from fish_train.identify.structure import Step, choose_effects
+from fish_train.identify.structure import Step, choose_effects, step_text
 from fish_train.identify.tempering import fit_tempered
 
 Array = NDArray[np.float64]
@@ -145,11 +145,7 @@ def is_wrong(fit: Fit, noise: Noise) -> bool:
 
 def step_statement(step: Step) -> str:
     """What a candidate did to training trials left out in turn."""
-    gain = 1.0 - step.after / step.before
-    return (
-        f"{step.name}: {'added' if step.added else 'not added'}; it changes the cost of predicting training trials left out "
-        f"by {-gain:+.1%} ({step.deviation / step.before:.1%})"
-    )
+    return f"{step.name}: {'added' if step.added else 'not added'}; {step_text(step)}"
 
 
 def lag_statements(lag: Alignment) -> list[str]:

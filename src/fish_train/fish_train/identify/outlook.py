@@ -62,10 +62,11 @@ class Target:
 class Outlook:
     """Prediction errors of a hypothesis on an experiment as functions of theta."""
 
-    def __init__(self, experiment: Experiment, hypothesis: Hypothesis) -> None:
+    def __init__(self, experiment: Experiment, hypothesis: Hypothesis, every: float = EVERY) -> None:
+        """every: s between start points."""
         self.coordinates = Coordinates(hypothesis)
         self.experiment = experiment
-        self.starts = start_points(experiment, EVERY, WARM_UP)
+        self.starts = start_points(experiment, every, WARM_UP)
         self.targets: dict[int, list[Target]] = {}
         sensors = self.coordinates.filter_inputs(self.coordinates.origin())[2]
         seen = moved_back(experiment, sensors.camera_latency)

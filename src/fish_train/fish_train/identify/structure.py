@@ -2,7 +2,7 @@
 
 For a robot whose recordings no likelihood explains (see `outlook`). Every candidate is fitted for the outlook on all trials;
 the few that promise most are judged by trials left out in turn, each predicted by parameters fitted without it. The best is
-added if it improves on the model without it by more than one standard error over the trials (Breiman et al. 1984, ch. 3.4),
+added if it lowers the logarithm of their costs by more than one standard error over the trials (Breiman et al. 1984, ch. 3.4),
 and so on. Trials that are held out of the whole identification take no part.
 """
 
@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 MOST_EFFECTS = 3
 FOLDS = 4
-JUDGED = 4  # candidates a round that are cross-validated
+JUDGED = 3  # candidates a round that are cross-validated
+EVERY = 2.0  # s between start points: half of those of the last fit
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is fitted
 SCALE = 0.3  # strength at which a hypothesis is written down; sets the coordinates only
 SCREENING_STEPS = 4  # of Gauss-Newton
@@ -38,10 +39,14 @@ class Step:
     """What one candidate does to trials left out."""
 
     name: str
-    before: float  # mean cost per prediction of trials left out, without it
-    after: float  # with it
-    deviation: float  # standard error of the difference over trials
+    gain: float  # mean over trials left out of the logarithm of their cost without it over that with it
+    deviation: float  # its standard error over trials
     added: bool
+
+
+def step_text(step: Step) -> str:
+    """What it does, in words."""
+    return f"predictions of trials left out cost {np.exp(-step.gain) - 1.0:+.0%} (a standard error: {step.deviation:.0%})"
 
 
 @dataclass(frozen=True)
@@ -68,17 +73,18 @@ def choose_effects(
         for i, name in enumerate(n for n in names if n not in fit.hypothesis.names):
             report(f"effect {number + 1}: trying {name} ({i + 1} of {len(names) - number})")
             tried.append(_screen(fit, name, experiment))
-        best, best_costs, judged = None, without, []
+        best, best_costs, judged = None, without, list[Step]()
         for promising in sorted(tried, key=lambda t: t.cost)[:JUDGED]:
             report(f"effect {number + 1}: leaving trials out to judge {promising.name}")
             candidate = _settled(promising, fit.noise, experiment)
             costs = left_out_costs(fit, candidate.hypothesis, candidate.theta, experiment)
-            gain = (without - costs)[np.isfinite(without - costs)]  # trials too short to predict say nothing
-            deviation = float(np.std(gain, ddof=1) / np.sqrt(len(gain)))
-            judged.append(
-                Step(candidate.name, float(np.nanmean(without)), float(np.nanmean(costs)), deviation, False)
-            )
-            if gain.mean() > deviation and np.nanmean(costs) < np.nanmean(best_costs):
+            # logarithms: a trial that diverges without it would outweigh all others in a mean of costs
+            ratio = np.log(without / costs)
+            ratio = ratio[np.isfinite(ratio)]  # a trial too short to predict says nothing
+            deviation = float(np.std(ratio, ddof=1) / np.sqrt(len(ratio)))
+            judged.append(Step(candidate.name, float(ratio.mean()), deviation, False))
+            report(f"{candidate.name}: {step_text(judged[-1])}")
+            if ratio.mean() > deviation and judged[-1].gain >= max(s.gain for s in judged):
                 best, best_costs = candidate, costs
         steps += [replace(s, added=best is not None and s.name == best.name) for s in judged]
         if best is None:
@@ -91,7 +97,7 @@ def choose_effects(
 def _screen(fit: Fit, name: str, experiment: Experiment) -> _Tried:
     """A candidate fitted for the outlook on all trials, in a few steps."""
     hypothesis = fit.hypothesis.with_effect(name, SCALE)
-    outlook = Outlook(experiment, hypothesis)
+    outlook = Outlook(experiment, hypothesis, EVERY)
     starts = (extend(fit.theta, hypothesis, name, strength) for strength in STRENGTHS)
 
     def judged(theta: Array) -> tuple[float, Array]:
@@ -105,7 +111,7 @@ def _screen(fit: Fit, name: str, experiment: Experiment) -> _Tried:
 
 def _settled(tried: _Tried, noise: Noise, experiment: Experiment) -> _Tried:
     """The candidate's fit on all trials, to the end: what it gains shall not be what the next one gains by going on."""
-    outlook, cost, theta = Outlook(experiment, tried.hypothesis), tried.cost, tried.theta
+    outlook, cost, theta = Outlook(experiment, tried.hypothesis, EVERY), tried.cost, tried.theta
     for _ in range(ROUNDS_TO_THE_END):
         before = cost
         cost, theta = outlook.improve(theta, noise)
@@ -120,11 +126,11 @@ def left_out_costs(fit: Fit, hypothesis: Hypothesis, theta: Array, experiment: E
     costs = np.empty(count)
     for fold in range(FOLDS):
         left_out = [m for m in range(count) if m % FOLDS == fold]
-        others = Outlook(experiment.select([m for m in range(count) if m not in left_out]), hypothesis)
+        others = Outlook(experiment.select([m for m in range(count) if m not in left_out]), hypothesis, EVERY)
         fitted = theta
         for _ in range(ROUNDS):
             _, fitted = others.improve(fitted, fit.noise)
-        unseen = Outlook(experiment.select(left_out), hypothesis)
+        unseen = Outlook(experiment.select(left_out), hypothesis, EVERY)
         unseen.start_from(fitted, fit.noise)
         costs[left_out] = unseen.mean_costs(fitted)
     return costs

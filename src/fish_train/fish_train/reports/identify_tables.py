@@ -59,9 +59,8 @@ def parameter_table(result: Identification) -> Table:
         ratio = "" if before is None else f"{value / before:.3f}"
         error = fit.standard_errors[name]
         remark = "not determined by these data" if name in unknown else ""
-        rows.append(
-            [name, f"{value:.5g}", f"{error:.2g}", unit, ratio, f"{100 * error / abs(value):.2g} %", remark]
-        )
+        relative = f"{100 * error / abs(value):.2g} %" if value else ""
+        rows.append([name, f"{value:.5g}", f"{error:.2g}", unit, ratio, relative, remark])
     header = ["parameter", "value", "standard error", "unit", "over start", "relative error", ""]
     return Table(
         "Parameters", header, rows, "Standard errors from the likelihood's curvature, to first order."
