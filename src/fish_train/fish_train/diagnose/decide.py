@@ -12,9 +12,9 @@ from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import effect_class, specification
 
 # One nat of innovations is worth 1/TEMPER nats of evidence: model errors too small to have a name, and the search
-# itself, make likelihood ratios over-confident. Set on the worlds of finished studies: where the model has the fish's
-# number of tail links no name gains more than 8 nats beside what is hidden, while hidden effects that the checks confirm
-# start at 34; more links than the model has give up to 80, but not on the trials of the check.
+# itself, make likelihood ratios over-confident. Set on the worlds of a finished study (docs/blind_studies.md, the fourth):
+# where the model has the fish's number of tail links no wrong name gains more than 14 nats, hidden effects that the check
+# confirms 34 and more; a fish of more links gives a wrong name up to 80, but not on the trials of the check.
 TEMPER = 4.0
 # nats per scalar measurement below which a gain is no physics worth a name, whatever its significance
 SMALLEST_GAIN = 0.001
