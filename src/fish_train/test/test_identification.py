@@ -12,7 +12,7 @@ from fish_sim.robot import Robot, load_robot
 from fish_train.identify.coverage import Repetition, repeat, scored, summarise
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.identification import Identification, data_statements, identify, split
+from fish_train.identify.identification import NOT_CHOSEN, Identification, data_statements, identify, split
 from fish_train.identify.record import write_identification
 from fish_train.identify.synthetic import program, record
 from fish_train.reports.identify_page import write_identify_page
@@ -32,13 +32,18 @@ def experiment_of(kinds: tuple[str, ...], duration: float, seed: int = 1) -> Exp
 
 @pytest.fixture(scope="module")
 def found() -> Identification:
-    return identify(experiment_of(("sines", "random", "steps", "straight"), 9.0), Robot(), free=FREE)
+    trials = experiment_of(("sines", "random", "steps", "straight"), 9.0)
+    return identify(trials, Robot(), free=FREE, choose_from=("tip_slip",))
 
 
 def test_truth_within_four_standard_errors(found: Identification) -> None:
     for name, value in found.fit.values.items():
         assert abs(value - TRUTH.parameters[name]) < 4.0 * found.fit.standard_errors[name], name
         assert found.fit.standard_errors[name] < 0.2 * TRUTH.parameters[name]
+
+
+def test_where_the_likelihood_does_no_effect_is_looked_for_and_that_is_said(found: Identification) -> None:
+    assert found.fit.hypothesis.names == () and NOT_CHOSEN in found.statements
 
 
 def test_held_out_trial_took_no_part(found: Identification) -> None:

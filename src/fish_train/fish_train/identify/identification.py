@@ -47,6 +47,7 @@ FITTED_FOR_OUTLOOK = (
     "the model needs sensors far noisier than they are: it lacks something, so that it was fitted to predictions over 0.5 "
     "to 5 s instead of the likelihood; standard errors count every error as independent, which is too small"
 )
+NOT_CHOSEN = "no effects were looked for: the model needs no noisier sensors than there are; `fish_train diagnose` asks the likelihood"
 NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"
 NO_ENCODER = "the rotor is taken to follow its commands"
 Report = Callable[[str], None]  # told what is being done
@@ -116,7 +117,7 @@ def identify(
     steps: tuple[Step, ...] = ()
     if wrong and choose_from:
         fit, steps = choose_effects(fit, training, choose_from, report)
-        fit = fit_outlook(fit, training, report) if steps else fit
+        fit = fit_outlook(fit, training, report) if any(step.added for step in steps) else fit
     report("predicting trials left out")
     judged, errors, lacking = judge(training, held_out, robot, fit)
     estimates = estimate(training, fit.robot, fit.noise)
@@ -124,6 +125,7 @@ def identify(
     statements += lost_statements(training, fit)
     statements += [
         *([FITTED_FOR_OUTLOOK] if wrong else []),
+        *([NOT_CHOSEN] if choose_from and not wrong else []),
         *map(step_statement, steps),
         *lacking,
         *verdict(errors),

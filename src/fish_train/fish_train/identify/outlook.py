@@ -135,14 +135,16 @@ class Outlook:
             e, J = self.errors(theta)
         return theta
 
-    def improve(self, theta: Array, noise: Noise, iterations: int = ITERATIONS) -> tuple[float, Array]:
+    def improve(
+        self, theta: Array, noise: Noise, iterations: int = ITERATIONS, shares: tuple[float, ...] = SHARES
+    ) -> tuple[float, Array]:
         """(cost, theta) of one round: parameters found with the states of theta, judged with states of their own.
 
-        Where those predict worse, a part of the way is tried, then none of it.
+        shares: of the way, tried in turn until one predicts better; theta if none does.
         """
         self.start_from(theta, noise)
         best, moved = self.cost(theta), self.minimise(theta, iterations)
-        for share in SHARES:
+        for share in shares:
             tried = self.coordinates.clip(theta + share * (moved - theta))
             self.start_from(tried, noise)
             cost = self.cost(tried)
@@ -258,18 +260,16 @@ def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] 
     def better_noise(theta: Array) -> tuple[float, Array, Noise]:
         return min(((judged(theta, noise), theta, noise) for noise in noises), key=lambda found: found[0])
 
-    def one_round(best: float, theta: Array, noise: Noise) -> tuple[float, Array, Noise]:
-        outlook.start_from(theta, noise)
-        moved = outlook.minimise(theta)
-        return min((best, theta, noise), (judged(moved, noise), moved, noise), key=lambda found: found[0])
+    def one_round(theta: Array, noise: Noise) -> tuple[float, Array, Noise]:
+        return *outlook.improve(theta, noise, shares=(1.0,)), noise
 
     report("fitting the outlook from two starts")
     starts = (outlook.coordinates.origin(), fit.theta)
-    best, theta, noise = min((one_round(*better_noise(t)) for t in starts), key=lambda found: found[0])
+    best, theta, noise = min((one_round(*better_noise(t)[1:]) for t in starts), key=lambda found: found[0])
     for i in range(1, ROUNDS):
         report(f"fitting the outlook, round {i + 1} of {ROUNDS}, cost {best:.0f}")
         before = best
-        best, theta, noise = one_round(best, theta, noise)
+        best, theta, noise = one_round(theta, noise)
         if before - best < SETTLED * before:
             break
     best, theta, noise = better_noise(theta)
