@@ -47,7 +47,7 @@ FITTED_FOR_OUTLOOK = (
     "the model needs sensors far noisier than they are: it lacks something, so that it was fitted to predictions over 0.5 "
     "to 5 s instead of the likelihood; standard errors count every error as independent, which is too small"
 )
-NOT_CHOSEN = "no effects were looked for: the model needs no noisier sensors than there are; `fish_train diagnose` asks the likelihood"
+NOT_CHOSEN = "no effects looked for: the model needs no noisier sensors than there are; `fish_train diagnose` asks the likelihood"
 NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"
 NO_ENCODER = "the rotor is taken to follow its commands"
 Report = Callable[[str], None]  # told what is being done
