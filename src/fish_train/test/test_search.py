@@ -81,3 +81,16 @@ def test_images_half_a_second_old_are_found():
     base = settle(evaluate(drags, np.zeros(3), late, Noise()), late)
     fit = settle(search.look_afar(base, "camera_latency", late), late)
     assert fit.values["camera_latency.delay"] == pytest.approx(0.47, abs=0.005)
+
+
+def test_an_effect_far_weaker_than_typical_is_found_where_little_is_left():
+    """From a typical strength, which the data refuse by tens of thousands of nats, no step leads back to a weak one."""
+    random = np.random.default_rng(8)
+    commands = np.stack([program(kind, 12.0, random) for kind in ("sines", "steps", "random")], axis=1)
+    weak = Robot().with_effect("tail_hardening", k3=0.036)
+    experiment = record(weak, commands, Noise(), random)[0]
+    free = nominal_hypothesis(Robot(), ("tail_stiffness", "fin_drag_sway"))
+    base = settle(evaluate(free, np.zeros(2), experiment, Noise()), experiment)
+    fit = search.look_near(base, "tail_hardening", experiment)
+    assert search.promise(fit) > base.objective + 100.0
+    assert settle(fit, experiment).values["tail_hardening.k3"] == pytest.approx(0.036, rel=0.05)

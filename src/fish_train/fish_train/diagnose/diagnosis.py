@@ -22,7 +22,7 @@ from fish_train.diagnose.search import (
 )
 from fish_train.diagnose.split import Split, split_trials
 from fish_train.diagnose.tail import MORE, finer_tails
-from fish_train.diagnose.verdict import TOO_STRONG, much_is_left, named
+from fish_train.diagnose.verdict import much_is_left, named
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
 from fish_train.identify.cold import SUSPICIOUS, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
@@ -164,8 +164,8 @@ def finer_tail(
     nominal: Fit, best: Fit, robot: Robot, experiment: Experiment, check: Experiment | None, level: Level,
     progress: Progress,
 ) -> Fit | None:  # fmt: skip
-    """The nominal model with more tail links, where the best fit leaves too strong a force and this explains more of it."""
-    if excess(best).max() < TOO_STRONG:
+    """The nominal model with more tail links, where the best fit leaves more than water and this explains more of it."""
+    if excess(best).max() < SUSPICIOUS:
         return None
     short = shorten(experiment, RANK_STEPS)
     finer = max(finer_tails(robot, best, experiment, short, progress), key=evidence, default=None)

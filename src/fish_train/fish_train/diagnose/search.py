@@ -26,6 +26,7 @@ from fish_train.identify.hypothesis import Coordinates, extend, specification
 from fish_train.identify.settle import open_gates
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
+WEAK_STRENGTHS = (0.05, 0.3)  # where little is left: no step leads back from far too strong an effect
 SCALE = 0.3  # strength at which the hypothesis is written down; sets the coordinates only
 IMU_DISTRUST = 10.0  # factor of the IMU's noise in the first part of the ranking
 RANK_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to rank
@@ -126,7 +127,7 @@ def look_afar(base: Fit, name: str, short: Experiment) -> Fit:
 def look_near(base: Fit, name: str, short: Experiment) -> Fit:
     """A candidate where the base leaves no more than water does: what is missing is small, so one step tells its gain."""
     hypothesis = base.hypothesis.with_effect(name, SCALE)
-    starts = warm_starts(base, name, short, base.noise)
+    starts = warm_starts(base, name, short, base.noise, WEAK_STRENGTHS)
     fits = [evaluate(hypothesis, theta, short, base.noise) for theta in starts]
     return max(fits, key=promise)
 
@@ -138,10 +139,12 @@ def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
         list(pool.map(lambda name: prepare(base.hypothesis.with_effect(name, SCALE).robot), names))
 
 
-def warm_starts(base: Fit, name: str, experiment: Experiment, noise: Noise) -> list[np.ndarray]:
+def warm_starts(
+    base: Fit, name: str, experiment: Experiment, noise: Noise, strengths: Sequence[float] = STRENGTHS
+) -> list[np.ndarray]:
     """theta of the base with a candidate at its best place, weak and strong."""
     place = best_place(base, name, experiment, noise)
-    return [started(base, name, strength, place) for strength in STRENGTHS]
+    return [started(base, name, strength, place) for strength in strengths]
 
 
 def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -> np.ndarray:

@@ -30,14 +30,16 @@ def with_links(robot: Robot, links: int) -> Robot:
 def finer_tails(
     robot: Robot, best: Fit, experiment: Experiment, short: Experiment, progress: Progress
 ) -> list[Fit]:
-    """Nominal models with more links, as far as they are better than the best fit so far on the shortened trials."""
+    """Nominal models with more links that are better than the best fit so far on the shortened trials.
+
+    Each begins from nominal values: from what fewer links came to, a tail that needs more does not find its optimum.
+    """
     found, beaten = [], log_posterior(best.hypothesis, best.theta, short, best.noise)
     for links in (robot.links + more for more in MORE):
         if links > MAX_LINKS:
             break
         progress(f"fitting the nominal model with {links} tail links")
         fit = fit_cold(nominal_hypothesis(with_links(robot, links)), short, usual_noise(short))
-        if not fit.objective > beaten:
-            break  # a link that does not help is not helped by another
-        found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
+        if fit.objective > beaten:
+            found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
     return found
