@@ -24,6 +24,7 @@ NoiseMove = Callable[[Noise, float], Noise]
 
 LARGEST_STEP = 0.5  # of theta in one iteration
 SETTLED_GAIN = 3.0  # nats; a round of noise and parameters that gains less is the last
+LARGE_GAIN = 100.0  # nats; a round that gains less leaves the noise near its best
 SMALL_GAIN = 0.05  # nats; below it an iteration has converged
 
 
@@ -61,13 +62,15 @@ class Fit:
 
 def settle(fit: Fit, experiment: Experiment, rounds: int = 5, iterations: int = 6) -> Fit:
     """Parameters and process noise in turn, from a fit that was evaluated on this experiment, until neither helps."""
-    fit = climb(fit, experiment, iterations)
+    fit, gain = climb(fit, experiment, iterations), np.inf
     for _ in range(rounds):
         before = fit.objective
-        noise = adapt_noise(fit, experiment)
-        fit = climb(evaluate(fit.hypothesis, fit.theta, experiment, noise), experiment, iterations)
+        noise = adapt_noise(fit, experiment, near=gain < LARGE_GAIN)
+        fit = evaluate(fit.hypothesis, fit.theta, experiment, noise)
         if fit.objective - before < SETTLED_GAIN:
             break
+        fit = climb(fit, experiment, iterations)
+        gain = fit.objective - before
     return fit
 
 
@@ -155,14 +158,18 @@ SENSOR_MOVES = tuple(map(_field, ("gyro", "accel", "camera_position", "camera_he
 
 
 def adapt_noise(
-    fit: Fit, experiment: Experiment, rounds: int = 1, moves: Sequence[NoiseMove] = NOISE_MOVES
+    fit: Fit,
+    experiment: Experiment,
+    rounds: int = 1,
+    moves: Sequence[NoiseMove] = NOISE_MOVES,
+    near: bool = False,
 ) -> Noise:
     """Maximum-likelihood wrench intensities and their time constant: parabola through three points each, in turn.
 
     The encoder's noise is that of what the fit leaves of it.
 
-    The start is the best of a few far apart: a model that has just found its missing effect needs far less noise than
-    the one before, and from there the parabola stops half-way.
+    The start is the best of a few far apart, unless it is known to be `near`: a model that has just found its missing
+    effect needs far less noise than the one before, and from there the parabola stops half-way.
     """
     residual = fit.noise.encoder * fit.result.whitened[..., ENCODER_ROW]
     old = replace(fit.noise, encoder=encoder_noise(residual, Noise().encoder))
@@ -172,8 +179,10 @@ def adapt_noise(
         gate_imu=old.gate_imu,
         encoder=old.encoder,
     )  # of the sensors too
-    starts = [old, usual, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
-    starts += [replace(old, wrench=tuple(f * w for w in old.wrench)) for f in JUMPS]
+    starts = [old]
+    if not near:
+        starts += [usual, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
+        starts += [replace(old, wrench=tuple(f * w for w in old.wrench)) for f in JUMPS]
     noise, best = max(((n, likelihood(fit, experiment, n)) for n in starts), key=lambda found: found[1])
     for _ in range(rounds):
         for change in moves:
