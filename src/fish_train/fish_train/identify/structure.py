@@ -1,15 +1,19 @@
 """Which effects let a wrong model predict trials better that it was not fitted to: forward selection by cross-validation.
 
 For a robot whose recordings no likelihood explains (see `outlook`). Every candidate is fitted for the outlook on all trials;
-the few that promise most are judged by trials left out in turn, each predicted by parameters fitted without it. The best is
+the third that promises most is judged by trials left out in turn, each predicted by parameters fitted without it. The best is
 added if it lowers the logarithm of their costs by more than one standard error over the trials (Breiman et al. 1984, ch. 3.4),
 and so on. Trials that are held out of the whole identification take no part.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +28,9 @@ Array = NDArray[np.float64]
 
 MOST_EFFECTS = 3
 FOLDS = 4
-JUDGED = 3  # candidates a round that are cross-validated
+JUDGED = (
+    8  # candidates a round that are cross-validated: what fits best foretells little of what predicts best
+)
 EVERY = 2.0  # s between start points: half of those of the last fit
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is fitted
 SCALE = 0.3  # strength at which a hypothesis is written down; sets the coordinates only
@@ -57,6 +63,13 @@ class _Tried:
     cost: float
 
 
+@dataclass(frozen=True)
+class _Judged:
+    tried: _Tried
+    costs: Array  # (M,) of trials left out
+    step: Step
+
+
 def choose_effects(
     fit: Fit, experiment: Experiment, names: Sequence[str], report: Report = lambda _: None
 ) -> tuple[Fit, tuple[Step, ...]]:
@@ -69,32 +82,29 @@ def choose_effects(
         return fit, ()
     without = left_out_costs(fit, fit.hypothesis, fit.theta, experiment)
     for number in range(MOST_EFFECTS):
-        tried = []
-        for i, name in enumerate(n for n in names if n not in fit.hypothesis.names):
-            report(f"effect {number + 1}: trying {name} ({i + 1} of {len(names) - number})")
-            tried.append(_screen(fit, name, experiment))
-        best, best_costs, judged = None, without, list[Step]()
-        for promising in sorted(tried, key=lambda t: t.cost)[:JUDGED]:
-            report(f"effect {number + 1}: leaving trials out to judge {promising.name}")
-            candidate = _settled(promising, fit.noise, experiment)
-            costs = left_out_costs(fit, candidate.hypothesis, candidate.theta, experiment)
-            # logarithms: a trial that diverges without it would outweigh all others in a mean of costs
-            ratio = np.log(without / costs)
-            ratio = ratio[np.isfinite(ratio)]  # a trial too short to predict says nothing
-            deviation = float(np.std(ratio, ddof=1) / np.sqrt(len(ratio)))
-            judged.append(Step(candidate.name, float(ratio.mean()), deviation, False))
-            report(f"{candidate.name}: {step_text(judged[-1])}")
-            if ratio.mean() > deviation and judged[-1].gain >= max(s.gain for s in judged):
-                best, best_costs = candidate, costs
-        steps += [replace(s, added=best is not None and s.name == best.name) for s in judged]
+        left = [name for name in names if name not in fit.hypothesis.names]
+        screened, judged = list[_Tried](), list[_Judged]()
+        # forked, so that a user's own effects are registered there as well
+        with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
+            for tried in pool.map(partial(_screen, fit, experiment), left):
+                screened.append(tried)
+                report(f"effect {number + 1}: tried {tried.name} ({len(screened)} of {len(left)})")
+            promising = sorted(screened, key=lambda t: t.cost)[:JUDGED]
+            report(f"effect {number + 1}: leaving trials out to judge {', '.join(t.name for t in promising)}")
+            for found in pool.map(partial(_judge, fit, experiment, without), promising):
+                judged.append(found)
+                report(f"{found.tried.name}: {step_text(found.step)}")
+        good = [j for j in judged if j.step.gain > j.step.deviation]
+        best = max(good, key=lambda j: j.step.gain, default=None)
+        steps += [replace(j.step, added=j is best) for j in sorted(judged, key=lambda j: -j.step.gain)]
         if best is None:
             break
-        fit = evaluate(best.hypothesis, best.theta, experiment, fit.noise)
-        without = best_costs
+        fit = evaluate(best.tried.hypothesis, best.tried.theta, experiment, fit.noise)
+        without = best.costs
     return fit, tuple(steps)
 
 
-def _screen(fit: Fit, name: str, experiment: Experiment) -> _Tried:
+def _screen(fit: Fit, experiment: Experiment, name: str) -> _Tried:
     """A candidate fitted for the outlook on all trials, in a few steps."""
     hypothesis = fit.hypothesis.with_effect(name, SCALE)
     outlook = Outlook(experiment, hypothesis, EVERY)
@@ -118,6 +128,17 @@ def _settled(tried: _Tried, noise: Noise, experiment: Experiment) -> _Tried:
         if before - cost < SETTLED * before:
             break
     return replace(tried, theta=theta, cost=cost)
+
+
+def _judge(fit: Fit, experiment: Experiment, without: Array, tried: _Tried) -> _Judged:
+    """What a candidate, fitted to the end, does to trials left out, against their costs without it."""
+    tried = _settled(tried, fit.noise, experiment)
+    costs = left_out_costs(fit, tried.hypothesis, tried.theta, experiment)
+    # logarithms: a trial that diverges without it would outweigh all others in a mean of costs
+    ratio = np.log(without / costs)
+    ratio = ratio[np.isfinite(ratio)]  # a trial too short to predict says nothing
+    deviation = float(np.std(ratio, ddof=1) / np.sqrt(len(ratio)))
+    return _Judged(tried, costs, Step(tried.name, float(ratio.mean()), deviation, False))
 
 
 def left_out_costs(fit: Fit, hypothesis: Hypothesis, theta: Array, experiment: Experiment) -> Array:
