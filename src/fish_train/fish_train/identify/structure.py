@@ -1,7 +1,7 @@
 """Which effects let a wrong model predict trials better that it was not fitted to: forward selection by cross-validation.
 
 For a robot whose recordings no likelihood explains (see `outlook`). Every candidate is fitted for the outlook on all trials;
-the third that promises most is judged by trials left out in turn, each predicted by parameters fitted without it. The best is
+the few that promise most are judged by trials left out in turn, each predicted by parameters fitted without it. The best is
 added if it lowers the logarithm of their costs by more than one standard error over the trials (Breiman et al. 1984, ch. 3.4),
 and so on. Trials that are held out of the whole identification take no part.
 """
