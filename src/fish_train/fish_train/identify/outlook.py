@@ -95,11 +95,14 @@ class Outlook:
     def mean_costs(self, theta: Array) -> Array:
         """(M,) cost per prediction of each trial, without the prior; NaN for a trial too short to predict."""
         p, dp, _ = self.coordinates.filter_inputs(theta)
-        costs = np.full(len(self.experiment.names), np.nan)
-        for m in self.targets:
-            e = np.clip(np.nan_to_num(self._trial(m, p, dp[:0])[0], nan=LOST), -LOST, LOST)
-            costs[m] = _huber(e).sum() / len(self.targets[m])
-        return costs
+        e = np.clip(np.nan_to_num(self._of_targets(p, dp[:0])[0], nan=LOST), -LOST, LOST)
+        cost, trial = _huber(e).sum(1), np.repeat(list(self.targets), [len(t) for t in self.targets.values()])
+        return np.array(
+            [
+                cost[trial == m].mean() if m in self.targets else np.nan
+                for m in range(len(self.experiment.names))
+            ]
+        )
 
     def _cost(self, e: Array, theta: Array) -> float:
         return float(_huber(e).sum() + 0.5 * np.sum((theta / self.coordinates.prior) ** 2))
@@ -107,8 +110,8 @@ class Outlook:
     def errors(self, theta: Array, slopes: bool = True) -> tuple[Array, Array]:
         """Scaled errors (R,) and their derivatives (R, K), K = 0 without slopes."""
         p, dp, _ = self.coordinates.filter_inputs(theta)
-        parts = [self._trial(m, p, dp if slopes else dp[:0]) for m in self.targets]
-        e, J = np.concatenate([a for a, _ in parts]), np.concatenate([b for _, b in parts])
+        e, J = self._of_targets(p, dp if slopes else dp[:0])
+        e, J = e.ravel(), J.reshape(e.size, J.shape[2])
         wild = ~np.isfinite(e) | ~np.isfinite(J).all(1) | (np.abs(J) > STEEPEST).any(1)
         return np.clip(np.nan_to_num(e, nan=LOST), -LOST, LOST), np.where(wild[:, None], 0.0, J)
 
@@ -163,29 +166,30 @@ class Outlook:
         e, J = self.errors(theta)
         return self._normal(e, J, theta)[1] / max(float(np.mean(np.minimum(e**2, ROBUST**2))), 1e-12)
 
-    def _trial(self, m: int, p: Array, dp: Array) -> tuple[Array, Array]:
-        """Errors and slopes of one trial's targets."""
-        targets, K = self.targets[m], len(dp)
-        rows = sorted({t.start for t in targets})
-        pose, d_pose = self._simulate(m, self.starts[rows, 1], p, dp)
+    def _of_targets(self, p: Array, dp: Array) -> tuple[Array, Array]:
+        """Errors (R, 4) and slopes (R, 4, K) of all targets, trial by trial."""
+        targets = [target for found in self.targets.values() for target in found]
+        rows = sorted({target.start for target in targets})
+        pose, d_pose = self._simulate(self.starts[rows], p, dp)
         column = {row: i for i, row in enumerate(rows)}
-        e, J = np.empty((len(targets), 4)), np.empty((len(targets), 4, K))
+        e, J = np.empty((len(targets), 4)), np.empty((len(targets), 4, len(dp)))
         for i, target in enumerate(targets):
             j = column[target.start]
             e[i], J[i] = _error(target, pose[:, j], d_pose[:, j])
-        return e.ravel(), J.reshape(e.size, K)
+        return e, J
 
-    def _simulate(self, m: int, starts: NDArray[np.int64], p: Array, dp: Array) -> tuple[Array, Array]:
-        """Poses (L + 1, S, 3) and their derivatives (L + 1, S, 3, K), as `prediction` simulates."""
+    def _simulate(self, starts: NDArray[np.int64], p: Array, dp: Array) -> tuple[Array, Array]:
+        """Poses (L + 1, S, 3) and derivatives (L + 1, S, 3, K) from (S, 2) trials and grid points, as `prediction` simulates."""
         S, K, stepper = len(starts), max(len(dp), 1), self.coordinates.stepper
+        m, first = starts.T
         length = int(np.ceil((max(HORIZONS) + HALF_WINDOW) / DT)) + 1
         at = [stepper.layout.parameters.index(name) for name in WRENCH]
         wrench = np.repeat(
-            np.nan_to_num(self.estimates.wrench[starts, m]), K, axis=0
+            np.nan_to_num(self.estimates.wrench[first, m]), K, axis=0
         )  # NaN: the filter diverged
-        state = np.repeat(self.estimates.state[starts, m], K, axis=0)
-        k = np.minimum(starts + np.arange(length)[:, None], self.experiment.steps[m] - 1)
-        commands = np.repeat(self.experiment.commands[k, m], K, axis=1)
+        state = np.repeat(self.estimates.state[first, m], K, axis=0)
+        k = np.minimum(first + np.arange(length)[:, None], self.experiment.steps[m] - 1)
+        commands = self.experiment.commands[k, m]
         P, d_state = np.tile(p, (S * K, 1)), np.zeros_like(state)
         dP = np.tile(dp, (S, 1)) if len(dp) else np.zeros_like(P)
         pose, d_pose = np.empty((length + 1, S * K, 3)), np.zeros((length + 1, S * K, 3))
@@ -193,12 +197,13 @@ class Outlook:
         for begin in range(0, length, CHUNK):
             end = min(begin + CHUNK, length)
             P[:, at] = p[at] + wrench * np.exp(-(begin + end) * DT / 2.0 / self.noise.wrench_time)
+            told = np.repeat(commands[begin:end], K, axis=1)
             if len(dp):
                 still = np.zeros((end - begin, 1, 2))
-                x, dx = stepper.rollout_jvp(state, commands[begin:end], P, d_state, still, dP)
+                x, dx = stepper.rollout_jvp(state, told, P, d_state, still, dP)
                 d_pose[begin + 1 : end + 1], d_state = dx[1:, :, :3], dx[-1]
             else:
-                x = stepper.rollout(state, commands[begin:end], P)
+                x = stepper.rollout(state, told, P)
             pose[begin + 1 : end + 1], state = x[1:, :, :3], x[-1]
         pose = pose.reshape(length + 1, S, K, 3)[:, :, 0]
         return pose, d_pose.reshape(length + 1, S, K, 3).transpose(0, 1, 3, 2)[..., : len(dp)]
