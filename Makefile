@@ -85,7 +85,7 @@ test: setup build
 		python -m pytest test || status=1; exit $$status
 
 lint: setup
-	@$(ACTIVATE); ruff format --check .; ruff check .
+	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_*
 
 clean:
 	rm -rf build install log

@@ -55,13 +55,17 @@ def torch_ops() -> SimpleNamespace:
     def pairwise(function: Any) -> Any:
         def apply(a: Scalar, b: Scalar) -> torch.Tensor:
             like = a if isinstance(a, torch.Tensor) else b
-            return function(tensor(a, like), tensor(b, like))
+            result: torch.Tensor = function(tensor(a, like), tensor(b, like))
+            return result
 
         return apply
 
     def elementwise(function: Any) -> Any:
         def apply(a: Scalar) -> torch.Tensor:
-            return function(a if isinstance(a, torch.Tensor) else torch.tensor(a, dtype=torch.float64))
+            result: torch.Tensor = function(
+                a if isinstance(a, torch.Tensor) else torch.tensor(a, dtype=torch.float64)
+            )
+            return result
 
         return apply
 

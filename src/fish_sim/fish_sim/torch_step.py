@@ -53,11 +53,12 @@ def rollout(
         commands = (
             commands.expand(len(commands), *lead, commands.shape[-1]) if commands.ndim > 2 else commands
         )
-        return _Rollout.apply(start, commands, parameters, stepper)
-    states = [start]
+        states: Tensor = _Rollout.apply(start, commands, parameters, stepper)
+        return states
+    steps = [start]
     for command in commands:
-        states.append(_generic_step(states[-1], command, parameters, stepper))
-    return torch.stack(torch.broadcast_tensors(*states))
+        steps.append(_generic_step(steps[-1], command, parameters, stepper))
+    return torch.stack(torch.broadcast_tensors(*steps))
 
 
 def step(

@@ -108,7 +108,8 @@ class CameraNode(Node):
         for time in times:
             head, tail = self._head.at(time), self._tail.at(time)
             assert head is not None  # a frame is taken only after odometry came
-            poses.append(FishPose(*map(float, head), tail=() if tail is None else tuple(map(float, tail))))
+            x, y, psi = map(float, head)
+            poses.append(FishPose(x, y, psi, tail=() if tail is None else tuple(map(float, tail))))
         return poses
 
     def _send_due(self) -> None:
@@ -161,7 +162,7 @@ class CameraNode(Node):
 
 
 def _seconds(header: Header) -> float:
-    return header.stamp.sec + header.stamp.nanosec * 1e-9
+    return float(header.stamp.sec + header.stamp.nanosec * 1e-9)
 
 
 def _raw_image(header: Header, picture: np.ndarray) -> Image:

@@ -136,7 +136,7 @@ class SimulatorNode(Node):
         """Simulated time [s] of a stamp; a message without one is of now."""
         if stamp == Time():
             return self._simulation.time
-        return 1e-9 * (stamp.sec * 1_000_000_000 + stamp.nanosec - self._start_ns)
+        return 1e-9 * float(stamp.sec * 1_000_000_000 + stamp.nanosec - self._start_ns)
 
     def _publish(self, readings: Readings) -> None:
         stamp = self._stamp(readings.time)

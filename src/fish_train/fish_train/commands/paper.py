@@ -17,6 +17,7 @@ from fish_train.errors import UserError
 from fish_train.evaluation import paper_numbers as paper
 
 if TYPE_CHECKING:
+    from fish_sim.robot import Robot
     from fish_train.training.run_log import CurveRow
 
 
@@ -77,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def trained(
-    folder: Path, seeds: int, robot: object, jobs: int, console: Console
+    folder: Path, seeds: int, robot: Robot, jobs: int, console: Console
 ) -> tuple[Sequence[Sequence[CurveRow]], int]:
     """Curves of the seeds, trained or continued where they are not finished; and the number of levels."""
     from fish_train.training.config import TrainConfig

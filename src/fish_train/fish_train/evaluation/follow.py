@@ -90,7 +90,8 @@ class Follower:
     def decide(self, seen: Array, known: NDArray[np.bool_]) -> None:
         """One control period of planner, policy and control law."""
         motion, at = Motion(*seen.T), self._paths.update(seen[:, :2])
-        ahead = PathAhead(*at.point.T, at.heading, at.curvature, *at.target.T, at.chord)
+        (x, y), (target_x, target_y) = at.point.T, at.target.T
+        ahead = PathAhead(x, y, at.heading, at.curvature, target_x, target_y, at.chord)
         state, guidance = self._guidance, self._law.guidance
         errors = tracking_errors(state.stroke, motion, ahead, self._speed, guidance, np)
         water = through_water(state, errors.course, at.curvature, self._speed, np)

@@ -115,13 +115,15 @@ def _grid(trial: Trial) -> dict[str, Array]:
             f"{trial.name}: {seen.sum()} camera poses between the first and the last command; at least three are needed"
         )
     nothing = np.full(count, np.nan)
-    rate, force = (None, None) if imu is None else level(imu)
+    gyro, accel = nothing, np.full((count, 2), np.nan)
+    if imu is not None:
+        gyro, accel = (_nearest(imu.t, felt, t) for felt in level(imu))
     measured = nothing if encoder is None else _nearest(encoder.t, encoder.speed, t)
     speed, measured = driven(c.rotor_speed[held], measured)
     return {
         "commands": np.column_stack([speed, c.rudder[held]]),
-        "gyro": nothing if imu is None else _nearest(imu.t, rate, t),
-        "accel": np.full((count, 2), np.nan) if imu is None else _nearest(imu.t, force, t),
+        "gyro": gyro,
+        "accel": accel,
         "encoder": measured,
         "frame_t": camera.t[seen] - start,
         "frame_pose": np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])[seen],

@@ -147,11 +147,11 @@ class _Job:
             self.gradient + terms.gradient,
             normal + terms.normal,
             whitened,
-            None if self.history is None else self._history(memory[:, :, 0]),
+            None if self.history is None else self._history(self.history, memory[:, :, 0]),
         )
 
-    def _history(self, memory: Array) -> History:
-        n, h = self.n, self.history.transpose(1, 0, 2)
+    def _history(self, rows: Array, memory: Array) -> History:
+        n, h = self.n, rows.transpose(1, 0, 2)
         T, M = h.shape[:2]
         cuts = np.cumsum([n, n * n, n, n * n, n * n])
         parts = np.split(h, cuts, axis=2)[:5]

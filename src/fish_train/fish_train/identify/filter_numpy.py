@@ -187,9 +187,8 @@ class Filter:
         ds, dp = self._directions(D, moving)
         drive = drive_at(self.memory[k, :, :2], self.memory[k + 1, :, :2], fraction)
         d_drive = np.zeros((M, R, 4))
-        d_drive[:, nx + 3 :] = drive_at(
-            *(d.transpose(0, 2, 1) for d in self.d_memory[k : k + 2, :, :2]), fraction
-        )
+        before, after = (d.transpose(0, 2, 1) for d in self.d_memory[k : k + 2, :, :2])
+        d_drive[:, nx + 3 :] = drive_at(before, after, fraction)
         rate, tangent = self.stepper.rates_jvp(
             np.repeat(motion, R, axis=0), np.repeat(drive, R, axis=0), np.repeat(self._parameters(xi), R, axis=0),
             ds.reshape(M * R, nx), d_drive.reshape(M * R, 4), dp.reshape(M * R, -1),

@@ -50,7 +50,7 @@ class Fit:
     @property
     def covariance(self) -> Array:
         """(K, K) of theta: inverse of the normal matrix."""
-        return np.linalg.inv(self.normal)
+        return np.asarray(np.linalg.inv(self.normal), float)
 
     @property
     def standard_errors(self) -> dict[str, float]:
@@ -137,9 +137,8 @@ def likelihood(fit: Fit, experiment: Experiment, noise: Noise) -> float:
 
 def _wrench(index: int) -> NoiseMove:
     def change(noise: Noise, factor: float) -> Noise:
-        wrench = list(noise.wrench)
-        wrench[index] *= factor
-        return replace(noise, wrench=tuple(wrench))
+        x, y, n = (w * (factor if i == index else 1.0) for i, w in enumerate(noise.wrench))
+        return replace(noise, wrench=(x, y, n))
 
     return change
 
@@ -182,7 +181,8 @@ def adapt_noise(
     starts = [old]
     if not near:
         starts += [usual, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
-        starts += [replace(old, wrench=tuple(f * w for w in old.wrench)) for f in JUMPS]
+        x, y, n = old.wrench
+        starts += [replace(old, wrench=(f * x, f * y, f * n)) for f in JUMPS]
     noise, best = max(((n, likelihood(fit, experiment, n)) for n in starts), key=lambda found: found[1])
     for _ in range(rounds):
         for change in moves:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import comb
+from math import comb, sqrt
 
 import numpy as np
 
@@ -23,9 +23,9 @@ FEWEST = 50  # differences that an estimate needs
 
 def usual_noise(experiment: Experiment) -> Noise:
     """`Noise()` with sensors as noisy as they are in these recordings; the encoder by its distance from the command."""
-    grid = DT * np.arange(experiment.length)
+    grid: Array = DT * np.arange(experiment.length, dtype=float)
     frames = experiment.frames
-    signals = {
+    signals: dict[str, list[tuple[Array, Array]]] = {
         "gyro": [(grid, s) for s in experiment.gyro.T],
         "accel": [(grid, s) for axis in (0, 1) for s in experiment.accel[..., axis].T],
         "camera_position": [(f.t, f.pose[:, axis]) for f in frames for axis in (0, 1)],
@@ -33,7 +33,8 @@ def usual_noise(experiment: Experiment) -> Noise:
     }
     usual = Noise()
     measured = {name: white_noise(own, getattr(usual, name)) for name, own in signals.items()}
-    return replace(usual, **measured, encoder=encoder_noise(commanded_residual(experiment), usual.encoder))
+    measured["encoder"] = encoder_noise(commanded_residual(experiment), usual.encoder)
+    return replace(usual, **measured)  # type: ignore[arg-type]  # all numbers, no wrench among them
 
 
 def white_noise(signals: Sequence[tuple[Array, Array]], usual: float) -> float:
@@ -50,4 +51,5 @@ def white_noise(signals: Sequence[tuple[Array, Array]], usual: float) -> float:
     size = np.concatenate(sizes)
     if len(size) < FEWEST:
         return usual
-    return max(float(np.median(size)) / NORMAL_MAD / comb(2 * ORDER, ORDER) ** 0.5, SMALLEST * usual)
+    found = float(np.median(size)) / NORMAL_MAD / sqrt(comb(2 * ORDER, ORDER))
+    return max(found, SMALLEST * usual)

@@ -18,9 +18,10 @@ def message_class(msgtype: str) -> type:
     """
     package, _, name = msgtype.split("/")
     try:
-        return getattr(import_module(f"{package}.msg"), name)
+        found: type = getattr(import_module(f"{package}.msg"), name)
     except (ImportError, AttributeError) as error:
         raise RecordingError(f"message type {msgtype} is not installed here: {error}") from error
+    return found
 
 
 def from_profile(profile: QoSProfile) -> Qos:

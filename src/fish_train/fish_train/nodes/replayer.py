@@ -18,6 +18,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.time import Time
+from rosbags.interfaces import Connection
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool
 
@@ -53,7 +54,7 @@ class ReplayerNode(Node):
         start = self._playback.start_ns
         self._time = PlaybackClock(config.rate, start, time.monotonic_ns() + delay_ns, config.paused)
         self._messages = self._playback.messages()
-        self._next = next(self._messages)
+        self._next: tuple[Connection, int, bytes] | None = next(self._messages)
         self._next_tick = start
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._due = self.create_timer(config.start_delay_s or 1e-3, self._publish_due, clock=steady)

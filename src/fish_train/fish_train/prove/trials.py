@@ -94,7 +94,8 @@ class _Captain:
                 self._controller.decide(Wanted(errors.course, plan.speed, plan.yaw_rate, errors.cross_track))
             else:
                 self._controller.rest()
-        return tuple(self._controller.command(PERIOD))
+        command = self._controller.command(PERIOD)
+        return command[0], command[1], command[2]
 
 
 def open_loop(kinds: Iterable[str], duration: float, random: np.random.Generator, calm: Array) -> Array:

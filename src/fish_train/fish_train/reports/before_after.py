@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fish_train.diagnose.diagnosis import Diagnosis
@@ -40,7 +41,7 @@ def before_after(d: Diagnosis) -> Figure:
     )
 
 
-def _lines(figure, swim: Swim, measured: bool, label: str, colour: str, column: int) -> None:
+def _lines(figure: go.Figure, swim: Swim, measured: bool, label: str, colour: str, column: int) -> None:
     """Path and speed of one trial in its column."""
     values, line = (swim.measured if measured else swim.simulated), {"color": colour, "width": 1.5}
     shared = {"name": label, "legendgroup": label, "line": line, "mode": "lines", "col": column}
