@@ -11,6 +11,7 @@ import pytest
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot, load_robot, save_robot
 from fish_train.commands.diagnose import without_wrench
+from fish_train.diagnose import answer as answers
 from fish_train.diagnose import diagnosis as module
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
@@ -65,10 +66,7 @@ def test_nothing_is_found_where_nothing_is(tmp_path):
     assert "nothing is missing" in (tmp_path / "report.html").read_text()
 
 
-def test_a_tail_of_more_links_is_no_missing_physics(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        module, "TOO_STRONG", 3.0
-    )  # what 4 links leave to 3 in these short trials is less than 30
+def test_a_tail_of_more_links_is_no_missing_physics(tmp_path):
     fish = swim(with_links(truth(), 4), duration=5.0)
     result = module.diagnose(fish, Robot(), names=("quadratic_drag", "payload"))
     content = answer(result)
@@ -162,6 +160,17 @@ def test_the_level_is_checked_and_probabilities_add_up():
     odds = probabilities({"a": -100.0, "b": -110.0, "c": -500.0})
     assert sum(odds.values()) == pytest.approx(1.0)
     assert odds["a"] > odds["b"] > odds["c"]
+
+
+def test_a_name_that_was_found_as_well_is_no_rival(monkeypatch):
+    monkeypatch.setattr(answers, "evidence", lambda fit, _: fit)
+    found = SimpleNamespace(refitted={"current": 10.0, "tip_slip": 40.0, "wall_effect": 9.0})
+    first, second = module.Accepted("current", found), module.Accepted("tip_slip", found)
+    odds = answers.competition(first, [first, second])
+    assert list(odds) == ["current", "wall_effect"] and odds["current"] == pytest.approx(
+        1.0 / (1.0 + np.exp(-1.0))
+    )
+    assert list(answers.competition(second, [first, second])) == ["tip_slip", "wall_effect"]
 
 
 def test_the_next_experiment_follows_what_is_open():

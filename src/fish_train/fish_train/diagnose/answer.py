@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     name, found = accepted.name, accepted.round
     gains = {a.name: a.round.gain(a.name) for a in d.accepted}
     tried = len(found.ranking)
-    odds = competition(accepted)
+    odds = competition(accepted, d.accepted)
     return {
         "name": name,
         "kind": kind_of(name),
@@ -73,15 +74,19 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     }
 
 
-def competition(accepted: Accepted) -> dict[str, float]:
-    """Probability of each refitted name of the round, most probable first."""
-    odds = probabilities({n: evidence(f, TEMPER) for n, f in accepted.round.refitted.items()})
+def competition(accepted: Accepted, found: Sequence[Accepted]) -> dict[str, float]:
+    """Probability of a name and of its rivals: those refitted in its round that were not found as well, most probable first."""
+    beside = {other.name for other in found} - {accepted.name}
+    fits = {n: f for n, f in accepted.round.refitted.items() if n not in beside}
+    odds = probabilities({n: evidence(f, TEMPER) for n, f in fits.items()})
     return dict(sorted(odds.items(), key=lambda item: -item[1]))
 
 
 def rivals(d: Diagnosis) -> list[str]:
     """Names that the data cannot tell from what was found."""
-    return [n for a in named(d) for n, p in competition(a).items() if n != a.name and p > PLAUSIBLE]
+    return [
+        n for a in named(d) for n, p in competition(a, d.accepted).items() if n != a.name and p > PLAUSIBLE
+    ]
 
 
 def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:

@@ -174,7 +174,8 @@ def finer_tail(
     gain = finer.objective - nominal.objective
     if gain < level.enough(float(nominal.result.samples.sum()), 1, len(MORE)):
         return None
-    if check is not None and not holds_elsewhere(nominal, finer, check):
+    # half of what the truth would gain there is too much to ask: no number of links is the truth, and none is a name
+    if check is not None and not gain_elsewhere(nominal, finer, check)[0] > SMALLEST_CHECK:
         return None
     progress(f"the tail needs {finer.robot.links} links: {gain:.0f} nats")
     return finer
@@ -217,7 +218,13 @@ def is_significant(fit: Fit, gain: float, name: str, samples: float, tried: int,
 
 
 def holds_elsewhere(base: Fit, fit: Fit, check: Experiment) -> bool:
-    """On trials that it was not fitted to, a fit must gain a fair share of what it would gain there if it were true.
+    """On trials that it was not fitted to, a fit must gain a fair share of what it would gain there if it were true."""
+    gain, expected = gain_elsewhere(base, fit, check)
+    return gain > max(FAIR_SHARE * expected, SMALLEST_CHECK)
+
+
+def gain_elsewhere(base: Fit, fit: Fit, check: Experiment) -> tuple[float, float]:
+    """Nats that a fit gains over the base on trials that neither was fitted to, and those that it would if it were true.
 
     With r the whitened innovations of the fit, white if it is true, and r + d those of the base under the same noise, the gain
     sum((r + d)^2 - r^2) / 2 is sum(d^2) / 2 in the mean: much where the effect acts, little on trials that do not excite it.
@@ -226,8 +233,7 @@ def holds_elsewhere(base: Fit, fit: Fit, check: Experiment) -> bool:
     here = trial_likelihoods(fit.hypothesis, fit.theta, check, noise)
     there = trial_likelihoods(base.hypothesis, base.theta, check, noise)
     gain = float(here.log_likelihood.sum() - there.log_likelihood.sum())
-    expected = 0.5 * float(np.nansum((here.whitened - there.whitened) ** 2))
-    return gain > max(FAIR_SHARE * expected, SMALLEST_CHECK)
+    return gain, 0.5 * float(np.nansum((here.whitened - there.whitened) ** 2))
 
 
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:
