@@ -35,6 +35,9 @@ from fish_train.identify.settle import open_gates, suitable_noise
 from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
+GROWN = (
+    2.0  # a force that more trials make so much stronger comes from a poor optimum rather than from the water
+)
 FAIR_SHARE = (
     0.5  # of the gain that a true effect shows on trials not fitted to: half-way from none to all of it
 )
@@ -245,8 +248,9 @@ def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fi
 
 
 def refine(fit: Fit, experiment: Experiment) -> Fit:
-    """A fit carried over to other trials."""
-    return settle_base(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment)
+    """A fit carried over to other trials; where it leaves far more there, the camera leads it to a better optimum."""
+    settled = settle_base(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment)
+    return anneal(settled, experiment) if excess(settled).max() > GROWN * excess(fit).max() else settled
 
 
 def prune(
