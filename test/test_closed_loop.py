@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CONTROLLER, FUSION, PLANNER, RECORDER, Run, parameters, running
+from conftest import CONTROLLER, FUSION, PATIENCE, PLANNER, RECORDER, Run, parameters, running
 from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from fish_train.bringup import REPLAYER, NodeSpec
 from fish_train.recordings import read_trial
@@ -147,7 +149,7 @@ def resumed(tmp_path_factory) -> Resumed:
         for spec, place in ((PLANNER, 0.4), (FUSION, 0.9), (CONTROLLER, 1.4)):
             run.until(lambda place=place: run.progress() > place, f"progress of {place} m")
             # without estimates the fish is to stop, which takes a while
-            seen.places[spec] = kill_and_restart(run, spec, pause=3.0 if spec is FUSION else 0.0)
+            seen.places[spec] = kill_and_restart(run, spec, pause=1.5 if spec is FUSION else 0.0)
         run.until(run.finished, "the end of the path")
         run.listen(0.5)  # the estimate may be there a little before the fish
         run.nodes.stop([RECORDER])
@@ -155,12 +157,12 @@ def resumed(tmp_path_factory) -> Resumed:
 
 
 def kill_and_restart(run: Run, spec, pause: float) -> Places:
-    """Kill a node, start it again after `pause` [s] and swim on until the planner is 0.1 m further."""
+    """Kill a node, start it again after `pause` [simulated s] and swim on until the planner is 0.1 m further."""
     process = run.nodes.running[spec]
     process.signal(signal.SIGKILL)
     assert process.wait(5.0) == -signal.SIGKILL
     before, words = run.progress(), []
-    run.listen(pause)
+    swim_without_estimates(run, pause)
     restarted = time.time()
     run.start(spec)
 
@@ -172,6 +174,25 @@ def kill_and_restart(run: Run, spec, pause: float) -> Places:
 
     run.until(further, f"the planner being where the fish is after the end of {spec.name}")
     return Places(before, float(np.nanmin(words)), words[-1], restarted)
+
+
+def swim_without_estimates(run: Run, duration: float) -> None:
+    """Until the commands are so much [simulated s] younger than the last estimate.
+
+    Not real time: who publishes to a node that was killed may be held up for seconds by the middleware.
+    """
+    commands: list[JointState] = []
+    subscription = run.watch.create_subscription(JointState, "joint_command", commands.append, 50)
+    deadline = time.monotonic() + PATIENCE
+    while duration and not (commands and seconds(commands[-1].header) > run.watch.sight.stamp + duration):
+        assert time.monotonic() < deadline, f"no commands over {duration:g} s within {PATIENCE:.0f} s"
+        run.listen(0.05)
+    run.watch.destroy_subscription(subscription)
+
+
+def seconds(header: Header) -> float:
+    """Stamp [s]."""
+    return header.stamp.sec + 1e-9 * header.stamp.nanosec
 
 
 def planned(run: Run) -> float:
@@ -195,7 +216,7 @@ def messages(recording: Path, topic: str) -> tuple[np.ndarray, list[Heard]]:
         connections = [c for c in reader.connections if c.topic == topic]
         for connection, arrival, data in reader.messages(connections=connections):
             message = reader.deserialize(data, connection.msgtype)
-            stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+            stamp = seconds(message.header)
             heard.append(Heard(stamp, 1e-9 * arrival, message))
     heard.sort(key=lambda h: h.stamp)
     return np.array([h.stamp for h in heard]), heard
