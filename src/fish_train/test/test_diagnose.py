@@ -76,6 +76,29 @@ def test_a_tail_of_more_links_is_no_missing_physics(tmp_path):
     assert "modelled with 4 links instead of 3" in (tmp_path / "report.html").read_text()
 
 
+@pytest.mark.parametrize(("gain", "accepted"), [(20.0, True), (5.0, False)])
+def test_a_finer_tail_must_gain_on_unseen_trials_but_not_what_the_truth_would(monkeypatch, gain, accepted):
+    nominal = SimpleNamespace(objective=0.0, result=SimpleNamespace(samples=np.array([1000.0])))
+    finer = SimpleNamespace(objective=500.0, robot=SimpleNamespace(links=4))
+    monkeypatch.setattr(module, "excess", lambda _: np.array([1.0, 1.0, 10.0]))
+    monkeypatch.setattr(module, "shorten", lambda *_: None)
+    monkeypatch.setattr(module, "finer_tails", lambda *_: [finer])
+    monkeypatch.setattr(module, "evidence", lambda fit: fit.objective)
+    monkeypatch.setattr(module, "gain_elsewhere", lambda *_: (gain, 1000.0))
+    found = module.finer_tail(nominal, nominal, None, None, "unseen", Level(), lambda _: None)
+    assert found is (finer if accepted else None)
+
+
+@pytest.mark.parametrize(("left", "led"), [(9.0, True), (3.0, False)])
+def test_a_fit_that_leaves_far_more_on_more_trials_is_led_once_more(monkeypatch, left, led):
+    fit = SimpleNamespace(hypothesis=None, theta=None, noise=None, left=2.0)
+    monkeypatch.setattr(module, "evaluate", lambda *_: None)
+    monkeypatch.setattr(module, "settle_base", lambda *_: SimpleNamespace(left=left))
+    monkeypatch.setattr(module, "excess", lambda f: np.array([f.left]))
+    monkeypatch.setattr(module, "anneal", lambda *_: "led")
+    assert (module.refine(fit, None) == "led") is led
+
+
 def test_a_tail_cut_finer_weighs_and_bends_as_before():
     fine = with_links(truth(), 5)
     for name in ("link_length", "link_mass", "link_drag_sway"):

@@ -35,12 +35,8 @@ from fish_train.identify.settle import open_gates, suitable_noise
 from fish_train.identify.tempering import fit_tempered
 
 MOST_EFFECTS = 3
-GROWN = (
-    2.0  # a force that more trials make so much stronger comes from a poor optimum rather than from the water
-)
-FAIR_SHARE = (
-    0.5  # of the gain that a true effect shows on trials not fitted to: half-way from none to all of it
-)
+GROWN = 2.0  # a force that more trials make so much stronger comes from a poor optimum
+FAIR_SHARE = 0.5  # of the gain that a true effect shows on trials not fitted to: half-way to it
 
 Progress = Callable[[str], None]
 

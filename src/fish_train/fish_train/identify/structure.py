@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 MOST_EFFECTS = 3
 FOLDS = 4
 JUDGED = (
-    8  # candidates a round that are cross-validated: what fits best foretells little of what predicts best
+    8  # candidates a round that are cross-validated: the best fit foretells little of the best prediction
 )
 EVERY = 2.0  # s between start points: half of those of the last fit
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is fitted
