@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 class CompiledKernel:
-    """Calls into c/rollout*.c, whichever part was compiled. All arrays C-contiguous float64; layouts as documented there."""
+    """Calls the C text of the same name, whichever part was compiled; arrays C-contiguous float64, layouts as there."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self._library = library
