@@ -25,6 +25,9 @@ typedef struct {
 /* a row of a matrix of N columns, padded to whole vectors with zeros */
 #define WIDTH ((N + LANES - 1) / LANES)
 typedef union { double at[WIDTH * LANES]; V v[WIDTH]; } Row;
+/* a column of a matrix of NX rows, likewise */
+#define HEIGHT ((NX + LANES - 1) / LANES)
+typedef union { double at[HEIGHT * LANES]; V v[HEIGHT]; } Column;
 
 typedef struct {
   Row P[N], F[N];
@@ -137,15 +140,37 @@ static void between(const V *x0, const V *x1, const V *rate0, const V *rate1, do
   }
 }
 
-/* half a step of tangents along the directions first .. last - 1: x' = A x + b, b their own rates (0 for the motion's) */
-static void carry(const double *A, const double *own, long first, long last, V *moving)
+/* out += M in, M column by column */
+static void add_product(const Column *M, const double *in, Column *out)
 {
-  for (; first < last; first += LANES, moving += NX) {
-    V b[NX];
-    for (int k = 0; k < NX; ++k) b[k] = v_constant(0.0);
-    for (int l = first < NX ? NX - first : 0; l < LANES && first + l < last; ++l)
-      for (int k = 0; k < NX; ++k) LANE(b[k], l) = own[(first + l) * NX + k];
-    for (int sub = 0; sub < SUBSTEPS; ++sub) flow(A, b, 0.5 * DT / SUBSTEPS, moving);
+  Column sum = *out;
+#pragma GCC unroll 32
+  for (int j = 0; j < NX; ++j)
+    for (int w = 0; w < HEIGHT; ++w) sum.v[w] += v_constant(in[j]) * M[j].v[w];
+  *out = sum;
+}
+
+/* half a step of x' = A x + b is x <- E x + G b: G the integral of exp(A s) over it, E = exp(A h) = 1 + A G */
+static void half_step(const double *A, Column *E, Column *G)
+{
+  Column padded[NX];
+  memset(padded, 0, sizeof padded);
+  memset(E, 0, NX * sizeof *E);
+  memset(G, 0, NX * sizeof *G);
+  for (int j = 0; j < NX; ++j) memcpy(padded[j].at, A + j * NX, NX * sizeof(double));
+  for (int first = 0; first < NX; first += LANES) {
+    V unit[NX], g[NX];
+    for (int k = 0; k < NX; ++k) {
+      unit[k] = g[k] = v_constant(0.0);
+      if (k >= first && k < first + LANES) LANE(unit[k], k - first) = 1.0;
+    }
+    for (int sub = 0; sub < SUBSTEPS; ++sub) flow(A, unit, 0.5 * DT / SUBSTEPS, g);
+    for (int l = 0; l < LANES && first + l < NX; ++l)
+      for (int k = 0; k < NX; ++k) G[first + l].at[k] = LANE(g[k], l);
+  }
+  for (int j = 0; j < NX; ++j) {
+    E[j].at[j] = 1.0;
+    add_product(padded, G[j].at, &E[j]);
   }
 }
 
@@ -155,11 +180,10 @@ static void carry(const double *A, const double *own, long first, long last, V *
 static void predict(const Settings *c, Work *f, long K, const double *p, const double *dp, const double *command)
 {
   V s0[NS], s1[NS], rate0[NX], rate1[NX], w[NW], pv[NP], cmd[NC], zero[NC], m1[NM], dm1[NM], ds[NS], dpv[NP];
-  V moving[(NX + 3 + LANES) / LANES * NX]; /* of the columns of the Jacobian */
   double at[NX], unused[NX], A[(NX + 3) * NX];
+  Column E[NX], G[NX];
   const long columns = NX + 3, last = columns + K;
   double *own = malloc(sizeof(double) * (last + 1) * NX);
-  V *d_moving = aligned_alloc(sizeof(V), sizeof(V) * (K + LANES) / LANES * NX); /* of the parameters' directions */
   for (int i = 0; i < NC; ++i) { cmd[i] = v_constant(command[i]); zero[i] = v_constant(0.0); }
   load_parameters(c, f, p, pv);
   for (int k = 0; k < NX; ++k) s0[k] = s1[k] = v_constant(f->xi[k]);
@@ -172,36 +196,39 @@ static void predict(const Settings *c, Work *f, long K, const double *p, const d
 
   between(s0, s1, rate0, rate1, 0.5, at);
   rates(c, f, K, p, dp, command, at, 0.5, 0, 0, columns, unused, A);
-  for (long j = 0; j < columns; j += LANES) {
-    seed(c, f, 0, dp, j, 1, ds, dpv);
-    memcpy(moving + j / LANES * NX, ds, sizeof(V) * NX);
-  }
-  for (int half = 0; half < 2; ++half) carry(A, A, 0, columns, moving);
+  half_step(A, E, G);
   memset(f->F, 0, sizeof f->F);
-  for (long j = 0; j < columns; ++j)
-    for (int k = 0; k < NX; ++k) f->F[k].at[j] = LANE(moving[j / LANES * NX + k], j % LANES);
-
-  for (long j = 0; j < K; j += LANES) {
-    seed(c, f, K, dp, columns + j, 1, ds, dpv);
-    memcpy(d_moving + j / LANES * NX, ds, sizeof(V) * NX);
+  for (long j = 0; j < columns; ++j) { /* two halves: E E for the motion, E G b + G b for the wrench's own rates b */
+    Column one = {{0}}, two = {{0}};
+    if (j < NX) one = E[j];
+    else {
+      add_product(G, A + j * NX, &one);
+      two = one;
+    }
+    add_product(E, one.at, &two);
+    for (int k = 0; k < NX; ++k) f->F[k].at[j] = two.at[k];
   }
   for (int half = 0; K && half < 2; ++half) {
     const double fraction = 0.25 + 0.5 * half;
     between(s0, s1, rate0, rate1, fraction, at);
     rates(c, f, K, p, dp, command, at, fraction, 0, columns, last, unused, own);
-    carry(A, own, columns, last, d_moving);
+    for (long j = 0; j < K; ++j) {
+      Column next = {{0}};
+      add_product(E, f->D + j * ND, &next);
+      add_product(G, own + (columns + j) * NX, &next);
+      memcpy(f->D + j * ND, next.at, NX * sizeof(double));
+    }
   }
   for (long first = 0; first < K; first += LANES) {
     seed(c, f, K, dp, columns + first, 1, ds, dpv);
     follow_jvp(s0 + NX, cmd, pv, ds + NX, zero, dpv, m1, dm1);
     for (int l = 0; l < LANES && first + l < K; ++l) {
       double *D = f->D + (first + l) * ND;
-      for (int k = 0; k < NX; ++k) D[k] = LANE(d_moving[first / LANES * NX + k], l);
       for (int k = 0; k < NM; ++k) D[NX + k] = LANE(dm1[k], l);
       for (int i = 0; i < 3; ++i) D[NS + i] *= c->wrench_decay;
     }
   }
-  free(own); free(d_moving);
+  free(own);
   for (int k = 0; k < NX; ++k) f->xi[k] = LANE(s1[k], 0);
   for (int k = 0; k < NM; ++k) f->memory[k] = LANE(s1[NX + k], 0);
   for (int i = 0; i < 3; ++i) {
