@@ -1,51 +1,57 @@
-"""A law of the remaining force: what it would gain, against dense matrices, and nothing where there is none."""
+"""A law of the remaining force: a hidden one is read off with its coefficient, and nothing where there is none."""
 
 import numpy as np
 import pytest
 
-from fish_sim.model import DT
-from fish_train.diagnose.law import describe, prior_cost
-from fish_train.diagnose.locate import MissingForce
+from fish_sim.effects import EFFECTS
+from fish_sim.robot import Robot
+from fish_train.diagnose.free_force import TERMS, known_to_the_filter
+from fish_train.diagnose.law import Quadratic, describe, forward
 from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import evaluate
+from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
+from fish_train.identify.synthetic import program, record
 
-NOISE = Noise(wrench=(0.004, 0.008, 2e-4), wrench_time=0.2)
-COVARIATES = ("surge_speed", "sway_speed", "yaw_rate", "rudder", "heading", "wall_distance", "x", "y", "time")
-STEPS, TRIALS = 2000, 5
-
-
-def water(random: np.random.Generator, deviation: float) -> np.ndarray:
-    """(STEPS, TRIALS) of the process that the filter assumes."""
-    decay, w = np.exp(-DT / NOISE.wrench_time), np.zeros((STEPS, TRIALS))
-    shocks = deviation * np.sqrt(1.0 - decay**2) * random.standard_normal((STEPS, TRIALS))
-    for k in range(1, STEPS):
-        w[k] = decay * w[k - 1] + shocks[k]
-    return w
+MOMENT = 1e-3  # N m, of a magnet that turns the fish to the side
 
 
-def slow(random: np.random.Generator) -> np.ndarray:
-    """A covariate that wanders as a fish does."""
-    t, phase = DT * np.arange(STEPS)[:, None], random.uniform(0.0, 6.3, (2, TRIALS))
-    return np.sin(0.8 * t + phase[0]) + 0.5 * np.sin(2.1 * t + phase[1])
+def left_by_the_nominal_model(**hidden: float):
+    """The law that the true nominal parameters leave of a fish with these coefficients of a free force."""
+    random = np.random.default_rng(4)
+    commands = np.stack([program(k, 6.0, random) for k in ("sines", "steps", "random", "sines")], axis=1)
+    with known_to_the_filter() as name:
+        robot = Robot().with_effect(name, **hidden) if hidden else Robot()
+        fish = record(robot, commands, Noise(), random)[0]
+    hypothesis = nominal_hypothesis(Robot())
+    fit = evaluate(hypothesis, Coordinates(hypothesis).origin(), fish, Noise())
+    return describe(fit, fish)
 
 
-def remaining(seed: int, yaw_law: float) -> MissingForce:
-    random = np.random.default_rng(seed)
-    c = {name: slow(random) for name in COVARIATES}
-    wrench = np.stack([water(random, d) for d in NOISE.wrench], axis=2)
-    wrench[..., 2] += yaw_law * np.cos(c["heading"])
-    return MissingForce(tuple("abcde"), wrench, np.ones_like(wrench), c)
+def test_a_hidden_law_is_read_off_with_its_coefficient_on_its_degree_of_freedom():
+    law = left_by_the_nominal_model(**{f"yaw_{TERMS.index('cos(heading)')}": MOMENT})
+    assert law.terms["yaw"]["cos(heading)"] == pytest.approx(MOMENT, rel=0.15)
+    assert max(law.gain, key=lambda dof: law.gain[dof]) == "yaw" and law.gain["yaw"] > 100.0
 
 
-def test_the_cost_of_a_wrench_is_that_of_its_dense_covariance():
-    t = DT * np.arange(60)
-    covariance = 0.3**2 * np.exp(-np.abs(t[:, None] - t) / NOISE.wrench_time)
-    w = np.random.default_rng(1).standard_normal(60)
-    assert prior_cost(w, 0.3, NOISE) == pytest.approx(0.5 * w @ np.linalg.solve(covariance, w))
+def test_water_alone_follows_no_law():
+    law = left_by_the_nominal_model()
+    assert max(law.gain.values()) < 5.0  # nats on trials that the terms were not chosen on
 
 
-def test_a_law_gains_what_it_explains_and_water_nothing():
-    there, nothing = (describe(remaining(2, size), NOISE) for size in (4e-4, 0.0))
-    assert "cos(heading)" in there.terms["yaw"]
-    assert there.terms["yaw"]["cos(heading)"] == pytest.approx(4e-4, rel=0.3)
-    assert there.gain["yaw"] > 50.0 > 0.0 > nothing.gain["yaw"]
-    assert max(nothing.gain.values()) < 0.0 and max(there.gain["surge"], there.gain["sway"]) < 0.0
+def test_a_step_is_the_minimum_over_fitted_and_chosen_parameters():
+    random = np.random.default_rng(0)
+    root = random.standard_normal((6, 6))
+    cost = Quadratic(random.standard_normal(6), root @ root.T, 2)
+    step = cost.best_step([4])
+    assert not step[[2, 3, 5]].any()
+    for j in (0, 1, 4):
+        for h in (-1e-4, 1e-4):
+            assert cost.cost(step) < cost.cost(step + h * np.eye(6)[j])
+    first = min(range(2, 6), key=lambda j: cost.cost(cost.best_step([j])))
+    assert forward(cost, range(2, 6))[0] == first
+
+
+def test_the_free_force_is_no_candidate():
+    with known_to_the_filter() as name:
+        assert name in EFFECTS
+    assert name not in EFFECTS

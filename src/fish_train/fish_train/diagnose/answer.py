@@ -111,8 +111,7 @@ def where_entry(d: Diagnosis, name: str) -> dict[str, Any]:
 
 
 def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
-    """What no name explains: size, place, and a sparse regression."""
-    r2 = d.description.r2
+    """What no name explains: size, place, and a law of few terms."""
     share = unexplained_share(d)
     if not much_is_left(d):
         return {"share": share, "where": {}, "description": "the remaining force looks like water noise"}
@@ -129,7 +128,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "place": locate.place_shares(d.remaining, scale),
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
-        "description": f"{worst} = {law} (SI units; {gain[worst]:.0f} nats, {r2[worst]:.0%} of it on unseen trials)"
+        "description": f"{worst} = {law} (SI units; {gain[worst]:.0f} nats on trials that it was not fitted to)"
         if has_law(d)
         else f"{STRONG.format(*excess(d.final))}; no law in place, time, speed, rudder or heading was found for it",
     }

@@ -20,8 +20,6 @@ TEMPER = 4.0
 SMALLEST_GAIN = 0.001
 # nats that a name must gain on the trials of the check, however little it should
 SMALLEST_CHECK = 10.0
-# of a law, which competes with other laws of the same force and has no check: more careful
-LAW_TEMPER, SMALLEST_LAW = 10.0, 0.004
 SMALLEST_Z = 4.0  # standard errors between the strength and its neutral value
 PLAUSIBLE = 0.02  # rivals less probable than this are not named
 
@@ -38,15 +36,8 @@ class Level:
 
     def enough(self, samples: float, parameters: int, candidates: int) -> float:
         """Nats a candidate must gain: tempered likelihood-ratio test over all candidates, and not too small."""
-        return max(TEMPER * self._quantile(parameters, candidates), SMALLEST_GAIN * samples)
-
-    def enough_of_a_law(self, samples: float, parameters: int, laws: int) -> float:
-        """Nats that a law of the remaining force must gain."""
-        return max(LAW_TEMPER * self._quantile(parameters, laws), SMALLEST_LAW * samples)
-
-    def _quantile(self, parameters: int, tried: int) -> float:
-        """Nats of an exact likelihood-ratio test over all that was tried."""
-        return 0.5 * float(chi2.isf(self.false_alarms / max(tried, 1), parameters))
+        exact = 0.5 * float(chi2.isf(self.false_alarms / max(candidates, 1), parameters))
+        return max(TEMPER * exact, SMALLEST_GAIN * samples)
 
 
 def p_value(gain: float, parameters: int, candidates: int) -> float:

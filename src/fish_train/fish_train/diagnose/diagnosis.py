@@ -122,7 +122,7 @@ def diagnose(
     held = held_out_density(unseen, robot, given_noise, nominal, final)
     found = Diagnosis(
         experiment, split, robot, nominal, final, tuple(rounds), tuple(accepted), unreachable, level,
-        force, parts, pushes, remaining, describe(remaining, final.noise), given_noise, held,
+        force, parts, pushes, remaining, describe(final, training), given_noise, held,
     )  # fmt: skip
     if named(found) or not much_is_left(found):
         return found
@@ -167,7 +167,7 @@ def finer_tail(
     if excess(best).max() < SUSPICIOUS:
         return None
     short = shorten(experiment, RANK_STEPS)
-    finer = max(finer_tails(robot, best, experiment, short, progress), key=evidence, default=None)
+    finer = max(finer_tails(robot, nominal, best, experiment, short, progress), key=evidence, default=None)
     if finer is None or evidence(finer) < evidence(best):
         return None
     gain = finer.objective - nominal.objective

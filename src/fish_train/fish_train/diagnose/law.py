@@ -1,100 +1,104 @@
-"""A law for the missing force: a sparse regression on what the fish did, and what it would be worth as a force of the model."""
+"""A law for the force that a model leaves: which few terms of a free force the innovations ask for, and what they would gain.
+
+One pass of the filter at the fit, every coefficient of `free_force` a direction, gives per trial the gradient g and the
+Gauss-Newton matrix N of the cost -log likelihood along the fitted parameters and the coefficients. The force is linear in
+its coefficients, so that the cost changes by g'd + d'N d / 2: terms are chosen one after the other, each with all
+parameters refitted, and judged on trials that they were not chosen on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from sklearn.linear_model import OrthogonalMatchingPursuit
 
-from fish_sim.model import DT
-from fish_train.diagnose.locate import DOFS, MissingForce
-from fish_train.identify.filter_types import Array, Noise
+from fish_train.diagnose.free_force import TERMS, known_to_the_filter
+from fish_train.diagnose.locate import DOFS
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Array
+from fish_train.identify.fit import Fit, evaluate
+from fish_train.identify.hypothesis import Coordinates
 
-REGRESSORS = 4  # of the sparse description
+MOST_TERMS = 4  # of a law
 
 
 @dataclass(frozen=True)
 class Description:
-    """A sparse regression of the missing wrench, judged on trials it has not seen."""
+    """A sparse law of the missing wrench, judged on trials it has not seen."""
 
-    r2: dict[str, float]  # per degree of freedom, cross-validated by trial
-    gain: dict[str, float]  # nats that the law would gain as a force of the model, cross-validated, at least
-    terms: dict[str, dict[str, float]]  # degree of freedom -> regressor -> coefficient (SI)
-    tried: int  # regressors that it could choose from
-
-
-def describe(force: MissingForce, noise: Noise) -> Description:
-    """What the missing force looks like: at most REGRESSORS products of covariates per degree of freedom.
-
-    A known force f added to the model raises the log likelihood by at least (w' K^-1 w - (w - f)' K^-1 (w - f)) / 2, where
-    w is the smoothed wrench and K the covariance that the filter assumes for it (from Gaussian conditioning, as in
-    Rasmussen and Williams 2006, appendix A.2; the posterior's covariance, left out, would add to it).
-    """
-    library = regressors(force.covariates)
-    trials = list(range(len(force.names)))
-    r2, gain, terms = {}, {}, {}
-    for i, dof in enumerate(DOFS):
-        wrench, scores, weights, nats = force.wrench[..., i], [], [], 0.0
-        for held in trials:
-            inside = [t for t in trials if t != held]
-            if not inside:
-                continue
-            B, z = columns(library, wrench, [held])
-            left = z - sparse(library, wrench, inside).predict(B)
-            scores.append(1.0 - np.sum(left**2) / np.sum((z - z.mean()) ** 2))
-            weights.append(len(z))
-            nats += prior_cost(z, noise.wrench[i], noise) - prior_cost(left, noise.wrench[i], noise)
-        r2[dof] = float(np.average(scores, weights=weights)) if scores else 0.0
-        gain[dof] = nats
-        terms[dof] = sparse(library, wrench, trials).terms
-    return Description(r2, gain, terms, len(library))
-
-
-def prior_cost(w: Array, deviation: float, noise: Noise) -> float:
-    """w' K^-1 w / 2 of a first-order Gauss-Markov process (T,) with this stationary standard deviation."""
-    decay = np.exp(-DT / noise.wrench_time)
-    steps = (w[1:] - decay * w[:-1]) / np.sqrt(1.0 - decay**2)
-    return 0.5 * float(w[0] ** 2 + np.sum(steps**2)) / deviation**2
-
-
-def regressors(c: dict[str, Array]) -> dict[str, Array]:
-    """Candidate terms: covariates, signed squares, products, place, what grows during a trial, induced drag."""
-    base = {k: c[k] for k in ("surge_speed", "sway_speed", "yaw_rate", "rudder")}
-    library = dict(base)
-    library |= {f"{k} |{k}|": v * np.abs(v) for k, v in base.items()}
-    keys = list(base)
-    library |= {f"{a} {b}": base[a] * base[b] for i, a in enumerate(keys) for b in keys[i + 1 :]}
-    library |= {"cos(heading)": np.cos(c["heading"]), "sin(heading)": np.sin(c["heading"])}
-    library |= {"surge_speed^2": base["surge_speed"] ** 2, "x": c["x"], "y": c["y"]}
-    library |= {"time": c["time"], "time surge_speed": c["time"] * base["surge_speed"]}
-    library["surge_speed rudder^2"] = base["surge_speed"] * base["rudder"] ** 2
-    library["surge_speed exp(-wall_distance/0.2 m)"] = base["surge_speed"] * np.exp(-c["wall_distance"] / 0.2)
-    return library
-
-
-def columns(library: dict[str, Array], y: Array, trials: list[int]) -> tuple[Array, Array]:
-    """(regressors (N, R), force (N,)) of some trials, where everything is known."""
-    A = np.stack([v[:, trials].ravel() for v in library.values()], axis=1)
-    z = y[:, trials].ravel()
-    good = np.isfinite(A).all(1) & np.isfinite(z)
-    return A[good], z[good]
+    gain: dict[
+        str, float
+    ]  # per degree of freedom, nats that the law gains as a force of the model, cross-validated
+    terms: dict[str, dict[str, float]]  # degree of freedom -> term -> coefficient (SI)
+    tried: int  # terms that it could choose from
 
 
 @dataclass(frozen=True)
-class Law:
-    """A fitted regression."""
+class Quadratic:
+    """Cost g'd + d'N d / 2 of a step d of all parameters (K,), the first `fitted` of them always free."""
 
-    predict: Callable[[Array], Array]  # of regressors (N, R)
-    terms: dict[str, float]  # regressor -> coefficient (SI)
+    gradient: Array  # (K,)
+    normal: Array  # (K, K)
+    fitted: int
+
+    def best_step(self, chosen: Sequence[int]) -> Array:
+        """The step (K,) of least cost that moves the fitted parameters and those `chosen`."""
+        kept = [*range(self.fitted), *chosen]
+        step = np.zeros(len(self.gradient))
+        step[kept] = -np.linalg.solve(self.normal[np.ix_(kept, kept)], self.gradient[kept])
+        return step
+
+    def cost(self, step: Array) -> float:
+        """Nats that a step loses."""
+        return float(self.gradient @ step + 0.5 * step @ self.normal @ step)
 
 
-def sparse(library: dict[str, Array], y: Array, trials: list[int]) -> Law:
-    """Orthogonal matching pursuit on some trials (Pati, Rezaiifar and Krishnaprasad 1993)."""
-    A, z = columns(library, y, trials)
-    scale = A.std(axis=0) + 1e-12
-    fitted = OrthogonalMatchingPursuit(n_nonzero_coefs=min(REGRESSORS, A.shape[1])).fit(A / scale, z)
-    names = list(library)
-    terms = {names[k]: float(fitted.coef_[k] / scale[k]) for k in np.flatnonzero(fitted.coef_)}
-    return Law(lambda B: fitted.predict(B / scale), terms)
+def describe(fit: Fit, experiment: Experiment) -> Description:
+    """The law of at most MOST_TERMS terms per degree of freedom that a fit leaves on the trials it was fitted to."""
+    with known_to_the_filter() as name:
+        hypothesis = fit.hypothesis.with_effect(name)
+        theta = np.concatenate([fit.theta, np.zeros(len(hypothesis.free) - len(fit.theta))])
+        result = evaluate(hypothesis, theta, experiment, fit.noise).result
+    prior = Coordinates(fit.hypothesis).prior
+    gains, terms = {}, {}
+    for i, dof in enumerate(DOFS):
+        offered = range(
+            len(theta) - (len(DOFS) - i) * len(TERMS), len(theta) - (len(DOFS) - 1 - i) * len(TERMS)
+        )
+        whole = quadratic(result.gradient, result.normal, fit.theta, prior)
+        step = whole.best_step(chosen := forward(whole, offered))
+        terms[dof] = {TERMS[j - offered.start]: float(step[j]) for j in chosen}
+        gains[dof] = cross_validated(result.gradient, result.normal, fit.theta, prior, offered)
+    return Description(gains, terms, len(TERMS))
+
+
+def quadratic(gradients: Array, normals: Array, theta: Array, prior: Array) -> Quadratic:
+    """The cost of some trials (M, K), (M, K, K) and of the prior of the fitted parameters theta."""
+    gradient, normal, fitted = gradients.sum(0), normals.sum(0), len(theta)
+    gradient[:fitted] += theta / prior**2
+    normal[range(fitted), range(fitted)] += 1.0 / prior**2
+    return Quadratic(gradient, normal, fitted)
+
+
+def forward(cost: Quadratic, offered: Sequence[int]) -> list[int]:
+    """The terms that lower the cost most, chosen one after the other, each with all parameters refitted."""
+    chosen: list[int] = []
+    for _ in range(MOST_TERMS):
+        left = [j for j in offered if j not in chosen and cost.normal[j, j] > 0.0]
+        if left:
+            chosen.append(min(left, key=lambda j: cost.cost(cost.best_step([*chosen, j]))))
+    return chosen
+
+
+def cross_validated(
+    gradients: Array, normals: Array, theta: Array, prior: Array, offered: Sequence[int]
+) -> float:
+    """Nats that laws chosen on the other trials gain on each trial, against the parameters refitted there without one."""
+    gain, trials = 0.0, np.arange(len(gradients))
+    for held in trials if len(trials) > 1 else []:
+        others = quadratic(gradients[trials != held], normals[trials != held], theta, prior)
+        unseen = Quadratic(gradients[held], normals[held], len(theta))
+        without, law = others.best_step([]), others.best_step(forward(others, offered))
+        gain += unseen.cost(without) - unseen.cost(law)
+    return gain

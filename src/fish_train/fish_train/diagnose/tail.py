@@ -9,11 +9,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
-from fish_train.identify.cold import fit_cold
+from fish_train.identify.cold import SUSPICIOUS, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit, evaluate, log_posterior, settle
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
+from fish_train.identify.tempering import fit_tempered
 
 MORE = (1, 2)  # links that are tried beyond the robot's
 
@@ -28,18 +29,21 @@ def with_links(robot: Robot, links: int) -> Robot:
 
 
 def finer_tails(
-    robot: Robot, best: Fit, experiment: Experiment, short: Experiment, progress: Progress
+    robot: Robot, nominal: Fit, best: Fit, experiment: Experiment, short: Experiment, progress: Progress
 ) -> list[Fit]:
     """Nominal models with more links that are better than the best fit so far on the shortened trials.
 
-    Each begins from nominal values: from what fewer links came to, a tail that needs more does not find its optimum.
+    Each begins from the ratios to nominal values that fewer links came to; where these lead to no good fit, from nominal ones.
     """
     found, beaten = [], log_posterior(best.hypothesis, best.theta, short, best.noise)
     for links in (robot.links + more for more in MORE):
         if links > MAX_LINKS:
             break
         progress(f"fitting the nominal model with {links} tail links")
-        fit = fit_cold(nominal_hypothesis(with_links(robot, links)), short, usual_noise(short))
+        hypothesis, noise = nominal_hypothesis(with_links(robot, links)), usual_noise(short)
+        fit = fit_tempered(hypothesis, short, noise, nominal.theta, held=())
+        if excess(fit).max() > SUSPICIOUS:
+            fit = better(fit, fit_cold(hypothesis, short, noise))
         if fit.objective > beaten:
             found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
     return found

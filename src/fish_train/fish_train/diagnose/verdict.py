@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fish_train.diagnose.law import REGRESSORS
+from fish_train.diagnose.law import MOST_TERMS
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.cold import excess
 from fish_train.identify.fit import Fit
@@ -33,9 +33,9 @@ def much_is_left(d: Diagnosis) -> bool:
 
 
 def has_law(d: Diagnosis) -> bool:
-    """A sparse regression of the remaining wrench would be as good as a name, on trials that it was not fitted to."""
+    """A few terms of a free force gain what a name must, on trials that they were not chosen on."""
     samples, gain = float(d.final.result.samples.sum()), max(d.description.gain.values())
-    return gain > d.level.enough_of_a_law(samples, REGRESSORS, len(d.description.gain) * d.description.tried)
+    return gain > d.level.enough(samples, MOST_TERMS, len(d.description.gain) * d.description.tried)
 
 
 def named(d: Diagnosis) -> tuple[Accepted, ...]:

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_train.diagnose.law import regressors
+from fish_sim.effects.effect import BodyMotion, Drive
+from fish_sim.ops import NUMPY
+from fish_train.diagnose.free_force import regressors
 from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit
@@ -27,7 +29,6 @@ NAMES = {  # term of the regression -> name it speaks for; other terms are laws 
     "surge_speed |surge_speed|": "quadratic_drag",
     "sway_speed |sway_speed|": "quadratic_drag",
     "yaw_rate |yaw_rate|": "quadratic_drag",
-    "surge_speed^2": "hull_asymmetry",
     "cos(heading)": "current",
     "sin(heading)": "current",
     "x": "nonuniform_current",
@@ -54,12 +55,23 @@ def compete(nominal: Fit, training: Experiment, held_out: Experiment) -> Rivals:
     return Rivals(name, sindy_r2, _neural(fitted, unseen))
 
 
+def terms(force: MissingForce) -> dict[str, Array]:
+    """The terms (T, M) of a free force along a smoothed motion."""
+    c = force.covariates
+    turned, moved = (
+        (np.cos(c["heading"]), np.sin(c["heading"])),
+        (c["surge_speed"], c["sway_speed"], c["yaw_rate"]),
+    )
+    head = BodyMotion("head", c["x"], c["y"], *turned, *moved, 0.0, 0.0, 0.0)
+    return regressors(head, c["time"], Drive(c["rudder"], 0.0, c["rotor_speed"], 0.0), NUMPY)
+
+
 def _sparse(fitted: MissingForce, unseen: MissingForce) -> tuple[str | None, float]:
     from pysindy.optimizers import STLSQ
 
-    library = regressors(fitted.covariates)
+    library = terms(fitted)
     A, y = columns(library, fitted.wrench)
-    B, z = columns(regressors(unseen.covariates), unseen.wrench)
+    B, z = columns(terms(unseen), unseen.wrench)
     middle, scale, size = A.mean(axis=0), A.std(axis=0) + 1e-12, y.std(axis=0) + 1e-12
     law = STLSQ(threshold=THRESHOLD, alpha=1e-3, normalize_columns=False)
     with warnings.catch_warnings():  # it says so when no term is large enough, which is an answer here
