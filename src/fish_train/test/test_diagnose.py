@@ -16,9 +16,11 @@ from fish_train.diagnose import diagnosis as module
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
 from fish_train.diagnose.experiment_plan import next_experiment
+from fish_train.diagnose.law import Description
 from fish_train.diagnose.locate import dof_shares
 from fish_train.diagnose.split import split_trials
 from fish_train.diagnose.tail import with_links
+from fish_train.diagnose.verdict import lawful
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate, settle
@@ -146,6 +148,21 @@ def test_a_late_camera_is_not_called_physics():
     result = module.diagnose(type(late)(**{**late.__dict__, "frames": shifted}), Robot(), names=FEW)
     assert [a.name for a in result.accepted] == ["camera_latency"]
     assert answer(result)["verdict"] == "sensor_or_actuator"
+
+
+def test_a_law_worth_a_name_is_told_for_every_degree_of_freedom_that_has_one():
+    gain = {"surge": 10.0, "sway": 90.0, "yaw": 300.0}
+    terms = {"surge": {}, "sway": {"time sway_speed": -0.05}, "yaw": {"cos(heading)": 1e-3, "rudder": 2e-4}}
+    fit = SimpleNamespace(result=SimpleNamespace(samples=np.array([1e4])))
+    found = SimpleNamespace(level=Level(), final=fit, description=Description(gain, terms, 30))
+    assert lawful(found) == ["yaw", "sway"]
+    assert answers.law(found, "yaw").startswith(
+        "yaw = (0.001) cos(heading) + (0.0002) rudder (SI units; 300 nats"
+    )
+    more = SimpleNamespace(
+        result=SimpleNamespace(samples=np.array([1e6]))
+    )  # too little for so many measurements
+    assert lawful(SimpleNamespace(level=Level(), final=more, description=found.description)) == []
 
 
 def test_what_the_data_cannot_say_is_said():

@@ -14,7 +14,7 @@ from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.own_force import intervals, regimes
 from fish_train.diagnose.search import evidence
-from fish_train.diagnose.verdict import has_law, much_is_left, named, unexplained_share, verdict
+from fish_train.diagnose.verdict import lawful, much_is_left, named, unexplained_share, verdict
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.cold import excess
 from fish_train.identify.filter_types import ROWS, Noise
@@ -115,9 +115,6 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
     share = unexplained_share(d)
     if not much_is_left(d):
         return {"share": share, "where": {}, "description": "the remaining force looks like water noise"}
-    gain = d.description.gain
-    worst = max(gain, key=lambda dof: gain[dof])
-    law = " + ".join(f"({c:.3g}) {term}" for term, c in d.description.terms[worst].items())
     scale = np.array(d.final.noise.wrench)
     return {
         "share": share,
@@ -128,10 +125,17 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "place": locate.place_shares(d.remaining, scale),
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
-        "description": f"{worst} = {law} (SI units; {gain[worst]:.0f} nats on trials that it was not fitted to)"
-        if has_law(d)
-        else f"{STRONG.format(*excess(d.final))}; no law in place, time, speed, rudder or heading was found for it",
+        "description": "; ".join(law(d, dof) for dof in lawful(d))
+        or f"{STRONG.format(*excess(d.final))}; no law in place, time, speed, rotor, rudder or heading was found for it",
     }
+
+
+def law(d: Diagnosis, dof: str) -> str:
+    """The remaining force along one degree of freedom in few terms."""
+    terms = " + ".join(f"({c:.3g}) {term}" for term, c in d.description.terms[dof].items())
+    return (
+        f"{dof} = {terms} (SI units; {d.description.gain[dof]:.0f} nats on trials that it was not fitted to)"
+    )
 
 
 def fit_entry(d: Diagnosis) -> dict[str, Any]:

@@ -29,13 +29,15 @@ def verdict(d: Diagnosis) -> str:
 
 def much_is_left(d: Diagnosis) -> bool:
     """The wrench that remains follows a law on trials that the law was not fitted to, or is far stronger than water."""
-    return has_law(d) or bool(excess(d.final).max() > TOO_STRONG)
+    return bool(lawful(d)) or bool(excess(d.final).max() > TOO_STRONG)
 
 
-def has_law(d: Diagnosis) -> bool:
-    """A few terms of a free force gain what a name must, on trials that they were not chosen on."""
-    samples, gain = float(d.final.result.samples.sum()), max(d.description.gain.values())
-    return gain > d.level.enough(samples, MOST_TERMS, len(d.description.gain) * d.description.tried)
+def lawful(d: Diagnosis) -> list[str]:
+    """Degrees of freedom, the most lawful first, on which a few terms of a free force gain what a name must on unseen trials."""
+    gain = d.description.gain
+    tried = len(gain) * d.description.tried
+    enough = d.level.enough(float(d.final.result.samples.sum()), MOST_TERMS, tried)
+    return sorted((dof for dof in gain if gain[dof] > enough), key=lambda dof: -gain[dof])
 
 
 def named(d: Diagnosis) -> tuple[Accepted, ...]:
