@@ -51,6 +51,16 @@ def test_a_step_is_the_minimum_over_fitted_and_chosen_parameters():
     assert forward(cost, range(2, 6))[0] == first
 
 
+def test_terms_that_nothing_tells_apart_do_no_harm():
+    normal = np.array(
+        [[2.0, 1.0, 1.0, 0.0], [1.0, 3.0, 3.0, 0.0], [1.0, 3.0, 3.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
+    )
+    cost = Quadratic(np.array([0.1, 1.0, 1.0, 0.0]), normal, 1)
+    chosen = forward(cost, (1, 2, 3))
+    assert 3 not in chosen  # never excited
+    assert cost.cost(cost.best_step(chosen)) == pytest.approx(cost.cost(cost.best_step([1])), rel=1e-6)
+
+
 def test_the_free_force_is_no_candidate():
     with known_to_the_filter() as name:
         assert name in EFFECTS

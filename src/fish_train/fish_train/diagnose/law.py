@@ -21,6 +21,7 @@ from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import Coordinates
 
 MOST_TERMS = 4  # of a law
+RIDGE = 1e-9  # of the diagonal: a rudder that stands still makes terms that nothing tells apart
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,8 @@ class Quadratic:
         """The step (K,) of least cost that moves the fitted parameters and those `chosen`."""
         kept = [*range(self.fitted), *chosen]
         step = np.zeros(len(self.gradient))
-        step[kept] = -np.linalg.solve(self.normal[np.ix_(kept, kept)], self.gradient[kept])
+        normal = self.normal[np.ix_(kept, kept)]
+        step[kept] = -np.linalg.solve(normal + RIDGE * np.diag(np.diag(normal)), self.gradient[kept])
         return step
 
     def cost(self, step: Array) -> float:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from fish_sim.compiled import compiler, lanes
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme, default_scheme, stable_scheme
-from fish_sim.step import Stepper
+from fish_sim.step import Stepper, kernel
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_compiled import compiled_pass, filter_library
 from fish_train.identify.filter_numpy import Filter
@@ -39,6 +40,7 @@ def filter_stepper(robot: Robot) -> Stepper:
 
 
 def prepare(robot: Robot) -> None:
-    """Compile the filter of a robot's structure unless it is in the cache: seconds that a caller may want to show."""
+    """Compile what a pass needs for a robot's structure unless it is in the cache: seconds that a caller may want to show."""
     stepper = filter_stepper(robot)
     filter_library(stepper.layout.structure, stepper.scheme.method)
+    kernel(stepper.layout.structure, stepper.scheme, lanes(), compiler() is not None, "memory")
