@@ -1,6 +1,9 @@
 """The blind study: labels that cannot be changed afterwards, runs that go on, scores that are right by hand."""
 
+import subprocess
 import sys
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -145,6 +148,28 @@ def test_a_study_is_sealed_first_goes_on_and_opens(tmp_path) -> None:
     (study.folder / "seals.json").write_text('{"world_0000": "0"}')
     with pytest.raises(StudyError, match="not what was sealed"):
         study.reveal()
+
+
+def test_a_study_that_is_killed_leaves_no_tool_behind(tmp_path: Path) -> None:
+    Study.create(tmp_path / "study", [small("null")], {"seed": 1})
+    tool = "import os, sys, time, pathlib as p; (p.Path(sys.argv[1]) / 'pid').write_text(str(os.getpid())); time.sleep(600)"
+    study = f"""from pathlib import Path
+from fish_train.prove.runner import run_study
+from fish_train.prove.study import Study
+run_study(Study(Path({str(tmp_path / "study")!r})), 1, print, ({sys.executable!r}, "-c", {tool!r}))
+"""
+    with subprocess.Popen([sys.executable, "-c", study]) as run:
+        note = tmp_path / "study/worlds/world_0000/recordings/pid"
+        wait_for(lambda: note.exists() and note.read_text())
+        run.kill()
+    wait_for(lambda: not Path(f"/proc/{note.read_text()}").exists())
+
+
+def wait_for(condition: Callable[[], object], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
 
 
 def test_recordings_say_what_the_instruments_read(tmp_path) -> None:

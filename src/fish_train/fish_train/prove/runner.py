@@ -11,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
@@ -71,17 +72,39 @@ def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
         **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), str(job.threads)),
     }
     command = [*job.tool, str(recordings), "--out", str(out)]
-    try:
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=LONGEST, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return {"diagnosis": None, "error": f"no answer within {LONGEST:g} s"}
-    if done.returncode in STOPPED:
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as tool:
+        _TOOLS.append(tool)
+        try:
+            said = tool.communicate(timeout=LONGEST)[1]
+        except subprocess.TimeoutExpired:
+            return {"diagnosis": None, "error": f"no answer within {LONGEST:g} s"}
+        finally:
+            tool.kill()
+            _TOOLS.remove(tool)
+    if tool.returncode in STOPPED:
         raise StudyError(f"{job.name}: the tool was stopped; the same command goes on")
-    if done.returncode != 0:
-        return {"diagnosis": None, "error": f"exit status {done.returncode}: {done.stderr[-TAIL:]}"}
+    if tool.returncode != 0:
+        return {"diagnosis": None, "error": f"exit status {tool.returncode}: {said[-TAIL:]}"}
     return {"diagnosis": read_json(out / "diagnosis.json"), "error": ""}
+
+
+_TOOLS: list[subprocess.Popen[str]] = []  # that this worker waits for
+
+
+def _end_with_the_study() -> None:
+    """A worker's watch: when the study's process is gone, even by a signal that it cannot catch, so are worker and tool."""
+    study = multiprocessing.parent_process()
+    assert study is not None  # this is a worker
+
+    def watch() -> None:
+        study.join()
+        for tool in _TOOLS:
+            tool.kill()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def run_study(
@@ -107,7 +130,7 @@ def spread(work: Callable[[Any], Any], tasks: Sequence[Any], jobs: int, cluster:
             for future in completed(client.map(work, tasks, pure=False)):
                 yield future.result()
         return
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _end_with_the_study) as pool:
         futures: list[Future[Any]] = [pool.submit(work, task) for task in tasks]
         try:
             for future in as_completed(futures):
