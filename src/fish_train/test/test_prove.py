@@ -25,7 +25,7 @@ from fish_train.evaluation.study import Row
 from fish_train.identify.experiment import build_experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
-from fish_train.prove import close_loop, groups
+from fish_train.prove import close_loop, groups, tool_version
 from fish_train.prove.build import make_readings, make_world
 from fish_train.prove.close_loop import Plan, loop_table, loop_world, searched
 from fish_train.prove.judge import judged_table, rivals_table
@@ -39,6 +39,7 @@ from fish_train.prove.score import score_world
 from fish_train.prove.seal import Sealed, broken_seals, seal_label
 from fish_train.prove.study import Study, StudyError, read_json
 from fish_train.prove.tables import ASKED, Share, calibration, choice, power, smallest_error
+from fish_train.prove.tool_version import tool_digest
 from fish_train.prove.truths import truths_of
 from fish_train.prove.where import dof_overlap, overlap, stated_range, stated_times, true_push
 from fish_train.prove.world import World
@@ -145,6 +146,10 @@ def test_a_study_is_sealed_first_goes_on_and_opens(tmp_path) -> None:
     assert main(pool) == 0
     page = (tmp_path / "pooled" / "report.html").read_text()
     assert "6 worlds, 4 of them with something hidden; seed 1, today; seed 2, later" in page
+    newer = Study.create(tmp_path / "newer", worlds, {"tool": "0123456789abcdef"})
+    assert main([*pool[:2], str(study.folder), str(newer.folder), *pool[4:]]) == 1
+    with pytest.raises(StudyError, match="got version 0123456789abcdef of the tool, expected"):
+        newer.check_tool(tool_digest())
     (study.folder / "seals.json").write_text('{"world_0000": "0"}')
     with pytest.raises(StudyError, match="not what was sealed"):
         study.reveal()
@@ -163,6 +168,13 @@ run_study(Study(Path({str(tmp_path / "study")!r})), 1, print, ({sys.executable!r
         wait_for(lambda: note.exists() and note.read_text())
         run.kill()
     wait_for(lambda: not Path(f"/proc/{note.read_text()}").exists())
+
+
+def test_the_tool_s_version_is_that_of_its_texts(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = tool_digest()
+    assert len(whole) == 16 and whole == tool_digest()
+    monkeypatch.setattr(tool_version, "PARTS", tool_version.PARTS[:-1])
+    assert tool_digest() != whole
 
 
 def wait_for(condition: Callable[[], object], seconds: float = 60.0) -> None:

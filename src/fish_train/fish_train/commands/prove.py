@@ -95,6 +95,8 @@ def run(args: argparse.Namespace) -> int:
         return _close_loop(args, console)
     with user_errors():
         studies = [Study(folder) for folder in args.pool] or [_ran(args, console)]
+        for study in studies[1:]:
+            study.check_tool(studies[0].about.get("tool", ""))
         scores: list[Score] = []
         oracle: dict[int, bool] = {}
         for study in studies:
@@ -138,9 +140,12 @@ def _study(args: argparse.Namespace, console: Console) -> Study:
 
     from fish_train.prove.groups import draw_worlds
     from fish_train.prove.study import Study
+    from fish_train.prove.tool_version import tool_digest
 
     if (args.out / "study.json").exists():
         study = Study(args.out)
+        if study.open_worlds:
+            study.check_tool(tool_digest())
         console.print(
             f"going on with {args.out}: {len(study.open_worlds)} of {len(study.worlds)} worlds to go",
             soft_wrap=True,
@@ -157,6 +162,7 @@ def _study(args: argparse.Namespace, console: Console) -> Study:
         "groups": args.groups,
         "trials": args.trials,
         "duration": args.duration,
+        "tool": tool_digest(),
     }
     began = time.monotonic()
     study = Study.create(args.out, worlds, about)

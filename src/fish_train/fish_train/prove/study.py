@@ -1,6 +1,6 @@
 """A study on disk: sealed labels, one result per world, everything there to go on after a kill.
 
-study.json   what was asked for, thresholds, versions
+study.json   what was asked for, and of which version of the tool
 seals.json   world -> SHA-256 of salt and label; written before any run
 sealed.json  salts and labels (mode 0600); nothing passes it to the tool
 worlds/world_0001/{recordings, tool, result.json}
@@ -48,6 +48,15 @@ class Study:
         """What was asked for."""
         content: dict[str, Any] = read_json(self.folder / "study.json")
         return content
+
+    def check_tool(self, digest: str) -> None:
+        """Raise StudyError if this study examines another version of the tool than the one with this digest."""
+        own = self.about.get("tool", "")
+        if own != digest:
+            raise StudyError(
+                f"{self.folder}: got version {own or 'unknown'} of the tool, expected {digest or 'unknown'}; worlds of"
+                " two versions make no table: begin another study, or go back to the version that this one began with"
+            )
 
     @property
     def worlds(self) -> dict[str, World]:

@@ -1,0 +1,34 @@
+"""Which tool a study examines: a digest of the text that an answer depends on, so that no table mixes two of them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+
+PARTS = (
+    ("fish_sim", ""),
+    ("fish_train", "diagnose"),
+    ("fish_train", "identify"),
+    ("fish_train", "recordings"),
+)
+KINDS = (".py", ".c", ".h")
+
+
+def tool_digest() -> str:
+    """The first 16 digits of the SHA-256 of simulator, identification, diagnosis and reader, names and texts."""
+    digest = hashlib.sha256()
+    for package, folder in PARTS:
+        root = files(package)
+        for name, text in sorted(_texts(root / folder if folder else root)):
+            digest.update(f"{package} {folder} {name}\n{text}".encode())
+    return digest.hexdigest()[:16]
+
+
+def _texts(folder: Traversable, under: str = "") -> Iterable[tuple[str, str]]:
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            yield from _texts(entry, f"{under}{entry.name}/")
+        elif entry.name.endswith(KINDS):
+            yield under + entry.name, entry.read_text(encoding="utf-8")
