@@ -78,11 +78,15 @@ def test_a_tail_of_more_links_is_no_missing_physics(tmp_path):
     assert "modelled with 4 links instead of 3" in (tmp_path / "report.html").read_text()
 
 
-@pytest.mark.parametrize(("gain", "accepted"), [(20.0, True), (5.0, False)])
-def test_a_finer_tail_must_gain_on_unseen_trials_but_not_what_the_truth_would(monkeypatch, gain, accepted):
+@pytest.mark.parametrize(
+    ("gain", "left", "accepted"), [(20.0, 2.0, True), (5.0, 2.0, False), (20.0, 14.0, False)]
+)
+def test_a_finer_tail_must_gain_on_unseen_trials_but_not_what_the_truth_would(
+    monkeypatch, gain, left, accepted
+):
     nominal = SimpleNamespace(objective=0.0, result=SimpleNamespace(samples=np.array([1000.0])))
     finer = SimpleNamespace(objective=500.0, robot=SimpleNamespace(links=4))
-    monkeypatch.setattr(module, "excess", lambda _: np.array([1.0, 1.0, 10.0]))
+    monkeypatch.setattr(module, "excess", lambda fit: np.array([left if fit is finer else 10.0]))
     monkeypatch.setattr(module, "shorten", lambda *_: None)
     monkeypatch.setattr(module, "finer_tails", lambda *_: [finer])
     monkeypatch.setattr(module, "evidence", lambda fit: fit.objective)
@@ -150,7 +154,7 @@ def test_a_late_camera_is_not_called_physics():
     assert answer(result)["verdict"] == "sensor_or_actuator"
 
 
-def test_a_law_worth_a_name_is_told_for_every_degree_of_freedom_that_has_one():
+def test_a_law_worth_a_name_is_told_for_every_degree_of_freedom_that_has_one(monkeypatch):
     gain = {"surge": 10.0, "sway": 90.0, "yaw": 300.0}
     terms = {"surge": {}, "sway": {"time sway_speed": -0.05}, "yaw": {"cos(heading)": 1e-3, "rudder": 2e-4}}
     fit = SimpleNamespace(result=SimpleNamespace(samples=np.array([1e4])))

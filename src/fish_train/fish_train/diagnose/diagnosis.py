@@ -168,7 +168,7 @@ def finer_tail(
         return None
     short = shorten(experiment, RANK_STEPS)
     finer = max(finer_tails(robot, nominal, best, experiment, short, progress), key=evidence, default=None)
-    if finer is None or evidence(finer) < evidence(best):
+    if finer is None or evidence(finer) < evidence(best) or excess(finer).max() > excess(best).max():
         return None
     gain = finer.objective - nominal.objective
     if gain < level.enough(float(nominal.result.samples.sum()), 1, len(MORE)):

@@ -8,7 +8,7 @@ import numpy as np
 
 from fish_train.diagnose.law import MOST_TERMS
 from fish_train.diagnose.vocabulary import kind_of
-from fish_train.identify.cold import excess
+from fish_train.identify.cold import SUSPICIOUS, excess
 from fish_train.identify.fit import Fit
 
 if TYPE_CHECKING:  # it holds the answer to `fit_without_a_name`
@@ -28,8 +28,9 @@ def verdict(d: Diagnosis) -> str:
 
 
 def much_is_left(d: Diagnosis) -> bool:
-    """The wrench that remains follows a law on trials that the law was not fitted to, or is far stronger than water."""
-    return bool(lawful(d)) or bool(excess(d.final).max() > TOO_STRONG)
+    """The wrench that remains is far stronger than water, or stronger and follows a law on trials that the law has not seen."""
+    strongest = excess(d.final).max()
+    return bool(strongest > TOO_STRONG or (strongest > SUSPICIOUS and lawful(d)))
 
 
 def lawful(d: Diagnosis) -> list[str]:
