@@ -13,6 +13,7 @@ from fish_sim.robot import Robot, load_robot, save_robot
 from fish_train.commands.diagnose import without_wrench
 from fish_train.diagnose import answer as answers
 from fish_train.diagnose import diagnosis as module
+from fish_train.diagnose import verdict as verdicts
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
 from fish_train.diagnose.experiment_plan import next_experiment
@@ -20,7 +21,6 @@ from fish_train.diagnose.law import Description
 from fish_train.diagnose.locate import dof_shares
 from fish_train.diagnose.split import split_trials
 from fish_train.diagnose.tail import with_links
-from fish_train.diagnose.verdict import lawful
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate, settle
@@ -159,14 +159,25 @@ def test_a_law_worth_a_name_is_told_for_every_degree_of_freedom_that_has_one(mon
     terms = {"surge": {}, "sway": {"time sway_speed": -0.05}, "yaw": {"cos(heading)": 1e-3, "rudder": 2e-4}}
     fit = SimpleNamespace(result=SimpleNamespace(samples=np.array([1e4])))
     found = SimpleNamespace(level=Level(), final=fit, description=Description(gain, terms, 30))
-    assert lawful(found) == ["yaw", "sway"]
+    assert verdicts.lawful(found) == ["yaw", "sway"]
     assert answers.law(found, "yaw").startswith(
         "yaw = (0.001) cos(heading) + (0.0002) rudder (SI units; 300 nats"
     )
     more = SimpleNamespace(
         result=SimpleNamespace(samples=np.array([1e6]))
     )  # too little for so many measurements
-    assert lawful(SimpleNamespace(level=Level(), final=more, description=found.description)) == []
+    assert verdicts.lawful(SimpleNamespace(level=Level(), final=more, description=found.description)) == []
+
+
+@pytest.mark.parametrize(
+    ("times_water", "gain", "much"),
+    [(2.0, 300.0, False), (5.0, 300.0, True), (5.0, 10.0, False), (40.0, 10.0, True)],
+)
+def test_a_law_counts_only_where_more_is_left_than_usual_water(monkeypatch, times_water, gain, much):
+    monkeypatch.setattr(verdicts, "excess", lambda _: np.array([1.0, times_water, 0.5]))
+    fit = SimpleNamespace(result=SimpleNamespace(samples=np.array([1e4])))
+    found = SimpleNamespace(level=Level(), final=fit, description=Description({"sway": gain}, {}, 30))
+    assert verdicts.much_is_left(found) is much
 
 
 def test_what_the_data_cannot_say_is_said():

@@ -165,9 +165,9 @@ run_study(Study(Path({str(tmp_path / "study")!r})), 1, print, ({sys.executable!r
 """
     with subprocess.Popen([sys.executable, "-c", study]) as run:
         note = tmp_path / "study/worlds/world_0000/recordings/pid"
-        wait_for(lambda: note.exists() and note.read_text())
+        assert comes_true(lambda: note.exists() and note.read_text())
         run.kill()
-    wait_for(lambda: not Path(f"/proc/{note.read_text()}").exists())
+    assert comes_true(lambda: not Path(f"/proc/{note.read_text()}").exists())
 
 
 def test_the_tool_s_version_is_that_of_its_texts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,11 +177,11 @@ def test_the_tool_s_version_is_that_of_its_texts(monkeypatch: pytest.MonkeyPatch
     assert tool_digest() != whole
 
 
-def wait_for(condition: Callable[[], object], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
+def comes_true(condition: Callable[[], object], patience: float = 60.0) -> bool:
+    end = time.monotonic() + patience
+    while not condition() and time.monotonic() < end:
         time.sleep(0.05)
+    return bool(condition())
 
 
 def test_recordings_say_what_the_instruments_read(tmp_path) -> None:

@@ -28,9 +28,7 @@ RIDGE = 1e-9  # of the diagonal: a rudder that stands still makes terms that not
 class Description:
     """A sparse law of the missing wrench, judged on trials it has not seen."""
 
-    gain: dict[
-        str, float
-    ]  # per degree of freedom, nats that the law gains as a force of the model, cross-validated
+    gain: dict[str, float]  # degree of freedom -> nats that the law gains as a force, cross-validated
     terms: dict[str, dict[str, float]]  # degree of freedom -> term -> coefficient (SI)
     tried: int  # terms that it could choose from
 
@@ -63,14 +61,13 @@ def describe(fit: Fit, experiment: Experiment) -> Description:
         theta = np.concatenate([fit.theta, np.zeros(len(hypothesis.free) - len(fit.theta))])
         result = evaluate(hypothesis, theta, experiment, fit.noise).result
     prior = Coordinates(fit.hypothesis).prior
+    whole = quadratic(result.gradient, result.normal, fit.theta, prior)
     gains, terms = {}, {}
     for i, dof in enumerate(DOFS):
-        offered = range(
-            len(theta) - (len(DOFS) - i) * len(TERMS), len(theta) - (len(DOFS) - 1 - i) * len(TERMS)
-        )
-        whole = quadratic(result.gradient, result.normal, fit.theta, prior)
+        first = len(fit.theta) + i * len(TERMS)
+        offered = range(first, first + len(TERMS))
         step = whole.best_step(chosen := forward(whole, offered))
-        terms[dof] = {TERMS[j - offered.start]: float(step[j]) for j in chosen}
+        terms[dof] = {TERMS[j - first]: float(step[j]) for j in chosen}
         gains[dof] = cross_validated(result.gradient, result.normal, fit.theta, prior, offered)
     return Description(gains, terms, len(TERMS))
 

@@ -11,7 +11,7 @@ from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.cold import SUSPICIOUS, excess
 from fish_train.identify.fit import Fit
 
-if TYPE_CHECKING:  # it holds the answer to `fit_without_a_name`
+if TYPE_CHECKING:  # it imports this module
     from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 
 # times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool

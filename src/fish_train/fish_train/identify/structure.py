@@ -28,9 +28,7 @@ Array = NDArray[np.float64]
 
 MOST_EFFECTS = 3
 FOLDS = 4
-JUDGED = (
-    8  # candidates a round that are cross-validated: the best fit foretells little of the best prediction
-)
+JUDGED = 8  # candidates a round that are cross-validated: a good fit foretells little of a good prediction
 EVERY = 2.0  # s between start points: half of those of the last fit
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is fitted
 SCALE = 0.3  # strength at which a hypothesis is written down; sets the coordinates only

@@ -58,11 +58,10 @@ def compete(nominal: Fit, training: Experiment, held_out: Experiment) -> Rivals:
 def terms(force: MissingForce) -> dict[str, Array]:
     """The terms (T, M) of a free force along a smoothed motion."""
     c = force.covariates
-    turned, moved = (
-        (np.cos(c["heading"]), np.sin(c["heading"])),
-        (c["surge_speed"], c["sway_speed"], c["yaw_rate"]),
+    moved = (c["surge_speed"], c["sway_speed"], c["yaw_rate"])
+    head = BodyMotion(
+        "head", c["x"], c["y"], np.cos(c["heading"]), np.sin(c["heading"]), *moved, 0.0, 0.0, 0.0
     )
-    head = BodyMotion("head", c["x"], c["y"], *turned, *moved, 0.0, 0.0, 0.0)
     return regressors(head, c["time"], Drive(c["rudder"], 0.0, c["rotor_speed"], 0.0), NUMPY)
 
 

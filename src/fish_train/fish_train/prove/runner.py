@@ -66,6 +66,9 @@ def run_world(job: Job) -> str:
     return job.name
 
 
+_TOOLS: list[subprocess.Popen[str]] = []  # that this worker waits for
+
+
 def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
     environment = {
         **os.environ,
@@ -88,9 +91,6 @@ def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
     if tool.returncode != 0:
         return {"diagnosis": None, "error": f"exit status {tool.returncode}: {said[-TAIL:]}"}
     return {"diagnosis": read_json(out / "diagnosis.json"), "error": ""}
-
-
-_TOOLS: list[subprocess.Popen[str]] = []  # that this worker waits for
 
 
 def _end_with_the_study() -> None:
