@@ -12,10 +12,11 @@ from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot, load_robot, save_robot
 from fish_train.commands.diagnose import without_wrench
 from fish_train.diagnose import answer as answers
-from fish_train.diagnose import diagnosis as module
+from fish_train.diagnose import base, procedure, tail
 from fish_train.diagnose import verdict as verdicts
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
+from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.law import Description
 from fish_train.diagnose.locate import dof_shares
@@ -60,7 +61,7 @@ def test_the_vocabulary_is_complete_and_every_name_has_a_kind():
 
 
 def test_nothing_is_found_where_nothing_is(tmp_path):
-    result = module.diagnose(swim(truth()), Robot(), names=FEW)
+    result = procedure.diagnose(swim(truth()), Robot(), names=FEW)
     content = answer(result)
     assert content["verdict"] == "no_mismatch"
     assert content["effects"] == []
@@ -70,7 +71,7 @@ def test_nothing_is_found_where_nothing_is(tmp_path):
 
 def test_a_tail_of_more_links_is_no_missing_physics(tmp_path):
     fish = swim(with_links(truth(), 4), duration=5.0)
-    result = module.diagnose(fish, Robot(), names=("quadratic_drag", "payload"))
+    result = procedure.diagnose(fish, Robot(), names=("quadratic_drag", "payload"))
     content = answer(result)
     assert content["verdict"] == "no_mismatch"
     assert content["fit"]["tail_links"] == {"given": 3, "used": 4}
@@ -86,23 +87,23 @@ def test_a_finer_tail_must_gain_on_unseen_trials_but_not_what_the_truth_would(
 ):
     nominal = SimpleNamespace(objective=0.0, result=SimpleNamespace(samples=np.array([1000.0])))
     finer = SimpleNamespace(objective=500.0, robot=SimpleNamespace(links=4))
-    monkeypatch.setattr(module, "excess", lambda fit: np.array([left if fit is finer else 10.0]))
-    monkeypatch.setattr(module, "shorten", lambda *_: None)
-    monkeypatch.setattr(module, "finer_tails", lambda *_: [finer])
-    monkeypatch.setattr(module, "evidence", lambda fit: fit.objective)
-    monkeypatch.setattr(module, "gain_elsewhere", lambda *_: (gain, 1000.0))
-    found = module.finer_tail(nominal, nominal, None, None, "unseen", Level(), lambda _: None)
+    monkeypatch.setattr(tail, "excess", lambda fit: np.array([left if fit is finer else 10.0]))
+    monkeypatch.setattr(tail, "shorten", lambda *_: None)
+    monkeypatch.setattr(tail, "finer_tails", lambda *_: [finer])
+    monkeypatch.setattr(tail, "evidence", lambda fit: fit.objective)
+    monkeypatch.setattr(tail, "gain_elsewhere", lambda *_: (gain, 1000.0))
+    found = tail.finer_tail(nominal, nominal, None, None, "unseen", Level(), lambda _: None)
     assert found is (finer if accepted else None)
 
 
 @pytest.mark.parametrize(("left", "led"), [(9.0, True), (3.0, False)])
 def test_a_fit_that_leaves_far_more_on_more_trials_is_led_once_more(monkeypatch, left, led):
     fit = SimpleNamespace(hypothesis=None, theta=None, noise=None, left=2.0)
-    monkeypatch.setattr(module, "evaluate", lambda *_: None)
-    monkeypatch.setattr(module, "settle_base", lambda *_: SimpleNamespace(left=left))
-    monkeypatch.setattr(module, "excess", lambda f: np.array([f.left]))
-    monkeypatch.setattr(module, "anneal", lambda *_: "led")
-    assert (module.refine(fit, None) == "led") is led
+    monkeypatch.setattr(base, "evaluate", lambda *_: None)
+    monkeypatch.setattr(base, "settle_base", lambda *_: SimpleNamespace(left=left))
+    monkeypatch.setattr(base, "excess", lambda f: np.array([f.left]))
+    monkeypatch.setattr(base, "anneal", lambda *_: "led")
+    assert (base.refine(fit, None) == "led") is led
 
 
 def test_a_tail_cut_finer_weighs_and_bends_as_before():
@@ -113,7 +114,7 @@ def test_a_tail_cut_finer_weighs_and_bends_as_before():
 
 
 def test_a_hidden_current_is_named_with_its_size(tmp_path):
-    result = module.diagnose(swim(truth(current={"x": 0.03, "y": -0.02})), Robot(), names=FEW)
+    result = procedure.diagnose(swim(truth(current={"x": 0.03, "y": -0.02})), Robot(), names=FEW)
     content = json.loads(json.dumps(answer(result), default=float))
     assert content["verdict"] == "missing_physics"
     assert [e["name"] for e in content["effects"]] == ["current"]
@@ -139,7 +140,7 @@ def test_a_hidden_current_is_named_with_its_size(tmp_path):
 def test_a_payload_is_found_on_the_side_where_it_is():
     """The fit starts on all sides; only mass times place is determined, which must not count against the name."""
     hidden = {"mass": 0.12, "forward": -0.08, "left": 0.02}
-    result = module.diagnose(swim(truth(payload=hidden)), Robot(), names=("payload", "camera_scale"))
+    result = procedure.diagnose(swim(truth(payload=hidden)), Robot(), names=("payload", "camera_scale"))
     assert [a.name for a in result.accepted] == ["payload"]
     found = result.final.values
     moment = found["payload.mass"] * found["payload.forward"]
@@ -149,7 +150,7 @@ def test_a_payload_is_found_on_the_side_where_it_is():
 def test_a_late_camera_is_not_called_physics():
     late = swim(truth())
     shifted = tuple(type(f)(f.t + 0.05, f.pose) for f in late.frames)
-    result = module.diagnose(type(late)(**{**late.__dict__, "frames": shifted}), Robot(), names=FEW)
+    result = procedure.diagnose(type(late)(**{**late.__dict__, "frames": shifted}), Robot(), names=FEW)
     assert [a.name for a in result.accepted] == ["camera_latency"]
     assert answer(result)["verdict"] == "sensor_or_actuator"
 
@@ -197,7 +198,7 @@ def test_an_effect_of_the_user_competes_with_the_others(monkeypatch):
 
 def test_only_known_names_compete():
     with pytest.raises(ValueError, match="unknown candidate 'magic'; known: quadratic_drag"):
-        module.diagnose(swim(Robot(), duration=1.0), Robot(), names=["magic"])
+        procedure.diagnose(swim(Robot(), duration=1.0), Robot(), names=["magic"])
 
 
 def test_held_out_trials_take_no_part():
@@ -220,7 +221,7 @@ def test_the_level_is_checked_and_probabilities_add_up():
 def test_a_name_that_was_found_as_well_is_no_rival(monkeypatch):
     monkeypatch.setattr(answers, "evidence", lambda fit, _: fit)
     found = SimpleNamespace(refitted={"current": 10.0, "tip_slip": 40.0, "wall_effect": 9.0})
-    first, second = module.Accepted("current", found), module.Accepted("tip_slip", found)
+    first, second = Accepted("current", found), Accepted("tip_slip", found)
     odds = answers.competition(first, [first, second])
     assert list(odds) == ["current", "wall_effect"] and odds["current"] == pytest.approx(
         1.0 / (1.0 + np.exp(-1.0))
@@ -244,10 +245,10 @@ def test_of_two_effects_each_has_its_own_place():
     experiment = swim(robot)
     final = settle(evaluate(nominal_hypothesis(robot, ()), np.zeros(0), experiment, Noise()), experiment)
     accepted = [SimpleNamespace(name="hull_asymmetry"), SimpleNamespace(name="tether")]
-    parts = module.shares(final, accepted, experiment)
+    parts = procedure.shares(final, accepted, experiment)
     yaw = {name: dof_shares(less, final)["yaw"] for name, (less, _) in parts.items()}
     assert yaw["hull_asymmetry"] > 0.5 and yaw["tether"] < 0.2
     assert set(parts["tether"][0].hypothesis.names) == {"hull_asymmetry"}
     assert (
-        module.shares(final, accepted[:1], experiment) == {}
+        procedure.shares(final, accepted[:1], experiment) == {}
     )  # one effect: what the refitted nominal model lacks

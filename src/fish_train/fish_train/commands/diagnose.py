@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose, write the three files, print the verdict."""
     from fish_train.diagnose.answer import answer
     from fish_train.diagnose.decide import Level
-    from fish_train.diagnose.diagnosis import diagnose
+    from fish_train.diagnose.procedure import diagnose
     from fish_train.diagnose.verdict import corrected
     from fish_train.diagnose.vocabulary import known
     from fish_train.identify.experiment import ExperimentError, build_experiment

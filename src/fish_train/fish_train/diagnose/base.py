@@ -2,13 +2,42 @@
 
 from __future__ import annotations
 
-from fish_train.identify.cold import SUSPICIOUS, excess
-from fish_train.identify.experiment import Experiment
-from fish_train.identify.fit import Fit, settle
+from fish_sim.robot import Robot
+from fish_train.identify.cold import SUSPICIOUS, better, excess, fit_cold
+from fish_train.identify.experiment import Experiment, shorten
+from fish_train.identify.fit import Fit, evaluate, settle
+from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.sensor_noise import usual_noise
+from fish_train.identify.tempering import fit_tempered
 
 ROUNDS, ROUNDS_OF_A_WRONG_MODEL = 5, 2  # of noise and parameters in turn, at most
+FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
+GROWN = 2.0  # a force that more trials make so much stronger comes from a poor optimum
+
+
+def fit_base(robot: Robot, experiment: Experiment) -> Fit:
+    """The nominal model: cold fit on the start of every trial, continued on the whole."""
+    short = shorten(experiment, FIRST_STEPS)
+    cold = fit_cold(nominal_hypothesis(robot), short, usual_noise(short))
+    return settle_base(evaluate(cold.hypothesis, cold.theta, experiment, cold.noise), experiment)
 
 
 def settle_base(fit: Fit, experiment: Experiment) -> Fit:
     """`settle`, which a model that lacks something would drag on: its noise has taken in what it lacks."""
     return settle(fit, experiment, ROUNDS_OF_A_WRONG_MODEL if excess(fit).max() > SUSPICIOUS else ROUNDS)
+
+
+def anneal(fit: Fit, experiment: Experiment) -> Fit:
+    """The fit, or where it needs far more than usual water a better optimum that the camera alone leads to."""
+    if excess(fit).max() < SUSPICIOUS:
+        return fit
+    noise, short = usual_noise(experiment), shorten(experiment, FIRST_STEPS)
+    short_fit = fit_tempered(fit.hypothesis, short, noise, fit.theta, held=())
+    other = settle(evaluate(fit.hypothesis, short_fit.theta, experiment, short_fit.noise), experiment)
+    return better(fit, other)
+
+
+def refine(fit: Fit, experiment: Experiment) -> Fit:
+    """A fit carried over to other trials; where it leaves far more there, the camera leads it to a better optimum."""
+    settled = settle_base(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment)
+    return anneal(settled, experiment) if excess(settled).max() > GROWN * excess(fit).max() else settled

@@ -16,7 +16,7 @@ from itertools import product
 
 import numpy as np
 
-from fish_train.diagnose.base import settle_base
+from fish_train.diagnose.base import FIRST_STEPS, settle_base
 from fish_train.identify.cold import SUSPICIOUS, better, excess
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
@@ -29,7 +29,6 @@ STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
 WEAK_STRENGTHS = (0.05, 0.3)  # where little is left: no step leads back from far too strong an effect
 SCALE = 0.3  # strength at which the hypothesis is written down; sets the coordinates only
 IMU_DISTRUST = 10.0  # factor of the IMU's noise in the first part of the ranking
-RANK_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to rank
 RANK_ITERATIONS = 6
 POLISH_ITERATIONS = 4
 PROMISING_PLACES = 3  # of those that are tried
@@ -96,7 +95,7 @@ def evidence(fit: Fit, temper: float = 1.0) -> float:
 
 def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Progress) -> tuple[Ranked, ...]:
     """All candidates added to the base one at a time, on short trials, the most promising polished."""
-    short = shorten(experiment, RANK_STEPS)
+    short = shorten(experiment, FIRST_STEPS)
     reference = climb(evaluate(base.hypothesis, base.theta, short, base.noise), short, POLISH_ITERATIONS)
     compile_all(base, names, progress)
     near = excess(base).max() < SUSPICIOUS
@@ -202,7 +201,7 @@ def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough
 
     None where it stays more than `enough` behind on shortened trials.
     """
-    hypothesis, short = base.hypothesis.with_effect(name, SCALE), shorten(experiment, RANK_STEPS)
+    hypothesis, short = base.hypothesis.with_effect(name, SCALE), shorten(experiment, FIRST_STEPS)
     beside = replace(base, theta=best.theta[: len(base.theta)])
     starts = warm_starts(beside, name, short, best.noise)
     start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, best.noise))

@@ -5,12 +5,15 @@ A tail that bends continuously, described by too few links, leaves a force behin
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
+from fish_train.diagnose.base import FIRST_STEPS
+from fish_train.diagnose.decide import SMALLEST_CHECK, Level
+from fish_train.diagnose.growth import gain_elsewhere
+from fish_train.diagnose.search import Progress, evidence
 from fish_train.identify.cold import SUSPICIOUS, better, excess, fit_cold
-from fish_train.identify.experiment import Experiment
+from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.fit import Fit, evaluate, log_posterior, settle
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
@@ -19,14 +22,33 @@ from fish_train.identify.tempering import fit_tempered
 MORE = (1, 2)  # links that are tried beyond the robot's
 ROUGH = 5.0  # factor of usual water's force: a filter that takes the nominal values for true less lets them go farther
 
-Progress = Callable[[str], None]
-
 
 def with_links(robot: Robot, links: int) -> Robot:
     """The same fish with its tail cut into another number of equal links: totals and ratios to nominal values stay."""
     old, new = nominal_parameters(robot.links), nominal_parameters(links)
     values = {name: robot.parameters[name] * new[name].value / old[name].value for name in new}
     return replace(robot, links=links, parameters=values)
+
+
+def finer_tail(
+    nominal: Fit, best: Fit, robot: Robot, experiment: Experiment, check: Experiment | None, level: Level,
+    progress: Progress,
+) -> Fit | None:  # fmt: skip
+    """The nominal model with more tail links, where the best fit leaves more than water and this explains more of it."""
+    if excess(best).max() < SUSPICIOUS:
+        return None
+    short = shorten(experiment, FIRST_STEPS)
+    finer = max(finer_tails(robot, nominal, best, experiment, short, progress), key=evidence, default=None)
+    if finer is None or evidence(finer) < evidence(best) or excess(finer).max() > excess(best).max():
+        return None
+    gain = finer.objective - nominal.objective
+    if gain < level.enough(float(nominal.result.samples.sum()), 1, len(MORE)):
+        return None
+    # half of what the truth would gain there is too much to ask: no number of links is the truth, and none is a name
+    if check is not None and not gain_elsewhere(nominal, finer, check)[0] > SMALLEST_CHECK:
+        return None
+    progress(f"the tail needs {finer.robot.links} links: {gain:.0f} nats")
+    return finer
 
 
 def finer_tails(

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.law import MOST_TERMS
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.cold import SUSPICIOUS, excess
 from fish_train.identify.fit import Fit
-
-if TYPE_CHECKING:  # it imports this module
-    from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 
 # times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
 TOO_STRONG = 30.0

@@ -1,0 +1,103 @@
+"""The whole diagnosis: identify, locate, search, decide, model, show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fish_sim.robot import Robot
+from fish_train.diagnose.base import fit_base
+from fish_train.diagnose.decide import Level
+from fish_train.diagnose.diagnosis import Accepted, Diagnosis
+from fish_train.diagnose.growth import final_fits, grow, prune, switched_off
+from fish_train.diagnose.law import describe
+from fish_train.diagnose.locate import MissingForce, missing_force
+from fish_train.diagnose.own_force import has_own_force, own_force
+from fish_train.diagnose.search import Progress
+from fish_train.diagnose.split import split_trials
+from fish_train.diagnose.tail import finer_tail
+from fish_train.diagnose.verdict import much_is_left, named
+from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import Fit, adapt_noise, evaluate
+from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.outlook import fit_outlook
+from fish_train.identify.settle import suitable_noise
+
+
+def silent(_: str) -> None:
+    """No progress shown."""
+
+
+def diagnose(
+    experiment: Experiment, robot: Robot, level: Level | None = None, progress: Progress = silent,
+    names: Sequence[str] | None = None,
+) -> Diagnosis:  # fmt: skip
+    """Answer for one experiment; `progress` gets a line at every step.
+
+    names: what competes, by default every registered effect and sensor error; an effect of your own is registered by
+    `fish_sim.effects.EFFECTS[name] = YourEffect`. Raises ValueError for a name that is not known.
+    """
+    level, split = level or Level(), split_trials(experiment)
+    reasons = out_of_reach(experiment)
+    names = known(names or candidates())
+    unreachable = {name: reasons[name] for name in names if name in reasons}
+    names = tuple(name for name in names if name not in reasons)
+    searched = experiment.select(split.search)
+    check = experiment.select(split.check) if split.check else None
+    progress("fitting the nominal model")
+    base = fit_base(robot, searched)
+    base, rounds, accepted = grow(base, searched, check, names, level, progress)
+    finer = finer_tail(rounds[0].base, base, robot, searched, check, level, progress)
+    if finer is not None:
+        base, rounds, accepted = grow(finer, searched, check, names, level, progress)
+    progress("fitting all training trials")
+    training = experiment.select(split.training)
+    nominal, final = final_fits(base, rounds, training)
+    final, accepted = prune(final, accepted, training, level, progress)
+    progress("locating the missing force")
+    force = missing_force(nominal, training)
+    remaining = missing_force(final, training) if accepted else force
+    parts = shares(final, accepted, training)
+    pushes = {a.name: own_force(final, a.name, training) for a in accepted if has_own_force(a.name)}
+    progress("scoring held-out trials")
+    unseen = experiment.select(split.held_out or split.training)
+    given_noise = suitable_noise(unseen, robot, nominal.noise)
+    held = held_out_density(unseen, robot, given_noise, nominal, final)
+    found = Diagnosis(
+        experiment, split, robot, nominal, final, tuple(rounds), tuple(accepted), unreachable, level,
+        force, parts, pushes, remaining, describe(final, training), given_noise, held,
+    )  # fmt: skip
+    if named(found) or not much_is_left(found):
+        return found
+    # a likelihood misleads about a model that lacks something without a name: its parameters go where the next 50 ms are right
+    progress("no name fits: fitting the nominal model to predict over seconds")
+    return replace(found, outlook=fit_outlook(nominal, training, progress))
+
+
+def shares(
+    final: Fit, accepted: Sequence[Accepted], training: Experiment
+) -> dict[str, tuple[Fit, MissingForce]]:
+    """Of several effects each one's part: the model less it, with the noise it then needs, and the force that it lacks."""
+    found = {}
+    for name in [a.name for a in accepted] if len(accepted) > 1 else []:
+        less = switched_off(final, name, training)
+        less = evaluate(less.hypothesis, less.theta, training, adapt_noise(less, training))
+        found[name] = less, missing_force(less, training)
+    return found
+
+
+def held_out_density(
+    held: Experiment, robot: Robot, given_noise: Noise, nominal: Fit, final: Fit
+) -> dict[str, np.ndarray]:
+    """Log density per scalar measurement of each held-out trial: model as given, refitted, with effects."""
+    given = evaluate(nominal_hypothesis(robot, ()), np.zeros(0), held, given_noise)
+    fits = {"nominal": given, "refitted": nominal, "with_effects": final}
+    density = {}
+    for name, fit in fits.items():
+        result = evaluate(fit.hypothesis, fit.theta, held, fit.noise).result
+        density[name] = result.log_likelihood / result.samples
+    return density
