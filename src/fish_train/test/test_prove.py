@@ -11,7 +11,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_control.hand_tuned import HAND_TUNED
 from fish_sim.effects import EFFECTS
 from fish_sim.ops import NUMPY
 from fish_sim.scheme import default_scheme
@@ -21,13 +20,13 @@ from fish_train.diagnose.own_force import acting, f1, own_force, regimes
 from fish_train.diagnose.vocabulary import candidates
 from fish_train.evaluation.cells import Cell
 from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
-from fish_train.evaluation.study import Row
+from fish_train.evaluation.study import Condition, Row
 from fish_train.identify.experiment import build_experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
 from fish_train.prove import close_loop, groups, tool_version
 from fish_train.prove.build import make_readings, make_world
-from fish_train.prove.close_loop import Plan, loop_table, loop_world, searched
+from fish_train.prove.close_loop import loop_table, loop_world, search
 from fish_train.prove.judge import judged_table, rivals_table
 from fish_train.prove.mujoco_plant import MujocoPlant, model_text
 from fish_train.prove.nulls import null_table
@@ -288,12 +287,32 @@ def test_power_counts_per_strength() -> None:
     assert [(p.strength, p.found.k, p.found.n, p.oracle.k) for p in steps] == [(0.5, 1, 2, 2), (1.0, 1, 1, 0)]
 
 
-def test_gains_searched_on_the_plant_are_searched_once(tmp_path, monkeypatch) -> None:
-    calls = []
-    monkeypatch.setattr(close_loop, "search", lambda *_: calls.append(1) or HAND_TUNED)
-    plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path / "out")
-    found = [searched(plan, None, (), lambda _: None) for _ in range(2)]
-    assert found == [HAND_TUNED, HAND_TUNED] and len(calls) == 1
+def test_what_the_loop_cannot_conceal_is_said() -> None:
+    assert loop_world("nothing", 1, 3, 4.0).effects == {}
+    with pytest.raises(ValueError, match="concealed: got 'storm'; expected one of nothing, "):
+        loop_world("storm", 1, 3, 4.0)
+
+
+def test_a_search_on_the_plant_goes_on_where_it_was_stopped(tmp_path, monkeypatch) -> None:
+    swum = []
+
+    def swim(candidates, conditions, cells, jobs):
+        assert not conditions[0].fused
+        if len(swum) == 7 and "stop" in cells:
+            raise KeyboardInterrupt
+        gains = candidates[0].gains.policy.gains(np.zeros(0))
+        swum.append(gains)
+        sizes = SimpleNamespace(cross_track_rmse=abs(np.log(gains.steering_kp)), speed_rmse=gains.speed_kp)
+        return [SimpleNamespace(metrics=SimpleNamespace(whole=sizes))]
+
+    monkeypatch.setattr(close_loop, "run_study", swim)
+    plant = Condition(name="second plant")
+    whole = search(plant, (), 20, 1, tmp_path / "whole.json")
+    expected, swum[:] = list(swum), []
+    with pytest.raises(KeyboardInterrupt):
+        search(plant, ("stop",), 20, 1, tmp_path / "again.json")
+    assert search(plant, (), 20, 1, tmp_path / "again.json") == whole
+    assert swum == expected and len(swum) >= 15
 
 
 def test_overlap_of_times_and_degrees_of_freedom() -> None:

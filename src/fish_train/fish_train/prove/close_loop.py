@@ -28,7 +28,7 @@ from fish_train.evaluation.candidates import read_policy
 from fish_train.evaluation.cells import Cell, make_cells
 from fish_train.evaluation.gains_source import PolicyGains
 from fish_train.evaluation.plant import Plant
-from fish_train.evaluation.study import Candidate, Condition, Row, evaluate, run_study
+from fish_train.evaluation.study import Candidate, Condition, Row, run_study
 from fish_train.json_file import write_json
 from fish_train.prove.mujoco_effects import CONCEALED
 from fish_train.prove.mujoco_plant import MujocoPlant
@@ -109,7 +109,9 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
         candidates.append(read_policy(name, _train(plan, name, robot)))
     condition = Condition(name="second plant", plant=SecondPlant(plan.world))
     cells = make_cells(plan.paths, plan.speeds, range(1, plan.seeds + 1))
-    candidates.append(Candidate("true", PolicyGains(Policy.constant(searched(plan, condition, cells, say)))))
+    say("searching gains on the plant itself")
+    best = search(condition, cells, plan.search, jobs, plan.out / "search" / "tries.json", say)
+    candidates.append(Candidate("true", PolicyGains(Policy.constant(best))))
     say("swimming")
     return run_study(candidates, [condition], cells, jobs)
 
@@ -152,21 +154,16 @@ def _verb(*arguments: str) -> None:
         raise UserError(f"fish_train {arguments[0]} ended with {done.returncode}: {said}")
 
 
-def searched(plan: Plan, condition: Condition, cells: Sequence[Cell], say: Say) -> Gains:
-    """Gains searched on the plant itself, from out/search/gains.json if they are there already."""
-    file = plan.out / "search" / "gains.json"
-    if file.exists():
-        return Gains(**read_json(file))
-    say("searching gains on the plant itself")
-    found = search(condition, cells, plan.search, say)
+def search(
+    condition: Condition, cells: Sequence[Cell], runs: int, jobs: int, file: Path, say: Say = lambda _: None
+) -> Gains:
+    """Constant gains by a simplex search on the plant, perfect state, from the hand-tuned ones.
+
+    What was tried before is in `file`: the same search goes on where it was stopped.
+    """
+    seen = replace(condition, fused=False)
+    tried = {tuple(t["x"]): float(t["cost"]) for t in (read_json(file) if file.exists() else [])}
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_json(file, found._asdict())
-    return found
-
-
-def search(condition: Condition, cells: Sequence[Cell], runs: int, say: Say) -> Gains:
-    """Constant gains by a simplex search on the plant, perfect state, from the hand-tuned ones."""
-    seen, costs = replace(condition, fused=False), list[float]()
 
     def gains(x: Array) -> Gains:
         wanted = HAND_TUNED._asdict()
@@ -174,10 +171,13 @@ def search(condition: Condition, cells: Sequence[Cell], runs: int, say: Say) -> 
         return Gains(*(float(np.clip(wanted[o.name], o.low, o.high)) for o in OUTPUTS))
 
     def cost(x: Array) -> float:
-        candidate = Candidate("", PolicyGains(Policy.constant(gains(x))))
-        costs.append(float(np.mean([_cost(row) for row in evaluate(candidate, seen, cells)])))
-        say(f"gains {len(costs)} of {runs}: cost {costs[-1]:.2f}, best {min(costs):.2f}")
-        return costs[-1]
+        key = tuple(x.tolist())
+        if key not in tried:
+            candidate = Candidate("", PolicyGains(Policy.constant(gains(x))))
+            tried[key] = float(np.mean([_cost(row) for row in run_study([candidate], [seen], cells, jobs)]))
+            write_json(file, [{"x": k, "cost": v} for k, v in tried.items()])
+            say(f"gains {len(tried)} of {runs}: cost {tried[key]:.2f}, best {min(tried.values()):.2f}")
+        return tried[key]
 
     start = np.vstack([np.zeros(len(SEARCHED)), WIDE * np.eye(len(SEARCHED))])
     found = minimize(cost, start[0], method="Nelder-Mead", options={"maxfev": runs, "initial_simplex": start})
