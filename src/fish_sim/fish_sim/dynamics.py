@@ -17,6 +17,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from fish_sim.effects.effect import BodyMotion, Drive, Effect, Grip
+from fish_sim.factorisation import back_substitute, dot, factorise, reduce
 from fish_sim.ops import Scalar
 
 # 1/s, Baumgarte rate of the tip constraint: slip decays within 10 ms; RK4 at 10 ms is stable up to 278
@@ -311,39 +312,6 @@ def add_springs(
         h[1 + i] = h[1 + i] - torque
 
 
-def factorise(M: list[list[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """M = L D L^T of a symmetric positive definite matrix of scalars, given below its diagonal: (L, 1/D)."""
-    size = len(M)
-    L: list[list[Scalar]] = [[0.0] * size for _ in range(size)]
-    D: list[Scalar] = []
-    inverse: list[Scalar] = []
-    for j in range(size):
-        scaled = [L[j][k] * D[k] for k in range(j)]
-        D.append(M[j][j] - dot(scaled, L[j][:j]))
-        inverse.append(1.0 / D[j])
-        for i in range(j + 1, size):
-            L[i][j] = (M[i][j] - dot(L[i][:j], scaled)) * inverse[j]
-    return L, inverse
-
-
-def reduce(L: list[list[Scalar]], b: Sequence[Scalar]) -> list[Scalar]:
-    """L^-1 b."""
-    x = list(b)
-    for i in range(len(x)):
-        for k in range(i):
-            x[i] = x[i] - L[i][k] * x[k]
-    return x
-
-
-def back_substitute(L: list[list[Scalar]], inverse: Sequence[Scalar], b: Sequence[Scalar]) -> list[Scalar]:
-    """(D L^T)^-1 b."""
-    x = [value * d for value, d in zip(b, inverse, strict=True)]
-    for i in reversed(range(len(x))):
-        for k in range(i + 1, len(x)):
-            x[i] = x[i] - L[k][i] * x[k]
-    return x
-
-
 def tip_force(slip: Scalar, A: Scalar, b: Scalar, grip: Grip | None, xp: Any) -> Scalar:
     """Lateral force of the water on the tip, slip' = A lambda + b.
 
@@ -407,11 +375,6 @@ def combine(grips: Sequence[Grip]) -> Grip | None:
         return None
     share = sum((g.share for g in grips), 0.0)
     return Grip(sum((g.mobility for g in grips), 0.0), share, sum((g.wake for g in grips), 0.0))
-
-
-def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    """Inner product of two lists of scalars."""
-    return sum((x * y for x, y in zip(a, b, strict=True)), 0.0)
 
 
 def energy(q: Sequence[Scalar], qd: Sequence[Scalar], alpha: Scalar, r: SimpleNamespace, xp: Any) -> Scalar:

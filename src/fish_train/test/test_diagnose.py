@@ -155,30 +155,36 @@ def test_a_late_camera_is_not_called_physics():
     assert answer(result)["verdict"] == "sensor_or_actuator"
 
 
-def test_a_law_worth_a_name_is_told_for_every_degree_of_freedom_that_has_one(monkeypatch):
+def test_a_law_that_holds_on_unseen_trials_is_told_for_every_degree_of_freedom_that_has_one():
     gain = {"surge": 10.0, "sway": 90.0, "yaw": 300.0}
     terms = {"surge": {}, "sway": {"time sway_speed": -0.05}, "yaw": {"cos(heading)": 1e-3, "rudder": 2e-4}}
-    fit = SimpleNamespace(result=SimpleNamespace(samples=np.array([1e4])))
-    found = SimpleNamespace(level=Level(), final=fit, description=Description(gain, terms, 30))
-    assert verdicts.lawful(found) == ["yaw", "sway"]
-    assert answers.law(found, "yaw").startswith(
+    description = Description(gain, terms, 1e4)
+    assert description.lawful(Level()) == ["yaw", "sway"]
+    assert description.lawful(Level(false_alarms=1e-11)) == ["yaw"]  # 4 log(3e11) = 106 nats
+    assert Description(gain, terms, 1e6).lawful(Level()) == []  # too little for so many measurements
+    assert answers.law(SimpleNamespace(description=description), "yaw").startswith(
         "yaw = (0.001) cos(heading) + (0.0002) rudder (SI units; 300 nats"
     )
-    more = SimpleNamespace(
-        result=SimpleNamespace(samples=np.array([1e6]))
-    )  # too little for so many measurements
-    assert verdicts.lawful(SimpleNamespace(level=Level(), final=more, description=found.description)) == []
 
 
 @pytest.mark.parametrize(
-    ("times_water", "gain", "much"),
-    [(2.0, 300.0, False), (5.0, 300.0, True), (5.0, 10.0, False), (40.0, 10.0, True)],
+    ("times_water", "gain", "much"), [(2.0, 300.0, True), (5.0, 10.0, False), (40.0, 10.0, True)]
 )
-def test_a_law_counts_only_where_more_is_left_than_usual_water(monkeypatch, times_water, gain, much):
+def test_much_is_left_where_it_is_far_more_than_water_or_follows_a_law(monkeypatch, times_water, gain, much):
     monkeypatch.setattr(verdicts, "excess", lambda _: np.array([1.0, times_water, 0.5]))
-    fit = SimpleNamespace(result=SimpleNamespace(samples=np.array([1e4])))
-    found = SimpleNamespace(level=Level(), final=fit, description=Description({"sway": gain}, {}, 30))
+    found = SimpleNamespace(level=Level(), final=None, description=Description({"sway": gain}, {}, 1e4))
     assert verdicts.much_is_left(found) is much
+
+
+@pytest.mark.parametrize(("left", "gain", "tried"), [(1.0, 5.0, 0), (1.0, 300.0, 1), (9.0, 5.0, 1)])
+def test_finer_tails_are_tried_where_much_is_left_or_follows_a_law(monkeypatch, left, gain, tried):
+    calls = []
+    monkeypatch.setattr(tail, "excess", lambda _: np.array([left]))
+    monkeypatch.setattr(tail, "describe", lambda *_: Description({"yaw": gain}, {}, 1e4))
+    monkeypatch.setattr(tail, "shorten", lambda *_: None)
+    monkeypatch.setattr(tail, "finer_tails", lambda *_: calls.append(1) or [])
+    assert tail.finer_tail(None, None, None, None, None, Level(), lambda _: None) is None
+    assert len(calls) == tried
 
 
 def test_what_the_data_cannot_say_is_said():

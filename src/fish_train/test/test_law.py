@@ -41,7 +41,7 @@ def test_water_alone_follows_no_law():
 def test_a_step_is_the_minimum_over_fitted_and_chosen_parameters():
     random = np.random.default_rng(0)
     root = random.standard_normal((6, 6))
-    cost = Quadratic(random.standard_normal(6), root @ root.T, 2)
+    cost = Quadratic(100.0 * random.standard_normal(6), root @ root.T, 2)
     step = cost.best_step([4])
     assert not step[[2, 3, 5]].any()
     for j in (0, 1, 4):
@@ -51,11 +51,16 @@ def test_a_step_is_the_minimum_over_fitted_and_chosen_parameters():
     assert forward(cost, range(2, 6))[0] == first
 
 
+def test_a_term_that_gains_no_more_than_chance_is_not_chosen():
+    weak, strong = -np.sqrt(2.0 * 9.0), -np.sqrt(2.0 * 11.0)  # gains of 9 and 11 nats
+    assert forward(Quadratic(np.array([0.0, weak, strong]), np.eye(3), 1), (1, 2)) == [2]
+
+
 def test_terms_that_nothing_tells_apart_do_no_harm():
     normal = np.array(
         [[2.0, 1.0, 1.0, 0.0], [1.0, 3.0, 3.0, 0.0], [1.0, 3.0, 3.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
     )
-    cost = Quadratic(np.array([0.1, 1.0, 1.0, 0.0]), normal, 1)
+    cost = Quadratic(100.0 * np.array([0.1, 1.0, 1.0, 0.0]), normal, 1)
     chosen = forward(cost, (1, 2, 3))
     assert 3 not in chosen  # never excited
     assert cost.cost(cost.best_step(chosen)) == pytest.approx(cost.cost(cost.best_step([1])), rel=1e-6)

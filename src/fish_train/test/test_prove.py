@@ -369,9 +369,15 @@ def test_the_oracle_and_the_rivals_by_hand() -> None:
         1: {"overlap": 0.5, "f1": 0.6, "range_f1": None, "dof": 0.7},
         2: {"overlap": None, "f1": None, "dof": None},
     }
-    table = judged_table([right, null], judged, {1: sight(9.0), 2: sight(0.0)}, {1: True})
+    nameless = [
+        score_world(World("outside", seed, {"jet": {"x": 0.03}}), diagnosis(verdict=verdict))
+        for seed, verdict in ((3, "unexplained"), (4, "no_mismatch"), (5, "no_mismatch"))
+    ]
+    sights, seen = {1: sight(9.0), 2: sight(0.0)}, {1: True, 3: True, 4: True, 5: False}
+    table = judged_table([right, null, *nameless], judged, sights, seen)
     assert [row[2] for row in table.rows] == [
         "100% of 1",
+        str(Share(1, 2)),
         "1.10 (1 worlds)",
         "0.55 (1 worlds)",
         "0.70 (1 worlds)",

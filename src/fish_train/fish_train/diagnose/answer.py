@@ -14,7 +14,7 @@ from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.own_force import intervals, regimes
 from fish_train.diagnose.search import evidence
-from fish_train.diagnose.verdict import lawful, much_is_left, named, unexplained_share, verdict
+from fish_train.diagnose.verdict import much_is_left, named, unexplained_share, verdict
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.cold import excess
 from fish_train.identify.filter_types import ROWS, Noise
@@ -125,7 +125,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "place": locate.place_shares(d.remaining, scale),
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
-        "description": "; ".join(law(d, dof) for dof in lawful(d))
+        "description": "; ".join(law(d, dof) for dof in d.description.lawful(d.level))
         or f"{STRONG.format(*excess(d.final))}; no law in place, time, speed, rotor, rudder or heading was found for it",
     }
 

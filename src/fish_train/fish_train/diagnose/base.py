@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fish_sim.robot import Robot
-from fish_train.identify.cold import SUSPICIOUS, better, excess, fit_cold
+from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.fit import Fit, evaluate, settle
 from fish_train.identify.hypothesis import nominal_hypothesis
@@ -11,7 +11,6 @@ from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.tempering import fit_tempered
 
 ROUNDS, ROUNDS_OF_A_WRONG_MODEL = 5, 2  # of noise and parameters in turn, at most
-FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
 GROWN = 2.0  # a force that more trials make so much stronger comes from a poor optimum
 
 
@@ -32,7 +31,7 @@ def anneal(fit: Fit, experiment: Experiment) -> Fit:
     if excess(fit).max() < SUSPICIOUS:
         return fit
     noise, short = usual_noise(experiment), shorten(experiment, FIRST_STEPS)
-    short_fit = fit_tempered(fit.hypothesis, short, noise, fit.theta, held=())
+    short_fit = fit_tempered(fit.hypothesis, short, noise, fit.theta)
     other = settle(evaluate(fit.hypothesis, short_fit.theta, experiment, short_fit.noise), experiment)
     return better(fit, other)
 

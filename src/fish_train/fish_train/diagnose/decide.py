@@ -39,6 +39,14 @@ class Level:
         exact = 0.5 * float(chi2.isf(self.false_alarms / max(candidates, 1), parameters))
         return max(TEMPER * exact, SMALLEST_GAIN * samples)
 
+    def enough_unseen(self, samples: float, tests: int) -> float:
+        """Nats that a law chosen and fitted elsewhere must gain, tempered, and not too small: half of a name's.
+
+        Where it is not true its likelihood ratio on unseen data is 1 in the mean, so that it exceeds tests / false_alarms less
+        often than false_alarms / tests (Markov's inequality; Gruenwald, de Heide and Koolen 2024).
+        """
+        return max(TEMPER * float(np.log(tests / self.false_alarms)), 0.5 * SMALLEST_GAIN * samples)
+
 
 def p_value(gain: float, parameters: int, candidates: int) -> float:
     """Of the tempered likelihood ratio, times the number of candidates tried (Bonferroni)."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fish_train.diagnose.decide import Level
 from fish_train.diagnose.free_force import TERMS, known_to_the_filter
 from fish_train.diagnose.locate import DOFS
 from fish_train.identify.experiment import Experiment
@@ -21,6 +22,9 @@ from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import Coordinates
 
 MOST_TERMS = 4  # of a law
+SMALLEST_TERM = (
+    10.0  # nats that a term must gain where it is chosen; chance reaches it once in a thousand laws
+)
 RIDGE = 1e-9  # of the diagonal: a rudder that stands still makes terms that nothing tells apart
 
 
@@ -30,7 +34,14 @@ class Description:
 
     gain: dict[str, float]  # degree of freedom -> nats that the law gains as a force, cross-validated
     terms: dict[str, dict[str, float]]  # degree of freedom -> term -> coefficient (SI)
-    tried: int  # terms that it could choose from
+    samples: float  # scalar measurements
+
+    def lawful(self, level: Level) -> list[str]:
+        """Degrees of freedom, the most lawful first, on which the law gains on unseen trials what chance does not."""
+        enough = level.enough_unseen(self.samples, len(self.gain))
+        return sorted(
+            (dof for dof, gain in self.gain.items() if gain > enough), key=lambda dof: -self.gain[dof]
+        )
 
 
 @dataclass(frozen=True)
@@ -69,7 +80,7 @@ def describe(fit: Fit, experiment: Experiment) -> Description:
         step = whole.best_step(chosen := forward(whole, offered))
         terms[dof] = {TERMS[j - first]: float(step[j]) for j in chosen}
         gains[dof] = cross_validated(result.gradient, result.normal, fit.theta, prior, offered)
-    return Description(gains, terms, len(TERMS))
+    return Description(gains, terms, float(fit.result.samples.sum()))
 
 
 def quadratic(gradients: Array, normals: Array, theta: Array, prior: Array) -> Quadratic:
@@ -81,12 +92,18 @@ def quadratic(gradients: Array, normals: Array, theta: Array, prior: Array) -> Q
 
 
 def forward(cost: Quadratic, offered: Sequence[int]) -> list[int]:
-    """The terms that lower the cost most, chosen one after the other, each with all parameters refitted."""
+    """The terms that lower the cost most, one after the other while one is worth it, each with all parameters refitted."""
     chosen: list[int] = []
-    for _ in range(MOST_TERMS):
-        left = [j for j in offered if j not in chosen and cost.normal[j, j] > 0.0]
-        if left:
-            chosen.append(min(left, key=lambda j: cost.cost(cost.best_step([*chosen, j]))))
+    left = {j for j in offered if cost.normal[j, j] > 0.0}
+    reached = cost.cost(cost.best_step([]))
+    while left and len(chosen) < MOST_TERMS:
+        costs = {j: cost.cost(cost.best_step([*chosen, j])) for j in sorted(left)}
+        best = min(costs, key=costs.__getitem__)
+        if reached - costs[best] < SMALLEST_TERM:
+            break
+        chosen.append(best)
+        left.remove(best)
+        reached = costs[best]
     return chosen
 
 

@@ -16,8 +16,8 @@ from itertools import product
 
 import numpy as np
 
-from fish_train.diagnose.base import FIRST_STEPS, settle_base
-from fish_train.identify.cold import SUSPICIOUS, better, excess
+from fish_train.diagnose.base import settle_base
+from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.filter_types import Noise

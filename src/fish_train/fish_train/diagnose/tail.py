@@ -8,19 +8,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
-from fish_train.diagnose.base import FIRST_STEPS
 from fish_train.diagnose.decide import SMALLEST_CHECK, Level
 from fish_train.diagnose.growth import gain_elsewhere
+from fish_train.diagnose.law import describe
 from fish_train.diagnose.search import Progress, evidence
-from fish_train.identify.cold import SUSPICIOUS, better, excess, fit_cold
+from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.fit import Fit, evaluate, log_posterior, settle
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
-from fish_train.identify.tempering import fit_tempered
 
 MORE = (1, 2)  # links that are tried beyond the robot's
-ROUGH = 5.0  # factor of usual water's force: a filter that takes the nominal values for true less lets them go farther
 
 
 def with_links(robot: Robot, links: int) -> Robot:
@@ -34,8 +32,8 @@ def finer_tail(
     nominal: Fit, best: Fit, robot: Robot, experiment: Experiment, check: Experiment | None, level: Level,
     progress: Progress,
 ) -> Fit | None:  # fmt: skip
-    """The nominal model with more tail links, where the best fit leaves more than water and this explains more of it."""
-    if excess(best).max() < SUSPICIOUS:
+    """The nominal model with more tail links, where the best fit leaves more than water or a law and this explains more of it."""
+    if excess(best).max() < SUSPICIOUS and not describe(best, experiment).lawful(level):
         return None
     short = shorten(experiment, FIRST_STEPS)
     finer = max(finer_tails(robot, nominal, best, experiment, short, progress), key=evidence, default=None)
@@ -56,23 +54,16 @@ def finer_tails(
 ) -> list[Fit]:
     """Nominal models with more links that are better than the best fit so far on the shortened trials.
 
-    No single way leads to the best optimum: they begin from the ratios to nominal values that fewer links came to, and from
-    nominal values in rough water; where neither gives a good fit, as every cold fit does.
+    The ratios to nominal values that fewer links came to are one of the places to begin at.
     """
     found, beaten = [], log_posterior(best.hypothesis, best.theta, short, best.noise)
     noise = usual_noise(short)
-    x, y, n = (ROUGH * w for w in noise.wrench)
     for links in (robot.links + more for more in MORE):
         if links > MAX_LINKS:
             break
         progress(f"fitting the nominal model with {links} tail links")
         hypothesis = nominal_hypothesis(with_links(robot, links))
-        fit = better(
-            fit_tempered(hypothesis, short, noise, nominal.theta, held=()),
-            fit_tempered(hypothesis, short, replace(noise, wrench=(x, y, n)), held=()),
-        )
-        if excess(fit).max() > SUSPICIOUS:
-            fit = better(fit, fit_cold(hypothesis, short, noise))
+        fit = fit_cold(hypothesis, short, noise, places=(nominal.theta,))
         if fit.objective > beaten:
             found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
     return found

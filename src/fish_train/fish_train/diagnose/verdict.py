@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fish_train.diagnose.diagnosis import Accepted, Diagnosis
-from fish_train.diagnose.law import MOST_TERMS
 from fish_train.diagnose.vocabulary import kind_of
-from fish_train.identify.cold import SUSPICIOUS, excess
+from fish_train.identify.cold import excess
 from fish_train.identify.fit import Fit
 
 # times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
@@ -24,17 +23,8 @@ def verdict(d: Diagnosis) -> str:
 
 
 def much_is_left(d: Diagnosis) -> bool:
-    """The wrench that remains is far stronger than water, or stronger and follows a law on trials that the law has not seen."""
-    strongest = excess(d.final).max()
-    return bool(strongest > TOO_STRONG or (strongest > SUSPICIOUS and lawful(d)))
-
-
-def lawful(d: Diagnosis) -> list[str]:
-    """Degrees of freedom, the most lawful first, on which a few terms of a free force gain what a name must on unseen trials."""
-    gain = d.description.gain
-    tried = len(gain) * d.description.tried
-    enough = d.level.enough(float(d.final.result.samples.sum()), MOST_TERMS, tried)
-    return sorted((dof for dof in gain if gain[dof] > enough), key=lambda dof: -gain[dof])
+    """The wrench that remains is far stronger than water, or follows a law on trials that the law has not seen."""
+    return bool(excess(d.final).max() > TOO_STRONG or d.description.lawful(d.level))
 
 
 def named(d: Diagnosis) -> tuple[Accepted, ...]:

@@ -1,27 +1,61 @@
-"""A cold fit that is not content with a poor optimum: no single way leads to the best one from everywhere."""
+"""A cold fit that is not content with a poor optimum: no single way leads to the best one from everywhere.
+
+How heavy the tail is and how the water holds it have many optima, the more the more links it has. Where the camera leads
+they lie close together, so that many short ways to there (multistart, then basin hopping: Wales and Doye 1997) cost less
+than one way to the end; the best goes on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 
-from fish_train.identify.experiment import Experiment
-from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, settle
-from fish_train.identify.hypothesis import Hypothesis
-from fish_train.identify.tempering import fit_tempered
+from fish_train.identify.experiment import Experiment, shorten
+from fish_train.identify.filter_types import Array, Noise
+from fish_train.identify.fit import Fit, evaluate, settle
+from fish_train.identify.hypothesis import Coordinates, Hypothesis
+from fish_train.identify.tempering import LEADING, Report, close, fit_tempered, lead
 
+FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
+STARTS_PER_LINK, SPREAD = (
+    2,
+    0.2,
+)  # places around the nominal values; how far: of the logarithms of the nominal parameters
+HOPS_PER_LINK, HOP = 2, 0.1  # from the best optimum so far; how far
 SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
-
-Report = Callable[[str], None]
 
 
 def fit_cold(
-    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, report: Report = lambda _: None
-) -> Fit:
-    """The camera leads from several values of the tail's inertias; a fit that leaves much is looked at again."""
-    return second_look(fit_tempered(hypothesis, experiment, noise, report=report), experiment, report)
+    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, report: Report = lambda _: None,
+    places: Sequence[Array] = (),
+) -> Fit:  # fmt: skip
+    """The best of many optima; a fit that leaves much is looked at again. places: (K,) theta to begin at besides."""
+    return second_look(fit_multistart(hypothesis, experiment, noise, report, places), experiment, report)
+
+
+def fit_multistart(
+    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, report: Report = lambda _: None,
+    places: Sequence[Array] = (),
+) -> Fit:  # fmt: skip
+    """`fit_tempered` from the best of the optima that the camera leads to on the first seconds; the same at every call."""
+    coordinates, short, links = (
+        Coordinates(hypothesis),
+        shorten(experiment, FIRST_STEPS),
+        hypothesis.robot.links,
+    )
+    origin, random = coordinates.origin(), np.random.default_rng(0)
+
+    def somewhere(count: int) -> Array:
+        return np.where(coordinates.is_log, 1.0, 0.0) * random.normal(size=(count, len(origin)))
+
+    report("fitting, the camera leads from many places")
+    starts = [origin, *places, *(origin + SPREAD * somewhere(STARTS_PER_LINK * links))]
+    best = reduce(better, (lead(hypothesis, short, noise, start) for start in starts))
+    for step in somewhere(HOPS_PER_LINK * links):
+        best = better(best, lead(hypothesis, short, noise, best.theta + HOP * step, LEADING[1:]))
+    return close(evaluate(hypothesis, best.theta, experiment, best.noise), experiment, noise, report)
 
 
 def second_look(fit: Fit, experiment: Experiment, report: Report = lambda _: None) -> Fit:
@@ -33,7 +67,7 @@ def second_look(fit: Fit, experiment: Experiment, report: Report = lambda _: Non
     if excess(settled).max() < SUSPICIOUS:
         return settled
     report("fitting once more from there")
-    again = fit_tempered(settled.hypothesis, experiment, settled.noise, settled.theta, report, held=())
+    again = fit_tempered(settled.hypothesis, experiment, settled.noise, settled.theta, report)
     return better(settled, again)
 
 
@@ -44,5 +78,5 @@ def excess(fit: Fit) -> np.ndarray:
 
 
 def better(first: Fit, second: Fit) -> Fit:
-    """The one with the higher objective."""
-    return max(first, second, key=lambda fit: fit.objective)
+    """The one with the higher objective; one that has none is none."""
+    return second if second.objective > first.objective or not np.isfinite(first.objective) else first

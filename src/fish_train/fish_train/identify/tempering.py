@@ -2,7 +2,7 @@
 
 With the accelerometer's and gyro's full weight the likelihood has many optima, because a wrong phase of the tail's swing is
 as bad as no swing at all. With their standard deviations a hundred times as large the camera leads, and the nominal values
-lead to the optimum from 30 % away; each further stage starts from the one before.
+lead to the optimum from 30 % away where the tail has few links; each further stage starts from the one before.
 """
 
 from __future__ import annotations
@@ -20,37 +20,52 @@ from fish_train.identify.hypothesis import Coordinates, Hypothesis
 from fish_train.identify.settle import STRANGE, open_gates, worst_row
 
 Array = NDArray[np.float64]
+Report = Callable[[str], None]
+Stages = tuple[tuple[float, int], ...]
 
-LEADING = ((100.0, 25), (30.0, 25), (10.0, 15))  # factor of the IMU's noise, iterations: the camera leads
-CLOSING = ((3.0, 15), (1.0, 15))
-# the tail's: far from the optimum they imitate a wrong phase of its swing, so they are held at several values first
-HELD_AT_FIRST = ("link_inertia_factor", "fin_inertia_factor")
-HELD_AT = (0.0, 0.25, -0.25)  # of theta
+LEADING: Stages = (
+    (100.0, 25),
+    (30.0, 25),
+    (10.0, 15),
+)  # factor of the IMU's noise, iterations: the camera leads
+CLOSING: Stages = ((3.0, 15), (1.0, 15))
 FAR_GAIN = 3.0  # nats; an iteration of a stage that is not the last and gains less is its last
 ROUNDS = 2  # of noise estimation and refits
 
 
 def fit_tempered(
     hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array | None = None,
-    report: Callable[[str], None] = lambda _: None, held: tuple[str, ...] = HELD_AT_FIRST,
+    report: Report = lambda _: None,
 ) -> Fit:  # fmt: skip
-    """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn.
-
-    The parameters `held` are free only when the camera has led the others, with these at several values; the best goes on.
-    Where a stage leaves innovations that the sensors' noise cannot explain, that noise is estimated as well.
-    The last steps leave out outliers by the gates of `noise`.
-    """
-    theta = Coordinates(hypothesis).origin() if theta is None else theta.copy()
-    held = tuple(name for name in held if name in hypothesis.free)
+    """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn."""
     report("fitting, the camera leads")
-    leads = [
-        _stages(hypothesis, experiment, noise, _with(hypothesis, theta, held, value), held, LEADING)
-        for value in (HELD_AT if held else HELD_AT[:1])
-    ]
-    fit = max(leads, key=lambda lead: lead.objective)
+    theta = Coordinates(hypothesis).origin() if theta is None else theta
+    return close(lead(hypothesis, experiment, noise, theta), experiment, noise, report)
+
+
+def lead(
+    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array, stages: Stages = LEADING
+) -> Fit:
+    """Where stages of falling IMU noise lead from theta, gates open; it ends at what the sensors' noise cannot explain."""
+    for factor, iterations in stages:
+        wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
+        fit = climb(evaluate(hypothesis, theta, experiment, wide), experiment, iterations, FAR_GAIN)
+        theta = fit.theta
+        if worst_row(fit) > STRANGE:
+            break
+    return fit
+
+
+def close(fit: Fit, experiment: Experiment, noise: Noise, report: Report = lambda _: None) -> Fit:
+    """From where the camera led to the IMU's full weight, then process noise and parameters in turn.
+
+    Where a stage leaves innovations that the sensors' noise cannot explain, that noise is estimated as well. The last steps
+    leave out outliers by the gates of `noise`.
+    """
+    hypothesis = fit.hypothesis
     if worst_row(fit) <= STRANGE:
         report("fitting, the IMU is believed more and more")
-        fit = _stages(hypothesis, experiment, noise, fit.theta, held, CLOSING)
+        fit = lead(hypothesis, experiment, noise, fit.theta, CLOSING)
     if worst_row(fit) > STRANGE:
         return _fit_with_sensor_noise(fit, experiment, report)
     fit = climb(evaluate(hypothesis, fit.theta, experiment, noise), experiment, CLOSING[-1][1])
@@ -63,39 +78,7 @@ def fit_tempered(
     return fit
 
 
-def _with(hypothesis: Hypothesis, theta: Array, names: tuple[str, ...], value: float) -> Array:
-    """Theta with some of its entries moved by `value`."""
-    moved = theta.copy()
-    moved[[hypothesis.free.index(name) for name in names]] += value
-    return moved
-
-
-def _stages(
-    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array, held: tuple[str, ...],
-    stages: tuple[tuple[float, int], ...],
-) -> Fit:  # fmt: skip
-    """The whole hypothesis where stages of falling IMU noise lead all but `held`; it ends at what is strange."""
-    theta = theta.copy()
-    first = [i for i, name in enumerate(hypothesis.free) if name not in held]
-    coarse = _fixing(hypothesis, theta, held)
-    for factor, iterations in stages:
-        wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
-        fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN)
-        theta[first] = fit.theta
-        if worst_row(fit) > STRANGE:
-            break
-    return evaluate(hypothesis, theta, experiment, wide)
-
-
-def _fixing(hypothesis: Hypothesis, theta: Array, held: tuple[str, ...]) -> Hypothesis:
-    """The hypothesis with the parameters `held` fixed at theta."""
-    robot = Coordinates(hypothesis).robot(theta)
-    fixed = {name: robot.parameters[name] for name in hypothesis.free if name in held}
-    free = tuple(name for name in hypothesis.free if name not in held)
-    return Hypothesis(hypothesis.robot.with_parameters(**fixed), free)
-
-
-def _fit_with_sensor_noise(fit: Fit, experiment: Experiment, report: Callable[[str], None]) -> Fit:
+def _fit_with_sensor_noise(fit: Fit, experiment: Experiment, report: Report) -> Fit:
     """Alternate between all noise and parameters, gates open."""
     for _ in range(ROUNDS + 1):
         report("fitting, noise of sensors and process")

@@ -17,6 +17,7 @@ from fish_train.json_file import number, write_json
 from fish_train.prove.build import make_readings
 from fish_train.prove.competitors import compete
 from fish_train.prove.oracle import Sight, as_experiment, detects, look
+from fish_train.prove.outside import OUTSIDE, known_to_the_plant
 from fish_train.prove.runner import spread
 from fish_train.prove.score import Score, vocabulary
 from fish_train.prove.study import Study, read_json
@@ -51,13 +52,14 @@ def judge(world: World, diagnosis: Mapping[str, Any]) -> dict[str, Any]:
     """The oracle's sight, overlap of degrees of freedom and of time, regime F1 (None where they mean nothing)."""
     experiment = as_experiment(make_readings(world), world.encoder)
     held = diagnosis["fit"]["held_out_trials"]
-    names = [n for n in world.names if n in vocabulary()]
+    names = [n for n in world.names if n in vocabulary() or n in OUTSIDE]
     if not world.names:  # what an oracle that looks for something finds where nothing is
         names = [str(np.random.default_rng(world.seed).choice(candidates()))]
     content: dict[str, Any] = {"sight": None, "dof": None, "overlap": None, "f1": None, "range_f1": None}
     effects = [e for e in diagnosis["effects"] if e["name"] in world.names] or diagnosis["effects"]
     if names and world.plant == "fish_sim" and world.links == 3:
-        looked = look(world, experiment, held, names)
+        with known_to_the_plant():  # an oracle knows what has no name as well
+            looked = look(world, experiment, held, names)
         content["sight"] = asdict(looked.sight)
         shares = dof_shares(looked.nominal, looked.true)
         content["dof"] = dof_overlap(effects[0]["where"]["dof"], shares) if effects else None
@@ -109,8 +111,9 @@ def judged_table(
     seen: Mapping[int, bool],
 ) -> Table:
     """Against the oracle and the truth."""
-    own = [s for s in scores if s.world.seed in seen]
+    own = [s for s in scores if s.truth and s.world.seed in seen]
     clear = [s for s in own if seen[s.world.seed]]
+    nameless = [s for s in scores if s.unnamed and seen.get(s.world.seed)]
     ratio = [
         _rms(s, "with_effects") / sights[s.world.seed].rms_true[HORIZON][0]
         for s in own
@@ -131,6 +134,11 @@ def judged_table(
             "truth in the answered set where the oracle detects",
             "at least 90 %",
             f"{found:.0%} of {len(clear)}",
+        ],
+        [
+            "unexplained where there is no name for what the oracle detects",
+            "at least 85 %",
+            str(Share.of(nameless, lambda s: s.verdict == "unexplained")),
         ],
         [
             "held-out position error at 2 s over that of the true structure fitted, median",

@@ -1,0 +1,65 @@
+"""A cold fit reaches the optimum of the truth where one way from the nominal values ends in a poor one."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from fish_sim.robot import Robot
+from fish_train.diagnose.tail import with_links
+from fish_train.identify import cold
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import Fit, evaluate, settle
+from fish_train.identify.hypothesis import NOMINAL_FREE, Hypothesis, nominal_hypothesis
+from fish_train.identify.synthetic import program, record
+from fish_train.identify.tempering import fit_tempered
+
+
+def swim(links: int, seed: int) -> tuple[Hypothesis, Experiment, Fit]:
+    """A fish up to 25 % away from the nominal one, its nominal hypothesis, two trials of 4 s, the fit from the truth."""
+    random = np.random.default_rng(seed)
+    robot = with_links(Robot(), links)
+    ratios = random.uniform(0.75, 1.25, len(NOMINAL_FREE))
+    ratios[NOMINAL_FREE.index("servo_rate_limit")] = 1.0
+    changed = {name: robot.parameters[name] * ratio for name, ratio in zip(NOMINAL_FREE, ratios, strict=True)}
+    commands = np.stack([program(kind, 4.0, random) for kind in ("sines", "steps")], axis=1)
+    fish = record(robot.with_parameters(**changed), commands, Noise(), random)[0]
+    hypothesis = nominal_hypothesis(robot)
+    return hypothesis, fish, settle(evaluate(hypothesis, np.log(ratios), fish, Noise()), fish)
+
+
+def test_a_tail_of_five_links_is_fitted_as_well_as_from_the_truth() -> None:
+    hypothesis, fish, true = swim(5, 0)
+    assert (
+        fit_tempered(hypothesis, fish, Noise()).objective < true.objective - 100.0
+    )  # what a single start comes to
+    found = cold.fit_multistart(hypothesis, fish, Noise())
+    assert found.objective > true.objective - 3.0
+
+
+def test_the_best_of_all_places_and_hops_goes_on(monkeypatch) -> None:
+    """A landscape with a basin at every half: `lead` falls into the nearest one, the best lies at a given place."""
+    hypothesis, origin = nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")), np.zeros(2)
+    best, begun = np.array([1.0, -0.5]), []
+
+    def lead(_hypothesis, _experiment, _noise, theta, *_stages):
+        begun.append(theta)
+        basin = np.round(2.0 * theta) / 2.0
+        return SimpleNamespace(theta=basin, noise=None, objective=-np.abs(basin - best).sum())
+
+    monkeypatch.setattr(cold, "lead", lead)
+    monkeypatch.setattr(cold, "shorten", lambda experiment, _: experiment)
+    monkeypatch.setattr(cold, "evaluate", lambda _h, theta, *_: theta)
+    monkeypatch.setattr(cold, "close", lambda theta, *_: theta)
+    far = np.array([1.1, -0.4])
+    assert np.array_equal(cold.fit_multistart(hypothesis, None, None, places=(far,)), best)
+    hops = cold.HOPS_PER_LINK * Robot().links
+    assert len(begun) == 2 + cold.STARTS_PER_LINK * Robot().links + hops
+    assert np.array_equal(begun[0], origin) and np.array_equal(begun[1], far)
+    moved = np.abs(np.array(begun[-hops:]) - best)  # all from the best so far
+    assert 0.0 < moved.max() < 5.0 * cold.HOP
+
+
+def test_a_fit_that_has_no_likelihood_is_never_the_better_one() -> None:
+    lost, low = SimpleNamespace(objective=np.nan), SimpleNamespace(objective=-5.0)
+    assert cold.better(lost, low) is low and cold.better(low, lost) is low
