@@ -19,11 +19,8 @@ from fish_train.identify.hypothesis import Coordinates, Hypothesis
 from fish_train.identify.tempering import LEADING, Report, close, fit_tempered, lead
 
 FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
-STARTS_PER_LINK, SPREAD = (
-    2,
-    0.2,
-)  # places around the nominal values; how far: of the logarithms of the nominal parameters
-HOPS_PER_LINK, HOP = 2, 0.1  # from the best optimum so far; how far
+STARTS_PER_LINK, HOPS_PER_LINK = 2, 2  # places around the nominal values; from the best optimum so far
+SPREAD, HOP = 0.2, 0.1  # how far a start and a hop are off: of the logarithms of the nominal parameters
 SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
 
 
@@ -40,11 +37,8 @@ def fit_multistart(
     places: Sequence[Array] = (),
 ) -> Fit:  # fmt: skip
     """`fit_tempered` from the best of the optima that the camera leads to on the first seconds; the same at every call."""
-    coordinates, short, links = (
-        Coordinates(hypothesis),
-        shorten(experiment, FIRST_STEPS),
-        hypothesis.robot.links,
-    )
+    coordinates, links = Coordinates(hypothesis), hypothesis.robot.links
+    short = shorten(experiment, FIRST_STEPS)
     origin, random = coordinates.origin(), np.random.default_rng(0)
 
     def somewhere(count: int) -> Array:
