@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
-from fish_train.identify.cold import fit_cold
+from fish_train.identify.cold import second_look
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import LOG_PRIOR, NOMINAL_FREE, Coordinates, nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.synthetic import KINDS, program, record
+from fish_train.identify.tempering import TAIL_INERTIAS, fit_tempered
 
 Array = NDArray[np.float64]
 
@@ -65,7 +66,10 @@ def repeat(seed: int, trials: int, duration: float) -> Repetition:
     commands = np.stack([program(KINDS[m % len(KINDS)], duration, random) for m in range(trials)], axis=1)
     experiment, _ = record(truth, commands, Noise(wrench=WRENCH), random)
     hypothesis = nominal_hypothesis(Robot())
-    return scored(seed, truth, fit_cold(hypothesis, experiment, usual_noise(experiment)))
+    fit = fit_tempered(
+        hypothesis, experiment, usual_noise(experiment), held=TAIL_INERTIAS
+    )  # as `identify` does
+    return scored(seed, truth, second_look(fit, experiment))
 
 
 def scored(seed: int, truth: Robot, fit: Fit) -> Repetition:

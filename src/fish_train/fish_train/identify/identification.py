@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_train.identify.alignment import Alignment, align, moved_back
 from fish_train.identify.baselines import fit_baselines, predict_baseline
-from fish_train.identify.cold import fit_multistart, second_look
+from fish_train.identify.cold import second_look
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
@@ -33,6 +33,7 @@ from fish_train.identify.prediction import (
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.settle import STRANGE, suitable_noise, worst_row
 from fish_train.identify.structure import Step, choose_effects, step_text
+from fish_train.identify.tempering import TAIL_INERTIAS, fit_tempered
 
 Array = NDArray[np.float64]
 
@@ -110,7 +111,8 @@ def identify(
     hypothesis = nominal_hypothesis(robot, free)
     for name in effects:
         hypothesis = hypothesis.with_effect(name, EFFECT_START)
-    fit = fit_multistart(hypothesis, training, noise, report)
+    # not from many places: of a wrong model's optima the likelihood does not tell which predicts, and this way is measured
+    fit = fit_tempered(hypothesis, training, noise, report=report, held=TAIL_INERTIAS)
     wrong = is_wrong(fit, noise)
     fit = fit_outlook(fit, training, report) if wrong else second_look(fit, training, report)
     steps: tuple[Step, ...] = ()

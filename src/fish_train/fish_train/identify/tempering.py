@@ -29,31 +29,59 @@ LEADING: Stages = (
     (10.0, 15),
 )  # factor of the IMU's noise, iterations: the camera leads
 CLOSING: Stages = ((3.0, 15), (1.0, 15))
+# the tail's: far from the optimum they imitate a wrong phase of its swing
+TAIL_INERTIAS = ("link_inertia_factor", "fin_inertia_factor")
+HELD_AT = (0.0, 0.25, -0.25)  # of theta
 FAR_GAIN = 3.0  # nats; an iteration of a stage that is not the last and gains less is its last
 ROUNDS = 2  # of noise estimation and refits
 
 
 def fit_tempered(
     hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array | None = None,
-    report: Report = lambda _: None,
+    report: Report = lambda _: None, held: tuple[str, ...] = (),
 ) -> Fit:  # fmt: skip
-    """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn."""
+    """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn.
+
+    The parameters `held` are free only when the camera has led the others, with these at several values; the best goes on.
+    """
     report("fitting, the camera leads")
     theta = Coordinates(hypothesis).origin() if theta is None else theta
-    return close(lead(hypothesis, experiment, noise, theta), experiment, noise, report)
+    held = tuple(name for name in held if name in hypothesis.free)
+    places = [_with(hypothesis, theta, held, value) for value in (HELD_AT if held else HELD_AT[:1])]
+    leads = [lead(hypothesis, experiment, noise, place, held=held) for place in places]
+    return close(max(leads, key=lambda fit: fit.objective), experiment, noise, report)
 
 
 def lead(
-    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array, stages: Stages = LEADING
-) -> Fit:
-    """Where stages of falling IMU noise lead from theta, gates open; it ends at what the sensors' noise cannot explain."""
+    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array, stages: Stages = LEADING,
+    held: tuple[str, ...] = (),
+) -> Fit:  # fmt: skip
+    """Where stages of falling IMU noise lead all but `held` from theta, gates open; it ends at what noise cannot explain."""
+    theta = theta.copy()
+    first = [i for i, name in enumerate(hypothesis.free) if name not in held]
+    coarse = _fixing(hypothesis, theta, held) if held else hypothesis
     for factor, iterations in stages:
         wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
-        fit = climb(evaluate(hypothesis, theta, experiment, wide), experiment, iterations, FAR_GAIN)
-        theta = fit.theta
+        fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN)
+        theta[first] = fit.theta
         if worst_row(fit) > STRANGE:
             break
-    return fit
+    return evaluate(hypothesis, theta, experiment, wide) if held else fit
+
+
+def _with(hypothesis: Hypothesis, theta: Array, names: tuple[str, ...], value: float) -> Array:
+    """Theta with some of its entries moved by `value`."""
+    moved = theta.copy()
+    moved[[hypothesis.free.index(name) for name in names]] += value
+    return moved
+
+
+def _fixing(hypothesis: Hypothesis, theta: Array, held: tuple[str, ...]) -> Hypothesis:
+    """The hypothesis with the parameters `held` fixed at theta."""
+    robot = Coordinates(hypothesis).robot(theta)
+    fixed = {name: robot.parameters[name] for name in hypothesis.free if name in held}
+    free = tuple(name for name in hypothesis.free if name not in held)
+    return Hypothesis(hypothesis.robot.with_parameters(**fixed), free)
 
 
 def close(fit: Fit, experiment: Experiment, noise: Noise, report: Report = lambda _: None) -> Fit:
