@@ -42,14 +42,15 @@ def fit_tempered(
 ) -> Fit:  # fmt: skip
     """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn.
 
-    The parameters `held` are free only when the camera has led the others, with these at several values; the best goes on.
+    The parameters `held` are free only at the IMU's full weight; before, the camera leads the others with these at several
+    values, and the best goes on.
     """
     report("fitting, the camera leads")
     theta = Coordinates(hypothesis).origin() if theta is None else theta
     held = tuple(name for name in held if name in hypothesis.free)
     places = [_with(hypothesis, theta, held, value) for value in (HELD_AT if held else HELD_AT[:1])]
     leads = [lead(hypothesis, experiment, noise, place, held=held) for place in places]
-    return close(max(leads, key=lambda fit: fit.objective), experiment, noise, report)
+    return close(max(leads, key=lambda fit: fit.objective), experiment, noise, report, held)
 
 
 def lead(
@@ -84,7 +85,13 @@ def _fixing(hypothesis: Hypothesis, theta: Array, held: tuple[str, ...]) -> Hypo
     return Hypothesis(hypothesis.robot.with_parameters(**fixed), free)
 
 
-def close(fit: Fit, experiment: Experiment, noise: Noise, report: Report = lambda _: None) -> Fit:
+def close(
+    fit: Fit,
+    experiment: Experiment,
+    noise: Noise,
+    report: Report = lambda _: None,
+    held: tuple[str, ...] = (),
+) -> Fit:
     """From where the camera led to the IMU's full weight, then process noise and parameters in turn.
 
     Where a stage leaves innovations that the sensors' noise cannot explain, that noise is estimated as well. The last steps
@@ -93,7 +100,7 @@ def close(fit: Fit, experiment: Experiment, noise: Noise, report: Report = lambd
     hypothesis = fit.hypothesis
     if worst_row(fit) <= STRANGE:
         report("fitting, the IMU is believed more and more")
-        fit = lead(hypothesis, experiment, noise, fit.theta, CLOSING)
+        fit = lead(hypothesis, experiment, noise, fit.theta, CLOSING, held)
     if worst_row(fit) > STRANGE:
         return _fit_with_sensor_noise(fit, experiment, report)
     fit = climb(evaluate(hypothesis, fit.theta, experiment, noise), experiment, CLOSING[-1][1])
