@@ -42,7 +42,7 @@ def fit_multistart(
     origin, random = coordinates.origin(), np.random.default_rng(0)
 
     def somewhere(count: int) -> Array:
-        return np.where(coordinates.is_log, 1.0, 0.0) * random.normal(size=(count, len(origin)))
+        return coordinates.is_log * random.normal(size=(count, len(origin)))
 
     report("fitting, the camera leads from many places")
     starts = [origin, *places, *(origin + SPREAD * somewhere(STARTS_PER_LINK * links))]

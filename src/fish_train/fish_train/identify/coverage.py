@@ -66,9 +66,8 @@ def repeat(seed: int, trials: int, duration: float) -> Repetition:
     commands = np.stack([program(KINDS[m % len(KINDS)], duration, random) for m in range(trials)], axis=1)
     experiment, _ = record(truth, commands, Noise(wrench=WRENCH), random)
     hypothesis = nominal_hypothesis(Robot())
-    fit = fit_tempered(
-        hypothesis, experiment, usual_noise(experiment), held=TAIL_INERTIAS
-    )  # as `identify` does
+    # as `identify` does
+    fit = fit_tempered(hypothesis, experiment, usual_noise(experiment), held=TAIL_INERTIAS)
     return scored(seed, truth, second_look(fit, experiment))
 
 

@@ -23,11 +23,8 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 Stages = tuple[tuple[float, int], ...]
 
-LEADING: Stages = (
-    (100.0, 25),
-    (30.0, 25),
-    (10.0, 15),
-)  # factor of the IMU's noise, iterations: the camera leads
+# factor of the IMU's noise, iterations: first the camera leads
+LEADING: Stages = ((100.0, 25), (30.0, 25), (10.0, 15))
 CLOSING: Stages = ((3.0, 15), (1.0, 15))
 # the tail's: far from the optimum they imitate a wrong phase of its swing
 TAIL_INERTIAS = ("link_inertia_factor", "fin_inertia_factor")
@@ -48,7 +45,7 @@ def fit_tempered(
     report("fitting, the camera leads")
     theta = Coordinates(hypothesis).origin() if theta is None else theta
     held = tuple(name for name in held if name in hypothesis.free)
-    places = [_with(hypothesis, theta, held, value) for value in (HELD_AT if held else HELD_AT[:1])]
+    places = [_with(hypothesis, theta, held, value) for value in (HELD_AT if held else (0.0,))]
     leads = [lead(hypothesis, experiment, noise, place, held=held) for place in places]
     return close(max(leads, key=lambda fit: fit.objective), experiment, noise, report, held)
 
