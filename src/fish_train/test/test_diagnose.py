@@ -20,7 +20,7 @@ from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.law import Description
 from fish_train.diagnose.locate import dof_shares
-from fish_train.diagnose.split import split_trials
+from fish_train.diagnose.split import Trials, split_trials, trials_of
 from fish_train.diagnose.tail import with_links
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
 from fish_train.identify.filter_types import Noise
@@ -91,8 +91,9 @@ def test_a_finer_tail_must_gain_on_unseen_trials_but_not_what_the_truth_would(
     monkeypatch.setattr(tail, "shorten", lambda *_: None)
     monkeypatch.setattr(tail, "finer_tails", lambda *_: [finer])
     monkeypatch.setattr(tail, "evidence", lambda fit: fit.objective)
-    monkeypatch.setattr(tail, "gain_elsewhere", lambda *_: (gain, 1000.0))
-    found = tail.finer_tail(nominal, nominal, None, None, "unseen", Level(), lambda _: None)
+    monkeypatch.setattr(tail, "on_all", lambda fit, _: fit)
+    monkeypatch.setattr(tail, "gain_unseen", lambda *_: (gain, 1000.0))
+    found = tail.finer_tail(nominal, nominal, None, Trials(None, None, (0,)), Level(), lambda _: None)
     assert found is (finer if accepted else None)
 
 
@@ -183,8 +184,28 @@ def test_finer_tails_are_tried_where_much_is_left_or_follows_a_law(monkeypatch, 
     monkeypatch.setattr(tail, "describe", lambda *_: Description({"yaw": gain}, {}, 1e4))
     monkeypatch.setattr(tail, "shorten", lambda *_: None)
     monkeypatch.setattr(tail, "finer_tails", lambda *_: calls.append(1) or [])
-    assert tail.finer_tail(None, None, None, None, None, Level(), lambda _: None) is None
+    assert tail.finer_tail(None, None, None, Trials(None, None, ()), Level(), lambda _: None) is None
     assert len(calls) == tried
+
+
+@pytest.mark.parametrize(("reached", "tried"), [({4: 5.0, 5: 9.0}, [4, 5]), ({4: -5.0, 5: 9.0}, [4])])
+def test_another_link_is_tried_only_where_the_one_before_gained(monkeypatch, reached, tried):
+    fit = SimpleNamespace(hypothesis=None, theta=None, noise=None)
+    calls = []
+
+    def cold_fit(links, *_args, **_keywords):
+        calls.append(links)
+        return SimpleNamespace(hypothesis=None, theta=None, noise=None, objective=reached[links])
+
+    monkeypatch.setattr(tail, "log_posterior", lambda *_: 0.0)
+    monkeypatch.setattr(tail, "usual_noise", lambda _: None)
+    monkeypatch.setattr(tail, "with_links", lambda _, links: links)
+    monkeypatch.setattr(tail, "nominal_hypothesis", lambda links: links)
+    monkeypatch.setattr(tail, "fit_cold", cold_fit)
+    monkeypatch.setattr(tail, "evaluate", lambda *_: None)
+    monkeypatch.setattr(tail, "settle", lambda *_: "settled")
+    found = tail.finer_tails(Robot(), fit, fit, None, None, lambda _: None)
+    assert calls == tried and len(found) == sum(gain > 0.0 for gain in list(reached.values())[: len(tried)])
 
 
 def test_what_the_data_cannot_say_is_said():
@@ -213,6 +234,14 @@ def test_held_out_trials_take_no_part():
     assert {*split.search, *split.check} == set(split.training)
     assert set(split.search).isdisjoint(split.check)
     assert sorted((*split.training, *split.held_out)) == list(range(7))
+
+
+def test_a_search_sees_the_training_trials_and_knows_which_of_them_it_has_not_fitted():
+    fish = swim(Robot(), kinds=("sines",) * 9, duration=1.0)
+    split = split_trials(fish)
+    trials = trials_of(fish, split)
+    assert [trials.training.names[i] for i in trials.check] == [fish.names[i] for i in split.check]
+    assert {*trials.searched.names}.isdisjoint(trials.training.names[i] for i in trials.check)
 
 
 def test_the_level_is_checked_and_probabilities_add_up():

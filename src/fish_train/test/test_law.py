@@ -6,7 +6,8 @@ import pytest
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_train.diagnose.free_force import TERMS, known_to_the_filter
-from fish_train.diagnose.law import Quadratic, describe, forward
+from fish_train.diagnose.law import describe, forward
+from fish_train.diagnose.quadratic import Quadratic
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis

@@ -176,6 +176,12 @@ def test_the_tool_s_version_is_that_of_its_texts(monkeypatch: pytest.MonkeyPatch
     assert tool_digest() != whole
 
 
+def test_a_tool_is_the_same_after_a_word_about_it_and_another_after_a_number():
+    before = tool_version.code('"""Steps."""\n\nSTEP = 0.1  # s\n\n\ndef f():\n    """Twice."""\n')
+    assert tool_version.code('STEP = (\n    0.1\n)\ndef f():\n    """Thrice."""\n') == before
+    assert tool_version.code("STEP = 0.2\ndef f(): pass\n") != before
+
+
 def comes_true(condition: Callable[[], object], patience: float = 60.0) -> bool:
     end = time.monotonic() + patience
     while not condition() and time.monotonic() < end:

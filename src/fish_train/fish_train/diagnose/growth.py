@@ -4,33 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from fish_train.diagnose.base import anneal, refine
+from fish_train.diagnose.base import anneal, refine, settle_base
 from fish_train.diagnose.decide import SMALLEST_CHECK, SMALLEST_Z, Level, parameter_count, strength_z
 from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.search import Progress, Round, evidence, look_alike, settled_round
+from fish_train.diagnose.split import Trials
+from fish_train.diagnose.unseen import gain_left_out, gain_unseen, on_all
 from fish_train.identify.experiment import Experiment
-from fish_train.identify.fit import Fit, evaluate, trial_likelihoods
-from fish_train.identify.settle import open_gates
+from fish_train.identify.fit import Fit, evaluate
 
 MOST_EFFECTS = 3
 FAIR_SHARE = 0.5  # of the gain that a true effect shows on trials not fitted to: half-way to it
 
 
 def grow(
-    base: Fit, experiment: Experiment, check: Experiment | None, competing: Sequence[str], level: Level,
-    progress: Progress,
+    base: Fit, trials: Trials, competing: Sequence[str], level: Level, progress: Progress
 ) -> tuple[Fit, list[Round], list[Accepted]]:  # fmt: skip
     """Add one effect at a time while one is significant."""
     rounds: list[Round] = []
     accepted: list[Accepted] = []
+    experiment = trials.searched
     while len(accepted) < min(MOST_EFFECTS, len(competing)):
         names = [n for n in competing if n not in base.hypothesis.names]
         samples = float(base.result.samples.sum())
         found = settled_round(base, names, experiment, level.enough(samples, 1, len(names)), progress)
         rounds.append(found)
-        name = choose(found, check, len(names), level)
+        name = choose(found, trials, len(names), level)
         if name is None:
             break
         accepted.append(Accepted(name, found))
@@ -39,15 +38,12 @@ def grow(
     return base, rounds, accepted
 
 
-def choose(found: Round, check: Experiment | None, tried: int, level: Level) -> str | None:
+def choose(found: Round, trials: Trials, tried: int, level: Level) -> str | None:
     """The name to add: most evidence among the significant ones, the simplest of those that are as good."""
     samples = float(found.base.result.samples.sum())
-    good = [
-        name
-        for name, fit in found.refitted.items()
-        if is_significant(fit, found.gain(name), name, samples, tried, level)
-        and (check is None or holds_elsewhere(found.base, fit, check))
-    ]
+    good = significant(found, samples, tried, level)
+    base = on_all(found.base, trials.training) if good else found.base
+    good = [name for name in good if holds_elsewhere(base, found.refitted[name], trials, tried, level)]
     if not good:
         return None
     best = max(good, key=lambda name: evidence(found.refitted[name]))
@@ -59,29 +55,27 @@ def choose(found: Round, check: Experiment | None, tried: int, level: Level) -> 
     return best
 
 
-def is_significant(fit: Fit, gain: float, name: str, samples: float, tried: int, level: Level) -> bool:
-    """Enough gain, and a strength that differs from neutral."""
-    enough = level.enough(samples, parameter_count(name), tried)
-    return gain > enough and strength_z(fit, name) > SMALLEST_Z
+def significant(found: Round, samples: float, tried: int, level: Level) -> list[str]:
+    """Refitted names with enough gain, and a strength that differs from neutral."""
+    return [
+        name
+        for name, fit in found.refitted.items()
+        if found.gain(name) > level.enough(samples, parameter_count(name), tried)
+        and strength_z(fit, name) > SMALLEST_Z
+    ]
 
 
-def holds_elsewhere(base: Fit, fit: Fit, check: Experiment) -> bool:
-    """On trials that it was not fitted to, a fit must gain a fair share of what it would gain there if it were true."""
-    gain, expected = gain_elsewhere(base, fit, check)
-    return gain > max(FAIR_SHARE * expected, SMALLEST_CHECK)
+def holds_elsewhere(base: Fit, fit: Fit, trials: Trials, tried: int, level: Level) -> bool:
+    """Whether a fit foretells trials that it was not fitted to, better than the base on all trials does.
 
-
-def gain_elsewhere(base: Fit, fit: Fit, check: Experiment) -> tuple[float, float]:
-    """Nats that a fit gains over the base on trials that neither was fitted to, and those that it would if it were true.
-
-    With r the whitened innovations of the fit, white if it is true, and r + d those of the base under the same noise, the gain
-    sum((r + d)^2 - r^2) / 2 is sum(d^2) / 2 in the mean: much where the effect acts, little on trials that do not excite it.
+    A fair share of what it would gain on the check if it were true; where the check is too calm for that, enough on every
+    training trial in turn.
     """
-    noise = open_gates(fit.noise)
-    here = trial_likelihoods(fit.hypothesis, fit.theta, check, noise)
-    there = trial_likelihoods(base.hypothesis, base.theta, check, noise)
-    gain = float(here.log_likelihood.sum() - there.log_likelihood.sum())
-    return gain, 0.5 * float(np.nansum((here.whitened - there.whitened) ** 2))
+    everywhere = on_all(fit, trials.training)
+    gain, expected = gain_unseen(base, everywhere, trials.check)
+    if expected < SMALLEST_CHECK:
+        return gain_left_out(base, everywhere) > level.enough_unseen(float(base.result.samples.sum()), tried)
+    return gain > max(FAIR_SHARE * expected, SMALLEST_CHECK)
 
 
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:
@@ -98,7 +92,7 @@ def prune(
     """Take effects out again that the others have made superfluous."""
     for candidate in list(accepted)[:-1] if len(accepted) > 1 else []:
         progress(f"without {candidate.name}?")
-        fit = refine(switched_off(final, candidate.name, training), training)
+        fit = settle_base(switched_off(final, candidate.name, training), training)
         samples = float(final.result.samples.sum())
         if final.objective - fit.objective < level.enough(samples, parameter_count(candidate.name), 1):
             final, accepted = fit, [a for a in accepted if a is not candidate]

@@ -16,6 +16,7 @@ import numpy as np
 from fish_train.diagnose.decide import Level
 from fish_train.diagnose.free_force import TERMS, known_to_the_filter
 from fish_train.diagnose.locate import DOFS
+from fish_train.diagnose.quadratic import Quadratic, quadratic
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Array
 from fish_train.identify.fit import Fit, evaluate
@@ -24,7 +25,6 @@ from fish_train.identify.hypothesis import Coordinates
 MOST_TERMS = 4  # of a law
 # nats that a term must gain where it is chosen: twice that is beyond chi square of one parameter in 1e-5, for 90 terms in 1e-3
 SMALLEST_TERM = 10.0
-RIDGE = 1e-9  # of the diagonal: a rudder that stands still makes terms that nothing tells apart
 
 
 @dataclass(frozen=True)
@@ -43,27 +43,6 @@ class Description:
         )
 
 
-@dataclass(frozen=True)
-class Quadratic:
-    """Cost g'd + d'N d / 2 of a step d of all parameters (K,), the first `fitted` of them always free."""
-
-    gradient: Array  # (K,)
-    normal: Array  # (K, K)
-    fitted: int
-
-    def best_step(self, chosen: Sequence[int]) -> Array:
-        """The step (K,) of least cost that moves the fitted parameters and those `chosen`."""
-        kept = [*range(self.fitted), *chosen]
-        step = np.zeros(len(self.gradient))
-        normal = self.normal[np.ix_(kept, kept)]
-        step[kept] = -np.linalg.solve(normal + RIDGE * np.diag(np.diag(normal)), self.gradient[kept])
-        return step
-
-    def cost(self, step: Array) -> float:
-        """Nats that a step loses."""
-        return float(self.gradient @ step + 0.5 * step @ self.normal @ step)
-
-
 def describe(fit: Fit, experiment: Experiment) -> Description:
     """The law of at most MOST_TERMS terms per degree of freedom that a fit leaves on the trials it was fitted to."""
     with known_to_the_filter() as name:
@@ -80,14 +59,6 @@ def describe(fit: Fit, experiment: Experiment) -> Description:
         terms[dof] = {TERMS[j - first]: float(step[j]) for j in chosen}
         gains[dof] = cross_validated(result.gradient, result.normal, fit.theta, prior, offered)
     return Description(gains, terms, float(fit.result.samples.sum()))
-
-
-def quadratic(gradients: Array, normals: Array, theta: Array, prior: Array) -> Quadratic:
-    """The cost of some trials (M, K), (M, K, K) and of the prior of the fitted parameters theta."""
-    gradient, normal, fitted = gradients.sum(0), normals.sum(0), len(theta)
-    gradient[:fitted] += theta / prior**2
-    normal[range(fitted), range(fitted)] += 1.0 / prior**2
-    return Quadratic(gradient, normal, fitted)
 
 
 def forward(cost: Quadratic, offered: Sequence[int]) -> list[int]:

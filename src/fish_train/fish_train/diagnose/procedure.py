@@ -16,7 +16,7 @@ from fish_train.diagnose.law import describe
 from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.diagnose.own_force import has_own_force, own_force
 from fish_train.diagnose.search import Progress
-from fish_train.diagnose.split import split_trials
+from fish_train.diagnose.split import split_trials, trials_of
 from fish_train.diagnose.tail import finer_tail
 from fish_train.diagnose.verdict import much_is_left, named
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
@@ -46,16 +46,15 @@ def diagnose(
     names = known(names or candidates())
     unreachable = {name: reasons[name] for name in names if name in reasons}
     names = tuple(name for name in names if name not in reasons)
-    searched = experiment.select(split.search)
-    check = experiment.select(split.check) if split.check else None
+    trials = trials_of(experiment, split)
     progress("fitting the nominal model")
-    base = fit_base(robot, searched)
-    base, rounds, accepted = grow(base, searched, check, names, level, progress)
-    finer = finer_tail(rounds[0].base, base, robot, searched, check, level, progress)
+    base = fit_base(robot, trials.searched)
+    base, rounds, accepted = grow(base, trials, names, level, progress)
+    finer = finer_tail(rounds[0].base, base, robot, trials, level, progress)
     if finer is not None:
-        base, rounds, accepted = grow(finer, searched, check, names, level, progress)
+        base, rounds, accepted = grow(finer, trials, names, level, progress)
     progress("fitting all training trials")
-    training = experiment.select(split.training)
+    training = trials.training
     nominal, final = final_fits(base, rounds, training)
     final, accepted = prune(final, accepted, training, level, progress)
     progress("locating the missing force")

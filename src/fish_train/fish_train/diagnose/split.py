@@ -18,7 +18,22 @@ class Split:
     training: tuple[int, ...]
     held_out: tuple[int, ...]
     search: tuple[int, ...]  # part of training: names are ranked and fitted on these
-    check: tuple[int, ...]  # the rest of training: a name must help here as well, without being fitted again
+    check: tuple[int, ...]  # the rest of training: what the search fitted must foretell these
+
+
+@dataclass(frozen=True)
+class Trials:
+    """The trials of a search."""
+
+    training: Experiment
+    searched: Experiment  # part of them
+    check: tuple[int, ...]  # positions among training of those that are not searched
+
+
+def trials_of(experiment: Experiment, split: Split) -> Trials:
+    """What a search sees of an experiment."""
+    check = tuple(split.training.index(i) for i in split.check)
+    return Trials(experiment.select(split.training), experiment.select(split.search), check)
 
 
 def split_trials(experiment: Experiment) -> Split:

@@ -1,14 +1,15 @@
 """A cold fit that is not content with a poor optimum: no single way leads to the best one from everywhere.
 
 How heavy the tail is and how the water holds it have many optima, the more the more links it has. Where the camera leads
-they lie close together, so that many short ways to there (multistart, then basin hopping: Wales and Doye 1997) cost less
-than one way to the end; the best goes on.
+they lie close together, so that many short ways to there (multistart, then basin hopping: Wales and Doye 1997; as many of
+each as there are pairs of links) cost less than one way to the end; the best goes on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import reduce
+from math import comb
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from fish_train.identify.hypothesis import Coordinates, Hypothesis
 from fish_train.identify.tempering import LEADING, Report, close, fit_tempered, lead
 
 FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
-STARTS_PER_LINK, HOPS_PER_LINK = 2, 2  # places around the nominal values; from the best optimum so far
 SPREAD, HOP = 0.2, 0.1  # how far a start and a hop are off: of the logarithms of the nominal parameters
 SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
 
@@ -37,7 +37,7 @@ def fit_multistart(
     places: Sequence[Array] = (),
 ) -> Fit:  # fmt: skip
     """`fit_tempered` from the best of the optima that the camera leads to on the first seconds; the same at every call."""
-    coordinates, links = Coordinates(hypothesis), hypothesis.robot.links
+    coordinates, pairs = Coordinates(hypothesis), comb(hypothesis.robot.links, 2)
     short = shorten(experiment, FIRST_STEPS)
     origin, random = coordinates.origin(), np.random.default_rng(0)
 
@@ -45,9 +45,9 @@ def fit_multistart(
         return coordinates.is_log * random.normal(size=(count, len(origin)))
 
     report("fitting, the camera leads from many places")
-    starts = [origin, *places, *(origin + SPREAD * somewhere(STARTS_PER_LINK * links))]
+    starts = [origin, *places, *(origin + SPREAD * somewhere(pairs))]
     best = reduce(better, (lead(hypothesis, short, noise, start) for start in starts))
-    for step in somewhere(HOPS_PER_LINK * links):
+    for step in somewhere(pairs):
         best = better(best, lead(hypothesis, short, noise, best.theta + HOP * step, LEADING[1:]))
     return close(evaluate(hypothesis, best.theta, experiment, best.noise), experiment, noise, report)
 

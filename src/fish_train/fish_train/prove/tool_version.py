@@ -1,7 +1,8 @@
-"""Which tool a study examines: a digest of the text that an answer depends on, so that no table mixes two of them."""
+"""Which tool a study examines: a digest of the code that an answer depends on, so that no table mixes two of them."""
 
 from __future__ import annotations
 
+import ast
 import hashlib
 from collections.abc import Iterable
 from importlib.resources import files
@@ -17,7 +18,7 @@ KINDS = (".py", ".c", ".h")
 
 
 def tool_digest() -> str:
-    """The first 16 digits of the SHA-256 of simulator, identification, diagnosis and reader, names and texts."""
+    """The first 16 digits of the SHA-256 of simulator, identification, diagnosis and reader: file names and code."""
     digest = hashlib.sha256()
     for package, folder in PARTS:
         root = files(package)
@@ -26,9 +27,21 @@ def tool_digest() -> str:
     return digest.hexdigest()[:16]
 
 
+def code(text: str) -> str:
+    """Python without comments, docstrings and layout, of which no answer depends on any."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            first = node.body[0] if node.body else None
+            if isinstance(first, ast.Expr) and isinstance(getattr(first.value, "value", None), str):
+                node.body = node.body[1:] or [ast.Pass()]
+    return ast.unparse(tree)
+
+
 def _texts(folder: Traversable, under: str = "") -> Iterable[tuple[str, str]]:
     for entry in folder.iterdir():
         if entry.is_dir():
             yield from _texts(entry, f"{under}{entry.name}/")
         elif entry.name.endswith(KINDS):
-            yield under + entry.name, entry.read_text(encoding="utf-8")
+            text = entry.read_text(encoding="utf-8")
+            yield under + entry.name, code(text) if entry.name.endswith(".py") else text

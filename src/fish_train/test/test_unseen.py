@@ -1,0 +1,101 @@
+"""What a fit gains on unseen trials: exact where all is linear, and it tells what it knows from what it had to leave open."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from fish_sim.robot import Robot
+from fish_train.diagnose import unseen
+from fish_train.diagnose.decide import SMALLEST_CHECK, Level
+from fish_train.diagnose.growth import holds_elsewhere
+from fish_train.diagnose.split import Trials
+from fish_train.diagnose.unseen import gain_left_out, gain_unseen, on_all, predicted
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import evaluate, settle
+from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
+from fish_train.identify.synthetic import program, record
+
+PRIOR = np.array([0.5, 4.0])
+
+
+@pytest.fixture(autouse=True)
+def linear(monkeypatch):
+    """Fits without a robot have the prior above."""
+    real = unseen.Coordinates
+    prior = SimpleNamespace(prior=PRIOR)
+    monkeypatch.setattr(unseen, "Coordinates", lambda hypothesis: real(hypothesis) if hypothesis else prior)
+
+
+def regression(x, y, used=(0, 1)):
+    """The fit of y = x theta + unit noise at its optimum; a parameter that is not used stays 0. x: (trials, samples, 2)."""
+    x = x * np.isin((0, 1), used)
+    theta = np.linalg.solve(np.einsum("tsi,tsj->ij", x, x) + np.diag(PRIOR**-2), np.einsum("tsi,ts->i", x, y))
+    left = y - x @ theta
+    return SimpleNamespace(
+        hypothesis=None,
+        theta=theta,
+        log_likelihood=-0.5 * np.sum(left**2 + np.log(2 * np.pi), axis=1),
+        result=SimpleNamespace(
+            gradient=-np.einsum("ts,tsi->ti", left, x),
+            normal=np.einsum("tsi,tsj->tij", x, x),
+            whitened=left.T[..., None],
+        ),
+    )
+
+
+def exact(x, y, held):
+    """log p(y of the trials held | y of the others) of jointly Gaussian measurements."""
+    others = [i for i in range(len(x)) if i not in held]
+
+    def log_p(trials):
+        rows = x[trials].reshape(-1, 2)
+        covariance = rows @ np.diag(PRIOR**2) @ rows.T + np.eye(len(rows))
+        return multivariate_normal.logpdf(y[trials].ravel(), cov=covariance)
+
+    return log_p([*others, *held]) - log_p(others)
+
+
+@pytest.mark.parametrize("held", [[0], [1, 3]])
+def test_it_is_the_predictive_density_where_all_is_linear(held):
+    random = np.random.default_rng(1)
+    x = random.standard_normal((4, 10, 2))
+    y = x @ np.array([0.3, -2.0]) + random.standard_normal((4, 10))
+    assert predicted(regression(x, y), held) == pytest.approx(exact(x, y, held), abs=1e-6)
+
+
+def test_a_fit_is_not_blamed_for_what_only_the_unseen_trials_tell_but_for_what_they_contradict():
+    random = np.random.default_rng(2)
+    x, noise = random.standard_normal((4, 30, 2)), random.standard_normal((4, 30))
+    x[:3, :, 1] = 0.0  # only the last trial tells the second parameter
+    y = x @ np.array([0.3, 2.0]) + noise
+    gain, expected = gain_unseen(regression(x, y, (0,)), regression(x, y), [3])
+    assert gain > 0.5 * expected > 10.0
+    x = random.standard_normal((4, 30, 2))
+    y = x @ np.array([0.3, 2.0]) + noise
+    y[3] = x[3] @ np.array([0.3, -2.0]) + noise[3]  # the others tell it, and wrong
+    assert gain_unseen(regression(x, y, (0,)), regression(x, y), [3])[0] < -10.0
+
+
+def swum(robot: Robot, kinds: tuple[str, ...]):
+    random = np.random.default_rng(3)
+    commands = np.stack([program(kind, 5.0, random) for kind in kinds], axis=1)
+    return record(robot, commands, Noise(), random)[0]
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_check_too_calm_to_tell_passes_the_question_on_to_every_trial_in_turn(there):
+    """The rudder lags; straight trials say nothing of that."""
+    lagging = Robot().with_effect("rudder_lag", time_constant=0.005)
+    training = swum(lagging if there else Robot(), ("sines", "steps", "random", "straight", "straight"))
+    searched, trials = training.select([0, 1, 2]), Trials(training, training.select([0, 1, 2]), (3, 4))
+    nominal = nominal_hypothesis(Robot())
+    hypothesis = nominal.with_effect("rudder_lag", 0.3)
+    start = Coordinates(hypothesis).origin()
+    refitted = settle(evaluate(nominal, start[: len(nominal.free)], searched, Noise()), searched)
+    base, fit = on_all(refitted, training), settle(evaluate(hypothesis, start, searched, Noise()), searched)
+    gain, expected = gain_unseen(base, on_all(fit, training), trials.check)
+    assert max(gain, expected) < SMALLEST_CHECK
+    assert (gain_left_out(base, on_all(fit, training)) > 30.0) is there
+    assert holds_elsewhere(base, fit, trials, 30, Level()) is there
