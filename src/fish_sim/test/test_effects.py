@@ -78,9 +78,13 @@ def test_wall_effect_is_drag_times_1_plus_k_exp_of_distance():
 
 def test_dry_friction_has_one_size_in_every_direction():
     for u, v in ((0.1, 0.0), (0.0, -0.3), (-0.2, 0.2)):
-        X, Y, N = wrench("dry_friction", head(u=u, v=v), force=0.02)
+        X, Y, N = wrench("dry_friction", head(u=u, v=v), force=0.02, moment=0.001)
         assert np.hypot(X, Y) == pytest.approx(0.02, rel=1e-6) and N == 0.0
         assert X * u + Y * v == pytest.approx(-0.02 * np.hypot(u, v), rel=1e-6)
+    for w in (0.5, -3.0):
+        assert wrench("dry_friction", head(w=w), moment=0.001) == pytest.approx(
+            [0.0, 0.0, -1e-3 * np.sign(w)]
+        )
     assert not wrench("dry_friction", head()).any()
 
 

@@ -10,7 +10,7 @@ from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "linear expansion and first stream-function modes of a basin; strengths are an assumption"
-LONG, WIDE = (1, 2, 3), (1, 2)  # half waves along and across the pool
+LONG, WIDE = (1, 2, 3, 4), (1, 2, 3)  # half waves along and across the pool
 MODES = tuple(product(LONG, WIDE))
 
 
@@ -19,11 +19,11 @@ def _gyre(strength: float) -> Parameter:
 
 
 class NonuniformCurrent(Effect):
-    """Incompressible flow: the linear expansion about the pool's centre plus six gyres that close at the walls.
+    """Incompressible flow: the linear expansion about the pool's centre plus twelve gyres that close at the walls.
 
         V_x = mean_x +  strain x + shear_x y + sum_mn gyre_mn sin(m pi a) cos(n pi b)
         V_y = mean_y + shear_y x -  strain y - sum_mn gyre_mn (m W / n L) cos(m pi a) sin(n pi b)
-        a = x / L + 1/2,   b = y / W + 1/2,   m = 1, 2, 3,   n = 1, 2
+        a = x / L + 1/2,   b = y / W + 1/2,   m = 1 .. 4,   n = 1 .. 3
 
     L, W: length and width of the pool. Every part is divergence-free; gyre_mn is the highest speed along the pool of a pattern of
     m by n eddies (stream function (W / n pi) gyre_mn sin(m pi a) sin(n pi b)); gyre_11 > 0 turns counter-clockwise.

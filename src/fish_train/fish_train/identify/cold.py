@@ -17,7 +17,7 @@ from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Array, Noise
 from fish_train.identify.fit import Fit, evaluate, settle
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
-from fish_train.identify.tempering import LEADING, Report, close, fit_tempered, lead
+from fish_train.identify.tempering import LEADING, TAIL_INERTIAS, Report, close, fit_tempered, lead
 
 FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
 SPREAD, HOP = 0.2, 0.1  # how far a start and a hop are off: of the logarithms of the nominal parameters
@@ -28,8 +28,15 @@ def fit_cold(
     hypothesis: Hypothesis, experiment: Experiment, noise: Noise, report: Report = lambda _: None,
     places: Sequence[Array] = (),
 ) -> Fit:  # fmt: skip
-    """The best of many optima; a fit that leaves much is looked at again. places: (K,) theta to begin at besides."""
-    return second_look(fit_multistart(hypothesis, experiment, noise, report, places), experiment, report)
+    """The best of many optima; a fit that leaves much is looked at again. places: (K,) theta to begin at besides.
+
+    Where much is missing, optima where the camera leads tell little of those at the IMU's full weight: there another way
+    competes, the tail's inertias held at several values until then. Either has ended thousands of nats below the other.
+    """
+    fit = second_look(fit_multistart(hypothesis, experiment, noise, report, places), experiment, report)
+    if excess(fit).max() < SUSPICIOUS:
+        return fit
+    return better(fit, fit_tempered(hypothesis, experiment, noise, report=report, held=TAIL_INERTIAS))
 
 
 def fit_multistart(

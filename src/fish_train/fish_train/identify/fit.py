@@ -135,6 +135,11 @@ def likelihood(fit: Fit, experiment: Experiment, noise: Noise) -> float:
     return total if np.isfinite(total) else -np.inf
 
 
+def _stronger(noise: Noise, factor: float) -> Noise:
+    x, y, n = noise.wrench
+    return replace(noise, wrench=(factor * x, factor * y, factor * n))
+
+
 def _wrench(index: int) -> NoiseMove:
     def change(noise: Noise, factor: float) -> Noise:
         x, y, n = (w * (factor if i == index else 1.0) for i, w in enumerate(noise.wrench))
@@ -152,6 +157,10 @@ def _field(name: str) -> NoiseMove:
 
 SHORTEST_WRENCH, LONGEST_WRENCH = 0.02, 5.0  # s; a step of the filter is 0.01 s
 JUMPS = (0.25, 4.0)  # of the wrench's standard deviations
+LADDER, TIMES = (
+    (4.0, 16.0, 64.0),
+    (0.2, 2.0),
+)  # times usual water's, and s: a missing force is strong, and fast or slow
 NOISE_MOVES = (*(_wrench(i) for i in range(3)), _field("wrench_time"))
 SENSOR_MOVES = tuple(map(_field, ("gyro", "accel", "camera_position", "camera_heading")))
 
@@ -181,8 +190,8 @@ def adapt_noise(
     starts = [old]
     if not near:
         starts += [usual, replace(old, wrench=usual.wrench, wrench_time=usual.wrench_time)]
-        x, y, n = old.wrench
-        starts += [replace(old, wrench=(f * x, f * y, f * n)) for f in JUMPS]
+        starts += [_stronger(old, f) for f in JUMPS]
+        starts += [replace(_stronger(usual, f), wrench_time=t) for f in LADDER for t in TIMES]
     noise, best = max(((n, likelihood(fit, experiment, n)) for n in starts), key=lambda found: found[1])
     for _ in range(rounds):
         for change in moves:

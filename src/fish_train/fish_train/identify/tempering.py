@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import NOISE_MOVES, SENSOR_MOVES, Fit, adapt_noise, climb, evaluate
+from fish_train.identify.fit import (
+    NOISE_MOVES,
+    SENSOR_MOVES,
+    Fit,
+    adapt_noise,
+    climb,
+    evaluate,
+    log_posterior,
+)
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 from fish_train.identify.settle import STRANGE, open_gates, worst_row
 
@@ -91,15 +99,15 @@ def close(
 ) -> Fit:
     """From where the camera led to the IMU's full weight, then process noise and parameters in turn.
 
-    Where a stage leaves innovations that the sensors' noise cannot explain, that noise is estimated as well. The last steps
-    leave out outliers by the gates of `noise`.
+    Where a stage leaves innovations that the sensors' noise cannot explain, either it or the model is wrong: both are tried,
+    that noise estimated as well and left alone, and the likelier goes on. The last steps leave out outliers by the gates of
+    `noise`.
     """
     hypothesis = fit.hypothesis
     if worst_row(fit) <= STRANGE:
         report("fitting, the IMU is believed more and more")
         fit = lead(hypothesis, experiment, noise, fit.theta, CLOSING, held)
-    if worst_row(fit) > STRANGE:
-        return _fit_with_sensor_noise(fit, experiment, report)
+    found = [_fit_with_sensor_noise(fit, experiment, report)] if worst_row(fit) > STRANGE else []
     fit = climb(evaluate(hypothesis, fit.theta, experiment, noise), experiment, CLOSING[-1][1])
     for _ in range(ROUNDS):
         report("fitting, process noise")
@@ -107,7 +115,12 @@ def close(
             adapt_noise(fit, experiment), gate_camera=noise.gate_camera, gate_imu=noise.gate_imu
         )
         fit = climb(evaluate(hypothesis, fit.theta, experiment, adapted), experiment, 8)
-    return fit
+
+    def without_gates(way: Fit) -> float:
+        """Behind gates a filter that has lost the fish would leave most of the evidence against it out."""
+        return log_posterior(hypothesis, way.theta, experiment, open_gates(way.noise))
+
+    return max((fit, *found), key=without_gates) if found else fit
 
 
 def _fit_with_sensor_noise(fit: Fit, experiment: Experiment, report: Report) -> Fit:
