@@ -1,16 +1,19 @@
 """A cold fit reaches the optimum of the truth where one way from the nominal values ends in a poor one."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from fish_sim.robot import Robot
 from fish_train.diagnose.tail import with_links
-from fish_train.identify import cold
+from fish_train.identify import cold, tempering
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, evaluate, settle
+from fish_train.identify.fit import SHORTEST_WRENCH, Fit, adapt_noise, evaluate, likelihood, settle
 from fish_train.identify.hypothesis import NOMINAL_FREE, Hypothesis, nominal_hypothesis
+from fish_train.identify.settle import OPEN
 from fish_train.identify.synthetic import program, record
 from fish_train.identify.tempering import fit_tempered
 
@@ -62,3 +65,65 @@ def test_the_best_of_all_places_and_hops_goes_on(monkeypatch) -> None:
 def test_a_fit_that_has_no_likelihood_is_never_the_better_one() -> None:
     lost, low = SimpleNamespace(objective=np.nan), SimpleNamespace(objective=-5.0)
     assert cold.better(lost, low) is low and cold.better(low, lost) is low
+
+
+@pytest.mark.parametrize(("left", "other", "best"), [(9.0, 7.0, 7.0), (9.0, 3.0, 5.0), (1.0, 7.0, 5.0)])
+def test_a_fit_that_leaves_much_competes_with_one_whose_tail_is_held_at_first(
+    monkeypatch, left: float, other: float, best: float
+) -> None:
+    monkeypatch.setattr(cold, "fit_multistart", lambda *_: SimpleNamespace(objective=5.0))
+    monkeypatch.setattr(cold, "second_look", lambda fit, *_: fit)
+    monkeypatch.setattr(cold, "excess", lambda _: np.array([left]))
+
+    def fit_held(*_args, held, **_keywords):
+        assert held == tempering.TAIL_INERTIAS
+        return SimpleNamespace(objective=other)
+
+    monkeypatch.setattr(cold, "fit_tempered", fit_held)
+    assert cold.fit_cold(None, None, None).objective == best
+
+
+@pytest.mark.parametrize("sensors_are_right", [True, False])
+def test_strange_innovations_are_put_down_to_the_likelier_of_sensors_and_model(
+    monkeypatch, sensors_are_right: bool
+) -> None:
+    """A filter behind gates would not count what it cannot follow: both are judged without."""
+    theirs, model = (
+        SimpleNamespace(noise=Noise(gyro=1.0), theta=None),
+        SimpleNamespace(noise=Noise(), theta=None),
+    )
+    monkeypatch.setattr(tempering, "worst_row", lambda _: 9.0)
+    monkeypatch.setattr(tempering, "_fit_with_sensor_noise", lambda *_: theirs)
+    monkeypatch.setattr(tempering, "evaluate", lambda *_: model)
+    monkeypatch.setattr(tempering, "climb", lambda *_: model)
+    monkeypatch.setattr(tempering, "adapt_noise", lambda *_: Noise())
+
+    def likelihood(_hypothesis, _theta, _experiment, noise: Noise) -> float:
+        assert noise.gate_imu == OPEN
+        return float((noise.gyro != 1.0) == sensors_are_right)
+
+    monkeypatch.setattr(tempering, "log_posterior", likelihood)
+    fit = SimpleNamespace(hypothesis=None, theta=None)
+    assert tempering.close(fit, None, Noise()) is (model if sensors_are_right else theirs)
+
+
+def test_a_slow_strong_force_is_found_from_a_fast_one() -> None:
+    """The fish lies in a current that the model has not."""
+    random = np.random.default_rng(5)
+    commands = np.stack([program(kind, 5.0, random) for kind in ("sines", "random")], axis=1)
+    robot = Robot().with_effect(
+        "nonuniform_current", mean_x=0.0, mean_y=0.0, strain=0.05, shear_x=0.2, shear_y=0.1
+    )
+    fish = record(robot, commands, Noise(), random)[0]
+    hypothesis = nominal_hypothesis(Robot())
+    fast = replace(Noise(), wrench=tuple(30.0 * w for w in Noise().wrench), wrench_time=SHORTEST_WRENCH)
+    fit = evaluate(hypothesis, np.zeros(len(hypothesis.free)), fish, fast)
+    slow = replace(Noise(), wrench=tuple(16.0 * w for w in Noise().wrench), wrench_time=2.0)
+    found = adapt_noise(fit, fish)
+    print(
+        found.wrench_time,
+        likelihood(fit, fish, fast),
+        likelihood(fit, fish, slow),
+        likelihood(fit, fish, found),
+    )
+    assert likelihood(fit, fish, found) > likelihood(fit, fish, slow) > likelihood(fit, fish, fast) + 100.0
