@@ -9,11 +9,12 @@ import pytest
 from fish_sim.robot import Robot
 from fish_train.diagnose.tail import with_links
 from fish_train.identify import cold, tempering
+from fish_train.identify.adapt import SHORTEST_WRENCH, Reach, adapt_noise, settle
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import SHORTEST_WRENCH, Fit, adapt_noise, evaluate, likelihood, settle
+from fish_train.identify.fit import Fit, evaluate, likelihoods
 from fish_train.identify.hypothesis import NOMINAL_FREE, Hypothesis, nominal_hypothesis
-from fish_train.identify.settle import OPEN
+from fish_train.identify.suitable import OPEN
 from fish_train.identify.synthetic import program, record
 from fish_train.identify.tempering import fit_tempered
 
@@ -96,7 +97,7 @@ def test_strange_innovations_are_put_down_to_the_likelier_of_sensors_and_model(
     monkeypatch.setattr(tempering, "_fit_with_sensor_noise", lambda *_: theirs)
     monkeypatch.setattr(tempering, "evaluate", lambda *_: model)
     monkeypatch.setattr(tempering, "climb", lambda *_: model)
-    monkeypatch.setattr(tempering, "adapt_noise", lambda *_: Noise())
+    monkeypatch.setattr(tempering, "adapt_noise", lambda *_, **__: Noise())
 
     def likelihood(_hypothesis, _theta, _experiment, noise: Noise) -> float:
         assert noise.gate_imu == OPEN
@@ -119,11 +120,6 @@ def test_a_slow_strong_force_is_found_from_a_fast_one() -> None:
     fast = replace(Noise(), wrench=tuple(30.0 * w for w in Noise().wrench), wrench_time=SHORTEST_WRENCH)
     fit = evaluate(hypothesis, np.zeros(len(hypothesis.free)), fish, fast)
     slow = replace(Noise(), wrench=tuple(16.0 * w for w in Noise().wrench), wrench_time=2.0)
-    found = adapt_noise(fit, fish)
-    print(
-        found.wrench_time,
-        likelihood(fit, fish, fast),
-        likelihood(fit, fish, slow),
-        likelihood(fit, fish, found),
-    )
-    assert likelihood(fit, fish, found) > likelihood(fit, fish, slow) > likelihood(fit, fish, fast) + 100.0
+    found = adapt_noise(fit, fish, reach=Reach.COLD)
+    of_found, of_slow, of_fast = likelihoods(hypothesis, fit.theta, fish, [found, slow, fast])
+    assert of_found > of_slow > of_fast + 100.0

@@ -23,8 +23,9 @@ from fish_train.diagnose.locate import dof_shares
 from fish_train.diagnose.split import Trials, split_trials, trials_of
 from fish_train.diagnose.tail import with_links
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
+from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import evaluate, settle
+from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.synthetic import program, record
 from fish_train.reports.diagnosis_page import sentence, write_diagnosis_page

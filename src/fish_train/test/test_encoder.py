@@ -7,9 +7,10 @@ import pytest
 from scipy.stats import norm
 
 from fish_sim.robot import Robot
+from fish_train.identify.adapt import adapt_noise
 from fish_train.identify.encoder import commanded_residual, encoder_noise, encoder_terms
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import adapt_noise, evaluate
+from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.synthetic import program, record
 

@@ -9,7 +9,7 @@ import pytest
 
 from fish_sim.robot import Robot
 from fish_train.identify.filter import filter_stepper, run_filter
-from fish_train.identify.filter_compiled import compiled_pass
+from fish_train.identify.filter_compiled import compiled_passes
 from fish_train.identify.filter_numpy import Filter
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
@@ -40,9 +40,10 @@ def test_compiled_and_numpy_passes_agree(stiffness):
     coordinates = Coordinates(with_sensors(robot))
     inputs = coordinates.filter_inputs(coordinates.origin())
     slow = Filter(data, coordinates.stepper, *inputs, Noise()).run(keep=True)
-    fast = compiled_pass(data, coordinates.stepper, *inputs, Noise(), keep=True)
-    if fast is None:
+    passes = compiled_passes(data, coordinates.stepper, *inputs, [Noise(gyro=0.1), Noise()], keep=True)
+    if passes is None:
         pytest.skip("no C compiler here")
+    fast = passes[1]
     for key in ("log_likelihood", "gradient", "normal", "whitened"):
         a, b = getattr(slow, key), getattr(fast, key)
         np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-8 * np.nanmax(np.abs(a)))

@@ -9,8 +9,9 @@ import pytest
 from fish_sim.robot import Robot
 from fish_train.diagnose import search
 from fish_train.diagnose.decide import TEMPER, probabilities
+from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import evaluate, settle
+from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.synthetic import program, record
 

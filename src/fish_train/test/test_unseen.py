@@ -12,8 +12,9 @@ from fish_train.diagnose.decide import SMALLEST_CHECK, Level
 from fish_train.diagnose.growth import holds_elsewhere
 from fish_train.diagnose.split import Trials
 from fish_train.diagnose.unseen import gain_left_out, gain_unseen, on_all, predicted
+from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import evaluate, settle
+from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.synthetic import program, record
 

@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.identify.prediction import WARM_UP, predict, prediction_errors
     from fish_train.identify.prediction_table import write_predictions
     from fish_train.identify.sensor_noise import usual_noise
-    from fish_train.identify.settle import suitable_noise
+    from fish_train.identify.suitable import suitable_noise
     from fish_train.reports.identify_tables import error_table
     from fish_train.score_table import print_table
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from fish_sim.robot import Robot
+from fish_train.identify.adapt import settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
-from fish_train.identify.fit import Fit, evaluate, settle
+from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.tempering import fit_tempered

@@ -10,6 +10,7 @@ from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.search import Progress, Round, evidence, look_alike, settled_round
 from fish_train.diagnose.split import Trials
 from fish_train.diagnose.unseen import gain_left_out, gain_unseen, on_all
+from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit, evaluate
 
@@ -83,7 +84,8 @@ def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fi
     if not base.hypothesis.names:
         nominal = refine(base, training)
         return nominal, nominal
-    return refine(rounds[0].base, training), refine(base, training)
+    nominal, final = on_all_cores(lambda fit: refine(fit, training), [rounds[0].base, base])
+    return nominal, final
 
 
 def prune(

@@ -20,12 +20,14 @@ from fish_train.diagnose.split import split_trials, trials_of
 from fish_train.diagnose.tail import finer_tail
 from fish_train.diagnose.verdict import much_is_left, named
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
+from fish_train.identify.adapt import adapt_noise
+from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, adapt_noise, evaluate
+from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.outlook import fit_outlook
-from fish_train.identify.settle import suitable_noise
+from fish_train.identify.suitable import suitable_noise
 
 
 def silent(_: str) -> None:
@@ -81,12 +83,14 @@ def shares(
     final: Fit, accepted: Sequence[Accepted], training: Experiment
 ) -> dict[str, tuple[Fit, MissingForce]]:
     """Of several effects each one's part: the model less it, with the noise it then needs, and the force that it lacks."""
-    found = {}
-    for name in [a.name for a in accepted] if len(accepted) > 1 else []:
+
+    def without(name: str) -> tuple[Fit, MissingForce]:
         less = switched_off(final, name, training)
         less = evaluate(less.hypothesis, less.theta, training, adapt_noise(less, training))
-        found[name] = less, missing_force(less, training)
-    return found
+        return less, missing_force(less, training)
+
+    names = [a.name for a in accepted] if len(accepted) > 1 else []
+    return dict(zip(names, on_all_cores(without, names), strict=True))
 
 
 def held_out_density(

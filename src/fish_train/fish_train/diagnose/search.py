@@ -10,20 +10,21 @@ Where the base already leaves no more than water does, one step from it is enoug
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
 from fish_train.diagnose.base import settle_base
+from fish_train.identify.adapt import adapt_noise, settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess
+from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate, log_posterior, settle
+from fish_train.identify.fit import Fit, climb, evaluate, log_posterior
 from fish_train.identify.hypothesis import Coordinates, extend, specification
-from fish_train.identify.settle import open_gates
+from fish_train.identify.suitable import open_gates
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
 WEAK_STRENGTHS = (0.05, 0.3)  # where little is left: no step leads back from far too strong an effect
@@ -99,15 +100,17 @@ def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Prog
     reference = climb(evaluate(base.hypothesis, base.theta, short, base.noise), short, POLISH_ITERATIONS)
     compile_all(base, names, progress)
     near = excess(base).max() < SUSPICIOUS
-    found = []
-    for i, name in enumerate(names):
-        progress(f"ranking {name} ({i + 1} of {len(names)})")
-        found.append(look_near(reference, name, short) if near else look_afar(base, name, short))
+
+    def look(place: int) -> Fit:
+        progress(f"ranking {names[place]} ({place + 1} of {len(names)})")
+        return look_near(reference, names[place], short) if near else look_afar(base, names[place], short)
+
+    found = dict(zip(names, on_all_cores(look, range(len(names))), strict=True))
     progress("ranking the most promising")
-    promising = sorted(range(len(found)), key=lambda i: -promise(found[i]))[:POLISHED]
-    for i in promising:
-        found[i] = climb(found[i], short, POLISH_ITERATIONS)
-    gains = [Ranked(n, f.objective - reference.objective, f.theta) for n, f in zip(names, found, strict=True)]
+    promising = sorted(names, key=lambda name: -promise(found[name]))[:POLISHED]
+    polished = on_all_cores(lambda name: climb(found[name], short, POLISH_ITERATIONS), promising)
+    found |= zip(promising, polished, strict=True)
+    gains = [Ranked(name, fit.objective - reference.objective, fit.theta) for name, fit in found.items()]
     return tuple(sorted(gains, key=lambda r: -r.gain))
 
 
@@ -134,8 +137,7 @@ def look_near(base: Fit, name: str, short: Experiment) -> Fit:
 def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
     """Build every candidate's kernel, which the first run on a machine has to do, on all cores."""
     progress("compiling what is not in the cache yet")
-    with ThreadPoolExecutor() as pool:
-        list(pool.map(lambda name: prepare(base.hypothesis.with_effect(name, SCALE).robot), names))
+    on_all_cores(lambda name: prepare(base.hypothesis.with_effect(name, SCALE).robot), names)
 
 
 def warm_starts(
@@ -218,10 +220,10 @@ def search_round(
     ranking = rank(base, names, experiment, progress)
     progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
     chosen = [r for r in shortlist(ranking) if r.gain > WORTH_A_REFIT * enough]
-    refitted = {}
-    for r in chosen:
-        progress(f"refitting {r.name}")
-        refitted[r.name] = refit(base, r, experiment)
+    if chosen:
+        progress("refitting " + ", ".join(r.name for r in chosen))
+    fits = on_all_cores(lambda ranked: refit(base, ranked, experiment), chosen)
+    refitted = dict(zip((r.name for r in chosen), fits, strict=True))
     return with_look_alikes(Round(base, ranking, refitted), names, experiment, enough, progress)
 
 

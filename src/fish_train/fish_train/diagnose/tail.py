@@ -13,9 +13,10 @@ from fish_train.diagnose.law import describe
 from fish_train.diagnose.search import Progress, evidence
 from fish_train.diagnose.split import Trials
 from fish_train.diagnose.unseen import gain_unseen, on_all
+from fish_train.identify.adapt import settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
-from fish_train.identify.fit import Fit, evaluate, log_posterior, settle
+from fish_train.identify.fit import Fit, evaluate, log_posterior
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
 

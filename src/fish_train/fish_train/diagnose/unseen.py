@@ -15,7 +15,7 @@ from fish_train.diagnose.quadratic import quadratic
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit, climb, evaluate
 from fish_train.identify.hypothesis import Coordinates
-from fish_train.identify.settle import open_gates
+from fish_train.identify.suitable import open_gates
 
 ITERATIONS = 3  # from the optimum of some of the trials to that of all
 

@@ -13,9 +13,11 @@ from math import comb
 
 import numpy as np
 
+from fish_train.identify.adapt import settle
+from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Array, Noise
-from fish_train.identify.fit import Fit, evaluate, settle
+from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 from fish_train.identify.tempering import LEADING, TAIL_INERTIAS, Report, close, fit_tempered, lead
 
@@ -53,7 +55,7 @@ def fit_multistart(
 
     report("fitting, the camera leads from many places")
     starts = [origin, *places, *(origin + SPREAD * somewhere(pairs))]
-    best = reduce(better, (lead(hypothesis, short, noise, start) for start in starts))
+    best = reduce(better, on_all_cores(lambda start: lead(hypothesis, short, noise, start), starts))
     for step in somewhere(pairs):
         best = better(best, lead(hypothesis, short, noise, best.theta + HOP * step, LEADING[1:]))
     return close(evaluate(hypothesis, best.theta, experiment, best.noise), experiment, noise, report)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fish_sim.compiled import compiler, lanes
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme, default_scheme, stable_scheme
 from fish_sim.step import Stepper, kernel
 from fish_train.identify.experiment import Experiment
-from fish_train.identify.filter_compiled import compiled_pass, filter_library
+from fish_train.identify.filter_compiled import compiled_passes, filter_library
 from fish_train.identify.filter_numpy import Filter
 from fish_train.identify.filter_types import Array, FilterResult, Noise, SensorModel
 
@@ -26,8 +28,21 @@ def run_filter(
     p (NP,): parameters of the stepper, which must have the effect `disturbance`; dp (K, NP): their derivatives with
     respect to the free parameters; keep: store what the smoother needs.
     """
-    result = compiled_pass(experiment, stepper, p, dp, sensors, noise, keep)
-    return result or Filter(experiment, stepper, p, dp, sensors, noise).run(keep)
+    return run_filters(experiment, stepper, p, dp, sensors, [noise], keep)[0]
+
+
+def run_filters(
+    experiment: Experiment,
+    stepper: Stepper,
+    p: Array,
+    dp: Array,
+    sensors: SensorModel,
+    noises: Sequence[Noise],
+    keep: bool = False,
+) -> list[FilterResult]:
+    """`run_filter` with each noise: several at once leave no core without work."""
+    results = compiled_passes(experiment, stepper, p, dp, sensors, noises, keep)
+    return results or [Filter(experiment, stepper, p, dp, sensors, n).run(keep) for n in noises]
 
 
 def filter_stepper(robot: Robot) -> Stepper:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import os
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
+from functools import partial
 from importlib.resources import files
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from fish_sim.compiled import lanes, library
 from fish_sim.model import DT, Structure
 from fish_sim.step import Stepper, tangent_source
+from fish_train.identify.cores import on_all_cores
 from fish_train.identify.encoder import encoder_terms
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
@@ -73,23 +74,23 @@ def filter_library(structure: Structure, method: str) -> ctypes.CDLL | None:
     return library(tangent_source(structure, method, lanes()) + text, "-O2")
 
 
-def compiled_pass(
+def compiled_passes(
     experiment: Experiment,
     stepper: Stepper,
     p: Array,
     dp: Array,
     sensors: SensorModel,
-    noise: Noise,
+    noises: Sequence[Noise],
     keep: bool,
-) -> FilterResult | None:
-    """The result of a pass, or None when it cannot be compiled here."""
+) -> list[FilterResult] | None:
+    """The result of a pass with each noise, or None when it cannot be compiled here."""
     loaded = filter_library(stepper.layout.structure, stepper.scheme.method)
     if loaded is None:
         return None
-    job = _Job(loaded, experiment, stepper, p, dp, sensors, noise, keep)
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        list(pool.map(job.run, range(len(experiment.names))))
-    return job.result()
+    jobs = [_Job(loaded, experiment, stepper, p, dp, sensors, noise, keep) for noise in noises]
+    runs = [partial(job.run, m) for job in jobs for m in range(len(experiment.names))]
+    on_all_cores(lambda run: run(), runs)
+    return [job.result() for job in jobs]
 
 
 class _Job:

@@ -31,8 +31,8 @@ from fish_train.identify.prediction import (
     prediction_errors,
 )
 from fish_train.identify.sensor_noise import usual_noise
-from fish_train.identify.settle import STRANGE, suitable_noise, worst_row
 from fish_train.identify.structure import Step, choose_effects, step_text
+from fish_train.identify.suitable import STRANGE, suitable_noise, worst_row
 from fish_train.identify.tempering import TAIL_INERTIAS, fit_tempered
 
 Array = NDArray[np.float64]

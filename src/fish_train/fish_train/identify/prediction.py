@@ -21,7 +21,7 @@ from fish_train.identify.filter_types import WRENCH, Noise, SensorModel
 from fish_train.identify.fixed_lag import smoothed
 from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.motion import HALF_WINDOW, stroke_mean
-from fish_train.identify.settle import open_gates
+from fish_train.identify.suitable import open_gates
 
 Array = NDArray[np.float64]
 

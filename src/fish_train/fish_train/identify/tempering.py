@@ -13,19 +13,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_train.identify.adapt import NOISE_MOVES, SENSOR_MOVES, Reach, adapt_noise
+from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import (
-    NOISE_MOVES,
-    SENSOR_MOVES,
-    Fit,
-    adapt_noise,
-    climb,
-    evaluate,
-    log_posterior,
-)
+from fish_train.identify.fit import Fit, climb, evaluate, log_posterior
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
-from fish_train.identify.settle import STRANGE, open_gates, worst_row
+from fish_train.identify.suitable import STRANGE, open_gates, worst_row
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -54,7 +48,7 @@ def fit_tempered(
     theta = Coordinates(hypothesis).origin() if theta is None else theta
     held = tuple(name for name in held if name in hypothesis.free)
     places = [_with(hypothesis, theta, held, value) for value in (HELD_AT if held else (0.0,))]
-    leads = [lead(hypothesis, experiment, noise, place, held=held) for place in places]
+    leads = on_all_cores(lambda place: lead(hypothesis, experiment, noise, place, held=held), places)
     return close(max(leads, key=lambda fit: fit.objective), experiment, noise, report, held)
 
 
@@ -112,7 +106,9 @@ def close(
     for _ in range(ROUNDS):
         report("fitting, process noise")
         adapted = replace(
-            adapt_noise(fit, experiment), gate_camera=noise.gate_camera, gate_imu=noise.gate_imu
+            adapt_noise(fit, experiment, reach=Reach.COLD),
+            gate_camera=noise.gate_camera,
+            gate_imu=noise.gate_imu,
         )
         fit = climb(evaluate(hypothesis, fit.theta, experiment, adapted), experiment, 8)
 
@@ -127,6 +123,6 @@ def _fit_with_sensor_noise(fit: Fit, experiment: Experiment, report: Report) -> 
     """Alternate between all noise and parameters, gates open."""
     for _ in range(ROUNDS + 1):
         report("fitting, noise of sensors and process")
-        adapted = adapt_noise(fit, experiment, 2, (*SENSOR_MOVES, *NOISE_MOVES))
+        adapted = adapt_noise(fit, experiment, 2, (*SENSOR_MOVES, *NOISE_MOVES), Reach.COLD)
         fit = climb(evaluate(fit.hypothesis, fit.theta, experiment, adapted), experiment, 8)
     return fit

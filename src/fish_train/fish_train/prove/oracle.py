@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from fish_sim.robot import Robot
+from fish_train.identify.adapt import adapt_noise
 from fish_train.identify.experiment import Experiment, Frames
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import Fit, adapt_noise, climb, evaluate
+from fish_train.identify.fit import Fit, climb, evaluate
 from fish_train.identify.hypothesis import Coordinates, Hypothesis, nominal_hypothesis
 from fish_train.identify.prediction import predict, prediction_errors
 from fish_train.identify.sensor_noise import usual_noise

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from fish_sim.robot import Robot
+from fish_train.identify.adapt import NOISE_MOVES, SENSOR_MOVES, adapt_noise
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import NOISE_MOVES, SENSOR_MOVES, Fit, adapt_noise, evaluate, likelihood
+from fish_train.identify.fit import Fit, evaluate, likelihoods
 from fish_train.identify.hypothesis import nominal_hypothesis
 
 OPEN = 1e9  # gates: nothing is left out
@@ -37,7 +38,7 @@ def suitable_noise(experiment: Experiment, robot: Robot, noise: Noise) -> Noise:
     fit = evaluate(nominal_hypothesis(robot, free=()), np.zeros(0), experiment, open_gates(noise))
     x, y, n = noise.wrench
     scaled = [replace(fit.noise, wrench=(f * x, f * y, f * n)) for f in LADDER]
-    best = max(scaled, key=lambda tried: likelihood(fit, experiment, tried))
+    best = scaled[int(np.argmax(likelihoods(fit.hypothesis, fit.theta, experiment, scaled)))]
     fit = evaluate(fit.hypothesis, fit.theta, experiment, best)
     if worst_row(fit) < STRANGE and best is not scaled[-1]:
         return best
