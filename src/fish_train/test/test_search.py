@@ -21,9 +21,10 @@ def quiet(_: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "restarted", "searches"), [(100.0, 90.0, 2), (100.0, 10.0, 1), (-5.0, 0.0, 1)]
+    ("gain", "restarted", "kept", "searches"),
+    [(100.0, 90.0, 90.0, 2), (100.0, 10.0, 10.0, 1), (20.0, 19.0, 0.0, 1)],
 )
-def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, restarted, searches):
+def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, restarted, kept, searches):
     bases = []
 
     def searched(base, *_):
@@ -34,9 +35,9 @@ def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, r
     monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)
     monkeypatch.setattr(search, "search_round", searched)
     monkeypatch.setattr(search, "restart_base", lambda base, *_: search.better(base, better))
-    found = search.settled_round(SimpleNamespace(objective=0.0), ["current"], None, 1.0, quiet)
+    found = search.settled_round(SimpleNamespace(objective=0.0), {"current": 23.0}, None, quiet)
     assert bases == [0.0, restarted][:searches]
-    assert found.base.objective == restarted
+    assert found.base.objective == kept  # what gains too little for a name tells nothing of the base
 
 
 def test_a_look_alike_is_refitted_from_where_the_winner_led():

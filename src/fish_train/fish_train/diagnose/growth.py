@@ -28,7 +28,8 @@ def grow(
     while len(accepted) < min(MOST_EFFECTS, len(competing)):
         names = [n for n in competing if n not in base.hypothesis.names]
         samples = float(base.result.samples.sum())
-        found = settled_round(base, names, experiment, level.enough(samples, 1, len(names)), progress)
+        needed = {name: level.enough(samples, parameter_count(name), len(names)) for name in names}
+        found = settled_round(base, needed, experiment, progress)
         rounds.append(found)
         name = choose(found, trials, len(names), level)
         if name is None:

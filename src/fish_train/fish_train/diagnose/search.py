@@ -213,18 +213,17 @@ def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough
     return settle(evaluate(hypothesis, near.theta, experiment, best.noise), experiment)
 
 
-def search_round(
-    base: Fit, names: Sequence[str], experiment: Experiment, enough: float, progress: Progress
-) -> Round:
-    """Rank all names on top of the base and refit the shortlist; nothing that gains far less than `enough`."""
+def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment, progress: Progress) -> Round:
+    """Rank all names on top of the base and refit the shortlist; nothing that gains far fewer nats than it needs."""
+    names = tuple(needed)
     ranking = rank(base, names, experiment, progress)
     progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
-    chosen = [r for r in shortlist(ranking) if r.gain > WORTH_A_REFIT * enough]
+    chosen = [r for r in shortlist(ranking) if r.gain > WORTH_A_REFIT * needed[r.name]]
     if chosen:
         progress("refitting " + ", ".join(r.name for r in chosen))
     fits = on_all_cores(lambda ranked: refit(base, ranked, experiment), chosen)
     refitted = dict(zip((r.name for r in chosen), fits, strict=True))
-    return with_look_alikes(Round(base, ranking, refitted), names, experiment, enough, progress)
+    return with_look_alikes(Round(base, ranking, refitted), names, experiment, min(needed.values()), progress)
 
 
 def with_look_alikes(
@@ -245,12 +244,16 @@ def with_look_alikes(
 
 
 def settled_round(
-    base: Fit, names: Sequence[str], experiment: Experiment, enough: float, progress: Progress
+    base: Fit, needed: Mapping[str, float], experiment: Experiment, progress: Progress
 ) -> Round:
-    """`search_round` from a base that the best candidate cannot lead to a better optimum: that would imitate its effect."""
+    """`search_round` from a base that the best candidate cannot lead to a better optimum: that would imitate its effect.
+
+    needed: nats that each of the names must gain.
+    """
+    enough = min(needed.values())
     for _ in range(MOST_SEARCHES):
-        found = search_round(base, names, experiment, enough, progress)
-        if found.best is None:
+        found = search_round(base, needed, experiment, progress)
+        if found.best is None or found.gain(found.best) < enough:
             return found
         best = found.refitted[found.best]
         progress("refitting without it, from where it led")
