@@ -11,7 +11,7 @@ from fish_train.diagnose import search
 from fish_train.diagnose.decide import TEMPER, probabilities
 from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import evaluate
+from fish_train.identify.fit import climb, evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.synthetic import program, record
 
@@ -81,6 +81,22 @@ def test_an_effect_is_found_from_the_place_that_promises_most(name, key, hidden,
     assert search.best_place(base, name, experiment, base.noise)[key] == pytest.approx(near)
     fit = settle(look(base, name, experiment), experiment)
     assert fit.values[f"{name}.{key}"] == pytest.approx(hidden[key], rel=0.1)
+
+
+@pytest.mark.parametrize("look", [search.look_near, search.look_afar])
+def test_a_hump_of_drag_is_not_lost_while_it_is_weak(look):
+    """A step of its speed and width, which seem free while it is weak, leads a weak hump to where the fish never swims."""
+    random = np.random.default_rng(9)
+    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "straight", "random")], axis=1)
+    place = {"speed": 0.145, "width": 0.035}
+    hump = Robot().with_effect("wave_drag", amplitude=0.02, **place)
+    experiment = record(hump, commands, Noise(), random)[0]
+    nominal = nominal_hypothesis(Robot())
+    base = settle(evaluate(nominal, np.zeros(len(nominal.free)), experiment, Noise()), experiment)
+    fit = climb(look(base, "wave_drag", experiment), experiment, search.POLISH_ITERATIONS)
+    truth = search.started(base, "wave_drag", 1.0, place)
+    best = climb(evaluate(fit.hypothesis, truth, experiment, base.noise), experiment, 20)
+    assert fit.objective > best.objective - 3.0 > base.objective + 15.0
 
 
 def test_images_half_a_second_old_are_found():

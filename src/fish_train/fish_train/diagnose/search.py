@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fish_train.diagnose.base import settle_base
 from fish_train.identify.adapt import adapt_noise, settle
@@ -23,7 +24,7 @@ from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, climb, evaluate, log_posterior
-from fish_train.identify.hypothesis import Coordinates, extend, specification
+from fish_train.identify.hypothesis import Coordinates, Hypothesis, extend, specification
 from fish_train.identify.suitable import open_gates
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
@@ -32,6 +33,7 @@ SCALE = 0.3  # strength at which the hypothesis is written down; sets the coordi
 IMU_DISTRUST = 10.0  # factor of the IMU's noise in the first part of the ranking
 RANK_ITERATIONS = 6
 POLISH_ITERATIONS = 4
+STRENGTH_ITERATIONS = 3
 PROMISING_PLACES = 3  # of those that are tried
 POLISHED = 8  # candidates that are ranked with the IMU's own noise
 SHORTLIST = 4
@@ -122,7 +124,7 @@ def look_afar(base: Fit, name: str, short: Experiment) -> Fit:
     cold = replace(base, theta=np.where(Coordinates(base.hypothesis).is_log, 0.0, base.theta))
     starts = [*warm_starts(base, name, short, wide), *warm_starts(cold, name, short, wide)]
     start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, wide))
-    fit = climb(evaluate(hypothesis, start, short, wide), short, RANK_ITERATIONS)
+    fit = climb(in_strength(evaluate(hypothesis, start, short, wide), name, short), short, RANK_ITERATIONS)
     return evaluate(hypothesis, fit.theta, short, own)
 
 
@@ -130,8 +132,17 @@ def look_near(base: Fit, name: str, short: Experiment) -> Fit:
     """A candidate where the base leaves no more than water does: what is missing is small, so one step tells its gain."""
     hypothesis = base.hypothesis.with_effect(name, SCALE)
     starts = warm_starts(base, name, short, base.noise, WEAK_STRENGTHS)
-    fits = [evaluate(hypothesis, theta, short, base.noise) for theta in starts]
+    fits = [in_strength(evaluate(hypothesis, theta, short, base.noise), name, short) for theta in starts]
     return max(fits, key=promise)
+
+
+def in_strength(fit: Fit, name: str, short: Experiment) -> Fit:
+    """A candidate that has a place, climbed in all but this: while an effect is weak its place seems free, and a step loses it.
+
+    Separable least squares (Golub and Pereyra 1973): in its strength a fit is nearly linear.
+    """
+    moving = strengths_of(fit.hypothesis, name)
+    return fit if moving.all() else climb(fit, short, STRENGTH_ITERATIONS, moving=moving)
 
 
 def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
@@ -156,25 +167,34 @@ def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -
 def best_place(base: Fit, name: str, experiment: Experiment, noise: Noise) -> dict[str, float]:
     """Values of the parameters that say where or how fast, of those to be tried, from which the effect gains most.
 
-    The few that promise most take one step: far from the base a promise is not kept.
+    The few that promise most are climbed at their place: far from the base a promise is not kept.
     """
-    keys = [key for key, parameter in specification(name).items() if parameter.tries]
+    keys = tried(name)
     places = [dict(zip(keys, v, strict=True)) for v in product(*(specification(name)[k].tries for k in keys))]
     if len(places) == 1:
         return places[0]
     hypothesis = base.hypothesis.with_effect(name, SCALE)
-    kept = np.array([free not in {f"{name}.{key}" for key in keys} for free in hypothesis.free])
     fits = [evaluate(hypothesis, started(base, name, SCALE, p), experiment, noise) for p in places]
-    promising = sorted(range(len(places)), key=lambda i: -promise(fits[i], kept))[:PROMISING_PLACES]
-    return places[max(promising, key=lambda i: climb(fits[i], experiment, 1).objective)]
+    promising = sorted(range(len(places)), key=lambda i: -promise(fits[i]))[:PROMISING_PLACES]
+    return places[max(promising, key=lambda i: in_strength(fits[i], name, experiment).objective)]
 
 
-def promise(fit: Fit, moving: np.ndarray | slice = slice(None)) -> float:
-    """Objective that one Gauss-Newton step of the parameters `moving` would reach, were the problem quadratic."""
-    gradient = (fit.result.gradient.sum(0) + fit.theta / Coordinates(fit.hypothesis).prior ** 2)[moving]
+def tried(name: str) -> list[str]:
+    """Parameters of an effect that say where or how fast, of which several values are tried."""
+    return [key for key, parameter in specification(name).items() if parameter.tries]
+
+
+def strengths_of(hypothesis: Hypothesis, name: str) -> NDArray[np.bool_]:
+    """(K,) all free parameters but those of the effect that say where or how fast."""
+    return np.array([free not in {f"{name}.{key}" for key in tried(name)} for free in hypothesis.free])
+
+
+def promise(fit: Fit) -> float:
+    """Objective that one Gauss-Newton step would reach, were the problem quadratic."""
+    gradient = fit.result.gradient.sum(0) + fit.theta / Coordinates(fit.hypothesis).prior ** 2
     if not np.isfinite(fit.objective):
         return -np.inf
-    return fit.objective + 0.5 * float(gradient @ np.linalg.solve(fit.normal[moving][:, moving], gradient))
+    return fit.objective + 0.5 * float(gradient @ np.linalg.solve(fit.normal, gradient))
 
 
 def look_alike(first: str, second: str) -> bool:

@@ -68,15 +68,24 @@ def evaluate(
     return Fit(hypothesis, theta, robot, noise, result.log_likelihood, objective, result, normal)
 
 
-def climb(start: Fit, experiment: Experiment, iterations: int, small_gain: float = SMALL_GAIN) -> Fit:
-    """Levenberg-Marquardt with fixed noise from a fit that was evaluated on this experiment, until it gains little."""
+def climb(
+    start: Fit, experiment: Experiment, iterations: int, small_gain: float = SMALL_GAIN,
+    moving: NDArray[np.bool_] | None = None,
+) -> Fit:  # fmt: skip
+    """Levenberg-Marquardt with fixed noise from a fit that was evaluated on this experiment, until it gains little.
+
+    moving: (K,) which parameters move, by default all.
+    """
     coordinates = Coordinates(start.hypothesis)
     best, noise = start, start.noise
     damping, small = 1e-3, 0
+    free = np.flatnonzero(np.ones(len(best.theta), bool) if moving is None else moving)
     for _ in range(iterations):
-        gradient = best.result.gradient.sum(0) + best.theta / coordinates.prior**2
-        damped = best.normal + damping * np.diag(np.diag(best.normal))
-        move = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
+        gradient = (best.result.gradient.sum(0) + best.theta / coordinates.prior**2)[free]
+        normal = best.normal[np.ix_(free, free)]
+        damped = normal + damping * np.diag(np.diag(normal))
+        move = np.zeros(len(best.theta))
+        move[free] = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
         trial = evaluate(start.hypothesis, coordinates.clip(best.theta + move), experiment, noise)
         gain = trial.objective - best.objective
         if np.isfinite(gain) and gain > 0:
