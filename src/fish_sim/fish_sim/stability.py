@@ -36,6 +36,8 @@ def enough_substeps(method: Method, modes: Modes) -> int | None:
 
 
 def _stability_function(method: Method, z: complex) -> complex:
-    """R(z) = 1 + z b (1 - z A)^-1 (1, .., 1)."""
-    A, ones = np.array(method.A), np.ones(len(method.B))
-    return complex(1.0 + z * np.dot(method.B, np.linalg.solve(np.eye(len(ones)) - z * A, ones)))
+    """R(z): what one step of an explicit method makes of y' = z y, y = 1; k_i = z (1 + sum_j a_ij k_j), R = 1 + sum_i b_i k_i."""
+    slopes: list[complex] = []
+    for row in method.A:
+        slopes.append(z * (1.0 + sum(a * k for a, k in zip(row, slopes, strict=False))))
+    return 1.0 + sum(b * k for b, k in zip(method.B, slopes, strict=True))

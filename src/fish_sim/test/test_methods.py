@@ -37,3 +37,13 @@ def test_cfmr7_keeps_an_oscillation_that_rk4_damps():
     mode = np.array([100j * turn])
     assert abs(growth(METHODS["cfmr7"], mode, 1) - 1.0) < 2e-8
     assert growth(METHODS["rk4"], mode, 1) < 1.0 - 1e-3
+
+
+@pytest.mark.parametrize("mode", [-3.0 + 40.0j, -250.0, -1e7 + 1e7j])
+def test_growth_is_the_stability_polynomial_also_far_from_stable(mode):
+    """R(z) of euler and rk4 is the exponential series to their order; at huge z a linear solver finds I - z A singular."""
+    z = mode * 0.01
+    modes = np.array([mode], dtype=complex)
+    assert growth(METHODS["euler"], modes, 1) == pytest.approx(abs(1 + z))
+    assert growth(METHODS["rk4"], modes, 1) == pytest.approx(abs(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24))
+    assert np.isfinite(growth(METHODS["dop853"], modes, 1))

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
+ROUNDING = 1e-6  # periods
 MAX_LAG = 0.2  # s of real time; a simulation further behind gives up what it missed
 
 
 class Pacer:
     """Keeps simulated time at `factor` times real time; factor 0 is as fast as possible.
 
-    A short lag is caught up with; after a longer one the lost time is skipped and counted.
+    It is never ahead of real time: stamps from the future look like another clock. A short lag is caught up with; after a
+    longer one the lost time is skipped and counted.
     """
 
     def __init__(self, factor: float, period: float, now: float) -> None:
@@ -24,10 +28,10 @@ class Pacer:
         """Number of periods to run now; they count as run. Negative never."""
         if self._factor == 0.0:
             return 1
-        behind = round((now - self._anchor) * self._factor / self._period) - self._done
+        behind = math.floor((now - self._anchor) * self._factor / self._period + ROUNDING) - self._done
         if behind * self._period > MAX_LAG * max(1.0, self._factor):
             self.lost += behind * self._period / self._factor
             self.restart(now)
-            return 1
+            return 0
         self._done += max(0, behind)
         return max(0, behind)
