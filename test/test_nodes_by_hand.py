@@ -8,14 +8,22 @@ from contextlib import ExitStack
 import pytest
 from conftest import PATIENCE
 
-from fish_train.bringup import RECORDER, ROBOTS
+from fish_train.bringup import EXCITER, RECORDER, ROBOTS
 from fish_train.domain import domain_in_use
 from fish_train.nodes.watch import watching
 from fish_train.processes import NodeProcesses
 
-NODES = ROBOTS["sim"]
+NODES = (*ROBOTS["sim"], EXCITER)
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 END_WITHIN = 5.0  # s
+
+
+def settings(spec, folder):
+    """What a node cannot do without."""
+    if spec == EXCITER:
+        (folder / "program.json").write_text('[{"t": 0, "amplitude": 8, "frequency": 2, "rudder": 0}]')
+        return {"program_file": str(folder / "program.json")}
+    return {"output": str(folder), "name": "recording"} if spec == RECORDER else {}
 
 
 @pytest.fixture(scope="module", params=SIGNALS, ids=lambda number: number.name)
@@ -30,8 +38,10 @@ def ended(request, tmp_path_factory):
         started = {}
         for domain, spec in zip(free_domains(len(NODES)), NODES, strict=True):
             nodes = stack.enter_context(NodeProcesses(domain, folder / "logs"))
-            settings = {"output": str(folder), "name": "recording"} if spec == RECORDER else {}
-            started[spec] = (nodes.start(spec, settings), *stack.enter_context(watching(domain)))
+            started[spec] = (
+                nodes.start(spec, settings(spec, folder)),
+                *stack.enter_context(watching(domain)),
+            )
         deadline = time.monotonic() + PATIENCE
         while len(said) < len(NODES) and time.monotonic() < deadline:
             for spec, (_, watch, listen) in started.items():

@@ -27,6 +27,7 @@ setup(
             "fusion = fish_control.nodes.entry:fusion",
             "planner = fish_control.nodes.entry:planner",
             "controller = fish_control.nodes.entry:controller",
+            "exciter = fish_control.nodes.entry:exciter",
         ],
     },
 )

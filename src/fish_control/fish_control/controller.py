@@ -32,6 +32,7 @@ from fish_control.policy import Policy, policy_inputs
 STANDING_SPEED = 0.02  # m/s, a gliding fish that is slower has stopped
 RELEASE_RATE = 0.2  # rad/s, of a rudder that is let go
 SEAM = 0.7  # rad, more than the head swings
+LONGEST_PERIOD = 0.05  # s, of commands; after a stall the rotor's phase goes on from where it was
 
 
 class Command(NamedTuple):

@@ -1,4 +1,4 @@
-"""Parameters of the planner and controller nodes; those of the fusion node are FusionConfig."""
+"""Parameters of the nodes planner, controller and exciter; those of the fusion node are FusionConfig."""
 
 from __future__ import annotations
 
@@ -96,3 +96,31 @@ class ControllerConfig:
         require_range("largest_variance", self.largest_variance, 1e-6, 1e3, "")
         require_one_of("resume", self.resume, get_args(Resume))
         require_range("resume_delay", self.resume_delay, 0.0, 60.0, "s")
+
+
+@dataclass(frozen=True)
+class ExciterConfig:
+    """Which part of which program, and when to stop."""
+
+    program_file: str = (
+        ""  # JSON or YAML rows of t, amplitude, frequency, rudder; a diagnosis.json holds them too
+    )
+    begin: float = 0.0  # s of the program's time
+    end: float = 0.0  # s of the program's time; 0: its end
+    rest: float = 1.0  # s at rest before the first stroke
+    command_rate_hz: float = 100.0  # Hz, joint commands
+    guard: bool = True  # stop before walls and when the estimate is lost; false: swim without looking
+    horizon: float = 1.0  # s, how far ahead the guard looks
+    margin: float = 0.15  # m, nearer to a wall the fish must not be then
+    odometry_timeout: float = 0.5  # s
+    largest_variance: float = 1.0  # m^2, rad^2 and their rates; fusion marks what it has lost with 1e4
+
+    def __post_init__(self) -> None:
+        require_range("begin", self.begin, 0.0, 3600.0, "s")
+        require_range("end", self.end, 0.0, 3600.0, "s")
+        require_range("rest", self.rest, 0.0, 60.0, "s")
+        require_range("command_rate_hz", self.command_rate_hz, 50.0, 400.0, "Hz")
+        require_range("horizon", self.horizon, 0.0, 10.0, "s")
+        require_range("margin", self.margin, 0.0, 1.0, "m")
+        require_range("odometry_timeout", self.odometry_timeout, 0.02, 5.0, "s")
+        require_range("largest_variance", self.largest_variance, 1e-6, 1e3, "")

@@ -8,13 +8,19 @@ import yaml
 
 from fish_control.fusion import FusionConfig
 from fish_control.gains_file import read_gains_file
-from fish_control.node_configs import ControllerConfig, PlannerConfig
+from fish_control.node_configs import ControllerConfig, ExciterConfig, PlannerConfig
 
 CONFIG = Path(__file__).parents[1] / "config"
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("fusion", FusionConfig), ("planner", PlannerConfig), ("controller", ControllerConfig)]
+    ("name", "kind"),
+    [
+        ("fusion", FusionConfig),
+        ("planner", PlannerConfig),
+        ("controller", ControllerConfig),
+        ("exciter", ExciterConfig),
+    ],
 )
 def test_yaml_holds_the_dataclass(name, kind):
     parameters = yaml.safe_load((CONFIG / f"{name}.yaml").read_text())["/**"]["ros__parameters"]
@@ -39,6 +45,8 @@ def test_shipped_weights_fit_the_shipped_controller():
         (ControllerConfig, "resume", "never", "known: auto, manual"),
         (ControllerConfig, "command_rate_hz", 120.0, "a multiple of rate_hz"),
         (ControllerConfig, "odometry_timeout", 0.0, "0.02 to 5"),
+        (ExciterConfig, "begin", -1.0, "0 to 3600 s"),
+        (ExciterConfig, "margin", float("nan"), "0 to 1 m"),
     ],
 )
 def test_a_value_out_of_range_is_named(kind, field, value, expected):

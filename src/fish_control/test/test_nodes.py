@@ -1,5 +1,6 @@
-"""The three nodes in one process: topics, frames, units, faults; and how they start and end as programs."""
+"""The nodes in one process: topics, frames, units, faults; and how they start and end as programs."""
 
+import json
 import math
 import subprocess
 import sys
@@ -20,8 +21,9 @@ from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
 from fish_control.fusion import LOST_VARIANCE
-from fish_control.nodes import controller, fusion, planner
+from fish_control.nodes import controller, exciter, fusion, planner
 from fish_control.nodes.controller import ControllerNode
+from fish_control.nodes.exciter import ExciterNode
 from fish_control.nodes.fusion import FusionNode
 from fish_control.nodes.messages import seconds, to_quaternion, to_stamp, yaw_of
 from fish_control.nodes.planner import PlannerNode
@@ -377,6 +379,61 @@ def test_controller_reports_its_latency(bench):
     assert 0.0 < float(values["latency_p50_ms"]) <= float(values["latency_p99_ms"]) < 500.0
 
 
+PROGRAM = [{"t": 0, "amplitude": 8, "frequency": 2, "rudder": 0.3}]
+
+
+def exciter_bench(bench, tmp_path, **parameters):
+    file = tmp_path / "program.json"
+    file.write_text(json.dumps(PROGRAM))
+    b = bench(ExciterNode, program_file=str(file), rest=0.1, **parameters)
+    b.listen("joint_command", JointState)
+    return b
+
+
+def show(b, seconds, **odometry_changes):
+    """Feed the estimate alone for a while."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        b.say("odometry/filtered", odometry(b.now(), **odometry_changes))
+        b.spin(0.01)
+
+
+def test_exciter_waits_for_the_estimate_swims_its_part_and_ends_at_rest(bench, tmp_path):
+    b = exciter_bench(bench, tmp_path, begin=2.0, end=2.8)
+    b.until(lambda: b.said(b"\x01", "waiting for odometry"))
+    np.testing.assert_allclose(commands(b, 10)[:, 1:], 0.0)
+    show(b, 2.5)
+    assert b.said(b"\x00", "ended at 2.8 s, as programmed")
+    moved = commands(b, 1000)
+    assert np.abs(moved[:, 1]).max() > 60.0 and moved[:, 2].max() == pytest.approx(0.3)  # rad/s, rad
+    np.testing.assert_allclose(moved[-5:, 1:], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("fault", "level", "said"),
+    [
+        ({"x": 2.0}, b"\x01", "before a wall, at (2.00, 0.00) m"),
+        ({"x": math.nan}, b"\x02", "odometry is not finite"),
+        ({"variance": LOST_VARIANCE}, b"\x02", "does not vouch"),
+        (None, b"\x02", "s old"),
+    ],
+)
+def test_exciter_stops_for_good_where_the_guard_finds_a_reason(bench, tmp_path, fault, level, said):
+    b = exciter_bench(bench, tmp_path)
+    show(b, 0.8)
+    assert np.abs(commands(b, 60)[:, 1]).max() > 40.0
+    b.spin(1.2) if fault is None else show(b, 1.2, **fault)
+    show(b, 0.5)
+    assert b.said(level, said) and b.said(level, "stopped at ")
+    np.testing.assert_allclose(commands(b, 5)[:, 1], 0.0)
+
+
+def test_exciter_without_its_guard_swims_without_looking(bench, tmp_path):
+    b = exciter_bench(bench, tmp_path, guard=False)
+    b.spin(1.0)
+    assert np.abs(commands(b, 50)[:, 1]).max() > 40.0
+
+
 @pytest.mark.parametrize(
     ("main", "parameter", "said"),
     [
@@ -390,6 +447,9 @@ def test_controller_reports_its_latency(bench):
         (controller.main, f"weights_file:={__file__}", "not a safetensors file"),
         (controller.main, "lookahead:=0.5", "does not fit: lookahead is 0.4, this controller runs at 0.5"),
         (fusion.main, "gate:=-1.0", "gate is -1.0"),
+        (exciter.main, "begin:=1.0", "program_file is empty, expected a file with a program"),
+        (exciter.main, "program_file:=nowhere.json", "No such file or directory: 'nowhere.json'"),
+        (exciter.main, f"program_file:={__file__}", "is neither JSON nor YAML"),
     ],
 )
 def test_what_cannot_start_says_why_in_one_line(main, parameter, said, monkeypatch):

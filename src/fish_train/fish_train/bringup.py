@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,10 +54,16 @@ CONTROL = (
     NodeSpec("fish_control", "planner", "planner.yaml"),
     NodeSpec("fish_control", "controller", "controller.yaml"),
 )
+EXCITER = NodeSpec("fish_control", "exciter", "exciter.yaml")
 RECORDER = NodeSpec("fish_train", "recorder", "recorder.yaml")
 REPLAYER = NodeSpec("fish_train", "replayer", "replayer.yaml")
 
 ROBOTS = {"sim": (*SIMULATED, *CONTROL, RECORDER), "real": (*REAL, *CONTROL, RECORDER)}
+
+
+def open_loop(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
+    """A robot's nodes with the exciter in the place of planner and controller."""
+    return (*(spec for spec in robot if spec not in CONTROL[2:]), EXCITER)
 
 
 def executable_path(spec: NodeSpec) -> Path:

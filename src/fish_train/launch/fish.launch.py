@@ -1,7 +1,8 @@
 """The whole robot with the full ROS 2: `ros2 launch fish_train fish.launch.py robot:=sim path:=R speed:=0.2`.
 
 The same nodes with the same parameter files as the pip-only starter (fish_train.bringup); robot:=real takes
-the drivers of fish_hw in place of simulator and simulated camera.
+the drivers of fish_hw in place of simulator and simulated camera. program:=diagnosis.json swims the proposed experiment
+open loop: the exciter takes the place of planner and controller.
 """
 
 from launch import LaunchContext, LaunchDescription
@@ -10,7 +11,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from fish_train.bringup import CONTROL, NAMESPACE, ROBOTS, NodeSpec, parameter_path
+from fish_train.bringup import CONTROL, EXCITER, NAMESPACE, ROBOTS, NodeSpec, open_loop, parameter_path
 
 PLANNER = CONTROL[2]
 ARGUMENTS = {
@@ -18,6 +19,9 @@ ARGUMENTS = {
     "namespace": (NAMESPACE, "namespace of all nodes"),
     "path": ("R", "letter or path family"),
     "speed": ("0.2", "surge speed, m/s"),
+    "program": ("", "program of stroke and rudder to swim open loop, instead of path and speed"),
+    "begin": ("0.0", "s of the program's time"),
+    "end": ("0.0", "s of the program's time; 0: its end"),
     "use_sim_time": ("false", "nodes follow /clock"),
 }
 
@@ -29,6 +33,10 @@ def _node(spec: NodeSpec) -> Node:
     if spec == PLANNER:
         parameters["path"] = ParameterValue(LaunchConfiguration("path"), value_type=str)
         parameters["speed"] = ParameterValue(LaunchConfiguration("speed"), value_type=float)
+    if spec == EXCITER:
+        parameters["program_file"] = ParameterValue(LaunchConfiguration("program"), value_type=str)
+        parameters["begin"] = ParameterValue(LaunchConfiguration("begin"), value_type=float)
+        parameters["end"] = ParameterValue(LaunchConfiguration("end"), value_type=float)
     return Node(
         package=spec.package,
         executable=spec.executable,
@@ -42,7 +50,8 @@ def _nodes(context: LaunchContext) -> list[Node]:
     robot = LaunchConfiguration("robot").perform(context)
     if robot not in ROBOTS:
         raise RuntimeError(f"robot:={robot} is unknown; known: {', '.join(ROBOTS)}")
-    return [_node(spec) for spec in ROBOTS[robot]]
+    program = LaunchConfiguration("program").perform(context)
+    return [_node(spec) for spec in (open_loop(ROBOTS[robot]) if program else ROBOTS[robot])]
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -14,7 +14,8 @@ from fish_train.errors import UserError
 
 SOURCE = Path(__file__).parents[2]
 EVERY_NODE = sorted(
-    {*bringup.ROBOTS["sim"], *bringup.ROBOTS["real"], bringup.REPLAYER}, key=lambda spec: spec.name
+    {*bringup.ROBOTS["sim"], *bringup.ROBOTS["real"], bringup.REPLAYER, bringup.EXCITER},
+    key=lambda spec: spec.name,
 )
 
 
@@ -103,12 +104,23 @@ def launch_file(installed, monkeypatch):
 @pytest.mark.parametrize("robot", bringup.ROBOTS)
 def test_the_launch_file_starts_the_table(launch_file, robot):
     [*arguments, opaque] = launch_file["generate_launch_description"]().args[0]
-    nodes = opaque.function({"robot": robot})
+    nodes = opaque.function({"robot": robot, "program": ""})
     started = [(node.package, node.executable, node.parameters[0]) for node in nodes]
     assert started == [
         (s.package, s.executable, str(bringup.parameter_path(s))) for s in bringup.ROBOTS[robot]
     ]
     assert {argument.args[0] for argument in arguments} >= {"robot", "path", "speed", "use_sim_time"}
+
+
+@pytest.mark.parametrize("robot", bringup.ROBOTS)
+def test_with_a_program_the_exciter_takes_the_place_of_planner_and_controller(launch_file, robot):
+    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
+    nodes = opaque.function({"robot": robot, "program": "diagnosis.json"})
+    assert [node.executable for node in nodes] == [
+        *(s.executable for s in bringup.ROBOTS[robot] if s.executable not in ("planner", "controller")),
+        "exciter",
+    ]
+    assert {"program_file", "begin", "end"} < set(nodes[-1].parameters[1])
 
 
 def test_the_launch_file_refuses_an_unknown_robot(launch_file):

@@ -22,7 +22,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from std_srvs.srv import Trigger
 
 from fish_control.control_law import Gains
-from fish_control.controller import Controller, Wanted
+from fish_control.controller import LONGEST_PERIOD, Controller, Wanted
 from fish_control.gains_file import read_gains_file, require_fit
 from fish_control.latency import Latency
 from fish_control.node_configs import ControllerConfig
@@ -31,6 +31,7 @@ from fish_control.nodes.messages import (
     OK,
     WARN,
     diagnostics,
+    joint_command,
     motion_of,
     planar_covariance,
     seconds,
@@ -39,8 +40,6 @@ from fish_control.nodes.messages import (
 from fish_control.nodes.start import read_parameters, run
 from fish_control.planner import motion_is_finite
 from fish_control.watchdog import Signs, Watchdog
-
-LONGEST_PERIOD = 0.05  # s; after a stall the rotor's phase goes on from where it was
 
 
 class ControllerNode(Node):
@@ -125,11 +124,7 @@ class ControllerNode(Node):
             self._gains.publish(to_message(self._controller.decide(self._wanted)))
         self._ticks += 1
         command = self._controller.command(dt)
-        message = JointState(name=["rotor", "rudder"])
-        message.header.stamp = clock.to_msg()
-        message.position = [command.phase, command.alpha]
-        message.velocity = [command.rotor_speed, 0.0]
-        self._command.publish(message)
+        self._command.publish(joint_command(clock.to_msg(), command))
         if may_swim:
             self._latency.add(now - self._odometry_time)
         if self._watchdog.state != self._said:

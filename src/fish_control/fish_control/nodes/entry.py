@@ -29,3 +29,8 @@ def planner() -> int | None:
 def controller() -> int | None:
     """Entry point."""
     return _start("controller")
+
+
+def exciter() -> int | None:
+    """Entry point."""
+    return _start("exciter")

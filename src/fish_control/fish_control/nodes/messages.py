@@ -8,7 +8,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
 
+from fish_control.controller import Command
 from fish_control.line_of_sight import Motion
 
 PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
@@ -38,6 +40,15 @@ def yaw_of(q: Quaternion) -> float:
 def to_quaternion(yaw: float) -> Quaternion:
     """Rotation about z [rad]."""
     return Quaternion(z=math.sin(0.5 * yaw), w=math.cos(0.5 * yaw))
+
+
+def joint_command(stamp: Time, command: Command) -> JointState:
+    """Rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder: position = alpha (rad)."""
+    message = JointState(name=["rotor", "rudder"])
+    message.header.stamp = stamp
+    message.position = [command.phase, command.alpha]
+    message.velocity = [command.rotor_speed, 0.0]
+    return message
 
 
 def motion_of(message: Odometry) -> Motion:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
 
 import yaml
@@ -18,6 +17,7 @@ from rich.console import Console
 from fish_control.paths import make_path
 from fish_control.reference_path import PathError
 from fish_train.bringup import CONTROL, RECORDER, ROBOTS, SIMULATED, NodeSpec, Parameters
+from fish_train.commands.output_folder import new_folder
 from fish_train.domain import choose_domain
 from fish_train.errors import UserError
 from fish_train.interruption import Interruption
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.duration > 0.0:
         raise UserError(f"duration is {args.duration:g} s, expected a positive number")
     domain, start = choose_domain(args.domain), start_pose(args.letter, args.path_args)
-    folder = _new_folder(args)
+    folder = new_folder(args.out, "demo_" + "".join(c if c.isalnum() else "_" for c in args.letter))
     console = Console(highlight=False)
     console.print(f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}")
     end, latency = _swim(domain, node_parameters(args, start, folder), folder, args.duration, console)
@@ -140,13 +140,3 @@ def _cpu_table(end: SwimEnd) -> Table:
     rows = [[spec.name, f"{100 * share:.0f} %"] for spec, share in end.cpu.items()]
     rows.append(["all nodes", f"{100 * sum(end.cpu.values()):.0f} %"])
     return Table("CPU", ["node", "of one core"], rows, f"Mean over {end.seconds:.0f} s of swimming.")
-
-
-def _new_folder(args: argparse.Namespace) -> Path:
-    """The folder of this run, made now; refuses one with something in it."""
-    name = "".join(c if c.isalnum() else "_" for c in args.letter)
-    folder = args.out or Path("out") / f"demo_{name}_{datetime.now():%Y%m%d_%H%M%S}"
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UserError(f"{folder} exists and is not empty; choose another folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder

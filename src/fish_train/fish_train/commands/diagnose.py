@@ -39,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.diagnose.vocabulary import known
     from fish_train.identify.experiment import ExperimentError, build_experiment
     from fish_train.recordings import read_dataset
-    from fish_train.reports.diagnosis_page import sentence, write_diagnosis_page
+    from fish_train.reports.diagnosis_page import write_diagnosis_page
+    from fish_train.reports.verdict_sentence import sentence
 
     console, start = Console(stderr=True), time.monotonic()
     try:

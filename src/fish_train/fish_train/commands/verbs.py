@@ -13,6 +13,7 @@ VERBS = {
     "import_pool": "convert the real robot's ROS 1 bags to recordings in the project's format",
     "identify": "fit the robot's parameters to recordings, with standard errors and a page",
     "diagnose": "say which physics the model lacks, where, and how sure that is",
+    "excite": "swim the experiment that a diagnosis proposes, or your own program, and record it",
     "prove": "blind study: hidden effects, sealed labels, how often the diagnosis is right",
     "predict": "simulate forward from a recording's states and compare",
     "coverage": "how often identification's intervals hold the truth, on synthetic recordings",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.sensors import SENSOR_EFFECTS
+from fish_train.placement import find_start
 from fish_train.prove.data_set import write_data_set
 from fish_train.prove.fish_sim_plant import FishSimPlant
 from fish_train.prove.instruments import Errors, Instruments
@@ -18,13 +19,13 @@ from fish_train.prove.outside import known_to_the_plant
 from fish_train.prove.swim import Plant, Readings, swim
 from fish_train.prove.trials import (
     CLOSED,
+    MARGIN,
     OPEN,
     PERIOD,
     Feedback,
     OpenLoop,
     at_one_speed,
     feedback_paths,
-    find_start,
     open_loop,
 )
 from fish_train.prove.world import World
@@ -103,7 +104,7 @@ def _open(
         which = np.flatnonzero(lost)
         ways = _way(make, table[:, which])
         for m, way in zip(which, np.moveaxis(ways, 1, 0), strict=True):
-            start = find_start(way, random)
+            start = find_start(way, random, MARGIN)
             lost[m] = start is None
             starts[m] = (0.0, 0.0, 0.0) if start is None else start
         if not lost.any():

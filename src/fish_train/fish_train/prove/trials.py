@@ -15,7 +15,6 @@ from fish_control.line_of_sight import Motion
 from fish_control.paths import make_path
 from fish_control.planner import Planner
 from fish_control.policy import Policy
-from fish_control.pool import HALF_LENGTH, HALF_WIDTH
 from fish_control.reference_path import ReferencePath
 from fish_train.identify.synthetic import FULL_SPEED, STROKE, program
 
@@ -28,8 +27,7 @@ CLOSED = ("circle", "figure_eight", "oval", "circle")
 ONE_SPEED = 0.15  # throttle of all trials that keep to one speed
 SPEEDS = (0.08, 0.2)  # m/s, under feedback
 OFF_PATH = 0.15  # m, a run under feedback starts about this far from its path
-MARGIN = 0.08  # m, from the walls
-HEADINGS = 60  # tried for a start
+MARGIN = 0.08  # m, from the walls, of a fish that swims open loop
 
 
 @dataclass(frozen=True)
@@ -110,19 +108,6 @@ def at_one_speed(table: Array) -> Array:
     amplitude = FULL_SPEED * np.sqrt(ONE_SPEED) * np.minimum(1.0, t)
     rotor = np.repeat((amplitude * np.sin(2.0 * np.pi * STROKE * t))[:, None], table.shape[1], axis=1)
     return np.stack([rotor, table[..., 1]], axis=-1)
-
-
-def find_start(way: Array, random: np.random.Generator) -> Array | None:
-    """A pose (3,) from which a way (T, 3), swum from the origin, keeps MARGIN from all walls; None if none was found."""
-    half = np.array([HALF_LENGTH - MARGIN, HALF_WIDTH - MARGIN])
-    for heading in random.uniform(-np.pi, np.pi, HEADINGS):
-        cos, sin = np.cos(heading), np.sin(heading)
-        x, y = way[:, 0] * cos - way[:, 1] * sin, way[:, 0] * sin + way[:, 1] * cos
-        low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
-        if np.all(high - low < 2.0 * half):
-            place = random.uniform(-half - low, half - high)
-            return np.array([*place, heading])
-    return None
 
 
 def feedback_paths(
