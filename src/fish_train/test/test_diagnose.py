@@ -20,6 +20,7 @@ from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.law import Description
 from fish_train.diagnose.locate import dof_shares
+from fish_train.diagnose.search import Ranked, Round
 from fish_train.diagnose.split import Trials, split_trials, trials_of
 from fish_train.diagnose.tail import with_links
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
@@ -28,7 +29,8 @@ from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.synthetic import program, record
-from fish_train.reports.diagnosis_page import sentence, write_diagnosis_page
+from fish_train.reports.diagnosis_page import write_diagnosis_page
+from fish_train.reports.verdict_sentence import sentence
 
 VOCABULARY = """quadratic_drag current nonuniform_current wall_effect tip_slip wake_memory wave_drag sloshing hull_asymmetry
 tail_hardening tail_joint_damping dry_friction tether payload rotor_imbalance rudder_lag rudder_delay rudder_backlash
@@ -129,7 +131,9 @@ def test_a_hidden_current_is_named_with_its_size(tmp_path):
         > content["fit"]["refitted"]["log_density_per_sample"]
     )
     write_diagnosis_page(tmp_path / "report.html", "current", content, result)
-    assert "When current acts" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    for title in ("What is missing: current", "The water with current", "When current acts"):
+        assert f"<h2>{title}</h2>" in page
     save_robot(
         without_wrench(result.final.robot),
         tmp_path / "model.yaml",
@@ -254,15 +258,33 @@ def test_the_level_is_checked_and_probabilities_add_up():
     assert odds["a"] > odds["b"] > odds["c"]
 
 
+def competed(refitted, **quick_gains):
+    """A round of which only what competition asks for is there."""
+    return Round(None, tuple(Ranked(name, gain, None) for name, gain in quick_gains.items()), refitted)
+
+
 def test_a_name_that_was_found_as_well_is_no_rival(monkeypatch):
     monkeypatch.setattr(answers, "evidence", lambda fit, _: fit)
-    found = SimpleNamespace(refitted={"current": 10.0, "tip_slip": 40.0, "wall_effect": 9.0})
+    found = competed({"current": 10.0, "tip_slip": 40.0, "wall_effect": 9.0})
     first, second = Accepted("current", found), Accepted("tip_slip", found)
-    odds = answers.competition(first, [first, second])
+    odds = answers.competition(first, [first, second], [found])
     assert list(odds) == ["current", "wall_effect"] and odds["current"] == pytest.approx(
         1.0 / (1.0 + np.exp(-1.0))
     )
-    assert list(answers.competition(second, [first, second])) == ["tip_slip", "wall_effect"]
+    assert list(answers.competition(second, [first, second], [found])) == ["tip_slip", "wall_effect"]
+
+
+@pytest.mark.parametrize(("left", "rival"), [(0.0, True), (80.0, True), (120.0, False), (900.0, False)])
+def test_a_name_that_still_gains_beside_the_found_one_explains_something_else(monkeypatch, left, rival):
+    """A current and a sliding tip are there: wake_memory, which the tip's slip resembles, is no rival of the current."""
+    monkeypatch.setattr(answers, "evidence", lambda fit, _: fit)
+    first = competed({"current": 10.0, "wake_memory": 40.0}, current=300.0, wake_memory=200.0)
+    second = competed({"tip_slip": 50.0}, tip_slip=1000.0, wake_memory=left)
+    current, slip = Accepted("current", first), Accepted("tip_slip", second)
+    odds = answers.competition(current, [current, slip], [first, second])
+    assert ("wake_memory" in odds) is rival and ("wake_memory" in odds or odds["current"] == 1.0)
+    # of the last one found nothing is known beside it
+    assert "current" in answers.competition(Accepted("wake_memory", first), [], [first])
 
 
 def test_the_next_experiment_follows_what_is_open():

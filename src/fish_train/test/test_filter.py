@@ -11,7 +11,7 @@ from fish_sim.robot import Robot
 from fish_train.identify.filter import filter_stepper, run_filter
 from fish_train.identify.filter_compiled import compiled_passes
 from fish_train.identify.filter_numpy import Filter
-from fish_train.identify.filter_types import Noise
+from fish_train.identify.filter_types import Noise, Problem
 from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, nominal_hypothesis
 from fish_train.identify.smoother import smooth
@@ -38,9 +38,9 @@ def test_compiled_and_numpy_passes_agree(stiffness):
     data, _ = experiment(Robot(), 1.5, ("sines", "steps"))
     robot = Robot() if stiffness is None else Robot().with_parameters(tail_stiffness=stiffness)
     coordinates = Coordinates(with_sensors(robot))
-    inputs = coordinates.filter_inputs(coordinates.origin())
-    slow = Filter(data, coordinates.stepper, *inputs, Noise()).run(keep=True)
-    passes = compiled_passes(data, coordinates.stepper, *inputs, [Noise(gyro=0.1), Noise()], keep=True)
+    problem = Problem(data, coordinates.stepper, *coordinates.filter_inputs(coordinates.origin()))
+    slow = Filter(problem, Noise()).run(keep=True)
+    passes = compiled_passes(problem, [Noise(gyro=0.1), Noise()], keep=True)
     if passes is None:
         pytest.skip("no C compiler here")
     fast = passes[1]

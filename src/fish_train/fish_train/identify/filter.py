@@ -11,7 +11,7 @@ from fish_sim.step import Stepper, kernel
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_compiled import compiled_passes, filter_library
 from fish_train.identify.filter_numpy import Filter
-from fish_train.identify.filter_types import Array, FilterResult, Noise, SensorModel
+from fish_train.identify.filter_types import Array, FilterResult, Noise, Problem, SensorModel
 
 
 def run_filter(
@@ -28,21 +28,12 @@ def run_filter(
     p (NP,): parameters of the stepper, which must have the effect `disturbance`; dp (K, NP): their derivatives with
     respect to the free parameters; keep: store what the smoother needs.
     """
-    return run_filters(experiment, stepper, p, dp, sensors, [noise], keep)[0]
+    return run_filters(Problem(experiment, stepper, p, dp, sensors), [noise], keep)[0]
 
 
-def run_filters(
-    experiment: Experiment,
-    stepper: Stepper,
-    p: Array,
-    dp: Array,
-    sensors: SensorModel,
-    noises: Sequence[Noise],
-    keep: bool = False,
-) -> list[FilterResult]:
+def run_filters(problem: Problem, noises: Sequence[Noise], keep: bool = False) -> list[FilterResult]:
     """`run_filter` with each noise: several at once leave no core without work."""
-    results = compiled_passes(experiment, stepper, p, dp, sensors, noises, keep)
-    return results or [Filter(experiment, stepper, p, dp, sensors, n).run(keep) for n in noises]
+    return compiled_passes(problem, noises, keep) or [Filter(problem, noise).run(keep) for noise in noises]
 
 
 def filter_stepper(robot: Robot) -> Stepper:

@@ -15,7 +15,6 @@ from fish_sim.model import DT, Structure
 from fish_sim.step import Stepper, tangent_source
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.encoder import encoder_terms
-from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
     ENCODER_ROW,
     ROWS,
@@ -24,6 +23,7 @@ from fish_train.identify.filter_types import (
     FilterResult,
     History,
     Noise,
+    Problem,
     SensorModel,
     first_memory,
     first_state,
@@ -74,21 +74,13 @@ def filter_library(structure: Structure, method: str) -> ctypes.CDLL | None:
     return library(tangent_source(structure, method, lanes()) + text, "-O2")
 
 
-def compiled_passes(
-    experiment: Experiment,
-    stepper: Stepper,
-    p: Array,
-    dp: Array,
-    sensors: SensorModel,
-    noises: Sequence[Noise],
-    keep: bool,
-) -> list[FilterResult] | None:
+def compiled_passes(problem: Problem, noises: Sequence[Noise], keep: bool) -> list[FilterResult] | None:
     """The result of a pass with each noise, or None when it cannot be compiled here."""
-    loaded = filter_library(stepper.layout.structure, stepper.scheme.method)
+    loaded = filter_library(problem.stepper.layout.structure, problem.stepper.scheme.method)
     if loaded is None:
         return None
-    jobs = [_Job(loaded, experiment, stepper, p, dp, sensors, noise, keep) for noise in noises]
-    runs = [partial(job.run, m) for job in jobs for m in range(len(experiment.names))]
+    jobs = [_Job(loaded, problem, noise, keep) for noise in noises]
+    runs = [partial(job.run, m) for job in jobs for m in range(len(problem.experiment.names))]
     on_all_cores(lambda run: run(), runs)
     return [job.result() for job in jobs]
 
@@ -96,10 +88,9 @@ def compiled_passes(
 class _Job:
     """Arrays of one pass, C order, one block per trial."""
 
-    def __init__(
-        self, loaded: ctypes.CDLL, experiment: Experiment, stepper: Stepper, p: Array, dp: Array,
-        sensors: SensorModel, noise: Noise, keep: bool,
-    ) -> None:  # fmt: skip
+    def __init__(self, loaded: ctypes.CDLL, problem: Problem, noise: Noise, keep: bool) -> None:
+        experiment, stepper, sensors = problem.experiment, problem.stepper, problem.sensors
+        p, dp = problem.p, problem.dp
         self.loaded, self.experiment, self.noise = loaded, experiment, noise
         self.settings = settings(stepper, sensors, noise)
         layout, T, M, K = stepper.layout, experiment.length, len(experiment.names), len(dp)

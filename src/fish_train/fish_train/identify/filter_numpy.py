@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
-from fish_sim.step import Stepper
 from fish_train.identify.encoder import encoder_terms
-from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import (
     ENCODER_ROW,
     ROWS,
@@ -20,7 +18,7 @@ from fish_train.identify.filter_types import (
     FilterResult,
     History,
     Noise,
-    SensorModel,
+    Problem,
     first_memory,
     first_state,
     place_frames,
@@ -32,24 +30,15 @@ SERIES = 8  # terms of the matrix exponential, as in c/filter.c
 class Filter:
     """One pass over an experiment for given parameters."""
 
-    def __init__(
-        self,
-        experiment: Experiment,
-        stepper: Stepper,
-        p: Array,
-        dp: Array,
-        sensors: SensorModel,
-        noise: Noise,
-    ) -> None:
-        """p (NP,) parameters; dp (K, NP) derivative of p with respect to each free parameter."""
-        self.experiment, self.stepper, self.sensors, self.noise = experiment, stepper, sensors, noise
-        layout = stepper.layout
-        self.p, self.dp = p, dp
-        self.trials, self.free = len(experiment.names), len(dp)
+    def __init__(self, problem: Problem, noise: Noise) -> None:
+        self.experiment, self.stepper, self.sensors = problem.experiment, problem.stepper, problem.sensors
+        self.p, self.dp, self.noise = problem.p, problem.dp, noise
+        layout = self.stepper.layout
+        self.trials, self.free = len(self.experiment.names), len(self.dp)
         self.nq, self.nx, self.n = layout.links + 3, len(layout.motion), len(layout.motion) + 6
         self.wrench_at = [layout.parameters.index(name) for name in WRENCH]
         self.directions = self.nx + 3 + self.free
-        self.frames = place_frames(experiment, sensors)
+        self.frames = place_frames(self.experiment, self.sensors)
         self.memory, self.d_memory = self._follow_commands()
 
     def run(self, keep: bool = False) -> FilterResult:

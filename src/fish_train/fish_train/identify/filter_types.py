@@ -65,6 +65,17 @@ class SensorModel:
 
 
 @dataclass(frozen=True)
+class Problem:
+    """What is filtered, with which model; the noise may be one of several."""
+
+    experiment: Experiment
+    stepper: Stepper  # with the effect `disturbance`
+    p: Array  # (NP,) parameters of the stepper
+    dp: Array  # (K, NP) their derivatives with respect to the free parameters
+    sensors: SensorModel
+
+
+@dataclass(frozen=True)
 class FilterResult:
     """Sums per trial and, if asked, everything along the way."""
 

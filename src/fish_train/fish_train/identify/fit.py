@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter import run_filter, run_filters
-from fish_train.identify.filter_types import FilterResult, Noise
+from fish_train.identify.filter_types import FilterResult, Noise, Problem
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 
 Array = NDArray[np.float64]
@@ -109,7 +109,8 @@ def likelihoods(
     coordinates = Coordinates(hypothesis)
     p, _, sensors = coordinates.filter_inputs(theta)
     plain = replace(sensors, free={}, slope={})
-    results = run_filters(experiment, coordinates.stepper, p, np.zeros((0, len(p))), plain, noises)
+    problem = Problem(experiment, coordinates.stepper, p, np.zeros((0, len(p))), plain)
+    results = run_filters(problem, noises)
     totals = np.array([result.log_likelihood.sum() for result in results])
     return np.where(np.isfinite(totals), totals, -np.inf)
 

@@ -15,10 +15,11 @@ PARTS = (
     ("fish_train", "recordings"),
 )
 KINDS = (".py", ".c", ".h")
+NODES = "nodes"  # folder of what talks ROS; an answer comes from recordings
 
 
 def tool_digest() -> str:
-    """The first 16 digits of the SHA-256 of simulator, identification, diagnosis and reader: file names and code."""
+    """The first 16 digits of the SHA-256 of simulator (less its nodes), identification, diagnosis and reader: names and code."""
     digest = hashlib.sha256()
     for package, folder in PARTS:
         root = files(package)
@@ -40,7 +41,7 @@ def code(text: str) -> str:
 
 def _texts(folder: Traversable, under: str = "") -> Iterable[tuple[str, str]]:
     for entry in folder.iterdir():
-        if entry.is_dir():
+        if entry.is_dir() and entry.name != NODES:
             yield from _texts(entry, f"{under}{entry.name}/")
         elif entry.name.endswith(KINDS):
             text = entry.read_text(encoding="utf-8")

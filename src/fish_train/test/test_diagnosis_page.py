@@ -1,0 +1,67 @@
+"""What a diagnosis says to people: its sentence, its tables, its figures."""
+
+import numpy as np
+import pytest
+
+from fish_train.reports.diagnosis_figures import binned_means, moves_water
+from fish_train.reports.verdict_sentence import sentence
+
+
+def effect(name: str, parameters: dict[str, tuple[float, float]], rivals=()) -> dict:
+    return {
+        "name": name,
+        "parameters": {k: {"value": v, "std": s, "unit": "m/s"} for k, (v, s) in parameters.items()},
+        "evidence": {"probability": 0.84},
+        "rivals": [{"name": n, "probability": p} for n, p in rivals],
+    }
+
+
+def content(*effects: dict, links: int = 3) -> dict:
+    return {
+        "verdict": "missing_physics",
+        "effects": list(effects),
+        "fit": {"tail_links": {"given": 3, "used": links}},
+    }
+
+
+def test_the_sentence_tells_rivals_beside_the_name():
+    told = sentence(content(effect("tip_slip", {"mobility": (0.1656, 0.00057)}, [("wake_memory", 0.159)])))
+    assert told == (
+        "missing_physics: the model lacks tip_slip "
+        "(mobility 0.1656 ± 0.00057 m/s; probability 0.84; or wake_memory, 0.16)."
+    )
+
+
+def test_of_many_numbers_the_sentence_tells_the_surest():
+    gyres = {
+        "mean_x": (0.01, 0.01),
+        "a": (0.02, 0.001),
+        "b": (-0.03, 0.001),
+        "c": (0.5, 0.1),
+        "d": (0.0, 0.001),
+    }
+    told = sentence(content(effect("nonuniform_current", gyres), links=4))
+    assert "(5 numbers, surest b -0.03 ± 0.001 m/s, a 0.02 ± 0.001 m/s, c 0.5 ± 0.1 m/s; probability" in told
+    assert told.endswith("The tail is modelled with 4 links instead of 3.")
+
+
+def test_bins_of_a_rudder_that_stays_at_its_stop_hold_means_and_no_zeros():
+    random = np.random.default_rng(0)
+    rudder = np.clip(random.normal(0.0, 1.0, 2000), -0.5, 0.5)
+    middle, mean = binned_means(rudder, 3.0 + rudder)
+    assert len(middle) < 15 and (np.diff(middle) > 0).all()
+    # bins at a stop hold the stop itself and what is near it
+    np.testing.assert_allclose(mean, 3.0 + middle, atol=0.06)
+
+
+def test_a_covariate_that_never_changes_or_was_never_measured_has_no_curve():
+    for values in (np.zeros(50), np.full(50, np.nan)):
+        assert binned_means(values, np.ones(50))[0].size == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "moves"),
+    [("current", True), ("nonuniform_current", True), ("quadratic_drag", False), ("camera_latency", False)],
+)
+def test_a_picture_of_the_water_is_for_effects_that_move_it(name, moves):
+    assert moves_water(name) is moves
