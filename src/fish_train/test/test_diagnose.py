@@ -12,7 +12,7 @@ from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot, load_robot, save_robot
 from fish_train.commands.diagnose import without_wrench
 from fish_train.diagnose import answer as answers
-from fish_train.diagnose import base, procedure, tail
+from fish_train.diagnose import base, procedure, pruning, tail
 from fish_train.diagnose import verdict as verdicts
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
@@ -20,7 +20,6 @@ from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.law import Description
 from fish_train.diagnose.locate import dof_shares
-from fish_train.diagnose.search import Ranked, Round
 from fish_train.diagnose.split import Trials, split_trials, trials_of
 from fish_train.diagnose.tail import with_links
 from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
@@ -258,33 +257,14 @@ def test_the_level_is_checked_and_probabilities_add_up():
     assert odds["a"] > odds["b"] > odds["c"]
 
 
-def competed(refitted, **quick_gains):
-    """A round of which only what competition asks for is there."""
-    return Round(None, tuple(Ranked(name, gain, None) for name, gain in quick_gains.items()), refitted)
-
-
 def test_a_name_that_was_found_as_well_is_no_rival(monkeypatch):
-    monkeypatch.setattr(answers, "evidence", lambda fit, _: fit)
-    found = competed({"current": 10.0, "tip_slip": 40.0, "wall_effect": 9.0})
-    first, second = Accepted("current", found), Accepted("tip_slip", found)
-    odds = answers.competition(first, [first, second], [found])
-    assert list(odds) == ["current", "wall_effect"] and odds["current"] == pytest.approx(
-        1.0 / (1.0 + np.exp(-1.0))
-    )
-    assert list(answers.competition(second, [first, second], [found])) == ["tip_slip", "wall_effect"]
-
-
-@pytest.mark.parametrize(("left", "rival"), [(0.0, True), (80.0, True), (120.0, False), (900.0, False)])
-def test_a_name_that_still_gains_beside_the_found_one_explains_something_else(monkeypatch, left, rival):
-    """A current and a sliding tip are there: wake_memory, which the tip's slip resembles, is no rival of the current."""
-    monkeypatch.setattr(answers, "evidence", lambda fit, _: fit)
-    first = competed({"current": 10.0, "wake_memory": 40.0}, current=300.0, wake_memory=200.0)
-    second = competed({"tip_slip": 50.0}, tip_slip=1000.0, wake_memory=left)
-    current, slip = Accepted("current", first), Accepted("tip_slip", second)
-    odds = answers.competition(current, [current, slip], [first, second])
-    assert ("wake_memory" in odds) is rival and ("wake_memory" in odds or odds["current"] == 1.0)
-    # of the last one found nothing is known beside it
-    assert "current" in answers.competition(Accepted("wake_memory", first), [], [first])
+    monkeypatch.setattr(pruning, "evidence", lambda fit, _: fit)
+    contest = {"current": 10.0, "tip_slip": 40.0, "wall_effect": 9.0}
+    first, second = Accepted("current", None, contest), Accepted("tip_slip", None, contest)
+    odds = answers.competition(first, [first, second])
+    assert list(odds) == ["current", "wall_effect"]
+    assert odds["current"] == pytest.approx(1.0 / (1.0 + np.exp(-1.0)))
+    assert list(answers.competition(second, [first, second])) == ["tip_slip", "wall_effect"]
 
 
 def test_the_next_experiment_follows_what_is_open():

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from fish_sim.robot import Robot
 from fish_train.diagnose import locate
-from fish_train.diagnose.decide import PLAUSIBLE, TEMPER, p_value, parameter_count, probabilities
+from fish_train.diagnose.decide import PLAUSIBLE, p_value, parameter_count
 from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.own_force import intervals, regimes
-from fish_train.diagnose.search import Round, evidence
+from fish_train.diagnose.pruning import odds
 from fish_train.diagnose.verdict import much_is_left, named, unexplained_share, verdict
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.cold import excess
@@ -24,9 +23,6 @@ from fish_train.identify.hypothesis import effect_class, specification
 from fish_train.identify.prediction import predict, prediction_errors
 
 HORIZONS = (1.0, 2.0, 5.0)
-STILL_GAINS = (
-    0.5  # share of a quick gain; of a rival's next to nothing is left once the other one is in the model
-)
 STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in surge, sway and yaw"
 
 
@@ -61,7 +57,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     name, found = accepted.name, accepted.round
     gains = {a.name: a.round.gain(a.name) for a in d.accepted}
     tried = len(found.ranking)
-    odds = competition(accepted, d.accepted, d.rounds)
+    probability = competition(accepted, d.accepted)
     return {
         "name": name,
         "kind": kind_of(name),
@@ -70,42 +66,26 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         "evidence": {
             "log_likelihood_gain": gains[name],
             "p_value": p_value(gains[name], parameter_count(name), tried),
-            "probability": odds[name],
+            "probability": probability[name],
         },
         "share": gains[name] / sum(gains.values()),
-        "rivals": [{"name": n, "probability": p} for n, p in odds.items() if n != name and p > PLAUSIBLE],
+        "rivals": [
+            {"name": n, "probability": p} for n, p in probability.items() if n != name and p > PLAUSIBLE
+        ],
         "where": where_entry(d, name),
     }
 
 
-def competition(accepted: Accepted, found: Sequence[Accepted], rounds: Sequence[Round]) -> dict[str, float]:
-    """Probability of a name and of its rivals, most probable first: those refitted in its round that explain the same.
-
-    What was found as well explains something else, and so does what still gains with the name in the model.
-    """
+def competition(accepted: Accepted, found: Sequence[Accepted]) -> dict[str, float]:
+    """Probability of a name and of its rivals, most probable first; what was found as well explains something else."""
     others = {other.name for other in found} - {accepted.name}
-    fits = {
-        n: f
-        for n, f in accepted.round.refitted.items()
-        if n == accepted.name or not (n in others or still_gains(n, accepted.round, rounds))
-    }
-    odds = probabilities({n: evidence(f, TEMPER) for n, f in fits.items()})
-    return dict(sorted(odds.items(), key=lambda item: -item[1]))
-
-
-def still_gains(name: str, found: Round, rounds: Sequence[Round]) -> bool:
-    """Whether a name's quick gain in the round after `found`, beside what was found there, is not much smaller than before."""
-    after = [later for before, later in pairwise(rounds) if before is found]
-    return any(later.quick_gain(name) > STILL_GAINS * found.quick_gain(name) > 0.0 for later in after)
+    return odds({name: fit for name, fit in accepted.contest.items() if name not in others})
 
 
 def rivals(d: Diagnosis) -> list[str]:
     """Names that the data cannot tell from what was found."""
     return [
-        n
-        for a in named(d)
-        for n, p in competition(a, d.accepted, d.rounds).items()
-        if n != a.name and p > PLAUSIBLE
+        n for a in named(d) for n, p in competition(a, d.accepted).items() if n != a.name and p > PLAUSIBLE
     ]
 
 

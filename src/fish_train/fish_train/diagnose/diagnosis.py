@@ -19,10 +19,12 @@ from fish_train.identify.fit import Fit
 
 @dataclass(frozen=True)
 class Accepted:
-    """An effect that was added, and the round it won."""
+    """An effect that was added, the round it won, and the fits that it competes with."""
 
     name: str
     round: Round
+    # name -> fit, its own among them: of its round, or in its place of the final model
+    contest: dict[str, Fit]
 
 
 @dataclass(frozen=True)

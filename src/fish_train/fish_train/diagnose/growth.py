@@ -1,26 +1,19 @@
-"""A model that grows by one effect at a time while one is significant, and is pruned of what that has made superfluous."""
+"""A model that grows by one effect at a time while one is significant."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fish_train.diagnose.base import anneal, refine, settle_base
+from fish_train.diagnose.base import anneal, refine
 from fish_train.diagnose.decide import SMALLEST_CHECK, SMALLEST_Z, Level, parameter_count, strength_z
 from fish_train.diagnose.diagnosis import Accepted
-from fish_train.diagnose.search import (
-    SCALE,
-    Progress,
-    Round,
-    evidence,
-    look_alike,
-    settled_round,
-    warm_starts,
-)
+from fish_train.diagnose.pruning import simplest
+from fish_train.diagnose.search import Progress, Round, evidence, settled_round
 from fish_train.diagnose.split import Trials
 from fish_train.diagnose.unseen import gain_left_out, gain_unseen, on_all
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment
-from fish_train.identify.fit import Fit, evaluate, log_posterior
+from fish_train.identify.fit import Fit
 
 MOST_EFFECTS = 3
 FAIR_SHARE = 0.5  # of the gain that a true effect shows on trials not fitted to: half-way to it
@@ -42,7 +35,7 @@ def grow(
         name = choose(found, trials, len(names), level)
         if name is None:
             break
-        accepted.append(Accepted(name, found))
+        accepted.append(Accepted(name, found, found.refitted))
         base = anneal(found.refitted[name], experiment)
         progress(f"found {name}: {found.gain(name):.0f} nats")
     return base, rounds, accepted
@@ -56,13 +49,8 @@ def choose(found: Round, trials: Trials, tried: int, level: Level) -> str | None
     good = [name for name in good if holds_elsewhere(base, found.refitted[name], trials, tried, level)]
     if not good:
         return None
-    best = max(good, key=lambda name: evidence(found.refitted[name]))
-    for name in good:
-        extra = parameter_count(best) - parameter_count(name)
-        lost = found.gain(best) - found.gain(name)
-        if extra > 0 and look_alike(name, best) and lost < level.enough(samples, extra, 1):
-            best = name
-    return best
+    refitted = {name: found.refitted[name] for name in good}
+    return simplest(max(good, key=lambda name: evidence(refitted[name])), refitted, level)
 
 
 def significant(found: Round, samples: float, tried: int, level: Level) -> list[str]:
@@ -95,58 +83,3 @@ def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fi
         return nominal, nominal
     nominal, final = on_all_cores(lambda fit: refine(fit, training), [rounds[0].base, base])
     return nominal, final
-
-
-def prune(
-    final: Fit, accepted: list[Accepted], training: Experiment, level: Level, progress: Progress
-) -> tuple[Fit, list[Accepted]]:
-    """Take effects out again that the others have made superfluous, and put in simpler look-alikes that do as well beside them.
-
-    An effect that was found while another one was missing may have been taken for something richer than it is.
-    """
-    samples = float(final.result.samples.sum())
-    for candidate in list(accepted)[:-1] if len(accepted) > 1 else []:
-        name = candidate.name
-        progress(f"without {name}?")
-        fit = settle_base(switched_off(final, name, training), training)
-        if final.objective - fit.objective < level.enough(samples, parameter_count(name), 1):
-            final, accepted = fit, [a for a in accepted if a is not candidate]
-            continue
-        for other in simpler(candidate, final):
-            progress(f"{other} instead of {name}?")
-            fit = exchanged(final, name, other, training)
-            extra = parameter_count(name) - parameter_count(other)
-            if final.objective - fit.objective < level.enough(samples, extra, 1):
-                new = Accepted(other, candidate.round)
-                final, accepted = fit, [new if a is candidate else a for a in accepted]
-                break
-    return final, accepted
-
-
-def simpler(candidate: Accepted, final: Fit) -> list[str]:
-    """Look-alikes with fewer parameters that competed in the candidate's round, the simplest first."""
-    name = candidate.name
-    names = [
-        n
-        for n in candidate.round.refitted
-        if look_alike(n, name)
-        and parameter_count(n) < parameter_count(name)
-        and n not in final.hypothesis.names
-    ]
-    return sorted(names, key=parameter_count)
-
-
-def exchanged(fit: Fit, name: str, other: str, experiment: Experiment) -> Fit:
-    """The fit with another effect in the place of one of its own, fitted."""
-    less = switched_off(fit, name, experiment)
-    hypothesis = less.hypothesis.with_effect(other, SCALE)
-    starts = warm_starts(less, other, experiment, fit.noise)
-    theta = max(starts, key=lambda start: log_posterior(hypothesis, start, experiment, fit.noise))
-    return settle_base(evaluate(hypothesis, theta, experiment, fit.noise), experiment)
-
-
-def switched_off(fit: Fit, name: str, experiment: Experiment) -> Fit:
-    """The fit less one effect, its other parameters as they are."""
-    smaller = fit.hypothesis.without(name)
-    keep = [i for i, free in enumerate(fit.hypothesis.free) if free in smaller.free]
-    return evaluate(smaller, fit.theta[keep], experiment, fit.noise)

@@ -11,10 +11,11 @@ from fish_sim.robot import Robot
 from fish_train.diagnose.base import fit_base
 from fish_train.diagnose.decide import Level
 from fish_train.diagnose.diagnosis import Accepted, Diagnosis
-from fish_train.diagnose.growth import final_fits, grow, prune, switched_off
+from fish_train.diagnose.growth import final_fits, grow
 from fish_train.diagnose.law import describe
 from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.diagnose.own_force import has_own_force, own_force
+from fish_train.diagnose.pruning import prune, switched_off
 from fish_train.diagnose.search import Progress
 from fish_train.diagnose.split import split_trials, trials_of
 from fish_train.diagnose.tail import finer_tail

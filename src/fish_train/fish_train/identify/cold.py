@@ -23,6 +23,7 @@ from fish_train.identify.tempering import LEADING, TAIL_INERTIAS, Report, close,
 
 FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
 SPREAD, HOP = 0.2, 0.1  # how far a start and a hop are off: of the logarithms of the nominal parameters
+FEW_LINKS = 3  # of a tail with so few optima that one which leaves no more than water does is the best
 SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
 
 
@@ -32,11 +33,12 @@ def fit_cold(
 ) -> Fit:  # fmt: skip
     """The best of many optima; a fit that leaves much is looked at again. places: (K,) theta to begin at besides.
 
-    Where much is missing, optima where the camera leads tell little of those at the IMU's full weight: there another way
-    competes, the tail's inertias held at several values until then. Either has ended thousands of nats below the other.
+    Where much is missing, or the tail has many links, optima where the camera leads tell little of those at the IMU's full
+    weight: there another way competes, the tail's inertias held at several values until then. Either has ended thousands
+    of nats below the other, and one a thousand below that left no more than water does.
     """
     fit = second_look(fit_multistart(hypothesis, experiment, noise, report, places), experiment, report)
-    if excess(fit).max() < SUSPICIOUS:
+    if excess(fit).max() < SUSPICIOUS and hypothesis.robot.links <= FEW_LINKS:
         return fit
     return better(fit, fit_tempered(hypothesis, experiment, noise, report=report, held=TAIL_INERTIAS))
 
