@@ -10,13 +10,20 @@ from fish_control.node_configs import ControllerConfig
 
 
 @dataclass(frozen=True)
+class EstimateSigns:
+    """What speaks for an estimate of the motion."""
+
+    age: float  # s since the stamp
+    finite: bool
+    pose_variance: float  # largest of x, y [m^2] and heading [rad^2]
+    twist_variance: float  # largest of u, v [m^2/s^2] and r [rad^2/s^2]
+
+
+@dataclass(frozen=True)
 class Signs:
     """What the controller knows at one moment; None where nothing came yet."""
 
-    odometry_age: float | None  # s since the stamp
-    odometry_finite: bool
-    pose_variance: float  # largest of x, y [m^2] and heading [rad^2]
-    twist_variance: float  # largest of u, v [m^2/s^2] and r [rad^2/s^2]
+    estimate: EstimateSigns | None
     target_age: float | None  # s since the stamp
 
 
@@ -70,21 +77,33 @@ class Watchdog:
         return False
 
     def _fault(self, signs: Signs) -> str | None:
-        if signs.odometry_age is None:
+        config = self._config
+        if signs.estimate is None:
             return "waiting for odometry"
-        if not signs.odometry_finite:
-            return "odometry is not finite"
-        if signs.odometry_age > self._config.odometry_timeout:
-            return _stale("odometry", signs.odometry_age, self._config.odometry_timeout)
-        if not signs.pose_variance <= self._config.largest_variance:
-            return "camera lost: fusion does not vouch for the pose"
-        if not signs.twist_variance <= self._config.largest_variance:
-            return "IMU lost: fusion does not vouch for the velocity"
+        fault = estimate_fault(signs.estimate, config.odometry_timeout, config.largest_variance)
+        if fault is not None:
+            return fault
         if signs.target_age is None:
             return "waiting for a target"
-        if signs.target_age > self._config.target_timeout:
-            return _stale("target", signs.target_age, self._config.target_timeout)
+        if signs.target_age > config.target_timeout:
+            return _stale("target", signs.target_age, config.target_timeout)
         return None
+
+
+def estimate_fault(signs: EstimateSigns, timeout: float, largest_variance: float) -> str | None:
+    """What is wrong with an estimate, None if nothing is.
+
+    timeout: s; largest_variance: m^2, rad^2 and their rates. Fusion marks what it has lost with a far larger one.
+    """
+    if not signs.finite:
+        return "odometry is not finite"
+    if signs.age > timeout:
+        return _stale("odometry", signs.age, timeout)
+    if not signs.pose_variance <= largest_variance:
+        return "camera lost: fusion does not vouch for the pose"
+    if not signs.twist_variance <= largest_variance:
+        return "IMU lost: fusion does not vouch for the velocity"
+    return None
 
 
 def _stale(name: str, age: float, allowed: float) -> str:

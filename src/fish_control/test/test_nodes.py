@@ -400,7 +400,7 @@ def show(b, seconds, **odometry_changes):
 
 def test_exciter_waits_for_the_estimate_swims_its_part_and_ends_at_rest(bench, tmp_path):
     b = exciter_bench(bench, tmp_path, begin=2.0, end=2.8)
-    b.until(lambda: b.said(b"\x01", "waiting for odometry"))
+    b.until(lambda: b.said(b"\x01", "waiting for odometry") and len(b.heard["joint_command"]) >= 10)
     np.testing.assert_allclose(commands(b, 10)[:, 1:], 0.0)
     show(b, 2.5)
     assert b.said(b"\x00", "ended at 2.8 s, as programmed")
@@ -415,7 +415,7 @@ def test_exciter_waits_for_the_estimate_swims_its_part_and_ends_at_rest(bench, t
         ({"x": 2.0}, b"\x01", "before a wall, at (2.00, 0.00) m"),
         ({"x": math.nan}, b"\x02", "odometry is not finite"),
         ({"variance": LOST_VARIANCE}, b"\x02", "does not vouch"),
-        (None, b"\x02", "s old"),
+        (None, b"\x02", "odometry is stale"),
     ],
 )
 def test_exciter_stops_for_good_where_the_guard_finds_a_reason(bench, tmp_path, fault, level, said):

@@ -6,14 +6,21 @@ from dataclasses import replace
 import pytest
 
 from fish_control.node_configs import ControllerConfig
-from fish_control.watchdog import Signs, Watchdog
+from fish_control.watchdog import EstimateSigns, Signs, Watchdog
 
-GOOD = Signs(0.01, True, 1e-5, 1e-4, 0.02)
+SURE = EstimateSigns(0.01, True, 1e-5, 1e-4)
+GOOD = Signs(SURE, 0.02)
+
+
+def but(**changes):
+    return replace(GOOD, estimate=replace(SURE, **changes))
+
+
 FAULTS = {
-    "odometry is stale": replace(GOOD, odometry_age=0.3),
-    "odometry is not finite": replace(GOOD, odometry_finite=False),
-    "camera lost": replace(GOOD, pose_variance=1e4),
-    "IMU lost": replace(GOOD, twist_variance=1e4),
+    "odometry is stale": but(age=0.3),
+    "odometry is not finite": but(finite=False),
+    "camera lost": but(pose_variance=1e4),
+    "IMU lost": but(twist_variance=1e4),
     "target is stale": replace(GOOD, target_age=0.5),
 }
 
@@ -26,7 +33,7 @@ def swimming(**parameters):
 
 def test_it_waits_for_odometry_and_target_without_calling_it_a_stop():
     dog = Watchdog(ControllerConfig())
-    assert not dog.check(0.0, Signs(None, True, math.inf, math.inf, None))
+    assert not dog.check(0.0, Signs(None, None))
     assert dog.reason == "waiting for odometry"
     assert not dog.check(0.1, replace(GOOD, target_age=None))
     assert (dog.state, dog.stops) == ("waiting", 0)
@@ -42,7 +49,7 @@ def test_every_fault_stops_at_once_and_is_said(said):
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_a_variance_that_is_no_number_is_a_fault(value):
-    assert not swimming().check(0.01, replace(GOOD, pose_variance=value))
+    assert not swimming().check(0.01, but(pose_variance=value))
 
 
 @pytest.mark.parametrize("said", FAULTS)

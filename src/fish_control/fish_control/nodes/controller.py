@@ -31,9 +31,9 @@ from fish_control.nodes.messages import (
     OK,
     WARN,
     diagnostics,
+    estimate_signs,
     joint_command,
     motion_of,
-    planar_covariance,
     seconds,
     yaw_of,
 )
@@ -53,7 +53,7 @@ class ControllerNode(Node):
         require_fit(policy, file, 1.0 / config.rate_hz, config.lookahead, config.robot_hash)
         self._controller = Controller(policy)
         self._watchdog = Watchdog(config)
-        self._signs = Signs(None, True, math.inf, math.inf, None)
+        self._odometry: Odometry | None = None
         self._odometry_time = self._target_time = math.nan
         self._wanted = Wanted(0.0, 0.0, 0.0, 0.0)
         self._now = math.nan
@@ -76,16 +76,8 @@ class ControllerNode(Node):
 
     def _on_odometry(self, message: Odometry) -> None:
         motion = motion_of(message)
-        finite = motion_is_finite(motion)
-        pose, twist = planar_covariance(message.pose.covariance), planar_covariance(message.twist.covariance)
-        self._signs = replace(
-            self._signs,
-            odometry_finite=finite,
-            pose_variance=float(pose.diagonal().max()),
-            twist_variance=float(twist.diagonal().max()),
-        )
-        self._odometry_time = seconds(message.header.stamp)
-        if finite:
+        self._odometry, self._odometry_time = message, seconds(message.header.stamp)
+        if motion_is_finite(motion):
             self._controller.observe(self._odometry_time, motion)
 
     def _on_twist(self, message: TwistStamped) -> None:
@@ -115,7 +107,7 @@ class ControllerNode(Node):
         dt = 1.0 / self._config.command_rate_hz if math.isnan(self._now) else now - self._now
         dt = min(max(dt, 0.0), LONGEST_PERIOD)
         self._now = now
-        may_swim = self._watchdog.check(now, self._aged_signs(now))
+        may_swim = self._watchdog.check(now, self._signs(now))
         if not may_swim:
             self._controller.rest()
         elif self._wanted.speed <= 0.0:
@@ -130,11 +122,11 @@ class ControllerNode(Node):
         if self._watchdog.state != self._said:
             self._report()
 
-    def _aged_signs(self, now: float) -> Signs:
-        def age(time: float) -> float | None:
-            return None if math.isnan(time) else now - time
-
-        return replace(self._signs, odometry_age=age(self._odometry_time), target_age=age(self._target_time))
+    def _signs(self, now: float) -> Signs:
+        return Signs(
+            None if self._odometry is None else estimate_signs(self._odometry, now),
+            None if math.isnan(self._target_time) else now - self._target_time,
+        )
 
     def _report(self) -> None:
         self._said = self._watchdog.state

@@ -3,7 +3,7 @@
 joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder:
 position = alpha (rad). It takes the place of planner and controller, begins when the estimate has come and ends
 by itself. The guard looks at the estimate only to stop: before a wall, and when the estimate is lost. Decisions
-are in Excitation and wall_guard.
+are in Exciter and Excitation.
 """
 
 import math
@@ -15,41 +15,40 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from fish_control.controller import LONGEST_PERIOD, Command
-from fish_control.excitation import LIMITS, Excitation, read_program
+from fish_control.controller import LONGEST_PERIOD
+from fish_control.excitation import Excitation, read_program
+from fish_control.exciter import Exciter, Sight, State
 from fish_control.node_configs import ExciterConfig
 from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
     diagnostics,
+    estimate_signs,
     joint_command,
     motion_of,
-    planar_covariance,
-    seconds,
 )
 from fish_control.nodes.start import read_parameters, run
-from fish_control.planner import motion_is_finite
-from fish_control.wall_guard import heads_for_a_wall, stopping_rudder
 
-AT_REST = Command(0.0, 0.0, 0.0)
+LEVELS: dict[State, bytes] = {"waiting": WARN, "before a wall": WARN, "lost": ERROR}  # the others are well
 
 
 class ExciterNode(Node):
-    """Topics in and out of Excitation."""
+    """Topics in and out of Exciter."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("exciter", namespace="fish", **options)
-        self._config = config = read_parameters(self, ExciterConfig)
+        config = read_parameters(self, ExciterConfig)
         if not config.program_file:
             raise ValueError(
                 "program_file is empty, expected a file with a program: a diagnosis.json has one"
             )
         program = read_program(Path(config.program_file))
         self._excitation = Excitation(program, config.begin, config.end or math.inf)
+        self._exciter = Exciter(config, self._excitation)
         self._odometry: Odometry | None = None
-        self._now = self._first = math.nan
-        self._level, self._said = WARN, "waiting for odometry" if config.guard else "at rest"
+        self._now = math.nan
+        self._said: State | None = None
         self._command = self.create_publisher(JointState, "joint_command", 10)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
@@ -64,64 +63,25 @@ class ExciterNode(Node):
         now = clock.nanoseconds * 1e-9
         dt = 0.0 if math.isnan(self._now) else min(max(now - self._now, 0.0), LONGEST_PERIOD)
         self._now = now
-        command = self._excitation.command(dt) if self._may_move(now) else AT_REST
+        command = self._exciter.command(now, dt, self._sight(now))
         self._command.publish(joint_command(clock.to_msg(), command))
+        if self._exciter.state != self._said:
+            self._report()
 
-    def _may_move(self, now: float) -> bool:
-        """False before the begin; afterwards always, for a stopped program brings rotor and rudder to rest."""
-        if self._config.guard and self._odometry is None:
-            return False
-        if math.isnan(self._first):
-            self._first = now
-            self._say(OK, "at rest")
-        if now - self._first < self._config.rest:
-            return False
-        if self._said == "at rest":
-            self._say(OK, "swimming")
-        if not self._excitation.over:
-            self._look(now)
-        if self._excitation.over and self._said == "swimming":
-            self._say(OK, f"ended at {self._excitation.time:.1f} s, as programmed")
-        return True
-
-    def _look(self, now: float) -> None:
-        """Stop where the guard finds a reason."""
-        if not self._config.guard or self._odometry is None:
-            return
-        config, message, time = self._config, self._odometry, self._excitation.time
-        motion, age = motion_of(message), now - seconds(message.header.stamp)
-        pose, twist = planar_covariance(message.pose.covariance), planar_covariance(message.twist.covariance)
-        if not motion_is_finite(motion):
-            self._stop(ERROR, f"stopped at {time:.1f} s: odometry is not finite")
-        elif age > config.odometry_timeout:
-            self._stop(ERROR, f"stopped at {time:.1f} s: odometry is {age:.2f} s old")
-        elif not max(pose.diagonal().max(), twist.diagonal().max()) <= config.largest_variance:
-            self._stop(ERROR, f"stopped at {time:.1f} s: fusion does not vouch for the estimate")
-        elif heads_for_a_wall(motion, config.horizon, config.margin):
-            where = f"({motion.x:.2f}, {motion.y:.2f}) m"
-            self._stop(
-                WARN,
-                f"stopped at {time:.1f} s before a wall, at {where}",
-                stopping_rudder(motion, LIMITS.rudder_range),
-            )
-
-    def _stop(self, level: bytes, reason: str, rudder: float = 0.0) -> None:
-        self._excitation.stop(rudder)
-        self._say(level, reason)
-
-    def _say(self, level: bytes, text: str) -> None:
-        self._level, self._said = level, text
-        self._report()
+    def _sight(self, now: float) -> Sight | None:
+        message = self._odometry
+        return None if message is None else Sight(motion_of(message), estimate_signs(message, now))
 
     def _report(self) -> None:
+        self._said = self._exciter.state
         now = self.get_clock().now().to_msg()
         values: dict[str, object] = {
             "time_s": f"{self._excitation.time:.2f}",
             "end_s": f"{self._excitation.end:.2f}",
             "over": str(self._excitation.over).lower(),
         }
-        name = self.get_fully_qualified_name()
-        self._diagnostics.publish(diagnostics(now, name, self._level, self._said, values))
+        name, level = self.get_fully_qualified_name(), LEVELS.get(self._said, OK)
+        self._diagnostics.publish(diagnostics(now, name, level, self._exciter.reason, values))
 
 
 def main() -> None:

@@ -12,6 +12,8 @@ from sensor_msgs.msg import JointState
 
 from fish_control.controller import Command
 from fish_control.line_of_sight import Motion
+from fish_control.planner import motion_is_finite
+from fish_control.watchdog import EstimateSigns
 
 PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
 
@@ -60,6 +62,17 @@ def motion_of(message: Odometry) -> Motion:
 def planar_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """(36,) of a message to (3, 3) of x, y and yaw."""
     return np.reshape(covariance, (6, 6))[np.ix_(PLANAR, PLANAR)]
+
+
+def estimate_signs(message: Odometry, now: float) -> EstimateSigns:
+    """What speaks for an estimate at `now` [s]."""
+    pose, twist = planar_covariance(message.pose.covariance), planar_covariance(message.twist.covariance)
+    return EstimateSigns(
+        age=now - seconds(message.header.stamp),
+        finite=motion_is_finite(motion_of(message)),
+        pose_variance=float(pose.diagonal().max()),
+        twist_variance=float(twist.diagonal().max()),
+    )
 
 
 def to_covariance(planar: NDArray[np.float64]) -> NDArray[np.float64]:
