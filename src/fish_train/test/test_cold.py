@@ -68,9 +68,12 @@ def test_a_fit_that_has_no_likelihood_is_never_the_better_one() -> None:
     assert cold.better(lost, low) is low and cold.better(low, lost) is low
 
 
-@pytest.mark.parametrize(("left", "other", "best"), [(9.0, 7.0, 7.0), (9.0, 3.0, 5.0), (1.0, 7.0, 5.0)])
-def test_a_fit_that_leaves_much_competes_with_one_whose_tail_is_held_at_first(
-    monkeypatch, left: float, other: float, best: float
+@pytest.mark.parametrize(
+    ("links", "left", "other", "best"),
+    [(3, 9.0, 7.0, 7.0), (3, 9.0, 3.0, 5.0), (3, 1.0, 7.0, 5.0), (4, 1.0, 7.0, 7.0)],
+)
+def test_a_fit_of_many_links_or_that_leaves_much_competes_with_one_whose_tail_is_held_at_first(
+    monkeypatch, links: int, left: float, other: float, best: float
 ) -> None:
     monkeypatch.setattr(cold, "fit_multistart", lambda *_: SimpleNamespace(objective=5.0))
     monkeypatch.setattr(cold, "second_look", lambda fit, *_: fit)
@@ -81,7 +84,8 @@ def test_a_fit_that_leaves_much_competes_with_one_whose_tail_is_held_at_first(
         return SimpleNamespace(objective=other)
 
     monkeypatch.setattr(cold, "fit_tempered", fit_held)
-    assert cold.fit_cold(None, None, None).objective == best
+    hypothesis = SimpleNamespace(robot=SimpleNamespace(links=links))
+    assert cold.fit_cold(hypothesis, None, None).objective == best
 
 
 @pytest.mark.parametrize("sensors_are_right", [True, False])
