@@ -18,15 +18,11 @@ from fish_train.commands.main import main
 from fish_train.diagnose.locate import MissingForce
 from fish_train.diagnose.own_force import acting, f1, own_force, regimes
 from fish_train.diagnose.vocabulary import candidates
-from fish_train.evaluation.cells import Cell
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
-from fish_train.evaluation.study import Condition, Row
 from fish_train.identify.experiment import build_experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
-from fish_train.prove import close_loop, groups, tool_version
+from fish_train.prove import groups, tool_version
 from fish_train.prove.build import make_readings, make_world
-from fish_train.prove.close_loop import loop_table, loop_world, search
 from fish_train.prove.judge import judged_table, rivals_table
 from fish_train.prove.mujoco_plant import MujocoPlant, model_text
 from fish_train.prove.nulls import null_table
@@ -301,34 +297,6 @@ def test_power_counts_per_strength() -> None:
     assert [(p.strength, p.found.k, p.found.n, p.oracle.k) for p in steps] == [(0.5, 1, 2, 2), (1.0, 1, 1, 0)]
 
 
-def test_what_the_loop_cannot_conceal_is_said() -> None:
-    assert loop_world("nothing", 1, 3, 4.0).effects == {}
-    with pytest.raises(ValueError, match="concealed: got 'storm'; expected one of nothing, "):
-        loop_world("storm", 1, 3, 4.0)
-
-
-def test_a_search_on_the_plant_goes_on_where_it_was_stopped(tmp_path, monkeypatch) -> None:
-    swum = []
-
-    def swim(candidates, conditions, cells, jobs):
-        assert not conditions[0].fused
-        if len(swum) == 7 and "stop" in cells:
-            raise KeyboardInterrupt
-        gains = candidates[0].gains.policy.gains(np.zeros(0))
-        swum.append(gains)
-        sizes = SimpleNamespace(cross_track_rmse=abs(np.log(gains.steering_kp)), speed_rmse=gains.speed_kp)
-        return [SimpleNamespace(metrics=SimpleNamespace(whole=sizes))]
-
-    monkeypatch.setattr(close_loop, "run_study", swim)
-    plant = Condition(name="second plant")
-    whole = search(plant, (), 20, 1, tmp_path / "whole.json")
-    expected, swum[:] = list(swum), []
-    with pytest.raises(KeyboardInterrupt):
-        search(plant, ("stop",), 20, 1, tmp_path / "again.json")
-    assert search(plant, (), 20, 1, tmp_path / "again.json") == whole
-    assert swum == expected and len(swum) >= 15
-
-
 def test_overlap_of_times_and_degrees_of_freedom() -> None:
     acts, names = np.zeros((800, 2), dtype=bool), ["trial_00", "trial_01"]
     acts[200:400, 1] = True
@@ -405,17 +373,6 @@ def test_the_oracle_and_the_rivals_by_hand() -> None:
     }
     rows = rivals_table([right, null], said).rows
     assert rows[0][1].startswith("1/1") and rows[1][1].startswith("0/1") and rows[1][2].startswith("0/1")
-
-
-def test_the_gap_is_shared_out_by_hand() -> None:
-    def row(name: str, cross_track: float, speed: float) -> Row:
-        sizes = ErrorSizes(cross_track, *(0.0,) * 4, speed, *(0.0,) * 4)
-        return Row(name, "second plant", Cell("S", 0.1, 1), RunMetrics(sizes, sizes, 1.0, ""))
-
-    errors = {"nominal": (0.03, 0.02), "corrected": (0.014, 0.02), "true": (0.01, 0.02)}
-    table = loop_table([row(name, *sizes) for name, sizes in errors.items()])
-    assert [r[2] for r in table.rows] == ["0%", "80%", "100%"]
-    assert table.rows[1][4] == "no gap"
 
 
 def test_a_competitor_finds_the_law_it_was_shown() -> None:

@@ -174,11 +174,12 @@ def _study(args: argparse.Namespace, console: Console) -> Study:
 
 
 def _close_loop(args: argparse.Namespace, console: Console) -> int:
-    """Recordings of the second plant, four trainings, one table and page."""
+    """Recordings of the second plant, three trainings, a search on the plant, one table and page."""
     from fish_train.evaluation.study import write_rows
     from fish_train.prove.build import make_world
-    from fish_train.prove.close_loop import Plan, close_loop, loop_table, loop_world
-    from fish_train.reports.page import write_page
+    from fish_train.prove.close_loop import Plan, close_loop, loop_world
+    from fish_train.reports.loop_page import loop_figure, loop_table
+    from fish_train.reports.page import Block, Figure, write_page
     from fish_train.score_table import print_table
 
     from .inputs import user_errors
@@ -193,7 +194,8 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
     print_table(console, table)
     write_rows(args.out / "runs.csv", rows)
     lead = f"The second plant with {args.close_loop} concealed in it, seed {world.seed}."
-    write_page(args.out / "loop.html", "Does a better model make better gains?", lead, [table])
+    blocks: list[Block] = [table, Figure("Every run", loop_figure(rows))]
+    write_page(args.out / "loop.html", "Does a better model make better gains?", lead, blocks)
     console.print(f"{args.out}/loop.html, runs.csv", soft_wrap=True)
     return 0
 

@@ -1,0 +1,119 @@
+"""Gains from three models and from the plant itself: what is searched, what is judged, and how the gap is shared out."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fish_control.gains_file import write_gains_file
+from fish_control.hand_tuned import hand_tuned_policy
+from fish_train.errors import UserError
+from fish_train.evaluation.cells import Cell
+from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
+from fish_train.evaluation.study import Condition, Row
+from fish_train.prove import close_loop, gain_search
+from fish_train.prove.close_loop import JUDGE_SEEDS, Plan, loop_world
+from fish_train.prove.gain_search import search
+from fish_train.reports.loop_page import gap_share, loop_figure, loop_table
+
+CELL = Cell("S", 0.1, 1)
+
+
+def row(name: str, cross_track: float, speed: float = 0.02, cell: Cell = CELL) -> Row:
+    sizes = ErrorSizes(cross_track, *(0.0,) * 4, speed, *(0.0,) * 4)
+    return Row(name, "second plant", cell, RunMetrics(sizes, sizes, 1.0, ""))
+
+
+def test_what_the_loop_cannot_conceal_is_said() -> None:
+    assert loop_world("nothing", 1, 3, 4.0).effects == {}
+    with pytest.raises(ValueError, match="concealed: got 'storm'; expected one of nothing, "):
+        loop_world("storm", 1, 3, 4.0)
+
+
+def test_a_search_on_the_plant_goes_on_where_it_was_stopped(tmp_path, monkeypatch) -> None:
+    swum = []
+
+    def swim(candidates, conditions, cells, jobs):
+        assert not conditions[0].fused
+        if len(swum) == 7 and "stop" in cells:
+            raise KeyboardInterrupt
+        gains = candidates[0].gains.policy.gains(np.zeros(0))
+        swum.append(gains)
+        sizes = SimpleNamespace(cross_track_rmse=abs(np.log(gains.steering_kp)), speed_rmse=gains.speed_kp)
+        return [SimpleNamespace(metrics=SimpleNamespace(whole=sizes))]
+
+    monkeypatch.setattr(gain_search, "run_study", swim)
+    plant = Condition(name="second plant")
+    whole = search(plant, (), 20, 1, tmp_path / "whole.json")
+    expected, swum[:] = list(swum), []
+    with pytest.raises(KeyboardInterrupt):
+        search(plant, ("stop",), 20, 1, tmp_path / "again.json")
+    assert search(plant, (), 20, 1, tmp_path / "again.json") == whole
+    assert swum == expected and len(swum) >= 15
+
+
+def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -> None:
+    """Verbs are stood in for: what they are given and what is swum is what is asked here."""
+    verbs, searched, judged = [], [], []
+
+    def verb(name: str, *arguments: str) -> None:
+        verbs.append((name, *arguments))
+        out = Path(arguments[arguments.index("--out") + 1])
+        made = {"train": "seed_1/gains.safetensors", "identify": "robot.yaml", "diagnose": "model.yaml"}[name]
+        (out / made).parent.mkdir(parents=True, exist_ok=True)
+        write_gains_file(out / made, hand_tuned_policy())
+        if name == "train" and "corrected" in str(out):
+            raise UserError("a recipe that is not swum to its end")
+
+    def try_gains(candidates, conditions, cells, jobs):
+        searched.extend(cells)
+        return [row(c.name, 0.01, cell=cell) for c in candidates for cell in cells]
+
+    def swim(candidates, conditions, cells, jobs):
+        assert conditions[0].fused
+        judged.extend(cells)
+        return [row(c.name, 0.01, cell=cell) for c in candidates for cell in cells]
+
+    monkeypatch.setattr(close_loop, "_verb", verb)
+    monkeypatch.setattr(gain_search, "run_study", try_gains)
+    monkeypatch.setattr(close_loop, "run_study", swim)
+    plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path / "out", search=8)
+    rows = close_loop.close_loop(plan, 2, lambda _: None)
+    assert list(dict.fromkeys(r.candidate for r in rows)) == ["nominal", "refitted", "corrected", "true"]
+    assert {v[0] for v in verbs[:2]} == {"identify", "diagnose"} and [v[0] for v in verbs[2:]] == [
+        "train"
+    ] * 3
+    given = {Path(v[v.index("--out") + 1]).name: v for v in verbs[2:]}
+    assert "--robot" not in given["nominal"]
+    assert str(tmp_path / "out" / "identify" / "robot.yaml") in given["refitted"]
+    assert str(tmp_path / "out" / "diagnose" / "model.yaml") in given["corrected"]
+    assert {c.seed for c in judged} == set(JUDGE_SEEDS)
+    assert {(c.path, c.speed) for c in judged} == {(c.path, c.speed) for c in searched}
+    assert {c.seed for c in searched}.isdisjoint(JUDGE_SEEDS)
+    done = len(verbs)
+    close_loop.close_loop(plan, 2, lambda _: None)
+    assert len(verbs) == done  # what is there is used
+
+
+def test_the_gap_is_shared_out_by_hand() -> None:
+    errors = {"nominal": (0.03, 0.02), "corrected": (0.014, 0.02), "true": (0.01, 0.02)}
+    rows = [row(name, *sizes) for name, sizes in errors.items()]
+    table = loop_table(rows)
+    assert [r[2] for r in table.rows] == ["0%", "80%", "100%"]
+    assert table.rows[1][4] == "no gap"
+    assert [box.y[0] for box in loop_figure(rows).data] == pytest.approx([30.0, 14.0, 10.0])
+
+
+def test_the_interval_of_a_share_is_as_wide_as_runs_differ() -> None:
+    random = np.random.default_rng(3)
+    water = random.normal(0.0, 0.02, 24)  # common to the runs of a cell, so it drops out
+    nominal, true = 0.08 + water, 0.05 + water
+    calm = gap_share(nominal, 0.056 + water, true)
+    assert calm == pytest.approx((0.8, 0.8, 0.8))
+    share, low, high = gap_share(nominal, 0.056 + water + random.normal(0.0, 0.01, 24), true)
+    assert low < 0.8 < high and low < share < high
+    assert 0.1 < high - low < 0.6  # 4 standard errors of 0.01 / sqrt(24) / 0.03: 0.27
+    assert np.isnan(gap_share(true, nominal, nominal)[0])
+    unsure = np.array([0.10, 0.01] * 12)  # a gap of 0.005 that other runs may not have
+    assert gap_share(unsure, np.zeros(24), np.full(24, 0.05))[2] == np.inf
