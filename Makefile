@@ -21,15 +21,16 @@ SOURCES := $(shell find src -not -path '*/test*' -not -path '*/__pycache__*' -no
 PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help setup build demo test lint identify diagnose prove predict train evaluate paper clean distclean
+.PHONY: help setup build demo test lint identify diagnose prove train evaluate paper clean distclean
 
 help:
 	@echo "make demo       the whole robot swims the letter R, is recorded, scored and shown; options:"
 	@echo "                LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder"
 	@echo "make test       build, the tests of every package, the tests across packages"
-	@echo "make identify, diagnose, predict, train, evaluate ARGS='...'   the offline tools; ARGS=--help says more"
+	@echo "make identify, diagnose DATASET=folder   the model's parameters; the physics that it lacks"
 	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--worlds 300' for the long one"
-	@echo "make paper      the figures and the table of the paper"
+	@echo "make train, evaluate, paper   learn the gains; how well they follow paths; the figures and the table of the paper"
+	@echo "                results in out/NAME or OUT=folder; ARGS='...' goes to the command, ARGS=--help says more"
 	@echo "make setup, build, lint, clean, distclean   the single steps"
 
 # --- set-up: virtual environment and wheels -----------------------------------------------------------------------------
@@ -46,7 +47,12 @@ $(VENV)/.run: requirements.txt constraints.txt $(VENV)/.created
 	@$(PIP) -r requirements.txt
 	@touch $@
 
-$(VENV)/.train: requirements-train.txt constraints.txt $(VENV)/.run
+$(VENV)/.diagnose: requirements-diagnose.txt constraints.txt $(VENV)/.run
+	@echo "setup: wheels of requirements-diagnose.txt"
+	@$(PIP) -r requirements-diagnose.txt
+	@touch $@
+
+$(VENV)/.train: requirements-train.txt constraints.txt $(VENV)/.diagnose
 	@echo "setup: wheels of requirements-train.txt"
 	@$(PIP) -r requirements-train.txt
 	@touch $@
@@ -59,8 +65,10 @@ $(VENV)/.dev: requirements-dev.txt constraints.txt $(VENV)/.train
 setup: $(VENV)/.dev
 
 # --- build ----------------------------------------------------------------------------------------------------------------
+# The command fish_train stands beside colcon's executables in the environment's folder of commands.
 install/.built: $(VENV)/.run colcon.meta $(SOURCES)
 	@$(ACTIVATE); colcon build
+	@ln -sfn ../../install/fish_train/lib/fish_train/fish_train $(VENV)/bin/fish_train
 	@touch $@
 
 build: install/.built
@@ -71,11 +79,16 @@ demo: build
 		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
 
 # A few small worlds; ARGS='--worlds 300 --oracle' is the study. The same OUT goes on where it was stopped.
-prove: build $(VENV)/.train
+prove: build $(VENV)/.diagnose
 	@$(FISH_TRAIN) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--worlds 4 --groups single sensor outside null --trials 6 --duration 8)
 
-identify diagnose predict train evaluate paper: build $(VENV)/.train
-	@$(FISH_TRAIN) $@ $(DATASET) $(if $(DATASET),--out out/$@) $(ARGS)
+identify diagnose: build $(VENV)/.diagnose
+	@$(FISH_TRAIN) $@ $(DATASET) --out '$(or $(OUT),out/$@)' $(ARGS)
+
+evaluate: build $(VENV)/.diagnose
+train paper: build $(VENV)/.train
+train evaluate paper:
+	@$(FISH_TRAIN) $@ --out '$(or $(OUT),out/$@)' $(ARGS)
 
 # --- tests ----------------------------------------------------------------------------------------------------------------
 # Built packages need not wait for the tests of those they depend on: both cores stay busy (drop_test_deps).

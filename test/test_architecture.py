@@ -63,6 +63,20 @@ def test_only_nodes_know_ros():
     assert not wrong, "\n".join(wrong)
 
 
+def test_only_training_needs_torch():
+    """The wheel is large: identify, diagnose, prove and evaluate are installed without it."""
+    code = """
+import importlib, pkgutil, sys, fish_train
+train = ("fish_train.training.", "fish_train.evaluation.paper_")  # `paper` trains nine seeds
+for module in pkgutil.walk_packages(fish_train.__path__, "fish_train."):
+    if not module.name.startswith((*train, "fish_train.nodes", "fish_train.commands.main")):
+        importlib.import_module(module.name)
+assert not {"torch", "tensorboard"} & set(sys.modules)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+
+
 @pytest.mark.parametrize("check", [["check"], ["format", "--check"]], ids=["ruff check", "ruff format"])
 def test_ruff(check):
     program = shutil.which("ruff", path=str(Path(sys.executable).parent))

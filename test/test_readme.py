@@ -28,12 +28,10 @@ def test_every_verb_is_listed():
     assert set(listed) == set(VERBS)
 
 
-@pytest.mark.parametrize(
-    "name", ["requirements.txt", "requirements-train.txt", "requirements-dev.txt", "requirements-bench.txt"]
-)
-def test_every_dependency_is_pinned_and_has_a_reason(name):
+@pytest.mark.parametrize("file", sorted(ROOT.glob("requirements*.txt")), ids=lambda file: file.name)
+def test_every_dependency_is_pinned_and_has_a_reason(file):
     table = section("## Dependencies").lower()
-    lines = [line for line in (ROOT / name).read_text().splitlines() if line and not line.startswith("#")]
+    lines = [line for line in file.read_text().splitlines() if line and not line.startswith("#")]
     for line in lines:
         package, version = line.split("==")
         assert version

@@ -1,10 +1,10 @@
 """Compare the simulator with trajectories of an independent implementation of the same equations.
 
-    python src/fish_sim/benchmarks/check_reference.py [FOLDER]
+    python src/fish_sim/benchmarks/check_reference.py FOLDER
 
-FOLDER (default ../shared/reference beside the checkout) holds CSV files: time, q, q', alpha, tip force,
-inputs; they were integrated with RK4 at 0.5 ms. Prints for every file differences relative to the largest value
-of each quantity, the worst of them:
+FOLDER, which does not come with the project, holds CSV files: time, q, q', alpha, tip force, inputs; they were
+integrated with RK4 at 0.5 ms. Prints for every file differences relative to the largest value of each quantity, the
+worst of them:
   same method   our equations integrated as the file was (RK4 at 0.5 ms)
   ours          our default scheme, but steps of 5 ms at most
   halved        ours against ours with half the steps: our own integration error
@@ -30,7 +30,6 @@ from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme, default_scheme
 from fish_sim.step import Stepper
 
-DEFAULT = Path(__file__).resolve().parents[4] / "shared" / "reference"
 LIMIT = 1e-4  # at 5 ms or finer, beside the reference's own error
 ENERGY_LIMIT = 1e-6  # per second
 SAME_METHOD_LIMIT = 1e-7  # the files have ten digits
@@ -109,7 +108,10 @@ def compare(path: Path) -> bool:
 
 
 def main() -> int:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT
+    if len(sys.argv) != 2:
+        print("usage: check_reference.py FOLDER (of reference trajectories, CSV)", file=sys.stderr)
+        return 2
+    folder = Path(sys.argv[1])
     files = sorted(folder.glob("*.csv"))
     if not files:
         print(

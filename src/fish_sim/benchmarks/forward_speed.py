@@ -2,7 +2,7 @@
 
     taskset -c 0 python src/fish_sim/benchmarks/forward_speed.py
 
-Needs mujoco (pip install mujoco), which nothing else in the project uses. Peers, stepped in C without
+Needs mujoco (requirements-bench.txt). Peers, stepped in C without
 Python in between: a head free in the plane and three hinged links with springs, the same six joints. "fish" is
 the fair one: it computes fluid forces (MuJoCo's ellipsoid model), as the fish does, and has MuJoCo's default
 options; "bare" has contacts, constraints and water switched off and computes less than the fish. Neither has a

@@ -104,7 +104,7 @@ def launch_file(installed, monkeypatch):
 @pytest.mark.parametrize("robot", bringup.ROBOTS)
 def test_the_launch_file_starts_the_table(launch_file, robot):
     [*arguments, opaque] = launch_file["generate_launch_description"]().args[0]
-    nodes = opaque.function({"robot": robot, "program": ""})
+    nodes = opaque.function({"robot": robot, "program": "", "config": ""})
     started = [(node.package, node.executable, node.parameters[0]) for node in nodes]
     assert started == [
         (s.package, s.executable, str(bringup.parameter_path(s))) for s in bringup.ROBOTS[robot]
@@ -115,7 +115,7 @@ def test_the_launch_file_starts_the_table(launch_file, robot):
 @pytest.mark.parametrize("robot", bringup.ROBOTS)
 def test_with_a_program_the_exciter_takes_the_place_of_planner_and_controller(launch_file, robot):
     [*_, opaque] = launch_file["generate_launch_description"]().args[0]
-    nodes = opaque.function({"robot": robot, "program": "diagnosis.json"})
+    nodes = opaque.function({"robot": robot, "program": "diagnosis.json", "config": ""})
     assert [node.executable for node in nodes] == [
         *(s.executable for s in bringup.ROBOTS[robot] if s.executable not in ("planner", "controller")),
         "exciter",
@@ -126,4 +126,15 @@ def test_with_a_program_the_exciter_takes_the_place_of_planner_and_controller(la
 def test_the_launch_file_refuses_an_unknown_robot(launch_file):
     [*_, opaque] = launch_file["generate_launch_description"]().args[0]
     with pytest.raises(RuntimeError, match="known: sim, real"):
-        opaque.function({"robot": "whale"})
+        opaque.function({"robot": "whale", "program": "", "config": ""})
+
+
+def test_a_robots_own_values_override_the_installed_ones(launch_file, tmp_path):
+    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
+    context = {"robot": "real", "program": "", "config": str(tmp_path)}
+    with pytest.raises(RuntimeError, match=r"holds none of .*; expected some of rotor.yaml, rudder.yaml"):
+        opaque.function(context)
+    (tmp_path / "tracker.yaml").touch()
+    files = {node.executable: node.parameters[:-1] for node in opaque.function(context)}
+    assert files["tracker"][1:] == [str(tmp_path / "tracker.yaml")]
+    assert all(len(given) == 1 for name, given in files.items() if name != "tracker")

@@ -90,6 +90,7 @@ def run(args: argparse.Namespace) -> int:
     _need("pysindy", "--oracle", args.oracle)
     _need("mujoco", "the second plant", bool(args.close_loop) or "mujoco" in args.groups)
     _need("distributed", "--cluster", bool(args.cluster))
+    _need("torch", "--close-loop", bool(args.close_loop), "requirements-train.txt")
     console = terminal()
     if args.close_loop:
         return _close_loop(args, console)
@@ -118,10 +119,10 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _need(module: str, what: str, wanted: bool) -> None:
+def _need(module: str, what: str, wanted: bool, file: str = "requirements-bench.txt") -> None:
     """Optional packages are asked for before anything starts."""
     if wanted and find_spec(module) is None:
-        raise UserError(f"{what} needs {module}: pip install {module} (versions: requirements-bench.txt)")
+        raise UserError(f"{what} needs {module}: pip install -r {file} -c constraints.txt")
 
 
 def _ran(args: argparse.Namespace, console: Console) -> Study:

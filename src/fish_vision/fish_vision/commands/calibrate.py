@@ -24,7 +24,7 @@ def arguments() -> argparse.ArgumentParser:
     lens.add_argument("--corners", required=True, help="inner corners, for example 8x6")
     lens.add_argument("--square", required=True, type=float, help="side of a square, m")
     lens.add_argument(
-        "--out", type=Path, default=Path("camera.yaml"), help="for the camera's camera_info_url"
+        "--out", type=Path, default=Path("lens.yaml"), help="calibration_file of the camera node"
     )
     lens.set_defaults(run=calibrate_lens)
     mount = verbs.add_parser("mount", help="position and tilt of the camera from known points of the pool")
