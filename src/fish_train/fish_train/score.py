@@ -6,7 +6,7 @@
 
 The approach phase lasts until, for the first time, the head is within 0.05 m of the path, the heading
 within 0.3 rad of the path's and the surge speed within 20 % of the commanded one (both averaged over a
-stroke), while it follows the path (progress > 0). A run on an open path ends where its path ends.
+stroke), while it follows the path (progress > 0). A run ends where its open path ends, or when the planner says so (speed 0).
 Frame: pool. Errors are wanted minus actual, the cross-track error apart. Source: this project.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.path_tracker import PathTracker
-from fish_control.reference_path import ReferencePath
+from fish_control.reference_path import PathError, ReferencePath
 
 from .errors import UserError
 from .recordings.trial import Odometry, Trial
@@ -59,7 +59,7 @@ class RunScore:
         t: [s] on the recording's axis. progress: [m] along the path.
         head_angle: heading error of the head as it swings [rad]. heading: of its mean over a stroke [rad].
         settled: first sample after the approach phase, N if the run never got there.
-        finished: whether the end of an open path was reached.
+        finished: whether the end of an open path was reached, or the planner said that it was.
     """
 
     source: str
@@ -113,8 +113,15 @@ def score_trial(trial: Trial) -> RunScore:
     speeds = trial.reference_speed.speed
     if not np.any(speeds > 0.0):
         raise UserError(f"{trial.name}: the commanded speed was never above 0; nothing to score")
-    speed = float(speeds[speeds > 0.0][-1])  # 0 is said at the end of the path
-    return score_motion(motion, path_from_points(given.points), speed, given.t, source)
+    last = int(np.flatnonzero(speeds > 0.0)[-1])
+    # 0 is said at the end of the path; a path that ends where it begins (B) does not say so itself
+    said = trial.reference_speed.t[last + 1 :]
+    end = float(min(said[said > given.t], default=np.inf))
+    try:
+        path = path_from_points(given.points)
+    except PathError as error:
+        raise UserError(f"{trial.name}: reference/path cannot be scored against: {error}") from error
+    return score_motion(motion, path, float(speeds[last]), given.t, source, end)
 
 
 def _last_path(trial: Trial) -> RecordedPath:
@@ -128,17 +135,29 @@ def _last_path(trial: Trial) -> RecordedPath:
 
 
 def path_from_points(points: Array) -> ReferencePath:
-    """The path of a reference/path message, closed if its ends meet."""
+    """The path of a reference/path message, closed if its ends meet.
+
+    Raises:
+        PathError: fewer than two points, or values that are not finite.
+    """
+    if len(points) < 2:
+        raise PathError(f"got {len(points)} points; expected at least two")
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     closed = bool(np.linalg.norm(points[-1] - points[0]) < CLOSED_GAP * np.median(steps))
     return ReferencePath.from_points(points, name="recorded", closed=closed)
 
 
 def score_motion(
-    motion: Odometry, path: ReferencePath, reference_speed: float, start: float, source: str
+    motion: Odometry,
+    path: ReferencePath,
+    reference_speed: float,
+    start: float,
+    source: str,
+    end: float = np.inf,
 ) -> RunScore:
-    """Errors of a motion on a path followed in order, from time `start` [s] to the end of path or motion."""
-    motion = motion.take(motion.t >= start)
+    """Errors of a motion on a path followed in order, from time `start` [s] to `end`, the path's end or the motion's."""
+    said = bool(len(motion)) and bool(motion.t[-1] >= end)
+    motion = motion.take((motion.t >= start) & (motion.t <= end))
     if not len(motion):
         raise UserError("no pose was recorded after the path was given; nothing to score")
     tracker = PathTracker(path)
@@ -172,7 +191,7 @@ def score_motion(
         head_angle=_wrap(chi - psi),
         speed_error=speed_error,
         settled=int(np.argmax(on_path)) if on_path.any() else n,
-        finished=points[-1].finished,
+        finished=points[-1].finished or said,
     )
 
 

@@ -245,3 +245,20 @@ def test_pause_rate_and_loop(peer, tmp_path):
     assert len(got) == stopped
     process.send_signal(signal.SIGINT)
     assert process.wait(10) == 0
+
+
+def test_ctrl_c_does_not_tear_what_the_recorder_is_writing(monkeypatch):
+    """rclpy ends the spinning; a KeyboardInterrupt in the middle of a record would leave half of it in the file."""
+    from fish_train.nodes import recorder
+
+    written = []
+
+    def run(make_node: object, name: str) -> int:
+        os.kill(os.getpid(), signal.SIGINT)
+        written.append(name)
+        return 0
+
+    monkeypatch.setattr(recorder, "run", run)
+    before = signal.getsignal(signal.SIGINT)
+    assert recorder.main() == 0 and written == ["recorder"]
+    assert signal.getsignal(signal.SIGINT) is before

@@ -111,6 +111,40 @@ def test_what_is_missing_is_named(tmp_path):
         score_trial(trial)
 
 
+def test_a_path_without_enough_points_is_an_error_the_user_can_read(tmp_path):
+    with pytest.raises(UserError, match="reference/path cannot be scored against: got 0 points; expected"):
+        score_trial(recorded_run(tmp_path, np.zeros((0, 2)), np.arange(3.0), np.zeros((3, 2))))
+
+
+def test_an_open_path_that_ends_where_it_begins_is_over_when_the_planner_says_so(tmp_path):
+    path = make_path("letter", letter="B")
+    t = np.arange(0.0, path.length / 0.2 + 20.0, 0.02)  # 20 s of rest at the end
+    score = score_trial(
+        recorded_run(
+            tmp_path, path.points, t, path.point(np.minimum(0.2 * t, path.length)), path.length / 0.2
+        )
+    )
+    assert score.finished and score.t[-1] == pytest.approx(path.length / 0.2, abs=0.03)
+    assert score.summaries(with_approach=True)["speed, m/s"].rmse < 1e-9
+
+
+def recorded_run(folder, points, t, position, end=1.0):
+    """A trial that moves through positions (N, 2) at 0.2 m/s until the planner says 0 at `end` [s]."""
+    stamps = np.array([0.0, end])
+    speed = ReferenceSpeed(
+        topic="s", frame_id="", t=stamps, t_arrival=stamps, flags=np.zeros(2, np.uint8), speed=np.array([0.2, 0.0])
+    )  # fmt: skip
+    truth = motion(t, *np.transpose(position), 0.0, np.where(t <= end, 0.2, 0.0))
+    common = dict(path=folder, origin_ns=0, duration=float(t[-1]), namespace="/fish", axis="robot")
+    return Trial(
+        name="a",
+        truth=truth,
+        reference_speed=speed,
+        reference_paths=(RecordedPath(0.0, points, "pool"),),
+        **common,
+    )
+
+
 def test_a_path_that_is_said_again_does_not_start_the_run_anew(tmp_path):
     t = np.arange(0.0, 11.0, 0.01)
     line = RecordedPath(0.0, STRAIGHT.points, "pool")

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from fish_sim.robot import Robot, RobotError, load_robot, save_robot
-from fish_train.errors import UserError
+from fish_sim.robot import Robot, save_robot
 from fish_train.json_file import write_json
 
 
@@ -37,20 +36,17 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.diagnose.procedure import diagnose
     from fish_train.diagnose.verdict import corrected
     from fish_train.diagnose.vocabulary import known
-    from fish_train.identify.experiment import ExperimentError, build_experiment
-    from fish_train.recordings import read_dataset
     from fish_train.reports.diagnosis_page import write_diagnosis_page
     from fish_train.reports.verdict_sentence import sentence
 
+    from .inputs import read_experiment, read_model, user_errors
+
     console, start = Console(stderr=True), time.monotonic()
-    try:
-        robot = load_robot(args.robot) if args.robot else Robot()
+    robot = read_model(args.robot)
+    with user_errors():
         level = Level(args.false_alarms)
         names = known(args.candidates.split(",")) if args.candidates else None
-        trials = [trial for path in args.dataset for trial in read_dataset(path)]
-        experiment = build_experiment(trials)
-    except (RobotError, ExperimentError, ValueError) as error:
-        raise UserError(str(error)) from error
+    experiment, left_out = read_experiment(*args.dataset)
     args.out.mkdir(parents=True, exist_ok=True)
     with console.status("diagnosing") as status:
 
@@ -60,13 +56,15 @@ def run(args: argparse.Namespace) -> int:
                 console.print(f"{time.monotonic() - start:5.0f} s  {text}")
 
         result = diagnose(experiment, robot, level, say, names)
-        content = answer(result)
+        content = {**answer(result), "left_out": left_out}
     write_json(args.out / "diagnosis.json", content)
     fit = corrected(result)
     save_robot(
         without_wrench(fit.robot), args.out / "model.yaml", fit.standard_errors, notes=sentence(content)
     )
     write_diagnosis_page(args.out / "report.html", args.dataset[0].name, content, result)
+    for text in left_out:
+        print(f"left out: {text}")
     print(sentence(content))
     print(f"{args.out}/diagnosis.json, model.yaml, report.html ({time.monotonic() - start:.0f} s)")
     return 0

@@ -50,21 +50,24 @@ def read_experiment(*paths: Path) -> tuple[Experiment, list[str]]:
     """
     from fish_train.identify.experiment import ExperimentError, build_experiment
     from fish_train.recordings import read_dataset
+    from fish_train.recordings.dataset import check_set
 
-    trials, left_out = [], []
-    for path in paths:
-        data = read_dataset(path, progress=True)
-        mixed = [problem.text for problem in data.problems if problem.kind == "mixed_robots"]
-        if mixed:
-            raise UserError(f"{path}: {mixed[0]}")
-        left_out += [problem.text for problem in data.problems if problem.kind == "unreadable_trial"]
-        for trial in data:
-            try:
-                build_experiment([trial])
-            except ExperimentError as error:
-                left_out.append(str(error))
-            else:
-                trials.append(trial)
+    read, trials, left_out = [], [], []
+    with user_errors():
+        for path in paths:
+            data = read_dataset(path, progress=True)
+            left_out += [problem.text for problem in data.problems if problem.kind == "unreadable_trial"]
+            read += list(data)
+    for problem in check_set(read):
+        if problem.kind == "mixed_robots":
+            raise UserError(problem.text)
+    for trial in read:
+        try:
+            build_experiment([trial])
+        except ExperimentError as error:
+            left_out.append(str(error))
+        else:
+            trials.append(trial)
     if not trials:
         raise UserError("no trial can be used: " + "; ".join(left_out))
     return build_experiment(trials), left_out

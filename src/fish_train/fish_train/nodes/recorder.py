@@ -7,6 +7,7 @@ under use_sim_time: simulation time stands in the stamps and on /clock, and the 
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
 from datetime import datetime
@@ -120,11 +121,15 @@ class RecorderNode(Node):
 
 def main() -> int:
     """Record until SIGINT or SIGTERM; 1 and one line if the recording cannot be made or the disk is full."""
+    # rclpy ends the spinning; a KeyboardInterrupt besides would tear a record that is being written
+    before = signal.signal(signal.SIGINT, lambda *_: None)
     try:
         return run(RecorderNode, "recorder")
     except (UserError, OSError) as error:
         print(f"recorder: {error}", file=sys.stderr)
         return 1
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 if __name__ == "__main__":

@@ -48,6 +48,7 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
         Text("Next experiment", content["next_experiment"]["why"]),
         Figure("Its program", program(content)),
         Text("Out of reach", _unreachable(d)),
+        *(Text("Left out", text) for text in content.get("left_out", ())),
         Text("What remains", content["unexplained"]["description"]),
     ]
     write_page(path, f"Diagnosis of {name}", sentence(content), blocks)
