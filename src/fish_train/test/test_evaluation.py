@@ -6,8 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fish_control.control_law import ControlLimits
+from fish_control.contract import INPUTS, Contract
+from fish_control.control_law import ControlLimits, Gains
+from fish_control.gains_file import write_gains_file
 from fish_control.paths import make_path
+from fish_control.policy import Policy
 from fish_sim.robot import Robot
 from fish_sim.simulation import Simulation
 from fish_sim.simulation_config import SimulationConfig
@@ -68,6 +71,31 @@ def test_a_run_off_its_path_or_unfinished_has_failed() -> None:
     far = trace.cross_track.copy()
     far[-100:] = 0.4
     assert "left the path" in measure(replace(trace, cross_track=far), 0, path).failure
+
+
+class BurstingPlant(FishSimPlant):
+    """A plant whose motion is no number from the second second on; the second robot's from the first step on."""
+
+    steps = 0
+
+    def step(self, commands: np.ndarray) -> None:
+        self.steps += 1
+        super().step(commands)
+
+    @property
+    def motion(self) -> np.ndarray:
+        motion = super().motion
+        motion[[self.steps >= 200, True]] = np.nan
+        return motion
+
+
+@pytest.mark.parametrize("path", [SHORT, "circle:radius=0.3"])
+def test_a_run_that_diverges_has_failed_however_small_its_errors_were(path: str) -> None:
+    condition = replace(make_condition(Robot(), perfect=True), plant=BurstingPlant)
+    for row in evaluate(constant_candidate(GAINS), condition, make_cells([path], [0.25], [0, 1])):
+        assert row.metrics.failure == "the motion diverged"
+        assert np.isnan([*vars(row.metrics.settled).values(), *vars(row.metrics.whole).values()]).all()
+        assert np.isnan(row.metrics.approach)
 
 
 def test_plant_and_sensors_are_those_of_the_simulation() -> None:
@@ -132,6 +160,9 @@ def test_cells_better_than_the_papers() -> None:
     assert better_cells(rows_of(0.9, "c")) == 16
     assert better_cells(rows_of(1.1, "c")) == 0
     assert better_cells([*rows_of(0.9, "c")[:15], *rows_of(1.1, "c")[15:]]) == 15
+    *good, last = rows_of(0.9, "c")
+    failed = replace(last, metrics=replace(last.metrics, failure="did not reach the end in time"))
+    assert better_cells([*good, failed]) == 15
 
 
 def test_ratios_to_the_nominal_condition() -> None:
@@ -179,10 +210,29 @@ def test_starts_and_conditions() -> None:
     ]  # fmt: skip
 
 
+def test_a_weights_file_the_node_refuses_is_refused_here(tmp_path: Path) -> None:
+    others = (replace(INPUTS[0], name="depth"), *INPUTS[1:])
+    for contract, said in (
+        (Contract(layers=(), control_period=0.05), "control period is 0.05"),
+        (Contract(layers=(), inputs=others), "inputs are .*depth"),
+    ):
+        write_gains_file(tmp_path / "w.safetensors", Policy.constant(Gains(*[0.05] * 6), contract))
+        with pytest.raises(UserError, match=said):
+            read_candidate(str(tmp_path / "w.safetensors"))
+
+
+@pytest.mark.parametrize("off", [1.0, -0.3, float("nan")])
+def test_parameters_are_off_by_a_share(off: float) -> None:
+    with pytest.raises(ValueError, match=f"off: got {off:g}; expected a share"):
+        make_condition(Robot(), off=off)
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
         (lambda: read_path("circle:radius"), "expected NAME=VALUE"),
+        (lambda: read_path("circle:radius=[1"), r"got '\[1' as radius; expected a number"),
+        (lambda: read_path("circle:radius=2020-13-45"), "got '2020-13-45' as radius"),
         (lambda: read_path("circel"), "unknown path 'circel'"),
         (lambda: read_path("circle:radius=-1"), "radius"),
         (lambda: make_cells(["R"], [0.9], [0]), "speed: got 0.9 m/s"),

@@ -1,10 +1,12 @@
 """The batch follower and the training loop run what the nodes run: fish_control's Controller and Planner."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from training_setup import COST, make_stepper
 
-from fish_control.contract import Contract
+from fish_control.contract import INPUTS, Contract
 from fish_control.controller import Controller, Wanted
 from fish_control.line_of_sight import GuidanceConfig, Motion
 from fish_control.paths import make_path
@@ -109,3 +111,23 @@ def test_the_follower_runs_the_nodes_laws(setting, listen_time) -> None:
         if k % 2:
             assert np.allclose(state[0], expected[k // 2], atol=1e-9)
     assert abs(state[0, size]) > 0.01  # it swims
+
+
+def test_the_follower_asks_a_policy_in_its_own_scales(setting) -> None:
+    """A file whose inputs have other scales gives the node's gains."""
+    _, policies, path, stepper, _ = setting
+    scales = tuple(replace(i, scale=3.0 * i.scale, offset=0.2) for i in INPUTS)
+    policy = Policy(replace(policies[0.0].contract, inputs=scales), policies[0.0].tensors)
+    start = motion_of(stepper.rest(START), stepper.layout.links + 3)
+    follower = Follower([path], np.array([SPEED]), PolicyGains(policy), law_of(0.0))
+    controller, planner = Controller(policy), Planner(path, SPEED)
+    for observer in (controller, planner):
+        for time in (-2.0 * DT, -DT, 0.0):
+            observer.observe(time, start)
+    plan = planner.plan(start)
+    wanted = Wanted(plan.errors.course, plan.speed, plan.yaw_rate, plan.errors.cross_track)
+    seen, known = np.array([start]), np.ones(1, dtype=bool)
+    for _ in range(2):
+        follower.observe(seen, known)
+    follower.decide(seen, known)
+    assert follower.gains[0] == pytest.approx(controller.decide(wanted), abs=1e-12)

@@ -59,6 +59,17 @@ def test_recover_prints_what_was_saved_and_lost(tmp_path, capsys):
     assert "never overwritten" in capsys.readouterr().err
 
 
+def test_recover_of_the_folder_one_is_in_is_made_beside_it(tmp_path, monkeypatch):
+    path = samples.robot_recording(tmp_path / "a")
+    monkeypatch.chdir(path)
+    assert command.main(["recover", "."]) == 0
+    assert (tmp_path / "a_recovered" / "metadata.yaml").exists()
+    (tmp_path / "linked").mkdir()
+    (tmp_path / "linked" / "b").symlink_to(path)
+    assert command.main(["recover", str(tmp_path / "linked" / "b")]) == 0
+    assert (tmp_path / "linked" / "b_recovered" / "metadata.yaml").exists()
+
+
 def test_inspect_prints_and_plots(tmp_path, capsys):
     def lost(i, t, m):
         return None if 20 <= i < 120 else (t, m)

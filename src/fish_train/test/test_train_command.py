@@ -12,6 +12,9 @@ SETTINGS = [
     "thresholds=[0.4]", "criterion_episodes=1", "polish_updates=4",
 ]  # fmt: skip
 
+GAINS = "0.3,0.3,0.03,0.6,0.05,0"
+EVALUATE = ["evaluate", "--constant", GAINS]
+
 
 @pytest.mark.parametrize("form", ["network", "schedule", "constant"])
 def test_train_then_use(form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -36,8 +39,27 @@ def test_train_then_use(form: str, tmp_path: Path, capsys: pytest.CaptureFixture
         (["train", "--robot", "nowhere.yaml"], "nowhere.yaml"),
         (["train", "--warm-start", "nowhere.safetensors"], "nowhere.safetensors"),
         (["train", "--seeds", "0"], "expected counts of at least 1"),
+        (["train", "--set", "batch=2020-13-45"], "'2020-13-45' is not a value"),
+        (["train", "--resume", "--overwrite"], "--resume --overwrite: one continues the runs"),
+        (["train", "--max-seconds", "nan"], "--max-seconds nan: expected at least 0 s"),
+        (["train", "--max-seconds", "-1"], "--max-seconds -1: expected at least 0 s"),
+        (["train", "--form", "constant", "--search", "--max-seconds", "9"], "leave out --max-seconds"),
         (["evaluate"], "nothing to evaluate"),
         (["evaluate", "--constant", "1,2"], "got 2 numbers"),
+        ([*EVALUATE, GAINS], "constant: more than one of --weights and --constant has this name"),
+        ([*EVALUATE, "--off", "1.5"], "off: got 1.5; expected a share"),
+        ([*EVALUATE, "--latency", "-1"], "camera_latency = -1.0: expected"),
+        ([*EVALUATE, "--current", "nan"], "effects.current.y: got nan"),
+        ([*EVALUATE, "--paths", "circle:radius=[1"], "got '[1' as radius"),
+        ([*EVALUATE, "--perfect", "--latency", "0.3"], "no camera takes part"),
+        ([*EVALUATE, "--robust", "--off", "0.1"], "leave out --off or --robust"),
+        ([*EVALUATE, "--robust", "--current", "0.1"], "leave out --current or --robust"),
+        (
+            [*EVALUATE, "--robust", "--latency", "0.1", "--perfect"],
+            "leave out --latency --perfect or --robust",
+        ),
+        (["coverage", "--seed", "-1"], "--seed -1: expected at least"),
+        (["coverage", "--duration", "inf"], "--duration inf --seed 0: expected at least"),
         (["weights", "show", "nowhere.safetensors"], "nowhere.safetensors"),
     ],
 )
@@ -52,3 +74,11 @@ def test_bad_input_is_one_line(
     assert main(arguments) == 1
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
+
+
+def test_what_resume_and_overwrite_contradict_about_is_left_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "seed_1"
+    folder.mkdir()
+    (folder / "checkpoint.npz").write_bytes(b"days of work")
+    assert main(["train", "--out", str(tmp_path), "--resume", "--overwrite"]) == 1
+    assert (folder / "checkpoint.npz").read_bytes() == b"days of work"

@@ -1,5 +1,6 @@
 """A run on disk: exact resume, roll-back of diverging training, weights that the controller reads."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,13 +8,15 @@ import numpy as np
 import pytest
 import torch
 
-from fish_control.gains_file import read_gains_file
+from fish_control.contract import INPUTS, Contract
+from fish_control.gains_file import read_gains_file, write_gains_file
+from fish_control.policy import Policy
 from fish_sim.robot import Robot
 from fish_train.errors import UserError
 from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
 from fish_train.training.config import TrainConfig, make_config
 from fish_train.training.fleet import WindowResult
-from fish_train.training.network import FORMS, from_tensors, split
+from fish_train.training.network import FORMS, from_tensors, split, to_tensors
 from fish_train.training.run import CHECKPOINT, Job, Status, run
 from fish_train.training.run_log import RunLog, read_curve
 from fish_train.training.search import search
@@ -70,9 +73,29 @@ def test_a_checkpoint_of_another_recipe_is_refused(tmp_path: Path) -> None:
         load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(learning_rate=0.01), Robot(), 3))
     with pytest.raises(UserError, match="format, robot and seed"):
         load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 4))
+    with pytest.raises(UserError, match="form was 'network', is 'constant'"):
+        load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 3, form=FORMS["constant"]))
     (tmp_path / CHECKPOINT).write_bytes(b"PK\x03\x04 cut short")
     with pytest.raises(UserError, match="not a checkpoint of training"):
         load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 3))
+
+
+def test_a_checkpoint_may_be_read_by_whom_the_user_lets(tmp_path: Path) -> None:
+    trainer, before = Trainer(short(), Robot(), 3, form=FORMS["constant"]), os.umask(0o027)
+    try:
+        save_checkpoint(tmp_path / CHECKPOINT, trainer)
+    finally:
+        os.umask(before)
+    assert (tmp_path / CHECKPOINT).stat().st_mode & 0o777 == 0o640
+    assert [file.name for file in tmp_path.iterdir()] == [CHECKPOINT]
+
+
+def test_a_warm_start_from_other_scales_is_refused(tmp_path: Path) -> None:
+    contract = Contract(inputs=tuple(replace(i, scale=2.0 * i.scale) for i in INPUTS))
+    file = tmp_path / "w.safetensors"
+    write_gains_file(file, Policy(contract, to_tensors(Trainer(short(), Robot(), 3).weights)))
+    with pytest.raises(UserError, match="other scales"):
+        run(job(tmp_path / "run", warm_start=file), lambda _: None)
 
 
 def test_a_run_finishes_and_its_weights_are_those_of_torch(tmp_path: Path) -> None:
@@ -107,6 +130,17 @@ def test_a_run_stopped_and_resumed_ends_like_one_in_one_go(tmp_path: Path) -> No
     assert run(job(tmp_path / "parts", resume=True), lambda _: None).state == "finished"
     whole, parts = (read_gains_file(tmp_path / k / "gains.safetensors").tensors for k in ("whole", "parts"))
     assert all(np.array_equal(whole[name], parts[name]) for name in whole)
+
+
+def test_a_finished_run_resumed_keeps_its_card(tmp_path: Path) -> None:
+    run(job(tmp_path, form="constant"), lambda _: None)
+    card = (tmp_path / "model_card.md").read_text()
+    assert "last training episode" in card
+    assert run(job(tmp_path, form="constant", resume=True), lambda _: None).state == "finished"
+    assert (tmp_path / "model_card.md").read_text() == card
+    (tmp_path / "model_card.md").write_text("of an earlier stop")
+    run(job(tmp_path, form="constant", resume=True), lambda _: None)
+    assert "training finished" in (tmp_path / "model_card.md").read_text()
 
 
 def test_what_was_logged_after_the_checkpoint_is_forgotten(tmp_path: Path) -> None:

@@ -35,8 +35,9 @@ def run(args: argparse.Namespace) -> int:
 
     from .inputs import terminal
 
-    if args.study < 1 or args.trials < 1 or not args.duration >= 2.0:
-        raise UserError("expected at least one repetition, one trial and 2 s")
+    if args.study < 1 or args.trials < 1 or args.seed < 0 or not 2.0 <= args.duration < float("inf"):
+        given = f"--study {args.study} --trials {args.trials} --duration {args.duration:g} --seed {args.seed}"
+        raise UserError(f"{given}: expected at least 1, 1, 2 s and 0")
     console, began = terminal(), time.monotonic()
     with Progress(console=console, transient=True) as bar:
         task = bar.add_task("repetitions", total=args.study)

@@ -63,21 +63,25 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.evaluation.tables import ratio_table, summary_table
     from fish_train.score_table import print_table
 
+    from .inputs import user_errors
     from .train import read_robot
 
+    check_conditions(args)
     candidates = [*map(read_candidate, args.weights), *map(constant_candidate, args.constant)]
     if not candidates:
         raise UserError("nothing to evaluate: give --weights FILE or --constant KP,KI,KD,KP,KI,KD")
+    check_names([candidate.name for candidate in candidates])
     if args.seeds < 1 or args.jobs < 1 or args.first_seed < 0:
         given = f"--seeds {args.seeds} --jobs {args.jobs} --first-seed {args.first_seed}"
         raise UserError(f"{given}: expected at least 1, 1 and 0")
     for path in args.paths:
         read_path(path)
     robot = read_robot(args.plant)
-    if args.robust:
-        conditions = robust_conditions(robot)
-    else:
-        conditions = [make_condition(robot, args.off, args.current, args.latency, args.perfect)]
+    with user_errors():
+        if args.robust:
+            conditions = robust_conditions(robot)
+        else:
+            conditions = [make_condition(robot, args.off, args.current, args.latency, args.perfect)]
     cells = make_cells(args.paths, args.speeds, range(args.first_seed, args.first_seed + args.seeds))
     console, began = Console(), time.monotonic()
     if not console.is_terminal:
@@ -108,3 +112,32 @@ def run(args: argparse.Namespace) -> int:
         f"{len(rows)} runs in {spent:.0f} s; runs.csv and evaluation.html in {args.out}", soft_wrap=True
     )
     return 1 if failed else 0
+
+
+def check_conditions(args: argparse.Namespace) -> None:
+    """Refuse flags of which one would make another do nothing."""
+    flags = {
+        "--off": args.off != 0.0,
+        "--current": args.current != 0.0,
+        "--latency": args.latency is not None,
+        "--perfect": args.perfect,
+    }
+    given = " ".join(flag for flag, is_given in flags.items() if is_given)
+    if args.robust and given:
+        raise UserError(
+            f"--robust {given}: --robust has conditions of its own; leave out {given} or --robust"
+        )
+    if args.perfect and args.latency is not None:
+        raise UserError(
+            "--perfect --latency: with perfect state no camera takes part; leave out one of the two"
+        )
+
+
+def check_names(names: list[str]) -> None:
+    """Refuse two candidates of one name: the tables would take them for one."""
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise UserError(
+            f"{', '.join(twice)}: more than one of --weights and --constant has this name; "
+            "give each its own: --weights NAME=FILE, --constant NAME=KP,KI,KD,KP,KI,KD"
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from rich.console import Console
@@ -17,9 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from fish_train.recordings.recover import recover
 
-    source = args.recording
-    out = args.out or source.with_name(f"{source.stem if source.is_file() else source.name}_recovered")
-    result = recover(source, out)
+    # `.` and `..` have no name of their own; a link keeps its own, so that the folder is made beside it
+    named = Path(os.path.abspath(args.recording))
+    out = args.out or named.parent / f"{named.stem if named.is_file() else named.name}_recovered"
+    result = recover(args.recording, out)
     console = Console()
     table = Table("topic", "messages saved", title=f"{result.count} messages saved in {result.directory}")
     for topic, count in result.saved.items():

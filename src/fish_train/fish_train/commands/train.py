@@ -66,10 +66,7 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(
             f"--seed {args.seed} --seeds {args.seeds} --jobs {args.jobs}: expected counts of at least 1"
         )
-    if args.search and args.form == "network":
-        raise UserError(
-            "--search: got form network; differential evolution is for --form constant or schedule"
-        )
+    check_flags(args)
     config = make_config({**(load_config(args.config) if args.config else {}), **parse_settings(args.set)})
     robot = read_robot(args.robot)
     jobs = [
@@ -99,6 +96,24 @@ def run(args: argparse.Namespace) -> int:
     return 0 if finished == len(statuses) else 1
 
 
+def check_flags(args: argparse.Namespace) -> None:
+    """Refuse flags that contradict each other, or of which one would do nothing."""
+    if args.search and args.form == "network":
+        raise UserError(
+            "--search: got form network; differential evolution is for --form constant or schedule"
+        )
+    if args.search and args.max_seconds != float("inf"):
+        raise UserError(
+            "--search --max-seconds: a search ends after its own number of generations; leave out --max-seconds"
+        )
+    if not args.max_seconds >= 0.0:
+        raise UserError(f"--max-seconds {args.max_seconds:g}: expected at least 0 s")
+    if args.resume and args.overwrite:
+        raise UserError(
+            "--resume --overwrite: one continues the runs that are there, the other deletes them; give one of the two"
+        )
+
+
 def parse_settings(settings: list[str]) -> dict[str, Any]:
     """KEY=VALUE pairs, values in YAML."""
     values = {}
@@ -108,7 +123,7 @@ def parse_settings(settings: list[str]) -> dict[str, Any]:
             raise UserError(f"--set {setting}: expected KEY=VALUE")
         try:
             value = yaml.safe_load(text)
-        except yaml.YAMLError as error:
+        except (yaml.YAMLError, ValueError) as error:  # ValueError: a date that is none, 2020-13-45
             raise UserError(f"--set {setting}: {text!r} is not a value: {error}") from error
         if isinstance(value, str):  # YAML takes 3e-4 for a text
             try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fish_control.contract import OUTPUTS
 from fish_control.control_law import Gains
-from fish_control.gains_file import GainsFileError, read_gains_file
+from fish_control.gains_file import GainsFileError, read_gains_file, require_fit
 from fish_control.path_batch import TrackerConfig
 from fish_control.policy import Policy
 from fish_train.errors import UserError
@@ -31,13 +31,11 @@ def read_policy(name: str, path: Path) -> Candidate:
     """A weights file with the law it was made for."""
     try:
         policy = read_gains_file(path)
+        # as the controller node asks; the lookahead is the file's own here
+        require_fit(policy, path, CONTROL_PERIOD, policy.contract.lookahead)
     except GainsFileError as error:
         raise UserError(str(error)) from error
     c = policy.contract
-    if not np.isclose(c.control_period, CONTROL_PERIOD):
-        raise UserError(
-            f"{path}: control period is {c.control_period} s; evaluation runs at {CONTROL_PERIOD} s"
-        )
     tracker = TrackerConfig(lookahead=c.lookahead)
     return Candidate(name, PolicyGains(policy), Law(limits=c.limits, guidance=c.guidance, tracker=tracker))
 

@@ -38,7 +38,12 @@ def read_path(specification: str) -> ReferencePath:
         name, equals, value = part.partition("=")
         if not equals:
             raise UserError(f"path {specification!r}: got {part!r}; expected NAME=VALUE")
-        arguments[name.strip()] = yaml.safe_load(value)
+        try:
+            arguments[name.strip()] = yaml.safe_load(value)
+        except (yaml.YAMLError, ValueError):  # ValueError: a date that is none, 2020-13-45
+            raise UserError(
+                f"path {specification!r}: got {value!r} as {name.strip()}; expected a number or a word"
+            ) from None
     try:
         return make_path(family, **arguments)
     except PathError as error:

@@ -33,7 +33,6 @@ from fish_control.line_of_sight import (
     tracking_errors,
 )
 from fish_control.path_batch import PathBatch
-from fish_control.policy import policy_inputs
 from fish_control.reference_path import ReferencePath
 from fish_sim.model import DT
 from fish_train.evaluation.gains_source import GainsSource
@@ -97,10 +96,8 @@ class Follower:
         water = through_water(state, errors.course, at.curvature, self._speed, np)
         e_psi = heading_error(state, motion, water, guidance, np)
         heading = mean_heading(state.stroke, motion)
-        inputs = policy_inputs(
-            heading, motion.surge, self._speed, e_psi, errors.speed, errors.cross_track, np
-        )
-        gains = self._gains.gains(np.stack(inputs, axis=-1), self._speed, at.curvature)
+        situation = (heading, motion.surge, self._speed, e_psi, errors.speed, errors.cross_track)
+        gains = self._gains.gains(situation, self._speed, at.curvature)
         wanted = Errors(e_psi, errors.speed, water.curvature, water.speed, state.water.thrust)
         control, setpoint = control_step(self._control, wanted, gains, CONTROL_PERIOD, self._law.limits, np)
         self._swims = self._swims | (known & has_listened(self._listened, motion, guidance, np))

@@ -9,19 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.control_law import Gains
-from fish_control.policy import Policy
+from fish_control.policy import Policy, policy_inputs
 from fish_sim.ops import NUMPY
 from fish_train.training.loop import gains_of, schedule_inputs
 from fish_train.training.network import FORMS, split
 
 Array = NDArray[np.float64]
+# the values of `policy_inputs` in its order, each (B,)
+Situation = tuple[Array, Array, Array, Array, Array, Array]
 
 
 class GainsSource(Protocol):
     """Gains for a batch of situations."""
 
-    def gains(self, inputs: Array, speed: Array, curvature: Array) -> Gains:
-        """Normalised policy inputs (B, 6), wanted speed (B,) [m/s], path curvature (B,) [1/m] -> gains, each (B,)."""
+    def gains(self, situation: Situation, speed: Array, curvature: Array) -> Gains:
+        """Situations, wanted speed (B,) [m/s], path curvature (B,) [1/m] -> gains, each (B,)."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +32,10 @@ class PolicyGains:
 
     policy: Policy
 
-    def gains(self, inputs: Array, speed: Array, curvature: Array) -> Gains:  # noqa: ARG002
-        """The policy looks at its inputs only."""
-        return self.policy.gains(inputs)
+    def gains(self, situation: Situation, speed: Array, curvature: Array) -> Gains:  # noqa: ARG002
+        """The policy looks at its inputs only, in the scales of its own contract."""
+        inputs = policy_inputs(*situation, np, self.policy.contract.inputs)
+        return self.policy.gains(np.stack(inputs, axis=-1))
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class ScheduledGains:
 
     weights: Array
 
-    def gains(self, inputs: Array, speed: Array, curvature: Array) -> Gains:  # noqa: ARG002
+    def gains(self, situation: Situation, speed: Array, curvature: Array) -> Gains:  # noqa: ARG002
         """By wanted speed and curvature only."""
         [(W, b)] = split(np.asarray(self.weights), FORMS["schedule"].layers)
         x = np.stack(schedule_inputs(speed, curvature, NUMPY), axis=-1)

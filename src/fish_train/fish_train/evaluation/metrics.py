@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ class ErrorSizes:
     throttle_mean: float
 
 
+NO_SIZES = ErrorSizes(*(float("nan") for _ in fields(ErrorSizes)))
+
+
 @dataclass(frozen=True)
 class RunMetrics:
     """One run."""
@@ -39,12 +42,14 @@ class RunMetrics:
     settled: ErrorSizes  # after the approach; NaN if it never ended
     whole: ErrorSizes
     approach: float  # s; NaN if it never ended
-    failure: str  # empty, or what went wrong
+    failure: str  # empty, or what went wrong; all sizes are NaN where the motion diverged
 
 
 def measure(trace: Trace, run: int, path: ReferencePath) -> RunMetrics:
     """Metrics of robot `run` of a trace."""
-    rows = np.isfinite(trace.cross_track[:, run]) & np.all(np.isfinite(trace.motion[:, run]), axis=1)
+    rows = np.isfinite(trace.cross_track[:, run])  # up to the run's end
+    if not rows.any() or not np.all(np.isfinite(trace.motion[rows, run])):  # small as its errors were before
+        return RunMetrics(NO_SIZES, NO_SIZES, float("nan"), "the motion diverged")
     time, motion = trace.time[rows], trace.motion[rows, run]
     cross_track, progress = trace.cross_track[rows, run], trace.progress[rows, run]
     speed = trace.speed[run]
@@ -62,13 +67,11 @@ def measure(trace: Trace, run: int, path: ReferencePath) -> RunMetrics:
     )
     first = int(np.argmax(near)) if near.any() else len(time)
     approach = float(time[first] - time[0]) if near.any() else float("nan")
-    failure = _failure(trace, run, path, errors[first:, 0], len(time))
+    failure = _failure(trace, run, path, errors[first:, 0])
     return RunMetrics(_sizes(errors[first:]), _sizes(errors), approach, failure)
 
 
-def _failure(trace: Trace, run: int, path: ReferencePath, settled: Array, rows: int) -> str:
-    if not np.all(np.isfinite(trace.motion[:rows, run])):
-        return "the motion diverged"
+def _failure(trace: Trace, run: int, path: ReferencePath, settled: Array) -> str:
     if len(settled) == 0:
         return "never came onto the path"
     if np.abs(settled).max() > LOST:
@@ -81,7 +84,7 @@ def _failure(trace: Trace, run: int, path: ReferencePath, settled: Array, rows: 
 def _sizes(errors: Array) -> ErrorSizes:
     """Of columns cross-track, heading, speed, alpha, throttle."""
     if len(errors) < 2:
-        return ErrorSizes(*(float("nan") for _ in range(10)))
+        return NO_SIZES
     size = np.abs(errors)
     rms = np.sqrt(np.mean(errors**2, axis=0))
     rate = np.diff(errors[:, 3]) / CONTROL_PERIOD

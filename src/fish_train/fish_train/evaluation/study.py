@@ -7,7 +7,7 @@ import multiprocessing
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -172,8 +172,3 @@ def write_rows(path: Path, rows: Sequence[Row]) -> None:
                 table = csv.DictWriter(stream, list(values))
                 table.writeheader()
             table.writerow(values)
-
-
-def with_sensors(condition: Condition, **values: float) -> Condition:
-    """The same condition with other sensor settings."""
-    return replace(condition, sensors=replace(condition.sensors, **values))

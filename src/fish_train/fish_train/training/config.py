@@ -123,7 +123,7 @@ class TrainConfig:
         self._check_turns()
 
     def _check_turns(self) -> None:
-        """Refuse sinusoids that no fish of this kind can turn in."""
+        """Refuse sinusoids far tighter than a fish of this kind can turn."""
         for amplitude in self.amplitudes:
             for cycles in self.cycles:
                 radius = 1.0 / (amplitude * (2.0 * math.pi * cycles / self.sinusoid_length) ** 2)
@@ -154,7 +154,8 @@ class TrainConfig:
         return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
 
-TIGHTEST_TURN = 0.15  # m, twice the smallest radius the nominal fish can hold
+# the nominal fish turns in 0.26 m with its rudder hard over, other fish may turn tighter
+TIGHTEST_TURN = 0.15  # m
 
 
 def _is_number(value: object) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import torch
 
+from fish_control.contract import INPUTS, OUTPUTS
 from fish_control.gains_file import GainsFileError, read_gains_file
 from fish_sim.robot import Robot
 from fish_train.errors import UserError
@@ -19,7 +20,7 @@ from fish_train.training.network import FORMS, LAYERS, Array, from_tensors
 from fish_train.training.run_log import RunLog
 from fish_train.training.search import search
 from fish_train.training.trainer import Progress, Trainer, TrainingDiverged
-from fish_train.training.weights_output import training_state, write_weights
+from fish_train.training.weights_output import CARD, training_state, write_card, write_weights
 
 CHECKPOINT = "checkpoint.npz"
 CHECKPOINT_PERIOD = 5.0  # s
@@ -82,8 +83,11 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
                 f"training diverged at update {at} ({error}); rolled back to update {trainer.update}, whose "
                 "weights are kept. Use a smaller learning_rate or clip"
             )
-    last = session.progress
-    write_weights(job.folder, trainer, training_state(trainer), last, session.seconds, job.command)
+    write_weights(job.folder, trainer, job.command)
+    made, card = training_state(trainer), job.folder / CARD
+    # a run that was finished before has no episode to tell of; its card does
+    if not card.exists() or made not in card.read_text(encoding="utf-8"):
+        write_card(job.folder, trainer, made, session.progress, session.seconds, job.command)
     status = session.status(state, message)
     report(status)
     return status
@@ -99,7 +103,8 @@ def _search(job: Job, trainer: Trainer, report: Callable[[Status], None]) -> Sta
     cost, weights = search(trainer, lambda text: report(status("training", text)))
     trainer.set_weights(weights)
     made = f"found by differential evolution, mean stage cost {cost:.5f}"
-    write_weights(job.folder, trainer, made, None, time.monotonic() - began, job.command)
+    write_weights(job.folder, trainer, job.command)
+    write_card(job.folder, trainer, made, None, time.monotonic() - began, job.command)
     last = status("finished", f"mean stage cost {cost:.5f}")
     report(last)
     return last
@@ -180,5 +185,10 @@ def warm_weights(job: Job) -> Array | None:
     if tuple(policy.contract.layers) != LAYERS:
         raise UserError(
             f"{file}: layers are {list(policy.contract.layers)}; a warm start needs {list(LAYERS)}"
+        )
+    if (policy.contract.inputs, policy.contract.outputs) != (INPUTS, OUTPUTS):
+        raise UserError(
+            f"{file}: inputs or gains have other scales than those trained here; its weights would mean other gains. "
+            "Start from a file that fish_train train wrote"
         )
     return from_tensors(policy.tensors)

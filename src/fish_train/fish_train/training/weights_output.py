@@ -52,15 +52,19 @@ def make_policy(trainer: Trainer, note: str) -> Policy:
     return Policy(contract, to_tensors(trainer.weights))
 
 
-def write_weights(
-    folder: Path, trainer: Trainer, made: str, last: Progress | None, seconds: float, command: str
-) -> None:
-    """Weights file (of a schedule, which no controller loads, its coefficients) and model card; `made`: how."""
+def write_weights(folder: Path, trainer: Trainer, command: str) -> None:
+    """Weights file; of a schedule, which no controller loads, its coefficients."""
     if trainer.form.inputs == "schedule":
         content = {"form": "schedule", "command": command, "weights": trainer.weights.tolist()}
         (folder / SCHEDULE).write_text(json.dumps(content, indent=1), encoding="utf-8")
     else:
         write_gains_file(folder / WEIGHTS, make_policy(trainer, f"trained by: {command}"))
+
+
+def write_card(
+    folder: Path, trainer: Trainer, made: str, last: Progress | None, seconds: float, command: str
+) -> None:
+    """Model card; `made`: how."""
     (folder / CARD).write_text(model_card(trainer, made, last, seconds, command), encoding="utf-8")
 
 
