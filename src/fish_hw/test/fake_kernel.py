@@ -1,10 +1,12 @@
-"""Stands in for the kernel's I2C driver, so that the real smbus2 runs: replaces its ioctl."""
+"""Stands in for the kernel: its I2C driver, so that the real smbus2 runs, and its rules for PWM files."""
 
 import ctypes
 import errno
 import os
 from collections.abc import Callable
+from pathlib import Path
 
+import pytest
 import smbus2.smbus2
 
 READ = 1  # I2C_M_RD
@@ -42,3 +44,18 @@ class FakeKernel:
             ctypes.memmove(message.buf, device.read(message.len), message.len)
         else:
             device.write(ctypes.string_at(message.buf, message.len))
+
+
+def refuse_as_sysfs_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels before mid-2024 refuse every write that leaves period 0 or a pulse longer than the period."""
+    plain = Path.write_text
+
+    def write_text(path: Path, text: str) -> int:
+        if path.name in ("period", "duty_cycle", "enable") and path.exists():
+            state = {name: int((path.parent / name).read_text()) for name in ("period", "duty_cycle")}
+            state[path.name] = int(text)
+            if state["period"] == 0 or state["duty_cycle"] > state["period"]:
+                raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+        return plain(path, text)
+
+    monkeypatch.setattr(Path, "write_text", write_text)

@@ -2,6 +2,7 @@
 
 import errno
 import math
+import struct
 from dataclasses import replace
 
 import pytest
@@ -11,10 +12,11 @@ from fish_hw.devices.bno085 import Bno085
 from fish_hw.devices.bno085_rvc import Bno085Rvc
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.imu_driver import ImuDriver
+from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.status import ERROR, OK, WARN
 from fish_hw.emulators.bno085 import YAW_FREQUENCY, YAW_RATE, Bno085Emulator
 from fish_hw.emulators.i2c_bus import I2cBusEmulator
-from fish_hw.protocol import rvc, shtp
+from fish_hw.protocol import rvc, sh2, shtp
 from fish_hw.settings.imu import ImuSettings
 from fish_hw.transport.errors import PortUnavailable, TransportError
 from fish_hw.transport.recorded import RecordedStream
@@ -172,6 +174,45 @@ def test_implausible_values_are_dropped(bench):
     assert bench.bno.counters.implausible == 3
 
 
+def flip_in_time_base(byte: int, mask: int):
+    """Damage: bits of one byte of every time base."""
+
+    def damage(packet: bytes) -> bytes:
+        if len(packet) <= 9 or packet[2] != shtp.REPORTS or packet[4] != 0xFB:
+            return packet
+        return packet[: 5 + byte] + bytes([packet[5 + byte] ^ mask]) + packet[6 + byte :]
+
+    return damage
+
+
+@pytest.mark.parametrize(("byte", "mask"), [(3, 0x80), (2, 0x10), (1, 0x80)])
+def test_reports_with_a_bit_error_in_the_time_base_are_dropped(bench, byte, mask):
+    bench.run(0.1)
+    bench.hub.damage = flip_in_time_base(byte, mask)
+    assert bench.run(0.1) == []
+    assert bench.bno.counters.bad_times >= 27  # three reports each
+    bench.hub.damage = lambda packet: packet
+    assert all(abs(s.time_s - bench.now) < 0.2 for s in bench.run(0.1))
+
+
+@pytest.mark.parametrize("lead_s", [-0.9, 0.04])
+def test_reports_a_little_early_or_late_are_kept(bench, lead_s):
+    bench.run(0.5)
+    payload = struct.pack("<Bi", 0xFB, round(-lead_s / 1e-4)) + bytes.fromhex("02 09 03 00 00 01 80 ff 00 03")
+    bench.bno._newest.clear()
+    bench.bno._take_reports(payload, bench.now)
+    assert bench.bno._newest[sh2.GYROSCOPE].time_s == pytest.approx(bench.now + lead_s)
+
+
+def test_a_hub_that_continues_without_end_is_left(bench):
+    bench.run(0.1)
+    reads = []
+    bench.bus.read = lambda _, count: reads.append(count) or bytes([0x14, 0x80, 3, 0]).ljust(count, b"\0")
+    bad = bench.bno.counters.bad_packets
+    assert bench.bno.poll() == []
+    assert len(reads) <= 2 * bno085.MAX_PIECES and bench.bno.counters.bad_packets == bad + 1
+
+
 def test_reset_of_the_hub_switches_the_reports_on_again(bench):
     bench.run(0.1)
     bench.hub.reset()
@@ -248,9 +289,26 @@ def test_frozen_values_start_the_sensor_again():
     bench.run(1.2)
     assert bench.events == ["IMU: values stand still for 1.0 s"]
     assert bench.driver.status().level == ERROR
+    bench.run(10.0)  # the sensor answers each time it is started, and stays frozen
+    assert len(bench.events) == 1 and isinstance(bench.events[0], Loss)
     bench.hub.frozen = False
-    assert bench.run(3.0)
-    assert bench.events[-1] == "IMU connected again"
+    assert bench.run(6.0)
+    assert bench.events[1:] == ["IMU connected again"]
+    bench.hub.frozen = True
+    bench.run(1.2)
+    assert bench.events[2:] == ["IMU: values stand still for 1.0 s"]  # said again after it worked
+
+
+def test_stamps_do_not_stay_ahead_after_the_sensor_was_started_again():
+    bench = DriverBench()
+    bench.driver.connect()
+    bench.run(0.5)
+    bench.driver._newest_s += 100.0  # however that came
+    bench.bus.fault = lambda: errno.EREMOTEIO
+    bench.run(1.2)
+    bench.bus.fault = lambda: None
+    samples = bench.run(8.0)
+    assert samples and all(s.time_s <= bench.now for s in samples)
 
 
 def test_silence_then_return():
@@ -308,6 +366,15 @@ def test_rvc_gaps():
     samples = [s for _ in frames for s in device.poll(0.0)]
     assert [round(s.angular_velocity[2], 1) for s in samples] == [0.5] * 4
     assert device.lost_frames == 1 + 35
+
+
+@pytest.mark.parametrize("asked_hz", [10.0, 100.0, 200.0])
+def test_rvc_has_its_own_rate_whatever_is_asked(asked_hz):
+    stream = RecordedStream(rvc_frames(range(300), 1.0))
+    bench = DriverBench(ImuSettings(interface="rvc", rate_hz=asked_hz), stream)
+    bench.driver.connect()
+    bench.run(2.0)
+    assert bench.driver.status().level == OK
 
 
 def test_rvc_port_lost_and_silent():

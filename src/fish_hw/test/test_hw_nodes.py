@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 import rclpy
@@ -17,6 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 from waiting import wait_until
 
 from fish_hw.devices import vertiq_registers as reg
+from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.usb_camera import jpeg_size
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
@@ -219,6 +221,17 @@ def test_a_step_that_raises_ends_the_node_and_leaves_the_device_safe(graph, tmp_
     assert wait_until(lambda: not g.node.context.ok(), TIMEOUT_S)
     assert chip.read("enable") == 0
     assert g.node.failure == "the device's thread ended unexpectedly"
+
+
+def test_losses_are_logged_as_errors(graph, monkeypatch):
+    g = graph(RudderNode, backend="emulator")
+    said = []
+    logger = SimpleNamespace(
+        info=lambda text: said.append(("info", text)), error=lambda text: said.append(("error", text))
+    )
+    monkeypatch.setattr(g.node, "get_logger", lambda: logger)
+    g.node.log_events([Loss("gone"), "back"])
+    assert ("error", "gone") in said and ("info", "back") in said
 
 
 def test_absent_port_is_refused(graph):

@@ -26,7 +26,7 @@ def test_yaml_has_every_parameter_with_its_default(name):
     [
         (RotorSettings, "sign", 0, "sign is 0, expected one of 1, -1"),
         (RotorSettings, "resume", "soon", "resume is 'soon', expected one of 'zero', 'auto', 'manual'"),
-        (RotorSettings, "stale_s", 5.0, "stale_s is 5.0, expected 0.02 to 1.0"),
+        (RotorSettings, "stale_s", 5.0, "stale_s is 5.0, expected 0.03 to 1.0"),
         (RotorSettings, "cell_warn_v", 3.0, "cell_warn_v is 3.0, expected 3.3 to 5.0"),
         (RotorSettings, "max_velocity", float("nan"), "max_velocity is nan"),
         (RudderSettings, "backend", "gpio", "backend is 'gpio', expected one of 'sysfs'"),
@@ -38,6 +38,15 @@ def test_yaml_has_every_parameter_with_its_default(name):
 def test_refusals_name_field_value_and_range(settings, field, value, expected):
     with pytest.raises(ValueError, match=expected):
         settings(**{field: value})
+
+
+@pytest.mark.parametrize("rate_hz", [20.0, 50.0, 200.0])
+def test_rotor_times_leave_room_for_three_cycles(rate_hz):
+    least = 3 / rate_hz
+    RotorSettings(rate_hz=rate_hz, stale_s=least, module_timeout_s=max(least, 0.05))
+    for field in ("stale_s", "module_timeout_s"):
+        with pytest.raises(ValueError, match=f"{field} is .* expected"):
+            RotorSettings(rate_hz=rate_hz, **{field: 0.9 * least})
 
 
 def test_rotor_limits_let_full_throttle_through():

@@ -8,6 +8,7 @@ import pytest
 
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.rotor_driver import RotorDriver
 from fish_hw.devices.rotor_guard import Phase
 from fish_hw.devices.status import ERROR, OK, WARN
@@ -42,7 +43,7 @@ class Bench:
             cycle = self.driver.step()
             self.events += cycle.events
             self.samples += [cycle.sample] if cycle.sample else []
-            self.telemetry += [cycle.telemetry] if cycle.telemetry else []
+            self.telemetry += [cycle.telemetry] if cycle.telemetry and cycle.telemetry.volts else []
             if until is not None and until():
                 return True
             time.sleep(DT)
@@ -159,6 +160,54 @@ def test_low_battery_stops_and_stays_stopped(vertiq_emulator):
     bench.emulator.volts = 4 * 3.8
     assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     bench.driver.close()
+
+
+def test_protection_works_without_the_derate_register(vertiq_emulator):
+    """Some firmware lacks it; nothing else depends on it."""
+    vertiq_emulator.mangle = lambda reply: b"" if reply[2:4] == bytes([50, 41]) else reply
+    bench = Bench(vertiq_emulator, replace(SETTINGS, battery_filter_s=0.0, reply_timeout_s=0.05))
+    bench.connect()
+    vertiq_emulator.faults = 0x40
+    assert bench.run(15.0, steady, until=lambda: "coil temperature" in bench.driver.guard.reason)
+    assert bench.driver.status().level == ERROR
+    bench.driver.close()
+
+
+def test_missing_telemetry_is_an_error(vertiq_emulator):
+    vertiq_emulator.mangle = lambda reply: b"" if reply[2:4] == bytes([88, 1]) else reply
+    bench = Bench(vertiq_emulator, replace(SETTINGS, reply_timeout_s=0.05))
+    bench.connect()
+    said = "no telemetry: battery and temperature are not watched"
+    assert bench.run(15.0, steady, until=lambda: bench.driver.status().message == said)
+    assert bench.driver.status().level == ERROR
+    vertiq_emulator.mangle = lambda reply: reply
+    assert bench.run(15.0, steady, until=lambda: bench.driver.status().level == OK)
+    bench.driver.close()
+
+
+def test_clearing_faults_does_not_break_the_silence_of_a_stop(bench):
+    assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
+    assert bench.run(15.0, until=lambda: bench.driver.guard.phase is Phase.COASTING)
+    bench.emulator.faults_ever = 0b10
+    bench.driver.clear_faults()
+    asked = sum(m.type == reg.FAULT_EVER.type for m in bench.emulator.log)
+    while bench.driver.guard.phase is Phase.COASTING:
+        assert sum(m.type == reg.FAULT_EVER.type for m in bench.emulator.log) == asked
+        bench.run(DT)
+    assert bench.run(15.0, until=lambda: any("it held: input voltage" in e for e in bench.events))
+
+
+def test_module_that_answers_no_measurement_is_lost_once(bench):
+    """It can be set up each time, so that it seems to be found."""
+    silent = (bytes([50, 12]), bytes([50, 13]))
+    bench.emulator.mangle = lambda reply: b"" if reply[2:4] in silent else reply
+    assert bench.run(15.0, until=lambda: any(isinstance(e, Loss) for e in bench.events))
+    lost = bench.driver._link.attempts
+    assert bench.run(30.0, until=lambda: bench.driver._link.attempts > lost)
+    said = [e for e in bench.events if isinstance(e, Loss) and "stopped answering" in e]
+    assert len(said) == 1 and "rotor connected again" not in bench.events
+    bench.emulator.mangle = lambda reply: reply
+    assert bench.run(15.0, until=lambda: bench.events[-1] == "rotor connected again")
 
 
 def test_faults_are_named_before_they_are_cleared(bench):

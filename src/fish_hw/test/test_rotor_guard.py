@@ -111,6 +111,13 @@ def test_rest_with_gaps_is_no_rest():
     assert bench.guard.latched
 
 
+@pytest.mark.parametrize(("resume", "reason"), [("auto", ""), ("zero", "not enabled yet")])
+def test_reason_at_the_start(resume, reason):
+    bench = Bench(replace(SETTINGS, resume=resume))
+    bench.run(0.1)
+    assert (bench.guard.latched, bench.guard.reason) == (bool(reason), reason)
+
+
 def test_resume_manual_needs_the_operator():
     bench = Bench(replace(SETTINGS, resume="manual"))
     assert all(a.velocity is None for a in bench.run(1.0, lambda _: 0.0))

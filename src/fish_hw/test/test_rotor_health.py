@@ -41,6 +41,15 @@ def test_battery_must_recover_above_the_warning():
     assert not health.judge(replace(WELL, volts=4 * 3.55), 2.0).stops
 
 
+def test_missing_answers_leave_the_judgement_as_it_was():
+    health = RotorHealth(replace(SETTINGS, battery_filter_s=0.0))
+    stopped = health.judge(replace(WELL, volts=4 * 3.2, coil_c=90.0), 0.0).stops
+    assert len(stopped) == 2
+    assert health.judge(RotorTelemetry(), 1.0).stops == stopped
+    assert health.judge(RotorTelemetry(faults=0b10), 2.0).stops == (*stopped, "module faults: input voltage")
+    assert RotorHealth(SETTINGS).judge(RotorTelemetry(faults=0), 0.0).stops == ()
+
+
 @pytest.mark.parametrize(
     ("change", "warning", "stop"),
     [

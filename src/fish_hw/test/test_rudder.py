@@ -7,9 +7,11 @@ import threading
 from dataclasses import replace
 
 import pytest
+from fake_kernel import refuse_as_sysfs_does
 from waiting import wait_until
 
 from fish_hw.devices.pca9685 import Pca9685Pwm, prescale
+from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.rudder_servo import RudderServo
 from fish_hw.devices.status import ERROR, OK, WARN
@@ -110,7 +112,8 @@ def test_prescale():
 
 
 @pytest.fixture
-def chip(tmp_path):
+def chip(tmp_path, monkeypatch):
+    refuse_as_sysfs_does(monkeypatch)
     return PwmChipEmulator(tmp_path / "pwmchip0")
 
 
@@ -123,6 +126,16 @@ def test_sysfs_pulse(chip, us):
     assert pwm.is_running()
     pwm.stop()
     assert not pwm.is_running()
+
+
+@pytest.mark.parametrize("left", [0, 1_900_000, 30_000_000])
+def test_sysfs_starts_whatever_the_channel_was_left_at(chip, left):
+    """At boot the period is 0; after another program the pulse may be longer than our period."""
+    if left:
+        (chip.channel / "period").write_text("40000000\n")
+        (chip.channel / "duty_cycle").write_text(f"{left}\n")
+    SysfsPwm(str(chip.chip), 0, 20_000_000).start(1_500_000)
+    assert (chip.read("period"), chip.read("duty_cycle"), chip.read("enable")) == (20_000_000, 1_500_000, 1)
 
 
 def test_sysfs_export_waits_for_the_files(tmp_path):
@@ -204,6 +217,18 @@ def test_close_centres_and_gives_the_servo_time_before_the_pulses_end(chip):
     assert bench.slept[-1] >= 0.6 / SETTINGS.max_rate
 
 
+def test_close_right_after_the_start_waits_for_a_servo_that_stood_anywhere(chip):
+    """safe_stop knows nothing of the angle that the killed node had sent."""
+    bench = DriverBench(chip)
+    bench.driver.connect()
+    bench.driver.close()
+    assert bench.slept[-1] >= 2 * SETTINGS.max_angle / SETTINGS.max_rate
+    bench.driver.connect()
+    bench.run(1.0)
+    bench.driver.close()
+    assert bench.slept[-1] < 0.2  # centred long ago
+
+
 def test_close_can_leave_the_pulses_on(chip):
     bench = DriverBench(chip, replace(SETTINGS, off_at_exit=False))
     bench.driver.connect()
@@ -223,6 +248,22 @@ def test_output_that_somebody_switches_off_is_started_again(chip):
     assert chip.read("enable") == 1
     assert chip.read("duty_cycle") == SETTINGS.us_per_rad * 600 + 1_500_000
     assert bench.events[-1] == "rudder output connected again"
+
+
+def test_output_that_does_not_stay_on_is_lost_once(chip):
+    bench = DriverBench(chip)
+    bench.driver.connect()
+    for _ in range(20):
+        (chip.channel / "enable").write_text("0\n")
+        bench.run(1.0, 0.6)
+        (chip.channel / "enable").write_text("0\n")
+    lost = [event for event in bench.events if isinstance(event, Loss)]
+    assert len(lost) == 1 and "connected again" not in " ".join(bench.events)
+    bench.run(8.0, 0.6)
+    assert bench.events[-1] == "rudder output connected again"
+    (chip.channel / "enable").write_text("0\n")
+    bench.run(1.5, 0.6)
+    assert bench.events[-1] == lost[0]
 
 
 def test_bus_error_loses_the_board_and_finds_it_again():

@@ -1,11 +1,15 @@
 """The command that makes the robot safe after a node was killed."""
 
+import time
+
 import pytest
 import yaml
 from waiting import wait_until
 
+from fish_hw.commands import safe_stop
 from fish_hw.commands.safe_stop import main
 from fish_hw.devices import vertiq_registers as reg
+from fish_hw.devices.rudder_output import open_output
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE
 from fish_hw.settings.parameter_file import read_parameter_file
@@ -39,6 +43,53 @@ def test_rudder_is_centred_though_the_rotor_is_gone(tmp_path, capsys):
     assert "safe_stop: rotor: cannot open serial port /dev/ttyX9" in capsys.readouterr().err
 
 
+def rudder_at_the_side(tmp_path) -> PwmChipEmulator:
+    chip = PwmChipEmulator(tmp_path / "pwmchip0")
+    for name, text in (("period", "20000000"), ("duty_cycle", "1900000"), ("enable", "1")):
+        (chip.channel / name).write_text(text)
+    return chip
+
+
+@pytest.mark.parametrize("wrong", [{"module_id": 0.0}, {"baud": "fast"}, {"port": 7}])
+def test_a_mistake_in_the_rotors_file_does_not_leave_the_rudder(tmp_path, capsys, wrong):
+    chip = rudder_at_the_side(tmp_path)
+    rotor = parameter_file(tmp_path / "rotor.yaml", **wrong)
+    rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip))
+    assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 1
+    assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
+    error = capsys.readouterr().err
+    assert f"{next(iter(wrong))} is" in error and error.count("\n") == 1
+
+
+def test_what_nobody_expects_does_not_leave_the_rudder(tmp_path, capsys, monkeypatch):
+    chip = rudder_at_the_side(tmp_path)
+    monkeypatch.setattr(safe_stop, "SerialPort", lambda *_: 1 / 0)
+    rotor = parameter_file(tmp_path / "rotor.yaml")
+    rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip))
+    assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 1
+    assert chip.read("enable") == 0
+    assert capsys.readouterr().err == "safe_stop: rotor: ZeroDivisionError('division by zero')\n"
+
+
+def test_the_servo_gets_time_to_travel_before_the_pulses_end(tmp_path):
+    """From one stop to the other, since the angle before is not known."""
+    chip = rudder_at_the_side(tmp_path)
+    rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip), max_rate=8.0)
+    start = time.monotonic()
+    assert main(["--rudder", str(rudder)]) == 0
+    assert time.monotonic() - start >= 2 * 0.8 / 8.0
+
+
+def test_emulated_devices_leave_the_real_ones_alone(tmp_path):
+    chip = rudder_at_the_side(tmp_path)
+    rotor = parameter_file(tmp_path / "rotor.yaml", port="emulator")
+    rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip), backend="emulator")
+    assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 0
+    assert (chip.read("duty_cycle"), chip.read("enable")) == (1_900_000, 1)
+    with pytest.raises(ValueError, match="no output to open"):
+        open_output(RudderSettings(backend="emulator"))
+
+
 def test_nothing_named(capsys):
     with pytest.raises(SystemExit, match="2"):
         main([])
@@ -51,8 +102,10 @@ def test_nothing_named(capsys):
         ("{bad: [", "while parsing"),
         ("[]", "expected a node name with ros__parameters"),
         ("/**: {ros__parameters: {chnnel: 1}}", "unknown chnnel; known: address"),
-        ("/**: {ros__parameters: {pwm_hz: 3}}", "pwm_hz is 3, expected 40.0 to 333.0"),
-        ("/**: {ros__parameters: {pwm_hz: fast}}", "rudder.yaml"),
+        ("/**: {ros__parameters: {1: 1, true: 2}}", "unknown 1"),
+        ("/**: {ros__parameters: {pwm_hz: 3}}", "pwm_hz is 3.0, expected 40.0 to 333.0"),
+        ("/**: {ros__parameters: {pwm_hz: fast}}", "pwm_hz is 'fast', expected float such as 50.0"),
+        ("/**: {ros__parameters: {channel: 0.0}}", "channel is 0.0, expected int such as 0"),
     ],
 )
 def test_parameter_file_errors_name_file_and_field(tmp_path, text, expected):

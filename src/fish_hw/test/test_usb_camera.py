@@ -1,11 +1,17 @@
 """The camera: capture from a video file, device, JPEG handling, calibration files."""
 
+import os
+import threading
+
 import cv2
 import numpy as np
 import pytest
 import yaml
+from waiting import wait_until
 
+from fish_hw.devices import usb_camera
 from fish_hw.devices.camera_calibration import CalibrationError, read_calibration
+from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.status import ERROR, OK, WARN
 from fish_hw.devices.usb_camera import UsbCamera, decode_jpeg, encode_jpeg, jpeg_size
 from fish_hw.emulators.walking_square import WalkingSquare
@@ -115,10 +121,83 @@ def test_camera_that_stops_is_opened_again(bench):
     events = [e for _ in range(40) for e in camera.step().events]
     assert events == ["camera emulator: no frames for 1.0 s"]
     assert source.closed and camera.status().level == ERROR
+    assert isinstance(events[0], Loss)
     clock.sleep(1.0)
-    assert camera.step().events == ["camera connected again"]
+    camera.step()  # opens it
     source.frames = [Frame(clock.now, image=picture())]
-    assert camera.step().picture is not None
+    cycle = camera.step()
+    assert cycle.picture is not None and cycle.events == ["camera connected again"]
+
+
+def test_camera_that_opens_but_sends_nothing_is_lost_once(bench):
+    camera, source, clock = bench
+    events = []
+
+    def run(duration_s: float) -> None:
+        end = clock.now + duration_s
+        while clock.now < end:
+            clock.sleep(0.01)
+            events.extend(camera.step().events)
+
+    lost, found = "camera emulator: no frames for 1.0 s", "camera connected again"
+    run(30.0)
+    assert events == [lost]
+    assert 4 <= camera.status().values["reconnect attempts"] <= 8  # waits grow to 5 s
+    source.frames = [Frame(clock.now, image=picture())]
+    run(30.0)
+    assert events == [lost, found, lost]  # a second loss for the same reason is said too
+
+
+def test_a_camera_is_not_released_in_the_middle_of_a_read(bench, monkeypatch):
+    camera, source, _ = bench
+    reading, go_on = threading.Event(), threading.Event()
+
+    def stalled() -> None:
+        reading.set()
+        go_on.wait()
+
+    source.read = stalled
+    worker = threading.Thread(target=camera.step)
+    worker.start()
+    assert reading.wait(5.0)
+    monkeypatch.setattr(usb_camera, "CLOSE_WAIT_S", 0.01)
+    camera.close()
+    assert not source.closed
+    monkeypatch.setattr(usb_camera, "CLOSE_WAIT_S", 5.0)
+    closer = threading.Thread(target=camera.close)
+    closer.start()
+    go_on.set()
+    assert wait_until(lambda: source.closed)
+    worker.join()
+    closer.join()
+
+
+@pytest.fixture
+def video(tmp_path):
+    """A video file of five frames that grow brighter."""
+    path = str(tmp_path / "pool.avi")
+    writer = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (64, 48))
+    for i in range(5):
+        writer.write(np.full((48, 64, 3), 40 * i, np.uint8))
+    writer.release()
+    return path
+
+
+@pytest.mark.parametrize("chosen", [{}, {"exposure": 100, "focus": 10, "white_balance_k": 4000}])
+def test_a_device_is_configured_through_the_real_opencv(video, monkeypatch, chosen):
+    """A file stands in for the device: OpenCV checks types, and what a file cannot do it ignores."""
+    opened = []
+    real = cv2.VideoCapture
+
+    def capture(device: str, api: int) -> cv2.VideoCapture:
+        opened.append((device, api, os.environ["OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT"]))
+        return real(video)
+
+    monkeypatch.delenv("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", raising=False)
+    monkeypatch.setattr(cv2, "VideoCapture", capture)
+    camera = VideoCapture(CameraSettings(device="/dev/video0", **chosen))
+    camera.close()
+    assert opened == [("/dev/video0", cv2.CAP_V4L2, "1")]  # s that a silent camera may block, not 10
 
 
 def test_absent_camera_names_it_and_the_others():
@@ -135,14 +214,9 @@ def test_file_that_is_no_video(tmp_path):
         VideoCapture(CameraSettings(device=str(path)))
 
 
-def test_video_file_is_played_in_a_loop_at_its_pace(tmp_path):
-    path = str(tmp_path / "pool.avi")
-    writer = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (64, 48))
-    for i in range(5):
-        writer.write(np.full((48, 64, 3), 40 * i, np.uint8))
-    writer.release()
+def test_video_file_is_played_in_a_loop_at_its_pace(video):
     clock = Clock()
-    capture = VideoCapture(CameraSettings(device=path, rate_hz=30.0), clock, clock.sleep)
+    capture = VideoCapture(CameraSettings(device=video, rate_hz=30.0), clock, clock.sleep)
     frames = [frame for _ in range(12) if (frame := capture.read()) is not None]
     capture.close()
     brightness = [round(frame.image.mean() / 40) for frame in frames]

@@ -149,6 +149,32 @@ def test_telemetry(module):
     assert (telemetry.derate, telemetry.mode) == (1.0, reg.COAST)
 
 
+def dropping(*registers: reg.Register):
+    """Damage: no answers of these registers."""
+    silent = [(register.type, register.param) for register in registers]
+    return lambda reply: b"" if (reply[2], reply[3]) in silent else reply
+
+
+def test_telemetry_keeps_the_answers_that_came(module):
+    vertiq, emulator = module
+    emulator.faults = 0b10
+    emulator.mangle = dropping(reg.DERATE)
+    telemetry = vertiq.telemetry()
+    assert (telemetry.volts, telemetry.faults, telemetry.derate) == (pytest.approx(14.8), 0b10, None)
+    emulator.mangle = dropping(reg.TELEMETRY)
+    telemetry = vertiq.telemetry()
+    assert (telemetry.volts, telemetry.faults, telemetry.derate) == (None, 0b10, 1.0)
+
+
+def test_fault_memory_that_could_not_be_read_is_not_erased(module):
+    vertiq, emulator = module
+    emulator.faults_ever = 0b10
+    emulator.mangle = dropping(reg.FAULT_EVER)
+    assert vertiq.clear_faults() is None
+    emulator.mangle = lambda reply: reply
+    assert vertiq.read(reg.FAULT_EVER) == [(0b10,)]  # by now the module would have taken an order to erase
+
+
 def test_fault_memory_is_told_before_it_is_cleared(module):
     vertiq, emulator = module
     emulator.faults_ever = 0b10

@@ -1,5 +1,6 @@
 """How the nodes of this package start and stop."""
 
+import sys
 from dataclasses import dataclass
 
 import pytest
@@ -46,6 +47,14 @@ class Broken(Node):
         raise RuntimeError("a real one")
 
 
+class Mistaken(Node):
+    """A node with a mistake in a callback."""
+
+    def __init__(self) -> None:
+        super().__init__("mistaken")
+        self.create_timer(0.01, lambda: int("x"))
+
+
 def read(*overrides: str) -> Config:
     arguments = ["--ros-args"] + [a for text in overrides for a in ("-p", text)]
     rclpy.init(args=arguments)
@@ -78,6 +87,21 @@ def test_a_callback_that_meets_the_end_is_no_error() -> None:
 def test_other_errors_are_not_hidden() -> None:
     with pytest.raises(RuntimeError, match="a real one"):
         run(Broken, "broken")
+
+
+def test_a_mistake_in_a_callback_is_no_refused_parameter() -> None:
+    with pytest.raises(ValueError, match="invalid literal"):
+        run(Mistaken, "mistaken")
+    assert not rclpy.ok()
+
+
+def test_an_argument_that_ros_refuses_gives_one_line_and_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["node", "--ros-args", "-p", "foo"])
+    assert run(Stopped, "node") == 1
+    error = capsys.readouterr().err
+    assert error.startswith("node: ") and "'-p foo'" in error and error.count("\n") == 1
 
 
 def test_refused_parameters_give_one_line_and_1(capsys: pytest.CaptureFixture[str]) -> None:

@@ -63,7 +63,8 @@ def mount_from_points(lens: Lens, points: ArrayLike, pixels: ArrayLike) -> tuple
     Returns:
         Mount, root mean square reprojection error (pixels).
     Raises:
-        CalibrationError: fewer than POINTS_MIN points, or points that fix no pose (on one line).
+        CalibrationError: fewer than POINTS_MIN points, or points that fix no pose (not
+            finite, on one line).
     """
     points = np.ascontiguousarray(points, float).reshape(-1, 3)
     pixels = np.ascontiguousarray(pixels, float).reshape(-1, 2)
@@ -71,6 +72,8 @@ def mount_from_points(lens: Lens, points: ArrayLike, pixels: ArrayLike) -> tuple
         raise CalibrationError(
             f"{len(points)} points and {len(pixels)} pixels: expected pairs, at least {POINTS_MIN}"
         )
+    if not (np.isfinite(points).all() and np.isfinite(pixels).all()):
+        raise CalibrationError("points or pixels are not all finite: expected numbers")
     if np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6) < 2:
         raise CalibrationError("all points lie on one line: expected points spread over the pool")
     _, rotation, t = cv2.solvePnP(points, pixels, lens.K, lens.D, flags=cv2.SOLVEPNP_SQPNP)

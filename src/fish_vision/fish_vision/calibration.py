@@ -16,6 +16,8 @@ Array = NDArray[Any]  # float64
 R_DOWN = np.diag([1.0, -1.0, -1.0])  # optical axes of an untilted camera: right = pool x, down = pool -y
 MODELS = {"plumb_bob": 5, "rational_polynomial": 8}  # distortion model -> number of coefficients
 POOL = (4.27, 2.13)  # m, along pool x and y
+FOCAL_MIN = 1.0  # pixels; a real lens has hundreds
+NEAREST = 0.01  # m from the camera to the plane of the markers
 
 
 class CalibrationError(ValueError):
@@ -45,7 +47,7 @@ class Lens:
             )
         if len(k) != 9 or not all(isfinite(v) for v in [*k, *d]):
             raise CalibrationError("camera_info has numbers missing or not finite in k or d")
-        if k[0] <= 0.0 or k[4] <= 0.0:
+        if k[0] < FOCAL_MIN or k[4] < FOCAL_MIN:
             raise CalibrationError(
                 f"camera_info has focal lengths {k[0]}, {k[4]}: the camera is not calibrated; run calibrate"
             )
@@ -85,6 +87,11 @@ class Calibration:
 
     def __init__(self, lens: Lens, mount: Mount, plane_height: float = 0.0) -> None:
         self.lens, self.plane_height = lens, plane_height
+        if abs(mount.position[2] - plane_height) < NEAREST:
+            raise CalibrationError(
+                f"camera_position = {list(mount.position)} lies in the plane of the markers, z = {plane_height}: "
+                "expected the place of the camera above the pool; run calibrate"
+            )
         R = mount.R
         t = -R @ np.asarray(mount.position, float)
         self._rotation = cv2.Rodrigues(R)[0]
@@ -95,6 +102,7 @@ class Calibration:
         self._plane_inverse = np.linalg.inv(self._plane)
         self.H = lens.K @ self._plane
         self._check_pool_visible()
+        self._check_lens_invertible()
 
     def _check_pool_visible(self) -> None:
         """The pool's centre must be in the image, or lens and mount belong to different cameras."""
@@ -104,6 +112,21 @@ class Calibration:
             raise CalibrationError(
                 f"the pool's centre falls on pixel ({u:.0f}, {v:.0f}) of a {width} x {height} image: "
                 "camera_info and camera_position / camera_tilt do not belong together; run calibrate"
+            )
+
+    def _check_lens_invertible(self) -> None:
+        """Every pixel must have a ray, or the first picture would find out."""
+        width, height = self.lens.size
+        corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], float)
+        try:
+            with np.errstate(all="ignore"):
+                rays = undistort(corners, self.lens)
+        except np.linalg.LinAlgError:
+            rays = np.full((4, 2), np.nan)
+        if not np.isfinite(rays).all():
+            raise CalibrationError(
+                f"camera_info has focal lengths {self.lens.K[0, 0]}, {self.lens.K[1, 1]} and distortion "
+                f"{self.lens.D.tolist()}, which no lens has: run calibrate"
             )
 
     def pool_to_pixel(self, points: ArrayLike) -> Array:

@@ -52,6 +52,10 @@ def from_raw(data: bytes, encoding: str, width: int, height: int, step: int, siz
             f"{len(data)} bytes in rows of {step} for a {width} x {height} {encoding} image: "
             f"expected at least {width * channels * height} bytes in rows of at least {width * channels}"
         )
+    if encoding == "yuv422_yuy2" and width % 2:
+        raise PictureError(
+            f"{encoding} image of width {width}: expected an even one, two pixels share a colour"
+        )
     rows = np.frombuffer(data, np.uint8, step * height).reshape(height, step)[:, : width * channels]
     picture = np.ascontiguousarray(rows).reshape(height, width, channels)
     return _of_size(picture if conversion is None else cv2.cvtColor(picture, conversion), size)

@@ -106,6 +106,14 @@ def test_mount_from_points_read_to_a_pixel_is_good_to_millimetres() -> None:
     assert np.abs(places - points[:, :2]).max() < 0.005
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_points_that_are_no_numbers_are_refused(bad: float) -> None:
+    points, pixels = corners_and_pixels(0.0)
+    pixels[2, 1] = bad
+    with pytest.raises(CalibrationError, match="not all finite"):
+        mount_from_points(TRUE, points, pixels)
+
+
 @pytest.mark.parametrize(
     ("points", "message"),
     [([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "at least 4"), ([[x, 0, 0] for x in range(5)], "one line")],

@@ -84,6 +84,7 @@ def test_no_points_give_no_points() -> None:
         ((0, 720, "plumb_bob", [1.0] * 9, []), "0 x 720"),
         ((1280, 720, "plumb_bob", [0.0] * 9, [0.0] * 5), "not calibrated"),
         ((1280, 720, "plumb_bob", [float("nan")] * 9, []), "not finite"),
+        ((1280, 720, "plumb_bob", [1e-300] * 9, []), "not calibrated"),
         ((1280, 720, "plumb_bob", [1.0] * 4, []), "missing"),
         ((1280, 720, "equidistant", [1.0] * 9, [0.1] * 4), "equidistant"),
         ((1280, 720, "plumb_bob", [1.0] * 9, [0.1] * 8), "8 coefficients"),
@@ -100,6 +101,22 @@ def test_unusable_camera_info_is_refused_with_the_reason(fields: tuple, message:
 def test_a_mount_that_does_not_see_the_pool_is_refused(mount: Mount) -> None:
     with pytest.raises(CalibrationError, match="camera_position"):
         Calibration(lens(), mount)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.3])
+def test_a_camera_in_the_plane_of_the_markers_is_refused(height: float) -> None:
+    with pytest.raises(CalibrationError, match="camera_position.*in the plane of the markers"):
+        Calibration(lens(), Mount((0.0, 0.0, height), (0.0, 0.0, 0.0)), height)
+
+
+def test_a_lens_that_sends_pixels_nowhere_is_refused() -> None:
+    d = (0.0, 0.0, 1e200, 0.0, 0.0)
+    straight_down = Mount((0.0, 0.0, 3.0), (0.0, 0.0, 0.0))  # whose pool centre is not distorted
+    with pytest.raises(CalibrationError, match="which no lens has"):
+        Calibration(
+            Lens.from_camera_info(1280, 720, "plumb_bob", [1e3, 0, 640, 0, 1e3, 360, 0, 0, 1], d),
+            straight_down,
+        )
 
 
 def test_a_lens_file_is_read_back(tmp_path: Path) -> None:

@@ -53,6 +53,36 @@ def test_check_image_says_what_is_missing(files: Path, monkeypatch, capsys) -> N
     assert "none.png" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["out.xyz", "out", "no_folder/out.png"])
+def test_check_image_says_in_one_line_that_it_cannot_write(
+    files: Path, monkeypatch, capsys, name: str
+) -> None:
+    arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / name)
+    assert call(check_image, monkeypatch, files / "fish.png", *arguments) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("check_image: ") and name in error and error.count("\n") == 1
+
+
+def test_calibrate_mount_names_the_line_that_is_no_number(files: Path, monkeypatch, capsys) -> None:
+    rows = (files / "points.csv").read_text().splitlines()
+    rows[2] = "nan,1,2,3"
+    (files / "points.csv").write_text("\n".join(rows))
+    mount = ("mount", files / "points.csv", "--lens", files / "lens.yaml", "--out", files / "mount.yaml")
+    assert call(calibrate, monkeypatch, *mount) == 1
+    error = capsys.readouterr().err
+    assert "points.csv: line 3 has [nan, 1.0, 2.0, 3.0]" in error and error.count("\n") == 1
+    assert not (files / "mount.yaml").exists()
+
+
+@pytest.mark.parametrize("square", ["nan", "inf"])
+def test_calibrate_lens_refuses_a_square_without_a_size(
+    files: Path, monkeypatch, capsys, square: str
+) -> None:
+    arguments = ("lens", files / "fish.png", "--corners", "7x5", "--square", square)
+    assert call(calibrate, monkeypatch, *arguments) == 1
+    assert "expected like 8x6" in capsys.readouterr().err
+
+
 def test_calibrate_mount_writes_params_of_the_tracker(files: Path, monkeypatch, capsys) -> None:
     arguments = ("mount", files / "points.csv", "--lens", files / "lens.yaml", "--out", files / "mount.yaml")
     assert call(calibrate, monkeypatch, *arguments) == 0

@@ -31,6 +31,11 @@ def test_yuyv_grey_is_grey() -> None:
     assert picture.shape == (24, 32, 3) and np.ptp(picture) <= 1
 
 
+def test_yuyv_of_odd_width_is_refused() -> None:
+    with pytest.raises(PictureError, match="width 17: expected an even one"):
+        from_raw(bytes(34 * 4), "yuv422_yuy2", 17, 4, 34, (17, 4))
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [

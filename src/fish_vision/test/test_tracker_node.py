@@ -81,7 +81,8 @@ class Bench:
 
     def send_raw(self, picture: np.ndarray, encoding: str) -> None:
         height, width = picture.shape[:2]
-        msg = Image(height=height, width=width, encoding=encoding, step=3 * width, data=picture.tobytes())
+        step = picture[0].nbytes
+        msg = Image(height=height, width=width, encoding=encoding, step=step, data=picture.tobytes())
         self.raw.publish(self._stamped(msg))
 
     def says(self, text: str) -> bool:
@@ -130,6 +131,8 @@ def test_raw_images_work_and_wrong_encodings_are_said(bench: Bench) -> None:
     bench.send_info()
     bench.send_raw(PICTURE[..., ::-1], "mono16")
     assert bench.says("encoding 'mono16'")
+    bench.send_raw(PICTURE[:, 1:, :2], "yuv422_yuy2")
+    assert bench.says("width 1279: expected an even one")
     bench.send_raw(PICTURE[..., ::-1], "rgb8")
     assert bench.spin_until(lambda: bool(bench.got["pose"]))
     check_pose(bench.got["pose"][0])
@@ -164,6 +167,7 @@ def test_bad_calibrations_are_said_and_a_good_one_mends_it(bench: Bench) -> None
             {"distortion_model": "equidistant", "d": [0.1] * 4, "k": [901.0] + lens_fields()[3][1:]},
             "equidistant",
         ),
+        ({"k": [1e-300, 0.0, 640.0, 0.0, 1e-300, 360.0, 0.0, 0.0, 1.0]}, "not calibrated"),
         ({"k": [900.0, 0.0, 5000.0, 0.0, 900.0, 360.0, 0.0, 0.0, 1.0]}, "camera_position"),
     ):
         bench.send_info(**changes)

@@ -19,8 +19,14 @@ from fish_hw.transport.errors import TransportError
 from fish_hw.transport.serial_port import SerialPort
 
 
-def stop_rotor(settings: RotorSettings) -> None:
-    """Tell the module to coast; TransportError if the port is not there."""
+def stop_rotor(path: Path) -> None:
+    """Tell the module of a parameter file to coast; TransportError if the port is not there.
+
+    An emulator has nothing to stop.
+    """
+    settings = read_parameter_file(path, RotorSettings)
+    if settings.port == "emulator":
+        return
     port = SerialPort(settings.port, settings.baud)
     try:
         Vertiq(port, settings.module_id).coast()
@@ -28,8 +34,14 @@ def stop_rotor(settings: RotorSettings) -> None:
         port.close()
 
 
-def stop_rudder(settings: RudderSettings) -> None:
-    """Centre the servo and end the pulses as the settings say; TransportError if the output is not there."""
+def stop_rudder(path: Path) -> None:
+    """Centre the servo and end the pulses as the parameter file says; TransportError if the output is not there.
+
+    An emulator has nothing to stop.
+    """
+    settings = read_parameter_file(path, RudderSettings)
+    if settings.backend == "emulator":
+        return
     driver = RudderDriver(settings, lambda: open_output(settings))
     driver.connect()  # this centres
     driver.close()
@@ -43,20 +55,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.rotor is None and options.rudder is None:
         parser.error("nothing to stop: give --rotor FILE, --rudder FILE or both")
-    failures = []
-    try:
-        if options.rotor is not None:
-            stop_rotor(read_parameter_file(options.rotor, RotorSettings))
-    except (TransportError, ValueError) as error:
-        failures.append(f"rotor: {error}")
-    try:
-        if options.rudder is not None:
-            stop_rudder(read_parameter_file(options.rudder, RudderSettings))
-    except (TransportError, ValueError) as error:
-        failures.append(f"rudder: {error}")
-    for failure in failures:
-        print(f"safe_stop: {failure}", file=sys.stderr)
-    return 1 if failures else 0
+    failed = False
+    for name, path, stop in (("rotor", options.rotor, stop_rotor), ("rudder", options.rudder, stop_rudder)):
+        try:
+            if path is not None:
+                stop(path)
+        except Exception as error:  # whatever it is, the other device is still to be stopped
+            failed = True
+            expected = isinstance(error, TransportError | ValueError)
+            print(f"safe_stop: {name}: {error if expected else repr(error)}", file=sys.stderr)
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

@@ -31,9 +31,11 @@ START_READ_WAIT_S = 0.01
 MAX_READS = 8  # packets per poll; one holds all three reports, or three hold one each
 EXTRA_READ = 20  # polls
 LONGEST_READ = 512  # bytes; longer cargoes come in pieces
+MAX_PIECES = 65  # of one cargo: 32766 bytes; more come from a hub, or a bus, that hangs
 MAX_ACCELERATION = 136.0  # m/s^2, magnitude; the sensor ends at 8 g per axis
 MAX_RATE = 60.5  # rad/s, magnitude; the sensor ends at 2000 deg/s per axis
 UNIT_TOLERANCE = 0.02
+OLDEST_S, NEWEST_S = 1.0, 0.05  # before and after the read; a bit error in the time base leads anywhere
 HINT = "check power, wiring, PS0/PS1 = 00, the address (0x4a or 0x4b) and the bus speed (400 kHz)"
 
 
@@ -44,6 +46,7 @@ class BnoCounters:
     bus_errors: int = 0
     bad_packets: int = 0
     implausible: int = 0
+    bad_times: int = 0
     resets: int = 0
 
 
@@ -177,6 +180,9 @@ class Bno085:
             if not plausible(report):
                 self.counters.implausible += 1
                 continue
+            if not -OLDEST_S <= report.time_s - time_s <= NEWEST_S:
+                self.counters.bad_times += 1
+                continue
             self._newest[report.id] = report
             if len(self._newest) == len(FEATURES):
                 samples.append(self._assemble())
@@ -194,13 +200,15 @@ class Bno085:
 
     def _read_cargo(self) -> Cargo | None:
         """Next complete cargo, or None if the hub has none, or sent something unreadable."""
-        header = self._read_header()
-        while header is not None and not header.empty:
+        for _ in range(MAX_PIECES):
+            header = self._read_header()
+            if header is None or header.empty:
+                return None
             body = self._read_body(header)
             cargo = None if body is None else self.reassembler.feed(header, body)
             if cargo is not None or body is None:
                 return cargo
-            header = self._read_header()
+        self.counters.bad_packets += 1
         return None
 
     def _read_header(self) -> Header | None:

@@ -9,8 +9,9 @@ from fish_hw.devices.bno085 import Bno085
 from fish_hw.devices.bno085_rvc import Bno085Rvc
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.imu_sample import ImuSample, Mounting
-from fish_hw.devices.reconnect import Backoff
+from fish_hw.devices.reconnect import Link
 from fish_hw.devices.status import ERROR, OK, WARN, Status
+from fish_hw.protocol.rvc import PERIOD_S
 from fish_hw.settings.imu import ImuSettings
 from fish_hw.transport.errors import TransportError
 from fish_hw.transport.interfaces import ByteStream, DataReady, I2cBus
@@ -39,6 +40,7 @@ class I2cSensor:
         clock: Callable[[], float],
         sleep: Callable[[float], None],
     ) -> None:
+        self.rate_hz = settings.rate_hz
         self._bus = open_bus()
         self._line: DataReady | None = None
         interval_us = round(1e6 / settings.rate_hz)
@@ -76,6 +78,7 @@ class SerialSensor:
     """A Bno085Rvc with the port it opens and closes."""
 
     name = "UART-RVC"
+    rate_hz = 1.0 / PERIOD_S  # whatever the settings ask for
 
     def __init__(self, open_stream: Callable[[], ByteStream], clock: Callable[[], float]) -> None:
         self._stream = open_stream()
@@ -118,8 +121,7 @@ class ImuDriver:
         self._clock, self._sleep = clock, sleep
         self._mounting = Mounting(settings)
         self._sensor: I2cSensor | SerialSensor | None = None
-        self._backoff = Backoff()
-        self._trouble = "not connected yet"
+        self._link = Link("IMU")
         self._last: ImuSample | None = None
         self._changed_time = 0.0
         self._newest_s = -math.inf
@@ -140,8 +142,8 @@ class ImuDriver:
             self._sensor = SerialSensor(self._open_stream, self._clock)
         self._changed_time = self._clock()
         self._last = None
+        self._newest_s = -math.inf
         self._rated = (self.samples, self._clock())
-        self._backoff.succeeded()
 
     def step(self, timeout_s: float) -> ImuCycle:
         """Read once; waits up to timeout_s for bytes, the interrupt, or the time to try again."""
@@ -150,10 +152,10 @@ class ImuDriver:
             if self._sensor is None:
                 return self._reconnect(now, timeout_s)
             samples = [self._in_order(self._mounting.to_base(s)) for s in self._sensor.poll(timeout_s)]
-            self._watch(samples)
+            return ImuCycle(samples, self._watch(samples))
         except (TransportError, DeviceError) as error:
-            return ImuCycle(events=self._lose(str(error), now))
-        return ImuCycle(samples)
+            self.close()
+            return ImuCycle(events=self._link.lose(str(error), now))
 
     def close(self) -> None:
         """Give the port back."""
@@ -164,17 +166,17 @@ class ImuDriver:
     def status(self) -> Status:
         """State in one line with counters and the rate since the last call."""
         rate = self._rate()
-        values: dict[str, object] = {"samples": self.samples, "reconnect attempts": self._backoff.attempts}
+        values: dict[str, object] = {"samples": self.samples, "reconnect attempts": self._link.attempts}
         sensor = self._sensor
         if sensor is None:
-            return Status(ERROR, self._trouble, values)
+            return Status(ERROR, self._link.trouble, values)
         values |= {"sensor": sensor.name, "rate [Hz]": round(rate, 1), **sensor.counters()}
         if rate == 0.0:
             return Status(ERROR, "no samples", values)
         if self._last is not None and self._last.accuracy == UNRELIABLE:
             return Status(WARN, "the sensor calls its values unreliable", values)
-        if not SLOWEST_RATE * self._settings.rate_hz <= rate <= FASTEST_RATE * self._settings.rate_hz:
-            return Status(WARN, f"{rate:.0f} samples/s instead of {self._settings.rate_hz:.0f}", values)
+        if not SLOWEST_RATE * sensor.rate_hz <= rate <= FASTEST_RATE * sensor.rate_hz:
+            return Status(WARN, f"{rate:.0f} samples/s instead of {sensor.rate_hz:.0f}", values)
         return Status(OK, f"{rate:.0f} samples/s", values)
 
     def _in_order(self, sample: ImuSample) -> ImuSample:
@@ -189,27 +191,27 @@ class ImuDriver:
         self._rated = (self.samples, now)
         return (self.samples - samples) / max(now - since, 1e-3)
 
-    def _watch(self, samples: list[ImuSample]) -> None:
+    def _watch(self, samples: list[ImuSample]) -> list[str]:
+        """Raise when the sensor is silent or frozen; the sensor works once its values change."""
+        events: list[str] = []
         for sample in samples:
             last, self._last = self._last, sample
             values = (sample.orientation, sample.angular_velocity, sample.acceleration)
-            if last is None or values != (last.orientation, last.angular_velocity, last.acceleration):
+            if last is None:
                 self._changed_time = self._clock()
+            elif values != (last.orientation, last.angular_velocity, last.acceleration):
+                self._changed_time = self._clock()
+                events += self._link.works()
         self.samples += len(samples)
         silence = self._clock() - self._changed_time
         if silence > self._settings.watchdog_s:
             what = "values stand still" if samples else "no samples"
             raise DeviceError(f"IMU: {what} for {self._settings.watchdog_s} s")
+        return events
 
     def _reconnect(self, now: float, timeout_s: float) -> ImuCycle:
-        if not self._backoff.due(now):
+        if self._link.due(now):
+            self.connect()
+        else:
             self._sleep(timeout_s)
-            return ImuCycle()
-        self.connect()
-        return ImuCycle(events=["IMU connected again"])
-
-    def _lose(self, reason: str, now: float) -> list[str]:
-        self.close()
-        self._backoff.failed(now)
-        said, self._trouble = self._trouble, reason
-        return [reason] if reason != said else []
+        return ImuCycle()

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.reconnect import Backoff
+from fish_hw.devices.reconnect import Link
 from fish_hw.devices.rotor_guard import Action, Phase, RotorGuard
 from fish_hw.devices.rotor_health import Health, RotorHealth
 from fish_hw.devices.status import ERROR, OK, WARN, Status
@@ -22,6 +22,7 @@ from fish_hw.transport.interfaces import ByteStream
 SILENCE_S = 0.5  # unanswered questions for this long, and at least
 SILENT_QUESTIONS = 5  # of them (a stalled computer asks few), mean that the module is gone
 TELEMETRY_S = 0.2
+UNWATCHED_QUESTIONS = 10  # for telemetry, 2 s of asking; without an answer nobody protects battery and rotor
 
 
 @dataclass
@@ -49,15 +50,16 @@ class RotorDriver:
         self._lock = threading.Lock()  # of the guard: commands arrive on another thread
         self._stream: ByteStream | None = None
         self._vertiq: Vertiq | None = None
-        self._backoff = Backoff()
-        self._trouble = "not connected yet"
+        self._link = Link("rotor")
         self._silent_since: float | None = None
         self._silent_questions = 0
-        self._telemetry: RotorTelemetry | None = None
+        self._telemetry = RotorTelemetry()  # newest known values
         self._telemetry_time = 0.0
+        self._unanswered = {"battery and temperature": 0, "module faults": 0}  # questions in a row
         self._judge = RotorHealth(settings)
         self._health = Health()
         self._clear_faults = threading.Event()
+        self._found: list[str] = []  # what connect() learned; said when the module is known to work
         self._events: list[str] = []
 
     @property
@@ -75,7 +77,7 @@ class RotorDriver:
                 self._stream, settings.module_id, settings.sign, settings.reply_timeout_s, self._clock
             )
             vertiq.coast()
-            self._events += vertiq.configure(settings.module_timeout_s)
+            found = vertiq.configure(settings.module_timeout_s)
             tuning = ", ".join(f"{name} {value:g}" for name, value in vertiq.tuning().items())
         except DeviceError as error:
             self._stream.close()
@@ -84,11 +86,11 @@ class RotorDriver:
             self._stream.close()
             raise
         self._vertiq = vertiq
-        self._telemetry = None
+        self._telemetry = RotorTelemetry()
+        self._unanswered = dict.fromkeys(self._unanswered, 0)
         self._silent_since = None
         self._silent_questions = 0
-        self._backoff.succeeded()
-        self._events.append(f"rotor module {settings.module_id} on {settings.port}: {tuning}")
+        self._found = [*found, f"rotor module {settings.module_id} on {settings.port}: {tuning}"]
 
     def command(self, velocity: float) -> None:
         """Take a commanded speed [rad/s]."""
@@ -131,7 +133,7 @@ class RotorDriver:
             if self._vertiq is not None:
                 self._vertiq.coast()
         except TransportError:
-            self._trouble = "the port was gone before the rotor could be told to coast"
+            self._link.trouble = "the port was gone before the rotor could be told to coast"
         self._stream.close()
         self._stream = self._vertiq = None
 
@@ -143,14 +145,17 @@ class RotorDriver:
             "reason": self.guard.reason,
             "rejected commands": self.guard.rejected,
             "clamped commands": self.guard.clamped,
-            "reconnect attempts": self._backoff.attempts,
+            "reconnect attempts": self._link.attempts,
         }
         vertiq = self._vertiq
         if vertiq is None:
-            return Status(ERROR, self._trouble, values)
+            return Status(ERROR, self._link.trouble, values)
         values |= self._line_values(vertiq)
+        unwatched = [name for name, missed in self._unanswered.items() if missed >= UNWATCHED_QUESTIONS]
         if self._health.stops:
             return Status(ERROR, "; ".join(self._health.stops), values)
+        if unwatched:
+            return Status(ERROR, f"no telemetry: {' and '.join(unwatched)} are not watched", values)
         if self._health.warnings:
             return Status(WARN, "; ".join(self._health.warnings), values)
         if self.guard.latched:
@@ -158,18 +163,20 @@ class RotorDriver:
         return Status(OK, self.guard.phase.value, values)
 
     def _cycle(self, vertiq: Vertiq, now: float, cycle: RotorCycle) -> None:
-        if self._clear_faults.is_set():
-            self._clear_module_faults(vertiq)
         with self._lock:
             before, action = self.guard.phase, self.guard.step(now, self._health.stops)
         self._note_phase(before)
         cycle.sample = self._perform(vertiq, action)
         self._watch_silence(action.ask, cycle.sample is not None, now)
+        if cycle.sample is not None:
+            self._events += [*self._found, *self._link.works()]
+            self._found = []
+        if action.ask and self._clear_faults.is_set():  # else the question would feed the module's watchdog
+            self._clear_module_faults(vertiq)
         if action.ask and now - self._telemetry_time >= TELEMETRY_S:
             self._telemetry_time = now
             cycle.telemetry = vertiq.telemetry()
-            if cycle.telemetry is not None:
-                self._check(vertiq, cycle.telemetry, now)
+            self._check(vertiq, cycle.telemetry, now)
 
     def _perform(self, vertiq: Vertiq, action: Action) -> RotorSample | None:
         if action.coast:
@@ -195,12 +202,19 @@ class RotorDriver:
     def _check(self, vertiq: Vertiq, telemetry: RotorTelemetry, now: float) -> None:
         """Health, and the two ways in which a module forgets what it was told."""
         self._health = self._judge.judge(telemetry, now)
-        last, self._telemetry = self._telemetry, telemetry
-        if last is not None and telemetry.uptime_s < last.uptime_s:
+        self._count_unanswered(telemetry)
+        last_s, uptime_s = self._telemetry.uptime_s, telemetry.uptime_s
+        self._telemetry = telemetry.completed(self._telemetry)
+        if last_s is not None and uptime_s is not None and uptime_s < last_s:
             self._cut(vertiq, "the module restarted", now)
             vertiq.configure(self._settings.module_timeout_s)
-        elif self.guard.phase is Phase.RESTING and telemetry.mode not in RESTING_MODES:
+        elif self.guard.phase is Phase.RESTING and telemetry.mode not in (None, *RESTING_MODES):
             self._cut(vertiq, "the module drove although it was told to coast", now)
+
+    def _count_unanswered(self, telemetry: RotorTelemetry) -> None:
+        answers = {"battery and temperature": telemetry.volts, "module faults": telemetry.faults}
+        for name, answer in answers.items():
+            self._unanswered[name] = self._unanswered[name] + 1 if answer is None else 0
 
     def _cut(self, vertiq: Vertiq, reason: str, now: float) -> None:
         vertiq.coast()
@@ -209,24 +223,23 @@ class RotorDriver:
         self._events.append(f"rotor coasts: {reason}")
 
     def _reconnect(self, now: float) -> None:
-        if self._backoff.due(now):
+        if self._link.due(now):
             self.connect()
-            self._events.append("rotor connected again")
 
     def _lose(self, reason: str, now: float) -> None:
-        if reason != self._trouble:
-            self._events.append(reason)
+        self._events += self._link.lose(reason, now)
         self.close()
-        self._trouble = reason
-        self._backoff.failed(now)
+        self._link.trouble = reason
         with self._lock:
             self.guard.cut(reason, now)
 
     def _clear_module_faults(self, vertiq: Vertiq) -> None:
         self._clear_faults.clear()
         ever = vertiq.clear_faults()
-        names = "no answer" if ever is None else ", ".join(fault_names(ever)) or "none"
-        self._events.append(f"fault memory cleared; it held: {names}")
+        if ever is None:
+            self._events.append("fault memory not cleared: the module did not say what it holds")
+            return
+        self._events.append(f"fault memory cleared; it held: {', '.join(fault_names(ever)) or 'none'}")
 
     def _note_phase(self, before: Phase) -> None:
         if self.guard.phase is not before:
@@ -241,6 +254,4 @@ class RotorDriver:
             "skipped bytes": vertiq.parser.skipped_bytes,
             "filtered volts": round(self._judge.filtered_volts, 2),
         }
-        if self._telemetry is not None:
-            values |= {name: value for name, value in vars(self._telemetry).items()}
-        return values
+        return values | {name: value for name, value in vars(self._telemetry).items() if value is not None}

@@ -3,11 +3,11 @@
     RESTING  coasting; measured, not driven
     RUNNING  follows the command within the limits of speed and acceleration
     STOPPING the command is gone: speed goes to zero in ramp_s, then COASTING
-    COASTING coast was said; nothing is sent for quiet_s, because every byte would feed the module's own
-    watchdog
+    COASTING coast was said; nothing is sent until the module's own watchdog has had its time, because every
+    byte would feed it
 
 A stop is latched: what ends it is the setting `resume`, or the operator alone if the operator asked for it.
-A node that starts is latched too.
+A node that starts is latched too, except with resume "auto".
 """
 
 import math
@@ -46,7 +46,7 @@ class RotorGuard:
     def __init__(self, settings: RotorSettings) -> None:
         self.phase = Phase.RESTING
         self.latched = settings.resume != "auto"
-        self.reason = "not enabled yet"
+        self.reason = "not enabled yet" if self.latched else ""
         self.rejected = 0
         self.clamped = 0
         self._settings = settings

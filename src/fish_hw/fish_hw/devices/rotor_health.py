@@ -26,17 +26,24 @@ class RotorHealth:
     def __init__(self, settings: RotorSettings) -> None:
         self.filtered_volts = math.nan
         self._settings = settings
+        self._known = RotorTelemetry()
         self._last_time = 0.0
         self._battery_stopped = False
 
     def judge(self, telemetry: RotorTelemetry, now: float) -> Health:
-        """Warnings and stops for the newest telemetry; now in s."""
-        self._filter(telemetry.volts, now)
+        """Warnings and stops for the newest telemetry; now in s.
+
+        Where answers are missing the older ones hold: a stop does not end because the module fell silent.
+        """
+        if telemetry.volts is not None:
+            self._filter(telemetry.volts, now)
+        telemetry = self._known = telemetry.completed(self._known)
         warnings: list[str] = []
         stops: list[str] = []
-        self._judge_battery(telemetry.volts, warnings, stops)
+        if telemetry.volts is not None:
+            self._judge_battery(telemetry.volts, warnings, stops)
         self._judge_temperature(telemetry, warnings, stops)
-        if telemetry.derate < 1.0:
+        if telemetry.derate is not None and telemetry.derate < 1.0:
             warnings.append(f"module gives {telemetry.derate:.0%} of its power")
         if telemetry.faults:
             stops.append("module faults: " + ", ".join(fault_names(telemetry.faults)))
@@ -65,6 +72,8 @@ class RotorHealth:
 
     def _judge_temperature(self, telemetry: RotorTelemetry, warnings: list[str], stops: list[str]) -> None:
         for name, value in (("controller", telemetry.controller_c), ("coil", telemetry.coil_c)):
+            if value is None:
+                continue
             if value > self._settings.temperature_stop_c:
                 stops.append(f"{name} at {value:.0f} deg C")
             elif value > self._settings.temperature_warn_c:

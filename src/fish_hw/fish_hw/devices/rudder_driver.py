@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from fish_hw.devices.reconnect import Backoff
+from fish_hw.devices.reconnect import Link
 from fish_hw.devices.rudder_servo import RudderServo
 from fish_hw.devices.status import ERROR, OK, WARN, Status
 from fish_hw.settings.rudder import RudderSettings
@@ -59,9 +59,9 @@ class RudderDriver:
         self._sleep = sleep
         self._lock = threading.Lock()  # of the servo: commands arrive on another thread
         self._output: PwmOutput | None = None
-        self._backoff = Backoff()
-        self._trouble = "not connected yet"
+        self._link = Link("rudder output")
         self._pulse_ns = 0
+        self._connected_s = 0.0
         self._checked = 0.0
         self._stale = True
 
@@ -80,8 +80,7 @@ class RudderDriver:
             output.close()
             raise
         self._output = output
-        self._checked = self._clock()
-        self._backoff.succeeded()
+        self._checked = self._connected_s = self._clock()
 
     def command(self, alpha: float) -> None:
         """Take a commanded angle [rad]."""
@@ -96,21 +95,24 @@ class RudderDriver:
                 return self._reconnect(now)
             return self._cycle(self._output, now)
         except TransportError as error:
-            return self._lose(str(error), now)
+            if self._output is not None:
+                self._output.close()
+            self._output = None
+            return self._link.lose(str(error), now)
 
     def close(self) -> None:
         """Centre, then pulses off if the settings say so, but not before the servo has had time to get
         there."""
         if self._output is None:
             return
-        travel_s = abs(self.servo.alpha) / self._settings.max_rate + SETTLE_S
+        travel_s = self._travel_s() + SETTLE_S
         try:
             self._output.set_pulse_ns(self.servo.centre_ns())
             if self._settings.off_at_exit:
                 self._sleep(travel_s)
                 self._output.stop()
         except TransportError as error:
-            self._trouble = f"rudder not centred: {error}"
+            self._link.trouble = f"rudder not centred: {error}"
         self._output.close()
         self._output = None
 
@@ -121,10 +123,10 @@ class RudderDriver:
             "pulse [us]": self._pulse_ns / 1000,
             "rejected commands": self.servo.counters.rejected,
             "clamped commands": self.servo.counters.clamped,
-            "reconnect attempts": self._backoff.attempts,
+            "reconnect attempts": self._link.attempts,
         }
         if self._output is None:
-            return Status(ERROR, self._trouble, values)
+            return Status(ERROR, self._link.trouble, values)
         if self._stale:
             return Status(WARN, f"no command for {self._settings.stale_s} s: centred", values)
         return Status(OK, "following commands", values)
@@ -136,29 +138,28 @@ class RudderDriver:
         if pulse_ns != self._pulse_ns:
             output.set_pulse_ns(pulse_ns)
             self._pulse_ns = pulse_ns
-        if now - self._checked >= CHECK_S:
-            self._check(output, now)
-        changed, self._stale = stale != self._stale, stale
-        return [] if not changed else ["rudder centred: no command" if stale else "rudder follows commands"]
+        events = self._check(output, now) if now - self._checked >= CHECK_S else []
+        if stale != self._stale:
+            self._stale = stale
+            events.append("rudder centred: no command" if stale else "rudder follows commands")
+        return events
 
-    def _check(self, output: PwmOutput, now: float) -> None:
+    def _check(self, output: PwmOutput, now: float) -> list[str]:
         self._checked = now
         if not output.is_running():
             raise TransportError(
                 "the PWM output stopped by itself (supply lost, or another program switched it off)"
             )
+        return self._link.works()
+
+    def _travel_s(self) -> float:
+        """How long the servo needs to the centre at the most: from the angle that was sent, and right after
+        connect(), which knows nothing of the angle before, from stop to stop."""
+        settings = self._settings
+        unknown_s = 2 * settings.max_angle / settings.max_rate - (self._clock() - self._connected_s)
+        return max(abs(self.servo.alpha) / settings.max_rate, unknown_s)
 
     def _reconnect(self, now: float) -> list[str]:
-        if not self._backoff.due(now):
-            return []
-        self.connect()
-        return ["rudder output connected again"]
-
-    def _lose(self, reason: str, now: float) -> list[str]:
-        events = [reason] if reason != self._trouble else []
-        if self._output is not None:
-            self._output.close()
-        self._output = None
-        self._trouble = reason
-        self._backoff.failed(now)
-        return events
+        if self._link.due(now):
+            self.connect()
+        return []

@@ -10,7 +10,9 @@ NS_PER_S = 1e9
 
 
 def open_output(settings: RudderSettings) -> PwmOutput:
-    """Open it; PortUnavailable if it is not there."""
+    """Open it; PortUnavailable if it is not there, ValueError for an emulator, which is made elsewhere."""
+    if settings.backend == "emulator":
+        raise ValueError("backend is 'emulator': there is no output to open")
     if settings.backend == "pca9685":
         bus = KernelI2c(settings.bus)
         return Pca9685Pwm(bus, settings.address, settings.channel, settings.pca_clock_hz, settings.pwm_hz)

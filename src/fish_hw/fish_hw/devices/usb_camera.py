@@ -1,6 +1,7 @@
 """The overhead camera as a whole: frames as JPEG with the middle of their exposure, found again after it was
 lost."""
 
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,12 +11,13 @@ import cv2
 import numpy as np
 
 from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.reconnect import Backoff
+from fish_hw.devices.reconnect import Link
 from fish_hw.devices.status import ERROR, OK, WARN, Status
 from fish_hw.settings.camera import CameraSettings
 from fish_hw.transport.errors import PortUnavailable
 from fish_hw.transport.video_capture import Frame
 
+CLOSE_WAIT_S = 1.5  # longer than a camera keeps OpenCV waiting
 SLOW = 0.8  # share of the asked rate below which the operator should know (dark picture, USB bandwidth)
 
 
@@ -64,8 +66,8 @@ class UsbCamera:
         self._open_source = open_source
         self._clock = clock
         self._source: FrameSource | None = None
-        self._backoff = Backoff()
-        self._trouble = "not connected yet"
+        self._reading = threading.Lock()
+        self._link = Link("camera")
         self._last_frame = clock()
         self._rated = (0, clock())
         self._size = (settings.width, settings.height)
@@ -79,7 +81,6 @@ class UsbCamera:
         """Open the camera; PortUnavailable if it cannot."""
         self._source = self._open_source()
         self._last_frame = self._clock()
-        self._backoff.succeeded()
 
     def step(self) -> CameraCycle:
         """Wait for a frame; the camera is opened again when none came for reopen_s."""
@@ -87,20 +88,24 @@ class UsbCamera:
         try:
             if self._source is None:
                 return self._reconnect(now)
-            frame = self._source.read()
+            with self._reading:
+                frame = self._source.read()
             if frame is None:
                 self._miss()
                 return CameraCycle()
             self._last_frame = self._clock()
-            return CameraCycle(self._picture(frame))
+            return CameraCycle(self._picture(frame), self._link.works())
         except (PortUnavailable, DeviceError) as error:
-            return CameraCycle(events=self._lose(str(error), now))
+            self.close()
+            return CameraCycle(events=self._link.lose(str(error), now))
 
     def close(self) -> None:
-        """Give the camera back."""
-        if self._source is not None:
-            self._source.close()
+        """Give the camera back; a picture that another thread is reading is waited for."""
+        if self._source is None or not self._reading.acquire(timeout=CLOSE_WAIT_S):
+            return  # to release it in the middle of a read ends the process the hard way
+        self._source.close()
         self._source = None
+        self._reading.release()
 
     def status(self) -> Status:
         """State in one line with counters and the rate since the last call."""
@@ -110,10 +115,10 @@ class UsbCamera:
             "missed frames": self.missed,
             "rate [Hz]": round(rate, 1),
             "size [px]": f"{self._size[0]}x{self._size[1]}",
-            "reconnect attempts": self._backoff.attempts,
+            "reconnect attempts": self._link.attempts,
         }
         if self._source is None:
-            return Status(ERROR, self._trouble, values)
+            return Status(ERROR, self._link.trouble, values)
         if rate == 0.0:
             return Status(ERROR, "no frames", values)
         if self._size != (self._settings.width, self._settings.height):
@@ -148,16 +153,9 @@ class UsbCamera:
         return (self.frames - frames) / max(now - since, 1e-3)
 
     def _reconnect(self, now: float) -> CameraCycle:
-        if not self._backoff.due(now):
-            return CameraCycle()
-        self.connect()
-        return CameraCycle(events=["camera connected again"])
-
-    def _lose(self, reason: str, now: float) -> list[str]:
-        self.close()
-        self._backoff.failed(now)
-        said, self._trouble = self._trouble, reason
-        return [reason] if reason != said else []
+        if self._link.due(now):
+            self.connect()
+        return CameraCycle()
 
 
 def encode_jpeg(image: np.ndarray, quality: int) -> bytes:

@@ -8,7 +8,8 @@ for a moment, so that a late reply is not taken for the answer to the next quest
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.errors import DeviceError
@@ -32,16 +33,25 @@ class RotorSample:
 
 @dataclass(frozen=True)
 class RotorTelemetry:
-    """Slow values of the module; temperatures in deg C, derate 0 to 1 (1: full power), uptime in s."""
+    """Slow values of the module; temperatures in deg C, derate 0 to 1 (1: full power), uptime in s.
 
-    controller_c: float
-    coil_c: float
-    volts: float
-    amps: float
-    uptime_s: float
-    faults: int
-    derate: float
-    mode: int
+    None stands where the module did not answer.
+    """
+
+    controller_c: float | None = None
+    coil_c: float | None = None
+    volts: float | None = None
+    amps: float | None = None
+    uptime_s: float | None = None
+    faults: int | None = None
+    derate: float | None = None
+    mode: int | None = None
+
+    def completed(self, older: "RotorTelemetry") -> "RotorTelemetry":
+        """These values, and older ones where an answer is missing."""
+        names = [field.name for field in fields(self)]
+        values = {name: getattr(self, name) for name in names}
+        return RotorTelemetry(**{n: getattr(older, n) if v is None else v for n, v in values.items()})
 
 
 @dataclass
@@ -90,28 +100,30 @@ class Vertiq:
         self._stream.write(encode(reg.CTRL_COAST.set(self._module)) * COAST_REPEATS)
 
     def clear_faults(self) -> int | None:
-        """Clear the fault memory; returns what was in it (None if the module did not answer)."""
+        """Clear the fault memory and return what was in it; None, and nothing cleared, if the module did not
+        answer."""
         (ever,) = self.read(reg.FAULT_EVER)
+        if ever is None:
+            return None
         self._stream.write(encode(reg.FAULT_EVER.set(self._module, 0)))
-        return None if ever is None else int(ever[0])
+        return int(ever[0])
 
-    def telemetry(self) -> RotorTelemetry | None:
-        """Voltages, temperatures, faults and mode; None if an answer is missing."""
+    def telemetry(self) -> RotorTelemetry:
+        """Voltages, temperatures, faults and mode, as far as the module answers."""
         slow, faults, mode = self.read(reg.TELEMETRY, reg.FAULT_NOW, reg.CTRL_MODE)
         (derate,) = self.read(reg.DERATE)
-        if slow is None or faults is None or mode is None or derate is None:
-            return None
-        controller, coil, volts, amps, _, _, uptime = slow
-        return RotorTelemetry(
-            controller_c=controller / 100,
-            coil_c=coil / 100,
-            volts=volts / 100,
-            amps=amps / 100,
-            uptime_s=uptime,
-            faults=int(faults[0]),
-            derate=derate[0] / reg.DERATE_NONE,
-            mode=int(mode[0]),
-        )
+        values: dict[str, Any] = {}
+        if slow is not None:
+            controller, coil, volts, amps, _, _, uptime = slow
+            values |= {"controller_c": controller / 100, "coil_c": coil / 100}
+            values |= {"volts": volts / 100, "amps": amps / 100, "uptime_s": uptime}
+        if faults is not None:
+            values["faults"] = int(faults[0])
+        if derate is not None:
+            values["derate"] = derate[0] / reg.DERATE_NONE
+        if mode is not None:
+            values["mode"] = int(mode[0])
+        return RotorTelemetry(**values)
 
     def configure(self, timeout_s: float) -> list[str]:
         """Set the module's own watchdog (coast, no error, no song) and read it back; nothing is saved in the

@@ -6,6 +6,8 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
+from fish_hw.settings.checks import in_type_of
+
 
 def read_settings(node: Node, settings_class: type[Any]) -> Any:
     """Declare every field as a parameter and make the settings of what is set.
@@ -18,12 +20,3 @@ def read_settings(node: Node, settings_class: type[Any]) -> Any:
         descriptor = ParameterDescriptor(dynamic_typing=True)
         values[name] = in_type_of(default, node.declare_parameter(name, default, descriptor).value, name)
     return settings_class(**values)
-
-
-def in_type_of(default: Any, value: Any, name: str) -> Any:
-    """value, of the same type as default; a whole number may stand for a float (rate_hz:=100)."""
-    if isinstance(default, float) and type(value) is int:
-        return float(value)
-    if type(value) is not type(default):
-        raise ValueError(f"{name} is {value!r}, expected {type(default).__name__} such as {default!r}")
-    return value

@@ -60,13 +60,16 @@ class RotorNode(DeviceNode):
     def _on_clear_faults(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._driver.clear_faults()
         response.success = self._driver.connected
-        response.message = "asked the module" if response.success else "the module is not connected"
+        response.message = (
+            "the module is asked as soon as it may be" if response.success else "the module is not connected"
+        )
         return response
 
     def _cycle(self) -> None:
         cycle = self._driver.step()
         self.log_events(cycle.events)
-        self._telemetry = cycle.telemetry or self._telemetry
+        if cycle.telemetry is not None and cycle.telemetry.volts is not None:
+            self._telemetry = cycle.telemetry
         if cycle.sample is not None:
             self.publish(self._joint_states, self._joint_message(cycle.sample))
 
@@ -78,7 +81,7 @@ class RotorNode(DeviceNode):
 
     def _on_battery(self) -> None:
         telemetry, self._telemetry = self._telemetry, None  # a value is not said twice
-        if telemetry is None:
+        if telemetry is None or telemetry.volts is None or telemetry.amps is None:
             return
         message = BatteryState(
             voltage=telemetry.volts,

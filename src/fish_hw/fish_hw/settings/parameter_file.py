@@ -1,10 +1,12 @@
 """Settings from a ROS parameter file, for commands that run without ROS."""
 
-from dataclasses import fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
+
+from fish_hw.settings.checks import in_type_of
 
 Settings = TypeVar("Settings")
 
@@ -22,13 +24,14 @@ def read_parameter_file(path: Path, settings_class: type[Settings]) -> Settings:
     parameters = _parameters(document)
     if parameters is None:
         raise ValueError(f"{path}: expected a node name with ros__parameters below it")
-    known = {field.name for field in fields(settings_class)}  # type: ignore[arg-type]
-    unknown = sorted(set(parameters) - known)
+    defaults = asdict(settings_class())  # type: ignore[call-overload]
+    unknown = sorted(str(name) for name in set(parameters) - set(defaults))
     if unknown:
-        raise ValueError(f"{path}: unknown {', '.join(unknown)}; known: {', '.join(sorted(known))}")
+        raise ValueError(f"{path}: unknown {', '.join(unknown)}; known: {', '.join(sorted(defaults))}")
     try:
-        return settings_class(**parameters)
-    except (TypeError, ValueError) as error:
+        values = {name: in_type_of(defaults[name], value, name) for name, value in parameters.items()}
+        return settings_class(**values)
+    except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
 
 

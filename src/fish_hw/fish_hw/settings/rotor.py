@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from fish_hw.settings.checks import require_choice, require_range
 
+CYCLES = 3  # that a command or an answer may be late without anything being stopped
 RESUME = ("zero", "auto", "manual")
 
 
@@ -24,9 +25,9 @@ class RotorSettings:
     sign: int = 1  # -1 if positive speed of the motor turns the rotor clockwise seen from above
     max_velocity: float = 160.0  # rad/s; full throttle at 2 Hz needs 150.8
     max_acceleration: float = 2200.0  # rad/s^2; full throttle at 2 Hz needs 1895
-    stale_s: float = 0.15  # s without a command until the rotor is stopped
+    stale_s: float = 0.15  # s without a command until the rotor is stopped; 3 / rate_hz at least
     ramp_s: float = 0.25  # s from the last speed to zero, then coast; at most one period of the oscillation
-    module_timeout_s: float = 0.25  # s without any byte until the module coasts by itself
+    module_timeout_s: float = 0.25  # s without any byte until it coasts by itself; 3 / rate_hz at least
     resume: str = "zero"  # zero | auto | manual
     rearm_s: float = 0.3  # s of commands at rest that end a stop (resume: zero)
     battery_cells: int = 4  # cells in series
@@ -43,13 +44,14 @@ class RotorSettings:
         require_range("module_id", self.module_id, 0, 63)
         require_range("startup_timeout_s", self.startup_timeout_s, 0.0, 3600.0)
         require_range("rate_hz", self.rate_hz, 20.0, 200.0)
+        shortest_s = round(CYCLES / self.rate_hz, 4)
         require_range("reply_timeout_s", self.reply_timeout_s, 0.001, 0.2)
         require_choice("sign", self.sign, (1, -1))
         require_range("max_velocity", self.max_velocity, 0.0, 500.0)
         require_range("max_acceleration", self.max_acceleration, 1.0, 1e4)
-        require_range("stale_s", self.stale_s, 0.02, 1.0)
+        require_range("stale_s", self.stale_s, shortest_s, 1.0)
         require_range("ramp_s", self.ramp_s, 0.0, 1.0)
-        require_range("module_timeout_s", self.module_timeout_s, 0.05, 2.0)
+        require_range("module_timeout_s", self.module_timeout_s, max(shortest_s, 0.05), 2.0)
         require_choice("resume", self.resume, RESUME)
         require_range("rearm_s", self.rearm_s, 0.0, 10.0)
         require_range("battery_cells", self.battery_cells, 1, 6)

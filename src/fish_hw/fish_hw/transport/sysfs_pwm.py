@@ -44,9 +44,11 @@ class SysfsPwm:
     def start(self, pulse_ns: int) -> None:
         """Set period and pulse, then switch the pulses on.
 
-        The kernel refuses a period shorter than the present duty cycle, so the duty cycle is cleared first.
+        The kernel refuses a period shorter than the present duty cycle, so a longer one is cleared first; but not
+        always, since kernels before mid-2024 refuse every duty cycle while the period is 0, as after a boot.
         """
-        self._write("duty_cycle", 0)
+        if self._read("duty_cycle") > self._period_ns:
+            self._write("duty_cycle", 0)
         self._write("period", self._period_ns)
         self._write("duty_cycle", pulse_ns)
         self._write("enable", 1)
@@ -61,10 +63,7 @@ class SysfsPwm:
 
     def is_running(self) -> bool:
         """Whether pulses are on, as the kernel says."""
-        try:
-            return (self._pwm / "enable").read_text().strip() == "1"
-        except OSError as error:
-            raise TransportError(f"PWM {self._pwm}: cannot read enable: {error}") from error
+        return self._read("enable") == 1
 
     def close(self) -> None:
         """Nothing to give back: the channel stays exported and keeps its pulses."""
@@ -99,6 +98,12 @@ class SysfsPwm:
 
     def _exported(self) -> list[str]:
         return sorted(path.name for path in self._chip.glob("pwm[0-9]*"))
+
+    def _read(self, name: str) -> int:
+        try:
+            return int((self._pwm / name).read_text())
+        except (OSError, ValueError) as error:
+            raise TransportError(f"PWM {self._pwm}: cannot read {name}: {error}") from error
 
     def _write(self, name: str, value: int) -> None:
         try:

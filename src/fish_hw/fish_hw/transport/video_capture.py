@@ -17,6 +17,7 @@ from fish_hw.transport.errors import unavailable
 
 AUTO_EXPOSURE, MANUAL_EXPOSURE = 3, 1  # V4L2_EXPOSURE_APERTURE_PRIORITY, V4L2_EXPOSURE_MANUAL
 MJPG = cv2.VideoWriter.fourcc(*"MJPG")
+GRAB_TIMEOUT_S = 1  # whole seconds that a camera may keep OpenCV waiting, instead of 10
 OLDEST_STAMP_S = 0.5  # a driver's time stamp older than this is on another clock
 JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
 
@@ -75,6 +76,8 @@ class VideoCapture:
 
     def _open(self) -> Any:
         if self._live:
+            # OpenCV looks for it at its first wait for a frame, not when it is imported (cap_v4l.cpp, tryIoctl)
+            os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", str(GRAB_TIMEOUT_S))
             return cv2.VideoCapture(self._settings.device, cv2.CAP_V4L2)
         return cv2.VideoCapture(self._settings.device)
 
@@ -91,10 +94,10 @@ class VideoCapture:
         capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, AUTO_EXPOSURE if settings.exposure < 0 else MANUAL_EXPOSURE)
         if settings.exposure >= 0:
             capture.set(cv2.CAP_PROP_EXPOSURE, settings.exposure)
-        capture.set(cv2.CAP_PROP_AUTOFOCUS, settings.focus < 0)
+        capture.set(cv2.CAP_PROP_AUTOFOCUS, float(settings.focus < 0))  # OpenCV 5 takes no bool
         if settings.focus >= 0:
             capture.set(cv2.CAP_PROP_FOCUS, settings.focus)
-        capture.set(cv2.CAP_PROP_AUTO_WB, settings.white_balance_k < 0)
+        capture.set(cv2.CAP_PROP_AUTO_WB, float(settings.white_balance_k < 0))
         if settings.white_balance_k >= 0:
             capture.set(cv2.CAP_PROP_WB_TEMPERATURE, settings.white_balance_k)
 

@@ -3,6 +3,7 @@
 import argparse
 import csv
 import sys
+from math import inf
 from pathlib import Path
 
 import cv2
@@ -39,7 +40,7 @@ def arguments() -> argparse.ArgumentParser:
 def calibrate_lens(args: argparse.Namespace) -> None:
     """Write a camera calibration file."""
     sides = args.corners.lower().split("x")
-    if len(sides) != 2 or not all(s.isdigit() and int(s) > 2 for s in sides) or args.square <= 0.0:
+    if len(sides) != 2 or not all(s.isdigit() and int(s) > 2 for s in sides) or not 0.0 < args.square < inf:
         raise CalibrationError(f"--corners {args.corners} --square {args.square}: expected like 8x6 and 0.03")
     pictures = [read_picture(path) for path in args.pictures]
     lens, rms, used = lens_from_chessboards(pictures, (int(sides[0]), int(sides[1])), args.square)
@@ -79,7 +80,11 @@ def read_points(path: Path) -> np.ndarray:
             rows = [[float(row[key]) for key in ("x", "y", "u", "v")] for row in csv.DictReader(file)]
     except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
         raise CalibrationError(f"{path}: expected CSV with header x,y,u,v and numbers ({error})") from error
-    return np.array(rows).reshape(-1, 4)
+    points = np.array(rows).reshape(-1, 4)
+    if not np.isfinite(points).all():
+        line = int(np.argmin(np.isfinite(points).all(axis=1))) + 2  # after the header, counted from 1
+        raise CalibrationError(f"{path}: line {line} has {rows[line - 2]}: expected finite numbers")
+    return points
 
 
 def main() -> int:

@@ -44,10 +44,19 @@ def check(args: argparse.Namespace) -> int:
         print(f"head {head.x:+.4f} {head.y:+.4f} m, heading {head.heading:+.4f} rad, std {std.round(5)}")
         print(f"spacing of the head markers {found.spacing:.4f} of the true one")
         print(f"tail {'not seen' if found.tail is None else [round(angle, 3) for angle in found.tail]}")
-    if not cv2.imwrite(str(args.out), annotated(picture, found, config, calibration)):
-        raise ValueError(f"{args.out}: cannot be written")
+    write_picture(args.out, annotated(picture, found, config, calibration))
     print(f"annotated picture: {args.out}")
     return 1 if isinstance(found, Lost) else 0
+
+
+def write_picture(path: Path, picture: np.ndarray) -> None:
+    """Picture to a file; ValueError if that cannot be."""
+    try:
+        written = cv2.imwrite(str(path), picture)
+    except cv2.error as error:
+        raise ValueError(f"{path}: no name of a picture, expected like checked.png ({error.err})") from error
+    if not written:
+        raise ValueError(f"{path}: cannot be written")
 
 
 def print_colours(picture: np.ndarray, config: TrackerConfig, calibration: Calibration) -> None:

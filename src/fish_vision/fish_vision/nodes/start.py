@@ -41,15 +41,28 @@ def _as(name: str, given: Any, like: Any) -> Any:
     return given
 
 
+def _init() -> None:
+    """Start rclpy; ValueError if it refuses the command line."""
+    try:
+        rclpy.init()
+    except RuntimeError as error:  # rclpy's RCLError
+        raise ValueError(str(error)) from error
+
+
 def run(make_node: Callable[[], Node], name: str) -> int:
-    """Spin a node until SIGINT or SIGTERM: 0; or 1 and one line on stderr if its parameters are refused."""
-    rclpy.init()
+    """Spin a node until SIGINT or SIGTERM: 0; or 1 and one line on stderr if its arguments are refused.
+
+    Errors of callbacks are the caller's.
+    """
     node = None
     try:
+        _init()
         node = make_node()
         rclpy.spin(node)
     except ValueError as error:
-        print(f"{name}: {error}", file=sys.stderr)
+        if node is not None:  # not a refused parameter but a mistake in a callback
+            raise
+        print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
