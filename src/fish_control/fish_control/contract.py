@@ -13,6 +13,15 @@ from fish_control.line_of_sight import GuidanceConfig
 FORMAT = "fish_control/gains"
 FORMAT_VERSION = 3
 HIDDEN = (6, 128, 128, 64, 6)  # the paper's policy; () in a contract means constant gains
+_KINDS: dict[str, tuple[tuple[type, ...], str]] = {  # what may stand in JSON for a field, by its annotation
+    "float": ((int, float), "a number"),
+    "bool": ((bool,), "true or false"),
+    "str": ((str,), "a text"),
+    "int | None": ((int, type(None)), "a whole number or null"),
+    "tuple[int, ...]": ((list, tuple), "a list of whole numbers"),
+    "tuple[Input, ...]": ((list, tuple), "a list of inputs"),
+    "tuple[Output, ...]": ((list, tuple), "a list of outputs"),
+}
 
 
 @dataclass(frozen=True)
@@ -74,9 +83,12 @@ class Contract:
     note: str = ""
 
     def __post_init__(self) -> None:
-        if self.layers and (self.layers[0] != len(self.inputs) or self.layers[-1] != len(self.outputs)):
-            sizes = f"{len(self.inputs)} inputs first and {len(self.outputs)} gains last"
+        ends = (len(self.inputs), len(self.outputs))
+        if self.layers and (len(self.layers) < 2 or (self.layers[0], self.layers[-1]) != ends):
+            sizes = f"{ends[0]} inputs first and {ends[1]} gains last, or none for constant gains"
             raise ContractError(f"layers are {list(self.layers)}, expected {sizes}")
+        if not all(type(size) is int and size > 0 for size in self.layers):
+            raise ContractError(f"layers are {list(self.layers)}, expected whole numbers > 0")
         if tuple(o.name for o in self.outputs) != Gains._fields:
             raise ContractError(
                 f"outputs are {[o.name for o in self.outputs]}, expected {list(Gains._fields)}"
@@ -150,7 +162,7 @@ def _construct(kind: type, values: dict[str, Any], where: str) -> Any:
         return kind(**values)
     except ContractError:
         raise
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ContractError(f"{where}: {error}") from error
 
 
@@ -162,4 +174,8 @@ def _checked_fields(kind: type, data: Mapping[str, Any], where: str) -> dict[str
             f"has unknown {', '.join(unknown)}"
         ] * bool(unknown)
         raise ContractError(f"{where} {' and '.join(parts)}")
+    for f in fields(kind):
+        kinds, expected = _KINDS.get(str(f.type), ((), "an object"))
+        if kinds and type(data[f.name]) not in kinds:
+            raise ContractError(f"{where}: {f.name} is {data[f.name]!r}, expected {expected}")
     return dict(data)

@@ -27,6 +27,7 @@ START_STD = (
 )  # m, rad, m/s, rad/s, m/s^2; of the state when it starts
 FASTEST_SWIM = 0.6  # m/s, poses of one fish are no farther apart
 FASTEST_TURN = 4.0  # rad/s
+SILENT_POSES = 3  # that arrive without an IMU sample in between say that the IMU is dead; stamps alone cannot
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class FusionConfig(MotionNoise):
     gate: float = 16.27  # squared Mahalanobis distance, chi^2 of 3 at 99.9 %
     history: float = 1.0  # s, how late a camera pose may come
     camera_timeout: float = 0.6  # s without an accepted pose: camera lost
-    imu_timeout: float = 0.1  # s without a sample: IMU lost
+    imu_timeout: float = 0.1  # s without a sample: IMU lost; s that a pose may be ahead of the newest sample
     reacquire_time: float = 1.0  # s of poses that agree, but not with the estimate: start anew from them
     start_frames: int = 3  # poses that must agree before the first estimate
     camera_offset: float = 0.0  # s, added to camera stamps (negative if images are older than their stamps)
@@ -79,6 +80,7 @@ class Fusion:
         self._timeline: Timeline | None = None
         self._candidates: list[tuple[float, Array]] = []  # poses in a row that agree with each other
         self._last_pose_time = self._last_imu_time = -math.inf
+        self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
 
     def add_imu(self, time: float, yaw_rate: float, forward: float, left: float) -> bool:
         """A sample stamped `time` [s]: gyro [rad/s], specific force [m/s^2]. False if it was not used."""
@@ -89,7 +91,7 @@ class Fusion:
             self.counts["restarted"] += 1
         if time <= self._last_imu_time:
             return self._refuse("imu_out_of_order")
-        self._last_imu_time = time
+        self._last_imu_time, self._poses_in_a_row = time, 0
         self.counts["imu"] += 1
         sample = InertialSample(yaw_rate, forward, left)
         if self._timeline is None:
@@ -97,7 +99,7 @@ class Fusion:
             self._imu.forget(time - self.config.history)
         elif time > self._timeline.first.time:
             self._timeline.insert_inertial(time, sample)
-            self._timeline.forget(self._timeline.last.time - self.config.history)
+            self._timeline.forget(time - self.config.history)
         return True
 
     def add_pose(self, time: float, pose: ArrayLike, covariance: Array | None = None) -> bool:
@@ -106,6 +108,10 @@ class Fusion:
         time += self.config.camera_offset
         if not (math.isfinite(time) and np.all(np.isfinite(camera.pose)) and np.all(np.isfinite(camera.R))):
             return self._refuse("pose_not_finite")
+        imu_lives = self._poses_in_a_row < SILENT_POSES
+        self._poses_in_a_row += 1
+        if imu_lives and time > self._last_imu_time + self.config.imu_timeout:
+            return self._refuse("pose_from_future")
         if self._timeline is None:
             return self._start(time, camera.pose)
         if time <= self._timeline.first.time:
@@ -115,23 +121,27 @@ class Fusion:
             self.counts["pose_outlier"] += 1
             return self._reacquire(time, camera.pose)
         self._timeline.insert_pose(time, camera)
+        self._timeline.forget(time - self.config.history)
         self._last_pose_time = max(self._last_pose_time, time)
         self._candidates.clear()
         self.counts["pose"] += 1
         return True
 
-    def estimate(self, now: float | None = None) -> Estimate | None:
-        """State at the newest measurement; `now` [s] (default: its time) decides what counts as lost."""
+    def estimate(self, silence: float = 0.0) -> Estimate | None:
+        """State at the newest IMU sample, without an IMU at the newest pose; None before the first.
+
+        silence: s since a measurement was used; with it the sensors' stamps say what is lost.
+        """
         if self._timeline is None:
             return None
-        last = self._timeline.last
-        now = last.time if now is None else now
-        return _to_estimate(
-            last,
-            self._imu.at(last.time),
-            camera_lost=now - self._last_pose_time > self.config.camera_timeout,
-            imu_lost=now - self._last_imu_time > self.config.imu_timeout,
-        )
+        now = self._timeline.last.time + silence
+        imu_lost = now - self._last_imu_time > self.config.imu_timeout
+        # a camera whose clock is a little ahead must not hold the estimate at its stamp until the IMU is there
+        moment = self._timeline.last if imu_lost else self._timeline.at(self._last_imu_time)
+        if moment is None:
+            return None
+        camera_lost = now - self._last_pose_time > self.config.camera_timeout
+        return _to_estimate(moment, self._imu.at(moment.time), camera_lost, imu_lost)
 
     def _refuse(self, reason: str) -> bool:
         self.counts[reason] += 1

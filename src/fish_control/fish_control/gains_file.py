@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +28,9 @@ def write_gains_file(file: str | Path, policy: Policy) -> None:
     metadata = {"contract": json.dumps(policy.contract.to_json(), allow_nan=False)}
     data = save({name: np.ascontiguousarray(t) for name, t in policy.tensors.items()}, metadata=metadata)
     file = Path(file)
-    with tempfile.NamedTemporaryFile(dir=file.parent, prefix=file.name, delete=False) as stream:
-        stream.write(data)
-    os.replace(stream.name, file)
+    new = file.with_name(f"{file.name}.{os.getpid()}.new")  # a tempfile would be for its owner only
+    new.write_bytes(data)
+    os.replace(new, file)
 
 
 def read_gains_file(file: str | Path) -> Policy:
@@ -49,6 +48,10 @@ def read_gains_file(file: str | Path) -> Policy:
         raise GainsFileError(f"weights file {file}: cannot be read: {error.strerror or error}") from error
     except SafetensorError as error:
         raise GainsFileError(f"weights file {file}: not a safetensors file ({error})") from error
+    except TypeError as error:
+        raise GainsFileError(
+            f"weights file {file}: numpy has no such arrays ({error}), expected float64"
+        ) from error
     if "contract" not in metadata:
         raise GainsFileError(
             f"weights file {file}: no contract in its metadata; was it written by write_gains_file?"

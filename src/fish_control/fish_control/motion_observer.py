@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from fish_control.line_of_sight import Motion
 
-LONGEST_STEP = 0.1  # s, a longer gap between odometry messages restarts the filters
+LONGEST_STEP = 0.1  # s, a longer gap between odometry messages, or a longer step back, restarts the filters
 State = TypeVar("State")
 
 
@@ -20,10 +21,12 @@ class MotionObserver(Generic[State]):
         self.state = start
 
     def add(self, time: float, motion: Motion) -> None:
-        """Take in odometry stamped `time` [s]."""
-        dt = 0.0 if self._time is None else time - self._time
-        self._time = time
-        if 0.0 < dt <= LONGEST_STEP:
+        """Take in odometry stamped `time` [s]; what repeats a stamp or comes a little out of order is ignored."""
+        dt = math.inf if self._time is None else time - self._time
+        if abs(dt) > LONGEST_STEP:  # a gap, or a clock that was set back
+            self.state = self._start
+        elif dt > 0.0:
             self.state = self._advance(self.state, motion, dt)
         else:
-            self.state = self._start
+            return
+        self._time = time

@@ -55,6 +55,11 @@ class Timeline:
         """The newest."""
         return self._moments[-1]
 
+    def at(self, time: float) -> Moment | None:
+        """The newest that is not after `time` [s]; None if all are."""
+        moment = self._moments[self._place(time) - 1]
+        return moment if moment.time <= time else None
+
     def predict(self, time: float) -> StrapdownFilter:
         """The filter at `time` [s], before anything measured there; valid until the next call."""
         before = self._moments[self._place(time) - 1]

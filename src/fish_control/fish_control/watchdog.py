@@ -8,6 +8,8 @@ from typing import Literal
 
 from fish_control.node_configs import ControllerConfig
 
+AHEAD = 0.1  # s, a stamp may be this far ahead of the clock: two machines' clocks are not quite the same
+
 
 @dataclass(frozen=True)
 class EstimateSigns:
@@ -85,9 +87,7 @@ class Watchdog:
             return fault
         if signs.target_age is None:
             return "waiting for a target"
-        if signs.target_age > config.target_timeout:
-            return _stale("target", signs.target_age, config.target_timeout)
-        return None
+        return _age_fault("target", signs.target_age, config.target_timeout)
 
 
 def estimate_fault(signs: EstimateSigns, timeout: float, largest_variance: float) -> str | None:
@@ -97,8 +97,9 @@ def estimate_fault(signs: EstimateSigns, timeout: float, largest_variance: float
     """
     if not signs.finite:
         return "odometry is not finite"
-    if signs.age > timeout:
-        return _stale("odometry", signs.age, timeout)
+    fault = _age_fault("odometry", signs.age, timeout)
+    if fault is not None:
+        return fault
     if not signs.pose_variance <= largest_variance:
         return "camera lost: fusion does not vouch for the pose"
     if not signs.twist_variance <= largest_variance:
@@ -106,5 +107,9 @@ def estimate_fault(signs: EstimateSigns, timeout: float, largest_variance: float
     return None
 
 
-def _stale(name: str, age: float, allowed: float) -> str:
-    return f"{name} is stale: {age:.2f} s old, {allowed:g} s allowed"
+def _age_fault(name: str, age: float, allowed: float) -> str | None:
+    if age > allowed:
+        return f"{name} is stale: {age:.2f} s old, {allowed:g} s allowed"
+    if age < -AHEAD:  # it would count as fresh for as long as its clock is ahead
+        return f"{name} is from the future: stamped {-age:.2f} s ahead of this clock, {AHEAD:g} s allowed"
+    return None

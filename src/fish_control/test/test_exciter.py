@@ -55,6 +55,7 @@ def test_it_rests_swims_its_part_and_ends_at_rest():
         ),
         (doubtful(finite=False), "lost", "odometry is not finite"),
         (doubtful(age=0.6), "lost", "odometry is stale: 0.60 s old, 0.5 s allowed"),
+        (doubtful(age=-5.0), "lost", "odometry is from the future: stamped 5.00 s ahead"),
         (doubtful(pose_variance=1e4), "lost", "camera lost"),
         (doubtful(twist_variance=1e4), "lost", "IMU lost"),
     ],

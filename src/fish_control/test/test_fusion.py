@@ -177,10 +177,55 @@ def test_lost_camera_is_said_in_the_covariance_and_passes():
 def test_lost_imu_is_said_and_the_camera_goes_on():
     fusion = Fusion()
     feed(fusion, [e for e in measurements(4.0) if e[1] == "camera" or e[2] < 2.0])
-    estimate = fusion.estimate(4.0)
+    estimate = fusion.estimate()
     assert estimate.imu_lost and not estimate.camera_lost
     assert estimate.twist_covariance[2, 2] == LOST_VARIANCE
     assert np.hypot(*pose_error(estimate)[:2]) < 0.05
+
+
+@pytest.mark.parametrize("begun", [True, False])
+def test_a_pose_from_the_future_is_refused_and_holds_nothing_up(begun):
+    fusion, events = Fusion(), measurements(3.0)
+    at = 2.0 if begun else 0.05
+    feed(fusion, [e for e in events if e[0] < at])
+    assert not fusion.add_pose(at + 5.0, truth(at)[0])
+    for event in events:
+        if event[0] >= at:
+            feed(fusion, [event])
+            if begun and event[1] == "imu":
+                assert fusion.estimate().time == event[2] and not fusion.estimate().imu_lost
+    assert fusion.counts["pose_from_future"] == 1 and fusion.counts["pose_too_late"] == 0
+    assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
+
+
+def test_a_camera_far_ahead_of_the_imu_is_lost():
+    fusion, events = Fusion(), measurements(4.0)
+    feed(fusion, [(a, k, s + (5.0 if k == "camera" and s > 2.0 else 0.0), v) for a, k, s, v in events])
+    assert fusion.counts["pose_from_future"] == pytest.approx(59, abs=3)  # of 2 s at 30 Hz
+    estimate = fusion.estimate()
+    assert estimate.camera_lost and not estimate.imu_lost
+
+
+@pytest.mark.parametrize("ahead", [0.02, 0.05])
+def test_a_camera_a_little_ahead_of_the_imu_does_not_repeat_stamps(ahead):
+    fusion, times = Fusion(), []
+    for arrival, kind, stamp, values in measurements(4.0, latency=0.0):
+        if kind == "camera":
+            stamp, values = stamp + ahead, truth(stamp + ahead)[0]
+        feed(fusion, [(arrival, kind, stamp, values)])
+        if kind == "imu" and fusion.estimate() is not None:
+            times.append((stamp, fusion.estimate().time))
+    stamps, estimated = np.transpose(times)
+    assert len(stamps) > 350 and fusion.counts["pose"] > 100
+    np.testing.assert_array_equal(estimated, stamps)
+
+
+def test_without_imu_the_camera_s_history_has_an_end():
+    fusion = Fusion()
+    feed(fusion, [e for e in measurements(6.0) if e[1] == "camera"])
+    assert not fusion.add_pose(3.0, truth(3.0)[0])
+    assert fusion.counts["pose_too_late"] == 1
+    assert fusion.add_pose(5.5, truth(5.5)[0])
 
 
 def test_a_clock_set_back_starts_anew():

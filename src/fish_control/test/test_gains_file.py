@@ -1,6 +1,7 @@
 """The weights file: round trip, inference, and what differs when it does not fit."""
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -124,12 +125,56 @@ def test_file_without_contract(tmp_path):
         (lambda c: c.update(layers=[6, 6]), "layers.1.weight is"),
         (lambda c: c.update(activation="tanh"), "activation is 'tanh', expected 'relu'"),
         (lambda c: c["inputs"][1].update(scale=0.0), "input surge_speed has scale 0.0"),
+        (lambda c: c.update(layers=None), "layers is None, expected a list"),
+        (lambda c: c.update(layers=[6]), r"layers are \[6\], expected 6 inputs first and 6 gains last"),
+        (lambda c: c.update(layers=[6, 8.0, 6]), r"layers are \[6, 8.0, 6\], expected whole numbers > 0"),
+        (lambda c: c.update(inputs=3), "inputs is 3, expected a list"),
+        (lambda c: c.update(inputs=[3]), "input is 3, expected an object"),
+        (lambda c: c.update(outputs="all"), "outputs is 'all', expected a list"),
+        (lambda c: c.update(limits=None), "limits is None, expected an object"),
+        (
+            lambda c: c["limits"].update(rudder_range="wide"),
+            "limits: rudder_range is 'wide', expected a number",
+        ),
+        (lambda c: c["guidance"].update(slip_arm=None), "guidance: slip_arm is None, expected a number"),
+        (lambda c: c["guidance"].update(learn_current=1), "learn_current is 1, expected true or false"),
+        (lambda c: c["inputs"][1].update(scale="1"), "input: scale is '1', expected a number"),
+        (lambda c: c.update(lookahead=True), "lookahead is True, expected a number"),
+        (lambda c: c.update(robot_hash=5), "robot_hash is 5, expected a text"),
     ],
 )
 def test_contract_that_differs_says_what(network, tmp_path, change, said):
     write_gains_file(tmp_path / "w.safetensors", network)
     with pytest.raises(GainsFileError, match=said):
         read_gains_file(rewritten(tmp_path / "w.safetensors", change_contract=change))
+
+
+def test_one_layer_is_no_network_even_without_arrays(tmp_path):
+    file = tmp_path / "w.safetensors"
+    write_gains_file(file, Policy.constant(CONSTANT))
+    with pytest.raises(GainsFileError, match=r"layers are \[6\], expected 6 inputs first"):
+        read_gains_file(rewritten(file, lambda c: c.update(layers=[6]), lambda t: t.pop("gains")))
+
+
+@pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o002, 0o664), (0o077, 0o600)])
+def test_a_written_file_is_for_those_whom_the_umask_leaves(tmp_path, umask, mode):
+    before = os.umask(umask)
+    try:
+        write_gains_file(tmp_path / "w.safetensors", Policy.constant(CONSTANT))
+    finally:
+        os.umask(before)
+    assert (tmp_path / "w.safetensors").stat().st_mode & 0o777 == mode
+    assert [f.name for f in tmp_path.iterdir()] == ["w.safetensors"]
+
+
+def test_arrays_that_numpy_does_not_know_are_refused(tmp_path):
+    contract = json.dumps(Contract(layers=()).to_json())
+    gains = {"dtype": "BF16", "shape": [6], "data_offsets": [0, 12]}
+    header = json.dumps({"__metadata__": {"contract": contract}, "gains": gains}).encode()
+    file = tmp_path / "w.safetensors"
+    file.write_bytes(len(header).to_bytes(8, "little") + header + bytes(12))
+    with pytest.raises(GainsFileError, match="bfloat16.*expected float64"):
+        read_gains_file(file)
 
 
 @pytest.mark.parametrize(

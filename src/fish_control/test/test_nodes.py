@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -127,7 +128,11 @@ def feed_fusion(bench, start, seconds, camera=True, imu=True):
             sample = Imu()
             sample.header.stamp, sample.header.frame_id = to_stamp(t), "imu_link"
             sample.linear_acceleration.z = 9.81
+            taken = bench.node._fusion.counts["imu"]
             bench.say("imu/data", sample)
+            bench.until(
+                lambda taken=taken: bench.node._fusion.counts["imu"] > taken
+            )  # else poses overtake it
         if camera and k % 3 == 0:
             pose = PoseWithCovarianceStamped()
             pose.header.stamp, pose.header.frame_id = to_stamp(t), "pool"
@@ -173,6 +178,34 @@ def test_fusion_goes_on_with_the_camera_when_the_imu_is_lost(bench):
     b.until(lambda: b.heard["odometry/filtered"][-1].twist.covariance[35] == LOST_VARIANCE)
     b.until(lambda: b.said(b"\x02", "IMU lost"))
     assert b.heard["odometry/filtered"][-1].pose.covariance[0] < 1.0
+
+
+def test_fusion_judges_by_silence_not_by_the_difference_of_the_clocks(bench):
+    b = bench(FusionNode)
+    b.listen("odometry/filtered", Odometry)
+    begun = time.monotonic()
+    feed_fusion(b, b.now() - 60.0, 2.0)
+    b.until(lambda: b.said(b"\x00", "estimating"))
+    statuses = [s.message for array in b.heard["/diagnostics"] for s in array.status]
+    assert "lost" not in " ".join(statuses)
+    assert len(statuses) <= 2.0 + time.monotonic() - begun  # 1 Hz, and one for the change
+    b.until(lambda: b.said(b"\x02", "camera and IMU lost"))  # nothing comes any more
+
+
+def test_fusion_is_not_stopped_by_one_pose_from_the_future(bench):
+    b = bench(FusionNode)
+    b.listen("odometry/filtered", Odometry)
+    start = b.now()
+    feed_fusion(b, start, 1.0)
+    pose = PoseWithCovarianceStamped()
+    pose.header.stamp = to_stamp(start + 6.0)
+    b.say("camera/pose", pose)
+    feed_fusion(b, start + 1.0, 0.5)
+    b.until(lambda: seconds(b.heard["odometry/filtered"][-1].header.stamp) > start + 1.4)
+    assert all(m.twist.covariance[35] < 1.0 for m in b.heard["odometry/filtered"])
+    stamps = [seconds(m.header.stamp) for m in b.heard["odometry/filtered"]]
+    assert max(stamps) < start + 2.0 and np.all(np.diff(stamps) > 0.0)
+    assert b.node._fusion.counts["pose_from_future"] == 1
 
 
 def test_fusion_survives_values_that_are_no_numbers(bench):
@@ -243,6 +276,12 @@ def test_planner_that_was_killed_resumes_where_it_was(bench, tmp_path):
     second.say("odometry/filtered", odometry(t + 1.5, y=0.05, yaw=1.57))
     second.until(lambda: second.node._plan is not None)
     assert second.node._plan.at.progress == pytest.approx(0.9, abs=0.01)
+
+
+def test_each_fish_on_a_domain_keeps_its_own_progress(graph):
+    files = [planner.default_state_file(name) for name in ("/fish", "/red/fish", "/red_fish")]
+    assert len(set(files)) == 3
+    assert all("/" not in file.removeprefix(tempfile.gettempdir() + "/") for file in files)
 
 
 def test_planner_follows_a_path_from_a_topic_and_refuses_one_through_the_wall(bench):

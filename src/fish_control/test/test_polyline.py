@@ -42,6 +42,20 @@ def test_bad_line_is_named(tmp_path):
         make_path("polyline", file=str(file))
 
 
+@pytest.mark.parametrize("content", ["Länge,Höhe\n0,0\n1,0\n".encode("latin-1"), b"0" * 200_000])
+def test_a_csv_that_is_no_text_with_lines_is_refused(tmp_path, content):
+    file = tmp_path / "bad.csv"
+    file.write_bytes(content)
+    with pytest.raises(PathError, match="bad.csv' is not UTF-8 text with lines x,y"):
+        make_path(str(file))
+
+
+def test_a_byte_order_mark_does_not_cost_the_first_point(tmp_path):
+    file = tmp_path / "l.csv"
+    file.write_text("0,0\n1,0\n3,0\n", encoding="utf-8-sig")
+    assert make_path(str(file)).length == pytest.approx(3.0)
+
+
 def test_corners_are_rounded_with_the_radius(tmp_path):
     file = tmp_path / "corner.csv"
     file.write_text("0,0\n1,0\n1,1\n")
@@ -73,6 +87,7 @@ def test_svg_curve_is_the_bezier_polynomial(tmp_path):
 
 
 def test_svg_z_and_polygon_close_the_path(tmp_path):
+    assert len(read_svg(svg(tmp_path, '<path d="M0 0 L1 0 L1 1 z z"/>'))[0]) == 3
     assert read_svg(svg(tmp_path, '<path d="M0 0 L1 0 L1 1 z"/>'))[1]
     assert read_svg(svg(tmp_path, '<polygon points="0,0 1,0 1,1"/>'))[1]
 
@@ -83,6 +98,17 @@ def test_svg_z_and_polygon_close_the_path(tmp_path):
         ('<path d="M0 0 A1 1 0 0 0 2 2"/>', "command 'A' is not supported"),
         ('<path d="M0 0 L1"/>', "expected 2 numbers"),
         ('<path d="M0 0 L1 1 M2 2 L3 3"/>', "several parts"),
+        ('<path d="M0 0 L1 0 L1 1 Z M5 5 L6 6"/>', "several parts"),
+        ('<path d="M0 0 L1 0 L1 1 z l2 2"/>', "several parts"),
+        ('<path d="M0 0 L1 0 L1 1 Z 5 5"/>', "'Z' is followed by 5, expected no numbers"),
+        ('<path d=""/>', "begins with '', expected M"),
+        ('<path d="Z"/>', "begins with 'Z', expected M"),
+        ('<path d="L1 1 L2 2"/>', "begins with 'L1 1 L2 2', expected M"),
+        ('<path d="M0 0 L10% 0"/>', "'%' in the outline, expected commands and numbers"),
+        ('<path d="M0 0 L1e999 0"/>', "coordinate 1e999 is not finite"),
+        ('<polyline points="0,0 10px,0"/>', "'p' among them, expected pairs of numbers"),
+        ('<polyline points="0,0 10,0 3"/>', "points have 5 numbers, expected pairs"),
+        ('<polyline points=""/>', "0 points; 2 are needed"),
         ("<circle r='1'/>", "no path"),
     ],
 )
@@ -91,8 +117,9 @@ def test_svg_that_cannot_be_swum_is_refused(tmp_path, body, said):
         make_path("polyline", file=str(svg(tmp_path, body)))
 
 
-def test_file_that_is_no_svg_is_refused(tmp_path):
+@pytest.mark.parametrize("content", ["not xml", '<?xml version="1.0" encoding="mine"?><svg/>'])
+def test_file_that_is_no_svg_is_refused(tmp_path, content):
     file = tmp_path / "x.svg"
-    file.write_text("not xml")
+    file.write_text(content)
     with pytest.raises(PathError, match="not an SVG drawing"):
         make_path("polyline", file=str(file))

@@ -22,6 +22,8 @@ FAULTS = {
     "camera lost": but(pose_variance=1e4),
     "IMU lost": but(twist_variance=1e4),
     "target is stale": replace(GOOD, target_age=0.5),
+    "odometry is from the future: stamped 5.00 s ahead": but(age=-5.0),
+    "target is from the future: stamped 0.30 s ahead": replace(GOOD, target_age=-0.3),
 }
 
 
@@ -45,6 +47,10 @@ def test_every_fault_stops_at_once_and_is_said(said):
     dog = swimming()
     assert not dog.check(0.01, FAULTS[said])
     assert dog.state == "stopped" and dog.reason.startswith(said) and dog.stops == 1
+
+
+def test_clocks_that_differ_by_little_are_no_fault():
+    assert swimming().check(0.01, replace(but(age=-0.05), target_age=-0.05))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])

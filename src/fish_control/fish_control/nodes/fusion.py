@@ -48,25 +48,34 @@ class FusionNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_subscription(Imu, "imu/data", self._on_imu, SENSORS)
         self.create_subscription(PoseWithCovarianceStamped, "camera/pose", self._on_pose, SENSORS)
-        self.create_timer(1.0, self._report)
+        self.create_timer(1.0, lambda: self._report(self._estimate()))
+        self._used = 0.0  # s on this node's clock, when a measurement was last used
         self._said = ""
 
     def _on_imu(self, message: Imu) -> None:
         time = seconds(message.header.stamp)
         w, a = message.angular_velocity.z, message.linear_acceleration
         if self._fusion.add_imu(time, w, a.x, a.y):
-            self._publish(time)
+            self._used = self._now()
+            self._publish(self._estimate())
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         time, p = seconds(message.header.stamp), message.pose.pose
         pose = np.array([p.position.x, p.position.y, yaw_of(p.orientation)])
-        self._fusion.add_pose(time, pose, planar_covariance(message.pose.covariance))
-        estimate = self._fusion.estimate(time)
+        if self._fusion.add_pose(time, pose, planar_covariance(message.pose.covariance)):
+            self._used = self._now()
+        estimate = self._estimate()
         if estimate is not None and estimate.imu_lost:  # no IMU message will publish it
-            self._publish(time)
+            self._publish(estimate)
 
-    def _publish(self, now: float) -> None:
-        estimate = self._fusion.estimate(now)
+    def _now(self) -> float:
+        return self.get_clock().now().nanoseconds * 1e-9
+
+    def _estimate(self) -> Estimate | None:
+        """Lost is what is silent for too long, even where the sensors' clock is not this node's."""
+        return self._fusion.estimate(self._now() - self._used)
+
+    def _publish(self, estimate: Estimate | None) -> None:
         if estimate is None:
             return
         message = to_odometry(estimate)
@@ -74,7 +83,7 @@ class FusionNode(Node):
         if self._transform:
             self._transform.publish(TFMessage(transforms=[to_transform(message)]))
         if self._state(estimate)[1] != self._said:
-            self._report()
+            self._report(estimate)
 
     def _state(self, estimate: Estimate | None) -> tuple[bytes, str]:
         if estimate is None:
@@ -82,17 +91,14 @@ class FusionNode(Node):
         lost = [name for name, gone in (("camera", estimate.camera_lost), ("IMU", estimate.imu_lost)) if gone]
         return (ERROR, f"{' and '.join(lost)} lost") if lost else (OK, "estimating")
 
-    def _report(self) -> None:
-        now = self.get_clock().now()
-        estimate = self._fusion.estimate(now.nanoseconds * 1e-9)
+    def _report(self, estimate: Estimate | None) -> None:
         level, self._said = self._state(estimate)
         values: dict[str, object] = dict(self._fusion.counts)
         if estimate is not None:
             values["gyro_bias_rad_s"] = f"{estimate.gyro_bias:.5f}"
             values["position_std_m"] = f"{np.sqrt(estimate.pose_covariance[0, 0]):.4f}"
-        self._diagnostics.publish(
-            diagnostics(now.to_msg(), self.get_fully_qualified_name(), level, self._said, values)
-        )
+        now, name = self.get_clock().now().to_msg(), self.get_fully_qualified_name()
+        self._diagnostics.publish(diagnostics(now, name, level, self._said, values))
 
 
 def to_odometry(estimate: Estimate) -> Odometry:

@@ -48,7 +48,7 @@ class PlannerNode(Node):
         self._error = self.create_publisher(Vector3Stamped, "tracking/error", 10)
         self._speed = self.create_publisher(Float64, "reference/speed", LATCHED)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._progress = ProgressFile(FilePath(config.state_file or default_state_file()))
+        self._progress = ProgressFile(FilePath(config.state_file or default_state_file(self.get_namespace())))
         self._planner: Planner | None = None
         self._plan: Plan | None = None
         self._fresh = False
@@ -168,9 +168,10 @@ def configured_path(config: PlannerConfig) -> ReferencePath:
     return make_path(config.path, **arguments)
 
 
-def default_state_file() -> str:
-    """One for each user and domain."""
-    return f"{tempfile.gettempdir()}/fish_planner_{os.getuid()}_{os.environ.get('ROS_DOMAIN_ID', '0')}.json"
+def default_state_file(namespace: str) -> str:
+    """One for each user, domain and fish; no name in a `namespace` such as /fish has a dot."""
+    domain, fish = os.environ.get("ROS_DOMAIN_ID", "0"), namespace.replace("/", ".")
+    return f"{tempfile.gettempdir()}/fish_planner_{os.getuid()}_{domain}{fish}.json"
 
 
 def to_message(path: ReferencePath, stamp: Any) -> Path:

@@ -44,6 +44,8 @@ def polyline(
         points, joined = readers[path.suffix.lower()](path)
     except OSError as error:
         raise PathError(f"polyline: cannot read {file!r}: {error.strerror}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise PathError(f"polyline: {file!r} is not UTF-8 text with lines x,y ({error})") from error
     if len(points) < 2:
         raise PathError(f"polyline: {file!r} has {len(points)} points; 2 are needed")
     if size is None and path.suffix.lower() == ".svg":
@@ -72,7 +74,7 @@ def _fit(points: NDArray[np.float64], size: float) -> NDArray[np.float64]:
 def _read_csv(path: Path) -> tuple[NDArray[np.float64], bool]:
     """Points and whether the last repeats the first; a heading line is allowed."""
     points = []
-    with path.open(newline="", encoding="utf-8") as stream:
+    with path.open(newline="", encoding="utf-8-sig") as stream:
         for number, row in enumerate(csv.reader(stream), start=1):
             if not row or row[0].lstrip().startswith("#"):
                 continue

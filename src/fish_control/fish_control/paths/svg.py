@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator
@@ -24,31 +25,58 @@ def read_svg(file: Path) -> tuple[Array, bool]:
 
     Straight lines and Bezier curves are understood (M L H V C S Q T Z, upper and lower case); transforms are
     not.
+
+    Raises:
+        PathError: not an SVG drawing, or one that cannot be swum in one stroke.
     """
     try:
         root = ElementTree.parse(file).getroot()
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: an unknown encoding
         raise PathError(f"{file}: not an SVG drawing ({error})") from error
     for element in root.iter():
         tag = element.tag.rsplit("}", 1)[-1]
         if tag in ("polyline", "polygon"):
-            points = np.array([float(t) for t in _TOKEN.findall(element.get("points", ""))])
-            return points[: len(points) // 2 * 2].reshape(-1, 2) * [1.0, -1.0], tag == "polygon"
+            return _vertices(element.get("points", ""), file) * [1.0, -1.0], tag == "polygon"
         if tag == "path":
             points, closed = _outline(element.get("d", ""), file)
             return points * [1.0, -1.0], closed
     raise PathError(f"{file}: no path, polyline or polygon in the drawing")
 
 
+def _vertices(points: str, file: Path) -> Array:
+    tokens = _tokens(points, file)
+    letters = [t for t in tokens if t.isalpha()]
+    if letters or len(tokens) % 2:
+        came = f"{letters[0]!r} among them" if letters else f"{len(tokens)} numbers"
+        raise PathError(f"{file}: points have {came}, expected pairs of numbers x,y without units")
+    return np.array([_number(t, file) for t in tokens]).reshape(-1, 2)
+
+
+def _tokens(text: str, file: Path) -> list[str]:
+    """Letters and numbers; only space and commas may stand between them."""
+    strange = _TOKEN.sub("", text).replace(",", "").split()
+    if strange:
+        raise PathError(f"{file}: {strange[0]!r} in the outline, expected commands and numbers")
+    return _TOKEN.findall(text)
+
+
+def _number(token: str, file: Path) -> float:
+    if not math.isfinite(float(token)):
+        raise PathError(f"{file}: coordinate {token} is not finite")
+    return float(token)
+
+
 def _outline(d: str, file: Path) -> tuple[Array, bool]:
     points = [np.zeros(2)]
     drawn: list[Array] = []
     control: Array | None = None
+    closed = False
     for command, numbers in _segments(d, file):
         here = points[-1]
         if command.upper() == "Z":
-            return np.array(drawn), True
-        if command.upper() == "M" and drawn:
+            closed = True
+            continue
+        if closed or (command.upper() == "M" and drawn):
             raise PathError(
                 f"{file}: the outline has several parts; a fish cannot lift off, draw it in one stroke"
             )
@@ -56,7 +84,7 @@ def _outline(d: str, file: Path) -> tuple[Array, bool]:
         new, control = _CURVES[command.upper()](here, absolute, control)
         points.append(new[-1])
         drawn.extend(new)
-    return np.array(drawn), False
+    return np.array(drawn), closed
 
 
 def _origin(command: str, here: Array) -> Array:
@@ -68,7 +96,9 @@ def _origin(command: str, here: Array) -> Array:
 
 def _segments(d: str, file: Path) -> Iterator[tuple[str, Array]]:
     """(command, its numbers), repeated commands written out."""
-    tokens = _TOKEN.findall(d)
+    if d.strip()[:1].upper() != "M":
+        raise PathError(f"{file}: an SVG path begins with {d.strip()[:10]!r}, expected M and a point")
+    tokens = _tokens(d, file)
     i = 0
     command = ""
     while i < len(tokens):
@@ -79,21 +109,19 @@ def _segments(d: str, file: Path) -> Iterator[tuple[str, Array]]:
                 raise PathError(
                     f"{file}: SVG command '{command}' is not supported; known: {' '.join(_ARGUMENTS)}"
                 )
-        count = _ARGUMENTS.get(command.upper(), 0)
+        elif command.upper() == "Z":
+            raise PathError(
+                f"{file}: SVG command '{command}' is followed by {tokens[i]}, expected no numbers"
+            )
+        count = _ARGUMENTS[command.upper()]
         numbers = tokens[i : i + count]
-        if (
-            len(numbers) < count
-            or any(t.isalpha() for t in numbers)
-            or (count == 0 and command.upper() != "Z")
-        ):
+        if len(numbers) < count or any(t.isalpha() for t in numbers):
             raise PathError(
                 f"{file}: SVG command '{command}' is followed by {numbers}, expected {count} numbers"
             )
-        yield command, np.array([float(t) for t in numbers])
+        yield command, np.array([_number(t, file) for t in numbers])
         i += count
         command = {"M": "L", "m": "l"}.get(command, command)
-        if count == 0:
-            return
 
 
 def _bezier(controls: list[Array]) -> Array:
