@@ -37,7 +37,10 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
 
 
 def run(make_node: Callable[[], Node], name: str) -> None:
-    """Spin until SIGINT or SIGTERM (exit code 0); what cannot start says why in one line (exit code 1)."""
+    """Spin until SIGINT or SIGTERM (exit code 0); what cannot start says why in one line (exit code 1).
+
+    Errors of callbacks are the caller's.
+    """
     node = None
     failure = ""
     try:
@@ -47,9 +50,10 @@ def run(make_node: Callable[[], Node], name: str) -> None:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (ValueError, OSError, RCLError) as error:
-        # a callback may publish after the signal has shut the context down
-        if node is None or rclpy.ok():
+        if node is None:
             failure = " ".join(str(error).split())
+        elif rclpy.ok():  # else a callback published after the signal had shut the context down
+            raise
     finally:
         if node is not None:
             node.destroy_node()
