@@ -1,4 +1,4 @@
-"""A node's end: what a signal brings about is no failure, everything else is one line."""
+"""A node's end: what a signal brings about is no failure, what cannot start is one line, a mistake shows its traceback."""
 
 from types import SimpleNamespace
 
@@ -8,19 +8,25 @@ from rclpy._rclpy_pybind11 import RCLError
 from fish_control.nodes import start
 
 
-@pytest.mark.parametrize("alive", [False, True])
-def test_publishing_after_a_signal_has_shut_the_context_down_is_no_failure(monkeypatch, alive):
+def run(monkeypatch, error, alive):
+    """A node whose callback raises `error`; alive: no signal has come."""
+
     def spin(_):
-        raise RCLError("Failed to publish: publisher's context is invalid")
+        raise error
 
     replaced = {"init": lambda: None, "spin": spin, "ok": lambda: alive, "try_shutdown": lambda: None}
     monkeypatch.setattr(start, "rclpy", SimpleNamespace(**replaced))
-    node = SimpleNamespace(destroy_node=lambda: None)
-    if not alive:
-        start.run(lambda: node, "controller")
-        return
-    with pytest.raises(SystemExit, match="controller: Failed to publish"):
-        start.run(lambda: node, "controller")
+    start.run(lambda: SimpleNamespace(destroy_node=lambda: None), "controller")
+
+
+def test_publishing_after_a_signal_has_shut_the_context_down_is_no_failure(monkeypatch):
+    run(monkeypatch, RCLError("Failed to publish: publisher's context is invalid"), alive=False)
+
+
+@pytest.mark.parametrize("error", [RCLError("Failed to publish"), ValueError("invalid literal")])
+def test_a_mistake_in_a_callback_is_no_refused_parameter(monkeypatch, error):
+    with pytest.raises(type(error), match=str(error)):
+        run(monkeypatch, error, alive=True)
 
 
 def test_what_cannot_start_says_why(monkeypatch):
