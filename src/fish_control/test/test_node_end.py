@@ -9,18 +9,26 @@ from fish_control.nodes import start
 
 
 def run(monkeypatch, error, alive):
-    """A node whose callback raises `error`; alive: no signal has come."""
+    """Run a node whose callback raises `error` and return what it did at its end; alive: no signal has come."""
+    ended = []
 
     def spin(_):
         raise error
 
-    replaced = {"init": lambda: None, "spin": spin, "ok": lambda: alive, "try_shutdown": lambda: None}
+    replaced = {
+        "init": lambda: None,
+        "spin": spin,
+        "ok": lambda: alive,
+        "try_shutdown": lambda: ended.append("shut down"),
+    }
     monkeypatch.setattr(start, "rclpy", SimpleNamespace(**replaced))
-    start.run(lambda: SimpleNamespace(destroy_node=lambda: None), "controller")
+    start.run(lambda: SimpleNamespace(destroy_node=lambda: ended.append("destroyed")), "controller")
+    return ended
 
 
 def test_publishing_after_a_signal_has_shut_the_context_down_is_no_failure(monkeypatch):
-    run(monkeypatch, RCLError("Failed to publish: publisher's context is invalid"), alive=False)
+    ended = run(monkeypatch, RCLError("Failed to publish: publisher's context is invalid"), alive=False)
+    assert ended == ["destroyed", "shut down"]
 
 
 @pytest.mark.parametrize("error", [RCLError("Failed to publish"), ValueError("invalid literal")])

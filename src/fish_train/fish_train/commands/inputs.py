@@ -70,4 +70,5 @@ def read_experiment(*paths: Path) -> tuple[Experiment, list[str]]:
             trials.append(trial)
     if not trials:
         raise UserError("no trial can be used: " + "; ".join(left_out))
-    return build_experiment(trials), left_out
+    with user_errors():
+        return build_experiment(trials), left_out
