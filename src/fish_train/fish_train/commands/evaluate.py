@@ -63,8 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.evaluation.tables import ratio_table, summary_table
     from fish_train.score_table import print_table
 
-    from .inputs import user_errors
-    from .train import read_robot
+    from .inputs import read_model, user_errors
 
     check_conditions(args)
     candidates = [*map(read_candidate, args.weights), *map(constant_candidate, args.constant)]
@@ -76,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(f"{given}: expected at least 1, 1 and 0")
     for path in args.paths:
         read_path(path)
-    robot = read_robot(args.plant)
+    robot = read_model(args.plant)
     with user_errors():
         if args.robust:
             conditions = robust_conditions(robot)

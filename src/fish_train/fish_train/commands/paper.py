@@ -52,11 +52,11 @@ def run(args: argparse.Namespace) -> int:
     )
     from fish_train.evaluation.study import swim_all
 
-    from .train import read_robot
+    from .inputs import read_model
 
     if min(args.seeds, args.jobs, args.training_seeds) < 1:
         raise UserError("--seeds, --jobs and --training-seeds: expected at least 1")
-    console, robot = Console(), read_robot(args.robot)
+    console, robot = Console(), read_model(args.robot)
     folder = args.training or args.out / "training"
     args.out.mkdir(parents=True, exist_ok=True)
     curves, levels = trained(folder, args.training_seeds, robot, args.jobs, console)

@@ -17,8 +17,9 @@ from typing import Any
 import yaml
 from rich.console import Console
 
-from fish_sim.robot import Robot, RobotError, load_robot
 from fish_train.errors import UserError
+
+from .inputs import read_model
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         )
     check_flags(args)
     config = make_config({**(load_config(args.config) if args.config else {}), **parse_settings(args.set)})
-    robot = read_robot(args.robot)
+    robot = read_model(args.robot)
     jobs = [
         Job(
             folder=args.out / f"seed_{seed}",
@@ -132,16 +133,6 @@ def parse_settings(settings: list[str]) -> dict[str, Any]:
                 raise UserError(f"--set {setting}: expected a number or a list of numbers") from None
         values[name] = value
     return values
-
-
-def read_robot(file: Path | None) -> Robot:
-    """The robot of a file, or the nominal one."""
-    if file is None:
-        return Robot()
-    try:
-        return load_robot(file)
-    except RobotError as error:
-        raise UserError(str(error)) from error
 
 
 def command_line(argv: list[str]) -> list[str]:
