@@ -2,38 +2,52 @@
 
 ros2 launch fish_hw drivers.launch.py config:=FOLDER
 
-The camera usually hangs on another computer than the rest: camera:=false leaves it out.
+FOLDER holds this robot's own values: what stands in FOLDER/rotor.yaml, rudder.yaml, ... overrides the installed file of that
+name, as in fish.launch.py. The camera usually hangs on another computer than the rest: camera:=false leaves it out.
 """
 
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 DRIVERS = ("rotor", "rudder", "imu", "camera")
+INSTALLED = Path(get_package_share_directory("fish_hw")) / "config"
 
 
-def generate_launch_description() -> LaunchDescription:
-    """One node per driver; each parameter file is FOLDER/<node>.yaml."""
-    folder = str(Path(get_package_share_directory("fish_hw")) / "config")
-    arguments = [
-        DeclareLaunchArgument("config", default_value=folder, description="folder of the parameter files"),
-        DeclareLaunchArgument("namespace", default_value="fish", description="namespace of all nodes"),
-        *(DeclareLaunchArgument(name, default_value="true", description=f"start {name}") for name in DRIVERS),
-    ]
-    nodes = [
+def _nodes(context: LaunchContext) -> list[Node]:
+    config = LaunchConfiguration("config").perform(context)
+    files = {name: Path(config).expanduser() / f"{name}.yaml" for name in DRIVERS if config}
+    own = {name: [str(file)] for name, file in files.items() if file.exists()}
+    if config and not own:
+        expected = ", ".join(file.name for file in files.values())
+        raise RuntimeError(
+            f"config:={config} holds none of the drivers' parameter files; expected some of {expected}"
+        )
+    return [
         Node(
             package="fish_hw",
             executable=name,
             namespace=LaunchConfiguration("namespace"),
-            parameters=[PathJoinSubstitution([LaunchConfiguration("config"), f"{name}.yaml"])],
+            parameters=[str(INSTALLED / f"{name}.yaml"), *own.get(name, [])],
             condition=IfCondition(LaunchConfiguration(name)),
             output="screen",
         )
         for name in DRIVERS
     ]
-    return LaunchDescription(arguments + nodes)
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Arguments, then one node per driver."""
+    arguments = [
+        DeclareLaunchArgument(
+            "config", default_value="", description="folder of parameter files that override the installed"
+        ),
+        DeclareLaunchArgument("namespace", default_value="fish", description="namespace of all nodes"),
+        *(DeclareLaunchArgument(name, default_value="true", description=f"start {name}") for name in DRIVERS),
+    ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=_nodes)])

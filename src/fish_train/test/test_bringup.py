@@ -5,6 +5,7 @@ import sys
 import types
 from pathlib import Path
 
+import ament_index_python.packages
 import pytest
 import yaml
 
@@ -26,7 +27,10 @@ def installed(tmp_path, monkeypatch):
     node.parent.mkdir(parents=True)
     node.touch()
     monkeypatch.setattr(bringup, "get_package_prefix", lambda _: str(tmp_path))
-    monkeypatch.setattr(bringup, "get_package_share_directory", lambda package: f"{tmp_path}/share/{package}")
+    for module in (bringup, ament_index_python.packages):
+        monkeypatch.setattr(
+            module, "get_package_share_directory", lambda package: f"{tmp_path}/share/{package}"
+        )
     return tmp_path
 
 
@@ -84,11 +88,12 @@ class Configuration(Recorded):
 
 
 @pytest.fixture
-def launch_file(installed, monkeypatch):
-    """The launch file's names, with stand-ins for launch and launch_ros, which have no wheels."""
+def launch_names(installed, monkeypatch):
+    """The names of a package's launch file, with stand-ins for launch and launch_ros, which have no wheels."""
     stand_ins = {
         "launch": {"LaunchContext": dict, "LaunchDescription": Recorded},
         "launch.actions": {"DeclareLaunchArgument": Recorded, "OpaqueFunction": Recorded},
+        "launch.conditions": {"IfCondition": Recorded},
         "launch.substitutions": {"LaunchConfiguration": Configuration},
         "launch_ros": {},
         "launch_ros.actions": {"Node": Recorded},
@@ -98,7 +103,13 @@ def launch_file(installed, monkeypatch):
         module = types.ModuleType(name)
         vars(module).update(members)
         monkeypatch.setitem(sys.modules, name, module)
-    return runpy.run_path(str(SOURCE / "fish_train" / "launch" / "fish.launch.py"))
+    return lambda package, file: runpy.run_path(str(SOURCE / package / "launch" / file))
+
+
+@pytest.fixture
+def launch_file(launch_names):
+    """The whole robot's."""
+    return launch_names("fish_train", "fish.launch.py")
 
 
 @pytest.mark.parametrize("robot", bringup.ROBOTS)
@@ -138,3 +149,18 @@ def test_a_robots_own_values_override_the_installed_ones(launch_file, tmp_path):
     files = {node.executable: node.parameters[:-1] for node in opaque.function(context)}
     assert files["tracker"][1:] == [str(tmp_path / "tracker.yaml")]
     assert all(len(given) == 1 for name, given in files.items() if name != "tracker")
+
+
+def test_the_drivers_alone_take_a_robots_own_values_in_the_same_way(launch_names, tmp_path):
+    [*arguments, opaque] = launch_names("fish_hw", "drivers.launch.py")["generate_launch_description"]().args[
+        0
+    ]
+    with pytest.raises(RuntimeError, match="holds none of .*; expected some of rotor.yaml, rudder.yaml"):
+        opaque.function({"config": str(tmp_path)})
+    (tmp_path / "rotor.yaml").touch()
+    drivers = [spec for spec in bringup.ROBOTS["real"] if spec.package == "fish_hw"]
+    installed = {spec.executable: [str(bringup.parameter_path(spec))] for spec in drivers}
+    for config, own in (("", []), (str(tmp_path), [str(tmp_path / "rotor.yaml")])):
+        files = {node.executable: node.parameters for node in opaque.function({"config": config})}
+        assert files == {**installed, "rotor": installed["rotor"] + own}
+    assert {argument.args[0] for argument in arguments} == {"config", "namespace", *installed}
