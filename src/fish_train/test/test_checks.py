@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import recording_samples as samples
 
+from fish_train.recordings import TopicMap, read_trial, trial
 from fish_train.recordings import message_build as build
-from fish_train.recordings import read_trial, trial
 from fish_train.recordings.jumps import find_jumps
 
 
@@ -152,6 +152,25 @@ def test_unreadable_messages(tmp_path):
     bad = problem(result, "unreadable", "imu/data")
     assert bad.severity == "error" and bad.count == np.count_nonzero(result.imu.flags == trial.UNREADABLE) > 5
     assert len(result.imu) == 200 and np.isnan(result.imu.gyro[-1]).all()
+
+
+@pytest.mark.parametrize(
+    "topic", ["imu/data", "control/gains", "camera/pose", "camera/tail", "reference/path"]
+)
+def test_a_topic_that_cannot_be_decoded_at_all_costs_itself_only(tmp_path, topic):
+    with samples.McapRecording(tmp_path / "trial") as recording:
+        for arrival_ns, name, message in samples.robot_messages():
+            raw = bytes(samples.typestore().serialize_cdr(message, message.__msgtype__))
+            entry = recording.add_topic(name, message.__msgtype__)
+            recording.write(entry, arrival_ns, raw[:17] if name == f"/fish/{topic}" else raw)
+    result = read_trial(tmp_path / "trial")
+    bad = problem(result, "unreadable", topic)
+    counted = next(summary for summary in result.topics if summary.topic == f"/fish/{topic}")
+    assert bad.severity == "error" and bad.count == counted.count
+    whole = read_trial(samples.robot_recording(tmp_path / "whole"))
+    roles = {rule.topic: role for role, rule in TopicMap().rules.items()}
+    assert set(result.streams) == set(whole.streams) - {roles[topic]}
+    assert result.reference_paths == () if topic == "reference/path" else len(result.reference_paths) == 1
 
 
 def test_constant_commands(tmp_path):

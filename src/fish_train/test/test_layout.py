@@ -5,7 +5,7 @@ import pytest
 from rosbags.interfaces import Nodetype
 
 from fish_train.recordings import message_build as build
-from fish_train.recordings.layout import LayoutError, decode_blocks, find_layout
+from fish_train.recordings.layout import MAX_LAYOUTS, LayoutError, decode_blocks, find_layout
 from fish_train.recordings.message_types import typestore
 
 TYPES = {
@@ -84,6 +84,17 @@ def test_short_messages_are_named_not_read(cut):
     blocks, bad = decode_blocks([raw, raw[:cut], raw], "sensor_msgs/msg/JointState", store.fielddefs)
     assert bad.tolist() == [1]
     assert blocks[0].index.tolist() == [0, 2]
+
+
+def test_layouts_beyond_the_limit_are_left_out():
+    store, msgtype = typestore(), "std_msgs/msg/Float64MultiArray"
+    raws = [
+        bytes(store.serialize_cdr(build.labelled_numbers(f"{n:04d}", [1.0]), msgtype))
+        for n in range(MAX_LAYOUTS + 3)
+    ]
+    blocks, bad = decode_blocks([*raws, raws[0]], msgtype, store.fielddefs)
+    assert len(blocks) == MAX_LAYOUTS and blocks[0].index.tolist() == [0, MAX_LAYOUTS + 3]
+    assert bad.tolist() == [MAX_LAYOUTS, MAX_LAYOUTS + 1, MAX_LAYOUTS + 2]
 
 
 def test_absurd_length_is_refused():

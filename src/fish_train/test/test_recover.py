@@ -1,8 +1,12 @@
 """Recovery: what was whole is saved bit by bit, what was lost is said."""
 
+import struct
+from contextlib import suppress
+
 import numpy as np
 import pytest
 import recording_samples as samples
+from mcap.opcode import Opcode
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 
@@ -52,6 +56,93 @@ def test_damaged_chunk_is_skipped_and_the_rest_kept(tmp_path):
     whole = len(samples.robot_messages())
     assert 0.7 * whole < result.count < whole
     assert result.last_ns == samples.robot_messages()[-1][0]
+
+
+def flipped(*positions):
+    def flip(data):
+        for position in positions:
+            data[position] ^= 0x41
+        return data
+
+    return flip
+
+
+def places(path):
+    """First byte of every record: (opcode, position) as they follow each other, without the end magic."""
+    data, position, found = next(path.glob("*.mcap")).read_bytes(), 8, []
+    while position < len(data) - 8:
+        opcode, length = struct.unpack_from("<BQ", data, position)
+        found.append((opcode, position))
+        position += 9 + length
+    return found
+
+
+def first(path, opcode):
+    return next(position for found, position in places(path) if found == opcode)
+
+
+@pytest.mark.parametrize("place", [0, 1, 5], ids=["opcode", "length", "length far beyond the end"])
+def test_a_damaged_head_of_a_chunk_costs_that_chunk(tmp_path, place):
+    path = samples.robot_recording(tmp_path / "a")
+    chunks = [position for opcode, position in places(path) if opcode == Opcode.CHUNK]
+    damaged(path, flipped(chunks[1] + place))
+    result = recover(path, tmp_path / "b")
+    lost = len(samples.robot_messages()) - result.count
+    assert 0.15 * result.count < lost < 0.35 * result.count and result.lost
+    assert result.last_ns == samples.robot_messages()[-1][0]
+    assert len(read_trial(tmp_path / "b").camera) < 60
+
+
+@pytest.mark.parametrize(
+    ("opcode", "place"),
+    [
+        (Opcode.SCHEMA, 1),
+        (Opcode.SCHEMA, 20),
+        (Opcode.CHANNEL, 3),
+        (Opcode.CHANNEL, 18),
+        (Opcode.CHANNEL, 200),
+    ],
+)
+def test_definitions_damaged_in_the_data_come_from_the_summary(tmp_path, opcode, place):
+    path = samples.robot_recording(tmp_path / "a")
+    result = recover(damaged(path, flipped(first(path, opcode) + place)), tmp_path / "b")
+    assert result.count == len(samples.robot_messages())
+    assert set(result.saved) == {topic for _, topic, _ in samples.robot_messages()}
+
+
+def test_definitions_damaged_in_the_summary_come_from_the_data(tmp_path):
+    path = samples.robot_recording(tmp_path / "a")
+    in_summary = [position for opcode, position in places(path) if opcode == Opcode.CHANNEL][-1]
+    result = recover(damaged(path, flipped(in_summary + 18)), tmp_path / "b")
+    assert result.count == len(samples.robot_messages())
+    assert result.lost == ("a.mcap: no message, but its index is cut off or damaged",)
+
+
+def test_messages_whose_channel_is_lost_are_counted(tmp_path):
+    path = samples.robot_recording(tmp_path / "a")
+    opcode_of_channel, end = first(path, Opcode.CHANNEL), first(path, Opcode.DATA_END)
+    damaged(path, lambda data: flipped(opcode_of_channel)(data)[:end])
+    result = recover(path, tmp_path / "b")
+    gone = [topic for _, topic, _ in samples.robot_messages()].count("/fish/joint_command")
+    assert result.count == len(samples.robot_messages()) - gone
+    assert any(f"{gone} messages of channel 1, whose topic or type is lost" in loss for loss in result.lost)
+
+
+def test_any_damaged_byte_is_survived(tmp_path):
+    """A trial or a RecordingError, and a recovery that can be read; half of the bytes where the file's structure lies."""
+    whole, count = samples.robot_recording(tmp_path / "whole", duration=1.0), len(samples.robot_messages(1.0))
+    data, rng = next(whole.glob("*.mcap")).read_bytes(), np.random.default_rng(5)
+    structure = [*range(8, first(whole, Opcode.CHUNK)), *range(first(whole, Opcode.DATA_END), len(data))]
+    for i in range(24):
+        at = int(rng.choice(structure) if i % 2 else rng.integers(8, len(data)))
+        broken = bytearray(data)
+        broken[at] = rng.choice([0, 255, broken[at] ^ 1 << int(rng.integers(8))])
+        (tmp_path / f"{i}.mcap").write_bytes(bytes(broken))
+        with suppress(RecordingError):
+            read_trial(tmp_path / f"{i}.mcap")
+        result = recover(tmp_path / f"{i}.mcap", tmp_path / f"{i}")
+        assert result.count > 0.3 * count
+        read_trial(tmp_path / f"{i}")
 
 
 def test_compressed_chunk_that_is_cut(tmp_path):

@@ -1,5 +1,6 @@
 """The topic map: the YAML file holds the defaults, mistakes are named."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,10 @@ FILE = Path(__file__).parents[1] / "config" / "topics.yaml"
 
 
 def test_file_holds_the_defaults():
-    assert yaml.safe_load(FILE.read_text()) == TopicMap().as_dict()
     assert load_topic_map(FILE) == TopicMap()
+    written = yaml.safe_load(FILE.read_text())
+    assert set(written) == {"namespace", "max_latency_s", "topics"}
+    assert written["topics"] == {role: asdict(rule) for role, rule in TopicMap().rules.items()}
 
 
 def test_partial_file(tmp_path):
@@ -29,13 +32,20 @@ def test_partial_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("topics: {sonar: /x}", "unknown role 'sonar'"),
-        ("topics: {imu: {topc: /x}}", "expected a topic name or keys topic"),
+        ("topics: {sonar: /x}", "role sonar: unknown; known: commands"),
+        ("topics: {sonar: {frame: x}}", "role sonar: unknown; known: commands"),
+        ("topics: {imu: {topc: /x}}", "expected a mapping with keys topic"),
+        ("topics: {imu: 3}", "got 3; expected a mapping with keys topic"),
+        ("topics: {imu: {topic: [a]}}", "got topic .'a'.; expected text"),
+        ("topics: {imu: {required: often}}", "expected true or false"),
         ("topics: {imu: {time: noon}}", "'noon'; expected stamp or arrival"),
-        ("speed: 3", "unknown keys"),
-        ("- 1", "unknown keys"),
-        ("a: [", "cannot be read"),
+        ("topics: [imu]", "got topics .'imu'.; expected a mapping"),
+        ("{speed: 3, 1: 2}", "expected a mapping with keys namespace"),
+        ("- 1", "expected a mapping with keys namespace"),
+        ("a: [", "is not YAML"),
         ("max_latency_s: 0", "expected > 0"),
+        ("max_latency_s: long", "got max_latency_s 'long'; expected a number"),
+        ("namespace: 7", "got namespace 7; expected text"),
     ],
 )
 def test_mistakes(tmp_path, text, message):

@@ -11,9 +11,7 @@ import numpy as np
 from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.interfaces.typing import Typesdict
-from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_idl, get_types_from_msg
-from rosbags.typesys.base import TypesysError
 
 from .message_types import typestore
 from .problem import RecordingError
@@ -77,10 +75,10 @@ def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
             topics = _collect(reader, wanted)
             types = _types(reader.connections, ros1)
             metadata = {} if isinstance(reader, rosbag1.Reader) else reader.storage.metadata.custom or {}
-    except (rosbag1.ReaderError, rosbag2.ReaderError, SerdeError, TypesysError) as error:
-        raise RecordingError(f"{path}: {_advice(source, str(error))}") from error
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except Exception as error:  # rosbags trips over damaged bytes with whatever they lead it to
+        raise RecordingError(f"{path}: {_advice(source, str(error) or type(error).__name__)}") from error
     bag = RawBag(path, ros1, types, topics, {str(k): str(v) for k, v in metadata.items()})
     if not bag.count:
         raise RecordingError(f"{path}: the recording holds no messages; was anything published while it ran?")
@@ -153,7 +151,8 @@ def _definition(msgtype: str, form: MessageDefinitionFormat, text: str) -> Types
 
 
 def _advice(source: Path, error: str) -> str:
-    """What the reader said, and what can be done about it."""
+    """What the reader said, in one line, and what can be done about it."""
+    error = " ".join(error.split())
     if "empty" in error:
         return "the file is empty"
     if source.suffix == ".bag":

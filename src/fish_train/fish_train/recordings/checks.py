@@ -37,7 +37,7 @@ FLAG_TEXTS = {
     NOT_FINITE: ("warning", "nan", "messages carry NaN, infinity or lack a value"),
     JUMP: ("warning", "jump", "poses lie far from those before and after"),
     BAD_STAMP: ("warning", "bad_stamp", "stamps are zero or far from the rest"),
-    UNREADABLE: ("error", "unreadable", "messages do not fit their type"),
+    UNREADABLE: ("error", "unreadable", "messages cannot be decoded"),
 }
 
 

@@ -152,7 +152,8 @@ def decode_blocks(
     """Decode messages of one type.
 
     Returns:
-        blocks, and the positions of messages whose bytes do not fit the type (in no block).
+        blocks, and the positions of messages in no block: their bytes do not fit the type, or MAX_LAYOUTS
+        others came before their layout.
     """
     sizes = np.fromiter(map(len, raws), int, len(raws))
     left = np.ones(len(raws), bool)
@@ -161,13 +162,14 @@ def decode_blocks(
     while left.any():
         first = int(np.argmax(left))
         left[first] = False
+        if len(blocks) == MAX_LAYOUTS:
+            bad += [first, *np.flatnonzero(left).tolist()]
+            break
         try:
             layout = find_layout(raws[first], msgtype, types, ros1)
         except LayoutError:
             bad.append(first)
             continue
-        if len(blocks) == MAX_LAYOUTS:
-            raise LayoutError(f"more than {MAX_LAYOUTS} different layouts of {msgtype} on one topic")
         alike = np.flatnonzero(left & (sizes == layout.size))
         index, rows = _same_structure(raws, first, alike, layout)
         left[index] = False

@@ -248,7 +248,8 @@ def _path(bag: RawBag) -> Iterator[Message]:
     """The reference polyline, on the pool's axes."""
     for raw in bag.topics:
         if raw.topic == PATH_SOURCE:
-            for arrival_ns, (points, _) in zip(
-                raw.arrival_ns.tolist(), decode_paths(raw, ros1=True), strict=True
-            ):
-                yield arrival_ns, "reference/path", build.path(arrival_ns, "pool", points - CENTRE)
+            paths = decode_paths(raw, bag.types, ros1=True)
+            for arrival_ns, path in zip(raw.arrival_ns.tolist(), paths, strict=True):
+                if path is None:
+                    raise RecordingError(f"{bag.path}: {raw.topic}: messages do not all fit {raw.type}")
+                yield arrival_ns, "reference/path", build.path(arrival_ns, "pool", path[0] - CENTRE)

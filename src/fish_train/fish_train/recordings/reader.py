@@ -64,7 +64,7 @@ class _Assembly:
             held = ", ".join(sorted(f"{raw.topic} ({raw.type})" for raw in self.bag.topics))
             advice = "; 'fish_train import_pool' converts it" if is_pool_bag(self.bag) else ""
             raise RecordingError(
-                f"{self.bag.path}: none of the robot's topics is in it; it holds {held}{advice}"
+                f"{self.bag.path}: none of the robot's topics can be read; it holds {held}{advice}"
             )
         arrivals = np.concatenate([raw.arrival_ns for raw in self.bag.topics])
         stamps = [m.stamps for m in mapped.values() if m.stamps is not None]
@@ -113,7 +113,11 @@ class _Assembly:
             raw = None if role == PATH_ROLE else self.topic_of(role)
             if raw is not None:
                 decoded = decode_topic(raw, ROLES[role], self.bag.types, self.bag.ros1)
-                mapped[role] = _Mapped(rule, decoded, self.stamps(rule, decoded))
+                if decoded.arrays:
+                    mapped[role] = _Mapped(rule, decoded, self.stamps(rule, decoded))
+                else:
+                    text = f"none of {len(raw.raws)} messages can be decoded as {raw.type}"
+                    self.problems.append(Problem("error", "unreadable", raw.topic, text, len(raw.raws)))
         return mapped
 
     def stamps(self, rule: TopicRule, decoded: Decoded) -> Stamps | None:
@@ -147,7 +151,12 @@ class _Assembly:
             return ()
         expected, times = self.topics.rules[PATH_ROLE].frame, axis.arrived(raw.arrival_ns)
         paths = []
-        for t, (points, frame) in zip(times.tolist(), decode_paths(raw, self.bag.ros1), strict=True):
+        for t, path in zip(times.tolist(), decode_paths(raw, self.bag.types, self.bag.ros1), strict=True):
+            if path is None:
+                text = f"a path cannot be decoded as {raw.type}"
+                self.problems.append(Problem("error", "unreadable", raw.topic, text, t=t))
+                continue
+            points, frame = path
             if expected and frame != expected:
                 text = f"path in frame {frame!r}, expected {expected!r}"
                 self.problems.append(Problem("error", "wrong_frame", raw.topic, text, t=t))

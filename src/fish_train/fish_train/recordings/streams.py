@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from rosbags.interfaces.typing import Typesdict
@@ -11,7 +10,6 @@ from rosbags.interfaces.typing import Typesdict
 from .bag import RawTopic
 from .decode import PATH_TYPE, Role
 from .layout import Block, decode_blocks
-from .message_types import typestore
 from .problem import Problem
 
 NS_PER_S = 1_000_000_000
@@ -27,7 +25,7 @@ class Decoded:
     frames: np.ndarray | None  # (N,) str
     arrays: dict[str, np.ndarray]  # fields of the role's stream, (N, ...)
     names: tuple[str, ...]
-    unreadable: np.ndarray  # positions of messages whose bytes do not fit the type
+    unreadable: np.ndarray  # positions of messages that cannot be decoded
     problems: list[Problem] = field(default_factory=list)
 
 
@@ -43,10 +41,6 @@ def decode_topic(raw: RawTopic, role: Role, types: Typesdict, ros1: bool) -> Dec
             if role.names == "name":
                 values = _by_name(values, block.texts["name"], names)
             _put(arrays, name, values, block.index, count)
-    if not blocks:
-        arrays = {
-            f.name: np.full(count, np.nan) for f in fields(role.stream) if f.name in _array_fields(role)
-        }
     return Decoded(raw.topic, raw.arrival_ns, stamp_ns, frames, arrays, names, unreadable)
 
 
@@ -64,16 +58,20 @@ def stamps_of_prefixes(raw: RawTopic, types: Typesdict, ros1: bool) -> np.ndarra
     return pairs[:, 0] * NS_PER_S + pairs[:, 1]
 
 
-def decode_paths(raw: RawTopic, ros1: bool) -> list[tuple[np.ndarray, str]]:
-    """Points (P, 2) and frame of every nav_msgs/Path, through rosbags: lengths vary and paths are rare."""
-    store = typestore(ros1)
-    read = store.deserialize_ros1 if ros1 else store.deserialize_cdr
-    paths = []
+def decode_paths(raw: RawTopic, types: Typesdict, ros1: bool) -> list[tuple[np.ndarray, str] | None]:
+    """Points (P, 2) and frame of every nav_msgs/Path, None where one cannot be decoded; one by one, as lengths vary."""
+    paths: list[tuple[np.ndarray, str] | None] = []
     for message in raw.raws:
-        path: Any = read(message, PATH_TYPE)
-        points = [(p.pose.position.x, p.pose.position.y) for p in path.poses]
-        paths.append((np.array(points, float).reshape(-1, 2), path.header.frame_id))
+        blocks, _ = decode_blocks([message], PATH_TYPE, types, ros1)
+        paths += [_path(block) for block in blocks] or [None]
     return paths
+
+
+def _path(block: Block) -> tuple[np.ndarray, str]:
+    xy = [
+        block.values[path] for path in block.values if path.endswith(("pose.position.x", "pose.position.y"))
+    ]
+    return np.array(xy, float).reshape(-1, 2), block.texts["header.frame_id"][0]
 
 
 def _headers(blocks: list[Block], count: int, raw: RawTopic) -> tuple[np.ndarray | None, np.ndarray | None]:
@@ -120,8 +118,3 @@ def _put(arrays: dict[str, np.ndarray], name: str, values: np.ndarray, index: np
         have[index, : values.shape[1]] = values
     else:
         have[index] = values
-
-
-def _array_fields(role: Role) -> set[str]:
-    common = {"topic", "frame_id", "t", "t_arrival", "flags", "names"}
-    return {f.name for f in fields(role.stream)} - common

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,10 @@ from .decode import PATH_ROLE, ROLES
 from .problem import RecordingError
 
 TIMES = ("stamp", "arrival")
+KNOWN_ROLES = (*ROLES, PATH_ROLE)
+KEYS = {"namespace": str, "max_latency_s": (int, float), "topics": dict}  # of the YAML file
+RULE_KEYS = {"topic": str, "time": str, "clock": str, "frame": str, "required": bool}  # of one role in it
+KIND_NAMES = {str: "text", (int, float): "a number", dict: "a mapping", bool: "true or false"}
 
 
 @dataclass(frozen=True)
@@ -59,17 +64,11 @@ class TopicMap:
     max_latency_s: float = 0.5  # stamps older than this at arrival, or in the future, are another clock's
 
     def __post_init__(self) -> None:
-        known = [*ROLES, PATH_ROLE]
         for role in self.rules:
-            if role not in known:
-                raise RecordingError(f"topic map: unknown role {role!r}; known: {', '.join(known)}")
+            if role not in KNOWN_ROLES:
+                raise RecordingError(f"topic map: unknown role {role!r}; known: {', '.join(KNOWN_ROLES)}")
         if not self.max_latency_s > 0:
             raise RecordingError(f"topic map: max_latency_s {self.max_latency_s}; expected > 0")
-
-    def as_dict(self) -> dict[str, Any]:
-        """What stands in the YAML file."""
-        rules = {role: asdict(rule) for role, rule in self.rules.items()}
-        return {"namespace": self.namespace, "max_latency_s": self.max_latency_s, "topics": rules}
 
 
 def load_topic_map(path: Path) -> TopicMap:
@@ -79,33 +78,31 @@ def load_topic_map(path: Path) -> TopicMap:
         RecordingError: the file or a rule is not as expected.
     """
     try:
-        data = yaml.safe_load(path.read_text()) or {}
-    except (OSError, yaml.YAMLError) as error:
-        raise RecordingError(f"{path}: topic map cannot be read: {error}") from error
-    unknown = (
-        set(data) - {"namespace", "max_latency_s", "topics"} if isinstance(data, dict) else {"(no mapping)"}
-    )
-    if unknown:
-        raise RecordingError(
-            f"{path}: unknown keys {sorted(unknown)}; known: namespace, max_latency_s, topics"
-        )
+        data = yaml.safe_load(path.read_text())
+    except OSError as error:
+        raise RecordingError(f"{path}: topic map cannot be read: {error.strerror or error}") from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise RecordingError(f"{path}: topic map is not YAML: {error}") from error
+    data = _checked(f"{path}: topic map", {} if data is None else data, KEYS)
     rules = dict(DEFAULT_RULES)
-    for role, given in (data.get("topics") or {}).items():
+    for role, given in data.pop("topics", {}).items():
+        where = f"{path}: role {role}"
         if given is None:
             rules.pop(role, None)
+        elif role in DEFAULT_RULES:
+            named = {"topic": given} if isinstance(given, str) else given
+            rules[role] = replace(DEFAULT_RULES[role], **_checked(where, named, RULE_KEYS))
         else:
-            rules[role] = _rule(path, role, given)
-    return TopicMap(rules, data.get("namespace"), float(data.get("max_latency_s", 0.5)))
+            raise RecordingError(f"{where}: unknown; known: {', '.join(KNOWN_ROLES)}")
+    return TopicMap(rules, **data)
 
 
-def _rule(path: Path, role: str, given: object) -> TopicRule:
-    """One rule; a bare string is the topic's name."""
-    default = DEFAULT_RULES.get(role)
-    values = asdict(default) if default else {}
-    given = {"topic": given} if isinstance(given, str) else given
-    known = [f.name for f in fields(TopicRule)]
-    if not isinstance(given, dict) or not set(given) <= set(known):
-        raise RecordingError(
-            f"{path}: role {role}: got {given!r}; expected a topic name or keys {', '.join(known)}"
-        )
-    return TopicRule(**(values | given))
+def _checked(where: str, given: object, kinds: Mapping[str, Any]) -> dict[str, Any]:
+    """The mapping without what is null, if it has these keys with values of these kinds only."""
+    if not isinstance(given, dict) or not set(given) <= set(kinds):
+        raise RecordingError(f"{where}: got {given!r}; expected a mapping with keys {', '.join(kinds)}")
+    values = {key: value for key, value in given.items() if value is not None}
+    for key, value in values.items():
+        if not isinstance(value, kinds[key]):
+            raise RecordingError(f"{where}: got {key} {value!r}; expected {KIND_NAMES[kinds[key]]}")
+    return values

@@ -31,7 +31,7 @@ NOT_FINITE = 4  # a value that is used is NaN or infinite
 WRONG_FRAME = 8  # frame_id is not the expected one
 BAD_STAMP = 16  # the stamp is zero or far away from the rest of the recording
 JUMP = 64  # a camera pose far from those before and after: lost or swapped markers
-UNREADABLE = 32  # the bytes do not fit the message type; values are NaN, t is the arrival
+UNREADABLE = 32  # the bytes cannot be decoded as the message type; values are NaN, t is the arrival
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,7 +193,7 @@ class TopicSummary:
 
 @dataclass(frozen=True)
 class Trial:
-    """One recording. None: the topic is missing (and `problems` says so where it matters)."""
+    """One recording. None: the topic is missing or not readable (and `problems` says so where it matters)."""
 
     name: str
     path: Path
