@@ -177,7 +177,9 @@ def load_robot(path: str | Path) -> Robot:
     path = Path(path)
     try:
         content = yaml.safe_load(path.read_text())
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except OSError as error:
+        raise RobotError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
         raise RobotError(f"{path}: cannot be read as YAML: {error}") from error
     try:
         return _from_content(content)

@@ -55,8 +55,35 @@ def test_no_topic_left(tmp_path, topics):
 
 @pytest.mark.parametrize("path", ["", "/nowhere/at/all"])
 def test_no_recording(path):
-    with pytest.raises(RecordingError, match="expected a rosbag2 folder|cannot be replayed"):
+    with pytest.raises(RecordingError, match="expected a rosbag2 folder|does not exist"):
         Playback(ReplayerConfig(path), "/fish")
+
+
+def test_ros1_bags_are_refused(tmp_path):
+    (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(RecordingError, match="ROS 1 bags are not replayed"):
+        Playback(ReplayerConfig(str(tmp_path / "a.bag")), "/fish")
+
+
+def test_messages_before_the_damage_are_replayed(tmp_path):
+    path = samples.robot_recording(tmp_path / "a")
+    data = bytearray((path / "a.mcap").read_bytes())
+    data[data.index(b"imu_link", len(data) // 2)] ^= 0xFF
+    (path / "a.mcap").write_bytes(bytes(data))
+    playback, sent = Playback(ReplayerConfig(str(path)), "/fish"), []
+    with pytest.raises(RecordingError, match="'fish_train recover .*/a' saves what is left"):
+        for message in playback.messages():
+            sent.append(message)
+    assert 0.2 * len(samples.robot_messages()) < len(sent) < len(samples.robot_messages())
+    playback.close()
+
+
+def test_a_folder_without_metadata_is_replayed(tmp_path):
+    path = samples.robot_recording(tmp_path / "a", duration=0.1)
+    (path / "metadata.yaml").unlink()
+    playback = Playback(ReplayerConfig(str(path)), "/fish")
+    assert len(list(playback.messages())) == len(samples.robot_messages(0.1))
+    playback.close()
 
 
 def test_quality_of_service_survives(tmp_path):

@@ -134,7 +134,7 @@ def test_killed_recorder_loses_at_most_a_second(peer, tmp_path):
     ("node", "parameters", "text"),
     [
         ("recorder", {"output": "/proc/none"}, "recorder: "),
-        ("replayer", {"recording": "/nowhere"}, "replayer: /nowhere: cannot be replayed"),
+        ("replayer", {"recording": "/nowhere"}, "replayer: /nowhere: does not exist"),
     ],
 )
 def test_bad_parameters_are_one_line(peer, node, parameters, text):

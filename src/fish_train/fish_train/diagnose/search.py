@@ -80,10 +80,6 @@ class Round:
         best = max(fit.objective for fit in self.refitted.values())
         return name in self.refitted and best - self.refitted[name].objective < enough
 
-    def quick_gain(self, name: str) -> float:
-        """Nats in the ranking; 0 for a name that was not ranked."""
-        return next((ranked.gain for ranked in self.ranking if ranked.name == name), 0.0)
-
     def gain(self, name: str) -> float:
         """Nats over the base, both with their own noise."""
         return self.refitted[name].objective - self.base.objective

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -68,24 +69,30 @@ def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
     Raises:
         RecordingError: nothing there, empty, truncated or not a recording; the text says what to do.
     """
-    source = _source(path)
+    source = storage(path)
     ros1 = source.suffix == ".bag"
-    try:
-        with (rosbag1.Reader if ros1 else rosbag2.Reader)(source) as reader:
-            topics = _collect(reader, wanted)
-            types = _types(reader.connections, ros1)
-            metadata = {} if isinstance(reader, rosbag1.Reader) else reader.storage.metadata.custom or {}
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # rosbags trips over damaged bytes with whatever they lead it to
-        raise RecordingError(f"{path}: {_advice(source, str(error) or type(error).__name__)}") from error
+    with damage_is_said(path), (rosbag1.Reader if ros1 else rosbag2.Reader)(source) as reader:
+        topics = _collect(reader, wanted)
+        types = _types(reader.connections, ros1)
+        metadata = {} if isinstance(reader, rosbag1.Reader) else reader.storage.metadata.custom or {}
     bag = RawBag(path, ros1, types, topics, {str(k): str(v) for k, v in metadata.items()})
     if not bag.count:
         raise RecordingError(f"{path}: the recording holds no messages; was anything published while it ran?")
     return bag
 
 
-def _source(path: Path) -> Path:
+@contextmanager
+def damage_is_said(path: Path) -> Iterator[None]:
+    """Whatever rosbags stumbles into when it reads damaged bytes as a RecordingError that says what to do."""
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except Exception as error:  # of every kind, as damaged bytes lead anywhere
+        raise RecordingError(f"{path}: {_advice(path, str(error) or type(error).__name__)}") from error
+
+
+def storage(path: Path) -> Path:
     """The path rosbags can open: the directory, or the only storage file of one without metadata.yaml."""
     if not path.exists():
         raise RecordingError(f"{path}: does not exist")
@@ -150,11 +157,11 @@ def _definition(msgtype: str, form: MessageDefinitionFormat, text: str) -> Types
     return types
 
 
-def _advice(source: Path, error: str) -> str:
+def _advice(path: Path, error: str) -> str:
     """What the reader said, in one line, and what can be done about it."""
     error = " ".join(error.split())
     if "empty" in error:
         return "the file is empty"
-    if source.suffix == ".bag":
+    if path.suffix == ".bag":
         return f"not a complete ROS 1 bag ({error.rstrip('.')}); mend it with 'rosbag reindex'"
-    return f"truncated or damaged ({error.rstrip('.')}); 'fish_train recover {source}' saves what is left"
+    return f"truncated or damaged ({error.rstrip('.')}); 'fish_train recover {path}' saves what is left"

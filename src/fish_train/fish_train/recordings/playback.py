@@ -9,6 +9,7 @@ from pathlib import Path
 from rosbags import rosbag2
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
 
+from .bag import damage_is_said, storage
 from .problem import RecordingError
 from .qos import Qos
 from .recorder_config import is_selected
@@ -70,14 +71,15 @@ class Playback:
     def __init__(self, config: ReplayerConfig, namespace: str) -> None:
         if not config.recording:
             raise RecordingError("parameter recording is empty: expected a rosbag2 folder or .mcap file")
-        path = Path(config.recording).expanduser()
-        try:
-            self._reader = rosbag2.Reader(path)
-            self._reader.open()
-        except (rosbag2.ReaderError, OSError) as error:
+        self._path = path = Path(config.recording).expanduser()
+        source = storage(path)
+        if source.suffix == ".bag":
             raise RecordingError(
-                f"{path}: cannot be replayed: {error}; 'fish_train inspect' says more"
-            ) from error
+                f"{path}: ROS 1 bags are not replayed; expected a rosbag2 folder or .mcap file"
+            )
+        with damage_is_said(path):
+            self._reader = rosbag2.Reader(source)
+            self._reader.open()
         self.connections = [
             c
             for c in self._reader.connections
@@ -91,8 +93,13 @@ class Playback:
         self.start_ns = self._reader.start_time
 
     def messages(self) -> Iterator[tuple[Connection, int, bytes]]:
-        """Connection, arrival [ns] and raw message; every call starts anew."""
-        return iter(self._reader.messages(self.connections))
+        """Connection, arrival [ns] and raw message; every call starts anew.
+
+        Raises:
+            RecordingError: the file is damaged from here on.
+        """
+        with damage_is_said(self._path):
+            yield from self._reader.messages(self.connections)
 
     def close(self) -> None:
         """Close the files."""
