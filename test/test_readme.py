@@ -1,11 +1,18 @@
 """What the README shows is what there is."""
 
+import json
 import re
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fish_train.commands.verbs import VERBS
+from fish_train.prove.score import score_world
+from fish_train.prove.study import Study
+from fish_train.prove.tables import ASKED, Share
+from fish_train.prove.truths import truths_of
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -41,3 +48,49 @@ def test_every_dependency_is_pinned_and_has_a_reason(file):
 def test_links_lead_somewhere():
     for target in re.findall(r"\]\(([^)#:]+)\)", README):
         assert (ROOT / target).exists(), target
+
+
+@pytest.fixture(scope="module")
+def newest_study(tmp_path_factory):
+    """Scores of all parts of the study whose table the README shows, from its committed answers."""
+    folder = tmp_path_factory.mktemp("study") / "sixteenth"
+    shutil.copytree(ROOT / "docs" / "studies" / "sixteenth", folder)
+    parts = [Study(part) for part in sorted(folder.iterdir())]
+    return [
+        score_world(world, part.results[name], truths_of(world))
+        for part in parts
+        for name, world in part.reveal().items()
+    ]
+
+
+def test_the_studys_table_is_what_the_committed_answers_give(newest_study):
+    asked = {row.what: Share.of(filter(row.among, newest_study), row.is_so) for row in ASKED}
+    expected = {
+        "right name first, single effects and sensors": asked["right name first, single effects"],
+        "the truth in the answered set": asked["truth in the answered set, single effects"],
+        "right name first, closed loop only": asked["right name first, closed loop only"],
+        "a wrong name first, in any world": Share.of(newest_study, lambda s: bool(s.named) and not s.top1),
+        "false alarms, nothing hidden": asked["false alarms, nothing hidden"],
+        "both of two effects": asked["both of two effects"],
+        "an effect without a name called unexplained": asked["no name exists: called unexplained"],
+        "sensor impostors called physics": asked["sensor impostors called physics"],
+    }
+    rows = re.findall(
+        r"^\| (.*?) \| .*? \| (.*?) \|$", section("## Is the diagnosis right? A blind study"), re.MULTILINE
+    )
+    for what, share in expected.items():
+        (measured,) = [cell for first, cell in rows if first.startswith(what)]
+        assert measured.startswith(f"{share.k} of {share.n}"), what
+        if "(" in measured:
+            low, high = (f"{100 * bound:.0f}" for bound in share.interval)
+            assert f"({low} to {high} %)" in measured, what
+    seconds = [score.seconds for score in newest_study]
+    (measured,) = [cell for first, cell in rows if first.startswith("seconds per data set")]
+    assert measured == f"{np.median(seconds):.0f} ({max(seconds):.0f})"
+
+
+def test_the_study_counts_every_world_and_seed(newest_study):
+    text = section("## Is the diagnosis right? A blind study")
+    assert f"of {len(newest_study)} " in text
+    for about in (ROOT / "docs" / "studies" / "sixteenth").glob("*/study.json"):
+        assert str(json.loads(about.read_text())["seed"]) in text
