@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -18,6 +19,8 @@ from std_srvs.srv import SetBool, Trigger
 from waiting import wait_until
 
 from fish_hw.devices import vertiq_registers as reg
+from fish_hw.devices.camera_calibration import CalibrationError
+from fish_hw.devices.imu_sample import ImuSample
 from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.usb_camera import jpeg_size
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
@@ -198,6 +201,26 @@ def test_imu_topics(graph):
     assert "emulated" in diagnostics[0].status[0].message
 
 
+def test_imu_message_keeps_every_axis(graph):
+    """The emulated sensor turns about one axis only."""
+    g = graph(ImuNode, bus="emulator", orientation_stddev=0.1, gyro_stddev=0.2, accel_stddev=0.3)
+    message = g.node._message(ImuSample(1.0, (0.1, 0.2, 0.3, 0.9), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 3))
+    q, w, a = message.orientation, message.angular_velocity, message.linear_acceleration
+    assert (q.x, q.y, q.z, q.w) == (0.1, 0.2, 0.3, 0.9)
+    assert (w.x, w.y, w.z, a.x, a.y, a.z) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    for covariance, stddev in (
+        (message.orientation_covariance, 0.1),
+        (message.angular_velocity_covariance, 0.2),
+        (message.linear_acceleration_covariance, 0.3),
+    ):
+        assert covariance.reshape(3, 3) == pytest.approx(stddev**2 * np.eye(3))
+
+
+def test_a_stamp_is_the_ros_time_of_the_moment(graph):
+    g = graph(RudderNode, backend="emulator")
+    assert age_s(g, g.node.stamp(time.monotonic() - 5.0)) == pytest.approx(5.0, abs=0.5)
+
+
 def test_camera_topics(graph):
     g = graph(CameraNode, device="emulator", width=160, height=120, publish_raw=True)
     compressed = g.listen(CompressedImage, "camera/image_raw/compressed")
@@ -211,6 +234,38 @@ def test_camera_topics(graph):
     ]
     assert len(stamps[0] & stamps[1] & stamps[2]) > 3
     assert (raw[-1].encoding, raw[-1].step, len(raw[-1].data)) == ("bgr8", 480, 160 * 120 * 3)
+
+
+CALIBRATION = """
+image_width: 160
+image_height: 120
+distortion_model: plumb_bob
+camera_matrix: {data: [101, 0, 81, 0, 102, 62, 0, 0, 1]}
+distortion_coefficients: {data: [-0.2, 0.05, 0.001, 0.002, 0.01]}
+rectification_matrix: {data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}
+projection_matrix: {data: [103, 0, 83, 0, 0, 104, 64, 0, 0, 0, 1, 0]}
+"""
+
+
+def test_camera_info_is_the_calibration_of_the_file(graph, tmp_path):
+    path = tmp_path / "camera.yaml"
+    path.write_text(CALIBRATION)
+    g = graph(CameraNode, device="emulator", width=160, height=120, calibration_file=str(path))
+    infos = g.listen(CameraInfo, "camera/camera_info")
+    assert g.spin(lambda: bool(infos))
+    info = infos[0]
+    assert (info.width, info.height, info.distortion_model) == (160, 120, "plumb_bob")
+    assert list(info.k) == [101, 0, 81, 0, 102, 62, 0, 0, 1]
+    assert list(info.d) == [-0.2, 0.05, 0.001, 0.002, 0.01]
+    assert list(info.r) == [1, 0, 0, 0, 1, 0, 0, 0, 1]
+    assert list(info.p) == [103, 0, 83, 0, 0, 104, 64, 0, 0, 0, 1, 0]
+
+
+def test_a_calibration_of_another_size_is_refused(graph, tmp_path):
+    path = tmp_path / "camera.yaml"
+    path.write_text(CALIBRATION)
+    with pytest.raises(CalibrationError, match="is for 160x120 px, the camera is set to 320x240"):
+        graph(CameraNode, device="emulator", width=320, height=240, calibration_file=str(path))
 
 
 def test_a_step_that_raises_ends_the_node_and_leaves_the_device_safe(graph, tmp_path, monkeypatch):

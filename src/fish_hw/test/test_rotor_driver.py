@@ -102,6 +102,15 @@ def test_module_stops_by_itself_if_coast_is_lost(bench):
     assert bench.emulator.mode == reg.COAST
 
 
+def test_module_that_was_left_driving_coasts_from_the_start(vertiq_emulator):
+    """As after a node that was killed and is back before the module's own watchdog fires."""
+    vertiq_emulator.mode, vertiq_emulator.commanded = VELOCITY_MODE, 50.0
+    bench = Bench(vertiq_emulator)
+    bench.connect()
+    assert vertiq_emulator.mode == reg.COAST and vertiq_emulator.timeouts == 0
+    bench.driver.close()
+
+
 def test_module_that_drives_on_its_own_is_told_to_coast(bench):
     bench.emulator.mode, bench.emulator.commanded = VELOCITY_MODE, 50.0
     assert bench.run(15.0, until=lambda: any("drove although" in e for e in bench.events))
@@ -123,6 +132,9 @@ def test_unplugged_then_plugged_again(bench):
     bench.emulator.close()
     assert bench.run(15.0, steady, until=lambda: not bench.driver.connected)
     assert bench.driver.status().level == ERROR
+    assert (
+        bench.driver.guard.latched and bench.driver.guard.phase is Phase.COASTING
+    )  # no jump when it is back
     said = len(bench.events)
     bench.run(0.3, steady)
     assert len(bench.events) == said  # not once per cycle

@@ -11,6 +11,7 @@ from fish_hw.settings.rotor import RotorSettings
 SETTINGS = RotorSettings(resume="auto")
 DT = 0.01
 AMPLITUDE, FREQUENCY = 9.0, 2.0 * math.tau / 1.0  # rad, rad/s: 2 Hz
+BOTH_WAYS = pytest.mark.parametrize("direction", [1.0, -1.0], ids=["left", "right"])
 
 
 def oscillation(t: float) -> float:
@@ -41,21 +42,30 @@ def test_follows_the_paper_oscillation_unchanged():
     sent = [a.velocity for a in actions]
     wanted = [oscillation(i * DT) for i in range(len(sent))]
     assert max(abs(a - b) for a, b in zip(sent, wanted, strict=True)) < 1e-9
+    assert all(a.ask for a in actions)  # measured in every cycle
 
 
-def test_speed_and_acceleration_are_limited():
+@BOTH_WAYS
+def test_speed_and_acceleration_are_limited(direction):
     bench = Bench(replace(SETTINGS, max_velocity=50.0, max_acceleration=500.0))
-    sent = [a.velocity for a in bench.run(0.5, lambda _: 200.0)]
+    sent = [direction * a.velocity for a in bench.run(0.5, lambda _: direction * 200.0)]
     assert max(sent) == 50.0
     assert max(b - a for a, b in zip(sent, sent[1:], strict=False)) <= 500.0 * DT + 1e-9
     assert bench.guard.clamped == 50
 
 
-def test_stale_command_ramps_down_then_coasts_then_is_silent():
+def test_the_first_cycle_starts_from_rest():
+    guard = RotorGuard(SETTINGS)
+    guard.command(150.0, 100.0)
+    assert guard.step(100.0).velocity == 0.0
+
+
+@BOTH_WAYS
+def test_stale_command_ramps_down_then_coasts_then_is_silent(direction):
     bench = Bench()
-    bench.run(0.5, lambda _: 100.0)
+    bench.run(0.5, lambda _: direction * 100.0)
     after = bench.run(1.5)
-    speeds = [a.velocity for a in after if a.velocity is not None]
+    speeds = [direction * a.velocity for a in after if a.velocity is not None]
     held = [v for v in speeds if v == 100.0]
     assert len(held) * DT == pytest.approx(SETTINGS.stale_s, abs=2 * DT)
     ramp = speeds[len(held) :]
@@ -70,10 +80,12 @@ def test_stale_command_ramps_down_then_coasts_then_is_silent():
     assert "no command for 0.15 s" in bench.guard.reason
 
 
-def test_ramp_respects_the_acceleration_limit():
+@BOTH_WAYS
+def test_ramp_respects_the_acceleration_limit(direction):
     bench = Bench(replace(SETTINGS, ramp_s=0.0, max_acceleration=500.0))
-    bench.run(1.0, lambda _: 100.0)
-    speeds = [a.velocity for a in bench.run(0.6) if a.velocity is not None]
+    bench.run(1.0, lambda _: direction * 100.0)
+    speeds = [direction * a.velocity for a in bench.run(0.6) if a.velocity is not None]
+    assert len(speeds) > 30  # 0.15 s until it is stale, 0.2 s for the ramp
     assert max(a - b for a, b in zip(speeds, speeds[1:], strict=False)) <= 500.0 * DT + 1e-9
 
 
@@ -93,6 +105,24 @@ def test_resume_zero_needs_rest_not_a_zero_crossing():
     assert bench.run(0.1, oscillation)[-1].velocity is not None
 
 
+@BOTH_WAYS
+def test_a_steady_speed_is_no_rest(direction):
+    bench = Bench(replace(SETTINGS, resume="zero"))
+    assert all(a.velocity is None for a in bench.run(1.0, lambda _: direction * 100.0))
+
+
+def test_a_stop_asks_for_a_new_rest():
+    """Commands that rested before the stop say nothing of what their sender knows of it."""
+    bench = Bench(replace(SETTINGS, resume="zero"))
+    bench.run(1.0, lambda _: 0.0)
+    assert not bench.guard.latched
+    bench.guard.step(bench.now, ("battery",))
+    bench.run(SETTINGS.rearm_s - 2 * DT, lambda _: 0.0)
+    assert bench.guard.latched
+    bench.run(4 * DT, lambda _: 0.0)
+    assert (bench.guard.latched, bench.guard.reason) == (False, "")
+
+
 def test_resume_zero_after_a_stop():
     bench = Bench(replace(SETTINGS, resume="zero"))
     bench.run(0.5, lambda _: 0.0)
@@ -106,9 +136,9 @@ def test_resume_zero_after_a_stop():
 def test_rest_with_gaps_is_no_rest():
     bench = Bench(replace(SETTINGS, resume="zero"))
     for _ in range(5):
-        bench.run(0.2, lambda _: 0.0)
+        bench.run(0.1, lambda _: 0.0)
         bench.run(0.3)
-    assert bench.guard.latched
+    assert all(a.velocity is None for a in bench.actions)
 
 
 @pytest.mark.parametrize(("resume", "reason"), [("auto", ""), ("zero", "not enabled yet")])
@@ -169,12 +199,15 @@ def test_no_resuming_while_there_is_an_obstacle(resume):
     assert bench.run(0.1, oscillation)[-1].velocity is not None
 
 
-def test_cut_is_silent_at_once():
-    bench = Bench()
+def test_cut_is_silent_at_once_and_latches():
+    bench = Bench(replace(SETTINGS, resume="zero"))
+    bench.run(0.5, lambda _: 0.0)
     bench.run(0.2, lambda _: 100.0)
     bench.guard.cut("the module restarted", bench.now)
     quiet = bench.run(0.3, lambda _: 100.0)
     assert not any(a.velocity is not None or a.ask or a.coast for a in quiet)
+    assert all(a.velocity is None for a in bench.run(1.0, lambda _: 100.0))
+    assert (bench.guard.latched, bench.guard.reason) == (True, "the module restarted")
 
 
 def test_a_late_cycle_earns_no_jump():

@@ -24,6 +24,7 @@ from fish_hw.transport.sysfs_pwm import SysfsPwm
 
 SETTINGS = RudderSettings()
 DT = 0.01
+BOTH_WAYS = pytest.mark.parametrize("direction", [1.0, -1.0], ids=["left", "right"])
 PCA_COUNTS = {500: 102, 900: 184, 1000: 205, 1250: 256, 1500: 307, 1750: 359, 2000: 410, 2100: 430, 2500: 512}
 
 
@@ -33,6 +34,7 @@ PCA_COUNTS = {500: 102, 900: 184, 1000: 205, 1250: 256, 1500: 307, 1750: 359, 20
         (0.0, {}, 1500.0),
         (0.5, {}, 1786.5),
         (0.5, {"sign": -1}, 1213.5),
+        (0.5, {"us_per_rad": 400.0}, 1700.0),
         (0.0, {"trim": 0.1}, 1557.3),
         (0.8, {"max_us": 1800.0}, 1800.0),
         (-0.8, {"trim": -0.4}, 1000.0),
@@ -58,19 +60,41 @@ class ServoBench:
         return angles
 
 
-def test_slew_and_range():
-    angles = ServoBench().run(1.0, 2.0)
-    assert max(b - a for a, b in zip(angles, angles[1:], strict=False)) <= SETTINGS.max_rate * DT + 1e-12
-    assert angles[-1] == SETTINGS.max_angle
+def test_a_servo_without_commands_stays_in_the_centre():
+    assert ServoBench().run(0.5) == [0.0] * 50
 
 
-def test_stale_command_centres_at_the_slew_rate():
+@BOTH_WAYS
+def test_slew_and_range(direction):
     bench = ServoBench()
-    bench.run(1.0, 0.6)
-    angles = bench.run(1.0)
+    angles = [direction * a for a in bench.run(1.0, direction * 2.0)]
+    steps = [b - a for a, b in zip([0.0, *angles], angles, strict=False)]
+    assert steps[0] == 0.0 and max(steps) == pytest.approx(SETTINGS.max_rate * DT)
+    assert angles[-1] == SETTINGS.max_angle
+    assert bench.servo.counters.clamped == 100
+
+
+@BOTH_WAYS
+def test_stale_command_centres_at_the_slew_rate(direction):
+    bench = ServoBench()
+    bench.run(1.0, direction * 0.6)
+    assert bench.servo.counters.clamped == 0
+    angles = [direction * a for a in bench.run(1.0)]
     held = sum(a == pytest.approx(0.6) for a in angles)
     assert held * DT == pytest.approx(SETTINGS.stale_s, abs=2 * DT)
+    assert max(a - b for a, b in zip(angles, angles[1:], strict=False)) == pytest.approx(
+        SETTINGS.max_rate * DT
+    )
     assert angles[-1] == 0.0
+
+
+def test_a_late_cycle_earns_no_jump():
+    bench = ServoBench()
+    bench.run(0.1, 0.0)
+    bench.now += 5.0
+    bench.servo.command(0.8, bench.now)
+    bench.servo.step(bench.now)
+    assert 0.0 < bench.servo.alpha <= SETTINGS.max_rate * 0.05 + 1e-12
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])

@@ -9,7 +9,7 @@ from waiting import wait_until
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.vertiq import Vertiq
-from fish_hw.protocol.iquart import REPLY, Message, encode
+from fish_hw.protocol.iquart import REPLY, SET, Message, encode
 from fish_hw.transport.recorded import RecordedStream
 from fish_hw.transport.serial_port import SerialPort
 
@@ -55,6 +55,8 @@ def test_sign_mirrors_command_and_measurement():
     sample = vertiq.drive(-10.0)
     assert stream.written[0].startswith(bytes.fromhex("55 06 34 05 01 00 00 20 41 ed 9e"))
     assert (sample.velocity, sample.angle) == (-9.5, -1.25)
+    vertiq.command(-10.0)  # the way down to a stop: the other sign would reverse the rotor
+    assert stream.written[1] == bytes.fromhex("55 06 34 05 01 00 00 20 41 ed 9e")
 
 
 def test_coast_is_said_three_times():
@@ -63,10 +65,25 @@ def test_coast_is_said_three_times():
     assert stream.written == [bytes.fromhex("55 02 34 02 01 8e 06") * 3]
 
 
-def test_silence_is_no_sample():
-    vertiq, _ = recorded()
+@pytest.mark.parametrize("reply", [b"", VELOCITY_REPLY, ANGLE_REPLY], ids=["nothing", "no angle", "no speed"])
+def test_silence_is_no_sample(reply):
+    vertiq, _ = recorded(b"", reply)
     assert vertiq.measure() is None
     assert vertiq.counters.timeouts == 1
+
+
+def test_a_sample_is_stamped_in_the_middle_of_its_exchange():
+    vertiq, _ = recorded(b"", b"", b"", b"", VELOCITY_REPLY + ANGLE_REPLY)
+    vertiq._clock.now = before = 50.0
+    sample = vertiq.measure()
+    assert vertiq._clock.now - before > 0.0055
+    assert sample.time_s == pytest.approx((before + vertiq._clock.now) / 2, abs=0.001)
+
+
+def test_an_exchange_ends_with_its_last_answer():
+    vertiq, _ = recorded(b"", VELOCITY_REPLY + ANGLE_REPLY)
+    vertiq.measure()
+    assert vertiq._clock.now < 0.0055  # and does not wait out its 8 ms
 
 
 def test_late_reply_is_not_the_next_answer():
@@ -86,6 +103,22 @@ def test_command_goes_out_before_the_wait_for_late_replies():
     assert stream.written[2] == bytes.fromhex("55 02 32 0d 00 31 b4  55 02 32 0c 00 00 87")
 
 
+def test_answers_behind_a_false_start_are_found_when_the_line_falls_silent():
+    vertiq, _ = recorded(b"", b"\x55\x3b" + VELOCITY_REPLY + ANGLE_REPLY)
+    assert vertiq.measure().velocity == 9.5
+
+
+def test_a_command_waits_for_nothing():
+    vertiq, stream = recorded()
+    read, waits = stream.read, []
+    stream.read = lambda timeout_s: waits.append((len(stream.written), timeout_s)) or read(timeout_s)
+    for written in (0, 1):  # at first, and after a question without an answer
+        vertiq.drive(10.0)
+        assert [t for n, t in waits if n == written][0] == 0.0
+        assert stream.written[written].startswith(bytes.fromhex("55 06 34 05 01"))
+        waits.clear()
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -93,6 +126,7 @@ def test_command_goes_out_before_the_wait_for_late_replies():
         encode(Message(69, 0, REPLY, 0, struct.pack("<f", 1.0))),  # another register
         encode(Message(50, 13, REPLY, 0, b"\0\0")),  # wrong size
         bytes.fromhex("55 02 32 0d 00 31 b4"),  # our own question, echoed by half-duplex wiring
+        encode(Message(50, 13, SET, 0, struct.pack("<f", 1.0))),  # our own order, echoed
     ],
 )
 def test_messages_that_are_no_answer_are_counted(wrong):
@@ -101,10 +135,12 @@ def test_messages_that_are_no_answer_are_counted(wrong):
     assert vertiq.counters.unexpected == 1
 
 
-def test_value_that_is_no_number_is_no_sample():
-    nan = encode(Message(50, 13, REPLY, 0, struct.pack("<f", math.nan)))
-    vertiq, _ = recorded(b"", nan + ANGLE_REPLY)
+@pytest.mark.parametrize("register", [reg.OBS_VELOCITY, reg.OBS_ANGLE], ids=["speed", "angle"])
+def test_value_that_is_no_number_is_no_sample(register):
+    nan = encode(Message(register.type, register.param, REPLY, 0, struct.pack("<f", math.nan)))
+    vertiq, _ = recorded(b"", nan + (ANGLE_REPLY if register is reg.OBS_VELOCITY else VELOCITY_REPLY))
     assert vertiq.measure() is None
+    assert vertiq.counters.unexpected == 1
 
 
 def test_angle_is_continuous_through_many_turns():
@@ -121,9 +157,30 @@ def test_angle_is_continuous_through_many_turns():
 
 def test_configure_writes_and_reads_back(module):
     vertiq, emulator = module
+    coast_quietly = [(r.type, r.param) for r in (reg.TIMEOUT_BEHAVIOR, reg.TIMEOUT_MEANING, reg.TIMEOUT_SONG)]
+    emulator.written |= dict.fromkeys(coast_quietly, b"\1")
     assert vertiq.configure(0.25) == []
     assert emulator.timeout_s == 0.25
-    assert emulator.written[reg.TIMEOUT_SONG.type, reg.TIMEOUT_SONG.param] == b"\0"
+    assert [emulator.written[address] for address in coast_quietly] == [b"\0"] * 3
+
+
+def test_a_module_that_refuses_its_watchdog_is_not_used(module):
+    vertiq, emulator = module
+    kept = encode(Message(reg.TIMEOUT.type, reg.TIMEOUT.param, REPLY, 0, struct.pack("<f", 1.0)))
+    emulator.mangle = lambda reply: kept if reply[2:4] == kept[2:4] else reply
+    with pytest.raises(DeviceError, match="refuses a timeout of 0.25 s"):
+        vertiq.configure(0.25)
+
+
+def test_tuning_is_what_the_module_has_and_what_it_lacks_is_left_out(module):
+    vertiq, emulator = module
+    vertiq._reply_timeout_s = 0.05
+    del emulator.written[reg.FIRMWARE.type, reg.FIRMWARE.param]
+    emulator.written[reg.INPUT_FILTER.type, reg.INPUT_FILTER.param] = struct.pack("<I", 500)
+    tuning = vertiq.tuning()
+    assert tuning["command filter [Hz]"] == 500
+    assert tuning["velocity feed-forward [V s/rad]"] == pytest.approx(0.0258)
+    assert "firmware version" not in tuning
 
 
 def test_configure_names_settings_that_the_firmware_lacks(module):
@@ -141,10 +198,13 @@ def test_configure_without_module_says_what_to_check():
 
 def test_telemetry(module):
     vertiq, emulator = module
-    emulator.volts, emulator.coil_c, emulator.faults = 14.2, 51.5, 0b100100
+    emulator.volts, emulator.amps, emulator.faults = 14.2, 3.5, 0b100100
+    emulator.controller_c, emulator.coil_c = 36.5, 51.5
+    emulator._booted -= 3600.0
     telemetry = vertiq.telemetry()
-    assert telemetry.volts == pytest.approx(14.2)
-    assert telemetry.coil_c == pytest.approx(51.5)
+    assert (telemetry.volts, telemetry.amps) == pytest.approx((14.2, 3.5))
+    assert (telemetry.controller_c, telemetry.coil_c) == pytest.approx((36.5, 51.5))
+    assert telemetry.uptime_s == pytest.approx(3600.0, abs=5.0)
     assert reg.fault_names(telemetry.faults) == ["reference voltage", "controller temperature"]
     assert (telemetry.derate, telemetry.mode) == (1.0, reg.COAST)
 
@@ -164,6 +224,9 @@ def test_telemetry_keeps_the_answers_that_came(module):
     emulator.mangle = dropping(reg.TELEMETRY)
     telemetry = vertiq.telemetry()
     assert (telemetry.volts, telemetry.faults, telemetry.derate) == (None, 0b10, 1.0)
+    emulator.mangle = dropping(reg.FAULT_NOW, reg.CTRL_MODE)
+    telemetry = vertiq.telemetry()
+    assert (telemetry.volts, telemetry.faults, telemetry.mode) == (pytest.approx(14.8), None, None)
 
 
 def test_fault_memory_that_could_not_be_read_is_not_erased(module):
