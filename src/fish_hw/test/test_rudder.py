@@ -106,16 +106,34 @@ def test_bad_numbers_do_not_feed_the_watchdog(bad):
 
 
 def test_pca9685_start_sequence_and_counts():
-    board = Pca9685Emulator()
-    pwm = Pca9685Pwm(I2cBusEmulator({0x40: board}), 0x40, 0, 25e6, 50.0, sleep=lambda _: None)
+    board, slept = Pca9685Emulator(), []
+    pwm = Pca9685Pwm(
+        I2cBusEmulator({0x40: board}), 0x40, 0, 25e6, 50.0, sleep=lambda s: slept.append((len(board.log), s))
+    )
     pwm.start(1_500_000)
     assert [w.hex(" ") for w in board.log] == ["00 00", "00 10", "fe 79", "00 00", "00 a0", "06 00 00 33 01"]
+    [(written, waited_s)] = slept
+    assert written == 4 and waited_s >= 500e-6  # the oscillator runs before the restart
     for us, count in PCA_COUNTS.items():
         pwm.set_pulse_ns(1000 * us)
         assert board.log[-1] == bytes([0x06, 0, 0]) + count.to_bytes(2, "little")
+    pwm.set_pulse_ns(30_000_000)  # longer than the period: bit 12 of the counter would be "full off"
+    assert board.pulse_counts(0) == (0, 4095)
     pwm.stop()
     assert board.log[-1].hex(" ") == "06 00 00 00 10"
+
+
+def test_pca9685_that_sleeps_or_has_another_rate_is_not_running():
+    board = Pca9685Emulator()
+    pwm = Pca9685Pwm(I2cBusEmulator({0x40: board}), 0x40, 0, 25e6, 50.0, sleep=lambda _: None)
+    pwm.start(1_500_000)
     assert pwm.is_running()
+    board.registers[0x00] |= 0x10  # put to sleep, its rate kept
+    assert not pwm.is_running()
+    pwm.start(1_500_000)
+    board.registers[0xFE] = 0x1E  # another program's rate, still awake
+    assert not pwm.is_running()
+    pwm.start(1_500_000)
     board.power_cycle()
     assert not pwm.is_running()
 
@@ -131,8 +149,10 @@ def test_pca9685_channel_and_real_clock():
 
 def test_prescale():
     assert prescale(25e6, 50.0) == 121
-    with pytest.raises(ValueError, match="has 3 to 255"):
-        prescale(25e6, 20.0)
+    assert (prescale(25e6, 1526.0), prescale(25e6, 23.84)) == (3, 255)  # the datasheet's range
+    for pwm_hz in (23.7, 1800.0):
+        with pytest.raises(ValueError, match="has 3 to 255"):
+            prescale(25e6, pwm_hz)
 
 
 @pytest.fixture
@@ -232,13 +252,17 @@ def test_driver_starts_centred_and_follows(chip):
     assert bench.events == ["rudder follows commands", "rudder centred: no command"]
 
 
-def test_close_centres_and_gives_the_servo_time_before_the_pulses_end(chip):
-    bench = DriverBench(chip)
+@BOTH_WAYS
+def test_close_centres_and_gives_the_servo_time_before_the_pulses_end(chip, direction):
+    bench = DriverBench(chip, replace(SETTINGS, max_rate=2.0))
     bench.driver.connect()
-    bench.run(0.5, 0.6)
+    bench.run(1.5, direction * 0.6)
     bench.driver.close()
     assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
-    assert bench.slept[-1] >= 0.6 / SETTINGS.max_rate
+    assert 0.6 / 2.0 <= bench.slept[-1] < 0.6 / 2.0 + 0.2
+    assert not bench.driver.connected
+    bench.driver.close()  # once is enough
+    assert len(bench.slept) == 1
 
 
 def test_close_right_after_the_start_waits_for_a_servo_that_stood_anywhere(chip):
@@ -246,7 +270,8 @@ def test_close_right_after_the_start_waits_for_a_servo_that_stood_anywhere(chip)
     bench = DriverBench(chip)
     bench.driver.connect()
     bench.driver.close()
-    assert bench.slept[-1] >= 2 * SETTINGS.max_angle / SETTINGS.max_rate
+    end_to_end_s = 2 * SETTINGS.max_angle / SETTINGS.max_rate
+    assert end_to_end_s <= bench.slept[-1] < end_to_end_s + 0.2
     bench.driver.connect()
     bench.run(1.0)
     bench.driver.close()
@@ -311,19 +336,27 @@ def test_bus_error_loses_the_board_and_finds_it_again():
 
     run(0.5)
     bus.fault = lambda: errno.EREMOTEIO
+    run(0.1)
+    assert bus.closed
+    bus.closed = False
     run(4.0)
+    assert bus.closed  # also by attempts that fail half-way: descriptors are few
     assert driver.status().level == ERROR and not driver.connected
     assert len(events) == 2  # follows, lost: not one line per attempt
     bus.fault = lambda: None
     board.power_cycle()
     run(6.0)
     assert driver.connected and board.registers[0xFE] == 121
+    bus.closed, bus.fault = False, lambda: errno.EREMOTEIO
+    driver.close()
+    assert bus.closed and "not centred" in driver.status().message
 
 
 def test_absent_output_is_raised_at_start(tmp_path):
     driver = RudderDriver(SETTINGS, lambda: SysfsPwm(str(tmp_path / "pwmchip0"), 0, 20_000_000))
     with pytest.raises(PortUnavailable):
         driver.connect()
+    driver.close()  # of nothing
 
 
 def test_write_that_fails_is_a_transport_error(chip):

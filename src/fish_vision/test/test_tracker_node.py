@@ -110,6 +110,9 @@ def check_pose(msg: PoseWithCovarianceStamped) -> None:
     covariance = np.array(msg.pose.covariance).reshape(6, 6)
     assert 0 < covariance[0, 0] < 1e-5 and 0 < covariance[5, 5] < 1e-3
     np.testing.assert_allclose(covariance, covariance.T)
+    assert (np.diag(covariance)[2:5] > 1e3).all()  # z, roll, pitch are not seen,
+    unseen = covariance[2:5] - np.eye(6)[2:5] * covariance[2:5]
+    assert not unseen.any()  # and go with nothing that is
 
 
 @pytest.mark.parametrize("bench", [{"debug_image": True}], indirect=True)
