@@ -54,9 +54,11 @@ def bench():
     return bench
 
 
-def test_start_switches_the_reports_on(bench):
+def test_start_switches_the_reports_on_once(bench):
     assert bench.hub.intervals_us == {1: 10000, 2: 10000, 8: 10000}
     assert bench.hub.written[0] == bytes.fromhex("05 00 01 00 01")
+    bench.run(0.1)
+    assert len(bench.hub.written) == 5  # reset, product id, three features
 
 
 def test_samples_have_the_motion_of_the_hub_at_the_time_it_was_measured(bench):
@@ -113,14 +115,29 @@ def test_interrupt_line_gives_the_time_and_spares_empty_reads():
     samples, without = bench.run(0.5), plain.run(0.5)
     assert len(samples) >= 45
     assert not any(data == bytes(4) for data in reads)
+    assert max(len(data) for data in reads) < 64  # what there is, no more: 40 bytes take a millisecond
     assert without[-1].time_s - samples[-1].time_s == pytest.approx(0.004, abs=1e-6)
+
+
+def test_a_poll_waits_for_the_interrupt_until_there_is_a_sample():
+    bench = Bench()
+    line = Line(bench, age_s=0.0)
+    bench.bno = Bno085(bench.bus, 0x4A, 10000, line, bench.clock, bench.sleep)
+    bench.bno.start()
+    bench.run(0.1)
+    line.waited.clear()
+    bench.sleep(INTERVAL_S)
+    assert len(bench.bno.poll(0.02)) == 1
+    assert line.waited == [0.02, 0.0]  # then takes what else is there
 
 
 def test_long_cargo_comes_in_pieces(bench, monkeypatch):
     bench.run(0.1)
     monkeypatch.setattr(bno085, "LONGEST_READ", 20)
+    read, sizes = bench.bus.read, []
+    bench.bus.read = lambda address, count: sizes.append(count) or read(address, count)
     samples = bench.run(0.5)  # reports are 43 bytes: three pieces
-    assert len(samples) >= 45
+    assert len(samples) >= 45 and max(sizes) == 20
     assert bench.bno.counters.bad_packets == bench.bno.reassembler.orphans == 0
 
 
@@ -174,6 +191,21 @@ def test_implausible_values_are_dropped(bench):
     assert bench.bno.counters.implausible == 3
 
 
+@pytest.mark.parametrize(
+    ("report_id", "largest"), [(sh2.ACCELEROMETER, 8 * 9.80665), (sh2.GYROSCOPE, math.radians(2000.0))]
+)
+def test_whatever_the_sensor_can_measure_is_plausible_and_hardly_more(report_id, largest):
+    for factor in (-1.05, -1.0, 1.0, 1.05):
+        report = sh2.Report(report_id, 0, 3, 0.0, (factor * largest,) * 3)
+        assert bno085.plausible(report) == (abs(factor) == 1.0)
+
+
+@pytest.mark.parametrize(("length", "expected"), [(0.97, False), (0.985, True), (1.015, True), (1.03, False)])
+def test_a_rotation_is_plausible_near_unit_length(length, expected):
+    values = (0.5 * length, -0.5 * length, 0.5 * length, -0.5 * length)
+    assert bno085.plausible(sh2.Report(sh2.GAME_ROTATION_VECTOR, 0, 3, 0.0, values)) == expected
+
+
 def flip_in_time_base(byte: int, mask: int):
     """Damage: bits of one byte of every time base."""
 
@@ -204,6 +236,23 @@ def test_reports_a_little_early_or_late_are_kept(bench, lead_s):
     assert bench.bno._newest[sh2.GYROSCOPE].time_s == pytest.approx(bench.now + lead_s)
 
 
+def test_reports_that_nobody_asked_for_change_nothing(bench):
+    bench.run(0.1)
+    bench.hub.push(shtp.REPORTS, b"\xfb\0\0\0\0" + bytes.fromhex("04 09 02 00 40 00 c0 ff 20 00"))
+    assert len(bench.run(0.5)) >= 45
+
+
+def test_a_sample_is_as_accurate_as_its_worst_report(bench):
+    bench.run(0.5)
+    bench.bno._newest.clear()
+    gyro, acceleration = "02 09 03 00 00 01 80 ff 00 03", "01 09 01 00 00 00 80 ff d0 09"
+    rotation = "08 08 02 00 00 00 00 00 7e 18 21 3b"
+    payload = b"\xfb\0\0\0\0" + bytes.fromhex(gyro + acceleration + rotation)
+    [sample] = bench.bno._take_reports(payload, bench.now)
+    assert sample.accuracy == 1
+    assert sample.angular_velocity == (0.5, -0.25, 1.5) and sample.acceleration == (0.0, -0.5, 9.8125)
+
+
 def test_a_hub_that_continues_without_end_is_left(bench):
     bench.run(0.1)
     reads = []
@@ -215,10 +264,20 @@ def test_a_hub_that_continues_without_end_is_left(bench):
 
 def test_reset_of_the_hub_switches_the_reports_on_again(bench):
     bench.run(0.1)
+    said = len(bench.hub.written)
     bench.hub.reset()
     assert bench.hub.intervals_us == {}
     assert len(bench.run(0.5)) >= 40
     assert bench.bno.counters.resets == 2  # the first was ours
+    assert len(bench.hub.written) == said + 3  # asked once for each report
+
+
+def test_other_words_on_the_resets_channel_and_its_word_on_others_are_no_reset(bench):
+    bench.run(0.1)
+    bench.hub.push(shtp.EXECUTABLE, b"\x02")
+    bench.hub.push(shtp.COMMAND, sh2.RESET_COMPLETE)
+    bench.run(0.2)
+    assert bench.bno.counters.resets == 1
 
 
 def test_sequence_gaps_are_counted(bench):
@@ -360,12 +419,21 @@ def test_rvc_rate_is_the_difference_of_attitudes():
     assert steps == pytest.approx([0.01] * 38)
 
 
+def test_rvc_samples_of_one_read_are_stamped_when_each_was_measured():
+    stream = RecordedStream([b"".join(rvc_frames([0, 1, 2, 4], rate=1.0))])
+    times = [s.time_s for s in Bno085Rvc(stream, clock=lambda: 50.0).poll(0.0)]
+    began = 50.0 - 19 * 10 / 115200  # 19 bytes of 10 bits were on the wire
+    # half-way between two attitudes; the lost one between the last two took its 10 ms
+    assert times == pytest.approx([began - 0.035, began - 0.025, began - 0.01])
+
+
 def test_rvc_gaps():
-    frames = rvc_frames([0, 1, 3, 4, 40, 41], rate=0.5)
+    frames = rvc_frames([0, 1, 1, 3, 4, 7, 11, 40, 41], rate=0.5)
     device = Bno085Rvc(RecordedStream(frames), clock=lambda: 0.0)
     samples = [s for _ in frames for s in device.poll(0.0)]
-    assert [round(s.angular_velocity[2], 1) for s in samples] == [0.5] * 4
-    assert device.lost_frames == 1 + 35
+    # none of the first, of a repeated one, and across more than 30 ms
+    assert [round(s.angular_velocity[2], 1) for s in samples] == [0.5] * 5
+    assert device.lost_frames == 1 + 2 + 3 + 28
 
 
 @pytest.mark.parametrize("asked_hz", [10.0, 100.0, 200.0])

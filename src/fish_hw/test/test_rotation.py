@@ -43,7 +43,9 @@ def test_mean_rate_of_a_steady_turn():
         later = multiply(q, step)
         assert mean_rate(q, later, dt) == pytest.approx(w)
         assert mean_rate(q, tuple(-c for c in later), dt) == pytest.approx(w)
-    assert mean_rate(q, q, dt) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    level = from_yaw_pitch_roll(0.4, 0.0, 0.0)
+    for still in (q, level):
+        assert mean_rate(still, still, dt) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
 def test_mounting_turns_everything_into_base_axes():
@@ -54,8 +56,9 @@ def test_mounting_turns_everything_into_base_axes():
     R_level_sensor = matrix(*level_base) @ R_base_sensor
     w, a = np.array([0.1, 0.2, 0.3]), np.array([1.0, -2.0, 9.0])
     # quaternion of the sensor by its columns, made with an independent formula
-    x, y, z, s = _quaternion(R_level_sensor)
+    x, y, z, s = (1.015 * c for c in _quaternion(R_level_sensor))  # as far from 1 as a reading may be
     sample = Mounting(settings).to_base(ImuSample(1.0, (x, y, z, s), tuple(w), tuple(a), 3))
+    assert norm(sample.orientation) == pytest.approx(1.0)
     assert sample.angular_velocity == pytest.approx(R_base_sensor @ w)
     assert sample.acceleration == pytest.approx(R_base_sensor @ a)
     for axis in np.eye(3):

@@ -5,6 +5,7 @@ import math
 import os
 import threading
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from fake_kernel import refuse_as_sysfs_does
@@ -198,6 +199,36 @@ def test_sysfs_export_waits_for_the_files(tmp_path):
     SysfsPwm(str(folder), 1, 20_000_000).start(1_500_000)
     thread.join()
     assert (folder / "pwm1" / "duty_cycle").read_text() == "1500000\n"
+
+
+def refuse_export(monkeypatch, folder, code: int, exported: bool) -> None:
+    """The kernel refuses an export; with `exported` because somebody else was faster."""
+    plain = Path.write_text
+
+    def write_text(path: Path, text: str) -> int:
+        if path != folder / "export":
+            return plain(path, text)
+        if exported:
+            os.rename(PwmChipEmulator(folder.parent / "made").channel, folder / "pwm0")
+        raise OSError(code, os.strerror(code))
+
+    folder.mkdir()
+    plain(folder / "export", "")
+    monkeypatch.setattr(Path, "write_text", write_text)
+
+
+def test_sysfs_channel_that_somebody_else_exports_at_the_same_time(tmp_path, monkeypatch):
+    folder = tmp_path / "pwmchip0"
+    refuse_export(monkeypatch, folder, errno.EBUSY, exported=True)
+    SysfsPwm(str(folder), 0, 20_000_000).start(1_500_000)
+    assert (folder / "pwm0" / "enable").read_text() == "1\n"
+
+
+def test_sysfs_export_that_is_refused_says_why(tmp_path, monkeypatch):
+    folder = tmp_path / "pwmchip0"
+    refuse_export(monkeypatch, folder, errno.ENODEV, exported=False)
+    with pytest.raises(PortUnavailable, match="No such device"):
+        SysfsPwm(str(folder), 0, 20_000_000, sleep=lambda _: None)
 
 
 def test_sysfs_files_that_never_become_writable(tmp_path):

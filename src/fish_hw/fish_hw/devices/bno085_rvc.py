@@ -33,7 +33,8 @@ class Bno085Rvc:
         messages = self.parser.feed(self._stream.read(timeout_s))
         newest_s = self._clock() - WIRE_S
         samples = []
-        for age, message in zip(range(len(messages) - 1, -1, -1), messages, strict=True):
+        for message in messages:
+            age = (messages[-1].index - message.index) % 256  # frames, with those that were lost
             sample = self._sample(message, newest_s - age * PERIOD_S)
             if sample is not None:
                 samples.append(sample)
