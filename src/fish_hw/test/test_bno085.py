@@ -88,7 +88,7 @@ class Line:
 
     def __init__(self, bench: Bench, age_s: float) -> None:
         self.bench, self.age_s = bench, age_s
-        self.waited = []
+        self.waited, self.closed = [], False
 
     def wait(self, timeout_s: float) -> float | None:
         self.waited.append(timeout_s)
@@ -99,7 +99,7 @@ class Line:
         return bool(self.bench.hub._queue or self.bench.hub._open)
 
     def close(self) -> None:
-        pass
+        self.closed = True
 
 
 def test_interrupt_line_gives_the_time_and_spares_empty_reads():
@@ -358,6 +358,20 @@ def test_frozen_values_start_the_sensor_again():
     assert bench.events[2:] == ["IMU: values stand still for 1.0 s"]  # said again after it worked
 
 
+def test_stamps_are_those_of_the_sensor_and_never_go_back():
+    """One read is delayed, and the next one brings two frames."""
+    first, second, *both = rvc_frames(range(4), 1.0)
+    bench = DriverBench(ImuSettings(interface="rvc"), RecordedStream([first, second, b"".join(both)]))
+    bench.driver.connect()
+    times = []
+    for now in (1000.0, 1000.018, 1000.020):
+        bench.now = now
+        times += [s.time_s for s in bench.driver.step(0.0).samples]
+    late_s = 19 * 10 / 115200 + 0.005  # time on the wire, half of the time between two attitudes
+    assert times == pytest.approx([1000.018 - late_s, 1000.018 - late_s, 1000.020 - late_s], abs=2e-4)
+    assert all(b - a > 0.9e-4 for a, b in zip(times, times[1:], strict=False))
+
+
 def test_stamps_do_not_stay_ahead_after_the_sensor_was_started_again():
     bench = DriverBench()
     bench.driver.connect()
@@ -378,12 +392,43 @@ def test_silence_then_return():
     bench.run(10.0)
     assert "IMU: no samples for 1.0 s" in bench.events
     assert len(bench.events) == 2  # lost, and why it cannot come back; not once per attempt
+    assert 4 <= bench.driver.status().values["reconnect attempts"] <= 7  # waits grow to 5 s
+    before = bench.now
+    bench.driver.step(0.01)
+    assert bench.now - before == pytest.approx(0.01)  # a step that waits for nothing must not spin
     bench.bus.fault = lambda: None
     assert bench.run(8.0)
     assert bench.driver.connected
 
 
-def test_unreliable_and_slow_sensors_are_said():
+def test_an_unreliable_sensor_is_said():
+    bench = DriverBench()
+    report = bench.hub._report
+    bench.hub._report = lambda report_id: report(report_id)[:2] + b"\0" + report(report_id)[3:]
+    bench.driver.connect()
+    bench.run(1.0)
+    status = bench.driver.status()
+    assert (status.level, status.message) == (WARN, "the sensor calls its values unreliable")
+
+
+def test_bus_and_line_are_given_back():
+    bench = DriverBench()
+    line = Line(bench, age_s=0.0)
+    bench.driver = ImuDriver(
+        ImuSettings(), lambda: bench.bus, lambda: line, RecordedStream, bench.clock, bench.sleep
+    )
+    bench.driver.connect()
+    bench.run(0.1)
+    bench.driver.close()
+    assert bench.bus.closed and line.closed and not bench.driver.connected
+    bench.bus.closed = line.closed = False
+    bench.bus.fault = lambda: errno.EREMOTEIO
+    with pytest.raises(DeviceError):
+        bench.driver.connect()
+    assert bench.bus.closed and line.closed
+
+
+def test_a_slow_sensor_is_said():
     bench = DriverBench(replace(ImuSettings(), rate_hz=200.0))
     bench.driver.connect()
     bench.run(1.0)
