@@ -195,6 +195,26 @@ def test_wake_memory_without_share_is_tip_slip(strokes):
     np.testing.assert_allclose(wake[:, :12], plain[:, :12], atol=1e-11)
 
 
+def test_states_of_effects_follow_their_equations(strokes):
+    """A phase that turns at its frequency, an angle that sums up the speed, a wake that lags behind the slip."""
+    robot = Robot(links=1).with_effect("sloshing", sine=0.02, frequency=0.7)
+    robot = robot.with_effect("rotor_imbalance", ahead=6e-5)
+    robot = robot.with_effect("wake_memory", mobility=0.125, share=0.5, time_constant=0.2)
+    stepper, commands = Stepper(robot.structure, compiled=False), strokes(150)
+    p = stepper.parameters(robot)
+    states = stepper.rollout(stepper.rest(), commands, p)
+    of = dict(zip(stepper.layout.state, states.T, strict=True))
+    time = 0.01 * np.arange(151)
+    np.testing.assert_allclose(of["sloshing.phase"], 2 * np.pi * 0.7 * time, atol=1e-9)
+    speed = of["rotor_speed"]
+    turned = np.concatenate([[0.0], np.cumsum(0.005 * (speed[1:] + speed[:-1]))])
+    np.testing.assert_allclose(of["rotor_imbalance.angle"], turned, atol=1e-9)
+    slip = stepper.outputs(states, np.zeros(2), p)["slip"]
+    _, late, _ = lsim(([1.0], [0.2, 1.0]), slip, time)
+    assert np.ptp(late) > 0.01
+    np.testing.assert_allclose(of["wake_memory.wake"], late, atol=0.01 * np.ptp(late))
+
+
 def test_tail_hardening_and_damping_are_torques_of_the_joint():
     hardening = EFFECTS["tail_hardening"].joint_torque
     assert hardening(namespace("tail_hardening", k3=0.3), 1, -0.5, 9.0, NUMPY) == pytest.approx(-0.0375)
@@ -211,31 +231,38 @@ def test_a_payload_at_the_centre_is_a_heavier_head(strokes):
     np.testing.assert_allclose(loaded, swim(Robot().with_parameters(head_mass=0.565), commands), atol=1e-10)
 
 
-def test_a_payload_off_centre_adds_its_moment_of_inertia():
-    """Free head, pure moment: r' = M / (I + m d^2 (1 - m / (m + m_head))), no added mass."""
+@pytest.mark.parametrize("X, Y", [(0.0, 0.0), (0.3, 0.0), (0.0, 0.3)])
+def test_a_payload_off_centre_makes_one_rigid_body_with_the_head(X, Y):
+    """A free head of 0.465 kg, without added mass, pushed at its own centre of mass c and braked by its rotor:
+
+    a = F / m + r' (y_c, -x_c),   r' = (M + y_c X - x_c Y) / I,   (x_c, y_c): centre of both, seen from c
+    """
     light = dict.fromkeys(("link_mass", "fin_mass"), 1e-9)
     light |= dict.fromkeys(("link_added_mass_sway", "fin_added_mass_sway", "tail_stiffness"), 0.0)
     light |= {k: 0.0 for k in Robot().parameters if "_drag_" in k}
     light |= {"head_added_mass_surge": 0.0, "head_added_mass_sway": 0.0}
-    robot = Robot().with_parameters(**light)
+    robot = Robot().with_parameters(**light).with_effect("disturbance", surge=X, sway=Y, yaw=0.02)
     loaded = robot.with_effect("payload", mass=0.1, forward=0.03, left=0.04)
     stepper = Stepper(loaded.structure, compiled=False)
-    rates = np.array([0.0, -1000.0])  # rotor brakes: moment +0.1 N m on the head
+    rates = np.array([0.0, -800.0])  # the rotor brakes: with the 0.02 N m above a moment of 0.1 N m
     out = stepper.outputs(stepper.rest(), rates, stepper.parameters(loaded))
-    inertia = 2.4e-3 + 0.05**2 * 0.1 * 0.465 / 0.565
-    assert out["acceleration"][2] == pytest.approx(0.1 / inertia, rel=1e-4)
+    x_c, y_c = 0.1 / 0.565 * np.array([0.03, 0.04])
+    turn = (0.1 + y_c * X - x_c * Y) / (2.4e-3 + 0.05**2 * 0.1 * 0.465 / 0.565)
+    expected = (X / 0.565 + turn * y_c, Y / 0.565 - turn * x_c, turn)
+    np.testing.assert_allclose(out["acceleration"][:3], expected, rtol=1e-4)
 
 
 def test_rotor_imbalance_is_the_reaction_of_a_mass_on_a_circle():
     """-m d2/dt2 of the mass's place on a rotor that turns at phi(t) on a head that turns at rate r."""
-    m_e, r, t, h = 6e-5, 0.8, 0.3, 1e-4
+    m_e, at, r, t, h = 6e-5, 0.5, 0.8, 0.3, 1e-4  # at: where the mass is on the rotor
     phi = lambda t: 3.0 + 20.0 * t + 40.0 * t**2  # noqa: E731
-    place = lambda t: m_e * np.array([np.cos(phi(t) + r * t), np.sin(phi(t) + r * t)])  # noqa: E731
+    place = lambda t: m_e * np.array([np.cos(at + phi(t) + r * t), np.sin(at + phi(t) + r * t)])  # noqa: E731
     reaction = -(place(t + h) - 2 * place(t) + place(t - h)) / h**2
     cos, sin = np.cos(r * t), np.sin(r * t)
     expected = np.array([[cos, sin], [-sin, cos]]) @ reaction
     drive = Drive(0.0, 0.0, 20.0 + 80.0 * t, 80.0)
-    got = wrench("rotor_imbalance", head(w=r), {"angle": phi(t)}, drive, ahead=m_e, left=0.0)
+    mass = {"ahead": m_e * np.cos(at), "left": m_e * np.sin(at)}
+    got = wrench("rotor_imbalance", head(w=r), {"angle": phi(t)}, drive, **mass)
     np.testing.assert_allclose(got[:2], expected, rtol=1e-5, atol=1e-6)
 
 

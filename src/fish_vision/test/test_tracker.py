@@ -2,7 +2,7 @@
 
 import sys
 from dataclasses import replace
-from math import pi
+from math import cos, pi, sin
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +10,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pool_picture import CONFIG, SIZE, calibration, discs_of_fish, draw  # noqa: E402
+from pool_picture import CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw  # noqa: E402
 
-from fish_vision.annotate import annotated  # noqa: E402
+from fish_vision.annotate import annotated, tail_points  # noqa: E402
 from fish_vision.tracker import Detection, Lost, Reason, Tracker  # noqa: E402
 
 
@@ -125,11 +125,29 @@ def test_pictures_of_noise_give_reasons_not_errors(tracker: Tracker) -> None:
         assert isinstance(tracker.track(noise, 0.03 * k), Lost)
 
 
-def test_the_annotated_picture_shows_more_than_the_picture(tracker: Tracker) -> None:
-    picture = draw(discs_of_fish(0.3, 0.3, 2.0))
+def changed(drawn: np.ndarray, picture: np.ndarray, x: float, y: float) -> bool:
+    """Whether something was drawn within 2 pixels of a place in the pool, m."""
+    u, v = round(640.0 + SCALE * x), round(360.0 - SCALE * y)
+    part = np.s_[v - 2 : v + 3, u - 2 : u + 3]
+    return bool(np.any(drawn[part] != picture[part]))
+
+
+def test_the_annotated_picture_points_where_the_fish_looks_and_follows_its_tail(tracker: Tracker) -> None:
+    discs = discs_of_fish(0.3, 0.3, 2.0, (0.4, -0.2, 0.3))
+    picture = draw(discs)
     before = picture.copy()
-    for image in (picture, draw([])):
-        found = tracker.track(image, 0.0)
-        drawn = annotated(image, found, CONFIG, calibration())
-        assert drawn.shape == image.shape and np.any(drawn != image)
+    found = seen(tracker.track(picture, 0.0))
+    drawn = annotated(picture, found, CONFIG, calibration())
     np.testing.assert_array_equal(picture, before)
+    along = np.array([cos(2.0), sin(2.0)])
+    assert changed(drawn, picture, *(0.3 + 0.2 * along)) and not changed(drawn, picture, *(0.3 - 0.2 * along))
+    assert all(changed(drawn, picture, x, y) for x in (-1.5, 1.5) for y in (-1.065, 1.065))  # the walls
+    links = tail_points(found, CONFIG)[2:]  # after centre of mass and hinge
+    np.testing.assert_allclose(links, [disc[:2] for disc in discs[2:]], atol=2e-3)
+
+
+def test_the_annotated_picture_says_why_there_is_no_pose(tracker: Tracker) -> None:
+    picture = draw([])
+    drawn = annotated(picture, tracker.track(picture, 0.0), CONFIG, calibration())
+    text = drawn[:34].astype(int)
+    assert np.any(text[..., 2] - text[..., 1] > 150)  # in red
