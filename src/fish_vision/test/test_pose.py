@@ -60,8 +60,10 @@ def test_covariance_is_that_of_sampled_markers(layout: MarkerLayout) -> None:
 
 def test_the_pair_with_the_right_distance_is_picked() -> None:
     front, rear = seen((0.0, 0.0, 0.0), LAYOUT)
-    stray = spot(1.0, 1.0)
-    assert pick_head([stray, front], [rear, spot(1.0, 1.05)], LAYOUT.spacing, 0.15) == (front, rear)
+    stray, almost = spot(1.0, 1.0), spot(-0.036, 0.0)  # almost: 10 % too near to the front marker
+    assert pick_head([stray, front], [almost, rear, spot(1.0, 1.05)], LAYOUT.spacing, 0.15) == (front, rear)
+    assert pick_head([front], [almost], LAYOUT.spacing, 0.15) == (front, almost)
+    assert pick_head([front], [almost], LAYOUT.spacing, 0.09) is None
     assert pick_head([stray], [rear], LAYOUT.spacing, 0.15) is None
     assert pick_head([], [rear], LAYOUT.spacing, 0.15) is None
 
@@ -95,6 +97,14 @@ def test_a_chain_with_a_hole_has_no_angles() -> None:
     pose = (0.5, 0.1, 1.0)
     one, _, three = chain(pose, [0.1, 0.1, 0.1])
     assert tail_angles(HeadPose(*pose, np.eye(3)), [[one, three], [], [one, three]], LAYOUT, 0.008) is None
+
+
+@pytest.mark.parametrize("share", [1.0 - 0.009 / 0.0233, 1.0 + 0.009 / 0.0233])
+def test_a_marker_at_the_wrong_distance_is_no_link(share: float) -> None:
+    stray = [[spot(-0.075 - share * 0.0233, 0.0)]]
+    head = HeadPose(0.0, 0.0, 0.0, np.eye(3))
+    assert tail_angles(head, stray, LAYOUT, 0.008) is None
+    assert tail_angles(head, stray, LAYOUT, 0.010) == pytest.approx([0.0])
 
 
 def test_swapped_head_markers_are_seen_by_the_tail() -> None:

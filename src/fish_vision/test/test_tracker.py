@@ -82,6 +82,23 @@ def test_a_jump_is_refused_at_first_and_believed_when_it_lasts(tracker: Tracker)
     assert seen(tracker.track(far, 0.6)).head.x == pytest.approx(1.0, abs=5e-4)
 
 
+@pytest.mark.parametrize(
+    ("pose", "believed"),
+    [
+        ((0.16, 0.0, 3.0), True),
+        ((0.0, -0.2, 3.0), False),  # more than 1.5 m/s and 30 mm
+        ((0.0, 0.0, 3.0 + 1.6), True),  # across +-pi
+        ((0.0, 0.0, 3.0 - 2.0), False),  # more than 15 rad/s and 0.3 rad
+    ],
+)
+def test_a_fish_is_followed_as_fast_as_it_may_be_and_no_faster(
+    tracker: Tracker, pose: tuple[float, float, float], believed: bool
+) -> None:
+    seen(tracker.track(draw(discs_of_fish(0.0, 0.0, 3.0)), 5.0))
+    found = tracker.track(draw(discs_of_fish(*pose)), 5.1)
+    assert isinstance(found, Detection) if believed else reason(found) == Reason.JUMP
+
+
 def test_a_flip_is_a_jump(tracker: Tracker) -> None:
     seen(tracker.track(draw(discs_of_fish(0.0, 0.0, 0.0)), 0.0))
     assert reason(tracker.track(draw(discs_of_fish(0.0, 0.0, pi)), 0.03)) == Reason.JUMP
