@@ -92,10 +92,28 @@ def test_delay_has_fourteen_bits():
 
 def test_rebase_moves_the_base_forward():
     gyro = GYRO_PACKET[9:]
-    payload = struct.pack("<Bi", 0xFB, 200) + gyro + struct.pack("<Bi", 0xFA, 100) + gyro
+    payload = struct.pack("<Bi", 0xFB, 200) + gyro + struct.pack("<Bi", 0xFA, 50) + gyro
     first, second = parse_reports(payload, T, Drops())
     assert first.time_s == pytest.approx(T - 20e-3)
-    assert second.time_s == pytest.approx(T - 10e-3)
+    assert second.time_s == pytest.approx(T - 15e-3)
+
+
+def test_a_base_may_lie_after_the_read_or_be_too_long_ago_to_say():
+    for ticks, lead_s in ((-30, 3e-3), (0x7FFFFFFF, 0.0)):
+        [report] = parse_reports(struct.pack("<Bi", 0xFB, ticks) + GYRO_PACKET[9:], T, Drops())
+        assert report.time_s == pytest.approx(T + lead_s)
+
+
+def test_a_rebase_without_a_base_is_not_guessed():
+    drops = Drops()
+    assert parse_reports(struct.pack("<Bi", 0xFA, 50) + GYRO_PACKET[9:], T, drops) == []
+    assert drops.unknown_reports == 1
+
+
+def test_reports_without_numbers_are_stepped_over():
+    stability, raw_gyro = b"\x13" + bytes(5), b"\x15" + bytes(15)
+    payload = GYRO_PACKET[4:] + stability + raw_gyro + GYRO_PACKET[9:]
+    assert [r.values for r in parse_reports(payload, T, Drops())] == [(0.5, -0.25, 1.5)] * 2
 
 
 def test_lost_first_bit_as_seen_on_real_buses_is_dropped():
@@ -114,8 +132,10 @@ def test_unknown_report_ends_the_cargo_but_keeps_what_came_before():
 def test_truncation_at_every_byte_never_raises_and_never_invents():
     payload = GYRO_PACKET[4:] * 2
     for size in range(len(payload)):
-        reports = parse_reports(payload[:size], T, Drops())
+        drops = Drops()
+        reports = parse_reports(payload[:size], T, drops)
         assert len(reports) == size // len(GYRO_PACKET[4:])
+        assert drops.truncated_reports == (size not in (0, 5, 15, 20))  # ends of bases and reports
         assert all(r.values == (0.5, -0.25, 1.5) for r in reports)
 
 
@@ -147,6 +167,13 @@ def test_empty_and_continued_headers():
     assert shtp.parse_header(bytes(4)).empty
     header = shtp.parse_header(bytes.fromhex("13 80 03 07"))
     assert (header.length, header.channel, header.sequence, header.continuation) == (0x13, 3, 7, True)
+    assert not shtp.parse_header(bytes.fromhex("13 00 03 07")).continuation
+
+
+@pytest.mark.parametrize(("data", "length", "channel"), [("04 00 05 00", 4, 5), ("fe 7f 00 00", 32766, 0)])
+def test_the_shortest_and_the_longest_cargo_and_the_last_channel_are_accepted(data, length, channel):
+    header = shtp.parse_header(bytes.fromhex(data))
+    assert (header.length, header.channel) == (length, channel)
 
 
 def test_fragments_are_joined():
@@ -164,6 +191,14 @@ def test_fragment_without_beginning_and_beginning_without_end():
     assert joined.feed(shtp.Header(14, 0, 2, False), b"abc") is None
     assert joined.feed(shtp.Header(6, 0, 3, False), b"xy").payload == b"xy"
     assert joined.orphans == 2
+
+
+def test_after_a_reset_nothing_is_missed():
+    joined = shtp.Reassembler()
+    joined.feed(shtp.Header(14, 3, 7, False), b"abc")
+    joined.reset()
+    assert joined.feed(shtp.Header(6, 3, 0, False), b"xy").payload == b"xy"
+    assert (joined.orphans, joined.sequence_gaps) == (0, 0)
 
 
 def test_sequence_gap_is_counted_per_channel():

@@ -97,10 +97,11 @@ def test_jpeg_without_a_size_is_dropped(bench):
 
 def test_status_follows_the_rate(bench):
     camera, source, clock = bench
-    source.frames = [Frame(clock.now, image=picture()) for _ in range(60)]
-    for _ in range(30):
+    source.frames = [Frame(clock.now, image=picture()) for _ in range(90)]
+    for _ in range(60):
         camera.step()
-    assert camera.status().level == OK
+    status = camera.status()
+    assert (status.level, status.values["rate [Hz]"], status.values["frames"]) == (OK, 30.0, 60)
     for _ in range(5):
         camera.step()
     clock.sleep(1.0)
@@ -120,13 +121,16 @@ def test_camera_that_stops_is_opened_again(bench):
     camera, source, clock = bench
     events = [e for _ in range(40) for e in camera.step().events]
     assert events == ["camera emulator: no frames for 1.0 s"]
-    assert source.closed and camera.status().level == ERROR
+    assert source.closed and not camera.connected and camera.status().level == ERROR
+    assert camera.missed == 31
     assert isinstance(events[0], Loss)
+    camera.close()  # of nothing
     clock.sleep(1.0)
     camera.step()  # opens it
     source.frames = [Frame(clock.now, image=picture())]
     cycle = camera.step()
     assert cycle.picture is not None and cycle.events == ["camera connected again"]
+    assert camera.connected
 
 
 def test_camera_that_opens_but_sends_nothing_is_lost_once(bench):
@@ -200,6 +204,80 @@ def test_a_device_is_configured_through_the_real_opencv(video, monkeypatch, chos
     assert opened == [("/dev/video0", cv2.CAP_V4L2, "1")]  # s that a silent camera may block, not 10
 
 
+class Device:
+    """A V4L2 camera as OpenCV shows it: keeps what is set, shows one picture."""
+
+    def __init__(self, frame: np.ndarray) -> None:
+        self.frame = frame
+        self.values: dict[int, float] = {}
+
+    def isOpened(self) -> bool:  # noqa: N802 (OpenCV's name)
+        return True
+
+    def set(self, key: int, value: float) -> None:
+        self.values[key] = value
+
+    def get(self, key: int) -> float:
+        return self.values.get(key, 0.0)
+
+    def grab(self) -> bool:
+        return True
+
+    def retrieve(self) -> tuple[bool, np.ndarray]:
+        return True, self.frame
+
+
+def opened(monkeypatch, device: Device, **chosen) -> VideoCapture:
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
+    return VideoCapture(CameraSettings(device="/dev/video0", **chosen), clock=lambda: 50.0)
+
+
+FORMAT = {
+    cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*"MJPG"),
+    cv2.CAP_PROP_FRAME_WIDTH: 640,
+    cv2.CAP_PROP_FRAME_HEIGHT: 480,
+    cv2.CAP_PROP_FPS: 60.0,
+    cv2.CAP_PROP_BUFFERSIZE: 1,
+    cv2.CAP_PROP_CONVERT_RGB: 0,
+}
+AUTOMATIC = {cv2.CAP_PROP_AUTO_EXPOSURE: 3, cv2.CAP_PROP_AUTOFOCUS: 1, cv2.CAP_PROP_AUTO_WB: 1}
+BY_HAND = {  # automatic exposure is 3 in V4L2, exposure by hand 1
+    cv2.CAP_PROP_AUTO_EXPOSURE: 1, cv2.CAP_PROP_EXPOSURE: 100,
+    cv2.CAP_PROP_AUTOFOCUS: 0, cv2.CAP_PROP_FOCUS: 0,
+    cv2.CAP_PROP_AUTO_WB: 0, cv2.CAP_PROP_WB_TEMPERATURE: 4000,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("chosen", "expected"),
+    [({}, AUTOMATIC), ({"exposure": 100, "focus": 0, "white_balance_k": 4000}, BY_HAND)],
+    ids=["automatic", "by hand"],
+)
+def test_a_device_gets_format_size_and_what_was_chosen(monkeypatch, chosen, expected):
+    device = Device(picture())
+    opened(monkeypatch, device, width=640, height=480, rate_hz=60.0, **chosen)
+    assert device.values == FORMAT | expected
+    # the format decides on the sizes, an automatic mode on whether a value is taken
+    assert [key for key in device.values if key in FORMAT | expected] == [*FORMAT, *expected]
+
+
+@pytest.mark.parametrize(
+    ("stamp_s", "time_s"), [(49.98, 49.98), (49.0, 50.0), (50.1, 50.0), (0.0, 50.0)], ids=str
+)
+def test_a_frame_has_the_drivers_stamp_if_it_is_believable(monkeypatch, stamp_s, time_s):
+    device = Device(picture())
+    capture = opened(monkeypatch, device)
+    device.values[cv2.CAP_PROP_POS_MSEC] = 1000 * stamp_s
+    frame = capture.read()
+    assert frame.time_s == pytest.approx(time_s) and frame.image is device.frame
+
+
+def test_the_jpeg_of_a_device_is_not_decoded(monkeypatch):
+    jpeg = encode_jpeg(picture(), 90)
+    frame = opened(monkeypatch, Device(np.frombuffer(jpeg, np.uint8)[None])).read()
+    assert frame.jpeg == jpeg and frame.image is None
+
+
 def test_absent_camera_names_it_and_the_others():
     with pytest.raises(
         PortUnavailable, match="cannot open camera /dev/video77: there is no such device or file"
@@ -235,6 +313,8 @@ def test_camera_jpeg_is_trimmed_and_checked():
 @pytest.mark.parametrize("size", [(64, 48), (1280, 720), (17, 33)])
 def test_jpeg_size(size):
     assert jpeg_size(encode_jpeg(picture(*size), 90)) == size
+    progressive = cv2.imencode(".jpg", picture(*size), [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1]
+    assert jpeg_size(progressive.tobytes()) == size
 
 
 def test_jpeg_size_of_damaged_data():
