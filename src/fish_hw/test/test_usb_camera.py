@@ -278,6 +278,14 @@ def test_the_jpeg_of_a_device_is_not_decoded(monkeypatch):
     assert frame.jpeg == jpeg and frame.image is None
 
 
+def test_a_damaged_frame_of_a_device_is_none(monkeypatch):
+    device = Device(picture())
+    capture = opened(monkeypatch, device)
+    for damaged in (lambda: (False, device.frame), lambda: (True, None), lambda: cv2.cvtColor(None, 0)):
+        device.retrieve = damaged
+        assert capture.read() is None
+
+
 def test_absent_camera_names_it_and_the_others():
     with pytest.raises(
         PortUnavailable, match="cannot open camera /dev/video77: there is no such device or file"

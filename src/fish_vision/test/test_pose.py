@@ -1,4 +1,4 @@
-"""Markers to pose: exact recovery, covariance against sampling, identities."""
+"""Markers to pose: exact recovery, covariance against finite differences, identities."""
 
 from math import cos, pi, sin
 
@@ -40,22 +40,25 @@ def test_pose_is_recovered(layout: MarkerLayout, heading: float) -> None:
 
 
 @pytest.mark.parametrize("layout", [LAYOUT, ODD])
-def test_covariance_is_that_of_sampled_markers(layout: MarkerLayout) -> None:
-    random = np.random.default_rng(7)
+def test_covariance_is_that_of_the_markers_carried_through_the_pose(layout: MarkerLayout) -> None:
+    """J S J^T with J from central differences of the pose."""
     front, rear = seen((0.3, -0.8, 0.7), layout)
     a, b = np.array([[2.0, 0.5], [0.5, 1.0]]) * 1e-7, np.array([[1.0, -0.3], [-0.3, 3.0]]) * 1e-7
-    samples = [
-        head_pose(Spot(p, a), Spot(q, b), layout)
-        for p, q in zip(
-            random.multivariate_normal(front.position, a, 4000),
-            random.multivariate_normal(rear.position, b, 4000),
-            strict=True,
-        )
-    ]
-    measured = np.cov(np.array([[s.x, s.y, s.heading] for s in samples]).T)
+
+    def pose(shift: np.ndarray) -> np.ndarray:
+        head = head_pose(Spot(front.position + shift[:2], a), Spot(rear.position + shift[2:], b), layout)
+        return np.array([head.x, head.y, head.heading])
+
+    h = 1e-6
+    J = np.column_stack([(pose(h * axis) - pose(-h * axis)) / (2 * h) for axis in np.eye(4)])
+    S = np.block([[a, np.zeros((2, 2))], [np.zeros((2, 2)), b]])
     stated = head_pose(Spot(front.position, a), Spot(rear.position, b), layout).covariance
-    scale = np.sqrt(np.outer(np.diag(stated), np.diag(stated)))
-    np.testing.assert_allclose(measured / scale, stated / scale, atol=0.08)
+    np.testing.assert_allclose(stated, J @ S @ J.T, rtol=1e-6)
+
+
+def test_spacing_is_the_distance_of_the_markers_however_they_sit() -> None:
+    front, rear = seen((0.3, -0.8, 0.7), ODD)
+    assert ODD.spacing == pytest.approx(float(np.linalg.norm(front.position - rear.position)))
 
 
 def test_the_pair_with_the_right_distance_is_picked() -> None:
