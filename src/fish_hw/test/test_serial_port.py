@@ -3,6 +3,7 @@
 import os
 import pty
 import sys
+import termios
 import tty
 
 import pytest
@@ -32,6 +33,15 @@ def test_bytes_both_ways(terminal):
     os.write(master, b"\x03\x13\x11\xff")
     assert port.read(1.0) == b"\x03\x13\x11\xff"
     assert port.read(0.0) == b""
+    port.close()
+
+
+def test_port_has_the_speed_that_was_asked_for(terminal):
+    master, name = terminal
+    port = SerialPort(name, 57600)
+    _, _, cflag, _, read_speed, write_speed, _ = termios.tcgetattr(master)
+    assert (read_speed, write_speed) == (termios.B57600, termios.B57600)
+    assert cflag & (termios.CSIZE | termios.PARENB | termios.CSTOPB) == termios.CS8  # 8N1
     port.close()
 
 

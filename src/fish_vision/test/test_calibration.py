@@ -17,6 +17,7 @@ from fish_vision.calibration import (
 )
 
 WIDE = (-0.26, 0.07, 0.0008, -0.0005, 0.0)
+RATIONAL = (0.31, -0.12, 0.0006, -0.0004, 0.02, 0.55, 0.03, -0.01)  # k1 k2 p1 p2 k3 k4 k5 k6
 MOUNT = Mount((0.05, -0.08, 3.2), (-0.022, 0.018, 0.010))
 FILE = Path(__file__).parents[1] / "config" / "simulated_camera.yaml"
 
@@ -49,6 +50,29 @@ def test_undistort_inverts_the_plumb_bob_formula_at_the_image_edge() -> None:
     np.testing.assert_allclose(undistort(pixels, lens()), np.column_stack([x, y]), atol=1e-8)
 
 
+def rational_lens() -> Lens:
+    return Lens.from_camera_info(
+        1280, 720, "rational_polynomial", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], RATIONAL
+    )
+
+
+def test_undistort_inverts_the_rational_formula_too() -> None:
+    k1, k2, p1, p2, k3, k4, k5, k6 = RATIONAL
+    u, v = np.meshgrid(np.linspace(-0.6, 0.6, 7), np.linspace(-0.35, 0.35, 5))
+    x, y = u.ravel(), v.ravel()
+    r2 = x * x + y * y
+    radial = (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
+    x_d = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    y_d = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    pixels = np.column_stack([634 + 1000 * x_d, 366 + 1000 * y_d])
+    np.testing.assert_allclose(undistort(pixels, rational_lens()), np.column_stack([x, y]), atol=1e-8)
+
+
+def test_a_lens_without_distortion_needs_no_model() -> None:
+    bare = Lens.from_camera_info(1280, 720, "", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [])
+    np.testing.assert_allclose(undistort(np.array([[734.0, 566.0]]), bare), [[0.1, 0.2]], atol=1e-12)
+
+
 @pytest.mark.parametrize("height", [0.0, 0.05])
 def test_pixels_and_pool_are_inverse_over_the_whole_pool(height: float) -> None:
     calibration = Calibration(lens(), MOUNT, height)
@@ -67,11 +91,12 @@ def test_homography_is_the_whole_map_of_a_lens_without_distortion() -> None:
 
 def test_scale_is_the_derivative_of_the_place() -> None:
     calibration = Calibration(lens(), MOUNT)
-    pixel, h = np.array([200.0, 600.0]), 1e-3
-    _, J = calibration.place_and_scale([pixel])
+    pixels, h = np.array([[200.0, 600.0], [900.0, 80.0], [640.0, 360.0]]), 1e-3
+    places, J = calibration.place_and_scale(pixels)
+    np.testing.assert_allclose(places, calibration.pixel_to_pool(pixels))
     for i, step in enumerate(np.eye(2) * h):
-        ends = calibration.pixel_to_pool([pixel + step, pixel - step])
-        np.testing.assert_allclose(J[0][:, i], (ends[0] - ends[1]) / (2 * h), rtol=1e-4, atol=1e-8)
+        change = calibration.pixel_to_pool(pixels + step) - calibration.pixel_to_pool(pixels - step)
+        np.testing.assert_allclose(J[:, :, i], change / (2 * h), rtol=1e-4, atol=1e-8)
 
 
 def test_no_points_give_no_points() -> None:
@@ -82,6 +107,9 @@ def test_no_points_give_no_points() -> None:
     ("fields", "message"),
     [
         ((0, 720, "plumb_bob", [1.0] * 9, []), "0 x 720"),
+        ((1280, 0, "plumb_bob", [1.0] * 9, []), "1280 x 0"),
+        ((1280, 720, "plumb_bob", [1e3, 0.0, 640.0, 0.0, 0.0, 360.0, 0.0, 0.0, 1.0], []), "1000.0, 0.0"),
+        ((1280, 720, "plumb_bob", [0.0, 0.0, 640.0, 0.0, 1e3, 360.0, 0.0, 0.0, 1.0], []), "0.0, 1000.0"),
         ((1280, 720, "plumb_bob", [0.0] * 9, [0.0] * 5), "not calibrated"),
         ((1280, 720, "plumb_bob", [float("nan")] * 9, []), "not finite"),
         ((1280, 720, "plumb_bob", [1e-300] * 9, []), "not calibrated"),
@@ -96,7 +124,12 @@ def test_unusable_camera_info_is_refused_with_the_reason(fields: tuple, message:
 
 
 @pytest.mark.parametrize(
-    "mount", [Mount((9.0, 0.0, 3.0), (0.0,) * 3), Mount((0.0, 0.0, 3.0), (3.1, 0.0, 0.0))]
+    "mount",
+    [
+        *(Mount((x, y, 3.0), (0.0,) * 3) for x, y in ((9.0, 0.0), (-9.0, 0.0), (0.0, 9.0), (0.0, -9.0))),
+        Mount((0.0, 0.0, 3.0), (3.1, 0.0, 0.0)),
+        Mount((0.0, 0.0, -3.0), (0.0, 0.0, 0.0)),
+    ],
 )
 def test_a_mount_that_does_not_see_the_pool_is_refused(mount: Mount) -> None:
     with pytest.raises(CalibrationError, match="camera_position"):
@@ -123,9 +156,20 @@ def test_a_lens_file_is_read_back(tmp_path: Path) -> None:
     path = tmp_path / "camera.yaml"
     path.write_text(yaml.safe_dump(lens_document(lens(), "overhead")))
     again = read_lens(path)
+    assert again.size == (1280, 720)
     np.testing.assert_array_equal(again.K, lens().K)
     np.testing.assert_array_equal(again.D, lens().D)
+    path.write_text(yaml.safe_dump(lens_document(rational_lens(), "overhead")))
+    np.testing.assert_array_equal(read_lens(path).D, RATIONAL)
     np.testing.assert_array_equal(read_lens(FILE).K, lens().K)
+
+
+def test_a_lens_file_has_what_the_camera_driver_publishes() -> None:
+    """Undistorted pictures keep the lens's own pixels: nothing is turned or scaled."""
+    document = lens_document(lens(), "overhead")
+    assert document["distortion_model"] == "plumb_bob"
+    assert document["rectification_matrix"]["data"] == [1, 0, 0, 0, 1, 0, 0, 0, 1]
+    assert document["projection_matrix"]["data"] == [1000, 0, 634, 0, 0, 1000, 366, 0, 0, 0, 1, 0]
 
 
 @pytest.mark.parametrize("text", [None, "", "a: [", "image_width: 3", "[]", "image_width: x"])
