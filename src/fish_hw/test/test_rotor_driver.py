@@ -5,6 +5,7 @@ import time
 from dataclasses import replace
 
 import pytest
+from waiting import wait_until
 
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.errors import DeviceError
@@ -115,6 +116,15 @@ def test_module_that_drives_on_its_own_is_told_to_coast(bench):
     bench.emulator.mode, bench.emulator.commanded = VELOCITY_MODE, 50.0
     assert bench.run(15.0, until=lambda: any("drove although" in e for e in bench.events))
     assert bench.run(15.0, until=lambda: bench.emulator.mode == reg.COAST)
+
+
+def test_module_that_does_not_say_its_mode_is_not_accused(vertiq_emulator):
+    vertiq_emulator.mangle = lambda reply: b"" if reply[2:4] == bytes([52, 0]) else reply
+    bench = Bench(vertiq_emulator, replace(SETTINGS, reply_timeout_s=0.05))
+    bench.connect()
+    assert bench.run(15.0, until=lambda: len(bench.telemetry) >= 2)
+    assert bench.driver.guard.phase is Phase.RESTING and not any("drove" in e for e in bench.events)
+    bench.driver.close()
 
 
 def test_restarted_module_is_set_up_again_before_it_moves(bench):
@@ -234,10 +244,8 @@ def test_close_coasts(bench):
     bench.run(0.3, steady)
     assert bench.emulator.mode == VELOCITY_MODE
     bench.driver.close()
-    deadline = time.monotonic() + 2.0
-    while bench.emulator.mode != reg.COAST and time.monotonic() < deadline:
-        time.sleep(0.002)
-    assert bench.emulator.mode == reg.COAST and bench.emulator.timeouts == 0
+    assert wait_until(lambda: bench.emulator.mode == reg.COAST)
+    assert bench.emulator.timeouts == 0
 
 
 def test_port_that_is_absent(vertiq_emulator):
