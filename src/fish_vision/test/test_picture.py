@@ -31,7 +31,17 @@ def test_yuyv_grey_is_grey() -> None:
     assert picture.shape == (24, 32, 3) and np.ptp(picture) <= 1
 
 
-def test_yuyv_of_odd_width_is_refused() -> None:
+def test_yuyv_keeps_its_colours() -> None:
+    """Studio-range BT.601, bytes Y U Y V: swapped U and V would make red blue."""
+    red, blue = bytes([82, 90, 82, 240]), bytes([41, 240, 41, 110])
+    picture = from_raw(red * 16 + blue * 16, "yuv422_yuy2", 64, 1, 128, (64, 1)).astype(int)
+    assert np.abs(picture[0, :32] - (0, 0, 255)).max() < 8
+    assert np.abs(picture[0, 32:] - (255, 0, 0)).max() < 8
+
+
+def test_odd_width_is_refused_only_where_two_pixels_share_a_colour() -> None:
+    odd = PICTURE[:, :31]
+    np.testing.assert_array_equal(from_raw(odd.tobytes(), "bgr8", 31, 24, 93, (31, 24)), odd)
     with pytest.raises(PictureError, match="width 17: expected an even one"):
         from_raw(bytes(34 * 4), "yuv422_yuy2", 17, 4, 34, (17, 4))
 
@@ -48,6 +58,14 @@ def test_yuyv_of_odd_width_is_refused() -> None:
 def test_broken_jpeg_is_refused_with_the_reason(data: bytes, message: str) -> None:
     with pytest.raises(PictureError, match=message):
         from_compressed(data, SIZE)
+
+
+def test_a_padded_jpeg_is_taken_and_an_early_end_marker_hides_no_cut() -> None:
+    data = to_jpeg(PICTURE)
+    np.testing.assert_array_equal(from_compressed(data + bytes(60), SIZE), from_compressed(data, SIZE))
+    with_thumbnail = data[:100] + b"\xff\xd9" + data[100:300]
+    with pytest.raises(PictureError, match="cut off after 302 bytes"):
+        from_compressed(with_thumbnail, SIZE)
 
 
 def test_a_picture_of_another_size_is_refused() -> None:
