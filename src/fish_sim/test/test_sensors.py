@@ -132,6 +132,18 @@ def test_battery_sags_under_load_and_runs_down():
     assert loaded < battery.measure() < idle
 
 
+@pytest.mark.parametrize("power", [12.4, -12.4])
+def test_battery_voltage_follows_the_load_in_a_second_and_braking_costs_as_much(power):
+    battery = Battery(SensorSettings(battery_noise=0.0), random())
+    idle = battery.measure()
+    for _ in range(100):
+        battery.draw(power, 0.01)
+    # of 2 A through 0.08 ohm; the charge taken meanwhile lowers it by 1 mV more
+    assert idle - battery.measure() == pytest.approx(2 * 0.08 * (1 - math.exp(-1.0)), abs=4e-3)
+    battery.draw(power, 1e6)
+    assert battery.measure() == 0.0
+
+
 def test_the_same_seed_gives_the_same_film():
     assert film(SensorSettings(), 2.0) == film(SensorSettings(), 2.0)
 

@@ -73,6 +73,21 @@ def test_box_is_cut_at_the_image() -> None:
     assert left >= right or top >= bottom
 
 
+@pytest.mark.parametrize(
+    ("colour", "expected"),
+    [
+        (YELLOW, range(12, 45)),
+        (RED, [*range(164, 180), *range(21)]),
+        (ColourRange(2, 10, 0, 0), [*range(19), *range(174, 180)]),
+    ],
+)
+def test_hues_at_the_edge_of_a_blob_may_leave_the_range_by_a_little(
+    colour: ColourRange, expected: list[int]
+) -> None:
+    near = colour.near(np.arange(180, dtype=np.uint8))
+    assert set(np.flatnonzero(near)) == set(expected)  # 8 half degrees either side, round the circle
+
+
 def test_mask_agrees_with_a_slow_comparison() -> None:
     hsv = cv2.cvtColor(
         np.random.default_rng(4).integers(0, 256, (30, 30, 3)).astype(np.uint8), cv2.COLOR_BGR2HSV
