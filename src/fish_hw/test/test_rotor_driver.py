@@ -1,6 +1,7 @@
 """The whole rotor driver on a real port with the emulated module behind it, in real time."""
 
 import math
+import struct
 import time
 from dataclasses import replace
 
@@ -82,6 +83,29 @@ def test_measured_angle_is_the_integral_of_measured_speed(bench):
     bench.run(0.8, steady)
     first, last = bench.samples[len(bench.samples) // 2], bench.samples[-1]
     assert last.angle - first.angle == pytest.approx(60.0 * (last.time_s - first.time_s), rel=0.05)
+
+
+def test_a_mirrored_module_turns_the_other_way_until_it_stands():
+    emulator = VertiqEmulator(module=3)
+    bench = Bench(emulator, replace(SETTINGS, module_id=3, sign=-1, ramp_s=0.1))
+    try:
+        bench.connect()
+        assert bench.run(15.0, steady, until=lambda: emulator.commanded == -60.0)
+        assert bench.run(
+            15.0, steady, until=lambda: bench.samples[-1].velocity == pytest.approx(60.0, abs=1.0)
+        )
+        orders = len(emulator.log)
+        assert bench.run(15.0, until=lambda: bench.driver.guard.phase is Phase.COASTING)
+        assert wait_until(lambda: emulator.mode == reg.COAST)
+        ordered = [
+            struct.unpack("<f", m.data)[0]
+            for m in emulator.log[orders:]
+            if m.param == reg.CTRL_VELOCITY.param
+        ]
+        assert ordered and max(ordered) < 0.0  # also on the ramp down
+    finally:
+        bench.driver.close()
+        emulator.close()
 
 
 def test_stale_command_coasts_without_polling(bench):

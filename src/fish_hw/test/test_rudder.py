@@ -11,9 +11,11 @@ import pytest
 from fake_kernel import refuse_as_sysfs_does
 from waiting import wait_until
 
+from fish_hw.devices import rudder_output
 from fish_hw.devices.pca9685 import Pca9685Pwm, prescale
 from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.rudder_driver import RudderDriver
+from fish_hw.devices.rudder_output import open_output
 from fish_hw.devices.rudder_servo import RudderServo
 from fish_hw.devices.status import ERROR, OK, WARN
 from fish_hw.emulators.i2c_bus import I2cBusEmulator
@@ -242,6 +244,26 @@ def test_sysfs_files_that_never_become_writable(tmp_path):
 def test_sysfs_absent_chip_lists_the_others(chip, tmp_path):
     with pytest.raises(PortUnavailable, match=f"no such chip.*available: {chip.chip}"):
         SysfsPwm(str(tmp_path / "pwmchip4"), 0, 20_000_000)
+
+
+def test_the_output_of_the_settings_on_sysfs(tmp_path):
+    chip = PwmChipEmulator(tmp_path / "pwmchip0", channel=1)
+    open_output(RudderSettings(chip=str(chip.chip), channel=1, pwm_hz=100.0)).start(1_500_000)
+    assert (chip.read("period"), chip.read("duty_cycle")) == (10_000_000, 1_500_000)
+
+
+def test_the_output_of_the_settings_on_a_board(monkeypatch):
+    board, opened = Pca9685Emulator(), []
+    bus = I2cBusEmulator({0x41: board})
+    monkeypatch.setattr(rudder_output, "KernelI2c", lambda path: opened.append(path) or bus)
+    settings = RudderSettings(
+        backend="pca9685", bus="/dev/i2c-7", address=0x41, channel=5, pca_clock_hz=26e6, pwm_hz=100.0
+    )
+    open_output(settings).start(1_500_000)
+    assert opened == ["/dev/i2c-7"]
+    tick_s = (board.registers[0xFE] + 1) / 26e6
+    assert 4096 * tick_s == pytest.approx(1 / 100.0, rel=0.01)
+    assert board.pulse_counts(5)[1] * tick_s == pytest.approx(1.5e-3, rel=0.01)
 
 
 class DriverBench:

@@ -11,7 +11,7 @@ from fish_hw.commands.safe_stop import main
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
-from fish_hw.emulators.vertiq import VELOCITY_MODE
+from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
 from fish_hw.settings.parameter_file import read_parameter_file
 from fish_hw.settings.rudder import RudderSettings
 
@@ -32,6 +32,18 @@ def test_both_are_stopped(tmp_path, vertiq_emulator):
     assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
     assert vertiq_emulator.timeouts == 0
     assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
+
+
+def test_the_module_of_the_file_is_stopped(tmp_path):
+    emulator = VertiqEmulator(module=5)
+    emulator.mode, emulator.commanded = VELOCITY_MODE, 50.0
+    try:
+        rotor = parameter_file(tmp_path / "rotor.yaml", port=emulator.port, module_id=5)
+        assert main(["--rotor", str(rotor)]) == 0
+        assert wait_until(lambda: emulator.mode == reg.COAST)
+        assert emulator.timeouts == 0
+    finally:
+        emulator.close()
 
 
 def test_rudder_is_centred_though_the_rotor_is_gone(tmp_path, capsys):

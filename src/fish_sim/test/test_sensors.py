@@ -101,15 +101,28 @@ def test_imu_has_white_noise_and_constant_bias():
     np.testing.assert_allclose(gyro.std(0), 0.006, rtol=0.1)
     np.testing.assert_allclose(force.mean(0), [0.5, -0.2, 9.81], atol=5e-3)
     np.testing.assert_allclose(force.std(0), 0.05, rtol=0.1)
-    yaw = np.array([s.yaw for s in samples])
-    assert abs(np.diff(yaw)).max() < 0.03 and np.ptp(yaw) < 0.2  # 40 s of drift
+
+
+def test_yaw_turns_with_the_head_and_drifts_as_a_random_walk():
+    imu = Imu(SensorSettings(orientation_noise=0.0, orientation_drift=0.001), random())
+    yaw = np.array([imu.measure((0.0, 0.0), 0.0, 0.05 * k, 0.25).yaw for k in range(4000)])
+    steps = np.diff(yaw) - 0.05
+    assert steps.std() == pytest.approx(0.001 * 0.5, rel=0.05) and abs(steps.mean()) < 5e-5  # sqrt(0.25 s)
+    still = Imu(SensorSettings(orientation_noise=0.003, orientation_drift=0.0), random())
+    yaw = np.array([still.measure((0.0, 0.0), 0.0, 0.0, 0.01).yaw for _ in range(4000)])
+    assert yaw.std() == pytest.approx(0.003, rel=0.05)
 
 
 def test_yaw_starts_at_an_unknown_angle_and_biases_differ_between_robots():
-    first = [
-        Imu(SensorSettings(), np.random.default_rng(seed)).measure((0, 0), 0, 0, 0.01) for seed in (1, 2)
-    ]
-    assert abs(first[0].yaw - first[1].yaw) > 0.1
+    robots = [Imu(SensorSettings(), np.random.default_rng(seed)) for seed in range(400)]
+    yaw = np.array([imu.measure((0.0, 0.0), 0.0, 0.0, 0.01).yaw for imu in robots])
+    assert np.histogram(yaw, bins=4, range=(-math.pi, math.pi))[0].min() > 60  # a quarter of 400 each
+    for biases, std in (
+        ([i.gyro_bias for i in robots], 0.01),
+        ([i.accelerometer_bias for i in robots], 0.05),
+    ):
+        np.testing.assert_allclose(np.std(biases, axis=0), std, rtol=0.15)
+        np.testing.assert_allclose(np.mean(biases, axis=0), 0.0, atol=0.2 * std)
 
 
 def test_encoder_noise_has_its_stated_size():
