@@ -46,6 +46,11 @@ def test_a_long_lag_is_given_up_and_counted():
     assert MAX_LAG < 3.0
 
 
+def test_what_is_given_up_is_counted_in_real_time():
+    counts, pacer = run(3.0, [0.01, 1.01, 1.02])
+    assert counts == [3, 0, 3] and pacer.lost == pytest.approx(1.0)
+
+
 def test_after_a_long_lag_simulated_time_goes_on_from_now():
     pacer = Pacer(1.0, 0.01, 100.0)
     assert pacer.due(103.0) == 0 and pacer.due(103.009) == 0 and pacer.due(103.0101) == 1

@@ -72,10 +72,11 @@ def test_camera_frames_jitter_are_lost_arrive_late_and_are_noisy():
     assert single.mean() == pytest.approx(1 / 30, rel=1e-3) and single.std() == pytest.approx(0.0008, rel=0.1)
     assert (gaps > 0.05).mean() == pytest.approx(0.01, abs=0.004)
     assert all(s.arrival == pytest.approx(s.stamp + settings.camera_latency) for s in samples)
-    x = np.array([s.x for s in samples]) - 0.2 * stamps
-    heading = np.array([s.heading for s in samples]) - 0.5 * stamps
-    assert x.std() == pytest.approx(0.002, rel=0.1) and abs(x.mean()) < 2e-4
-    assert heading.std() == pytest.approx(0.012, rel=0.1) and abs(heading.mean()) < 1e-3
+    truth = np.column_stack([0.2 * stamps, np.full(len(stamps), -0.3), 0.5 * stamps])
+    noise = np.array([(s.x, s.y, s.heading) for s in samples]) - truth
+    np.testing.assert_allclose(noise.std(axis=0), (0.002, 0.002, 0.012), rtol=0.1)
+    assert (abs(noise.mean(axis=0)) < (2e-4, 2e-4, 1e-3)).all()
+    assert abs(np.corrcoef(noise.T) - np.eye(3)).max() < 0.06  # three errors, not one
 
 
 def test_camera_samples_are_handed_out_only_after_they_arrived():
