@@ -103,6 +103,16 @@ def test_a_batch_equals_its_elements(name, strokes):
         np.testing.assert_allclose(batch[:, i], swim({name: typical(name)}, commands, pose), atol=1e-12)
 
 
+@pytest.mark.parametrize("name", EFFECTS)
+def test_wrenches_act_on_the_head_and_only_those_of_the_walls_on_the_tail_too(name):
+    effect, p = EFFECTS[name], SimpleNamespace(**typical(name))
+    z = SimpleNamespace(**dict.fromkeys(effect.states, 0.3))
+    for body in ("link_1", "fin"):
+        motion = BodyMotion(body, 0.3, 0.85, 0.8, 0.6, 0.2, -0.1, 0.5, 0.2, 1.5, 3e-3)
+        force = effect.wrench(p, motion, z, Drive(0.1, 0.2, 50.0, -300.0), NUMPY) or (0.0, 0.0, 0.0)
+        assert any(force) == (name == "wall_effect")
+
+
 @pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.dissipative])
 def test_dissipative_effects_never_give_energy_to_the_fish(name):
     random = np.random.default_rng(0)
