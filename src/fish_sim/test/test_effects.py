@@ -66,6 +66,13 @@ def test_quadratic_drag_stops_a_gliding_head_like_the_closed_form():
     np.testing.assert_allclose(u, 0.4 / (1 + 0.6 * 0.4 * 0.01 * np.arange(101) / mass), rtol=1e-9)
 
 
+def test_quadratic_drag_opposes_every_motion_with_its_square():
+    got = wrench("quadratic_drag", head(u=0.3, v=-0.2, w=2.0), surge=0.6, sway=4.0, yaw=1.2e-3)
+    np.testing.assert_allclose(got, (-0.6 * 0.09, 4.0 * 0.04, -1.2e-3 * 4.0))
+    back = wrench("quadratic_drag", head(u=-0.3, v=0.2, w=-2.0), surge=0.6, sway=4.0, yaw=1.2e-3)
+    np.testing.assert_allclose(back, -got)
+
+
 def test_wall_effect_is_drag_times_1_plus_k_exp_of_distance():
     d = 0.3
     body = head(x=pool.LENGTH / 2 - d, u=0.2, v=-0.1, w=0.5)
@@ -86,6 +93,8 @@ def test_dry_friction_has_one_size_in_every_direction():
             [0.0, 0.0, -1e-3 * np.sign(w)]
         )
     assert not wrench("dry_friction", head()).any()
+    slow = wrench("dry_friction", head(u=0.003, v=-0.004, w=0.05), force=0.02, moment=0.001)
+    np.testing.assert_allclose(slow, np.tanh(1.0) * np.array([-0.012, 0.016, -0.001]), rtol=1e-5)
 
 
 def test_wave_drag_is_largest_at_the_hump_and_brakes_both_ways():
@@ -93,12 +102,18 @@ def test_wave_drag_is_largest_at_the_hump_and_brakes_both_ways():
     force = np.array([wrench("wave_drag", head(u=u), speed=0.22)[0] for u in speeds])
     assert speeds[force.argmin()] == pytest.approx(0.22, abs=0.003)
     assert wrench("wave_drag", head(u=-0.22), speed=0.22)[0] == pytest.approx(-force.min(), rel=1e-4)
+    hump = {"amplitude": 0.02, "speed": 0.22, "width": 0.04}
+    for u, share in ((0.22, 1.0), (0.26, np.exp(-0.5)), (0.14, np.exp(-2.0))):
+        assert wrench("wave_drag", head(u=u), **hump) == pytest.approx([-0.02 * share, 0.0, 0.0], rel=1e-6)
+    slow = wrench("wave_drag", head(u=0.01), amplitude=0.02, speed=0.02, width=0.5)[0]
+    assert slow == pytest.approx(-0.02 * np.tanh(1.0), rel=1e-3)
 
 
 def test_hull_asymmetry_keeps_its_sign_and_grows_with_the_square():
     once, twice = (wrench("hull_asymmetry", head(u=u), sway=0.1, yaw=0.02) for u in (0.1, 0.2))
     np.testing.assert_allclose(twice, 4 * once)
-    assert once[1] > 0 and once[2] > 0 and once[0] == 0
+    np.testing.assert_allclose(wrench("hull_asymmetry", head(u=-0.1), sway=0.1, yaw=0.02), -once)
+    np.testing.assert_allclose(once, (0.0, 0.1 * 0.01, 0.02 * 0.01))
 
 
 def test_sloshing_pushes_along_the_pool_whatever_the_heading():
@@ -116,6 +131,10 @@ def test_tether_is_slack_inside_its_length_and_pulls_to_the_anchor_outside():
     line = {"stiffness": 2.0, "length": 0.5, "x": 1.0, "y": 0.0}
     assert not wrench("tether", head(x=0.6), **line).any()
     np.testing.assert_allclose(wrench("tether", head(x=0.0), **line), [2.0 * 0.5, 0, 0], rtol=1e-9)
+    aside = wrench("tether", head(x=1.0, y=0.8), **line)
+    np.testing.assert_allclose(aside, [0, -2.0 * 0.3, 0], atol=1e-9)
+    half_taut = wrench("tether", head(x=0.5), **line)  # w / 4 = 2.5 mm of stretch at its very length
+    np.testing.assert_allclose(half_taut, [2.0 * 2.5e-3, 0, 0], rtol=1e-6)
     np.testing.assert_allclose(
         wrench("tether", head(x=0.0, heading=np.pi / 2), **line), [0, -1.0, 0], atol=1e-9
     )
@@ -162,6 +181,28 @@ def test_nonuniform_current_is_incompressible_closed_at_the_walls_and_has_its_ow
     others = {key: 0.0 for key in vars(gyres) if key != "gyre_11"}
     one = namespace("nonuniform_current", **others)
     assert flow(one, 0.0, -pool.WIDTH / 2, z, NUMPY)[0][0] == pytest.approx(0.03)  # counter-clockwise
+
+
+def test_nonuniform_current_is_a_linear_part_and_the_eddies_of_its_stream_function():
+    """V = (d psi/dy, -d psi/dx) with psi = sum (W / n pi) g_mn sin(m pi a) sin(n pi b), every part of its own size."""
+    random = np.random.default_rng(4)
+    p = namespace("nonuniform_current")
+    p = SimpleNamespace(**{key: random.uniform(-0.1, 0.1) for key in vars(p)})
+    L, W, h = pool.LENGTH, pool.WIDTH, 1e-5
+
+    def psi(x, y):
+        a, b = x / L + 0.5, y / W + 0.5
+        return sum(
+            W / (n * np.pi) * getattr(p, f"gyre_{m}{n}") * np.sin(m * np.pi * a) * np.sin(n * np.pi * b)
+            for m in (1, 2, 3, 4)
+            for n in (1, 2, 3)
+        )
+
+    for x, y in random.uniform(-1, 1, (10, 2)):
+        V, _ = EFFECTS["nonuniform_current"].water(p, x, y, SimpleNamespace(), NUMPY)
+        eddies = (psi(x, y + h) - psi(x, y - h)) / (2 * h), -(psi(x + h, y) - psi(x - h, y)) / (2 * h)
+        linear = p.mean_x + p.strain * x + p.shear_x * y, p.mean_y + p.shear_y * x - p.strain * y
+        np.testing.assert_allclose(V, np.add(linear, eddies), atol=1e-9)
 
 
 # tail
