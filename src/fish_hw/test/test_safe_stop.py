@@ -1,5 +1,6 @@
 """The command that makes the robot safe after a node was killed."""
 
+import struct
 import time
 
 import pytest
@@ -36,6 +37,7 @@ def test_both_are_stopped(tmp_path, vertiq_emulator):
 
 def test_the_module_of_the_file_is_stopped(tmp_path):
     emulator = VertiqEmulator(module=5)
+    emulator.written[reg.TIMEOUT.type, reg.TIMEOUT.param] = struct.pack("<f", 60.0)  # not by its own watchdog
     emulator.mode, emulator.commanded = VELOCITY_MODE, 50.0
     try:
         rotor = parameter_file(tmp_path / "rotor.yaml", port=emulator.port, module_id=5)
