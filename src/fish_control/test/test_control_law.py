@@ -113,6 +113,35 @@ def test_anti_windup_leaves_saturation_soon_after_the_error_changes_sign():
     assert steps_until_negative(LIMITS) < 25 < 200 < steps_until_negative(wound)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_saturated_integral_settles_where_the_error_and_the_excess_balance(sign):
+    """I' = Ki e + k_w (sat - unsat) / c = 0; to a period; the integral's own limit is not reached."""
+    gains, heading, speed = Gains(0.3, 0.04, 0, 0.6, 0.02, 0), 1.5 * sign, 0.5 if sign > 0.0 else -0.1
+    state = ControlState()
+    for _ in range(1000):
+        state, out = control_step(state, Errors(heading, speed, 0.0, 0.0), gains, 0.02, LIMITS, np)
+    turning = feedforward_throttle(0.0, out.alpha, LIMITS)
+    for integral, error, kp, ki, scale, ahead, output in (
+        (state.steering_integral, heading, 0.3, 0.04, LIMITS.steering_scale, 0.0, out.alpha),
+        (state.speed_integral, speed, 0.6, 0.02, LIMITS.throttle_scale, turning, out.throttle),
+    ):
+        excess = ahead + scale * (kp * error + integral) - output
+        assert excess == pytest.approx(scale * ki * error / LIMITS.unwinding_rate, rel=0.05)
+        assert abs(integral) < 0.9 * LIMITS.integral_limit
+    assert (out.alpha, out.throttle) == (sign * LIMITS.rudder_range, max(sign, 0.0))
+
+
+@pytest.mark.parametrize(("speed", "throttle"), [(2.0, 1.0), (-2.0, 0.0)])
+def test_throttle_stays_between_nothing_and_all_there_is(speed, throttle):
+    errors = Errors(0.0, speed, 0.0, 0.2)
+    assert control_step(ControlState(), errors, GAINS, 0.02, LIMITS, np)[1].throttle == throttle
+
+
+def test_feedforward_of_water_that_overtakes_the_fish_is_the_opposite():
+    for alpha in (0.0, 0.4):
+        assert feedforward_throttle(-0.2, alpha, LIMITS) == -feedforward_throttle(0.2, alpha, LIMITS)
+
+
 def test_derivative_acts_on_a_ramp_and_not_on_the_first_sample():
     gains, state = Gains(0, 0, 0.5, 0, 0, 0), ControlState()
     state, first = control_step(state, Errors(1.0, 0, 0, 0.2), gains, 0.02, LIMITS, np)
@@ -133,13 +162,31 @@ def test_curvature_acts_after_its_lag():
     assert out.alpha == pytest.approx(LIMITS.curvature_gain * state.curvature)
 
 
-def test_throttle_map_is_the_models():
-    w = 2.0 * np.pi * LIMITS.frequency
+@pytest.mark.parametrize("frequency", [1.0, 2.0, 3.0])
+def test_throttle_map_is_the_models(frequency):
+    """The rotor's acceleration A w^2 says the thrust, whatever the stroke's frequency."""
+    limits = ControlLimits(frequency=frequency)
+    w = 2.0 * np.pi * frequency
     s_max = (12.0 * (2.0 * np.pi * 2.0) ** 2) ** 2
     for s in (0.1, 0.5, 1.0):
-        A = amplitude_of_throttle(s, LIMITS, np)
+        A = amplitude_of_throttle(s, limits, np)
         assert A**2 * w**4 == pytest.approx(s * s_max, rel=0.02)
-    assert amplitude_of_throttle(0.0, LIMITS, np) == 0.0
+    assert amplitude_of_throttle(0.0, limits, np) == 0.0
+
+
+def test_a_rotor_without_frequency_stands_still():
+    state, speed = actuator_step(ActuatorState(), Setpoint(0.0, 1.0), 0.01, ControlLimits(frequency=0.0), np)
+    assert (state.amplitude, speed) == (0.0, 0.0)
+
+
+def test_rotor_speed_at_full_throttle_is_the_models_oscillation():
+    """phi_dot = A w sin(w t) with A = 12 rad at 2 Hz, after the amplitude has grown for half a second."""
+    state, speeds = ActuatorState(), []
+    for _ in range(200):
+        state, speed = actuator_step(state, Setpoint(0.0, 1.0), 0.01, LIMITS, np)
+        speeds.append(speed)
+    t, w = 0.01 * np.arange(1, 201), 4.0 * np.pi
+    np.testing.assert_allclose(speeds[60:], 12.0 * w * np.sin(w * t[60:]), atol=2e-3 * 12.0 * w)
 
 
 def test_rotor_oscillates_at_its_frequency_whatever_the_amplitude_does():
@@ -153,10 +200,11 @@ def test_rotor_oscillates_at_its_frequency_whatever_the_amplitude_does():
 
 
 def test_rotor_speed_has_no_jumps_when_the_throttle_jumps():
+    """Also where the rotor is fastest: 0.56 s and 1.62 s are a quarter of a period past a whole one."""
     state, last = ActuatorState(), 0.0
     w = 2.0 * np.pi * LIMITS.frequency
     largest = LIMITS.amplitude_rate * w * 0.01 + 12.0 * w * w * 0.01
-    for throttle in [1.0] * 100 + [0.0] * 100 + [0.5] * 50:
+    for throttle in [0.2] * 56 + [1.0] * 106 + [0.0] * 100 + [0.5] * 50:
         state, speed = actuator_step(state, Setpoint(0.0, throttle), 0.01, LIMITS, np)
         assert abs(speed - last) <= largest
         last = speed
@@ -169,11 +217,24 @@ def test_full_stop_within_half_a_second():
     assert state.amplitude == pytest.approx(0.0, abs=1e-12) and speed == pytest.approx(0.0, abs=1e-9)
 
 
-def test_rudder_moves_at_its_rate():
-    state, _ = actuator_step(ActuatorState(), Setpoint(0.8, 0.0), 0.01, LIMITS, np)
-    assert state.alpha == pytest.approx(LIMITS.rudder_rate * 0.01)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rudder_and_amplitude_move_at_their_rates(sign):
+    state, _ = actuator_step(
+        ActuatorState(amplitude=6.0), Setpoint(0.8 * sign, 0.5 + 0.5 * sign), 0.01, LIMITS, np
+    )
+    assert state.alpha == pytest.approx(sign * LIMITS.rudder_rate * 0.01)
+    assert state.amplitude == pytest.approx(6.0 + sign * LIMITS.amplitude_rate * 0.01)
 
 
-def test_limits_name_field_and_value():
-    with pytest.raises(ValueError, match="rudder_range is nan"):
-        ControlLimits(rudder_range=float("nan"))
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("rudder_range", float("nan")),
+        ("throttle_scale", float("inf")),
+        ("unwinding_rate", -0.1),
+        ("curvature_gain", 0.0),
+    ],
+)
+def test_limits_name_field_and_value(field, value):
+    with pytest.raises(ValueError, match=f"{field} is {value!r}, expected a"):
+        ControlLimits(**{field: value})
