@@ -106,16 +106,29 @@ def test_order_of_arrival_makes_no_difference():
 
 
 def test_flipped_headings_and_far_positions_are_refused():
-    fusion, events = Fusion(), measurements(6.0)
+    fusion, events, refused = Fusion(), measurements(6.0), 0
     rng = np.random.default_rng(6)
     for event in events:
         if event[1] == "camera" and event[2] > 1.0 and rng.random() < 0.2:
             wrong = FLIPPED if rng.random() < 0.5 else np.array([0.3, -0.2, 0.0])
             assert not fusion.add_pose(event[2], event[3] + wrong)
+            refused += 1
         else:
             feed(fusion, [event])
-    assert fusion.counts["pose_outlier"] > 15
+    poses = sum(event[1] == "camera" for event in events)
+    assert fusion.counts["pose_outlier"] == refused > 15
+    assert fusion.counts["pose"] == poses - refused - fusion.config.start_frames
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
+
+
+def test_a_reflection_that_is_seen_now_and_then_is_never_believed():
+    """It moves like the fish, so that its poses agree with each other for as long as one likes."""
+    fusion = Fusion()
+    for k, event in enumerate(measurements(6.0)):
+        reflected = event[1] == "camera" and event[2] > 1.0 and k % 3 == 0
+        feed(fusion, [(*event[:3], event[3] + [0.8, -0.5, 0.0]) if reflected else event])
+    assert fusion.counts["pose_outlier"] > 30 and fusion.counts["reacquired"] == 0
+    assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.01
 
 
 def test_a_flip_among_the_first_frames_does_not_start_the_filter():
@@ -147,7 +160,9 @@ def test_values_that_are_not_finite_are_counted_and_dropped(bad):
     assert not fusion.add_imu(2.0, bad, 0.0, 0.0)
     assert not fusion.add_pose(2.0, [0.0, bad, 0.0])
     assert not fusion.add_pose(2.0, [0.0, 0.0, 0.0], np.full((3, 3), bad))
-    assert fusion.counts["imu_not_finite"] == 1 and fusion.counts["pose_not_finite"] == 2
+    assert not fusion.add_imu(bad, 0.0, 0.0, 0.0)
+    assert not fusion.add_pose(bad, truth(2.0)[0])
+    assert fusion.counts["imu_not_finite"] == 2 and fusion.counts["pose_not_finite"] == 3
     np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
 
 
@@ -157,6 +172,14 @@ def test_too_late_and_repeated_measurements_are_dropped():
     assert not fusion.add_pose(0.5, truth(0.5)[0])
     assert not fusion.add_imu(1.0 + 1.9, 0.0, 0.0, 0.0)
     assert fusion.counts["pose_too_late"] == 1 and fusion.counts["imu_out_of_order"] == 1
+
+
+def test_a_camera_that_comes_back_cannot_speak_of_what_is_longer_ago_than_the_history():
+    fusion = Fusion()
+    feed(fusion, [e for e in measurements(5.0) if e[1] == "imu" or e[2] < 2.0])
+    assert not fusion.add_pose(3.9, truth(3.9)[0])
+    assert fusion.counts["pose_too_late"] == 1
+    assert fusion.add_pose(4.1, truth(4.1)[0])
 
 
 def test_lost_camera_is_said_in_the_covariance_and_passes():
@@ -181,6 +204,16 @@ def test_lost_imu_is_said_and_the_camera_goes_on():
     assert estimate.imu_lost and not estimate.camera_lost
     assert estimate.twist_covariance[2, 2] == LOST_VARIANCE
     assert np.hypot(*pose_error(estimate)[:2]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("silence", "camera_lost", "imu_lost"), [(0.02, False, False), (0.3, False, True), (0.8, True, True)]
+)
+def test_sensors_that_fall_silent_together_are_lost_after_their_times(silence, camera_lost, imu_lost):
+    fusion = Fusion()
+    feed(fusion, measurements(3.0, latency=0.0))
+    estimate = fusion.estimate(silence)
+    assert (estimate.camera_lost, estimate.imu_lost) == (camera_lost, imu_lost)
 
 
 @pytest.mark.parametrize("begun", [True, False])
@@ -243,6 +276,9 @@ def test_nothing_is_estimated_before_poses_agree():
     for k in range(20):  # jumps of a metre
         assert not fusion.add_pose(0.01 + k / 30.0, [float(k % 2), 0.0, 0.0])
     assert fusion.estimate() is None
+    fusion.add_imu(0.7, 0.0, 0.0, 0.0)
+    assert [fusion.add_pose(0.7 + k / 30.0, [0.0, 0.0, 0.0]) for k in range(3)] == [False, False, True]
+    assert fusion.counts["started"] == 1
 
 
 def test_camera_offset_moves_the_stamps():
@@ -251,6 +287,17 @@ def test_camera_offset_moves_the_stamps():
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.008, 0.008, 0.03])
 
 
-def test_config_names_field_and_value():
-    with pytest.raises(ValueError, match="gate is -1.0"):
-        FusionConfig(gate=-1.0)
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("gate", -1.0),
+        ("gate", np.inf),
+        ("camera_position_noise", 0.0),
+        ("gyro_noise", 0.0),
+        ("imu_timeout", np.nan),
+        ("camera_offset", -0.5),
+    ],
+)
+def test_config_names_field_and_value(field, value):
+    with pytest.raises(ValueError, match=f"{field} is {value!r}, expected a finite number > "):
+        FusionConfig(**{field: value})
