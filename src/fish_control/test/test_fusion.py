@@ -72,8 +72,10 @@ def test_pose_and_velocity_of_a_swinging_head_in_spite_of_latency(latency):
 
 def test_gyro_bias_is_found():
     fusion = Fusion()
-    feed(fusion, measurements(10.0, gyro_bias=0.03))
-    assert fusion.estimate().gyro_bias == pytest.approx(0.03, abs=0.004)
+    feed(fusion, measurements(10.0, gyro_bias=0.1))
+    estimate = fusion.estimate()
+    assert estimate.gyro_bias == pytest.approx(0.1, abs=0.004)
+    assert estimate.twist[2] == pytest.approx(truth(estimate.time)[1], abs=0.03)  # and taken off
 
 
 def test_errors_are_as_large_as_the_covariance_says():
@@ -131,25 +133,31 @@ def test_a_reflection_that_is_seen_now_and_then_is_never_believed():
     assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.01
 
 
-def test_a_flip_among_the_first_frames_does_not_start_the_filter():
+@pytest.mark.parametrize("turn", [np.pi, 1.5, -1.5])
+def test_a_wrong_heading_among_the_first_frames_does_not_start_the_filter(turn):
     fusion, seen = Fusion(), 0
     for event in measurements(2.0):
         if event[1] == "camera":
             seen += 1
-            if seen == 2:
-                fusion.add_pose(event[2], event[3] + FLIPPED)
+            if seen <= 3:
+                wrong = np.array([0.0, 0.0, turn if seen == 2 else 0.0])
+                assert not fusion.add_pose(event[2], event[3] + wrong)
                 continue
         feed(fusion, [event])
     assert abs(pose_error(fusion.estimate())[2]) < 0.05
 
 
 def test_a_fish_that_was_carried_away_is_found_again():
-    fusion, moved = Fusion(), np.array([0.8, -0.5, 0.0])
-    for event in measurements(6.0):
-        late = event[1] == "camera" and event[2] > 2.0
+    fusion, moved, bias = Fusion(), np.array([0.8, -0.5, 0.0]), None
+    for event in measurements(10.0, gyro_bias=0.03):
+        late = event[1] == "camera" and event[2] > 6.0
         feed(fusion, [(*event[:3], event[3] + moved) if late else event])
+        if bias is None and fusion.counts["reacquired"]:
+            found = fusion.estimate()
+            bias, spread = found.gyro_bias, np.sqrt(found.twist_covariance[2, 2])
     assert fusion.counts["reacquired"] == 1
     np.testing.assert_allclose(pose_error(fusion.estimate())[:2], moved[:2], atol=0.01)
+    assert bias == pytest.approx(0.03, abs=0.01) and spread < 0.01  # the sensor is the same as before
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -172,6 +180,7 @@ def test_too_late_and_repeated_measurements_are_dropped():
     assert not fusion.add_pose(0.5, truth(0.5)[0])
     assert not fusion.add_imu(1.0 + 1.9, 0.0, 0.0, 0.0)
     assert fusion.counts["pose_too_late"] == 1 and fusion.counts["imu_out_of_order"] == 1
+    assert fusion.counts["imu"] == 300
 
 
 def test_a_camera_that_comes_back_cannot_speak_of_what_is_longer_ago_than_the_history():

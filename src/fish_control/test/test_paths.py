@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_control.paths import PATHS, make_path
+from fish_control.paths import PATHS, make_path, read_arguments
 from fish_control.paths.letter_strokes import STROKES
 from fish_control.pool import check_inside_pool
 from fish_control.reference_path import PathError
@@ -92,3 +92,15 @@ def test_square_wave_swings_between_its_levels():
 def test_bad_requests_say_what_is_known(name, arguments, said):
     with pytest.raises(PathError, match=said):
         make_path(name, **arguments)
+
+
+def test_arguments_are_a_table_of_yaml():
+    assert read_arguments("", "path_args") == {}
+    assert read_arguments("{radius: 0.6, end: stop}", "path_args") == {"radius": 0.6, "end": "stop"}
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", "0", "radius", "{1: 2}", "{radius: 2020-13-45}"])
+def test_arguments_that_are_no_table_are_refused(text):
+    with pytest.raises(PathError) as refusal:
+        read_arguments(text, "path_args")
+    assert str(refusal.value) == f"path_args is {text!r}, expected YAML such as '{{radius: 0.6}}'"

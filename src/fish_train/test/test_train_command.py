@@ -13,6 +13,7 @@ SETTINGS = [
 ]  # fmt: skip
 
 GAINS = "0.3,0.3,0.03,0.6,0.05,0"
+BROKEN = "broken.yaml"
 EVALUATE = ["evaluate", "--constant", GAINS]
 
 
@@ -40,6 +41,8 @@ def test_train_then_use(form: str, tmp_path: Path, capsys: pytest.CaptureFixture
         (["train", "--warm-start", "nowhere.safetensors"], "nowhere.safetensors"),
         (["train", "--seeds", "0"], "expected counts of at least 1"),
         (["train", "--set", "batch=2020-13-45"], "'2020-13-45' is not a value"),
+        (["train", "--set", "radii=[1.0"], "'[1.0' is not a value: while parsing a flow sequence"),
+        (["train", "--config", BROKEN], "broken.yaml: cannot be read as YAML: while scanning a simple key"),
         (["train", "--resume", "--overwrite"], "--resume --overwrite: one continues the runs"),
         (["train", "--max-seconds", "nan"], "--max-seconds nan: expected at least 0 s"),
         (["train", "--max-seconds", "-1"], "--max-seconds -1: expected at least 0 s"),
@@ -71,6 +74,7 @@ def test_bad_input_is_one_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    (tmp_path / BROKEN).write_text("batch: 2\nunroll")
     assert main(arguments) == 1
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1

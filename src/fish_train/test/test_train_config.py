@@ -50,3 +50,25 @@ def test_settings_of_the_command_line() -> None:
         parse_settings(["batch"])
     with pytest.raises(UserError, match="expected a number"):
         parse_settings(["batch=many"])
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"batch: 2020-13-45", "cannot be read as YAML: month must be in 1..12"),
+        (b"batch: [1", "cannot be read as YAML: while parsing"),
+        (b"name: \xff", "cannot be read as YAML: 'utf-8' codec"),
+        (b"[batch]", "got list; expected a table of name: value"),
+    ],
+)
+def test_a_recipe_that_is_no_table_is_refused_with_its_name(
+    content: bytes, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "recipe.yaml").write_bytes(content)
+    with pytest.raises(UserError, match=f"recipe.yaml: {said}"):
+        load_config(tmp_path / "recipe.yaml")
+
+
+def test_an_empty_recipe_is_the_default(tmp_path: Path) -> None:
+    (tmp_path / "recipe.yaml").write_text("# all as shipped\n")
+    assert make_config(load_config(tmp_path / "recipe.yaml")) == TrainConfig()

@@ -15,7 +15,6 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry, Path
@@ -27,7 +26,7 @@ from fish_control.line_of_sight import Motion
 from fish_control.node_configs import PlannerConfig
 from fish_control.nodes.messages import ERROR, OK, WARN, diagnostics, motion_of, seconds, to_quaternion
 from fish_control.nodes.start import read_parameters, run
-from fish_control.paths import make_path
+from fish_control.paths import make_path, read_arguments
 from fish_control.planner import Plan, Planner, motion_is_finite
 from fish_control.pool import check_inside_pool
 from fish_control.progress_file import ProgressFile, path_digest
@@ -157,12 +156,7 @@ class PlannerNode(Node):
 
 def configured_path(config: PlannerConfig) -> ReferencePath:
     """The path that the parameters name. Raises PathError."""
-    try:
-        arguments = yaml.safe_load(config.path_args) if config.path_args else {}
-    except yaml.YAMLError:
-        arguments = None
-    if not isinstance(arguments, dict):
-        raise PathError(f"path_args is {config.path_args!r}, expected YAML such as '{{radius: 0.6}}'")
+    arguments = read_arguments(config.path_args, "path_args")
     if config.end:
         arguments["end"] = config.end
     return make_path(config.path, **arguments)

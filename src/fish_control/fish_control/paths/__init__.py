@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 
+from fish_control.paths.arguments import read_arguments
 from fish_control.paths.circle import circle
 from fish_control.paths.figure_eight import figure_eight
 from fish_control.paths.letter import letter
@@ -51,4 +52,4 @@ def make_path(name: str, **arguments: object) -> ReferencePath:
         raise PathError(f"path '{name}': an argument has the wrong type ({error})") from error
 
 
-__all__ = ["PATHS", "make_path"]
+__all__ = ["PATHS", "make_path", "read_arguments"]

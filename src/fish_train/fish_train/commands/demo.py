@@ -11,10 +11,9 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
-import yaml
 from rich.console import Console
 
-from fish_control.paths import make_path
+from fish_control.paths import make_path, read_arguments
 from fish_control.reference_path import PathError
 from fish_train.bringup import CONTROL, RECORDER, ROBOTS, SIMULATED, NodeSpec, Parameters
 from fish_train.commands.output_folder import new_folder
@@ -95,13 +94,7 @@ def start_pose(name: str, path_args: str) -> Parameters:
         UserError: no such path.
     """
     try:
-        arguments = yaml.safe_load(path_args) or {}
-    except yaml.YAMLError:
-        arguments = None
-    if not isinstance(arguments, dict):
-        raise UserError(f"path-args is {path_args!r}, expected YAML such as '{{radius: 0.5}}'")
-    try:
-        path = make_path(name, **arguments)
+        path = make_path(name, **read_arguments(path_args, "path-args"))
     except PathError as error:
         raise UserError(str(error)) from error
     (x, y), heading = path.point(0.0), float(path.heading_at(0.0))

@@ -50,8 +50,8 @@ def run_verb(verb: str, argv: list[str] | None = None) -> int:
     args = parser.parse_args(argv)
     try:
         return int(module.run(args))
-    except UserError as error:
-        print(f"fish_train {verb}: {error}", file=sys.stderr)
+    except UserError as error:  # what a library says of a file in it may have several lines
+        print(f"fish_train {verb}: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
