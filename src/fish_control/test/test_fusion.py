@@ -133,6 +133,15 @@ def test_a_reflection_that_is_seen_now_and_then_is_never_believed():
     assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.01
 
 
+def test_what_the_imu_said_before_the_first_pose_came_is_not_lost():
+    fusion, estimate = Fusion(), None
+    for event in measurements(1.0, latency=0.3, gyro_bias=0.0, noisy=False):
+        feed(fusion, [event])
+        estimate = estimate or fusion.estimate()
+    assert estimate.time < 0.1  # where the poses are that began it, a third of a second ago
+    assert estimate.twist[2] == pytest.approx(truth(estimate.time)[1], abs=0.05)
+
+
 @pytest.mark.parametrize("turn", [np.pi, 1.5, -1.5])
 def test_a_wrong_heading_among_the_first_frames_does_not_start_the_filter(turn):
     fusion, seen = Fusion(), 0
@@ -180,7 +189,8 @@ def test_too_late_and_repeated_measurements_are_dropped():
     assert not fusion.add_pose(0.5, truth(0.5)[0])
     assert not fusion.add_imu(1.0 + 1.9, 0.0, 0.0, 0.0)
     assert fusion.counts["pose_too_late"] == 1 and fusion.counts["imu_out_of_order"] == 1
-    assert fusion.counts["imu"] == 300
+    assert fusion.add_imu(3.0, 0.0, 0.0, 0.0)
+    assert fusion.counts["imu"] == 301
 
 
 def test_a_camera_that_comes_back_cannot_speak_of_what_is_longer_ago_than_the_history():

@@ -210,6 +210,15 @@ def test_starts_and_conditions() -> None:
     ]  # fmt: skip
 
 
+def test_a_condition_does_only_what_it_says() -> None:
+    condition = make_condition(Robot(), off=0.2, current=0.05, perfect=True)
+    assert condition.name == "nominal, perfect state, parameters off by up to 20%, current 0.05 m/s"
+    assert condition.robot == Robot().with_effect("current", x=0.0, y=0.05)  # across the pool
+    assert (condition.off, condition.fused, condition.disturbance) == (0.2, False, 0.0)
+    late = make_condition(Robot(), latency=0.3)
+    assert late.fused and late.sensors.camera_latency == 0.3 and late.disturbance > 0.0
+
+
 def test_a_weights_file_the_node_refuses_is_refused_here(tmp_path: Path) -> None:
     others = (replace(INPUTS[0], name="depth"), *INPUTS[1:])
     for contract, said in (

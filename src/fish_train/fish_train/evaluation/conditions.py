@@ -25,7 +25,7 @@ def make_condition(
         raise ValueError(f"off: got {off:g}; expected a share from 0 to below 1 (0.3 is 30 %)")
     parts = [robot.name if robot != Robot() else "nominal"]
     if perfect:
-        parts.append("perfect state, still water")
+        parts.append("perfect state" if current else "perfect state, still water")
     if off:
         parts.append(f"parameters off by up to {off:.0%}")
     if current:
