@@ -51,15 +51,24 @@ def test_samples_after_the_end_of_an_open_path_do_not_count():
     assert np.abs(score.cross_track).max() < 1e-9
 
 
-def test_approach_ends_when_path_and_speed_are_both_near():
+@pytest.mark.parametrize("last", ["path", "heading", "speed"])
+def test_approach_ends_when_path_heading_and_speed_are_all_near(last):
     t = np.arange(0.0, 9.0, 0.01)
-    y = np.maximum(0.2 - 0.1 * t, 0.0)  # within 0.05 m from 1.5 s on
-    u = np.minimum(0.04 * t, 0.2)  # above 0.16 m/s from 4 s on
-    score = score_motion(motion(t, -1.0 + 0.2 * t, y, 0.0, u), STRAIGHT, 0.2, 0.0, "truth")
+    near = {name: 4.0 if name == last else 1.0 for name in ("path", "heading", "speed")}  # s
+    y = np.maximum(0.05 + 0.05 * (near["path"] - t), 0.0)  # m, within 0.05 m from then on
+    psi = -np.maximum(0.3 + 0.1 * (near["heading"] - t), 0.0)
+    u = 0.2 - np.maximum(0.04 + 0.02 * (near["speed"] - t), 0.0)
+    score = score_motion(motion(t, -1.0 + 0.2 * t, y, psi, u), STRAIGHT, 0.2, 0.0, "truth")
     assert score.approach_s == pytest.approx(4.0, abs=0.03)
     settled, whole = score.summaries(with_approach=False), score.summaries(with_approach=True)
-    assert settled["cross-track, m"].maximum == pytest.approx(0.0, abs=1e-9)
-    assert whole["cross-track, m"].maximum == pytest.approx(0.2)
+    assert settled["cross-track, m"].maximum == pytest.approx(0.05 if last == "path" else 0.0, abs=1e-3)
+    assert whole["cross-track, m"].maximum == pytest.approx(0.05 + 0.05 * near["path"])
+
+
+def test_before_the_path_begins_nothing_has_settled():
+    t = np.arange(0.0, 9.0, 0.01)
+    score = score_motion(motion(t, -1.3 + 0.2 * t, 0.0, 0.0, 0.2), STRAIGHT, 0.2, 0.0, "truth")
+    assert score.approach_s == pytest.approx(0.3 / 0.2, abs=0.03)
 
 
 def test_a_run_that_never_settles_says_so():
@@ -84,6 +93,7 @@ def test_headings_are_compared_across_the_seam():
     psi = np.where(np.arange(len(t)) % 2, np.pi - 0.01, -np.pi + 0.01)
     score = score_motion(motion(t, 1.0 - 0.2 * t, 0.0, psi, 0.2), west, 0.2, 0.0, "truth")
     assert np.abs(score.head_angle).max() == pytest.approx(0.01, abs=1e-6)
+    assert np.abs(score.heading).max() <= 0.01 + 1e-6
 
 
 def test_a_self_crossing_path_is_followed_in_order():
@@ -95,9 +105,15 @@ def test_a_self_crossing_path_is_followed_in_order():
     assert np.all(np.diff(score.progress) > -1e-9)
 
 
-def test_stroke_mean_of_a_ramp_is_the_ramp():
-    t = np.arange(0.0, 5.0, 0.01)
-    assert stroke_mean(t, 3.0 * t)[50:-50] == pytest.approx(3.0 * t[50:-50], abs=1e-9)
+def test_stroke_mean_of_a_parabola_is_its_integral_also_at_the_ends():
+    """(b^3 - a^3) / 3 (b - a) between a and b, a quarter of a second to both sides where there is as much."""
+    t = np.r_[np.arange(0.0, 2.0, 0.01), np.arange(2.0, 5.0, 0.02)]
+    a, b = np.maximum(t - 0.25, t[0]), np.minimum(t + 0.25, t[-1])
+    assert stroke_mean(t, t**2) == pytest.approx((b**3 - a**3) / (3.0 * (b - a)), rel=2e-4, abs=2e-4)
+
+
+def test_the_mean_over_a_single_sample_is_that_sample():
+    assert stroke_mean(np.array([1.0]), np.array([0.3])) == pytest.approx([0.3])
 
 
 def test_path_from_points_knows_closed_paths():
@@ -105,10 +121,76 @@ def test_path_from_points_knows_closed_paths():
     assert not path_from_points(make_path("letter", letter="S").points).closed
 
 
-def test_what_is_missing_is_named(tmp_path):
-    trial = Trial(name="a", path=tmp_path, origin_ns=0, duration=1.0, namespace="/fish", axis="robot")
-    with pytest.raises(UserError, match="odometry"):
-        score_trial(trial)
+@pytest.mark.parametrize(
+    ("missing", "said"),
+    [
+        ({"truth": None}, "neither sim/odometry nor odometry/filtered was recorded"),
+        ({"reference_paths": ()}, "reference/path was not recorded"),
+        ({"reference_speed": None}, "reference/speed was not recorded"),
+    ],
+)
+def test_what_is_missing_is_named(tmp_path, missing, said):
+    t = np.arange(0.0, 3.0, 0.01)
+    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]))
+    with pytest.raises(UserError, match=f"^a: {said}"):
+        score_trial(replace(trial, **missing))
+
+
+def test_a_run_without_a_wanted_speed_or_a_pose_on_its_path_is_refused(tmp_path):
+    t = np.arange(0.0, 3.0, 0.01)
+    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]))
+    at_rest = replace(trial.reference_speed, speed=np.zeros(2))
+    with pytest.raises(UserError, match="a: the commanded speed was never above 0"):
+        score_trial(replace(trial, reference_speed=at_rest))
+    late = replace(trial.reference_paths[0], t=5.0)
+    with pytest.raises(UserError, match="no pose was recorded after the path was given"):
+        score_trial(replace(trial, reference_paths=(late,)))
+
+
+def test_truth_is_scored_where_there_is_one_and_else_the_estimate(tmp_path):
+    t = np.arange(0.0, 3.0, 0.01)
+    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]), end=9.0)
+    beside = motion(t, 0.2 * t - 1.0, 0.03, 0.0, 0.2)
+    for odometry, truth, source, offset in (
+        (beside, trial.truth, "truth", 0.0),
+        (beside, None, "estimate", 0.03),
+    ):
+        score = score_trial(replace(trial, odometry=odometry, truth=truth))
+        assert score.source == source and score.cross_track == pytest.approx(offset, abs=1e-9)
+
+
+def test_the_last_commanded_speed_is_the_one_of_the_last_path(tmp_path):
+    """A first path that ended with a speed of 0, then another at 0.25 m/s that lasts until 0 is said again, just before the end."""
+    t = np.arange(0.0, 6.3, 0.01)
+    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]))
+    stamps = np.array([0.0, 1.0, 3.0, 6.0])
+    speeds = replace(
+        trial.reference_speed,
+        t=stamps, t_arrival=stamps, flags=np.zeros(4, np.uint8), speed=np.array([0.2, 0.0, 0.25, 0.0]),
+    )  # fmt: skip
+    paths = (
+        replace(trial.reference_paths[0], points=STRAIGHT.points + 0.5),
+        replace(trial.reference_paths[0], t=2.0),
+    )
+    score = score_trial(replace(trial, reference_speed=speeds, reference_paths=paths))
+    assert score.reference_speed == 0.25 and score.finished
+    assert (score.t[0], score.t[-1]) == pytest.approx((2.0, 6.0))
+
+
+def test_a_speed_of_0_that_was_said_before_the_path_does_not_end_it(tmp_path):
+    t = np.arange(0.0, 5.0, 0.01)
+    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]))
+    score = score_trial(replace(trial, reference_paths=(replace(trial.reference_paths[0], t=2.0),)))
+    assert score.t[-1] == pytest.approx(4.99) and not score.finished
+
+
+def test_a_closed_path_is_followed_from_where_the_fish_is():
+    path = make_path("circle", radius=0.5)
+    s = np.linspace(0.3 * path.length, 0.9 * path.length, 1000)
+    x, y = (path.point(s) * 0.96).T  # within the circle: left of a path that goes round to the left
+    score = score_motion(motion(s / 0.2, x, y, path.heading_at(s), 0.2), path, 0.2, 0.0, "truth")
+    assert score.progress == pytest.approx(s, abs=5e-3)
+    assert score.cross_track == pytest.approx(0.04 * 0.5, abs=1e-4) and not score.finished
 
 
 def test_a_path_without_enough_points_is_an_error_the_user_can_read(tmp_path):
