@@ -15,6 +15,7 @@ from fish_control.control_law import (
     actuator_step,
     amplitude_of_throttle,
     control_step,
+    feedforward_slope,
     feedforward_throttle,
 )
 
@@ -140,6 +141,20 @@ def test_throttle_stays_between_nothing_and_all_there_is(speed, throttle):
 def test_feedforward_of_water_that_overtakes_the_fish_is_the_opposite():
     for alpha in (0.0, 0.4):
         assert feedforward_throttle(-0.2, alpha, LIMITS) == -feedforward_throttle(0.2, alpha, LIMITS)
+
+
+@pytest.mark.parametrize("speed", [0.15, -0.15])
+@pytest.mark.parametrize("alpha", [0.0, 0.4])
+def test_slope_of_the_feedforward_is_its_difference_quotient(speed, alpha):
+    ends = [feedforward_throttle(speed + step, alpha, LIMITS) for step in (1e-6, -1e-6)]
+    assert feedforward_slope(speed, alpha, LIMITS) == pytest.approx((ends[0] - ends[1]) / 2e-6)
+
+
+def test_filters_do_not_overshoot_however_long_a_period_is():
+    gains, before = Gains(0, 0, 0.5, 0, 0, 0), ControlState(primed=1.0)
+    state, out = control_step(before, Errors(0.1, 0.0, 2.0, 0.2), gains, 1.0, LIMITS, np)
+    assert 0.0 < state.heading_error_rate < 0.1 / 1.0
+    assert 0.0 < state.curvature < 2.0
 
 
 def test_derivative_acts_on_a_ramp_and_not_on_the_first_sample():

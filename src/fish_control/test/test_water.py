@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fish_control import water
-from fish_control.control_law import ControlLimits, Setpoint, feedforward_slope, feedforward_throttle
+from fish_control.control_law import ControlLimits, Setpoint, feedforward_throttle
 from fish_control.water import SIZE, WaterState, bounded, see_across, see_ahead, swim
 
 LIMITS, DT = ControlLimits(), 0.01
@@ -45,10 +45,6 @@ def test_prediction_is_that_of_an_extended_kalman_filter(seed):
     np.testing.assert_allclose(matrices(after)[1], F @ P @ F.T + dt * Q, atol=1e-11)
     rate = 1.1 * after.throttle - feedforward_throttle(0.15, 0.2, LIMITS)
     assert after.speed == pytest.approx(0.15 + dt * rate / water.LAG, abs=1e-10)
-    assert feedforward_slope(0.15, 0.2, LIMITS) == pytest.approx(
-        (feedforward_throttle(0.15 + eps, 0.2, LIMITS) - feedforward_throttle(0.15 - eps, 0.2, LIMITS))
-        / (2 * eps)
-    )
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -160,7 +160,7 @@ def test_truth_is_scored_where_there_is_one_and_else_the_estimate(tmp_path):
 
 
 def test_the_last_commanded_speed_is_the_one_of_the_last_path(tmp_path):
-    """A first path that ended with a speed of 0, then another at 0.25 m/s that lasts until 0 is said again, just before the end."""
+    """A first path that ended with a speed of 0, then another at 0.25 m/s until 0 is said again, just before the end."""
     t = np.arange(0.0, 6.3, 0.01)
     trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]))
     stamps = np.array([0.0, 1.0, 3.0, 6.0])
@@ -244,4 +244,5 @@ def test_a_path_that_is_said_again_does_not_start_the_run_anew(tmp_path):
     paths = (other, replace(line, t=0.5), replace(line, t=5.0))
     score = score_trial(Trial(name="a", truth=truth, reference_speed=speed, reference_paths=paths, **common))
     assert score.t[0] == pytest.approx(0.5) and score.finished
+    assert score.approach_s == pytest.approx(0.01)  # it is swum along from its second sample on
     assert score.reference_speed == 0.2
