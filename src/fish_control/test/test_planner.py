@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_control.line_of_sight import Motion
+from fish_control.line_of_sight import GuidanceConfig, Motion
 from fish_control.paths import make_path
 from fish_control.planner import Planner, motion_is_finite
 
@@ -25,13 +25,22 @@ def test_yaw_rate_is_speed_times_curvature():
     assert planner.plan(at(planner.path, 0.0)).yaw_rate == pytest.approx(0.4, rel=1e-3)
 
 
+@pytest.mark.parametrize(("compensates", "error"), [(True, 0.0), (False, np.arcsin(0.4 / (2.0 * 0.5)))])
+def test_the_law_that_is_asked_for_is_followed(compensates, error):
+    """The paper's points inside a circle of 0.5 m by the direction of its chord of 0.4 m."""
+    guidance = GuidanceConfig(compensate_curvature=compensates)
+    planner = Planner(make_path("circle", radius=0.5), 0.2, guidance=guidance)
+    assert planner.plan(at(planner.path, 0.0)).errors.heading == pytest.approx(error, abs=2e-3)
+
+
 def test_speed_is_wanted_until_the_end_and_zero_for_good_after_it():
     planner = Planner(make_path("I"), 0.15)
     length = planner.path.length
     assert follow(planner, 0.0, length - 0.01).speed == 0.15
     assert follow(planner, length - 0.01, length + 0.05).speed == 0.0
     assert planner.finished
-    assert planner.plan(at(planner.path, 1.0)).speed == 0.0
+    after = planner.plan(at(planner.path, 1.0, speed=0.12))
+    assert after.speed == 0.0 and after.errors.speed == pytest.approx(-0.12)
 
 
 @pytest.mark.parametrize(("x", "side"), [(-1.9, -1.0), (1.9, 1.0)])
@@ -84,6 +93,22 @@ def test_resume_takes_the_nearest_point_ahead_of_the_saved_progress():
     x, y = planner.path.point(crossing + 0.05)
     assert planner.resume(float(x), float(y), crossing - 0.2, 0.6)
     assert planner.tracker.progress == pytest.approx(crossing + 0.05, abs=0.01)
+
+
+@pytest.mark.parametrize(("name", "progress"), [("straight", 0.0), ("circle", 0.1)])
+def test_resume_near_the_end_stops_at_it_or_goes_round(name, progress):
+    """Of the way that may have been swum 0.1 m leads to the end and 0.1 m beyond it."""
+    planner = Planner(make_path(name), 0.2)
+    length = planner.path.length
+    x, y = planner.path.point(length + 0.1)
+    assert planner.resume(float(x), float(y), length - 0.1, 0.4)
+    assert planner.tracker.progress == pytest.approx(length + progress, abs=0.01)
+
+
+def test_resume_takes_a_robot_that_has_drifted_off_the_path():
+    planner = Planner(make_path("straight", length=3.0), 0.2)
+    assert planner.resume(-0.5, 0.35, 1.0, 0.4)
+    assert planner.tracker.progress == pytest.approx(1.0, abs=0.01)
 
 
 def test_resume_refuses_a_robot_that_is_elsewhere():

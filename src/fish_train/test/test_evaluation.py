@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fish_control.contract import INPUTS, Contract
-from fish_control.control_law import ControlLimits, Gains
+from fish_control.control_law import ControlLimits, Gains, feedforward_throttle
 from fish_control.gains_file import write_gains_file
 from fish_control.paths import make_path
 from fish_control.policy import Policy
@@ -17,57 +17,94 @@ from fish_sim.simulation_config import SimulationConfig
 from fish_train.errors import UserError
 from fish_train.evaluation import paper_numbers as paper
 from fish_train.evaluation.candidates import constant_candidate, read_candidate
-from fish_train.evaluation.cells import Cell, make_cells, read_path, start_pose
+from fish_train.evaluation.cells import RUN_UP, Cell, longest, make_cells, read_path, start_pose
 from fish_train.evaluation.conditions import make_condition, robust_conditions
 from fish_train.evaluation.follow import Trace
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics, measure
+from fish_train.evaluation.metrics import NO_SIZES, ErrorSizes, RunMetrics, measure
 from fish_train.evaluation.open_loop import speed_of_throttle
 from fish_train.evaluation.page import write_study_page
 from fish_train.evaluation.paper_page import better_cells
 from fish_train.evaluation.plant import FishSimPlant
 from fish_train.evaluation.sensing import FusedSensing
-from fish_train.evaluation.study import Row, detuned, evaluate, write_rows
-from fish_train.evaluation.tables import cell_ratios, ratio_table, summary_table
+from fish_train.evaluation.study import LARGEST_BATCH, Row, detuned, evaluate, run_study, write_rows
+from fish_train.evaluation.tables import cell_ratios, cell_table, ratio_table, summary_table
+from fish_train.recordings.trial import Odometry
+from fish_train.score import score_motion
 
 GAINS = "0.3,0.3,0.03,0.6,0.05,0"
 SHORT = "straight:length=0.8"
 
 
-def straight_trace(offset: float, speed_error: float, wanted: float = 0.2) -> tuple[Trace, object]:
-    """A robot that slides along a straight path, 10 s, `offset` to its left and too slow by `speed_error`."""
+TIME = 0.02 * np.arange(1, 501)  # s
+
+
+def straight_trace(offset, speed_error=0.0, heading=0.0, wanted: float = 0.2) -> tuple[Trace, object]:
+    """A robot on a straight path for 10 s, `offset` to its left, too slow by `speed_error`, headed off by `heading`."""
     path = make_path("straight", length=2.5)
-    time = 0.02 * np.arange(1, 501)
-    u = wanted - speed_error
-    motion = np.zeros((500, 1, 6))
-    motion[:, 0, 0], motion[:, 0, 1], motion[:, 0, 3] = u * time, offset, u
-    cross_track = np.full((500, 1), offset)
-    alpha, throttle = (0.1 * np.arange(500) * 0.02)[:, None], np.full((500, 1), 0.4)
-    progress, course = (u * time)[:, None], np.zeros((500, 1))
-    gains, speed, finished = np.full((500, 1, 6), 0.1), np.array([wanted]), np.array([True])
-    return Trace(time, motion, cross_track, course, progress, alpha, throttle, gains, speed, finished), path
+    offset, u, heading = (np.broadcast_to(v, 500) for v in (offset, wanted - speed_error, heading))
+    progress, still = np.cumsum(0.02 * u), np.zeros(500)
+    motion = np.column_stack([progress - 1.25, offset, heading, u, still, still])[:, None]
+    alpha, throttle = (0.1 * TIME)[:, None], np.linspace(0.3, 0.5, 500)[:, None]
+    course, gains = np.zeros((500, 1)), np.full((500, 1, 6), 0.1)
+    trace = Trace(
+        TIME, motion, offset[:, None], course, progress[:, None], alpha, throttle, gains,
+        np.array([wanted]), np.array([True]),
+    )  # fmt: skip
+    return trace, path
 
 
 def test_metrics_of_known_errors() -> None:
-    trace, path = straight_trace(0.02, 0.01)
+    """Sines over whole periods: mean 2 A / pi, RMS A / sqrt 2, and 95 % of the time below A sin(0.95 pi / 2)."""
+    wave = np.sin(np.pi * TIME)
+    trace, path = straight_trace(0.02 * wave, 0.01 * np.roll(wave, 25), heading=-0.05)
     metrics = measure(trace, 0, path)
     assert metrics.failure == "" and metrics.approach == pytest.approx(0.02)
     for sizes in (metrics.settled, metrics.whole):
-        assert sizes.cross_track_rmse == pytest.approx(0.02)
-        assert sizes.cross_track_p95 == pytest.approx(0.02)
-        assert sizes.speed_rmse == pytest.approx(0.01)
-        assert sizes.heading_rmse == pytest.approx(0.0, abs=1e-12)
+        assert sizes.cross_track_mean == pytest.approx(0.02 * 2.0 / np.pi, rel=0.01)
+        assert sizes.cross_track_rmse == pytest.approx(0.02 / np.sqrt(2.0), rel=0.01)
+        assert sizes.cross_track_p95 == pytest.approx(0.02 * np.sin(0.95 * np.pi / 2.0), rel=0.01)
+        assert sizes.cross_track_max == pytest.approx(0.02, rel=0.01)
+        assert sizes.speed_mean == pytest.approx(0.01 * 2.0 / np.pi, rel=0.01)
+        assert sizes.speed_rmse == pytest.approx(0.01 / np.sqrt(2.0), rel=0.01)
+        assert sizes.speed_p95 == pytest.approx(0.01 * np.sin(0.95 * np.pi / 2.0), rel=0.01)
+        assert sizes.heading_rmse == pytest.approx(0.05)
         assert sizes.rudder_rate_rms == pytest.approx(0.1)
-        assert sizes.throttle_mean == pytest.approx(0.4)
+        assert sizes.throttle_mean == pytest.approx(0.4, rel=1e-3)
+
+
+@pytest.mark.parametrize("late", ["path", "heading", "speed"])
+def test_metrics_are_those_of_a_recorded_run(late: str) -> None:
+    """What `fish_train score` says of the same motion, with and without an approach that one error draws out."""
+    fades = {
+        name: np.maximum((4.0 if name == late else 1.0) - TIME, 0.0) for name in ("path", "heading", "speed")
+    }
+    swing = 0.2 * np.sin(4.0 * np.pi * TIME)
+    trace, path = straight_trace(
+        0.01 + 0.06 * fades["path"], 0.005 + 0.03 * fades["speed"], swing - 0.25 * fades["heading"]
+    )
+    x, y, psi, u, v, r = trace.motion[:, 0].T
+    zeros = np.zeros(len(TIME), np.uint8)
+    recorded = Odometry(
+        topic="t", frame_id="pool", t=TIME, t_arrival=TIME, flags=zeros, x=x, y=y, psi=psi, u=u, v=v, r=r
+    )
+    score, metrics = score_motion(recorded, path, 0.2, 0.0, "truth"), measure(trace, 0, path)
+    assert metrics.approach == pytest.approx(score.approach_s) and metrics.approach > 2.0
+    for ours, with_approach in ((metrics.settled, False), (metrics.whole, True)):
+        theirs = score.summaries(with_approach=with_approach)
+        cross_track, speed = theirs["cross-track, m"], theirs["speed, m/s"]
+        assert ours.cross_track_rmse == pytest.approx(cross_track.rmse, rel=1e-6)
+        assert ours.cross_track_max == pytest.approx(cross_track.maximum, rel=1e-6)
+        assert ours.heading_rmse == pytest.approx(theirs["heading, rad"].rmse, rel=1e-6)
+        assert (ours.speed_rmse, ours.speed_p95) == pytest.approx((speed.rmse, speed.p95), rel=1e-6)
 
 
 def test_a_run_off_its_path_or_unfinished_has_failed() -> None:
-    trace, path = straight_trace(0.2, 0.0)
+    trace, path = straight_trace(0.2)
     assert measure(trace, 0, path).failure == "never came onto the path"
-    trace, path = straight_trace(0.01, 0.0)
-    assert (
-        measure(replace(trace, finished=np.array([False])), 0, path).failure
-        == "did not reach the end in time"
-    )
+    trace, path = straight_trace(0.01)
+    unfinished = replace(trace, finished=np.array([False]))
+    assert measure(unfinished, 0, path).failure == "did not reach the end in time"
+    assert measure(unfinished, 0, make_path("circle")).failure == ""  # which has no end
     far = trace.cross_track.copy()
     far[-100:] = 0.4
     assert "left the path" in measure(replace(trace, cross_track=far), 0, path).failure
@@ -185,6 +222,44 @@ def test_the_table_of_ratios_names_the_worst_cell_and_leaves_failed_runs_out() -
     assert line[4].endswith(f"4.50 ({cell.path} {cell.speed:g} m/s)")
 
 
+def test_tables_are_means_over_the_runs_that_did_not_fail_in_millimetres() -> None:
+    def run(cross_track: float, speed: float, seed: int, failure: str = "") -> Row:
+        settled, whole = sizes(cross_track, speed), sizes(2.0 * cross_track, 2.0 * speed)
+        return Row("a", "c", Cell("R", 0.2, seed), RunMetrics(settled, whole, 1.0, failure))
+
+    rows = [run(0.010, 0.020, 0), run(0.014, 0.030, 1), run(9.0, 9.0, 2, "lost")]
+    table = summary_table(rows, "t")
+    (line,) = table.rows
+    shown = dict(zip(table.header, line, strict=True))
+    assert (shown["runs"], shown["failed"]) == ("3", "1")
+    assert (shown["cross-track RMSE, mm"], shown["speed RMSE, mm/s"]) == ("12", "25")
+    assert (shown["cross-track RMSE *, mm"], shown["speed RMSE *, mm/s"]) == ("24", "50")
+    assert cell_table(rows, "t").rows == [["R", "12.0 / 25.0"]]
+    assert cell_table(rows[2:], "t").rows == [["R", "failed"]]
+
+
+def test_a_study_swims_every_cell_once_for_each_candidate_and_condition(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    batches, told = [], []
+
+    def evaluate(candidate, condition, cells) -> list[Row]:
+        batches.append(len(cells))
+        return [
+            Row(candidate.name, condition.name, c, RunMetrics(NO_SIZES, NO_SIZES, 0.0, "")) for c in cells
+        ]
+
+    monkeypatch.setattr("fish_train.evaluation.study.evaluate", evaluate)
+    candidates = [constant_candidate(f"{name}={GAINS}") for name in "ab"]
+    conditions = [make_condition(Robot()), make_condition(Robot(), latency=0.3)]
+    cells = make_cells([SHORT, "circle"], [0.1, 0.2], range(5))
+    rows = run_study(candidates, conditions, cells, 1, lambda done, total: told.append((done, total)))
+    expected = {(c.name, d.name, cell) for c in candidates for d in conditions for cell in cells}
+    assert len(rows) == len(expected) and {(r.candidate, r.condition, r.cell) for r in rows} == expected
+    assert max(batches) <= LARGEST_BATCH
+    assert told == [(k + 1, len(batches)) for k in range(len(batches))]
+
+
 def test_detuned_robots_keep_what_is_measured() -> None:
     robot = detuned(Robot(), 0.3, 4)
     ratio = {k: robot.parameters[k] / Robot().parameters[k] for k in robot.parameters}
@@ -194,16 +269,36 @@ def test_detuned_robots_keep_what_is_measured() -> None:
     assert detuned(Robot(), 0.3, 4) == robot
 
 
-def test_full_throttle_is_faster_than_half() -> None:
-    still, half, full = speed_of_throttle(Robot(), np.array([0.0, 0.5, 1.0]), ControlLimits())
-    assert still == pytest.approx(0.0, abs=1e-6)
-    assert 0.1 < half < full < 0.5
+def test_speeds_at_throttles_are_those_of_the_feedforward() -> None:
+    throttles = np.array([0.0, 0.2, 0.6])
+    speeds = speed_of_throttle(Robot(), throttles, ControlLimits())
+    np.testing.assert_allclose(feedforward_throttle(speeds, 0.0, ControlLimits()), throttles, atol=0.02)
+
+
+def test_starts_are_scattered_to_the_sides_and_in_heading_but_not_along_the_path() -> None:
+    course = 2.0
+    path = make_path("straight", length=0.8, course=course)
+    begin, heading = path.point(0.0), np.array([np.cos(course), np.sin(course)])
+    assert start_pose(path, 0) == pytest.approx((*(begin - RUN_UP * heading), course))
+    starts = np.array([start_pose(path, seed) for seed in range(1, 200)])
+    along = (starts[:, :2] - begin) @ heading
+    left = (starts[:, :2] - begin) @ [-heading[1], heading[0]]
+    np.testing.assert_allclose(along, -RUN_UP)
+    assert (left.mean(), left.std()) == pytest.approx((0.0, 0.01), abs=0.002)
+    assert (starts[:, 2].mean(), starts[:, 2].std()) == pytest.approx((course, 0.05), abs=0.01)
+    assert start_pose(path, 1) == start_pose(path, 1) != start_pose(path, 2)
+
+
+def test_a_run_has_time_for_its_path() -> None:
+    """Two laps of a closed path, half as much again for an open one, and time to start."""
+    circle, straight = make_path("circle", radius=0.5), make_path("straight", length=0.8)
+    assert longest(circle, 0.2) == pytest.approx((2.0 * 2.0 * np.pi * 0.5 + 0.15) / 0.2 + 4.0, rel=1e-4)
+    assert longest(straight, 0.1) == pytest.approx(1.5 * (0.8 + 0.15) / 0.1 + 8.0)
 
 
 def test_starts_and_conditions() -> None:
     path = read_path(SHORT)
     assert start_pose(path, 0) == pytest.approx((-0.55, 0.0, 0.0), abs=1e-9)
-    assert start_pose(path, 1) != start_pose(path, 2)
     names = [condition.name for condition in robust_conditions(Robot())]
     assert names == [
         "nominal", "nominal, parameters off by up to 30%", "nominal, camera latency 0.3 s", "nominal, current 0.03 m/s"
