@@ -19,17 +19,26 @@ from fish_train.evaluation import paper_numbers as paper
 from fish_train.evaluation.candidates import constant_candidate, read_candidate
 from fish_train.evaluation.cells import RUN_UP, Cell, longest, make_cells, read_path, start_pose
 from fish_train.evaluation.conditions import make_condition, robust_conditions
-from fish_train.evaluation.follow import Trace
+from fish_train.evaluation.follow import Trace, follow
 from fish_train.evaluation.metrics import NO_SIZES, ErrorSizes, RunMetrics, measure
 from fish_train.evaluation.open_loop import speed_of_throttle
 from fish_train.evaluation.page import write_study_page
 from fish_train.evaluation.paper_page import better_cells
 from fish_train.evaluation.plant import FishSimPlant
-from fish_train.evaluation.sensing import FusedSensing
-from fish_train.evaluation.study import LARGEST_BATCH, Row, detuned, evaluate, run_study, write_rows
+from fish_train.evaluation.sensing import FusedSensing, PerfectSensing
+from fish_train.evaluation.study import (
+    LARGEST_BATCH,
+    Candidate,
+    Row,
+    detuned,
+    evaluate,
+    run_study,
+    write_rows,
+)
 from fish_train.evaluation.tables import cell_ratios, cell_table, ratio_table, summary_table
 from fish_train.recordings.trial import Odometry
 from fish_train.score import score_motion
+from fish_train.training.loop import Law
 
 GAINS = "0.3,0.3,0.03,0.6,0.05,0"
 SHORT = "straight:length=0.8"
@@ -78,9 +87,11 @@ def test_metrics_are_those_of_a_recorded_run(late: str) -> None:
     fades = {
         name: np.maximum((4.0 if name == late else 1.0) - TIME, 0.0) for name in ("path", "heading", "speed")
     }
-    swing = 0.2 * np.sin(4.0 * np.pi * TIME)
+    stroke = np.sin(4.0 * np.pi * TIME)
     trace, path = straight_trace(
-        0.01 + 0.06 * fades["path"], 0.005 + 0.03 * fades["speed"], swing - 0.25 * fades["heading"]
+        0.01 + 0.06 * fades["path"],
+        0.005 + 0.03 * fades["speed"] + 0.06 * stroke,
+        0.2 * stroke - 0.25 * fades["heading"],
     )
     x, y, psi, u, v, r = trace.motion[:, 0].T
     zeros = np.zeros(len(TIME), np.uint8)
@@ -146,6 +157,35 @@ def test_plant_and_sensors_are_those_of_the_simulation() -> None:
         truth = simulation.advance().truth
         plant.step(np.array([command]))
         assert plant.motion[0] == pytest.approx([*truth.pose, *truth.velocity], abs=1e-10)
+
+
+def test_the_water_pushes_as_in_the_simulation() -> None:
+    """Root mean squares over many fish that do nothing for 0.6 s; the random numbers are others."""
+    plant, seeds = FishSimPlant([Robot()] * 32, range(32), disturbance=0.01), range(32)
+    simulations = [Simulation(Robot(), SimulationConfig(disturbance=0.01, seed=seed)) for seed in seeds]
+    for _ in range(60):
+        plant.step(np.zeros((32, 2)))
+        truths = [simulation.advance().truth for simulation in simulations]
+    theirs = np.array([(*truth.pose, *truth.velocity) for truth in truths])
+    ratio = np.sqrt(np.mean(plant.motion**2, axis=0) / np.mean(theirs**2, axis=0))
+    assert np.all((0.6 < ratio) & (ratio < 1.7)) and np.all(theirs.std(axis=0) > 1e-4)
+
+
+def test_a_run_whose_time_is_over_has_not_finished_even_if_it_drifts_over_the_end_later() -> None:
+    candidate, path = constant_candidate(GAINS), read_path(SHORT)
+    trace = follow(
+        FishSimPlant([Robot()] * 2, [0, 0]), PerfectSensing(), candidate.gains, [path] * 2,
+        np.array([0.25, 0.25]), np.array([start_pose(path, 0)] * 2), np.array([2.0, 30.0]), law_at_once(candidate),
+    )  # fmt: skip
+    assert trace.finished.tolist() == [False, True]
+    ends = [trace.time[np.isfinite(trace.cross_track[:, k])].max() for k in range(2)]
+    assert ends[0] == pytest.approx(2.0) and ends[1] == trace.time[-1] < 12.0
+    assert trace.progress[-1, 1] == pytest.approx(path.length)
+
+
+def law_at_once(candidate: Candidate) -> Law:
+    """The candidate's law for a fish that does not listen before it swims."""
+    return replace(candidate.law, guidance=replace(candidate.law.guidance, listen_time=0.0))
 
 
 def test_fused_sensing_finds_the_truth() -> None:
