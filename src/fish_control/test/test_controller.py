@@ -69,20 +69,37 @@ def test_rest_stops_rotor_and_centres_rudder_within_half_a_second():
     assert command.rotor_speed == pytest.approx(0.0, abs=1e-9) and command.alpha == 0.0
 
 
-def test_gliding_holds_the_rudder_without_drive_until_the_fish_has_stopped():
+def test_a_fish_that_swims_does_not_stop_to_listen_again():
+    made = controller(surge=0.2, policy=LISTENS)
+    made.decide(STRAIGHT)
+    for k in range(3, 20):  # something holds it
+        made.observe(0.01 * k, Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        made.decide(STRAIGHT)
+        command = made.command(0.01)
+    assert abs(command.rotor_speed) > 10.0  # rad/s
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_gliding_holds_the_rudder_without_drive_until_the_fish_has_stopped(side):
     made = controller(surge=0.15)
     made.decide(STRAIGHT)
     for _ in range(60):
-        made.glide(0.5, 0.01)
+        made.glide(0.5 * side, 0.01)
         command = made.command(0.01)
-    assert command.rotor_speed == pytest.approx(0.0, abs=1e-9) and command.alpha == 0.8
+    assert command.rotor_speed == pytest.approx(0.0, abs=1e-9) and command.alpha == 0.8 * side
     angles = []
     for k in range(500):  # noise about standing still does not start it again
         made.observe(1.0 + 0.01 * k, Motion(0.0, 0.0, 0.0, 0.015 + 0.03 * (k % 2), 0.0, 0.0))
-        made.glide(0.5, 0.01)
+        made.glide(0.5 * side, 0.01)
         angles.append(made.command(0.01).alpha)
-    np.testing.assert_allclose(np.diff(angles[:300]), -0.002, atol=1e-9)
+    np.testing.assert_allclose(np.diff(angles[:300]), -0.002 * side, atol=1e-9)
     assert angles[-1] == 0.0
+    made.observe(7.0, Motion(0.0, 0.0, 0.0, 0.15, 0.0, 0.0))
+    made.decide(STRAIGHT)
+    for _ in range(60):  # after the next path it does the same
+        made.glide(0.5 * side, 0.01)
+        command = made.command(0.01)
+    assert command.alpha == 0.8 * side
 
 
 def test_gliding_straight_on_when_no_turn_is_wanted():
@@ -109,19 +126,23 @@ def test_decide_before_odometry_is_an_error_of_the_caller():
 def test_phase_is_published_within_one_turn():
     made = controller()
     phases = [made.command(0.01).phase for _ in range(200)]
+    t = 0.01 * np.arange(1, 201)
+    np.testing.assert_allclose(np.exp(1j * np.array(phases)), np.exp(4j * np.pi * t), atol=1e-9)
     assert 0.0 <= min(phases) and max(phases) < 2.0 * np.pi
 
 
-def test_a_fish_that_faces_backwards_keeps_turning_the_same_way():
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_fish_that_faces_backwards_keeps_turning_the_same_way(side):
     errors, e = [], 0.0
     for k in range(400):  # facing pi, swinging by 0.3 rad
-        measured = np.pi + 0.3 * np.sin(0.25 * k)
+        measured = side * (np.pi - 0.1 + 0.3 * np.sin(0.25 * k))
         e = continued(e, float(np.arctan2(np.sin(measured), np.cos(measured))))
         errors.append(e)
-    assert np.all(np.array(errors[1:]) > 2.0) or np.all(np.array(errors[1:]) < -2.0)
+    assert np.all(side * np.array(errors) > 2.0)
 
 
 def test_continued_error_comes_back_within_reach():
     assert continued(3.0, -2.0) == -2.0
+    assert continued(-3.0, 2.0) == 2.0
     assert continued(3.0, -3.1) == pytest.approx(2 * np.pi - 3.1)
     assert continued(0.1, 0.2) == pytest.approx(0.2)

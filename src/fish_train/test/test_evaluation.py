@@ -81,17 +81,18 @@ def test_metrics_of_known_errors() -> None:
         assert sizes.throttle_mean == pytest.approx(0.4, rel=1e-3)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("late", ["path", "heading", "speed"])
-def test_metrics_are_those_of_a_recorded_run(late: str) -> None:
+def test_metrics_are_those_of_a_recorded_run(late: str, side: float) -> None:
     """What `fish_train score` says of the same motion, with and without an approach that one error draws out."""
     fades = {
         name: np.maximum((4.0 if name == late else 1.0) - TIME, 0.0) for name in ("path", "heading", "speed")
     }
     stroke = np.sin(4.0 * np.pi * TIME)
     trace, path = straight_trace(
-        0.01 + 0.06 * fades["path"],
-        0.005 + 0.03 * fades["speed"] + 0.06 * stroke,
-        0.2 * stroke - 0.25 * fades["heading"],
+        side * (0.01 + 0.06 * fades["path"]),
+        side * (0.005 + 0.03 * fades["speed"] + 0.06 * stroke),
+        side * (0.2 * stroke - 0.25 * fades["heading"]),
     )
     x, y, psi, u, v, r = trace.motion[:, 0].T
     zeros = np.zeros(len(TIME), np.uint8)

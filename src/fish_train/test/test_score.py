@@ -51,14 +51,16 @@ def test_samples_after_the_end_of_an_open_path_do_not_count():
     assert np.abs(score.cross_track).max() < 1e-9
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("last", ["path", "heading", "speed"])
-def test_approach_ends_when_path_heading_and_speed_are_all_near(last):
+def test_approach_ends_when_path_heading_and_speed_are_all_near(last, side):
     t = np.arange(0.0, 9.0, 0.01)
     near = {name: 4.0 if name == last else 1.0 for name in ("path", "heading", "speed")}  # s
     y = np.maximum(0.05 + 0.05 * (near["path"] - t), 0.0)  # m, within 0.05 m from then on
     psi = -np.maximum(0.3 + 0.1 * (near["heading"] - t), 0.0)
     u = 0.2 - np.maximum(0.04 + 0.02 * (near["speed"] - t), 0.0)
-    score = score_motion(motion(t, -1.0 + 0.2 * t, y, psi, u), STRAIGHT, 0.2, 0.0, "truth")
+    u = 0.2 + side * (u - 0.2)
+    score = score_motion(motion(t, -1.0 + 0.2 * t, side * y, side * psi, u), STRAIGHT, 0.2, 0.0, "truth")
     assert score.approach_s == pytest.approx(4.0, abs=0.03)
     settled, whole = score.summaries(with_approach=False), score.summaries(with_approach=True)
     assert settled["cross-track, m"].maximum == pytest.approx(0.05 if last == "path" else 0.0, abs=1e-3)
