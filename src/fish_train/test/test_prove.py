@@ -1,54 +1,40 @@
-"""The blind study: labels that cannot be changed afterwards, runs that go on, scores that are right by hand."""
+"""The blind study: labels that cannot be changed afterwards, runs that go on, the oracle beside the tool."""
 
+from __future__ import annotations
+
+import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from prove_samples import diagnosis, small
 
-from fish_sim.effects import EFFECTS
-from fish_sim.ops import NUMPY
-from fish_sim.scheme import default_scheme
 from fish_train.commands.main import main
 from fish_train.diagnose.locate import MissingForce
 from fish_train.diagnose.own_force import acting, f1, own_force, regimes
-from fish_train.diagnose.vocabulary import candidates
-from fish_train.identify.experiment import build_experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
-from fish_train.prove import groups, tool_version
-from fish_train.prove.build import make_readings, make_world
+from fish_train.json_file import write_json
+from fish_train.prove import runner, tool_version
+from fish_train.prove.build import make_readings
 from fish_train.prove.judge import judged_table, rivals_table
-from fish_train.prove.mujoco_plant import MujocoPlant, model_text
-from fish_train.prove.nulls import null_table
 from fish_train.prove.oracle import Sight, as_experiment, detects, with_truth
-from fish_train.prove.other_forms import OTHER_FORMS
-from fish_train.prove.outside import OUTSIDE, known_to_the_plant
-from fish_train.prove.runner import run_study
+from fish_train.prove.runner import Job, run_study, run_world
 from fish_train.prove.score import score_world
 from fish_train.prove.seal import Sealed, broken_seals, seal_label
 from fish_train.prove.study import Study, StudyError, read_json
-from fish_train.prove.tables import ASKED, Share, calibration, choice, power, smallest_error
+from fish_train.prove.tables import Share
 from fish_train.prove.tool_version import tool_digest
-from fish_train.prove.truths import truths_of
 from fish_train.prove.where import dof_overlap, overlap, stated_range, stated_times, true_push
 from fish_train.prove.world import World
-from fish_train.recordings import read_dataset
-from fish_train.reports.prove_page import write_prove_page
 
 TOOL = (sys.executable, str(Path(__file__).with_name("fake_tool.py")))
-
-
-def small(group: str, number: int = 0, **changes) -> World:
-    world = groups.GROUPS[group](np.random.default_rng(5), number)
-    scheme = default_scheme(3)  # the kernel of other tests
-    changes = {"method": scheme.method, "substeps": scheme.substeps, **changes}
-    return replace(world, count=3, duration=4.0, **changes)
 
 
 def test_labels_cannot_be_changed_after_the_seal() -> None:
@@ -61,100 +47,137 @@ def test_labels_cannot_be_changed_after_the_seal() -> None:
     assert broken_seals(seals, {"a": sealed["a"]}) == ["b"]
 
 
-def test_worlds_are_drawn_from_the_seed_alone() -> None:
-    names = list(groups.GROUPS)
-    worlds = groups.draw_worlds(60, names, 7)
-    assert worlds == groups.draw_worlds(60, names, 7) != groups.draw_worlds(60, names, 8)
-    assert {w.group for w in worlds} == set(names)
-    assert all(World.of(w.label()) == w for w in worlds)
-    hidden = {groups.single(np.random.default_rng(0), k).names[0] for k in range(len(candidates()) + 1)}
-    assert hidden == {*candidates(), *OTHER_FORMS}
-    with pytest.raises(ValueError, match="known: single"):
-        groups.draw_worlds(3, ["nonsense"], 0)
+def three_worlds() -> list[World]:
+    return [small("single"), small("null"), small("outside", 4)]
 
 
-def test_no_outside_effect_is_in_the_vocabulary() -> None:
-    before = dict(EFFECTS)
-    assert not set(OUTSIDE) & set(candidates())
-    with known_to_the_plant():
-        assert set(OUTSIDE) < set(EFFECTS)
-    assert before == EFFECTS
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
+    """A study of three worlds that was stopped at its last one and went on; on the second the tool fails."""
+    study = Study.create(
+        tmp_path_factory.mktemp("ran") / "study",
+        three_worlds(),
+        {"seed": 1, "began": "today", "command": "test"},
+    )
+    seals, done = read_json(study.folder / "seals.json"), []
+    left = study.place("world_0000") / "recordings" / "half"  # of a run that was killed
+    left.mkdir(parents=True)
+    with pytest.raises(StudyError, match="world_0002: the tool was stopped"):
+        run_study(study, 1, done.append, TOOL)
+    stopped = SimpleNamespace(done=list(done), left=study.open_worlds)
+    run_study(study, 1, done.append, TOOL)
+    return SimpleNamespace(study=study, seals=seals, stopped=stopped, done=done)
 
 
-def test_another_form_of_a_name_counts_as_that_name() -> None:
-    flow, p = OTHER_FORMS["vortex"].water, SimpleNamespace(speed=0.04, at_x=0.3, at_y=-0.1, core=0.5)
-    velocity, ((a, b), (c, d)) = flow(p, 0.3, 0.4, None, NUMPY)  # a core above its middle
-    assert velocity == pytest.approx((-0.04, 0.0), abs=1e-15) and a + d == pytest.approx(0.0, abs=1e-15)
-    h = 1e-6
-    up, right = (flow(p, 0.2 + dx, 0.1 + dy, None, NUMPY)[0] for dx, dy in ((0.0, h), (h, 0.0)))
-    down, left = (flow(p, 0.2 - dx, 0.1 - dy, None, NUMPY)[0] for dx, dy in ((0.0, h), (h, 0.0)))
-    (a, b), (c, d) = flow(p, 0.2, 0.1, None, NUMPY)[1]
-    slopes = [(u - v) / (2 * h) for u, v in zip((*right, *up), (*left, *down), strict=True)]
-    assert slopes == pytest.approx([a, c, b, d], abs=1e-9)
-    world = groups.single(np.random.default_rng(0), len(candidates()))
-    assert world.names == ("vortex",) and truths_of(world) == ("nonuniform_current",)
-    assert truths_of(small("single")) is None
+@pytest.fixture
+def study(ran: SimpleNamespace, tmp_path: Path) -> Study:
+    """A copy of that study, nothing opened yet."""
+    shutil.copytree(ran.study.folder, tmp_path / "study")
+    return Study(tmp_path / "study")
 
 
-def test_a_study_is_sealed_first_goes_on_and_opens(tmp_path) -> None:
-    worlds = [small("single"), small("null"), small("outside", 4)]
-    study = Study.create(tmp_path / "study", worlds, {"seed": 1, "began": "today", "command": "test"})
-    seals = read_json(study.folder / "seals.json")
+def test_labels_stay_sealed_until_every_world_has_a_result(tmp_path: Path) -> None:
+    study = Study.create(tmp_path / "study", three_worlds(), {"seed": 1})
     assert (study.folder / "sealed.json").stat().st_mode & 0o077 == 0
     with pytest.raises(StudyError, match="3 worlds have no result"):
         study.reveal()
     with pytest.raises(StudyError, match="already"):
-        Study.create(tmp_path / "study", worlds, {})
-    left = study.place("world_0000") / "recordings" / "half"  # of a run that was killed
-    left.mkdir(parents=True)
-    done: list[str] = []
-    with pytest.raises(StudyError, match="world_0002: the tool was stopped"):
-        run_study(study, 1, done.append, TOOL)
-    assert done == ["world_0000", "world_0001"] and study.open_worlds == ["world_0002"]
-    run_study(study, 1, done.append, TOOL)
-    assert done[2:] == ["world_0002"]
-    run_study(study, 1, lambda name: pytest.fail(f"{name} ran twice"), TOOL)
-    results = study.results
-    told = results["world_0000"]["diagnosis"]["seen"]
+        Study.create(tmp_path / "study", three_worlds(), {})
+    assert not (study.folder / "labels.json").exists()
+
+
+def test_a_study_goes_on_where_it_was_stopped(ran: SimpleNamespace) -> None:
+    assert ran.stopped.done == ["world_0000", "world_0001"] and ran.stopped.left == ["world_0002"]
+    assert ran.done == ["world_0000", "world_0001", "world_0002"]
+    run_study(ran.study, 1, lambda name: pytest.fail(f"{name} ran twice"), TOOL)
+    assert read_json(ran.study.folder / "seals.json") == ran.seals
+
+
+def test_the_tool_is_given_the_recordings_and_no_more(ran: SimpleNamespace) -> None:
+    told = ran.study.results["world_0000"]["diagnosis"]["seen"]
     assert told["trials"] == ["trial_00", "trial_01", "trial_02"]
-    place = study.place("world_0000").resolve()
+    place = ran.study.place("world_0000").resolve()
     assert told["arguments"] == [str(place / "recordings"), "--out", str(place / "tool")]
-    assert "exit status 3: cannot" in results["world_0001"]["error"]
+    assert not (place / "recordings").exists()
+
+
+def test_an_opened_study_has_the_labels_that_were_sealed(study: Study) -> None:
     opened = study.reveal()
-    assert list(opened.values()) == worlds
-    assert read_json(study.folder / "seals.json") == seals
-    scores = [score_world(world, results[name]) for name, world in opened.items()]
+    assert list(opened.values()) == three_worlds()
+    assert {n: World.of(s["label"]) for n, s in read_json(study.folder / "labels.json").items()} == opened
+    scores = [score_world(world, study.results[name]) for name, world in opened.items()]
     assert [s.verdict for s in scores] == ["no_mismatch", "failed", "no_mismatch"]
-    write_prove_page(tmp_path / "report.html", [study.about], scores)
-    page = (tmp_path / "report.html").read_text()
-    assert (
-        "exit status 3: cannot" in page
-        and "Asked and measured" in page
-        and "http" not in page.split("plotly.js")[0].split("<script")[0]
-    )
-    other = Study.create(tmp_path / "other", worlds, {"seed": 2, "began": "later", "command": "again"})
+    assert "exit status 3: cannot" in scores[1].error
+    seals = study.folder / "seals.json"
+    seals.write_text(seals.read_text().replace(read_json(seals)["world_0001"], "0"))
+    with pytest.raises(StudyError, match="not what was sealed: world_0001"):
+        study.reveal()
+
+
+def test_finished_studies_of_one_version_are_pooled(study: Study, tmp_path: Path) -> None:
+    other = Study(Path(shutil.copytree(study.folder, tmp_path / "other")))
+    write_json(other.folder / "study.json", {"seed": 2, "began": "later", "command": "again"})
+    result = other.place("world_0002") / "result.json"
+    kept = result.read_bytes()
+    result.unlink()
     pool = ["prove", "--pool", str(study.folder), str(other.folder), "--out", str(tmp_path / "pooled")]
     assert main(pool) == 1  # nothing is said before every label may be opened
-    with pytest.raises(StudyError, match="stopped"):
-        run_study(other, 1, done.append, TOOL)
-    run_study(other, 1, done.append, TOOL)
+    result.write_bytes(kept)
     assert main(pool) == 0
     page = (tmp_path / "pooled" / "report.html").read_text()
     assert "6 worlds, 4 of them with something hidden; seed 1, today; seed 2, later" in page
-    newer = Study.create(tmp_path / "newer", worlds, {"tool": "0123456789abcdef"})
+    assert "exit status 3: cannot" in page and "Asked and measured" in page
+    newer = Study.create(tmp_path / "newer", three_worlds(), {"tool": "0123456789abcdef"})
     assert main([*pool[:2], str(study.folder), str(newer.folder), *pool[4:]]) == 1
     with pytest.raises(StudyError, match="got version 0123456789abcdef of the tool, expected"):
         newer.check_tool(tool_digest())
-    (study.folder / "seals.json").write_text('{"world_0000": "0"}')
-    with pytest.raises(StudyError, match="not what was sealed"):
-        study.reveal()
+
+
+@pytest.fixture
+def run_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, Any]]:
+    """The result of a world whose recordings are an empty folder, and whose tool is a line of Python."""
+    monkeypatch.setattr(runner, "make_world", lambda world, folder: folder.mkdir())
+
+    def result(tool: str, **changes: Any) -> dict[str, Any]:
+        command = (sys.executable, "-c", f"import os, pathlib, signal, sys, time; {tool}")
+        run_world(Job("a", small("null"), tmp_path, command, **changes))
+        return read_json(tmp_path / "result.json")
+
+    return result
+
+
+def test_a_tool_that_does_not_end_is_a_result(run_with, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "LONGEST", 0.2)
+    result = run_with("time.sleep(60)")
+    assert result["diagnosis"] is None and result["error"] == "no answer within 0.2 s"
+    assert 0.2 <= result["seconds"] < 30.0
+
+
+def test_of_a_tool_that_fails_the_last_words_are_kept(run_with) -> None:
+    result = run_with("sys.exit('first ' + 'x' * 3000 + ' last')")
+    assert result["error"].startswith("exit status 1: x") and result["error"].endswith(" last\n")
+
+
+def test_a_tool_that_somebody_stopped_is_no_result(run_with, tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="a: the tool was stopped"):
+        run_with("os.kill(os.getpid(), signal.SIGTERM)")
+    assert not (tmp_path / "result.json").exists()
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_recordings_are_kept_if_asked_and_the_tool_gets_its_threads(
+    run_with, tmp_path: Path, keep: bool
+) -> None:
+    write = "p = pathlib.Path(sys.argv[-1]); p.mkdir(); (p / 'diagnosis.json').write_text(os.environ['OMP_NUM_THREADS'])"
+    assert run_with(write, keep=keep, threads=3)["diagnosis"] == 3
+    assert (tmp_path / "recordings").exists() is keep
 
 
 def test_a_study_that_is_killed_leaves_no_tool_behind(tmp_path: Path) -> None:
     Study.create(tmp_path / "study", [small("null")], {"seed": 1})
     tool = "import os, sys, time, pathlib as p; (p.Path(sys.argv[1]) / 'pid').write_text(str(os.getpid())); time.sleep(600)"
     study = f"""from pathlib import Path
-from fish_train.prove.runner import run_study
+from fish_train.prove.runner import Job, run_study, run_world
 from fish_train.prove.study import Study
 run_study(Study(Path({str(tmp_path / "study")!r})), 1, print, ({sys.executable!r}, "-c", {tool!r}))
 """
@@ -191,110 +214,6 @@ def comes_true(condition: Callable[[], object], patience: float = 60.0) -> bool:
     while not condition() and time.monotonic() < end:
         time.sleep(0.05)
     return bool(condition())
-
-
-def test_recordings_say_what_the_instruments_read(tmp_path) -> None:
-    world = small("single", encoder=True)
-    make_world(world, tmp_path / "set")
-    data = read_dataset(tmp_path / "set")
-    assert not [p for trial in data for p in trial.problems if p.severity != "info"]
-    read, direct = build_experiment(list(data)), as_experiment(make_readings(world), True)
-    for key in ("commands", "gyro", "accel", "encoder"):
-        assert np.allclose(
-            getattr(read, key)[:-1], getattr(direct, key)[: len(read.commands) - 1], atol=1e-9, equal_nan=True
-        )
-    for a, b in zip(read.frames, direct.frames, strict=True):
-        turns = np.round((a.pose - b.pose) / (2.0 * np.pi)) * [
-            0.0,
-            0.0,
-            2.0 * np.pi,
-        ]  # a heading may wrap elsewhere
-        assert np.allclose(a.t, b.t, atol=1e-8) and np.allclose(a.pose - turns, b.pose, atol=1e-9)
-
-
-def test_the_hidden_effect_changes_the_motion_and_the_rest_stays() -> None:
-    hidden = small("outside", 4)
-    without = replace(hidden, effects={})
-    a, b, again = (make_readings(w)[0] for w in (hidden, without, hidden))
-    assert np.array_equal(a.truth, again.truth)
-    assert np.abs(a.truth - b.truth).max() > 1e-3
-
-
-def diagnosis(*effects, verdict="missing_physics", rivals=()) -> dict:
-    rows = [
-        {
-            "name": name,
-            "kind": kind,
-            "evidence": {"probability": p},
-            "rivals": [{"name": n, "probability": 0.1} for n in rivals],
-            "parameters": {"x": {"value": 0.031, "std": 0.0001}},
-        }
-        for name, kind, p in effects
-    ]
-    ranking = [{"name": "current", "gain": 9.0}, {"name": "quadratic_drag", "gain": 10.0}]
-    fit = {"with_effects": {"rms": {}}, "refitted": {"rms": {"2 s": {"position_m": 0.010}}}}
-    errors = {"current": 0.012, "wall_effect": 0.009}
-    refitted = [{"name": n, "held_out_rms": {"2 s": {"position_m": e}}} for n, e in errors.items()]
-    content = {"verdict": verdict, "effects": rows, "fit": fit, "ranking": ranking, "refitted": refitted}
-    return {"seconds": 60.0, "diagnosis": content}
-
-
-def test_scores_by_hand() -> None:
-    current = World("single", 1, {"current": {"x": 0.03, "y": 0.0}})
-    right = score_world(current, diagnosis(("current", "physics", 0.97), rivals=("tether",)))
-    assert right.top1 and right.in_set and right.exact and not right.confident_wrong
-    assert right.answered == {"current", "tether"}
-    assert [p.within for p in right.parameters] == [True]  # ten standard errors, but 3 %
-    wrong = score_world(current, diagnosis(("tether", "physics", 0.97), rivals=("current",)))
-    assert not wrong.top1 and wrong.in_set and wrong.confident_wrong and wrong.false_names == ("tether",)
-    nothing = score_world(World("null", 2), diagnosis(verdict="no_mismatch"))
-    assert not nothing.alarm and nothing.exact and not nothing.in_set
-    odd = score_world(World("outside", 3, {"jet": {"x": 0.1}}), diagnosis(verdict="unexplained"))
-    assert odd.unnamed and odd.alarm and not odd.truth
-    pair = World("two", 4, {"current": {}, "rudder_offset": {}})
-    half = score_world(pair, diagnosis(("current", "physics", 0.6)))
-    assert half.top1 and not half.in_set and not half.exact
-    lens = score_world(World("sensor", 5, {"camera_scale": {}}), diagnosis(("payload", "physics", 0.99)))
-    assert lens.called_physics
-    lost = diagnosis(("current", "physics", 0.97))  # what is not finite is null in the file
-    lost["diagnosis"]["ranking"][1]["gain"] = lost["diagnosis"]["refitted"][1]["held_out_rms"]["2 s"][
-        "position_m"
-    ] = None
-    assert choice(score_world(current, lost), lambda *_: 1.0) == "current"
-    lost["diagnosis"]["fit"]["refitted"]["rms"]["2 s"]["position_m"] = None
-    assert smallest_error(score_world(current, lost)) == "current"
-    assert choice(right, lambda name, _: 3.0 if name == "quadratic_drag" else 1.0) == "current"
-    assert choice(right, lambda *_: 20.0) is None
-    assert smallest_error(right) == "wall_effect"
-    assert smallest_error(replace(right, held_out={"current": 0.011})) is None
-    bins = calibration([right, wrong, half])
-    assert [(b.low, b.right.k, b.right.n) for b in bins] == [(0.5, 1, 1), (0.95, 1, 2)]
-
-
-def test_gains_of_null_worlds_by_hand() -> None:
-    worlds = [World("null", k, links=links) for k, links in enumerate((3, 3, 5))]
-    scores = [score_world(w, diagnosis(verdict="no_mismatch")) for w in worlds]
-    scores[0] = replace(scores[0], ranking={"current": 2.0, "tether": -np.inf})
-    table = null_table([*scores, score_world(World("single", 9, {"current": {}}), diagnosis())])
-    assert table.rows == [["3", "1", "2", "6.0", "10.0"], ["5", "1", "1", "10.0", "10.0"]]
-    assert "0.6 in the median" in table.note  # the larger of two chi square / 2 with one degree of freedom
-    assert null_table([]) is None
-
-
-def test_share_has_the_exact_interval() -> None:
-    low, high = Share(0, 100).interval
-    assert low == 0.0 and np.isclose(high, 1.0 - 0.025 ** (1 / 100))
-    assert str(Share(0, 0)) == "–"
-    assert len({a.what for a in ASKED}) == len(ASKED)
-
-
-def test_power_counts_per_strength() -> None:
-    scores = []
-    for i, (strength, name) in enumerate([(0.5, "tether"), (0.5, "current"), (1.0, "current")]):
-        world = World("ladder", i, {"current": {"x": 0.03}}, strength)
-        scores.append(score_world(world, diagnosis((name, "physics", 0.9))))
-    steps = power(scores, {0: True, 1: True, 2: False})
-    assert [(p.strength, p.found.k, p.found.n, p.oracle.k) for p in steps] == [(0.5, 1, 2, 2), (1.0, 1, 1, 0)]
 
 
 def test_overlap_of_times_and_degrees_of_freedom() -> None:
@@ -402,39 +321,3 @@ def test_a_competitor_finds_the_law_it_was_shown() -> None:
     name, share = _sparse(force(0.01), force(0.01))
     assert name == "current" and share < 1.0
     assert _sparse(force(0.0), force(0.0))[0] is None
-
-
-@pytest.fixture(scope="module")
-def basin():
-    """The second plant, nothing concealed, still water."""
-    pytest.importorskip("mujoco")
-    return lambda count, **effects: MujocoPlant(
-        model_text(5, {}, effects), count, 0.0, np.random.default_rng(0)
-    )
-
-
-def drive(plant, rudder: np.ndarray, seconds: float) -> np.ndarray:
-    """(T, M, 6) motion at 10 to 15 % throttle."""
-    plant.reset(np.zeros((len(rudder), 3)))
-    rows = []
-    for k in range(round(100 * seconds)):
-        rotor = min(1.0, 0.01 * k) * 50.0 * np.sin(2.0 * np.pi * 2.0 * 0.01 * k)
-        plant.step(np.column_stack([np.full(len(rudder), rotor), rudder]))
-        rows.append(plant.motion)
-    return np.array(rows)
-
-
-@pytest.mark.slow
-def test_the_second_plant_swims_and_turns_as_the_rudder_says(basin) -> None:
-    motion = drive(basin(3), np.array([0.0, 0.5, -0.5]), 6.0)[-200:].mean(axis=0)
-    assert 0.05 < motion[0, 3] < 0.3 and abs(motion[0, 5]) < 0.02
-    assert motion[1, 5] > 0.05 and motion[2, 5] < -0.05  # a positive rudder steers left
-
-
-def test_the_second_plants_wind_carries_the_fish(basin) -> None:
-    plant = basin(1, wind={"x": 0.05, "y": 0.0})
-    plant.reset(np.zeros((1, 3)))
-    for _ in range(300):
-        felt = plant.step(np.zeros((1, 2)))
-    assert 1e-4 < plant.pose[0, 0] < 0.15 and abs(plant.pose[0, 1]) < 1e-6
-    assert abs(felt.left[0]) < 1e-6

@@ -17,6 +17,7 @@ CONFIDENT = (
     0.9  # stated probability from which a wrong name counts as given with confidence; fixed before any run
 )
 NOTHING = "no_mismatch"
+FAILED = "failed"  # in place of a verdict
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,11 @@ class Score:
     held_out: Mapping[str, float] = field(default_factory=dict)
 
     @property
+    def has_answer(self) -> bool:
+        """The tool came to an end."""
+        return self.verdict != FAILED
+
+    @property
     def top1(self) -> bool:
         """The first name is a hidden one."""
         return bool(self.named) and self.named[0] in self.truth
@@ -67,13 +73,13 @@ class Score:
 
     @property
     def exact(self) -> bool:
-        """All hidden names and no other."""
-        return set(self.named) == set(self.truth)
+        """An answer with all hidden names and no other."""
+        return self.has_answer and set(self.named) == set(self.truth)
 
     @property
     def alarm(self) -> bool:
         """The tool says that something is missing."""
-        return self.verdict not in (NOTHING, "failed")
+        return self.has_answer and self.verdict != NOTHING
 
     @property
     def false_names(self) -> tuple[str, ...]:
@@ -108,7 +114,7 @@ def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] 
             world,
             names,
             unnamed,
-            "failed",
+            FAILED,
             (),
             names_given,
             none,

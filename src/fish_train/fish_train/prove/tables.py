@@ -56,7 +56,10 @@ class Share:
 
 @dataclass(frozen=True)
 class Asked:
-    """A number the project asks for, fixed before the run."""
+    """A number the project asks for, fixed before the run.
+
+    A world without an answer is never right; what must not happen is counted among answers, which alone can do it.
+    """
 
     what: str
     asked: str
@@ -69,19 +72,25 @@ def _one(s: Score) -> bool:
     return len(s.truth) == 1 and s.world.group in ("single", "sensor")
 
 
+def _answers(group: str) -> Callable[[Score], bool]:
+    """A world of this group to which the tool gave an answer."""
+    return lambda s: s.world.group == group and s.has_answer
+
+
 ASKED = (
     Asked("right name first, single effects", "at least 90 %", _one, lambda s: s.top1),
     Asked("truth in the answered set, single effects", "at least 98 %", _one, lambda s: s.in_set),
     Asked("right name first, closed loop only", "at most 5 points below open loop", lambda s: s.world.group == "feedback",
           lambda s: s.top1),
-    Asked("false alarms, nothing hidden", "at most 2 %", lambda s: s.world.group == "null", lambda s: s.alarm),
+    Asked("false alarms, nothing hidden", "at most 2 %", _answers("null"), lambda s: s.alarm),
     Asked("both of two effects", "at least 75 %", lambda s: s.world.group == "two", lambda s: set(s.truth) <= set(s.named)),
-    Asked("no false third name", "at least 95 %", lambda s: s.world.group == "two", lambda s: not s.false_names),
+    Asked("no false third name", "at least 95 %", lambda s: s.world.group == "two",
+          lambda s: s.has_answer and not s.false_names),
     Asked("no name exists: called unexplained", "at least 85 %", lambda s: s.unnamed and s.world.group == "outside",
           lambda s: s.verdict == "unexplained"),
-    Asked("no name exists: wrong name with confidence", "at most 5 %", lambda s: s.unnamed and s.world.group == "outside",
-          lambda s: s.confident_wrong),
-    Asked("sensor impostors called physics", "at most 3 %", lambda s: s.world.group == "sensor", lambda s: s.called_physics),
+    Asked("no name exists: wrong name with confidence", "at most 5 %",
+          lambda s: s.unnamed and s.world.group == "outside" and s.has_answer, lambda s: s.confident_wrong),
+    Asked("sensor impostors called physics", "at most 3 %", _answers("sensor"), lambda s: s.called_physics),
 )  # fmt: skip
 
 
@@ -103,7 +112,10 @@ def asked_table(scores: Sequence[Score]) -> Table:
     rows.append(
         ["seconds per data set, median (longest)", "180", f"{np.median(seconds):.0f} ({max(seconds):.0f})"]
     )
-    note = "Thresholds were fixed before the run. Intervals: exact, 95 %."
+    note = (
+        "Thresholds were fixed before the run. Intervals: exact, 95 %. A world without an answer is not right, and no evidence "
+        "that false alarms, confident wrong names or impostors called physics are few."
+    )
     return Table("Asked and measured", ["what", "asked", "measured"], rows, note)
 
 
@@ -122,7 +134,7 @@ def group_table(scores: Sequence[Score]) -> Table:
             group, str(len(own)), Share.of(named, lambda s: s.top1).short, Share.of(named, lambda s: s.in_set).short,
             f"{np.mean(sizes):.2f}" if sizes else "–", Share.of(named, lambda s: s.exact).short,
             Share.of(own, lambda s: bool(s.false_names)).short, Share.of(own, lambda s: s.alarm).short,
-            Share.of(own, lambda s: s.verdict == "unexplained").short, str(sum(s.verdict == "failed" for s in own)),
+            Share.of(own, lambda s: s.verdict == "unexplained").short, str(sum(not s.has_answer for s in own)),
             f"{np.median([s.seconds for s in own]):.0f}",
         ])  # fmt: skip
     note = "; ".join(f"{name}: {(f.__doc__ or '').strip().rstrip('.')}" for name, f in GROUPS.items())
@@ -147,7 +159,7 @@ def failure_table(scores: Sequence[Score]) -> Table:
     rows = [
         [s.world.group, ", ".join(s.world.names) or "nothing", " ".join(s.error.split())[:200]]
         for s in scores
-        if s.verdict == "failed"
+        if not s.has_answer
     ]
     return Table(
         "No answer",

@@ -32,7 +32,7 @@ def tables(
 ) -> list[Table]:
     """Everything that is printed as well."""
     steps = power(scores, oracle)
-    failed = [failure_table(scores)] if any(s.verdict == "failed" for s in scores) else []
+    failed = [failure_table(scores)] if any(not s.has_answer for s in scores) else []
     nulls = null_table(scores)
     shown = [asked_table(scores), group_table(scores), calibration_table(scores), criterion_table(scores)]
     shown += [power_table(steps)] if steps else []
