@@ -85,7 +85,7 @@ def draw_effect(name: str, strength: float, random: Random) -> dict[str, float]:
 def _strong(parameter: Parameter, strength: float, sign: float) -> float:
     """Neutral + strength (typical - neutral); a limit, which acts by being small, is the typical one over the strength."""
     typical = parameter.value if parameter.typical is None else parameter.typical
-    if parameter.value > 10.0 * abs(typical):
+    if parameter.value == parameter.highest:  # neutral where it can limit nothing
         return float(np.clip(typical / strength, parameter.lowest, parameter.highest))
     value = parameter.value + sign * strength * (typical - parameter.value)
     return float(np.clip(value, parameter.lowest, parameter.highest))
