@@ -21,10 +21,12 @@ from fish_train.diagnose.own_force import acting, f1, own_force, regimes
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
 from fish_train.json_file import write_json
+from fish_train.prove import judge as judging
 from fish_train.prove import runner, tool_version
 from fish_train.prove.build import make_readings
-from fish_train.prove.judge import judged_table, rivals_table
-from fish_train.prove.oracle import Sight, as_experiment, detects, with_truth
+from fish_train.prove.competitors import Rivals
+from fish_train.prove.judge import judge, judged_table, rivals_table
+from fish_train.prove.oracle import Looked, Sight, as_experiment, detects, look, with_truth
 from fish_train.prove.runner import Job, run_study, run_world
 from fish_train.prove.score import score_world
 from fish_train.prove.seal import Sealed, broken_seals, seal_label
@@ -292,6 +294,27 @@ def test_the_oracle_and_the_rivals_by_hand() -> None:
     }
     rows = rivals_table([right, null], said).rows
     assert rows[0][1].startswith("1/1") and rows[1][1].startswith("0/1") and rows[1][2].startswith("0/1")
+
+
+def test_the_judge_sees_a_hidden_current_as_the_oracle_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its fit from the true values predicts better, with the noise of the world; a current acts everywhere, so no times."""
+    seen: list[Looked] = []
+    monkeypatch.setattr(judging, "look", lambda *given: seen.append(look(*given)) or seen[0])
+    monkeypatch.setattr(judging, "compete", lambda *_: Rivals("current", 0.5, 0.6))
+    world = small("single", 1, encoder=True, noise=2.0)
+    assert world.names == ("current",)
+    content = judge(world, {"fit": {"held_out_trials": ["trial_02"]}, "effects": []})
+    sight = Sight.read(content["sight"])
+    assert detects(sight, []) and sight.gain > 100.0 and sight.parameters == 2
+    assert sight.rms_true[1][0] < 0.7 * sight.rms_nominal[1][0]
+    assert {k: content[k] for k in ("dof", "overlap", "f1")} == {"dof": None, "overlap": None, "f1": None}
+    assert content["rivals"] == {"sindy": "current", "sindy_r2": 0.5, "neural_r2": 0.6}
+    (looked,) = seen
+    assert looked.training.names == ("trial_00", "trial_01") and looked.held_out.names == ("trial_02",)
+    assert looked.true.noise.gyro == pytest.approx(2.0 * Noise().gyro, rel=0.1)
+    for key, true in world.effects["current"].items():
+        name = f"current.{key}"
+        assert looked.true.values[name] == pytest.approx(true, abs=4.0 * looked.true.standard_errors[name])
 
 
 def test_a_competitor_finds_the_law_it_was_shown() -> None:

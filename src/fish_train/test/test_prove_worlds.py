@@ -12,6 +12,8 @@ from prove_samples import small
 
 from fish_sim.effects import EFFECTS
 from fish_sim.ops import NUMPY
+from fish_sim.robot import Robot
+from fish_sim.scheme import default_scheme
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose.vocabulary import candidates
 from fish_train.identify.experiment import build_experiment
@@ -20,6 +22,7 @@ from fish_train.identify.fit import evaluate
 from fish_train.identify.synthetic import FULL_SPEED
 from fish_train.prove import groups
 from fish_train.prove.build import make_readings, make_world
+from fish_train.prove.fish_sim_plant import FishSimPlant
 from fish_train.prove.instruments import TRANSPORT, Errors, Instruments
 from fish_train.prove.mujoco_effects import CONCEALED
 from fish_train.prove.mujoco_plant import MujocoPlant, model_text
@@ -181,6 +184,21 @@ def test_trials_are_open_loop_under_feedback_or_at_one_speed() -> None:
     assert np.array_equal(rotor[:, 0], rotor[:, 1]) and np.array_equal(rotor[:, 0], rotor[:, 2])
     assert np.abs(rotor[second]).max() == pytest.approx(np.sqrt(0.15) * FULL_SPEED, rel=0.01)
     assert not np.array_equal(one.commands[:, 0, 1], one.commands[:, 1, 1])
+    np.testing.assert_allclose(  # the phase that is recorded is that of the speed
+        rotor[second, 0], np.sqrt(0.15) * FULL_SPEED * np.sin(one.phase[second, 0]), atol=1e-9
+    )
+
+
+def test_the_water_pushes_a_fish_as_long_and_as_hard_as_it_says() -> None:
+    """An Ornstein-Uhlenbeck process that is stationary from the start: 3 and 6 mN, 0.15 mN m, for 0.2 s."""
+    plant = FishSimPlant(Robot(), default_scheme(3), 300, 2.0, np.random.default_rng(0))
+    first = plant._push
+    for _ in range(20):
+        plant.step(np.zeros((300, 2)))
+    for push in (first, plant._push):
+        np.testing.assert_allclose(push.std(axis=0), [0.006, 0.012, 3e-4], rtol=0.15)
+    kept = (first * plant._push).mean(axis=0) / (first.std(axis=0) * plant._push.std(axis=0))
+    np.testing.assert_allclose(kept, np.exp(-1.0), atol=0.15)
 
 
 def test_a_program_whose_way_fits_nowhere_is_swum_more_slowly(monkeypatch: pytest.MonkeyPatch) -> None:
