@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fish_sim.robot import Robot, load_robot
 from fish_train.identify.coverage import Repetition, repeat, scored, summarise
-from fish_train.identify.experiment import Experiment
+from fish_train.identify.experiment import Experiment, Frames
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.identification import NOT_CHOSEN, Identification, data_statements, identify, split
+from fish_train.identify.identification import (
+    NOT_CHOSEN,
+    Identification,
+    data_statements,
+    entangled,
+    identify,
+    lost_statements,
+    split,
+    verdict,
+)
+from fish_train.identify.prediction import ErrorSizes, predict, prediction_errors
 from fish_train.identify.record import write_identification
 from fish_train.identify.synthetic import program, record
 from fish_train.reports.identify_page import write_identify_page
@@ -72,6 +83,7 @@ def test_files_and_page(found: Identification, tmp_path) -> None:
     assert robot.parameters["tail_stiffness"] == pytest.approx(found.fit.values["tail_stiffness"])
     assert "std:" in (tmp_path / "robot.yaml").read_text()
     content = json.loads((tmp_path / "identification.json").read_text())
+    assert all(entry["determined"] for entry in content["parameters"].values())
     assert set(content["parameters"]) == set(FREE)
     assert content["held_out_trials"] == ["synthetic_03"]
     write_identify_page(tmp_path / "report.html", found, content["left_out"])
@@ -125,6 +137,51 @@ def test_missing_imu_is_named_per_trial() -> None:
     pair = experiment_of(("sines", "turn"), 3.0)
     pair.gyro[:, 1] = np.nan
     assert any(text.startswith("no IMU in synthetic_01") for text in data_statements(pair, pair))
+
+
+def test_a_late_camera_is_taken_out_and_given_to_the_robot() -> None:
+    """So that the robot that comes back predicts the recordings as they are."""
+    trials = experiment_of(("sines",), 6.5)
+    late = replace(trials, frames=tuple(Frames(f.t + 0.3, f.pose) for f in trials.frames))
+    result = identify(late, Robot().with_parameters(tail_stiffness=0.08), free=("head_drag_surge",))
+    assert result.robot.sensors["camera_latency"]["delay"] == pytest.approx(0.3, abs=0.011)
+    assert any("older than their stamps" in text for text in result.statements)
+    raw = prediction_errors(predict(late, result.robot, result.fit.noise, 1.0, 1.0, 2.0), (1.0,))
+    assert raw.counts.sum() >= 3
+    assert raw.rms[0, 0] == pytest.approx(result.errors["identified"].rms[0, 0], rel=0.3)
+
+
+def test_parameters_that_only_their_sum_or_difference_tells_are_entangled() -> None:
+    covariance = np.array([[4.0, -3.9, 0.1], [-3.9, 4.0, 0.0], [0.1, 0.0, 1.0]])
+    fit = SimpleNamespace(covariance=covariance, hypothesis=SimpleNamespace(free=("a", "b", "c")))
+    assert entangled(fit) == [("a", "b", pytest.approx(-0.975))]
+
+
+def test_the_verdict_is_given_against_the_best_baseline_of_each_number() -> None:
+    def sizes(*rms: float) -> ErrorSizes:
+        return ErrorSizes((1.0,), np.array([rms]), np.zeros((1, 1, 3)), np.ones((1, 1), dtype=int))
+
+    mine, ahead = sizes(0.02, 0.03, 0.01), sizes(0.01, 0.02, 0.01)
+    errors = {"identified": mine, "constant": sizes(0.05, 0.029, 0.02), "arx": sizes(0.03, 0.04, np.nan)}
+    errors |= {f"{k}_ahead": v for k, v in {"identified": ahead, "constant": mine}.items()}
+    past, more = verdict(errors)
+    assert (
+        past
+        == "the physics model does NOT beat the baselines in heading at 1 s (0.03 against 0.029, constant)"
+    )
+    assert "does NOT" in more and "speed at 1 s" in more and "position" not in more  # as good is not better
+    errors["constant_ahead"] = sizes(1.0, 1.0, 1.0)
+    assert verdict(errors)[1].startswith(
+        "the physics model beats all baselines where all know 0.5 s of what comes"
+    )
+    assert verdict({"identified": mine}) == []
+
+
+def test_trials_in_which_the_filter_is_lost_are_named() -> None:
+    training = SimpleNamespace(names=("a", "b", "c"))
+    (text,) = lost_statements(training, SimpleNamespace(log_likelihood=np.array([1.0, np.nan, -np.inf])))
+    assert "loses the fish in b, c " in text
+    assert lost_statements(training, SimpleNamespace(log_likelihood=np.zeros(3))) == []
 
 
 @pytest.mark.parametrize("seed", [112, 125, 145])  # without several starts the tail's inertias end elsewhere

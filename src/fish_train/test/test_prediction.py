@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
+from fish_sim.step import Stepper
 from fish_train.identify import prediction
 from fish_train.identify.baselines import constant, fit_baselines, predict_baseline
 from fish_train.identify.experiment import Experiment, Frames
@@ -76,18 +77,60 @@ def test_a_filter_that_diverges_begins_anew(quiet: Experiment, monkeypatch: pyte
     np.testing.assert_allclose(broken.velocity[400:800, 1, 0], whole.velocity[400:800, 1, 0], atol=0.03)
 
 
-def test_camera_errors_of_the_model_are_in_what_it_predicts(quiet: Experiment) -> None:
-    wrong = _with_heading_offset(0.1)
-    turned = tuple(Frames(f.t, f.pose + np.array([0.0, 0.0, 0.1])) for f in quiet.frames)
-    errors = prediction_errors(predict(replace(quiet, frames=turned), wrong, QUIET, 1.0, 1.0, 1.0), (1.0,))
-    assert errors.rms[0, 1] < 5e-3
+CAMERA_ERRORS = {
+    "camera_heading_offset": ("offset", 0.1, lambda f: Frames(f.t, f.pose + [0.0, 0.0, 0.1])),
+    "camera_scale": ("factor", 1.05, lambda f: Frames(f.t, f.pose * [1.05, 1.05, 1.0])),
+    "camera_latency": ("delay", 0.2, lambda f: Frames(f.t + 0.2, f.pose)),
+}
 
 
-def _with_heading_offset(value: float) -> Robot:
-    from fish_sim.sensors import SENSOR_EFFECTS
+@pytest.mark.parametrize("name", CAMERA_ERRORS)
+def test_camera_errors_of_the_model_are_in_what_it_predicts(quiet: Experiment, tmp_path, name: str) -> None:
+    key, value, wrong = CAMERA_ERRORS[name]
+    robot = ROBOT.with_effect(name, **{key: value})
+    seen = replace(quiet, frames=tuple(map(wrong, quiet.frames)))
+    predictions = predict(seen, robot, QUIET, 1.0, 1.0, 1.0)
+    assert np.all(prediction_errors(predictions, (1.0,)).rms[0] < [1e-3, 5e-3, 5e-3])
+    write_predictions(tmp_path / "table.csv", predictions)
+    with (tmp_path / "table.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        assert abs(float(row["predicted_x"]) - float(row["measured_x"])) < 3e-3
+        assert float(row["start"]) - 1e-9 <= float(row["time"]) - (0.2 if name == "camera_latency" else 0.0)
 
-    (key,) = SENSOR_EFFECTS["camera_heading_offset"].parameters
-    return ROBOT.with_effect("camera_heading_offset", **{key: value})
+
+def test_an_unexplained_force_dies_away_with_the_waters_time(quiet: Experiment) -> None:
+    """Against a force that is told to the simulator anew at every step."""
+    noise, push, start = replace(Noise(), wrench_time=0.3), np.array([0.05, -0.04, 1e-3]), 100
+    state = prediction.estimate(quiet, ROBOT, QUIET).state[start, :1]
+    found = prediction._simulate(quiet, ROBOT, noise, np.array([[0, start]]), state, push[None], 120)
+    robot = ROBOT.with_effect("disturbance")
+    stepper = Stepper.of(robot)
+    for k in range(120):
+        now = push * np.exp(-(k + 0.5) * 0.01 / 0.3)
+        p = stepper.parameters(robot.with_effect("disturbance", surge=now[0], sway=now[1], yaw=now[2]))
+        state = stepper.step(state, quiet.commands[start + k, :1], p[None])
+    np.testing.assert_allclose(found[120, 0], state[0, :3], atol=3e-4)
+    free = prediction._simulate(quiet, ROBOT, noise, np.array([[0, start]]), state, np.zeros((1, 3)), 120)
+    assert np.abs(found[120] - free[120]).max() > 0.01
+
+
+def test_velocities_of_the_body_are_those_of_the_pool_turned() -> None:
+    """Heading north-west and moving west: ahead and to the left alike."""
+    state = np.zeros((1, 14))
+    state[0, 2], state[0, 6:9] = 0.75 * np.pi, (-0.2, 0.0, 0.7)
+    u, v, r = prediction.body_velocity(state, 3)[0]
+    assert (u, v, r) == pytest.approx((0.2 / np.sqrt(2.0), 0.2 / np.sqrt(2.0), 0.7))
+
+
+def test_a_heading_a_whole_turn_off_is_no_error() -> None:
+    t = np.arange(0.0, 2.0, 1 / 30)
+    pose = np.column_stack([0.1 * t, 0.0 * t, 0.0 * t])
+    squares, count = prediction._squares(
+        t, pose, (pose + [0.03, 0.04, 2.0 * np.pi + 0.1])[:, None], np.array([1.0])
+    )
+    assert count == 1
+    np.testing.assert_allclose(squares[:2], [0.05**2, 0.1**2])
 
 
 def test_bad_horizon_is_refused(quiet: Experiment) -> None:
@@ -151,6 +194,17 @@ def test_constant_baseline_follows_a_circle(lead: float) -> None:
     errors = prediction_errors(predict_baseline(constant(), like, lead), (1.0, 2.0))
     assert np.all(errors.rms[:, 0] < 2e-3)  # the chord of a second's window
     assert np.all(errors.rms[:, 1:] < 1e-3)
+
+
+def test_headings_of_the_table_are_wrapped(tmp_path) -> None:
+    experiment = circling(0.2, 0.5)  # 4 rad in all
+    write_predictions(tmp_path / "table.csv", predict(experiment, ROBOT, Noise(), 2.0))
+    with (tmp_path / "table.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    headings = np.array([[float(row["measured_heading"]), float(row["predicted_heading"])] for row in rows])
+    assert headings.min() < -2.0 and np.abs(headings).max() <= np.pi
+    expected = 0.5 * np.array([float(row["time"]) for row in rows])
+    np.testing.assert_allclose(headings[:, 0], np.angle(np.exp(1j * expected)), atol=1e-6)
 
 
 def test_a_baseline_with_a_lead_knows_nothing_of_what_comes() -> None:
