@@ -1,5 +1,6 @@
 """Gains from three models and from the plant itself: what is searched, what is judged, and how the gap is shared out."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -102,6 +103,9 @@ def test_the_gap_is_shared_out_by_hand() -> None:
     table = loop_table(rows)
     assert [r[2] for r in table.rows] == ["0%", "80%", "100%"]
     assert table.rows[1][4] == "no gap"
+    assert [r[1] for r in table.rows] == ["30.0", "14.0", "10.0"]  # mm
+    lost = replace(rows[1], metrics=replace(rows[1].metrics, failure="left the pool"))
+    assert [r[5] for r in loop_table([rows[0], lost, rows[2]]).rows] == ["0 of 1", "1 of 1", "0 of 1"]
     assert [box.y[0] for box in loop_figure(rows).data] == pytest.approx([30.0, 14.0, 10.0])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -219,6 +220,9 @@ def test_what_the_data_cannot_say_is_said():
     assert "current" not in reasons
     blind = type(still)(**{**still.__dict__, "gyro": np.full_like(still.gyro, np.nan)})
     assert out_of_reach(blind)["gyro_scale"] == "no IMU was recorded"
+    drifting = type(still)(**{**still.__dict__, "commands": still.commands * [0.0, 1.0]})
+    told = {name for name, why in out_of_reach(drifting).items() if why == "the rotor never moved"}
+    assert told == {"rotor_lag", "rotor_saturation", "battery_sag", "rotor_imbalance"}
 
 
 def test_an_effect_of_the_user_competes_with_the_others(monkeypatch):
@@ -240,6 +244,14 @@ def test_held_out_trials_take_no_part():
     assert sorted((*split.training, *split.held_out)) == list(range(7))
 
 
+def test_the_search_uses_the_four_training_trials_that_are_excited_most():
+    fish = swim(Robot(), kinds=("sines",) * 9, duration=1.0)
+    still = fish.commands * np.isin(range(9), (0, 3, 4, 7, 8))[:, None]  # 2, 5 and 8 are held out
+    split = split_trials(replace(fish, commands=still))
+    assert split.held_out == (2, 5, 8)
+    assert split.search == (0, 3, 4, 7) and split.check == (1, 6)
+
+
 def test_a_search_sees_the_training_trials_and_knows_which_of_them_it_has_not_fitted():
     fish = swim(Robot(), kinds=("sines",) * 9, duration=1.0)
     split = split_trials(fish)
@@ -253,6 +265,10 @@ def test_the_level_is_checked_and_probabilities_add_up():
         Level(0.9)
     assert Level(0.001).enough(100, 1, 30) > Level(0.1).enough(100, 1, 30)
     odds = probabilities({"a": -100.0, "b": -110.0, "c": -500.0})
+    assert Level(0.02).enough(0, 2, 30) == pytest.approx(
+        4.0 * np.log(30 / 0.02)
+    )  # chi square of two is exponential
+    assert Level().enough(1e6, 1, 30) == 1000.0  # a thousandth of a nat per measurement
     assert sum(odds.values()) == pytest.approx(1.0)
     assert odds["a"] > odds["b"] > odds["c"]
 
@@ -273,6 +289,42 @@ def test_the_next_experiment_follows_what_is_open():
     assert "unexplained" in turning["why"] and {row["rudder"] for row in turning["program"]} == {0.5, -0.5}
     rivals = next_experiment(["rudder_lag"], ["rudder_delay"])
     assert rivals["why"].startswith("tell rudder_lag from rudder_delay")
+    told_apart = next_experiment(["current"], ["quadratic_drag"])  # by what the rival shows best in: coasting
+    assert 0.0 in {row["amplitude"] for row in told_apart["program"]}
+
+
+@pytest.mark.parametrize(
+    ("names", "much", "share", "verdict", "named"),
+    [
+        (("current", "rudder_lag"), False, 0.9, "missing_physics", 2),
+        (("rudder_lag", "gyro_scale"), False, 0.0, "sensor_or_actuator", 2),
+        (("current",), True, 0.4, "missing_physics", 1),
+        (("current",), True, 0.6, "unexplained", 0),
+        ((), True, 0.0, "unexplained", 0),
+        ((), False, 1.0, "no_mismatch", 0),
+    ],
+)
+def test_names_stand_unless_they_leave_more_than_they_explain(
+    monkeypatch, names, much, share, verdict, named
+):
+    monkeypatch.setattr(verdicts, "much_is_left", lambda _: much)
+    monkeypatch.setattr(verdicts, "unexplained_share", lambda _: share)
+    found = SimpleNamespace(accepted=tuple(SimpleNamespace(name=name) for name in names))
+    assert verdicts.verdict(found) == verdict and len(verdicts.named(found)) == named
+
+
+def test_effects_share_out_their_gains_and_name_plausible_rivals_only(monkeypatch):
+    def accepted(name, gain):
+        return Accepted(name, SimpleNamespace(gain=lambda _: gain, ranking=range(30)), {})
+
+    monkeypatch.setattr(answers, "where_entry", lambda *_: {})
+    monkeypatch.setattr(answers, "effect_parameters", lambda *_: {})
+    monkeypatch.setattr(answers, "competition", lambda a, _: {a.name: 0.9, "tether": 0.085, "payload": 0.015})
+    found = SimpleNamespace(accepted=(accepted("current", 300.0), accepted("tip_slip", 100.0)), final=None)
+    first, second = (answers.effect_entry(found, a) for a in found.accepted)
+    assert (first["share"], second["share"]) == (0.75, 0.25)
+    assert first["rivals"] == [{"name": "tether", "probability": 0.085}]
+    assert first["evidence"]["log_likelihood_gain"] == 300.0 and first["kind"] == "physics"
 
 
 def test_of_two_effects_each_has_its_own_place():

@@ -45,6 +45,21 @@ def test_of_many_numbers_the_sentence_tells_the_surest():
     assert told.endswith("The tail is modelled with 4 links instead of 3.")
 
 
+@pytest.mark.parametrize(
+    ("nearest", "told"),
+    [
+        ([], "unexplained: yaw = (0.001) cos(heading)."),
+        (
+            ["current"],
+            "unexplained: yaw = (0.001) cos(heading). Without explaining the most of it, current would help.",
+        ),
+    ],
+)
+def test_what_no_name_explains_is_told_with_the_names_that_would_help(nearest, told):
+    left = {"description": "yaw = (0.001) cos(heading)", "nearest": nearest}
+    assert sentence({**content(), "verdict": "unexplained", "unexplained": left}) == told
+
+
 def test_bins_of_a_rudder_that_stays_at_its_stop_hold_means_and_no_zeros():
     random = np.random.default_rng(0)
     rudder = np.clip(random.normal(0.0, 1.0, 2000), -0.5, 0.5)

@@ -137,6 +137,21 @@ def smoothed_surge(data, noise: Noise) -> float:
     return float(np.mean(xi[200:-100, 0, nx]))
 
 
+def test_a_smoothed_state_is_as_sure_as_it_says_and_surer_than_the_filtered_one() -> None:
+    data, truth = experiment(Robot(), 6.0, ("sines", "steps", "random"))
+    fit = evaluate(nominal_hypothesis(Robot(), ()), np.zeros(0), data, Noise(), keep=True)
+    xi, deviation = smooth(fit.result.history)
+    filtered = np.sqrt(np.diagonal(fit.result.history.filtered_P, axis1=2, axis2=3))
+    pose, inner = slice(0, 3), slice(100, 500)
+    z = (xi[inner, :, pose] - truth.state[inner, :, pose]) / deviation[inner, :, pose]
+    size = np.sqrt(np.mean(z**2, axis=(0, 1)))  # of few independent samples: an error of a pose lasts
+    assert np.all((0.6 < size) & (size < 1.7))
+    assert np.all(deviation[inner, :, pose] < 0.9 * filtered[inner, :, pose])
+    error = np.mean(np.square(xi[inner, :, pose] - truth.state[inner, :, pose]), axis=(0, 1))
+    causal = fit.result.history.filtered[inner, :, pose] - truth.state[inner, :, pose]
+    assert np.all(error < np.mean(causal**2, axis=(0, 1)))
+
+
 def test_a_short_trial_is_smoothed_beside_a_long_one_as_alone():
     data, _ = experiment(Robot(), 1.5, ("sines", "steps"))
     uneven = replace(data, steps=np.array([150, 90]))

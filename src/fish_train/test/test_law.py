@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from fish_sim.effects import EFFECTS
+from fish_sim.effects.effect import BodyMotion, Drive
+from fish_sim.ops import NUMPY
+from fish_sim.pool import LENGTH, WIDTH
 from fish_sim.robot import Robot
-from fish_train.diagnose.free_force import TERMS, known_to_the_filter
-from fish_train.diagnose.law import describe, forward
+from fish_train.diagnose.free_force import TERMS, known_to_the_filter, regressors
+from fish_train.diagnose.law import cross_validated, describe, forward
 from fish_train.diagnose.quadratic import Quadratic
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
@@ -57,6 +60,17 @@ def test_a_term_that_gains_no_more_than_chance_is_not_chosen():
     assert forward(Quadratic(np.array([0.0, weak, strong]), np.eye(3), 1), (1, 2)) == [2]
 
 
+@pytest.mark.parametrize(
+    ("pulls", "gain"), [((1, 1, 1, 1), 4 * 50.0), ((1, 1, 1, -1), 3 * 250.0 / 9.0 - 150.0)]
+)
+def test_a_law_is_judged_on_the_trial_it_was_not_chosen_on(pulls: tuple[int, ...], gain: float) -> None:
+    """Four trials of normal matrix 1, a term pulled by 10 each: steps of 10, or of 10 / 3 where one of three pulls back."""
+    gradients = -10.0 * np.column_stack([np.zeros(4), pulls])
+    normals = np.tile(np.eye(2), (4, 1, 1))
+    found = cross_validated(gradients, normals, np.zeros(1), np.array([1e6]), (1,))
+    assert found == pytest.approx(gain, rel=1e-6)
+
+
 def test_terms_that_nothing_tells_apart_do_no_harm():
     normal = np.array(
         [[2.0, 1.0, 1.0, 0.0], [1.0, 3.0, 3.0, 0.0], [1.0, 3.0, 3.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
@@ -65,6 +79,15 @@ def test_terms_that_nothing_tells_apart_do_no_harm():
     chosen = forward(cost, (1, 2, 3))
     assert 3 not in chosen  # never excited
     assert cost.cost(cost.best_step(chosen)) == pytest.approx(cost.cost(cost.best_step([1])), rel=1e-6)
+
+
+@pytest.mark.parametrize(("x", "y"), [(LENGTH / 2 - 0.2, 0.0), (0.0, 0.2 - WIDTH / 2)])
+def test_a_wall_is_felt_less_by_a_factor_e_two_decimetres_away(x, y):
+    body = BodyMotion("head", x, y, 0.6, 0.8, 0.2, -0.1, 0.5, 0.0, 0.0, 0.0)
+    terms = regressors(body, 3.0, Drive(-0.4, 0.0, 20.0, 0.0), NUMPY)
+    assert terms["surge_speed exp(-wall_distance/0.2 m)"] == pytest.approx(0.2 / np.e)
+    assert terms["rudder |rudder|"] == pytest.approx(-0.16) and terms["time yaw_rate"] == 1.5
+    assert terms["cos(heading)"] == 0.6 and terms["surge_speed rudder"] == pytest.approx(-0.08)
 
 
 def test_the_free_force_is_no_candidate():

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
+from fish_train.identify.experiment import Experiment, Frames, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.identification import is_wrong
-from fish_train.identify.outlook import Outlook, fit_outlook
+from fish_train.identify.outlook import Outlook, _huber, fit_outlook
 from fish_train.identify.synthetic import program, record
 
 FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
@@ -44,6 +47,41 @@ def test_truth_comes_back(outlook: Outlook) -> None:
     found = fit_outlook(start, outlook.experiment)
     for name, value in found.values.items():
         assert value == pytest.approx(TRUTH.parameters[name], rel=0.1), name
+
+
+CAMERA_ERRORS = {
+    "camera_heading_offset": ({"offset": 0.3}, lambda f: Frames(f.t, f.pose + [0.0, 0.0, 0.3])),
+    "camera_scale": ({"factor": 1.2}, lambda f: Frames(f.t, f.pose * [1.2, 1.2, 1.0])),
+    "camera_latency": ({"delay": 0.2}, lambda f: Frames(f.t + 0.2, f.pose)),
+}
+
+
+@pytest.mark.parametrize("name", CAMERA_ERRORS)
+def test_a_camera_s_error_that_the_model_knows_costs_nothing(outlook: Outlook, name: str) -> None:
+    values, wrong = CAMERA_ERRORS[name]
+    seen = replace(outlook.experiment, frames=tuple(map(wrong, outlook.experiment.frames)))
+
+    def size(experiment: Experiment, robot: Robot) -> float:
+        judge = Outlook(experiment, nominal_hypothesis(robot, FREE))
+        judge.start_from(np.zeros(len(FREE)), NOISE)
+        return float(np.sqrt(np.mean(np.square(judge.errors(np.zeros(len(FREE)), False)[0]))))
+
+    right = size(outlook.experiment, TRUTH)
+    assert size(seen, TRUTH.with_effect(name, **values)) == pytest.approx(right, rel=0.15)
+    assert size(seen, TRUTH) > 1.5 * right
+
+
+def test_far_errors_pull_no_harder_than_three() -> None:
+    e = np.linspace(-10.0, 10.0, 2001)
+    pull = np.gradient(_huber(e), e)
+    np.testing.assert_allclose(pull, np.clip(e, -3.0, 3.0), atol=0.011)
+
+
+def test_nothing_is_foretold_of_what_lies_beyond_a_trial_s_end(outlook: Outlook) -> None:
+    """Images may go on after the last command that is used."""
+    short = Outlook(shorten(outlook.experiment, 500), nominal_hypothesis(Robot(), FREE))
+    last = [short.starts[t.start, 1] + t.position.max() for found in short.targets.values() for t in found]
+    assert 450 < max(last) <= 498
 
 
 def test_sensors_far_noisier_than_said_tell_of_a_wrong_model(outlook: Outlook) -> None:

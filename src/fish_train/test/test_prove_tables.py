@@ -12,6 +12,7 @@ from prove_samples import diagnosis
 from fish_train.prove.nulls import null_table
 from fish_train.prove.score import ParameterError, Score, score_world
 from fish_train.prove.tables import (
+    Power,
     Share,
     aic_cost,
     asked_table,
@@ -27,7 +28,7 @@ from fish_train.prove.tables import (
     smallest_error,
 )
 from fish_train.prove.world import World
-from fish_train.reports.prove_page import tables, write_prove_page
+from fish_train.reports.prove_page import _confusion, _power, tables, write_prove_page
 
 CURRENT = World("single", 1, {"current": {"x": 0.03, "y": 0.0}})
 
@@ -215,6 +216,14 @@ def test_power_counts_names_and_rivals_per_strength() -> None:
     ]
 
 
+def test_bars_of_the_power_curve_reach_to_both_ends_of_the_interval() -> None:
+    found = Share(9, 10)
+    (line,) = _power([Power(1.0, found, None)]).data
+    low, high = found.interval
+    assert line.y == (0.9,) and line.error_y.array == pytest.approx([high - 0.9])
+    assert line.error_y.arrayminus == pytest.approx([0.9 - low])
+
+
 def test_competitors_are_judged_on_worlds_with_one_name_and_on_nulls() -> None:
     single = answered("single", ("current",), "tether")
     found = replace(single, ranking={"current": 30.0, "quadratic_drag": 20.0}, held_out={"current": 0.009})
@@ -244,8 +253,6 @@ def test_the_page_counts_each_hidden_thing_against_the_first_answer(tmp_path) ->
     assert "5 worlds, 4 of them with something hidden; seed 7, today" in page
     shown = [table.title for table in tables(scores)]
     assert "No answer" in shown and "Detection power over strength" not in shown
-    from fish_train.reports.prove_page import _confusion
-
     heat = _confusion(scores).data[0]
     counted = {
         (h, a): n

@@ -20,7 +20,7 @@ from fish_train.reports.diagnosis_figures import program, water_over_the_pool, w
 from fish_train.reports.identify_tables import bias_table, error_table, parameter_table
 from fish_train.reports.recording_figures import figures, over_time, path_figure, timing_figure
 from fish_train.reports.recording_tables import clocks_table, problems_table, topics_table, trials_table
-from fish_train.reports.run_page import _lead, _pool, _speed
+from fish_train.reports.run_page import _lead, _pool, _pool_note, _speed
 from fish_train.score import score_motion
 
 
@@ -135,6 +135,10 @@ def test_the_page_of_a_run_sets_the_approach_apart(run) -> None:
         "Scored against the simulator's true pose."
     )
     assert [line.y[100] for line in _speed(run).data] == pytest.approx([0.19, 0.19])
+    assert (
+        _pool_note(run) == f"The approach phase took {run.approach_s:.1f} s." and 4.0 < run.approach_s < 5.1
+    )
+    assert "never ended" in _pool_note(SimpleNamespace(approach_s=np.nan))
 
 
 def test_the_next_experiment_is_drawn_until_its_last_row_is_over() -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from fish_sim.robot import Robot
-from fish_train.diagnose import unseen
+from fish_train.diagnose import growth, unseen
 from fish_train.diagnose.decide import SMALLEST_CHECK, Level
 from fish_train.diagnose.growth import holds_elsewhere
 from fish_train.diagnose.split import Trials
@@ -16,6 +16,7 @@ from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
+from fish_train.identify.suitable import OPEN
 from fish_train.identify.synthetic import program, record
 
 PRIOR = np.array([0.5, 4.0])
@@ -100,3 +101,23 @@ def test_a_check_too_calm_to_tell_passes_the_question_on_to_every_trial_in_turn(
     assert max(gain, expected) < SMALLEST_CHECK
     assert (gain_left_out(base, on_all(fit, training)) > 30.0) is there
     assert holds_elsewhere(base, fit, trials, 30, Level()) is there
+
+
+def test_every_measurement_of_unseen_trials_counts(monkeypatch):
+    """Behind gates a fit that has lost the fish would foretell it well."""
+    monkeypatch.setattr(unseen, "evaluate", lambda hypothesis, theta, trials, noise: noise)
+    monkeypatch.setattr(unseen, "climb", lambda fit, *_: fit)
+    noise = on_all(SimpleNamespace(hypothesis=None, theta=None, noise=Noise(wrench=(1.0, 2.0, 3.0))), None)
+    assert noise.gate_imu == noise.gate_camera == OPEN and noise.wrench == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("gain", "expected", "holds"),
+    [(60.0, 100.0, True), (40.0, 100.0, False), (9.0, 12.0, False), (11.0, 12.0, True)],
+)
+def test_a_name_must_gain_half_of_what_it_would_were_it_true_and_never_little(
+    monkeypatch, gain, expected, holds
+):
+    monkeypatch.setattr(growth, "on_all", lambda fit, _: fit)
+    monkeypatch.setattr(growth, "gain_unseen", lambda *_: (gain, expected))
+    assert holds_elsewhere(None, None, Trials(None, None, (0,)), 30, Level()) is holds
