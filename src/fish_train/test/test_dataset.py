@@ -1,10 +1,14 @@
 """Folders of trials: order, bad trials, mixed robots, several processes."""
 
+import re
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import recording_samples as samples
 
 from fish_train.recordings import RecordingError, read_dataset
+from fish_train.recordings.dataset import check_set
 
 
 def kinds(data):
@@ -55,6 +59,35 @@ def test_mixed_robots(tmp_path):
     assert kinds(data) == ["mixed_robots", "mixed_robots"]
     assert "carp: b; trout: a" in data.problems[0].text
     assert "/other: c" in data.problems[1].text
+
+
+def kin(name: str, **changes) -> SimpleNamespace:
+    """As much of a trial as a set is checked by."""
+    tail = SimpleNamespace(names=("tail_1", "tail_2"))
+    battery = SimpleNamespace(voltage=np.array([np.nan, 14.8, 14.6]))
+    return SimpleNamespace(
+        name=name, metadata={}, namespace="/fish", **{"tail": tail, "battery": battery} | changes
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"tail": SimpleNamespace(names=("tail_1",))}, r"differ in tail segments \(1: b; 2: a\)"),
+        (
+            {"battery": SimpleNamespace(voltage=np.array([22.2]))},
+            r"battery \(more than 4 cells: b; up to 4 cells: a\)",
+        ),
+    ],
+)
+def test_trials_of_robots_that_are_built_differently_are_no_set(changes, text):
+    (problem,) = check_set([kin("a"), kin("b", **changes)])
+    assert problem.kind == "mixed_robots" and re.search(text, problem.text)
+
+
+def test_a_set_whose_trials_know_less_of_the_robot_is_one():
+    unknown = {"tail": None, "battery": SimpleNamespace(voltage=np.array([np.nan]))}
+    assert list(check_set([kin("a"), kin("b", **unknown), kin("c", battery=None)])) == []
 
 
 def test_several_processes_read_the_same(tmp_path):

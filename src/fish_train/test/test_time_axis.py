@@ -49,6 +49,13 @@ def test_robot_with_another_clock(tmp_path, offset, drift):
     assert np.all(np.abs(trial.commands.t[0]) < 1e-3)
 
 
+@pytest.mark.parametrize(("ahead", "axis"), [(0.0005, "recorder"), (0.002, "robot")])
+def test_a_stamp_a_little_after_its_arrival_is_the_same_clock_s(tmp_path, ahead, axis):
+    """Rounding and time synchronisation are good to a millisecond."""
+    messages = moved(samples.robot_messages(1.0), ROBOT_TOPICS, ahead)
+    assert read_trial(samples.write_mcap(tmp_path / "a", messages)).axis == axis
+
+
 def test_camera_computer_with_another_clock(tmp_path):
     messages = moved(samples.robot_messages(5.0), ("camera/pose", "camera/tail"), 77.0)
     trial = read_trial(samples.write_mcap(tmp_path / "a", messages))
