@@ -179,7 +179,7 @@ def load_robot(path: str | Path) -> Robot:
         content = yaml.safe_load(path.read_text())
     except OSError as error:
         raise RobotError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
         raise RobotError(f"{path}: cannot be read as YAML: {error}") from error
     try:
         return _from_content(content)

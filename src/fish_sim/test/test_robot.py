@@ -79,6 +79,7 @@ def test_impossible_robots_are_refused_with_name_and_value(make, words):
     ("text", "words"),
     [
         ("[1, 2", ["cannot be read as YAML"]),
+        ("format: 2020-13-45", ["cannot be read as YAML"]),
         ("3", ["int", "table"]),
         ("format: 2", ["format", "2", "expected 1"]),
         ("format: 1\ncolour: blue", ["colour", "unknown field"]),

@@ -317,6 +317,14 @@ def test_the_judge_sees_a_hidden_current_as_the_oracle_does(monkeypatch: pytest.
         assert looked.true.values[name] == pytest.approx(true, abs=4.0 * looked.true.standard_errors[name])
 
 
+def test_the_judge_sees_what_has_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(judging, "compete", lambda *_: Rivals(None, 0.0, 0.0))
+    world = small("outside", 4, encoder=True)
+    assert world.names == ("compass",)
+    sight = Sight.read(judge(world, {"fit": {"held_out_trials": ["trial_02"]}, "effects": []})["sight"])
+    assert detects(sight, []) and sight.parameters == 2 and np.isfinite(sight.rms_true[1][0])
+
+
 def test_a_competitor_finds_the_law_it_was_shown() -> None:
     pytest.importorskip("pysindy")
     from fish_train.prove.competitors import _sparse

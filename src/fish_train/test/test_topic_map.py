@@ -43,6 +43,7 @@ def test_partial_file(tmp_path):
         ("{speed: 3, 1: 2}", "expected a mapping with keys namespace"),
         ("- 1", "expected a mapping with keys namespace"),
         ("a: [", "is not YAML"),
+        ("max_latency_s: 2020-13-45", "is not YAML"),
         ("max_latency_s: 0", "expected > 0"),
         ("max_latency_s: long", "got max_latency_s 'long'; expected a number"),
         ("namespace: 7", "got namespace 7; expected text"),

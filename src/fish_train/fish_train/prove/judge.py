@@ -60,7 +60,7 @@ def judge(world: World, diagnosis: Mapping[str, Any]) -> dict[str, Any]:
     if names and world.plant == "fish_sim" and world.links == 3:
         with known_to_the_plant():  # an oracle knows what has no name as well
             looked = look(world, experiment, held, names)
-        content["sight"] = asdict(looked.sight)
+            content["sight"] = asdict(looked.sight)
         shares = dof_shares(looked.nominal, looked.true)
         content["dof"] = dof_overlap(effects[0]["where"]["dof"], shares) if effects else None
         content["rivals"] = asdict(compete(looked.nominal, looked.training, looked.held_out))

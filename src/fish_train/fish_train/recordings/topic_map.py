@@ -81,7 +81,7 @@ def load_topic_map(path: Path) -> TopicMap:
         data = yaml.safe_load(path.read_text())
     except OSError as error:
         raise RecordingError(f"{path}: topic map cannot be read: {error.strerror or error}") from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
         raise RecordingError(f"{path}: topic map is not YAML: {error}") from error
     data = _checked(f"{path}: topic map", {} if data is None else data, KEYS)
     rules = dict(DEFAULT_RULES)
