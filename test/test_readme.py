@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fish_train.commands.verbs import VERBS
+from fish_train.prove.judge import judge_studies
 from fish_train.prove.score import score_world
 from fish_train.prove.study import Study
 from fish_train.prove.tables import ASKED, Share
@@ -51,11 +52,16 @@ def test_links_lead_somewhere():
 
 
 @pytest.fixture(scope="module")
-def newest_study(tmp_path_factory):
-    """Scores of all parts of the study whose table the README shows, from its committed answers."""
+def parts(tmp_path_factory):
+    """A copy of the study whose table the README shows."""
     folder = tmp_path_factory.mktemp("study") / "sixteenth"
     shutil.copytree(ROOT / "docs" / "studies" / "sixteenth", folder)
-    parts = [Study(part) for part in sorted(folder.iterdir())]
+    return [Study(part) for part in sorted(folder.iterdir())]
+
+
+@pytest.fixture(scope="module")
+def newest_study(parts):
+    """Scores of all its parts, from the committed answers."""
     return [
         score_world(world, part.results[name], truths_of(world))
         for part in parts
@@ -87,6 +93,22 @@ def test_the_studys_table_is_what_the_committed_answers_give(newest_study):
     seconds = [score.seconds for score in newest_study]
     (measured,) = [cell for first, cell in rows if first.startswith("seconds per data set")]
     assert measured == f"{np.median(seconds):.0f} ({max(seconds):.0f})"
+
+
+def test_the_oracles_rows_are_what_the_committed_judgements_give(parts, newest_study):
+    _, (against_truth, rivals) = judge_studies(parts, newest_study, 1, lambda _: None)
+    measured = [row[-1] for row in against_truth.rows]
+    detected, _, ratio, over_nominal, dof, iou, f1, alone = measured
+    text = section("## Is the diagnosis right? A blind study")
+    for cell in (
+        detected.replace("%", " %"),
+        f"{ratio.split()[0]}; {over_nominal}",
+        dof,
+        f"{iou.split()[0]}; {f1.split()[0]}; {alone}",
+    ):
+        assert f"| {cell} |" in text, cell
+    tool, sparse = (row[1].split(" ")[0].split("/") for row in rivals.rows[:2])
+    assert f"| {tool[0]}; {sparse[0]} of {sparse[1]} (" in text
 
 
 def test_the_study_counts_every_world_and_seed(newest_study):
