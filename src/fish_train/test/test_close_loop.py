@@ -7,16 +7,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fish_control.control_law import ControlLimits
 from fish_control.gains_file import write_gains_file
 from fish_control.hand_tuned import hand_tuned_policy
+from fish_sim.robot import Robot
 from fish_train.errors import UserError
 from fish_train.evaluation.cells import Cell
+from fish_train.evaluation.feed_forward import law_of_robot
 from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
+from fish_train.evaluation.plant import FishSimPlant
 from fish_train.evaluation.study import Condition, Row
 from fish_train.prove import close_loop, gain_search
 from fish_train.prove.close_loop import JUDGE_SEEDS, Plan, loop_world
 from fish_train.prove.gain_search import search
 from fish_train.reports.loop_page import gap_share, loop_figure, loop_table
+from fish_train.training.loop import Law
 
 CELL = Cell("S", 0.1, 1)
 
@@ -67,18 +72,24 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
         if name == "train" and "corrected" in str(out):
             raise UserError("a recipe that is not swum to its end")
 
+    own = replace(Law(), limits=ControlLimits(curvature_gain=0.18))
+    laws = {}
+
     def try_gains(candidates, conditions, cells, jobs):
         searched.extend(cells)
+        assert all(c.law == own for c in candidates)
         return [row(c.name, 0.01, cell=cell) for c in candidates for cell in cells]
 
     def swim(candidates, conditions, cells, jobs):
         assert conditions[0].fused
         judged.extend(cells)
+        laws.update({c.name: c.law for c in candidates})
         return [row(c.name, 0.01, cell=cell) for c in candidates for cell in cells]
 
     monkeypatch.setattr(close_loop, "_verb", verb)
     monkeypatch.setattr(gain_search, "run_study", try_gains)
     monkeypatch.setattr(close_loop, "run_study", swim)
+    monkeypatch.setattr(close_loop, "_plant_law", lambda _: own)
     plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path / "out", search=8)
     rows = close_loop.close_loop(plan, 2, lambda _: None)
     assert list(dict.fromkeys(r.candidate for r in rows)) == ["nominal", "refitted", "corrected", "true"]
@@ -86,15 +97,31 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
         "train"
     ] * 3
     given = {Path(v[v.index("--out") + 1]).name: v for v in verbs[2:]}
+    assert len({v[v.index("--set") :] for v in given.values()}) == 1  # all trained alike
     assert "--robot" not in given["nominal"]
     assert str(tmp_path / "out" / "identify" / "robot.yaml") in given["refitted"]
     assert str(tmp_path / "out" / "diagnose" / "model.yaml") in given["corrected"]
+    assert laws["true"] == own and laws["corrected"].limits == ControlLimits()
     assert {c.seed for c in judged} == set(JUDGE_SEEDS)
     assert {(c.path, c.speed) for c in judged} == {(c.path, c.speed) for c in searched}
     assert {c.seed for c in searched}.isdisjoint(JUDGE_SEEDS)
     done = len(verbs)
     close_loop.close_loop(plan, 2, lambda _: None)
     assert len(verbs) == done  # what is there is used
+
+
+@pytest.mark.parametrize(("concealed", "kept"), [("wind", set()), ("servo_filter", {"servo_filter"})])
+def test_the_plants_own_feed_forward_is_of_still_water(concealed, kept, monkeypatch) -> None:
+    """The simulator stands in for MuJoCo here."""
+    asked = []
+
+    def of(world, count, random):
+        asked.append(set(world.effects))
+        return FishSimPlant([Robot()] * count, range(count))
+
+    monkeypatch.setattr(close_loop, "MujocoPlant", SimpleNamespace(of=of))
+    assert close_loop._plant_law(loop_world(concealed, 1, 3, 4.0)) == law_of_robot(Robot())
+    assert asked == [kept]
 
 
 def test_the_gap_is_shared_out_by_hand() -> None:

@@ -5,7 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from fish_control.control_law import ControlLimits
+from fish_control.gains_file import read_gains_file
+from fish_control.line_of_sight import GuidanceConfig
+from fish_sim.robot import Robot, save_robot
 from fish_train.commands.main import main
+from fish_train.evaluation.feed_forward import law_of_robot
 
 SETTINGS = [
     "batch=2", "unroll=2", "hold=5", "episode=1.0", "approach=0.2", "amplitudes=[1.0]", "cycles=[0.5]", "radii=[1.5]",
@@ -29,6 +34,28 @@ def test_train_then_use(form: str, tmp_path: Path, capsys: pytest.CaptureFixture
     shown = capsys.readouterr().out
     assert ("6-128-128-64-6" if form == "network" else "constant gains") in shown
     assert str(tmp_path) not in (folder / "model_card.md").read_text()
+
+
+def test_gains_of_a_robot_carry_its_own_feed_forward(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heavy, stuck = (
+        Robot().with_parameters(head_drag_surge=0.5),
+        Robot().with_parameters(head_drag_surge=1e4),
+    )
+    contracts = {}
+    for name, robot in {"heavy": heavy, "stuck": stuck}.items():
+        file = tmp_path / f"{name}.yaml"
+        save_robot(robot, file)
+        given = ["--robot", str(file), "--form", "constant", "--max-seconds", "0", "--set", *SETTINGS]
+        main(["train", "--out", str(tmp_path / name), *given])  # one episode
+        contracts[name] = read_gains_file(tmp_path / name / "seed_1" / "gains.safetensors").contract
+    law = law_of_robot(heavy)
+    assert (contracts["heavy"].limits, contracts["heavy"].guidance) == (law.limits, law.guidance)
+    assert (contracts["stuck"].limits, contracts["stuck"].guidance) == (ControlLimits(), GuidanceConfig())
+    said = capsys.readouterr().out
+    assert f"heavy.yaml: throttle {law.limits.throttle_linear:.3g} u" in said
+    assert "the nominal fish's feed-forward is used" in said
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 Writes for every seed a folder with the weights file (gains.safetensors), a model card, the training curve
 (curve.csv, TensorBoard events) and a checkpoint from which a killed run continues exactly (--resume). Any key of
 the recipe (config/train.yaml) can be set: --set learning_rate=3e-4 latency=0.1 randomise=0.3
+The control law's feed-forward and slip, which the weights file carries, are measured on the robot of --robot; without
+one they are the nominal fish's.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import os
 import shlex
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 from rich.console import Console
@@ -20,6 +22,10 @@ from rich.console import Console
 from fish_train.errors import UserError
 
 from .inputs import read_model
+
+if TYPE_CHECKING:
+    from fish_sim.robot import Robot
+    from fish_train.training.loop import Law
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,7 +75,9 @@ def run(args: argparse.Namespace) -> int:
         )
     check_flags(args)
     config = make_config({**(load_config(args.config) if args.config else {}), **parse_settings(args.set)})
+    console = Console()
     robot = read_model(args.robot)
+    law = robot_law(robot, args.robot, console)
     jobs = [
         Job(
             folder=args.out / f"seed_{seed}",
@@ -83,10 +91,10 @@ def run(args: argparse.Namespace) -> int:
             resume=args.resume,
             overwrite=args.overwrite,
             max_seconds=args.max_seconds,
+            law=law,
         )
         for seed in range(args.seed, args.seed + args.seeds)
     ]
-    console = Console()
     with Display(console) as display:
         statuses = run_all(jobs, min(args.jobs, args.seeds), display)
     finished = sum(status.state == "finished" for status in statuses)
@@ -95,6 +103,28 @@ def run(args: argparse.Namespace) -> int:
         soft_wrap=True,
     )
     return 0 if finished == len(statuses) else 1
+
+
+def robot_law(robot: Robot, file: Path | None, console: Console) -> Law:
+    """The law with the feed-forward of the robot in `file`, the nominal one's without a file."""
+    from fish_train.evaluation.feed_forward import DoesNotSwim, law_of_robot
+    from fish_train.training.loop import Law
+
+    if file is None:
+        return Law()
+    try:
+        law = law_of_robot(robot)
+    except DoesNotSwim as error:
+        console.print(f"{file}: {error}; the nominal fish's feed-forward is used", soft_wrap=True)
+        return Law()
+    limits, guidance = law.limits, law.guidance
+    console.print(
+        f"feed-forward of {file}: throttle {limits.throttle_linear:.3g} u + {limits.throttle_quadratic:.3g} u^2, in turns "
+        f"alpha^2 ({limits.turn_linear:.3g} u + {limits.turn_quadratic:.3g} u^2) more; rudder {limits.curvature_gain:.3g} m "
+        f"kappa; slip {guidance.slip_arm:.3g} m + {guidance.slip_time:.3g} s u",
+        soft_wrap=True,
+    )
+    return law
 
 
 def check_flags(args: argparse.Namespace) -> None:

@@ -142,7 +142,10 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
     """Prediction errors and log density on held-out trials, before and after."""
     robots = {"nominal": (d.robot, d.given_noise), "refitted": (d.nominal.robot, d.nominal.noise),
               "with_effects": (d.final.robot, d.final.noise)}  # fmt: skip
-    outlook = {"rms": held_out_errors(d, d.outlook.robot, d.outlook.noise)} if d.outlook is not None else None
+    outlook = d.outlook and {
+        "effects": list(d.outlook.hypothesis.names),  # a description, no findings
+        "rms": held_out_errors(d, d.outlook.robot, d.outlook.noise),
+    }
     entries = {
         name: {
             "rms": held_out_errors(d, robot, noise),
@@ -154,7 +157,7 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
     return {
         "held_out_trials": [d.experiment.names[i] for i in d.split.held_out],
         **entries,
-        "model_yaml": outlook,  # where no name fits: the refitted structure that predicts best over seconds
+        "model_yaml": outlook,  # where no name fits: the structure that predicts best over seconds
         "tail_links": {"given": d.robot.links, "used": d.final.robot.links},
         "noise_floor": {"wrench_std": list(map(float, d.final.noise.wrench)), "unit": ["N", "N", "N m"],
                         "correlation_time_s": float(d.final.noise.wrench_time)},

@@ -50,7 +50,7 @@ class Diagnosis:
     given_noise: Noise  # that suits the robot as given: at the refitted noise its filter would lose the fish
     held_out: dict[str, np.ndarray]  # log density per sample and held-out trial: given, nominal, final
     outlook: Fit | None = (
-        None  # where much is left and no name fits: the nominal structure that predicts best
+        None  # where much is left and no name fits: the model that predicts best (`stand_in`)
     )
 
     @property

@@ -18,6 +18,7 @@ from fish_train.diagnose.own_force import has_own_force, own_force
 from fish_train.diagnose.pruning import prune, switched_off
 from fish_train.diagnose.search import Progress
 from fish_train.diagnose.split import split_trials, trials_of
+from fish_train.diagnose.stand_in import STRUCTURAL, stand_in
 from fish_train.diagnose.tail import finer_tail
 from fish_train.diagnose.verdict import much_is_left, named
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
@@ -27,7 +28,6 @@ from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
-from fish_train.identify.outlook import fit_outlook
 from fish_train.identify.suitable import suitable_noise
 
 
@@ -75,9 +75,8 @@ def diagnose(
     )  # fmt: skip
     if named(found) or not much_is_left(found):
         return found
-    # a likelihood misleads about a model that lacks something without a name: its parameters go where the next 50 ms are right
-    progress("no name fits: fitting the nominal model to predict over seconds")
-    return replace(found, outlook=fit_outlook(nominal, training, progress))
+    helpful = dict.fromkeys((*(a.name for a in accepted), *(n for n in STRUCTURAL if n in names)))
+    return replace(found, outlook=stand_in(nominal, tuple(helpful), training, progress))
 
 
 def shares(

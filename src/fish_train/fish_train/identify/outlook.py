@@ -62,10 +62,16 @@ class Target:
 class Outlook:
     """Prediction errors of a hypothesis on an experiment as functions of theta."""
 
-    def __init__(self, experiment: Experiment, hypothesis: Hypothesis, every: float = EVERY) -> None:
-        """every: s between start points."""
+    def __init__(
+        self,
+        experiment: Experiment,
+        hypothesis: Hypothesis,
+        every: float = EVERY,
+        horizons: tuple[float, ...] = HORIZONS,
+    ) -> None:
+        """every: s between start points; horizons: s."""
         self.coordinates = Coordinates(hypothesis)
-        self.experiment = experiment
+        self.experiment, self.horizons = experiment, horizons
         self.starts = start_points(experiment, every, WARM_UP)
         self.targets: dict[int, list[Target]] = {}
         sensors = self.coordinates.filter_inputs(self.coordinates.origin())[2]
@@ -76,7 +82,7 @@ class Outlook:
             truth = (frames.pose - [0.0, 0.0, sensors.camera_heading_offset]) / shown
             found = [
                 target
-                for h in HORIZONS
+                for h in horizons
                 if (target := _target(row, frames.t, truth, k, h, int(experiment.steps[m])))
             ]
             if found:
@@ -182,7 +188,7 @@ class Outlook:
         """Poses (L + 1, S, 3) and derivatives (L + 1, S, 3, K) from (S, 2) trials and grid points, as `prediction` simulates."""
         S, K, stepper = len(starts), max(len(dp), 1), self.coordinates.stepper
         m, first = starts.T
-        length = int(np.ceil((max(HORIZONS) + HALF_WINDOW) / DT)) + 1
+        length = int(np.ceil((max(self.horizons) + HALF_WINDOW) / DT)) + 1
         at = [stepper.layout.parameters.index(name) for name in WRENCH]
         wrench = np.repeat(
             np.nan_to_num(self.estimates.wrench[first, m]), K, axis=0

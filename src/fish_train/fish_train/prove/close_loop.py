@@ -5,7 +5,8 @@ refitted    `identify` on recordings of the plant
 corrected   `diagnose` on the same recordings
 true        gains searched on the plant itself (`gain_search`)
 
-The search sees other seeds (start and water) than the runs that are judged.
+Each with the feed-forward of what its gains were made on (`feed_forward`), the plant's from swims in still water. All
+trainings are alike (TRAINING). The search sees other seeds (start and water) than the runs that are judged.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from fish_sim.robot import Robot
 from fish_train.errors import UserError
 from fish_train.evaluation.candidates import read_policy
 from fish_train.evaluation.cells import make_cells
+from fish_train.evaluation.feed_forward import law_of_plant
 from fish_train.evaluation.gains_source import PolicyGains
 from fish_train.evaluation.plant import Plant
 from fish_train.evaluation.study import Candidate, Condition, Row, run_study
@@ -32,12 +34,16 @@ from fish_train.prove.gain_search import Say, search
 from fish_train.prove.mujoco_effects import CONCEALED
 from fish_train.prove.mujoco_plant import MujocoPlant
 from fish_train.prove.world import World
+from fish_train.training.loop import Law
 
 Array = NDArray[np.float64]
 
 PATHS, SPEEDS = ("circle:radius=0.6", "figure_eight:length=2.6,width=1.1", "S"), (0.1, 0.15)  # speeds in m/s
 SEARCH_SEEDS, JUDGE_SEEDS = (1,), (2, 3, 4, 5)
 LINKS = 5
+# of every training: runs are judged through camera, IMU and fusion, on a robot that no model is exactly
+TRAINING = ("--set", "randomise=0.2", "latency=0.1", "noise_position=0.003", "noise_heading=0.02", "noise_speed=0.01",
+            "noise_rate=0.05")  # fmt: skip
 
 
 def loop_world(concealed: str, seed: int, trials: int, duration: float) -> World:
@@ -87,7 +93,7 @@ class Plan:
     paths: Sequence[str] = PATHS
     speeds: Sequence[float] = SPEEDS
     search: int = 40  # runs of the search on the plant
-    training: Sequence[str] = field(default_factory=tuple)  # more arguments of `train`
+    training: Sequence[str] = TRAINING  # more arguments of `train`
 
 
 def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
@@ -100,11 +106,20 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
     condition = Condition(name="second plant", plant=SecondPlant(plan.world))
     say("searching gains on the plant itself")
     cells = make_cells(plan.paths, plan.speeds, SEARCH_SEEDS)
-    best = search(condition, cells, plan.search, jobs, plan.out / "search" / "tries.json", say)
-    candidates.append(Candidate("true", PolicyGains(Policy.constant(best))))
+    law = _plant_law(plan.world)
+    best = search(condition, cells, plan.search, jobs, plan.out / "search" / "tries.json", say, law)
+    candidates.append(Candidate("true", PolicyGains(Policy.constant(best)), law))
     judged = make_cells(plan.paths, plan.speeds, JUDGE_SEEDS)
     say(f"swimming: {len(judged)} runs with the gains of each")
     return run_study(candidates, [condition], judged, jobs)
+
+
+def _plant_law(world: World) -> Law:
+    """The law with the feed-forward of the plant, which is no matter of the wind."""
+    still = replace(world, effects={name: v for name, v in world.effects.items() if name != "wind"})
+    return law_of_plant(
+        lambda count: Swimmer(MujocoPlant.of(still, count, np.random.default_rng([world.seed, 6])))
+    )
 
 
 def _models(plan: Plan, say: Say) -> dict[str, Path]:

@@ -19,6 +19,7 @@ from fish_train.evaluation.gains_source import PolicyGains
 from fish_train.evaluation.study import Candidate, Condition, Row, run_study
 from fish_train.json_file import write_json
 from fish_train.prove.study import read_json
+from fish_train.training.loop import Law
 
 Array = NDArray[np.float64]
 
@@ -31,9 +32,15 @@ Say = Callable[[str], None]
 
 
 def search(
-    condition: Condition, cells: Sequence[Cell], runs: int, jobs: int, file: Path, say: Say = lambda _: None
+    condition: Condition,
+    cells: Sequence[Cell],
+    runs: int,
+    jobs: int,
+    file: Path,
+    say: Say = lambda _: None,
+    law: Law | None = None,
 ) -> Gains:
-    """Constant gains by a simplex search on the plant, perfect state, from the hand-tuned ones.
+    """Constant gains of a law (default: the nominal fish's) by a simplex search on the plant, perfect state, from the hand's.
 
     What was tried before is in `file`: the same search goes on where it was stopped.
     """
@@ -49,7 +56,7 @@ def search(
     def cost(x: Array) -> float:
         key = tuple(x.tolist())
         if key not in tried:
-            candidate = Candidate("", PolicyGains(Policy.constant(gains(x))))
+            candidate = Candidate("", PolicyGains(Policy.constant(gains(x))), law or Law())
             tried[key] = float(np.mean([_cost(row) for row in run_study([candidate], [seen], cells, jobs)]))
             write_json(file, [{"x": k, "cost": v} for k, v in tried.items()])
             say(f"gains {len(tried)} of {runs}: cost {tried[key]:.2f}, best {min(tried.values()):.2f}")

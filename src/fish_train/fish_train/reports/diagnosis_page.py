@@ -73,7 +73,8 @@ def _fit_table(content: Content) -> Table:
         rows.append([label.replace("_", " "), *cells, f"{entry['log_density_per_sample']:.3f}"])
     if fit["model_yaml"]:
         cells = [_errors(v) for v in fit["model_yaml"]["rms"].values()]
-        rows.append(["model.yaml: refitted to predict over seconds", *cells, ""])
+        helped = ", ".join(fit["model_yaml"]["effects"]) or "no effects"
+        rows.append([f"model.yaml: fitted to predict over seconds, described with {helped}", *cells, ""])
     header = ["model", *(f"{h}: m / rad / m/s" for h in fit["nominal"]["rms"]), "log density per sample"]
     low, high = fit["improvement_ci95"]
     held = fit["held_out_trials"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
@@ -16,6 +16,7 @@ from fish_sim.robot import Robot
 from fish_train.errors import UserError
 from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
 from fish_train.training.config import TrainConfig
+from fish_train.training.loop import Law
 from fish_train.training.network import FORMS, LAYERS, Array, from_tensors
 from fish_train.training.run_log import RunLog
 from fish_train.training.search import search
@@ -42,6 +43,7 @@ class Job:
     resume: bool = False
     overwrite: bool = False
     max_seconds: float = float("inf")
+    law: Law = field(default_factory=Law)  # with the robot's feed-forward
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
     """
     torch.set_num_threads(1)
     checkpoint = prepare_folder(job)
-    trainer = Trainer(job.config, job.robot, job.seed, weights=warm_weights(job), form=FORMS[job.form])
+    trainer = Trainer(job.config, job.robot, job.seed, job.law, warm_weights(job), FORMS[job.form])
     if checkpoint.exists():
         load_checkpoint(checkpoint, trainer)
     else:

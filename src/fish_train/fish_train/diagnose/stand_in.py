@@ -1,0 +1,151 @@
+"""Where no name fits: the robot to go on with, whose predictions over seconds are best.
+
+A likelihood misleads about a model that lacks something without a name: its parameters go where the next 50 ms are right. Here
+every structure is fitted by its predictions alone (`identify.outlook`), from the nominal values, short horizons first, as long
+ones have many optima. The filter's states follow what was measured (FOLLOWING), and no unexplained force acts on the
+predictions: it would stand in for what the model lacks.
+
+The structure grows by one effect at a time, of those that the search found nearest and of those that change every stroke
+(STRUCTURAL), while trials left out are foretold better. It describes, for simulation and training; no effect in it is a name of
+the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_train.diagnose.vocabulary import kind_of
+from fish_train.identify.cores import on_all_cores
+from fish_train.identify.experiment import Experiment
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import Fit, evaluate
+from fish_train.identify.hypothesis import Coordinates, Hypothesis, nominal_hypothesis
+from fish_train.identify.outlook import HORIZONS, Outlook
+from fish_train.identify.suitable import open_gates
+
+Array = NDArray[np.float64]
+
+STRUCTURAL = (
+    "tip_slip",
+    "quadratic_drag",
+)  # change every stroke; a bad base's linear scores say nothing of them
+MOST_EFFECTS = 3
+STAGES = ((0.5, 1.0), (0.5, 1.0, 2.0), HORIZONS)  # s
+EVERY = 2.0  # s between start points
+FOLLOWING, CALM = (
+    20.0,
+    5.0,
+)  # times usual water: unexplained forces in the filter that gives the states; in predictions
+STRENGTH = 0.3  # of an effect, in typical ones, from which it is fitted
+ROUNDS = 8  # of states and parameters, in each stage
+SETTLED = 0.005  # of the cost; a round that gains less is the last
+FOLDS, FOLD_ROUNDS = 3, 2
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A structure fitted by its predictions."""
+
+    hypothesis: Hypothesis
+    theta: Array
+    cost: float
+
+
+class Unpushed(Outlook):
+    """Predictions on which no unexplained force acts."""
+
+    def start_from(self, theta: Array, noise: Noise) -> None:
+        """Take the start states from the filter with theta, the force that it needs left behind."""
+        super().start_from(theta, noise)
+        self.estimates = replace(self.estimates, wrench=np.zeros_like(self.estimates.wrench))
+
+
+def stand_in(
+    nominal: Fit, names: Sequence[str], experiment: Experiment, report: Callable[[str], None]
+) -> Fit:
+    """The structure that predicts best; nominal: the fit without effects; names: effects that may help.
+
+    The nominal fit itself where no trial is long enough to predict.
+    """
+    plain = nominal_hypothesis(nominal.hypothesis.robot, nominal.hypothesis.free)
+    if not Unpushed(experiment, plain, EVERY).targets:
+        return nominal
+    names = [name for name in names if kind_of(name) != "sensor"]  # which predicts no motion
+    noise = _water(nominal.noise, FOLLOWING)
+    report("no name fits: fitting predictions over seconds")
+    best = _fitted(plain, noise, experiment)
+    for _ in range(MOST_EFFECTS):
+        left = [name for name in names if name not in best.hypothesis.names]
+        grown = [best.hypothesis.with_effect(name, STRENGTH) for name in left]
+        tried = on_all_cores(lambda hypothesis: _fitted(hypothesis, noise, experiment), grown)
+        promising = min(tried, key=lambda one: one.cost, default=best)
+        if promising is best or not _foretells_better(best, promising, noise, experiment):
+            break
+        best = promising
+        report(f"predictions are better with {', '.join(best.hypothesis.names)}")
+    return _as_fit(best, _water(nominal.noise, CALM), experiment)
+
+
+def _water(noise: Noise, times: float) -> Noise:
+    """The noise of these sensors in water that pushes so many times as strongly as it usually does.
+
+    Without gates: a filter of a wrong model that leaves out what surprises it loses the fish, and its states teach nothing.
+    """
+    usual = Noise()
+    x, y, n = (times * size for size in usual.wrench)
+    return open_gates(replace(noise, wrench=(x, y, n), wrench_time=usual.wrench_time))
+
+
+def _fitted(hypothesis: Hypothesis, noise: Noise, experiment: Experiment) -> _Tried:
+    """From the hypothesis's start values by predictions over longer and longer horizons."""
+    cost, theta = np.inf, Coordinates(hypothesis).origin()
+    for horizons in STAGES:
+        outlook = Unpushed(experiment, hypothesis, EVERY, horizons)
+        cost, theta = _rounds(outlook, theta, noise, ROUNDS)
+    return _Tried(hypothesis, theta, cost)
+
+
+def _rounds(outlook: Outlook, theta: Array, noise: Noise, most: int) -> tuple[float, Array]:
+    """(cost, theta): states and parameters in turn while the cost falls."""
+    cost, theta = outlook.improve(theta, noise, shares=(1.0,))
+    for _ in range(most - 1):
+        before = cost
+        cost, theta = outlook.improve(theta, noise, shares=(1.0,))
+        if before - cost < SETTLED * before:
+            break
+    return cost, theta
+
+
+def _foretells_better(before: _Tried, after: _Tried, noise: Noise, experiment: Experiment) -> bool:
+    """Trials left out cost less in the mean (of logarithms: no trial outweighs the others)."""
+    without, with_it = on_all_cores(lambda tried: _left_out_costs(tried, noise, experiment), [before, after])
+    return bool(np.nanmean(np.log(without / with_it)) > 0.0)
+
+
+def _left_out_costs(tried: _Tried, noise: Noise, experiment: Experiment) -> Array:
+    """(M,) mean cost of a prediction in each trial, by parameters that were fitted on, from theta, without its fold."""
+    count = len(experiment.names)
+    costs = np.full(count, np.nan)
+    for fold in range(min(FOLDS, count)):
+        left_out = [m for m in range(count) if m % FOLDS == fold]
+        others = [m for m in range(count) if m % FOLDS != fold]
+        if not others:
+            continue
+        fitting = Unpushed(experiment.select(others), tried.hypothesis, EVERY)
+        _, theta = _rounds(fitting, tried.theta, noise, FOLD_ROUNDS)
+        unseen = Unpushed(experiment.select(left_out), tried.hypothesis, EVERY)
+        unseen.start_from(theta, noise)
+        costs[left_out] = unseen.mean_costs(theta)
+    return costs
+
+
+def _as_fit(tried: _Tried, noise: Noise, experiment: Experiment) -> Fit:
+    """With the noise that predictions are made with, and standard errors from the predictions' curvature."""
+    outlook = Unpushed(experiment, tried.hypothesis, EVERY)
+    outlook.start_from(tried.theta, noise)
+    normal = outlook.normal(tried.theta)
+    return replace(evaluate(tried.hypothesis, tried.theta, experiment, noise), normal=normal)

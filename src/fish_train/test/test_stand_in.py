@@ -1,0 +1,109 @@
+"""The robot to go on with where no name fits: it predicts better, by effects that help and no others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_sim.robot import Robot
+from fish_train.diagnose import stand_in as module
+from fish_train.diagnose.stand_in import Unpushed, stand_in
+from fish_train.identify.experiment import Experiment, shorten
+from fish_train.identify.filter_types import Noise
+from fish_train.identify.fit import Fit, evaluate
+from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.outlook import Outlook
+from fish_train.identify.synthetic import program, record
+
+FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
+WATER = Noise(wrench=(0.002, 0.004, 1e-4))
+SLIPPING = Robot().with_parameters(head_drag_surge=0.26).with_effect("tip_slip", mobility=0.3)
+KINDS = ("sines", "random", "steps", "turn")
+
+
+def recorded(robot: Robot, seed: int) -> Experiment:
+    random = np.random.default_rng(seed)
+    return record(robot, np.stack([program(k, 9.0, random) for k in KINDS], axis=1), WATER, random)[0]
+
+
+@pytest.fixture(scope="module")
+def slipping() -> Experiment:
+    return recorded(SLIPPING, 4)
+
+
+def nominal(experiment: Experiment) -> Fit:
+    """Of a likelihood that was content with what it got."""
+    hypothesis = nominal_hypothesis(Robot(), FREE)
+    return evaluate(hypothesis, np.zeros(len(FREE)), experiment, Noise(wrench=(0.1, 0.2, 0.01)))
+
+
+def mean_error(fit: Fit, experiment: Experiment) -> float:
+    outlook = Outlook(experiment, fit.hypothesis)
+    outlook.start_from(fit.theta, fit.noise)
+    return float(np.abs(outlook.errors(fit.theta, False)[0]).mean())
+
+
+def test_what_helps_is_taken_and_unseen_trials_are_foretold(slipping: Experiment) -> None:
+    """Of three effects, one is true; `current` is neutral here, and a sensor's error predicts no motion."""
+    start, said = nominal(slipping), []
+    found = stand_in(start, ("current", "camera_scale", "tip_slip"), slipping, said.append)
+    assert "tip_slip" in found.hypothesis.names and "camera_scale" not in found.hypothesis.names
+    assert found.values["tip_slip.mobility"] == pytest.approx(0.3, rel=0.15)
+    assert found.values["head_drag_surge"] == pytest.approx(0.26, rel=0.1)
+    unseen = recorded(SLIPPING, 5)
+    alone = stand_in(start, (), slipping, said.append)
+    assert alone.hypothesis.names == ()
+    assert mean_error(found, unseen) < 0.3 * mean_error(alone, unseen)
+    assert any("better with tip_slip" in text for text in said)
+
+
+def test_a_model_that_lacks_nothing_gets_nothing_much(slipping: Experiment) -> None:
+    """Parameters come back; an effect that is tried is near neutral if it is taken at all."""
+    true = Robot().with_parameters(head_drag_surge=0.26, tail_stiffness=0.08)
+    experiment = recorded(true, 6)
+    found = stand_in(nominal(experiment), ("tip_slip",), experiment, lambda _: None)
+    for name in ("head_drag_surge", "tail_stiffness"):
+        assert found.values[name] == pytest.approx(true.parameters[name], rel=0.1)
+    assert found.values.get("tip_slip.mobility", 0.0) < 0.03
+
+
+def test_no_unexplained_force_acts_on_the_predictions(slipping: Experiment) -> None:
+    fit = nominal(slipping)
+    pushed, free = (kind(slipping, fit.hypothesis) for kind in (Outlook, Unpushed))
+    for outlook in (pushed, free):
+        outlook.start_from(fit.theta, fit.noise)
+    assert np.nanmax(np.abs(pushed.estimates.wrench)) > 0.01
+    assert not free.estimates.wrench.any()
+    np.testing.assert_array_equal(pushed.estimates.state, free.estimates.state)
+
+
+def test_trials_too_short_to_predict_leave_the_fit_as_it_is(slipping: Experiment) -> None:
+    start = nominal(short := shorten(slipping, 150))
+    assert stand_in(start, ("tip_slip",), short, lambda _: None) is start
+
+
+def test_left_out_trials_are_foretold_by_parameters_that_have_not_seen_them(
+    slipping: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitted, judged = [], []
+
+    class Watched(Unpushed):
+        def improve(self, *given, **named):
+            fitted.append(set(self.experiment.names))
+            return super().improve(
+                *given, iterations=1, **{k: v for k, v in named.items() if k != "iterations"}
+            )
+
+        def mean_costs(self, theta):
+            judged.append((set(self.experiment.names), fitted[-1]))
+            return super().mean_costs(theta)
+
+    monkeypatch.setattr(module, "Unpushed", Watched)
+    hypothesis = nominal_hypothesis(Robot(), FREE)
+    tried = module._Tried(hypothesis, np.zeros(len(FREE)), 0.0)
+    costs = module._left_out_costs(tried, replace(WATER), slipping)
+    assert np.isfinite(costs).all()
+    assert set().union(*(names for names, _ in judged)) == set(slipping.names)
+    assert all(not seen & names for names, seen in judged)
