@@ -39,11 +39,12 @@ from fish_train.training.loop import Law
 Array = NDArray[np.float64]
 
 PATHS, SPEEDS = ("circle:radius=0.6", "figure_eight:length=2.6,width=1.1", "S"), (0.1, 0.15)  # speeds in m/s
-SEARCH_SEEDS, JUDGE_SEEDS = (1,), (2, 3, 4, 5)
+SEARCH_SEEDS, JUDGE_SEEDS = (1,), (6, 7, 8, 9, 10, 11)  # 2 to 5 were seen when the recipe below was chosen
 LINKS = 5
-# of every training: runs are judged through camera, IMU and fusion, on a robot that no model is exactly
+# of every training: runs are judged through camera, IMU and fusion, on a robot that no model is exactly; with such noise a
+# level of 0.01 m is not passed
 TRAINING = ("--set", "randomise=0.2", "latency=0.1", "noise_position=0.003", "noise_heading=0.02", "noise_speed=0.01",
-            "noise_rate=0.05")  # fmt: skip
+            "noise_rate=0.05", "thresholds=[0.03,0.02]")  # fmt: skip
 
 
 def loop_world(concealed: str, seed: int, trials: int, duration: float) -> World:
