@@ -20,7 +20,7 @@ from fish_train.evaluation.study import Condition, Row
 from fish_train.prove import close_loop, gain_search
 from fish_train.prove.close_loop import JUDGE_SEEDS, Plan, loop_world
 from fish_train.prove.gain_search import search
-from fish_train.reports.loop_page import gap_share, loop_figure, loop_table
+from fish_train.reports.loop_page import gap_share, loop_figure, loop_table, speed_table
 from fish_train.training.loop import Law
 
 CELL = Cell("S", 0.1, 1)
@@ -134,6 +134,16 @@ def test_the_gap_is_shared_out_by_hand() -> None:
     lost = replace(rows[1], metrics=replace(rows[1].metrics, failure="left the pool"))
     assert [r[5] for r in loop_table([rows[0], lost, rows[2]]).rows] == ["0 of 1", "1 of 1", "0 of 1"]
     assert [box.y[0] for box in loop_figure(rows).data] == pytest.approx([30.0, 14.0, 10.0])
+
+
+def test_every_speed_has_a_gap_of_its_own() -> None:
+    slow = {"nominal": 0.05, "corrected": 0.05, "true": 0.04}
+    fast = {"nominal": 0.03, "corrected": 0.012, "true": 0.01}
+    rows = [row(n, size, cell=Cell("S", 0.1, 1)) for n, size in slow.items()]
+    rows += [row(n, size, cell=Cell("S", 0.15, 1)) for n, size in fast.items()]
+    table = speed_table(rows)
+    assert table.header[1::2] == ["0.1 m/s: mm", "0.15 m/s: mm"]
+    assert table.rows[1] == ["corrected", "50.0", "0%", "12.0", "90%"]
 
 
 def test_the_interval_of_a_share_is_as_wide_as_runs_differ() -> None:

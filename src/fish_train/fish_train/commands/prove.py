@@ -179,7 +179,7 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
     from fish_train.evaluation.study import write_rows
     from fish_train.prove.build import make_world
     from fish_train.prove.close_loop import Plan, close_loop, loop_world
-    from fish_train.reports.loop_page import loop_figure, loop_table
+    from fish_train.reports.loop_page import loop_figure, loop_table, speed_table
     from fish_train.reports.page import Block, Figure, write_page
     from fish_train.score_table import print_table
 
@@ -191,11 +191,12 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
         if not recordings.exists():
             make_world(world, recordings)
         rows = close_loop(Plan(world, recordings, args.out, search=args.search), args.jobs, console.print)
-    table = loop_table(rows)
-    print_table(console, table)
+    result = [loop_table(rows), speed_table(rows)]
+    for table in result:
+        print_table(console, table)
     write_rows(args.out / "runs.csv", rows)
     lead = f"The second plant with {args.close_loop} concealed in it, seed {world.seed}."
-    blocks: list[Block] = [table, Figure("Every run", loop_figure(rows))]
+    blocks: list[Block] = [*result, Figure("Every run", loop_figure(rows))]
     write_page(args.out / "loop.html", "Does a better model make better gains?", lead, blocks)
     console.print(f"{args.out}/loop.html, runs.csv", soft_wrap=True)
     return 0

@@ -44,6 +44,20 @@ def loop_table(rows: Sequence[Row]) -> Table:
     return Table("Gains from a corrected model", header, text, note)
 
 
+def speed_table(rows: Sequence[Row]) -> Table:
+    """Cross-track errors and shares of the gap at each wanted speed: slow fish are at the water's mercy."""
+    names = list(dict.fromkeys(row.candidate for row in rows))
+    speeds = sorted({row.cell.speed for row in rows})
+    header = ["gains from", *(text for v in speeds for text in (f"{v:g} m/s: mm", "of the gap"))]
+    text = [[n] for n in names]
+    for v in speeds:
+        own = [row for row in rows if row.cell.speed == v]
+        size = {n: _sizes(own, n, "cross_track_rmse") for n in names}
+        for line, n in zip(text, names, strict=True):
+            line += [f"{1e3 * size[n].mean():.1f}", _share(size[FIRST], size[n], size[LAST])]
+    return Table("Cross-track RMSE by wanted speed", header, text, "")
+
+
 def loop_figure(rows: Sequence[Row]) -> go.Figure:
     """Cross-track error of every run, a box for each model."""
     figure = go.Figure()
