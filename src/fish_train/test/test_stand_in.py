@@ -69,6 +69,20 @@ def test_a_model_that_lacks_nothing_gets_nothing_much(slipping: Experiment) -> N
     assert found.values.get("tip_slip.mobility", 0.0) < 0.03
 
 
+def test_a_fit_that_predicts_better_than_what_was_grown_stays(
+    slipping: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hypothesis = nominal_hypothesis(SLIPPING, FREE)
+    good = evaluate(hypothesis, np.zeros(len(FREE)), slipping, WATER)
+    bad = module._Tried(hypothesis, np.full(len(FREE), 1.0), 0.0)
+    kept = module._best_of(bad, (nominal(slipping), good), slipping)
+    assert (kept.theta == 0.0).all() and kept.hypothesis.names == ("tip_slip",)
+    kept = module._best_of(
+        module._Tried(hypothesis, np.zeros(len(FREE)), 0.0), (nominal(slipping),), slipping
+    )
+    assert kept.hypothesis.names == ("tip_slip",)
+
+
 def test_no_unexplained_force_acts_on_the_predictions(slipping: Experiment) -> None:
     fit = nominal(slipping)
     pushed, free = (kind(slipping, fit.hypothesis) for kind in (Outlook, Unpushed))

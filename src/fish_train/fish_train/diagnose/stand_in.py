@@ -7,13 +7,14 @@ predictions: it would stand in for what the model lacks.
 
 The structure grows by one effect at a time, of those that the search found nearest and of those that change every stroke
 (STRUCTURAL), while trials left out are foretold better. It describes, for simulation and training; no effect in it is a name of
-the answer.
+the answer. Where the nominal structure predicts better after all, that is taken.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,8 @@ from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate
-from fish_train.identify.hypothesis import Coordinates, Hypothesis, nominal_hypothesis
-from fish_train.identify.outlook import HORIZONS, Outlook
+from fish_train.identify.hypothesis import Coordinates, Hypothesis, extend, nominal_hypothesis
+from fish_train.identify.outlook import HORIZONS, Outlook, fit_outlook
 from fish_train.identify.suitable import open_gates
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ class Unpushed(Outlook):
 def stand_in(
     nominal: Fit, names: Sequence[str], experiment: Experiment, report: Callable[[str], None]
 ) -> Fit:
-    """The structure that predicts best; nominal: the fit without effects; names: effects that may help.
+    """The model that predicts best; nominal: the fit without effects; names: effects that may help.
 
     The nominal fit itself where no trial is long enough to predict.
     """
@@ -77,17 +78,16 @@ def stand_in(
     names = [name for name in names if kind_of(name) != "sensor"]  # which predicts no motion
     noise = _water(nominal.noise, FOLLOWING)
     report("no name fits: fitting predictions over seconds")
-    best = _fitted(plain, noise, experiment)
+    best = _fitted(plain, [Coordinates(plain).origin(), nominal.theta], noise, experiment)
     for _ in range(MOST_EFFECTS):
         left = [name for name in names if name not in best.hypothesis.names]
-        grown = [best.hypothesis.with_effect(name, STRENGTH) for name in left]
-        tried = on_all_cores(lambda hypothesis: _fitted(hypothesis, noise, experiment), grown)
+        tried = on_all_cores(partial(_grown, best, noise, experiment), left)
         promising = min(tried, key=lambda one: one.cost, default=best)
         if promising is best or not _foretells_better(best, promising, noise, experiment):
             break
         best = promising
         report(f"predictions are better with {', '.join(best.hypothesis.names)}")
-    return _as_fit(best, _water(nominal.noise, CALM), experiment)
+    return _best_of(best, (nominal, fit_outlook(nominal, experiment, report)), experiment)
 
 
 def _water(noise: Noise, times: float) -> Noise:
@@ -100,13 +100,22 @@ def _water(noise: Noise, times: float) -> Noise:
     return open_gates(replace(noise, wrench=(x, y, n), wrench_time=usual.wrench_time))
 
 
-def _fitted(hypothesis: Hypothesis, noise: Noise, experiment: Experiment) -> _Tried:
-    """From the hypothesis's start values by predictions over longer and longer horizons."""
-    cost, theta = np.inf, Coordinates(hypothesis).origin()
-    for horizons in STAGES:
-        outlook = Unpushed(experiment, hypothesis, EVERY, horizons)
-        cost, theta = _rounds(outlook, theta, noise, ROUNDS)
-    return _Tried(hypothesis, theta, cost)
+def _grown(best: _Tried, noise: Noise, experiment: Experiment, name: str) -> _Tried:
+    """The structure with one more effect, from the start values and from what it was without."""
+    hypothesis = best.hypothesis.with_effect(name, STRENGTH)
+    starts = [Coordinates(hypothesis).origin(), extend(best.theta, hypothesis, name, STRENGTH)]
+    return _fitted(hypothesis, starts, noise, experiment)
+
+
+def _fitted(hypothesis: Hypothesis, starts: Sequence[Array], noise: Noise, experiment: Experiment) -> _Tried:
+    """By predictions over longer and longer horizons, from the start that ends best."""
+    outlooks = [Unpushed(experiment, hypothesis, EVERY, horizons) for horizons in STAGES]
+    found = []
+    for theta in starts:
+        for outlook in outlooks:
+            cost, theta = _rounds(outlook, theta, noise, ROUNDS)
+        found.append(_Tried(hypothesis, theta, cost))
+    return min(found, key=lambda tried: tried.cost)
 
 
 def _rounds(outlook: Outlook, theta: Array, noise: Noise, most: int) -> tuple[float, Array]:
@@ -143,9 +152,21 @@ def _left_out_costs(tried: _Tried, noise: Noise, experiment: Experiment) -> Arra
     return costs
 
 
-def _as_fit(tried: _Tried, noise: Noise, experiment: Experiment) -> Fit:
-    """With the noise that predictions are made with, and standard errors from the predictions' curvature."""
-    outlook = Unpushed(experiment, tried.hypothesis, EVERY)
-    outlook.start_from(tried.theta, noise)
-    normal = outlook.normal(tried.theta)
-    return replace(evaluate(tried.hypothesis, tried.theta, experiment, noise), normal=normal)
+def _best_of(grown: _Tried, others: Sequence[Fit], experiment: Experiment) -> Fit:
+    """What predicts training trials best as `predict` makes predictions: the filter's force dies away in them.
+
+    Where the model is right but for a force that comes and goes, a likelihood and that force predict better than any structure.
+    """
+    noises = (_water(others[0].noise, CALM), others[0].noise)
+    tried = [(grown.hypothesis, grown.theta, noise) for noise in noises]
+    tried += [(fit.hypothesis, fit.theta, fit.noise) for fit in others]
+
+    def cost(hypothesis: Hypothesis, theta: Array, noise: Noise) -> float:
+        outlook = Outlook(experiment, hypothesis, EVERY)
+        outlook.start_from(theta, noise)
+        return float(np.nanmean(outlook.mean_costs(theta)))
+
+    hypothesis, theta, noise = min(tried, key=lambda one: cost(*one))
+    outlook = Unpushed(experiment, hypothesis, EVERY)
+    outlook.start_from(theta, noise)
+    return replace(evaluate(hypothesis, theta, experiment, noise), normal=outlook.normal(theta))
