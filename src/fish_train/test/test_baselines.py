@@ -54,7 +54,7 @@ def excited(step, trials: int = 3, length: int = 60) -> list[Table]:
     return out
 
 
-def follows(advance, data: list[Table]) -> None:
+def assert_follows(advance, data: list[Table]) -> None:
     for d in data:
         ahead = advance(d.y[3:-1], d.y[2:-2], d.w[4:], d.w[3:-1])
         np.testing.assert_allclose(ahead, d.y[4:], atol=2e-4)
@@ -73,7 +73,7 @@ def test_the_linear_model_finds_a_linear_system() -> None:
         return A1 @ y + A2 @ before + B1 @ w + B2 @ w_before + c
 
     data = excited(step)
-    follows(fit_arx(data), data)
+    assert_follows(fit_arx(data), data)
 
 
 def test_the_bilinear_model_finds_a_fish_that_turns_with_rudder_times_speed() -> None:
@@ -83,7 +83,7 @@ def test_the_bilinear_model_finds_a_fish_that_turns_with_rudder_times_speed() ->
         return np.array([u, -0.05 * r, r])
 
     data = excited(step)
-    follows(fit_bilinear(data), data)
+    assert_follows(fit_bilinear(data), data)
 
 
 def test_velocities_of_the_body_add_up_to_a_way_through_the_pool() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.outlook import Outlook
+from fish_train.identify.structure import left_out_costs
 from fish_train.identify.synthetic import program, record
 
 FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
@@ -70,7 +71,7 @@ def test_a_model_that_lacks_nothing_gets_nothing_much(slipping: Experiment) -> N
 
 
 def test_a_fit_that_predicts_better_than_what_was_grown_stays(
-    slipping: Experiment, monkeypatch: pytest.MonkeyPatch
+    slipping: Experiment,
 ) -> None:
     hypothesis = nominal_hypothesis(SLIPPING, FREE)
     good = evaluate(hypothesis, np.zeros(len(FREE)), slipping, WATER)
@@ -98,9 +99,7 @@ def test_trials_too_short_to_predict_leave_the_fit_as_it_is(slipping: Experiment
     assert stand_in(start, ("tip_slip",), short, lambda _: None) is start
 
 
-def test_left_out_trials_are_foretold_by_parameters_that_have_not_seen_them(
-    slipping: Experiment, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_left_out_trials_are_foretold_by_parameters_that_have_not_seen_them(slipping: Experiment) -> None:
     fitted, judged = [], []
 
     class Watched(Unpushed):
@@ -114,10 +113,9 @@ def test_left_out_trials_are_foretold_by_parameters_that_have_not_seen_them(
             judged.append((set(self.experiment.names), fitted[-1]))
             return super().mean_costs(theta)
 
-    monkeypatch.setattr(module, "Unpushed", Watched)
     hypothesis = nominal_hypothesis(Robot(), FREE)
-    tried = module._Tried(hypothesis, np.zeros(len(FREE)), 0.0)
-    costs = module._left_out_costs(tried, replace(WATER), slipping)
+    outlook_on = partial(Watched, hypothesis=hypothesis, every=module.EVERY)
+    costs = left_out_costs(outlook_on, np.zeros(len(FREE)), WATER, slipping, module.FOLDS)
     assert np.isfinite(costs).all()
     assert set().union(*(names for names, _ in judged)) == set(slipping.names)
     assert all(not seen & names for names, seen in judged)

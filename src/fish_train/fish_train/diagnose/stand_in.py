@@ -26,25 +26,22 @@ from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import Coordinates, Hypothesis, extend, nominal_hypothesis
 from fish_train.identify.outlook import HORIZONS, Outlook, fit_outlook
+from fish_train.identify.structure import left_out_costs
 from fish_train.identify.suitable import open_gates
 
 Array = NDArray[np.float64]
 
-STRUCTURAL = (
-    "tip_slip",
-    "quadratic_drag",
-)  # change every stroke; a bad base's linear scores say nothing of them
+# change every stroke; a bad base's linear scores say nothing of them
+STRUCTURAL = ("tip_slip", "quadratic_drag")
 MOST_EFFECTS = 3
 STAGES = ((0.5, 1.0), (0.5, 1.0, 2.0), HORIZONS)  # s
 EVERY = 2.0  # s between start points
-FOLLOWING, CALM = (
-    20.0,
-    5.0,
-)  # times usual water: unexplained forces in the filter that gives the states; in predictions
+# times usual water: unexplained forces in the filter that gives the states, and in that of the predictions
+FOLLOWING, CALM = 20.0, 5.0
 STRENGTH = 0.3  # of an effect, in typical ones, from which it is fitted
 ROUNDS = 8  # of states and parameters, in each stage
 SETTLED = 0.005  # of the cost; a round that gains less is the last
-FOLDS, FOLD_ROUNDS = 3, 2
+FOLDS = 3
 
 
 @dataclass(frozen=True)
@@ -113,43 +110,31 @@ def _fitted(hypothesis: Hypothesis, starts: Sequence[Array], noise: Noise, exper
     found = []
     for theta in starts:
         for outlook in outlooks:
-            cost, theta = _rounds(outlook, theta, noise, ROUNDS)
+            cost, theta = _rounds(outlook, theta, noise)
         found.append(_Tried(hypothesis, theta, cost))
     return min(found, key=lambda tried: tried.cost)
 
 
-def _rounds(outlook: Outlook, theta: Array, noise: Noise, most: int) -> tuple[float, Array]:
+def _rounds(outlook: Outlook, theta: Array, noise: Noise) -> tuple[float, Array]:
     """(cost, theta): states and parameters in turn while the cost falls."""
-    cost, theta = outlook.improve(theta, noise, shares=(1.0,))
-    for _ in range(most - 1):
-        before = cost
+    before, cost = np.inf, np.inf
+    for _ in range(ROUNDS):
         cost, theta = outlook.improve(theta, noise, shares=(1.0,))
         if before - cost < SETTLED * before:
             break
+        before = cost
     return cost, theta
 
 
 def _foretells_better(before: _Tried, after: _Tried, noise: Noise, experiment: Experiment) -> bool:
     """Trials left out cost less in the mean (of logarithms: no trial outweighs the others)."""
-    without, with_it = on_all_cores(lambda tried: _left_out_costs(tried, noise, experiment), [before, after])
+
+    def left_out(tried: _Tried) -> Array:
+        outlook_on = partial(Unpushed, hypothesis=tried.hypothesis, every=EVERY)
+        return left_out_costs(outlook_on, tried.theta, noise, experiment, FOLDS)
+
+    without, with_it = on_all_cores(left_out, [before, after])
     return bool(np.nanmean(np.log(without / with_it)) > 0.0)
-
-
-def _left_out_costs(tried: _Tried, noise: Noise, experiment: Experiment) -> Array:
-    """(M,) mean cost of a prediction in each trial, by parameters that were fitted on, from theta, without its fold."""
-    count = len(experiment.names)
-    costs = np.full(count, np.nan)
-    for fold in range(min(FOLDS, count)):
-        left_out = [m for m in range(count) if m % FOLDS == fold]
-        others = [m for m in range(count) if m % FOLDS != fold]
-        if not others:
-            continue
-        fitting = Unpushed(experiment.select(others), tried.hypothesis, EVERY)
-        _, theta = _rounds(fitting, tried.theta, noise, FOLD_ROUNDS)
-        unseen = Unpushed(experiment.select(left_out), tried.hypothesis, EVERY)
-        unseen.start_from(theta, noise)
-        costs[left_out] = unseen.mean_costs(theta)
-    return costs
 
 
 def _best_of(grown: _Tried, others: Sequence[Fit], experiment: Experiment) -> Fit:
@@ -157,16 +142,18 @@ def _best_of(grown: _Tried, others: Sequence[Fit], experiment: Experiment) -> Fi
 
     Where the model is right but for a force that comes and goes, a likelihood and that force predict better than any structure.
     """
+
+    def cost(fit: Fit | _Tried, noise: Noise) -> float:
+        outlook = Outlook(experiment, fit.hypothesis, EVERY)
+        outlook.start_from(fit.theta, noise)
+        return float(np.nanmean(outlook.mean_costs(fit.theta)))
+
     noises = (_water(others[0].noise, CALM), others[0].noise)
-    tried = [(grown.hypothesis, grown.theta, noise) for noise in noises]
-    tried += [(fit.hypothesis, fit.theta, fit.noise) for fit in others]
-
-    def cost(hypothesis: Hypothesis, theta: Array, noise: Noise) -> float:
-        outlook = Outlook(experiment, hypothesis, EVERY)
-        outlook.start_from(theta, noise)
-        return float(np.nanmean(outlook.mean_costs(theta)))
-
-    hypothesis, theta, noise = min(tried, key=lambda one: cost(*one))
-    outlook = Unpushed(experiment, hypothesis, EVERY)
-    outlook.start_from(theta, noise)
-    return replace(evaluate(hypothesis, theta, experiment, noise), normal=outlook.normal(theta))
+    noise = min(noises, key=lambda noise: cost(grown, noise))
+    best = min(others, key=lambda fit: cost(fit, fit.noise))
+    if cost(best, best.noise) < cost(grown, noise):
+        return best
+    outlook = Unpushed(experiment, grown.hypothesis, EVERY)
+    outlook.start_from(grown.theta, noise)
+    normal = outlook.normal(grown.theta)
+    return replace(evaluate(grown.hypothesis, grown.theta, experiment, noise), normal=normal)

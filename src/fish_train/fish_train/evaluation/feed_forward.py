@@ -6,7 +6,7 @@
     -v / u              = (a_0 + a_1 u) kappa                      slip
 
 u, v [m/s], r [rad/s]: surge, sway and yaw rate, means over whole strokes. Every swim is made on two opposite headings,
-whose mean a steady current leaves as it is. All constants >= 0 (`scipy.optimize.nnls`).
+whose mean a steady current leaves as it is. All constants >= 0 (`scipy.optimize.nnls`), k > 0.
 
 Source: this project; the defaults of `ControlLimits` and `GuidanceConfig` are those of the nominal fish.
 """
@@ -31,13 +31,8 @@ Array = NDArray[np.float64]
 THROTTLES = (0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8)  # straight
 TURNING_THROTTLES, RUDDERS = (0.15, 0.35, 0.6), (0.1, 0.2, 0.3, 0.45)  # rad, to both sides
 SETTLING, AVERAGING = 16.0, 4.0  # s
-OF_A_PLACE = (
-    "current",
-    "nonuniform_current",
-    "sloshing",
-    "tether",
-    "wall_effect",
-)  # of the pool, not of the robot
+# of the pool, not of the robot
+OF_A_PLACE = ("current", "nonuniform_current", "sloshing", "tether", "wall_effect")
 SLOWEST = 0.02  # m/s, at full throttle: what is slower does not swim
 
 
@@ -56,15 +51,15 @@ class SteadySwim:
     yaw_rate: Array
 
 
-def law_of_robot(robot: Robot, law: Law | None = None) -> Law:
-    """`law` with the feed-forward of this robot in still water far from walls. Raises DoesNotSwim."""
+def law_of_robot(robot: Robot) -> Law:
+    """The law with the feed-forward of this robot in still water far from walls. Raises DoesNotSwim."""
     swimmer = replace(robot, effects={n: v for n, v in robot.effects.items() if n not in OF_A_PLACE})
-    return law_of_plant(lambda count: FishSimPlant([swimmer] * count, range(count)), law)
+    return law_of_plant(lambda count: FishSimPlant([swimmer] * count, range(count)))
 
 
-def law_of_plant(make_plant: Callable[[int], Plant], law: Law | None = None) -> Law:
-    """`law` with the feed-forward of what swims; make_plant(count): so many equal robots. Raises DoesNotSwim."""
-    law = law or Law()
+def law_of_plant(make_plant: Callable[[int], Plant]) -> Law:
+    """The law with the feed-forward of what swims; make_plant(count): so many equal robots. Raises DoesNotSwim."""
+    law = Law()
     rows = [(s, 0.0) for s in THROTTLES]
     rows += [(s, sign * alpha) for s in TURNING_THROTTLES for alpha in RUDDERS for sign in (1.0, -1.0)]
     return fitted_law(steady_swims(make_plant(2 * len(rows)), rows, law.limits), law)
@@ -88,7 +83,7 @@ def steady_swims(plant: Plant, rows: Sequence[tuple[float, float]], limits: Cont
 
 
 def fitted_law(swims: SteadySwim, law: Law) -> Law:
-    """Least squares of the equations above. Raises DoesNotSwim."""
+    """`law` with the least squares of the equations above. Raises DoesNotSwim."""
     u, alpha = swims.surge, swims.alpha
     straight = alpha == 0.0
     if not (np.isfinite(u).all() and u[straight].max() > SLOWEST and u.min() > 0.0):

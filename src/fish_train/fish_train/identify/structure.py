@@ -78,7 +78,7 @@ def choose_effects(
     steps: list[Step] = []
     if len(experiment.names) < 2 * FOLDS:
         return fit, ()
-    without = left_out_costs(fit, fit.hypothesis, fit.theta, experiment)
+    without = left_out_costs(_outlook(fit.hypothesis), fit.theta, fit.noise, experiment)
     for number in range(MOST_EFFECTS):
         left = [name for name in names if name not in fit.hypothesis.names]
         screened, judged = list[_Tried](), list[_Judged]()
@@ -131,7 +131,7 @@ def _settled(tried: _Tried, noise: Noise, experiment: Experiment) -> _Tried:
 def _judge(fit: Fit, experiment: Experiment, without: Array, tried: _Tried) -> _Judged:
     """What a candidate, fitted to the end, does to trials left out, against their costs without it."""
     tried = _settled(tried, fit.noise, experiment)
-    costs = left_out_costs(fit, tried.hypothesis, tried.theta, experiment)
+    costs = left_out_costs(_outlook(tried.hypothesis), tried.theta, fit.noise, experiment)
     # logarithms: a trial that diverges without it would outweigh all others in a mean of costs
     ratio = np.log(without / costs)
     ratio = ratio[np.isfinite(ratio)]  # a trial too short to predict says nothing
@@ -139,17 +139,32 @@ def _judge(fit: Fit, experiment: Experiment, without: Array, tried: _Tried) -> _
     return _Judged(tried, costs, Step(tried.name, float(ratio.mean()), deviation, False))
 
 
-def left_out_costs(fit: Fit, hypothesis: Hypothesis, theta: Array, experiment: Experiment) -> Array:
-    """(M,) mean cost per prediction of each trial by parameters that were fitted, from theta, without its fold."""
+def _outlook(hypothesis: Hypothesis) -> Callable[[Experiment], Outlook]:
+    return partial(Outlook, hypothesis=hypothesis, every=EVERY)
+
+
+def left_out_costs(
+    outlook_on: Callable[[Experiment], Outlook],
+    theta: Array,
+    noise: Noise,
+    experiment: Experiment,
+    folds: int = FOLDS,
+) -> Array:
+    """(M,) mean cost per prediction of each trial by parameters that were fitted, from theta, without its fold.
+
+    NaN for what no other fold can foretell.
+    """
     count = len(experiment.names)
-    costs = np.empty(count)
-    for fold in range(FOLDS):
-        left_out = [m for m in range(count) if m % FOLDS == fold]
-        others = Outlook(experiment.select([m for m in range(count) if m not in left_out]), hypothesis, EVERY)
-        fitted = theta
+    costs = np.full(count, np.nan)
+    for fold in range(min(folds, count)):
+        left_out = [m for m in range(count) if m % folds == fold]
+        rest = [m for m in range(count) if m % folds != fold]
+        if not rest:
+            continue
+        others, fitted = outlook_on(experiment.select(rest)), theta
         for _ in range(ROUNDS):
-            _, fitted = others.improve(fitted, fit.noise)
-        unseen = Outlook(experiment.select(left_out), hypothesis, EVERY)
-        unseen.start_from(fitted, fit.noise)
+            _, fitted = others.improve(fitted, noise)
+        unseen = outlook_on(experiment.select(left_out))
+        unseen.start_from(fitted, noise)
         costs[left_out] = unseen.mean_costs(fitted)
     return costs
