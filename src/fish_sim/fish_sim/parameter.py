@@ -15,5 +15,5 @@ class Parameter:
     highest: float
     source: str = ""
     typical: float | None = None  # a plausible non-zero strength: where searches start and tests probe
-    # values that a search starts from, where it cannot walk from one to the next: a frequency, a place
+    # values that a search starts from, where it cannot walk from one to the next: a frequency, a place, a limit
     tries: tuple[float, ...] = ()

@@ -29,6 +29,12 @@ def test_delay_of_the_camera_comes_back_even_beyond_a_stroke(delay: float) -> No
     assert align(experiment_with_delay(delay)).delay == pytest.approx(delay, abs=0.011)
 
 
+def test_the_delay_is_the_nearest_of_those_that_are_tried() -> None:
+    """A sum of samples is the integral up to half a step after the last one; taken for a whole step it costs 5 ms."""
+    found = [align(experiment_with_delay(delay)).delay for delay in (0.122, 0.128)]
+    assert found == pytest.approx([0.12, 0.13])
+
+
 @pytest.mark.parametrize("delay", [0.02, 1.1])
 def test_a_delay_below_a_frame_or_beyond_what_is_looked_for_is_not_stated(delay: float) -> None:
     """The first is left to the filter; the best of all that were tried is not the delay where it is the last of them."""

@@ -223,6 +223,10 @@ def test_what_the_data_cannot_say_is_said():
     drifting = type(still)(**{**still.__dict__, "commands": still.commands * [0.0, 1.0]})
     told = {name for name, why in out_of_reach(drifting).items() if why == "the rotor never moved"}
     assert told == {"rotor_lag", "rotor_saturation", "battery_sag", "rotor_imbalance"}
+    held = np.stack([still.commands[..., 0], np.full_like(still.commands[..., 1], 0.2)], axis=-1)
+    held[150:, 1] = 0.0  # what pads a trial of 1.5 s is no command
+    turned = type(still)(**{**still.__dict__, "commands": held, "steps": still.steps - [0, len(held) - 150]})
+    assert out_of_reach(turned)["rudder_lag"] == "the rudder never moved"
 
 
 def test_an_effect_of_the_user_competes_with_the_others(monkeypatch):

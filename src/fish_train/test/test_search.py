@@ -69,7 +69,9 @@ def test_a_look_alike_is_refitted_from_where_the_winner_led():
 @pytest.mark.parametrize(
     ("name", "key", "hidden", "near", "look"),
     [("sloshing", "frequency", {"sine": -0.02, "cosine": 0.01, "frequency": 0.77}, 0.8, search.look_near),
-     ("wave_drag", "speed", {"amplitude": 0.03, "speed": 0.13, "width": 0.03}, 0.12, search.look_afar)],
+     ("wave_drag", "speed", {"amplitude": 0.03, "speed": 0.13, "width": 0.03}, 0.12, search.look_afar),
+     ("rudder_saturation", "limit", {"limit": 0.11}, 0.13, search.look_near),
+     ("rudder_saturation", "limit", {"limit": 0.11}, 0.13, search.look_afar)],
 )  # fmt: skip
 def test_an_effect_is_found_from_the_place_that_promises_most(name, key, hidden, near, look):
     """From the one start value that both had before, a search does not walk there."""

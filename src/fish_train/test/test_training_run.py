@@ -132,6 +132,14 @@ def test_a_run_stopped_and_resumed_ends_like_one_in_one_go(tmp_path: Path) -> No
     assert all(np.array_equal(whole[name], parts[name]) for name in whole)
 
 
+def test_a_run_out_of_updates_says_which_level_it_did_not_pass(tmp_path: Path) -> None:
+    hard = job(tmp_path)
+    hard = replace(hard, config=replace(hard.config, thresholds=(1e-4,), max_updates=20))
+    last = run(hard, lambda _: None)
+    assert last.state == "stopped" and last.progress.level == 0
+    assert "(sinusoid 1 m x 0.5, 0.0001 m)" in last.message and "expected below 0.0001 m" in last.message
+
+
 def test_a_finished_run_resumed_keeps_its_card(tmp_path: Path) -> None:
     run(job(tmp_path, form="constant"), lambda _: None)
     card = (tmp_path / "model_card.md").read_text()

@@ -8,6 +8,8 @@ from fish_sim.parameter import Parameter
 
 SOURCE = "end stop or pulse width limit; strength is an assumption"
 NO_LIMIT = 1.6  # rad, beyond every admissible rudder range
+# rad, tried: a limit above all commands does nothing, so nothing leads from there to one below
+LIMITS = (0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5)
 
 
 class RudderSaturation(Effect):
@@ -20,7 +22,7 @@ class RudderSaturation(Effect):
     kind = "actuator"
     equation = "target = clip(command, -limit, limit)"
     source = SOURCE
-    parameters = {"limit": Parameter(NO_LIMIT, "rad", 0.0, NO_LIMIT, SOURCE, typical=0.25)}
+    parameters = {"limit": Parameter(NO_LIMIT, "rad", 0.0, NO_LIMIT, SOURCE, typical=0.25, tries=LIMITS)}
     strength = ("limit",)
 
     @staticmethod

@@ -24,7 +24,7 @@ from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, climb, evaluate, log_posterior
-from fish_train.identify.hypothesis import Coordinates, Hypothesis, extend, specification
+from fish_train.identify.hypothesis import Coordinates, Hypothesis, effect_class, extend, specification
 from fish_train.identify.suitable import open_gates
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
@@ -154,8 +154,10 @@ def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
 def warm_starts(
     base: Fit, name: str, experiment: Experiment, noise: Noise, strengths: Sequence[float] = STRENGTHS
 ) -> list[np.ndarray]:
-    """theta of the base with a candidate at its best place, weak and strong."""
+    """theta of the base with a candidate at its best place, weak and strong where this leaves its strength open."""
     place = best_place(base, name, experiment, noise)
+    if place.keys() >= set(effect_class(name).strength):  # how strong says the place itself
+        strengths = strengths[:1]
     return [started(base, name, strength, place) for strength in strengths]
 
 
@@ -180,7 +182,7 @@ def best_place(base: Fit, name: str, experiment: Experiment, noise: Noise) -> di
 
 
 def tried(name: str) -> list[str]:
-    """Parameters of an effect that say where or how fast, of which several values are tried."""
+    """Parameters of an effect that say where, how fast or from where on, of which several values are tried."""
     return [key for key, parameter in specification(name).items() if parameter.tries]
 
 

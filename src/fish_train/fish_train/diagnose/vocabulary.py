@@ -36,10 +36,11 @@ def out_of_reach(experiment: Experiment) -> dict[str, str]:
     reasons: dict[str, str] = {}
     if not np.isfinite(experiment.gyro).any():
         reasons |= dict.fromkeys(("gyro_scale", "imu_misalignment"), "no IMU was recorded")
-    if np.ptp(experiment.commands[..., 1]) < 1e-3:
+    rotor, rudder = experiment.given_commands.T
+    if np.ptp(rudder) < 1e-3:
         still = [name for name in EFFECTS if name.startswith("rudder_")]
         reasons |= dict.fromkeys(still, "the rudder never moved")
-    if np.ptp(experiment.commands[..., 0]) < 1e-3:
+    if np.ptp(rotor) < 1e-3:
         still = ["rotor_lag", "rotor_saturation", "battery_sag", "rotor_imbalance"]
         reasons |= dict.fromkeys(still, "the rotor never moved")
     return reasons

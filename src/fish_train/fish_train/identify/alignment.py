@@ -66,7 +66,7 @@ def misfits(experiment: Experiment) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _turned(experiment: Experiment, m: int) -> Array | None:
-    """Integral of the gyro (steps,) [rad] on the grid of trial m; None without a gyro."""
+    """Integral of the gyro (steps,) [rad] up to half a step after each grid point of trial m; None without a gyro."""
     gyro = experiment.gyro[: experiment.steps[m], m]
     known = np.flatnonzero(np.isfinite(gyro))
     if len(known) < 2:
@@ -88,7 +88,7 @@ def _windows(frames: Frames, duration: float) -> list[NDArray[np.int64]]:
 def _misfit(t: Array, heading: Array, turned: Array, delays: Array) -> Array:
     """Mean squares [rad^2] of the differences less their straight lines, one per delay."""
     taken = t[:, None] - delays
-    difference = heading[:, None] - np.interp(taken / DT, np.arange(1, len(turned) + 1), turned)
+    difference = heading[:, None] - np.interp(taken / DT, np.arange(len(turned)) + 0.5, turned)
     line = np.column_stack([np.ones_like(t), t - t.mean()])
     rest = difference - line @ np.linalg.lstsq(line, difference, rcond=None)[0]
     return np.asarray(np.mean(np.minimum(rest**2, CLIP**2), axis=0))

@@ -1,6 +1,6 @@
 """Trials on the filter's grid: every 10 ms a command, an IMU sample, an encoder sample and perhaps a camera pose.
 
-All trials of a data set stand side by side, padded to the longest; `valid` says where a trial has data.
+All trials of a data set stand side by side, padded to the longest; `steps` says where a trial ends.
 """
 
 from __future__ import annotations
@@ -63,6 +63,11 @@ class Experiment:
     @property
     def length(self) -> int:
         return len(self.commands)
+
+    @property
+    def given_commands(self) -> Array:
+        """(N, 2) commands of all trials, one trial after the other, without what pads the shorter ones."""
+        return np.concatenate([self.commands[:steps, m] for m, steps in enumerate(self.steps)])
 
 
 def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None) -> Experiment:

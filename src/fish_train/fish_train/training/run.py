@@ -76,7 +76,8 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
     with RunLog(job.folder, trainer.update) as log:
         session = _Session(job, trainer, log, report)
         try:
-            state, message = session.train(), ""
+            state = session.train()
+            message = session.what_is_left() if state == "stopped" else ""
         except TrainingDiverged as error:
             at = trainer.update
             load_checkpoint(checkpoint, trainer)
@@ -143,6 +144,18 @@ class _Session:
         self._trainer.end_episode_early()
         self._save()
         return "finished"
+
+    def what_is_left(self) -> str:
+        """Why a run that was stopped did not finish: a level that noise does not let pass looks like one that takes long."""
+        trainer = self._trainer
+        if trainer.passed_all:
+            return "stopped in the polish, every level passed"
+        level = trainer.levels[trainer.level]
+        return (
+            f"stopped before the level was passed ({level.name}): mean |cross-track| of the last episodes "
+            f"{trainer.criterion.mean:.4f} m, expected below {level.threshold:g} m over {self._job.config.criterion_episodes} "
+            "episodes; where it falls no further (noise, latency and randomise set a floor) raise thresholds"
+        )
 
     def _save(self) -> None:
         self._log.flush()
