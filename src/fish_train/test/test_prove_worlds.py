@@ -352,5 +352,16 @@ def test_the_second_plants_wind_carries_the_fish(basin) -> None:
     plant.reset(np.zeros((1, 3)))
     for _ in range(300):
         felt = plant.step(np.zeros((1, 2)))
-    assert 1e-4 < plant.pose[0, 0] < 0.15 and abs(plant.pose[0, 1]) < 1e-6
+    assert plant.pose[0] == pytest.approx([0.15, 0.0, 0.0], abs=1e-6)
     assert abs(felt.left[0]) < 1e-6
+
+
+@pytest.mark.slow
+def test_seen_from_the_water_the_second_plant_swims_in_wind_as_in_still_water(basin) -> None:
+    """Galilei: whichever way it faces, also at low throttle with the wind from behind."""
+    wind, rudder = np.array([0.04, -0.03]), np.array([0.0, 0.1])
+    still, blown = (drive(plant, rudder, 6.0) for plant in (basin(2), basin(2, wind=dict(zip("xy", wind)))))
+    carried = 0.01 * np.arange(1, len(blown) + 1)[:, None, None] * wind
+    np.testing.assert_allclose(blown[..., :2] - carried, still[..., :2], atol=1e-3)
+    np.testing.assert_allclose(blown[..., 2], still[..., 2], atol=1e-2)
+    assert blown[-100:, 0, 3].mean() > still[-100:, 0, 3].mean() + 0.03  # from behind: faster over ground

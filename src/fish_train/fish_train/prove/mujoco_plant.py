@@ -145,10 +145,14 @@ class MujocoPlant:
         return cls(model_text(world.links, world.parameters, world.effects), count, world.noise, random, trim)
 
     def reset(self, poses: Array) -> None:
-        """At rest at (M, 3) poses with a straight tail."""
+        """Afloat at (M, 3) poses with a straight tail, at rest in the water, which carries the fish along.
+
+        Not at rest over ground: with water from behind at the start the fish swims on backwards, as the fin's lift knows no
+        trailing edge. From here it swims in any steady wind as in still water, seen from the water.
+        """
         for data, pose in zip(self._data, poses, strict=True):
             self._engine.mj_resetData(self._model, data)
-            data.qpos[:3] = pose
+            data.qpos[:3], data.qvel[:2] = pose, self._model.opt.wind[:2]
         self._at = np.zeros((len(poses), 2))  # rotor speed, rudder that the drivers ask for
         self._push = self._size * self._random.standard_normal((len(poses), 3))
 
