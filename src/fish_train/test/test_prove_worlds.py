@@ -360,7 +360,7 @@ def test_the_second_plants_wind_carries_the_fish(basin) -> None:
 def test_seen_from_the_water_the_second_plant_swims_in_wind_as_in_still_water(basin) -> None:
     """Galilei: whichever way it faces, also at low throttle with the wind from behind."""
     wind, rudder = np.array([0.04, -0.03]), np.array([0.0, 0.1])
-    still, blown = (drive(plant, rudder, 6.0) for plant in (basin(2), basin(2, wind=dict(zip("xy", wind)))))
+    still, blown = (drive(p, rudder, 6.0) for p in (basin(2), basin(2, wind={"x": wind[0], "y": wind[1]})))
     carried = 0.01 * np.arange(1, len(blown) + 1)[:, None, None] * wind
     np.testing.assert_allclose(blown[..., :2] - carried, still[..., :2], atol=1e-3)
     np.testing.assert_allclose(blown[..., 2], still[..., 2], atol=1e-2)
