@@ -1,5 +1,6 @@
 """Gains from three models and from the plant itself: what is searched, what is judged, and how the gap is shared out."""
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -66,9 +67,10 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     def verb(name: str, *arguments: str) -> None:
         verbs.append((name, *arguments))
         out = Path(arguments[arguments.index("--out") + 1])
-        made = {"train": "seed_1/gains.safetensors", "identify": "robot.yaml", "diagnose": "model.yaml"}[name]
-        (out / made).parent.mkdir(parents=True, exist_ok=True)
-        write_gains_file(out / made, hand_tuned_policy())
+        seeds = [f"seed_{k}/gains.safetensors" for k in (1, 2, 3)]
+        for made in {"train": seeds, "identify": ["robot.yaml"], "diagnose": ["model.yaml"]}[name]:
+            (out / made).parent.mkdir(parents=True, exist_ok=True)
+            write_gains_file(out / made, hand_tuned_policy())
         if name == "train" and "corrected" in str(out):
             raise UserError("a recipe that is not swum to its end")
 
@@ -92,12 +94,15 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     monkeypatch.setattr(close_loop, "_plant_law", lambda _: own)
     plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path / "out", search=8)
     rows = close_loop.close_loop(plan, 2, lambda _: None)
+    count = Counter(r.candidate for r in rows)
+    assert {count[n] / count["true"] for n in ("nominal", "refitted", "corrected")} == {3.0}
     assert list(dict.fromkeys(r.candidate for r in rows)) == ["nominal", "refitted", "corrected", "true"]
     assert {v[0] for v in verbs[:2]} == {"identify", "diagnose"} and [v[0] for v in verbs[2:]] == [
         "train"
     ] * 3
     given = {Path(v[v.index("--out") + 1]).name: v for v in verbs[2:]}
     assert len({v[v.index("--set") :] for v in given.values()}) == 1  # all trained alike
+    assert all(v[v.index("--seeds") + 1] == "3" for v in given.values())
     assert "--robot" not in given["nominal"]
     assert str(tmp_path / "out" / "identify" / "robot.yaml") in given["refitted"]
     assert str(tmp_path / "out" / "diagnose" / "model.yaml") in given["corrected"]
@@ -132,7 +137,7 @@ def test_the_gap_is_shared_out_by_hand() -> None:
     assert table.rows[1][4] == "no gap"
     assert [r[1] for r in table.rows] == ["30.0", "14.0", "10.0"]  # mm
     lost = replace(rows[1], metrics=replace(rows[1].metrics, failure="left the pool"))
-    assert [r[5] for r in loop_table([rows[0], lost, rows[2]]).rows] == ["0 of 1", "1 of 1", "0 of 1"]
+    assert [r[6] for r in loop_table([rows[0], lost, rows[2]]).rows] == ["0 of 1", "1 of 1", "0 of 1"]
     assert [box.y[0] for box in loop_figure(rows).data] == pytest.approx([30.0, 14.0, 10.0])
 
 
@@ -149,12 +154,26 @@ def test_every_speed_has_a_gap_of_its_own() -> None:
 def test_the_interval_of_a_share_is_as_wide_as_runs_differ() -> None:
     random = np.random.default_rng(3)
     water = random.normal(0.0, 0.02, 24)  # common to the runs of a cell, so it drops out
-    nominal, true = 0.08 + water, 0.05 + water
-    calm = gap_share(nominal, 0.056 + water, true)
+    nominal, true = 0.08 + water[None], 0.05 + water[None]
+    calm = gap_share(nominal, 0.056 + water[None], true)
     assert calm == pytest.approx((0.8, 0.8, 0.8))
-    share, low, high = gap_share(nominal, 0.056 + water + random.normal(0.0, 0.01, 24), true)
+    share, low, high = gap_share(nominal, 0.056 + water + random.normal(0.0, 0.01, (1, 24)), true)
     assert low < 0.8 < high and low < share < high
     assert 0.1 < high - low < 0.6  # 4 standard errors of 0.01 / sqrt(24) / 0.03: 0.27
     assert np.isnan(gap_share(true, nominal, nominal)[0])
-    unsure = np.array([0.10, 0.01] * 12)  # a gap of 0.005 that other runs may not have
-    assert gap_share(unsure, np.zeros(24), np.full(24, 0.05))[2] == np.inf
+    unsure = np.array([[0.10, 0.01] * 12])  # a gap of 0.005 that other runs may not have
+    assert gap_share(unsure, np.zeros((1, 24)), np.full((1, 24), 0.05))[2] == np.inf
+
+
+def test_trainings_that_differ_widen_the_interval_and_all_count() -> None:
+    nominal, true = np.full((3, 12), 0.08), np.full((1, 12), 0.05)
+    own = np.array([0.05, 0.056, 0.062])[:, None] + np.zeros(12)
+    share, low, high = gap_share(nominal, own, true)
+    assert (share, low, high) == pytest.approx((0.8, 0.6, 1.0))
+    cells = [Cell("S", 0.1, seed) for seed in (1, 2)]
+    rows = [row(n, size, cell=c) for n, sizes in {"nominal": (0.05, 0.05), "corrected": (0.02, 0.04), "true": (0.03,)}.items()
+            for size in sizes for c in cells]  # fmt: skip
+    table = loop_table(rows)
+    assert [r[1] for r in table.rows] == ["50.0", "30.0", "30.0"] and table.rows[1][2].startswith("100% (")
+    assert [r[5] for r in table.rows] == ["50.0, 50.0", "20.0, 40.0", "30.0"]
+    assert [r[6] for r in table.rows] == ["0 of 4", "0 of 4", "0 of 2"]

@@ -6,7 +6,8 @@ corrected   `diagnose` on the same recordings
 true        gains searched on the plant itself (`gain_search`)
 
 Each with the feed-forward of what its gains were made on (`feed_forward`), the plant's from swims in still water. All
-trainings are alike (TRAINING). The search sees other seeds (start and water) than the runs that are judged.
+trainings are alike (TRAINING), several of each model, as one says little: all of them are judged. The search sees other seeds
+(start and water) than the runs that are judged.
 """
 
 from __future__ import annotations
@@ -98,15 +99,21 @@ class Plan:
     speeds: Sequence[float] = SPEEDS
     search: int = 40  # runs of the search on the plant
     training: Sequence[str] = TRAINING  # more arguments of `train`
+    trainings: int = 3  # of each model, from seeds of their own
 
 
 def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
-    """Identify, diagnose, train (`jobs` side by side), search, swim; what is there already is used."""
+    """Identify, diagnose, train (`jobs` side by side), search, swim; what is there already is used.
+
+    Rows of all trainings of a model bear its name, one training after the other.
+    """
     robots = {"nominal": plan.nominal, **_models(plan, say)}
     say(f"training on the models {', '.join(robots)}")
     with ThreadPoolExecutor(jobs) as pool:  # of threads that wait for processes
         weights = list(pool.map(lambda name: _train(plan, name, robots[name]), robots))
-    candidates = [read_policy(name, file) for name, file in zip(robots, weights, strict=True)]
+    candidates = [
+        read_policy(name, file) for name, files in zip(robots, weights, strict=True) for file in files
+    ]
     condition = Condition(name="second plant", plant=SecondPlant(plan.world))
     say("searching gains on the plant itself")
     cells = make_cells(plan.paths, plan.speeds, SEARCH_SEEDS)
@@ -114,7 +121,7 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
     best = search(condition, cells, plan.search, jobs, plan.out / "search" / "tries.json", say, law)
     candidates.append(Candidate("true", PolicyGains(Policy.constant(best)), law))
     judged = make_cells(plan.paths, plan.speeds, JUDGE_SEEDS)
-    say(f"swimming: {len(judged)} runs with the gains of each")
+    say(f"swimming: {len(judged)} runs with each of {len(candidates)} gains")
     return run_study(candidates, [condition], judged, jobs)
 
 
@@ -140,16 +147,18 @@ def _models(plan: Plan, say: Say) -> dict[str, Path]:
     return files
 
 
-def _train(plan: Plan, name: str, robot: Path | None) -> Path:
-    weights = plan.out / "training" / name / "seed_1" / "gains.safetensors"
-    if not weights.exists():
+def _train(plan: Plan, name: str, robot: Path | None) -> list[Path]:
+    """Weights of all trainings on one model."""
+    out = plan.out / "training" / name
+    weights = [out / f"seed_{k}" / "gains.safetensors" for k in range(1, plan.trainings + 1)]
+    if not all(file.exists() for file in weights):
         given = ["--robot", str(robot)] if robot else []
-        out = str(plan.out / "training" / name)
+        seeds = ["--seeds", str(plan.trainings), "--jobs", "1"]
         try:
-            _verb("train", "--out", out, "--jobs", "1", "--overwrite", *given, *plan.training)
+            _verb("train", "--out", str(out), *seeds, "--overwrite", *given, *plan.training)
         except UserError:
             # a recipe that this robot cannot swim to its end leaves gains all the same
-            if not weights.exists():
+            if not all(file.exists() for file in weights):
                 raise
     return weights
 
