@@ -21,6 +21,7 @@ from fish_train.identify.identification import (
     identify,
     lost_statements,
     split,
+    start_statements,
     verdict,
 )
 from fish_train.identify.prediction import ErrorSizes, predict, prediction_errors
@@ -175,6 +176,17 @@ def test_the_verdict_is_given_against_the_best_baseline_of_each_number() -> None
         "the physics model beats all baselines where all know 0.5 s of what comes"
     )
     assert verdict({"identified": mine}) == []
+
+
+def test_a_fit_that_predicts_worse_than_what_it_began_with_is_told_from_one_as_good() -> None:
+    def sizes(*position: float) -> ErrorSizes:
+        rms = np.array([(p, 0.1, 0.1) for p in position])
+        return ErrorSizes((1.0, 5.0), rms, np.zeros((2, 1, 3)), np.ones((2, 1), dtype=int))
+
+    fitted = sizes(0.02, 0.49)
+    (said,) = start_statements({"start": sizes(0.019, 0.26), "identified": fitted})
+    assert "at 5 s (0.49 m against 0.26)" in said and "1 s" not in said and "diagnose" in said
+    assert start_statements({"start": sizes(0.019, 0.6), "identified": fitted}) == []
 
 
 def test_trials_in_which_the_filter_is_lost_are_named() -> None:

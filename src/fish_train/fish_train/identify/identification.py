@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 
 UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data say little
 ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
+WORSE = 1.1  # times the error of the robot it began with: more than two robots as good differ by chance
 STILL = 0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
 BASELINES = ("constant", "arx", "bilinear")
 AHEAD, PEEK = "_ahead", HALF_WINDOW  # suffix of predictors that know so many s of what comes
@@ -129,6 +130,7 @@ def identify(
         *([NOT_CHOSEN] if choose_from and not wrong else []),
         *map(step_statement, steps),
         *lacking,
+        *start_statements(errors),
         *verdict(errors),
     ]
     seconds = time.monotonic() - began
@@ -264,6 +266,21 @@ def lost_statements(training: Experiment, fit: Fit) -> list[str]:
     if not lost:
         return []
     return [f"the filter loses the fish in {', '.join(lost)} with these values and begins anew there"]
+
+
+def start_statements(errors: dict[str, ErrorSizes]) -> list[str]:
+    """Where the positions that the fit predicts are further off than those of the robot it began with."""
+    start, fitted = errors["start"], errors["identified"]
+    pairs = zip(fitted.horizons, start.rms[:, 0], fitted.rms[:, 0], strict=True)
+    worse = [
+        f"{h:g} s ({mine:.3g} m against {before:.3g})" for h, before, mine in pairs if mine > WORSE * before
+    ]
+    if not worse:
+        return []
+    return [
+        f"the fit predicts positions worse than the robot it began with at {', '.join(worse)}: the model lacks something; "
+        "fish_train diagnose looks for it and makes a model that predicts"
+    ]
 
 
 def verdict(errors: dict[str, ErrorSizes]) -> list[str]:
