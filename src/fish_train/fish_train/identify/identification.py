@@ -223,8 +223,7 @@ def data_statements(experiment: Experiment, held_out: Experiment | None) -> list
         missing = [name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()]
         if missing:
             out.append(f"no {what} in {', '.join(missing)}: {cost}")
-    valid = np.arange(experiment.length)[:, None] < experiment.steps
-    rotor, rudder = (experiment.commands[..., i][valid] for i in (0, 1))
+    rotor, rudder = experiment.given_commands.T
     if np.std(rudder) < STILL:
         out.append(
             "the rudder hardly moved: turning (yaw and sway drag, servo) is not excited; add rudder steps or sines"
