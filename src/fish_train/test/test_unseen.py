@@ -121,3 +121,40 @@ def test_a_name_must_gain_half_of_what_it_would_were_it_true_and_never_little(
     monkeypatch.setattr(growth, "on_all", lambda fit, _: fit)
     monkeypatch.setattr(growth, "gain_unseen", lambda *_: (gain, expected))
     assert holds_elsewhere(None, None, Trials(None, None, (0,)), 30, Level()) is holds
+
+
+@pytest.mark.parametrize(
+    ("names", "log_evidence", "foretold", "chosen"),
+    [
+        (("current", "nonuniform_current"), (50.0, 500.0), (180.0, 340.0), "nonuniform_current"),
+        (
+            ("current", "nonuniform_current"),
+            (50.0, 500.0),
+            (180.0, 185.0),
+            "current",
+        ),  # as good as the simpler
+        (
+            ("current", "nonuniform_current"),
+            (500.0, 50.0),
+            (180.0, 340.0),
+            "current",
+        ),  # the search knows better
+        (("current", "tether"), (50.0, 500.0), (180.0, 340.0), "current"),  # no look-alike
+    ],
+)
+def test_a_name_gives_way_to_the_look_alike_that_leads_everywhere_though_it_keeps_less_of_its_promise(
+    monkeypatch, names, log_evidence, foretold, chosen
+):
+    """As a current does to a vortex, whose form the nonuniform current has only nearly."""
+    fits = {
+        name: SimpleNamespace(name=name, objective=e) for name, e in zip(names, log_evidence, strict=True)
+    }
+    gains = dict(zip(names, foretold, strict=True))
+    monkeypatch.setattr(growth, "significant", lambda *_: list(names))
+    monkeypatch.setattr(growth, "on_all", lambda fit, _: fit)
+    monkeypatch.setattr(growth, "evidence", lambda fit: fit.objective)
+    monkeypatch.setattr(growth, "holds_elsewhere", lambda base, fit, *_: fit.name == names[0])
+    monkeypatch.setattr(growth, "gain_unseen", lambda base, fit, _: (gains[fit.name], 1000.0))
+    base = SimpleNamespace(result=SimpleNamespace(samples=np.array([1e4])))
+    found = SimpleNamespace(base=base, refitted=fits)
+    assert growth.choose(found, Trials(None, None, (0,)), 30, Level()) == chosen

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from fish_train.diagnose.base import anneal, refine
 from fish_train.diagnose.decide import SMALLEST_CHECK, SMALLEST_Z, Level, parameter_count, strength_z
 from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.pruning import simplest
-from fish_train.diagnose.search import Progress, Round, evidence, settled_round
+from fish_train.diagnose.search import Progress, Round, evidence, look_alike, settled_round
 from fish_train.diagnose.split import Trials
 from fish_train.diagnose.unseen import gain_left_out, gain_unseen, on_all
 from fish_train.identify.cores import on_all_cores
@@ -46,11 +46,26 @@ def choose(found: Round, trials: Trials, tried: int, level: Level) -> str | None
     samples = float(found.base.result.samples.sum())
     good = significant(found, samples, tried, level)
     base = on_all(found.base, trials.training) if good else found.base
-    good = [name for name in good if holds_elsewhere(base, found.refitted[name], trials, tried, level)]
-    if not good:
+    held = [name for name in good if holds_elsewhere(base, found.refitted[name], trials, tried, level)]
+    if not held:
         return None
-    refitted = {name: found.refitted[name] for name in good}
-    return simplest(max(good, key=lambda name: evidence(refitted[name])), refitted, level)
+    refitted = {name: found.refitted[name] for name in held}
+    best = simplest(max(held, key=lambda name: evidence(refitted[name])), refitted, level)
+    rivals = {name: found.refitted[name] for name in good if name not in held and look_alike(name, best)}
+    return overtaken(best, refitted[best], rivals, base, trials)
+
+
+def overtaken(name: str, fit: Fit, rivals: Mapping[str, Fit], base: Fit, trials: Trials) -> str:
+    """The name, or the look-alike that leads it on the trials of the search and on those of the check as well.
+
+    A look-alike whose form is not quite the true one promises more than it keeps; a poorer one keeps its smaller promise.
+    """
+    for other, rival in rivals.items():
+        if evidence(rival) > evidence(fit):
+            foretold = [gain_unseen(base, on_all(f, trials.training), trials.check)[0] for f in (rival, fit)]
+            if foretold[0] - foretold[1] > SMALLEST_CHECK:
+                name, fit = other, rival
+    return name
 
 
 def significant(found: Round, samples: float, tried: int, level: Level) -> list[str]:
