@@ -14,6 +14,7 @@ from fish_train.identify.coverage import Repetition, repeat, scored, summarise
 from fish_train.identify.experiment import Experiment, Frames
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.identification import (
+    FITTED_FOR_OUTLOOK,
     NOT_CHOSEN,
     Identification,
     data_statements,
@@ -36,10 +37,10 @@ TRUTH = Robot().with_parameters(
 )
 
 
-def experiment_of(kinds: tuple[str, ...], duration: float, seed: int = 1) -> Experiment:
+def experiment_of(kinds: tuple[str, ...], duration: float, seed: int = 1, robot: Robot = TRUTH) -> Experiment:
     random = np.random.default_rng(seed)
     commands = np.stack([program(kind, duration, random) for kind in kinds], axis=1)
-    return record(TRUTH, commands, NOISE, random)[0]
+    return record(robot, commands, NOISE, random)[0]
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +57,16 @@ def test_truth_within_four_standard_errors(found: Identification) -> None:
 
 def test_where_the_likelihood_does_no_effect_is_looked_for_and_that_is_said(found: Identification) -> None:
     assert found.fit.hypothesis.names == () and NOT_CHOSEN in found.statements
+
+
+def test_a_model_that_lacks_something_is_fitted_to_what_it_is_for() -> None:
+    """The fish's tail slips: the likelihood's parameters would be right for the next moment, and wrong for seconds."""
+    slipping = TRUTH.with_effect("tip_slip", mobility=1.0 / 6.0)
+    trials = experiment_of(("sines", "random", "steps", "straight"), 9.0, robot=slipping)
+    found = identify(trials, Robot(), free=FREE)
+    assert FITTED_FOR_OUTLOOK in found.statements
+    at_5_s = [found.errors[robot].rms[-1, 0] for robot in ("start", "identified")]
+    assert at_5_s[1] < 0.5 * at_5_s[0]
 
 
 def test_held_out_trial_took_no_part(found: Identification) -> None:

@@ -88,3 +88,11 @@ def test_sensors_far_noisier_than_said_tell_of_a_wrong_model(outlook: Outlook) -
     fit = evaluate(nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE)
     assert not is_wrong(fit, NOISE)
     assert is_wrong(fit, Noise(gyro=NOISE.gyro / 10.0))
+
+
+def test_a_force_that_no_water_has_tells_of_a_wrong_model(outlook: Outlook) -> None:
+    fit = evaluate(nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE)
+    surge, sway, yaw = Noise().wrench
+    rough, impossible = (replace(NOISE, wrench=(surge, sway, factor * yaw)) for factor in (5.0, 6.0))
+    assert not is_wrong(replace(fit, noise=rough), NOISE)
+    assert is_wrong(replace(fit, noise=impossible), NOISE)

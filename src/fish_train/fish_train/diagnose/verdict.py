@@ -6,11 +6,8 @@ import numpy as np
 
 from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.vocabulary import kind_of
-from fish_train.identify.cold import excess
+from fish_train.identify.cold import TOO_STRONG, excess
 from fish_train.identify.fit import Fit
-
-# times the density of usual water: five times its standard deviation, more than the noisiest pool that is still a pool
-TOO_STRONG = 30.0
 
 
 def verdict(d: Diagnosis) -> str:

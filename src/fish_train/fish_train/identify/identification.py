@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_train.identify.alignment import Alignment, align, moved_back
 from fish_train.identify.baselines import fit_baselines, predict_baseline
-from fish_train.identify.cold import second_look
+from fish_train.identify.cold import TOO_STRONG, excess, second_look
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
@@ -45,10 +45,14 @@ BASELINES = ("constant", "arx", "bilinear")
 AHEAD, PEEK = "_ahead", HALF_WINDOW  # suffix of predictors that know so many s of what comes
 EFFECT_START = 0.3  # typical strengths, at which the fit of an effect starts
 FITTED_FOR_OUTLOOK = (
-    "the model needs sensors far noisier than they are: it lacks something, so that it was fitted to predictions over 0.5 "
-    "to 5 s instead of the likelihood; standard errors count every error as independent, which is too small"
+    "the model needs sensors far noisier than they are, or water far stronger than in any pool: it lacks something, so that "
+    "it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors count every error as "
+    "independent, which is too small; `fish_train diagnose` looks for what is missing"
 )
-NOT_CHOSEN = "no effects looked for: the model needs no noisier sensors than there are; `fish_train diagnose` asks the likelihood"
+NOT_CHOSEN = (
+    "no effects looked for: the model needs no noisier sensors than there are and no stronger water; `fish_train diagnose` "
+    "asks the likelihood"
+)
 NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"
 NO_ENCODER = "the rotor is taken to follow its commands"
 Report = Callable[[str], None]  # told what is being done
@@ -140,12 +144,12 @@ def identify(
 
 
 def is_wrong(fit: Fit, noise: Noise) -> bool:
-    """The model needs sensors far noisier than they are said to be: it lacks something, and the likelihood misleads."""
+    """The model needs sensors far noisier than they are said to be, or a force that no water has: the likelihood misleads."""
     told = [
         (getattr(fit.noise, key), getattr(noise, key))
         for key in ("gyro", "camera_position", "camera_heading")
     ]
-    return any(needed > STRANGE * said for needed, said in told)
+    return any(needed > STRANGE * said for needed, said in told) or bool(excess(fit).max() > TOO_STRONG)
 
 
 def step_statement(step: Step) -> str:
