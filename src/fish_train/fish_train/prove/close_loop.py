@@ -120,7 +120,9 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
     candidates.append(Candidate("true", PolicyGains(Policy.constant(best)), law))
     judged = make_cells(plan.paths, plan.speeds, JUDGE_SEEDS)
     say(f"swimming: {len(judged)} runs with each of {len(candidates)} gains")
-    return run_study(candidates, [condition], judged, jobs)
+    return run_study(
+        candidates, [condition], judged, jobs, lambda done, batches: say(f"swum: {done} of {batches} batches")
+    )
 
 
 def _plant_law(world: World) -> Law:
