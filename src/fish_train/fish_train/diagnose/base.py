@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from fish_sim.robot import Robot
 from fish_train.identify.adapt import settle
-from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess, fit_cold
+from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, UNWHITE, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
-from fish_train.identify.tempering import fit_tempered
+from fish_train.identify.suitable import worst_row
+from fish_train.identify.tempering import TAIL_INERTIAS, fit_tempered
 
 ROUNDS, ROUNDS_OF_A_WRONG_MODEL = 5, 2  # of noise and parameters in turn, at most
 GROWN = 2.0  # a force that more trials make so much stronger comes from a poor optimum
@@ -35,6 +36,19 @@ def anneal(fit: Fit, experiment: Experiment) -> Fit:
     short_fit = fit_tempered(fit.hypothesis, short, noise, fit.theta)
     other = settle(evaluate(fit.hypothesis, short_fit.theta, experiment, short_fit.noise), experiment)
     return better(fit, other)
+
+
+def look_again(fit: Fit, experiment: Experiment) -> Fit:
+    """The fit, or where it explains less than its water and sensors claim a better optimum.
+
+    The camera leads there, the tail's inertias held about their nominal values: these had imitated a wrong phase of its swing.
+    """
+    if excess(fit).max() >= SUSPICIOUS or worst_row(fit) <= UNWHITE:
+        return fit
+    start, short = fit.theta.copy(), shorten(experiment, FIRST_STEPS)
+    start[[i for i, name in enumerate(fit.hypothesis.free) if name in TAIL_INERTIAS]] = 0.0
+    led = fit_tempered(fit.hypothesis, short, usual_noise(experiment), start, held=TAIL_INERTIAS)
+    return better(fit, settle(evaluate(fit.hypothesis, led.theta, experiment, led.noise), experiment))
 
 
 def refine(fit: Fit, experiment: Experiment) -> Fit:

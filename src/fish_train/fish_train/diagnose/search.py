@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_train.diagnose.base import settle_base
+from fish_train.diagnose.base import look_again, settle_base
 from fish_train.identify.adapt import adapt_noise, settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess
 from fish_train.identify.cores import on_all_cores
@@ -217,7 +217,7 @@ def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
     start = evaluate(hypothesis, ranked.theta, experiment, base.noise)
     # the base's noise has taken the mismatch in, also as sensor noise
     start = evaluate(hypothesis, ranked.theta, experiment, adapt_noise(start, experiment))
-    return settle(start, experiment)
+    return look_again(settle(start, experiment), experiment)
 
 
 def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough: float) -> Fit | None:

@@ -19,12 +19,15 @@ from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Array, Noise
 from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
+from fish_train.identify.suitable import worst_row
 from fish_train.identify.tempering import LEADING, TAIL_INERTIAS, Report, close, fit_tempered, lead
 
 FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
 SPREAD, HOP = 0.2, 0.1  # how far a start and a hop are off: of the logarithms of the nominal parameters
 FEW_LINKS = 3  # of a tail with so few optima that one which leaves no more than water does is the best
 SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
+# rms of whitened innovations, 1 where all is right: a fit that needs no strong water and still leaves these is a poor optimum
+UNWHITE = 1.2
 # five times the standard deviation of usual water, more than the noisiest pool that is still a pool: something is missing
 TOO_STRONG = 30.0
 
@@ -40,7 +43,8 @@ def fit_cold(
     of nats below the other, and one a thousand below that left no more than water does.
     """
     fit = second_look(fit_multistart(hypothesis, experiment, noise, report, places), experiment, report)
-    if excess(fit).max() < SUSPICIOUS and hypothesis.robot.links <= FEW_LINKS:
+    right = excess(fit).max() < SUSPICIOUS and worst_row(fit) <= UNWHITE
+    if right and hypothesis.robot.links <= FEW_LINKS:
         return fit
     return better(fit, fit_tempered(hypothesis, experiment, noise, report=report, held=TAIL_INERTIAS))
 
