@@ -82,8 +82,9 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
         assert all(c.law == own for c in candidates)
         return [row(c.name, 0.01, cell=cell) for c in candidates for cell in cells]
 
-    def swim(candidates, conditions, cells, jobs):
+    def swim(candidates, conditions, cells, jobs, report):
         assert conditions[0].fused
+        report(3, 20)
         judged.extend(cells)
         laws.update({c.name: c.law for c in candidates})
         return [row(c.name, 0.01, cell=cell) for c in candidates for cell in cells]
@@ -93,7 +94,9 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     monkeypatch.setattr(close_loop, "run_study", swim)
     monkeypatch.setattr(close_loop, "_plant_law", lambda _: own)
     plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path / "out", search=8)
-    rows = close_loop.close_loop(plan, 2, lambda _: None)
+    said = []
+    rows = close_loop.close_loop(plan, 2, said.append)
+    assert "swum: 3 of 20 batches" in said
     count = Counter(r.candidate for r in rows)
     assert {count[n] / count["true"] for n in ("nominal", "refitted", "corrected")} == {3.0}
     assert list(dict.fromkeys(r.candidate for r in rows)) == ["nominal", "refitted", "corrected", "true"]
