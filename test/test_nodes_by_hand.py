@@ -67,7 +67,10 @@ def test_a_node_runs_alone_and_ends_with_0(spec, ended):
 @pytest.mark.parametrize("spec", NODES, ids=lambda spec: spec.name)
 def test_a_signal_while_python_imports_a_node_ends_it_with_0(spec, number, monkeypatch):
     entry = importlib.import_module(f"{spec.package}.nodes.entry")
-    before = signal.getsignal(signal.SIGTERM)
+    before = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
+    signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # what a shell starts in the background ignores it
 
     def interrupted(name):
         assert name == f"{spec.package}.nodes.{spec.executable}"
@@ -77,7 +80,8 @@ def test_a_signal_while_python_imports_a_node_ends_it_with_0(spec, number, monke
     try:
         assert getattr(entry, spec.executable)() == 0
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for changed, handler in before.items():
+            signal.signal(changed, handler)
 
 
 def free_domains(count):
