@@ -42,17 +42,23 @@ def grow(
 
 
 def choose(found: Round, trials: Trials, tried: int, level: Level) -> str | None:
-    """The name to add: most evidence among the significant ones, the simplest of those that are as good."""
+    """The name to add: most evidence among the significant ones that the check confirms, the simplest of those as good.
+
+    A look-alike that is better everywhere takes its place (`overtaken`).
+    """
     samples = float(found.base.result.samples.sum())
     good = significant(found, samples, tried, level)
     base = on_all(found.base, trials.training) if good else found.base
-    held = [name for name in good if holds_elsewhere(base, found.refitted[name], trials, tried, level)]
-    if not held:
+    confirmed = {
+        name: found.refitted[name]
+        for name in good
+        if holds_elsewhere(base, found.refitted[name], trials, tried, level)
+    }
+    if not confirmed:
         return None
-    refitted = {name: found.refitted[name] for name in held}
-    best = simplest(max(held, key=lambda name: evidence(refitted[name])), refitted, level)
-    rivals = {name: found.refitted[name] for name in good if name not in held and look_alike(name, best)}
-    return overtaken(best, refitted[best], rivals, base, trials)
+    best = simplest(max(confirmed, key=lambda name: evidence(confirmed[name])), confirmed, level)
+    rivals = {n: found.refitted[n] for n in good if n not in confirmed and look_alike(n, best)}
+    return overtaken(best, confirmed[best], rivals, base, trials)
 
 
 def overtaken(name: str, fit: Fit, rivals: Mapping[str, Fit], base: Fit, trials: Trials) -> str:

@@ -26,7 +26,8 @@ FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin 
 SPREAD, HOP = 0.2, 0.1  # how far a start and a hop are off: of the logarithms of the nominal parameters
 FEW_LINKS = 3  # of a tail with so few optima that one which leaves no more than water does is the best
 SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
-# rms of whitened innovations, 1 where all is right: a fit that needs no strong water and still leaves these is a poor optimum
+# rms of whitened innovations, 1 where all is right: a fit that needs no strong water and still leaves more is a poor optimum
+# (one 8000 nats below the truth: 1.46, at the truth: 1.05; docs/blind_studies.md, the eighteenth)
 UNWHITE = 1.2
 # five times the standard deviation of usual water, more than the noisiest pool that is still a pool: something is missing
 TOO_STRONG = 30.0
