@@ -68,9 +68,8 @@ def test_a_node_runs_alone_and_ends_with_0(spec, ended):
 def test_a_signal_while_python_imports_a_node_ends_it_with_0(spec, number, monkeypatch):
     entry = importlib.import_module(f"{spec.package}.nodes.entry")
     before = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
-    signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # what a shell starts in the background ignores it
+    # what a shell starts in the background ignores it
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def interrupted(name):
         assert name == f"{spec.package}.nodes.{spec.executable}"
