@@ -147,6 +147,29 @@ def test_a_fit_whose_innovations_its_own_noise_does_not_explain_is_looked_at_aga
     assert (fit.theta == 0.4).all()
 
 
+@pytest.mark.parametrize(("reached", "best"), [(7.0, 7.0), (3.0, 5.0)])
+def test_a_candidate_is_fitted_from_the_nominal_values_with_its_effect_as_found(
+    monkeypatch, reached: float, best: float
+) -> None:
+    hypothesis = nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")).with_effect(
+        "rudder_offset", 0.3
+    )
+    fit = SimpleNamespace(hypothesis=hypothesis, theta=np.array([0.6, -0.4, 0.8]), objective=5.0)
+    begun = []
+
+    def fit_cold(_hypothesis, _experiment, _noise, places):
+        begun.extend(places)
+        return SimpleNamespace(hypothesis=hypothesis, theta=None, noise=None)
+
+    monkeypatch.setattr(base, "shorten", lambda experiment, _: experiment)
+    monkeypatch.setattr(base, "usual_noise", lambda _: None)
+    monkeypatch.setattr(base, "fit_cold", fit_cold)
+    monkeypatch.setattr(base, "evaluate", lambda *_: None)
+    monkeypatch.setattr(base, "settle_base", lambda *_: SimpleNamespace(objective=reached))
+    assert base.from_nominal(fit, None).objective == best
+    assert np.array_equal(begun, [[0.0, 0.0, 0.8], [0.6, -0.4, 0.8]])
+
+
 def test_a_slow_strong_force_is_found_from_a_fast_one() -> None:
     """The fish lies in a current that the model has not."""
     random = np.random.default_rng(5)

@@ -193,24 +193,39 @@ def test_finer_tails_are_tried_where_much_is_left_or_follows_a_law(monkeypatch, 
     assert len(calls) == tried
 
 
-@pytest.mark.parametrize(("reached", "tried"), [({4: 5.0, 5: 9.0}, [4, 5]), ({4: -5.0, 5: 9.0}, [4])])
-def test_another_link_is_tried_only_where_the_one_before_gained(monkeypatch, reached, tried):
-    fit = SimpleNamespace(hypothesis=None, theta=None, noise=None)
+@pytest.mark.parametrize(
+    ("cold", "led", "tried", "kept"),
+    [({4: 5.0, 5: 9.0}, {4: 1.0, 5: 1.0}, [4, 5], [5.0, 9.0]), ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, [4], []),
+     ({4: -5.0, 5: 1.0}, {4: 3.0, 5: 8.0}, [4, 5], [3.0, 8.0])],
+)  # fmt: skip
+def test_another_link_is_tried_where_the_one_before_gained_fitted_cold_or_from_fewer(
+    monkeypatch, cold, led, tried, kept
+):
+    fewer = SimpleNamespace(hypothesis=None, theta="fewer", noise=None)
     calls = []
 
-    def cold_fit(links, *_args, **_keywords):
+    def reaches(objective):
+        return SimpleNamespace(hypothesis=objective, theta=None, noise=None, objective=objective)
+
+    def cold_fit(links, *_args, places):
         calls.append(links)
-        return SimpleNamespace(hypothesis=None, theta=None, noise=None, objective=reached[links])
+        assert places == ("fewer",)
+        return reaches(cold[links])
+
+    def led_fit(links, _experiment, _noise, theta):
+        assert theta == "fewer"
+        return reaches(led[links])
 
     monkeypatch.setattr(tail, "log_posterior", lambda *_: 0.0)
     monkeypatch.setattr(tail, "usual_noise", lambda _: None)
     monkeypatch.setattr(tail, "with_links", lambda _, links: links)
     monkeypatch.setattr(tail, "nominal_hypothesis", lambda links: links)
     monkeypatch.setattr(tail, "fit_cold", cold_fit)
-    monkeypatch.setattr(tail, "evaluate", lambda *_: None)
-    monkeypatch.setattr(tail, "settle", lambda *_: "settled")
-    found = tail.finer_tails(Robot(), fit, fit, None, None, lambda _: None)
-    assert calls == tried and len(found) == sum(gain > 0.0 for gain in list(reached.values())[: len(tried)])
+    monkeypatch.setattr(tail, "fit_tempered", led_fit)
+    monkeypatch.setattr(tail, "evaluate", lambda objective, *_: objective)
+    monkeypatch.setattr(tail, "settle", lambda objective, _: objective)
+    assert tail.finer_tails(Robot(), fewer, fewer, None, None, lambda _: None) == kept
+    assert calls == tried
 
 
 def test_what_the_data_cannot_say_is_said():

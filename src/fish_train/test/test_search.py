@@ -50,6 +50,38 @@ def test_what_gains_far_less_than_it_needs_itself_is_not_refitted(monkeypatch):
     assert set(found.refitted) == {"sloshing"}
 
 
+@pytest.mark.parametrize(
+    ("left", "cold", "asked", "best"),
+    [(2000.0, 4000.0, ["rudder_saturation"], 4000.0), (2000.0, 1010.0, ["rudder_saturation"], 1000.0),
+     (10.0, 4000.0, [], 1000.0)],
+)  # fmt: skip
+def test_the_best_candidate_is_fitted_cold_where_it_leaves_a_force_that_no_pool_has(
+    monkeypatch, left, cold, asked, best
+):
+    """A rudder that stops was found so, but left 2300 times usual water, as its base did: nothing was named."""
+    fits = {"rudder_saturation": 1000.0, "rudder_gain": 900.0, "rudder_offset": 100.0}
+    fits = {name: SimpleNamespace(objective=objective) for name, objective in fits.items()}
+    beside = {"rudder_gain": SimpleNamespace(objective=3000.0), "rudder_offset": None}
+    calls = []
+
+    def anew(fit, _):
+        calls.extend(name for name in fits if fits[name] is fit)
+        return SimpleNamespace(objective=cold)
+
+    monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)
+    monkeypatch.setattr(search, "excess", lambda _: np.array([1.0, left, 1.0]))
+    monkeypatch.setattr(search, "from_nominal", anew)
+    monkeypatch.setattr(search, "refit_beside", lambda led, base, name, *_: beside[name])
+    found = search.Round(SimpleNamespace(objective=0.0), (), fits)
+    led = search.best_cold(found, None, 23.0, quiet)
+    assert calls == asked and led.best == "rudder_saturation"
+    assert led.refitted["rudder_saturation"].objective == best
+    assert led.refitted["rudder_gain"].objective == (3000.0 if best > 1000.0 else 900.0)
+    assert led.refitted["rudder_offset"] is fits["rudder_offset"]  # so far behind that it was not refitted
+    nothing = search.best_cold(replace(found, base=SimpleNamespace(objective=990.0)), None, 23.0, quiet)
+    assert nothing.refitted is fits and calls == asked  # what gains too little for a name is left alone
+
+
 def test_a_look_alike_is_refitted_from_where_the_winner_led():
     random = np.random.default_rng(2)
     truth = Robot().with_effect("tip_slip", mobility=1.0 / 6.0)

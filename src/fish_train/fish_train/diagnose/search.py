@@ -16,9 +16,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_train.diagnose.base import look_again, settle_base
+from fish_train.diagnose.base import from_nominal, look_again, settle_base
 from fish_train.identify.adapt import adapt_noise, settle
-from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess
+from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, TOO_STRONG, better, excess
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
@@ -245,7 +245,26 @@ def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment,
         progress("refitting " + ", ".join(r.name for r in chosen))
     fits = on_all_cores(lambda ranked: refit(base, ranked, experiment), chosen)
     refitted = dict(zip((r.name for r in chosen), fits, strict=True))
-    return with_look_alikes(Round(base, ranking, refitted), names, experiment, min(needed.values()), progress)
+    enough = min(needed.values())
+    found = best_cold(Round(base, ranking, refitted), experiment, enough, progress)
+    return with_look_alikes(found, names, experiment, enough, progress)
+
+
+def best_cold(found: Round, experiment: Experiment, enough: float, progress: Progress) -> Round:
+    """The round with its best candidate fitted cold where it needs a force that no pool has, and its rivals from there."""
+    best = found.best
+    if best is None or found.gain(best) < enough or excess(found.refitted[best]).max() <= TOO_STRONG:
+        return found
+    progress(f"fitting once more with {best}, from the nominal values")
+    cold = from_nominal(found.refitted[best], experiment)
+    if cold.objective - found.refitted[best].objective < enough:
+        return found
+    refitted = {**found.refitted, best: cold}
+    for name in found.refitted.keys() - {best}:
+        fit = refit_beside(cold, found.base, name, experiment, enough)
+        if fit is not None:
+            refitted[name] = better(fit, refitted[name])
+    return replace(found, refitted=refitted)
 
 
 def with_look_alikes(
