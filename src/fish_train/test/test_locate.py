@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from fish_train.diagnose import verdict as verdicts
 from fish_train.diagnose.answer import bootstrap_interval, whiteness
@@ -170,3 +171,15 @@ def test_a_strength_is_as_sure_as_at_its_own_place() -> None:
     assert strength_z(known, "payload") == pytest.approx(0.5 * 10.0)
     normal[0, 1] = normal[1, 0] = 16.0  # correlated by 0.8 with the drag
     assert strength_z(known, "payload") == pytest.approx(0.5 * 10.0 * 0.6)
+
+
+def test_strengths_that_are_unsure_alone_may_be_sure_together() -> None:
+    """Of two currents of which the data tell the sum alone each is open; p is that of chi square with two degrees."""
+    free = ("current.x", "current.y")
+    normal = np.array([[100.0, 99.0], [99.0, 100.0]])
+    theta = np.array([0.4, 0.4])
+    assert (theta / np.sqrt(np.diag(np.linalg.inv(normal)))).max() < 1.0
+    fit = SimpleNamespace(hypothesis=SimpleNamespace(free=free), theta=theta, normal=normal)
+    wald = theta @ normal @ theta  # exponential under the null: p = exp(-wald / 2)
+    assert 2.0 * norm.sf(strength_z(fit, "current")) == pytest.approx(np.exp(-0.5 * wald))
+    assert strength_z(fit, "current") > 7.0

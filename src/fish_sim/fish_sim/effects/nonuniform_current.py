@@ -10,20 +10,23 @@ from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "linear expansion and first stream-function modes of a basin; strengths are an assumption"
-LONG, WIDE = (1, 2, 3, 4), (1, 2, 3)  # half waves along and across the pool
+# half waves along and across the pool, down to 0.53 m: what resolves an eddy of 0.3 m radius
+LONG, WIDE = tuple(range(1, 9)), tuple(range(1, 5))
 MODES = tuple(product(LONG, WIDE))
 
 
-def _gyre(strength: float) -> Parameter:
-    return Parameter(0.0, "m/s", -0.5, 0.5, SOURCE, typical=strength)
+def _gyre(m: int, n: int) -> Parameter:
+    """The first swirls the most; eddies of less than a metre by 0.7 m are weaker."""
+    typical = 0.03 if m == n == 1 else 0.01 if m <= 4 and n <= 3 else 0.004
+    return Parameter(0.0, "m/s", -0.5, 0.5, SOURCE, typical=typical)
 
 
 class NonuniformCurrent(Effect):
-    """Incompressible flow: the linear expansion about the pool's centre plus twelve gyres that close at the walls.
+    """Incompressible flow: the linear expansion about the pool's centre plus gyres that close at the walls.
 
         V_x = mean_x +  strain x + shear_x y + sum_mn gyre_mn sin(m pi a) cos(n pi b)
         V_y = mean_y + shear_y x -  strain y - sum_mn gyre_mn (m W / n L) cos(m pi a) sin(n pi b)
-        a = x / L + 1/2,   b = y / W + 1/2,   m = 1 .. 4,   n = 1 .. 3
+        a = x / L + 1/2,   b = y / W + 1/2,   m = 1 .. 8,   n = 1 .. 4
 
     L, W: length and width of the pool. Every part is divergence-free; gyre_mn is the highest speed along the pool of a pattern of
     m by n eddies (stream function (W / n pi) gyre_mn sin(m pi a) sin(n pi b)); gyre_11 > 0 turns counter-clockwise.
@@ -44,7 +47,7 @@ class NonuniformCurrent(Effect):
         "strain": Parameter(0.0, "1/s", -0.5, 0.5, SOURCE, typical=0.005),
         "shear_x": Parameter(0.0, "1/s", -0.5, 0.5, SOURCE, typical=0.03),
         "shear_y": Parameter(0.0, "1/s", -0.5, 0.5, SOURCE, typical=-0.01),
-        **{f"gyre_{m}{n}": _gyre(0.03 if m == n == 1 else 0.01) for m, n in MODES},
+        **{f"gyre_{m}{n}": _gyre(m, n) for m, n in MODES},
     }
     strength = ("strain", "shear_x", "shear_y", *(f"gyre_{m}{n}" for m, n in MODES))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import softmax
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import effect_class, specification
@@ -60,7 +60,10 @@ def probabilities(log_evidence: dict[str, float]) -> dict[str, float]:
 
 
 def strength_z(fit: Fit, name: str) -> float:
-    """Largest distance of a strength parameter from neutral, in standard errors at the effect's own place.
+    """Distance of an effect's strengths from neutral, in standard errors at the effect's own place.
+
+    Of several strengths together: the number of standard errors of one that is as improbable as their Wald statistic. Each alone
+    may be unsure while the sum of all is not: a vortex was found with 2700 nats, its eddies each within 2.7 standard errors.
 
     Where and when an effect acts is kept fixed: of a payload the data may tell the moment mass times place alone, so that
     its mass is uncertain beside its place, but not whether there is one.
@@ -68,9 +71,11 @@ def strength_z(fit: Fit, name: str) -> float:
     effect = effect_class(name)
     places = [f"{name}.{key}" for key in effect.parameters if key not in effect.strength]
     kept = [i for i, free in enumerate(fit.hypothesis.free) if free not in places]
-    deviation = np.sqrt(np.diag(np.linalg.inv(fit.normal[np.ix_(kept, kept)])))
-    z = np.abs(fit.theta[kept]) / deviation  # an effect's theta is 0 where it is neutral
-    return float(max(z[i] for i, k in enumerate(kept) if fit.hypothesis.free[k].startswith(f"{name}.")))
+    own = [j for j, i in enumerate(kept) if fit.hypothesis.free[i].startswith(f"{name}.")]
+    covariance = np.linalg.inv(fit.normal[np.ix_(kept, kept)])[np.ix_(own, own)]
+    theta = fit.theta[kept][own]  # an effect's theta is 0 where it is neutral
+    wald = float(theta @ np.linalg.solve(covariance, theta))
+    return float(norm.isf(0.5 * max(chi2.sf(wald, len(own)), np.finfo(float).tiny)))
 
 
 def parameter_count(name: str) -> int:
