@@ -120,6 +120,13 @@ def test_strange_innovations_are_put_down_to_the_likelier_of_sensors_and_model(
     assert tempering.close(fit, None, Noise()) is (model if sensors_are_right else theirs)
 
 
+def without_data(monkeypatch) -> None:
+    """`base` shortens, measures and evaluates nothing: where fits begin and which is kept is asked."""
+    monkeypatch.setattr(base, "shorten", lambda experiment, _: experiment)
+    monkeypatch.setattr(base, "usual_noise", lambda _: None)
+    monkeypatch.setattr(base, "evaluate", lambda *_: None)
+
+
 @pytest.mark.parametrize(
     ("left", "worst", "other", "best"),
     [(1.0, 1.0, 7.0, 5.0), (1.0, 1.5, 7.0, 7.0), (1.0, 1.5, 3.0, 5.0), (9.0, 1.5, 7.0, 5.0)],
@@ -138,10 +145,8 @@ def test_a_fit_whose_innovations_its_own_noise_does_not_explain_is_looked_at_aga
 
     monkeypatch.setattr(base, "excess", lambda _: np.array([left]))
     monkeypatch.setattr(base, "worst_row", lambda _: worst)
-    monkeypatch.setattr(base, "shorten", lambda experiment, _: experiment)
-    monkeypatch.setattr(base, "usual_noise", lambda _: None)
+    without_data(monkeypatch)
     monkeypatch.setattr(base, "fit_tempered", fit_held)
-    monkeypatch.setattr(base, "evaluate", lambda *_: None)
     monkeypatch.setattr(base, "settle", lambda *_: SimpleNamespace(objective=other))
     assert base.look_again(fit, None).objective == best
     assert (fit.theta == 0.4).all()
@@ -161,10 +166,8 @@ def test_a_candidate_is_fitted_from_the_nominal_values_with_its_effect_as_found(
         begun.extend(places)
         return SimpleNamespace(hypothesis=hypothesis, theta=None, noise=None)
 
-    monkeypatch.setattr(base, "shorten", lambda experiment, _: experiment)
-    monkeypatch.setattr(base, "usual_noise", lambda _: None)
+    without_data(monkeypatch)
     monkeypatch.setattr(base, "fit_cold", fit_cold)
-    monkeypatch.setattr(base, "evaluate", lambda *_: None)
     monkeypatch.setattr(base, "settle_base", lambda *_: SimpleNamespace(objective=reached))
     assert base.from_nominal(fit, None).objective == best
     assert np.array_equal(begun, [[0.0, 0.0, 0.8], [0.6, -0.4, 0.8]])
