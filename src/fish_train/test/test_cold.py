@@ -162,15 +162,15 @@ def test_a_candidate_is_fitted_from_the_nominal_values_with_its_effect_as_found(
     fit = SimpleNamespace(hypothesis=hypothesis, theta=np.array([0.6, -0.4, 0.8]), objective=5.0)
     begun = []
 
-    def fit_cold(_hypothesis, _experiment, _noise, places):
-        begun.extend(places)
+    def fit_tempered(_hypothesis, _experiment, _noise, start, held):
+        begun.append((*start, *held))
         return SimpleNamespace(hypothesis=hypothesis, theta=None, noise=None)
 
     without_data(monkeypatch)
-    monkeypatch.setattr(base, "fit_cold", fit_cold)
+    monkeypatch.setattr(base, "fit_tempered", fit_tempered)
     monkeypatch.setattr(base, "settle_base", lambda *_: SimpleNamespace(objective=reached))
     assert base.from_nominal(fit, None).objective == best
-    assert np.array_equal(begun, [[0.0, 0.0, 0.8], [0.6, -0.4, 0.8]])
+    assert begun == [(0.0, 0.0, 0.8, *tempering.TAIL_INERTIAS)]
 
 
 def test_a_slow_strong_force_is_found_from_a_fast_one() -> None:

@@ -207,7 +207,7 @@ def test_another_link_is_tried_where_the_one_before_gained_fitted_cold_or_from_f
     def reaches(objective):
         return SimpleNamespace(hypothesis=objective, theta=None, noise=None, objective=objective)
 
-    def cold_fit(links, *_args, places):
+    def many_fit(links, *_args, places):
         calls.append(links)
         assert places == ("fewer",)
         return reaches(cold[links])
@@ -220,7 +220,7 @@ def test_another_link_is_tried_where_the_one_before_gained_fitted_cold_or_from_f
     monkeypatch.setattr(tail, "usual_noise", lambda _: None)
     monkeypatch.setattr(tail, "with_links", lambda _, links: links)
     monkeypatch.setattr(tail, "nominal_hypothesis", lambda links: links)
-    monkeypatch.setattr(tail, "fit_cold", cold_fit)
+    monkeypatch.setattr(tail, "fit_multistart", many_fit)
     monkeypatch.setattr(tail, "fit_tempered", led_fit)
     monkeypatch.setattr(tail, "evaluate", lambda objective, *_: objective)
     monkeypatch.setattr(tail, "settle", lambda objective, _: objective)

@@ -123,6 +123,16 @@ def test_one_effect_more_leaves_the_others_where_they_are(several: Hypothesis, t
     )
 
 
+def test_numbers_that_are_held_stay_where_theta_has_them(several: Hypothesis, theta: np.ndarray) -> None:
+    """Of the robot, of an effect and of a sensor; the others keep their coordinates."""
+    held = [several.free[0], "wall_effect.k", "camera_latency.delay"]
+    rest = several.fixing(held, theta)
+    moving = np.array([name not in held for name in several.free])
+    assert rest.free == tuple(name for name in several.free if name not in held)
+    assert Coordinates(rest).robot(theta[moving]) == Coordinates(several).robot(theta)
+    assert several.fixing((), theta) == several
+
+
 def test_only_strengths_start_at_a_fraction() -> None:
     wall = effect_class("wall_effect").parameters
     assert start_values("wall_effect", 0.0)["k"] == wall["k"].value

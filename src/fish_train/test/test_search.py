@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
-from fish_train.diagnose import search
+from fish_train.diagnose import ranking, search
 from fish_train.diagnose.decide import TEMPER, probabilities
 from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import climb, evaluate
+from fish_train.identify.fit import evaluate
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.synthetic import program, record
 
@@ -41,8 +41,8 @@ def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, r
 
 
 def test_what_gains_far_less_than_it_needs_itself_is_not_refitted(monkeypatch):
-    ranking = tuple(search.Ranked(name, 10.0, np.zeros(1)) for name in ("nonuniform_current", "sloshing"))
-    monkeypatch.setattr(search, "rank", lambda *_: ranking)
+    ranked = tuple(ranking.Ranked(name, 10.0, np.zeros(1)) for name in ("nonuniform_current", "sloshing"))
+    monkeypatch.setattr(search, "rank", lambda *_: ranked)
     monkeypatch.setattr(search, "refit", lambda *_: SimpleNamespace(objective=10.0))
     monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)
     needed = {"nonuniform_current": 82.0, "sloshing": 30.0}
@@ -55,7 +55,7 @@ def test_what_gains_far_less_than_it_needs_itself_is_not_refitted(monkeypatch):
     [(2000.0, 4000.0, ["rudder_saturation"], 4000.0), (2000.0, 1010.0, ["rudder_saturation"], 1000.0),
      (10.0, 4000.0, [], 1000.0)],
 )  # fmt: skip
-def test_the_best_candidate_is_fitted_cold_where_it_leaves_a_force_that_no_pool_has(
+def test_the_best_candidate_is_led_from_afar_where_it_leaves_a_force_that_no_pool_has(
     monkeypatch, left, cold, asked, best
 ):
     """A rudder that stops was found so, but left 2300 times usual water, as its base did: nothing was named."""
@@ -73,12 +73,12 @@ def test_the_best_candidate_is_fitted_cold_where_it_leaves_a_force_that_no_pool_
     monkeypatch.setattr(search, "from_nominal", anew)
     monkeypatch.setattr(search, "refit_beside", lambda led, base, name, *_: beside[name])
     found = search.Round(SimpleNamespace(objective=0.0), (), fits)
-    led = search.best_cold(found, None, 23.0, quiet)
+    led = search.from_afar(found, None, 23.0, quiet)
     assert calls == asked and led.best == "rudder_saturation"
     assert led.refitted["rudder_saturation"].objective == best
     assert led.refitted["rudder_gain"].objective == (3000.0 if best > 1000.0 else 900.0)
     assert led.refitted["rudder_offset"] is fits["rudder_offset"]  # so far behind that it was not refitted
-    nothing = search.best_cold(replace(found, base=SimpleNamespace(objective=990.0)), None, 23.0, quiet)
+    nothing = search.from_afar(replace(found, base=SimpleNamespace(objective=990.0)), None, 23.0, quiet)
     assert nothing.refitted is fits and calls == asked  # what gains too little for a name is left alone
 
 
@@ -88,7 +88,7 @@ def test_a_look_alike_is_refitted_from_where_the_winner_led():
     commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps")], axis=1)
     experiment = record(truth, commands, Noise(), random)[0]
     base = evaluate(nominal_hypothesis(Robot(), ("tail_stiffness",)), np.zeros(1), experiment, Noise())
-    wake = base.hypothesis.with_effect("wake_memory", search.SCALE)
+    wake = base.hypothesis.with_effect("wake_memory", ranking.SCALE)
     best = settle(evaluate(wake, np.array([0.0, 1.0, 0.0, 0.0]), experiment, Noise()), experiment)
     slip = search.refit_beside(best, base, "tip_slip", experiment, 20.0)
     assert slip is not None and slip.objective > best.objective - 10.0  # wake_memory holds tip_slip within it
@@ -96,63 +96,3 @@ def test_a_look_alike_is_refitted_from_where_the_winner_led():
     assert search.refit_beside(best, base, "tail_joint_damping", experiment, 20.0) is None
     odds = probabilities({"slip": search.evidence(slip, TEMPER), "wake": search.evidence(best, TEMPER)})
     assert odds["slip"] > 0.7  # two numbers more that nothing asks for
-
-
-@pytest.mark.parametrize(
-    ("name", "key", "hidden", "near", "look"),
-    [("sloshing", "frequency", {"sine": -0.02, "cosine": 0.01, "frequency": 0.77}, 0.8, search.look_near),
-     ("wave_drag", "speed", {"amplitude": 0.03, "speed": 0.13, "width": 0.03}, 0.12, search.look_afar),
-     ("rudder_saturation", "limit", {"limit": 0.11}, 0.13, search.look_near),
-     ("rudder_saturation", "limit", {"limit": 0.11}, 0.13, search.look_afar)],
-)  # fmt: skip
-def test_an_effect_is_found_from_the_place_that_promises_most(name, key, hidden, near, look):
-    """From the one start value that both had before, a search does not walk there."""
-    random = np.random.default_rng(4)
-    commands = np.stack([program(kind, 7.0, random) for kind in ("sines", "straight")], axis=1)
-    experiment = record(Robot().with_effect(name, **hidden), commands, Noise(), random)[0]
-    drags = nominal_hypothesis(Robot(), ("head_drag_surge", "head_drag_sway"))
-    base = settle(evaluate(drags, np.zeros(2), experiment, Noise()), experiment)
-    assert search.best_place(base, name, experiment, base.noise)[key] == pytest.approx(near)
-    fit = settle(look(base, name, experiment), experiment)
-    assert fit.values[f"{name}.{key}"] == pytest.approx(hidden[key], rel=0.1)
-
-
-@pytest.mark.parametrize("look", [search.look_near, search.look_afar])
-def test_a_hump_of_drag_is_not_lost_while_it_is_weak(look):
-    """A step of its speed and width, which seem free while it is weak, leads a weak hump to where the fish never swims."""
-    random = np.random.default_rng(9)
-    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "straight", "random")], axis=1)
-    place = {"speed": 0.145, "width": 0.035}
-    hump = Robot().with_effect("wave_drag", amplitude=0.02, **place)
-    experiment = record(hump, commands, Noise(), random)[0]
-    nominal = nominal_hypothesis(Robot())
-    base = settle(evaluate(nominal, np.zeros(len(nominal.free)), experiment, Noise()), experiment)
-    fit = climb(look(base, "wave_drag", experiment), experiment, search.POLISH_ITERATIONS)
-    truth = search.started(base, "wave_drag", 1.0, place)
-    best = climb(evaluate(fit.hypothesis, truth, experiment, base.noise), experiment, 20)
-    assert fit.objective > best.objective - 3.0 > base.objective + 15.0
-
-
-def test_images_half_a_second_old_are_found():
-    """A stroke is half a second: the heading fits again without a delay."""
-    random = np.random.default_rng(6)
-    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1)
-    experiment = record(Robot(), commands, Noise(), random)[0]
-    late = replace(experiment, frames=tuple(replace(f, t=f.t + 0.47) for f in experiment.frames))
-    drags = nominal_hypothesis(Robot(), ("head_drag_surge", "head_drag_yaw", "fin_drag_sway"))
-    base = settle(evaluate(drags, np.zeros(3), late, Noise()), late)
-    fit = settle(search.look_afar(base, "camera_latency", late), late)
-    assert fit.values["camera_latency.delay"] == pytest.approx(0.47, abs=0.005)
-
-
-def test_an_effect_far_weaker_than_typical_is_found_where_little_is_left():
-    """From a typical strength, which the data refuse by tens of thousands of nats, no step leads back to a weak one."""
-    random = np.random.default_rng(8)
-    commands = np.stack([program(kind, 12.0, random) for kind in ("sines", "steps", "random")], axis=1)
-    weak = Robot().with_effect("tail_hardening", k3=0.036)
-    experiment = record(weak, commands, Noise(), random)[0]
-    free = nominal_hypothesis(Robot(), ("tail_stiffness", "fin_drag_sway"))
-    base = settle(evaluate(free, np.zeros(2), experiment, Noise()), experiment)
-    fit = search.look_near(base, "tail_hardening", experiment)
-    assert search.promise(fit) > base.objective + 100.0
-    assert settle(fit, experiment).values["tail_hardening.k3"] == pytest.approx(0.036, rel=0.05)

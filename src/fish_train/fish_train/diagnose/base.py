@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from fish_sim.robot import Robot
 from fish_train.identify.adapt import settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, UNWHITE, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
-from fish_train.identify.filter_types import Array
 from fish_train.identify.fit import Fit, evaluate
-from fish_train.identify.hypothesis import Coordinates, Hypothesis, nominal_hypothesis
+from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.suitable import worst_row
 from fish_train.identify.tempering import TAIL_INERTIAS, fit_tempered
@@ -22,25 +19,24 @@ GROWN = 2.0  # a force that more trials make so much stronger comes from a poor 
 
 
 def fit_base(robot: Robot, experiment: Experiment) -> Fit:
-    """The nominal model, fitted cold."""
-    return from_cold(nominal_hypothesis(robot), experiment)
-
-
-def from_cold(hypothesis: Hypothesis, experiment: Experiment, places: Sequence[Array] = ()) -> Fit:
-    """Cold fit on the start of every trial, continued on the whole; places: theta to begin at besides."""
+    """The nominal model, fitted cold on the start of every trial, continued on the whole."""
     short = shorten(experiment, FIRST_STEPS)
-    cold = fit_cold(hypothesis, short, usual_noise(short), places=places)
+    cold = fit_cold(nominal_hypothesis(robot), short, usual_noise(short))
     return settle_base(evaluate(cold.hypothesis, cold.theta, experiment, cold.noise), experiment)
 
 
 def from_nominal(fit: Fit, experiment: Experiment) -> Fit:
-    """The fit or a better one, fitted cold with its effects as strong as they were found.
+    """The fit or a better one, led by the camera from the nominal values with its effects as strong as they were found.
 
     A candidate found from a base in a poor optimum may stay there: a rudder that stops, rightly found, left 2300 times usual
-    water; fitted cold it leaves less than usual (docs/blind_studies.md, the nineteenth).
+    water; led so it leaves less than usual (docs/blind_studies.md, the nineteenth).
     """
-    start = np.where(Coordinates(fit.hypothesis).is_log, 0.0, fit.theta)
-    return better(fit, from_cold(fit.hypothesis, experiment, [start, fit.theta]))
+    start, short = (
+        np.where(Coordinates(fit.hypothesis).is_log, 0.0, fit.theta),
+        shorten(experiment, FIRST_STEPS),
+    )
+    led = fit_tempered(fit.hypothesis, short, usual_noise(short), start, held=TAIL_INERTIAS)
+    return better(fit, settle_base(evaluate(fit.hypothesis, led.theta, experiment, led.noise), experiment))
 
 
 def settle_base(fit: Fit, experiment: Experiment) -> Fit:

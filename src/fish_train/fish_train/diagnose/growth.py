@@ -8,7 +8,8 @@ from fish_train.diagnose.base import anneal, refine
 from fish_train.diagnose.decide import SMALLEST_CHECK, SMALLEST_Z, Level, parameter_count, strength_z
 from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.pruning import simplest
-from fish_train.diagnose.search import Progress, Round, evidence, look_alike, settled_round
+from fish_train.diagnose.ranking import Progress
+from fish_train.diagnose.search import Round, evidence, look_alike, settled_round
 from fish_train.diagnose.split import Trials
 from fish_train.diagnose.unseen import gain_left_out, gain_unseen, on_all
 from fish_train.identify.cores import on_all_cores

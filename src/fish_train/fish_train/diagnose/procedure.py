@@ -16,7 +16,7 @@ from fish_train.diagnose.law import describe
 from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.diagnose.own_force import has_own_force, own_force
 from fish_train.diagnose.pruning import prune, switched_off
-from fish_train.diagnose.search import Progress
+from fish_train.diagnose.ranking import Progress
 from fish_train.diagnose.split import split_trials, trials_of
 from fish_train.diagnose.stand_in import STRUCTURAL, stand_in
 from fish_train.diagnose.tail import finer_tail

@@ -11,7 +11,8 @@ from dataclasses import replace
 from fish_train.diagnose.base import settle_base
 from fish_train.diagnose.decide import PLAUSIBLE, TEMPER, Level, parameter_count, probabilities
 from fish_train.diagnose.diagnosis import Accepted
-from fish_train.diagnose.search import SCALE, Progress, evidence, look_alike, warm_starts
+from fish_train.diagnose.ranking import SCALE, Progress, warm_starts
+from fish_train.diagnose.search import evidence, look_alike
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit, evaluate, log_posterior
 

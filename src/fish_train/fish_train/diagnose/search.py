@@ -1,47 +1,29 @@
 """Which effect explains the mismatch: rank all candidates, refit the best, compare.
 
-Every hypothesis refits all nominal parameters: an effect counts only for what they cannot absorb. The first ranking runs
-at the noise of the model without the effect, inflated by what that model lacks, with the IMU believed a tenth: there the
-likelihood has few optima. A structural effect (slip, hardening) may be absorbed so deeply that no path leads from
-the fitted base to the truth, so every candidate is tried from the base and from the nominal values, weak and strong.
-Where the base already leaves no more than water does, one step from it is enough.
+Every hypothesis refits all nominal parameters: an effect counts only for what they cannot absorb.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fish_train.diagnose.base import from_nominal, look_again, settle_base
+from fish_train.diagnose.ranking import RANK_ITERATIONS, SCALE, Progress, Ranked, rank, warm_starts
 from fish_train.identify.adapt import adapt_noise, settle
-from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, TOO_STRONG, better, excess
+from fish_train.identify.cold import FIRST_STEPS, TOO_STRONG, better, excess
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment, shorten
-from fish_train.identify.filter import prepare
-from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, climb, evaluate, log_posterior
-from fish_train.identify.hypothesis import Coordinates, Hypothesis, effect_class, extend, specification
-from fish_train.identify.suitable import open_gates
+from fish_train.identify.hypothesis import Coordinates
 
-STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
-WEAK_STRENGTHS = (0.05, 0.3)  # where little is left: no step leads back from far too strong an effect
-SCALE = 0.3  # strength at which the hypothesis is written down; sets the coordinates only
-IMU_DISTRUST = 10.0  # factor of the IMU's noise in the first part of the ranking
-RANK_ITERATIONS = 6
-POLISH_ITERATIONS = 4
-STRENGTH_ITERATIONS = 3  # nearly linear; the climb in everything begins where it ends
-PROMISING_PLACES = 3  # of those that are tried
-POLISHED = 8  # candidates that are ranked with the IMU's own noise
 SHORTLIST = 4
 MOST_SEARCHES = 3  # with one base after the other, each a better optimum
 POOR_BASE = 0.5  # share of the best candidate's gain that a better optimum of the base has as well
-WORTH_A_REFIT = (
-    0.2  # share of the best ranking gain, and of a gain that is enough: a refit on whole trials gains more
-)
+# share of the best ranking gain, and of a gain that is enough: a refit on whole trials gains more
+WORTH_A_REFIT = 0.2
 LOOK_ALIKES = (
     ("tip_slip", "wake_memory", "tail_joint_damping"),
     ("rudder_lag", "rudder_delay"),
@@ -49,17 +31,6 @@ LOOK_ALIKES = (
     ("rudder_offset", "camera_heading_offset", "hull_asymmetry"),
     ("current", "nonuniform_current"),
 )
-
-Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Ranked:
-    """A candidate after the quick ranking."""
-
-    name: str
-    gain: float  # nats over the base at the base's noise
-    theta: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -94,109 +65,6 @@ def evidence(fit: Fit, temper: float = 1.0) -> float:
     log_prior = 0.5 * float(np.log(weight).sum() - np.sum(weight * fit.theta**2))
     normal = (fit.normal - np.diag(weight)) / temper + np.diag(weight)
     return float(fit.log_likelihood.sum()) / temper + log_prior - 0.5 * float(np.linalg.slogdet(normal)[1])
-
-
-def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Progress) -> tuple[Ranked, ...]:
-    """All candidates added to the base one at a time, on short trials, the most promising polished."""
-    short = shorten(experiment, FIRST_STEPS)
-    reference = climb(evaluate(base.hypothesis, base.theta, short, base.noise), short, POLISH_ITERATIONS)
-    compile_all(base, names, progress)
-    near = excess(base).max() < SUSPICIOUS
-
-    def look(place: int) -> Fit:
-        progress(f"ranking {names[place]} ({place + 1} of {len(names)})")
-        return look_near(reference, names[place], short) if near else look_afar(base, names[place], short)
-
-    found = dict(zip(names, on_all_cores(look, range(len(names))), strict=True))
-    progress("ranking the most promising")
-    promising = sorted(names, key=lambda name: -promise(found[name]))[:POLISHED]
-    polished = on_all_cores(lambda name: climb(found[name], short, POLISH_ITERATIONS), promising)
-    found |= zip(promising, polished, strict=True)
-    gains = [Ranked(name, fit.objective - reference.objective, fit.theta) for name, fit in found.items()]
-    return tuple(sorted(gains, key=lambda r: -r.gain))
-
-
-def look_afar(base: Fit, name: str, short: Experiment) -> Fit:
-    """A candidate where the base is far from the truth: from the best of all starts, the IMU believed little at first."""
-    own = base.noise
-    wide = replace(open_gates(own), gyro=IMU_DISTRUST * own.gyro, accel=IMU_DISTRUST * own.accel)
-    hypothesis = base.hypothesis.with_effect(name, SCALE)
-    cold = replace(base, theta=np.where(Coordinates(base.hypothesis).is_log, 0.0, base.theta))
-    starts = [*warm_starts(base, name, short, wide), *warm_starts(cold, name, short, wide)]
-    start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, wide))
-    fit = climb(in_strength(evaluate(hypothesis, start, short, wide), name, short), short, RANK_ITERATIONS)
-    return evaluate(hypothesis, fit.theta, short, own)
-
-
-def look_near(base: Fit, name: str, short: Experiment) -> Fit:
-    """A candidate where the base leaves no more than water does: what is missing is small, so one step tells its gain."""
-    hypothesis = base.hypothesis.with_effect(name, SCALE)
-    starts = warm_starts(base, name, short, base.noise, WEAK_STRENGTHS)
-    fits = [in_strength(evaluate(hypothesis, theta, short, base.noise), name, short) for theta in starts]
-    return max(fits, key=promise)
-
-
-def in_strength(fit: Fit, name: str, short: Experiment) -> Fit:
-    """A candidate that has a place, climbed in all but this: while an effect is weak its place seems free, and a step loses it.
-
-    Separable least squares (Golub and Pereyra 1973): in its strength a fit is nearly linear.
-    """
-    moving = strengths_of(fit.hypothesis, name)
-    return fit if moving.all() else climb(fit, short, STRENGTH_ITERATIONS, moving=moving)
-
-
-def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
-    """Build every candidate's kernel, which the first run on a machine has to do, on all cores."""
-    progress("compiling what is not in the cache yet")
-    on_all_cores(lambda name: prepare(base.hypothesis.with_effect(name, SCALE).robot), names)
-
-
-def warm_starts(
-    base: Fit, name: str, experiment: Experiment, noise: Noise, strengths: Sequence[float] = STRENGTHS
-) -> list[np.ndarray]:
-    """theta of the base with a candidate at its best place, weak and strong where this leaves its strength open."""
-    place = best_place(base, name, experiment, noise)
-    if place.keys() >= set(effect_class(name).strength):  # how strong says the place itself
-        strengths = strengths[:1]
-    return [started(base, name, strength, place) for strength in strengths]
-
-
-def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -> np.ndarray:
-    """theta of the base with a candidate of this strength, in typical ones, at this place."""
-    return extend(base.theta, base.hypothesis.with_effect(name, SCALE), name, strength, place)
-
-
-def best_place(base: Fit, name: str, experiment: Experiment, noise: Noise) -> dict[str, float]:
-    """Values of the parameters that say where or how fast, of those to be tried, from which the effect gains most.
-
-    The few that promise most are climbed at their place: far from the base a promise is not kept.
-    """
-    keys = tried(name)
-    places = [dict(zip(keys, v, strict=True)) for v in product(*(specification(name)[k].tries for k in keys))]
-    if len(places) == 1:
-        return places[0]
-    hypothesis = base.hypothesis.with_effect(name, SCALE)
-    fits = [evaluate(hypothesis, started(base, name, SCALE, p), experiment, noise) for p in places]
-    promising = sorted(range(len(places)), key=lambda i: -promise(fits[i]))[:PROMISING_PLACES]
-    return places[max(promising, key=lambda i: in_strength(fits[i], name, experiment).objective)]
-
-
-def tried(name: str) -> list[str]:
-    """Parameters of an effect that say where, how fast or from where on, of which several values are tried."""
-    return [key for key, parameter in specification(name).items() if parameter.tries]
-
-
-def strengths_of(hypothesis: Hypothesis, name: str) -> NDArray[np.bool_]:
-    """(K,) all free parameters but those of the effect that say where or how fast."""
-    return np.array([free not in {f"{name}.{key}" for key in tried(name)} for free in hypothesis.free])
-
-
-def promise(fit: Fit) -> float:
-    """Objective that one Gauss-Newton step would reach, were the problem quadratic."""
-    gradient = fit.result.gradient.sum(0) + fit.theta / Coordinates(fit.hypothesis).prior ** 2
-    if not np.isfinite(fit.objective):
-        return -np.inf
-    return fit.objective + 0.5 * float(gradient @ np.linalg.solve(fit.normal, gradient))
 
 
 def look_alike(first: str, second: str) -> bool:
@@ -246,22 +114,25 @@ def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment,
     fits = on_all_cores(lambda ranked: refit(base, ranked, experiment), chosen)
     refitted = dict(zip((r.name for r in chosen), fits, strict=True))
     enough = min(needed.values())
-    found = best_cold(Round(base, ranking, refitted), experiment, enough, progress)
+    found = from_afar(Round(base, ranking, refitted), experiment, enough, progress)
     return with_look_alikes(found, names, experiment, enough, progress)
 
 
-def best_cold(found: Round, experiment: Experiment, enough: float, progress: Progress) -> Round:
-    """The round with its best candidate fitted cold where it needs a force that no pool has, and its rivals from there."""
+def from_afar(found: Round, experiment: Experiment, enough: float, progress: Progress) -> Round:
+    """The round with its best candidate led from the nominal values if it needs a force that no pool has, its rivals from there.
+
+    At once, also where more may be missing: from the poor optimum other names would be found beside the right one.
+    """
     best = found.best
     if best is None or found.gain(best) < enough or excess(found.refitted[best]).max() <= TOO_STRONG:
         return found
-    progress(f"fitting once more with {best}, from the nominal values")
-    cold = from_nominal(found.refitted[best], experiment)
-    if cold.objective - found.refitted[best].objective < enough:
+    progress(f"fitting {best} once more, from the nominal values")
+    led = from_nominal(found.refitted[best], experiment)
+    if led.objective - found.refitted[best].objective < enough:
         return found
-    refitted = {**found.refitted, best: cold}
+    refitted = {**found.refitted, best: led}
     for name in found.refitted.keys() - {best}:
-        fit = refit_beside(cold, found.base, name, experiment, enough)
+        fit = refit_beside(led, found.base, name, experiment, enough)
         if fit is not None:
             refitted[name] = better(fit, refitted[name])
     return replace(found, refitted=refitted)

@@ -10,11 +10,12 @@ from dataclasses import replace
 from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
 from fish_train.diagnose.decide import SMALLEST_CHECK, Level
 from fish_train.diagnose.law import describe
-from fish_train.diagnose.search import Progress, evidence
+from fish_train.diagnose.ranking import Progress
+from fish_train.diagnose.search import evidence
 from fish_train.diagnose.split import Trials
 from fish_train.diagnose.unseen import gain_unseen, on_all
 from fish_train.identify.adapt import settle
-from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess, fit_cold
+from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, better, excess, fit_multistart
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.fit import Fit, evaluate, log_posterior
 from fish_train.identify.hypothesis import nominal_hypothesis
@@ -59,9 +60,10 @@ def finer_tails(
     """Nominal models with more links, one after the other while they are better than the best fit so far on shortened trials.
 
     A tail that needs two links more gains by one already: 1200 and 8000 nats on two fish of five links (docs/blind_studies.md,
-    after the tenth), if its optimum is found. So a cold fit, which has the ratios to nominal values that fewer links came to
-    among its places but goes on from the best only, competes with one led from these all the way: on another fish of five
-    links that was 1400 nats better with four, and the cold one no gain (ibid., the nineteenth).
+    after the tenth), if its optimum is found. So a fit from many places, the ratios to nominal values that fewer links came to
+    among them, which goes on from the best only, competes with one led from these ratios all the way: on another fish of
+    five links that was 1400 nats better with four, and the other no gain (ibid., the nineteenth). The better of the two came
+    as far as `fit_cold` goes with its further ways (ibid., the twenty-first).
     """
     found, beaten = [], log_posterior(best.hypothesis, best.theta, short, best.noise)
     noise = usual_noise(short)
@@ -70,8 +72,8 @@ def finer_tails(
             break
         progress(f"fitting the nominal model with {links} tail links")
         hypothesis = nominal_hypothesis(with_links(robot, links))
-        cold = fit_cold(hypothesis, short, noise, places=(nominal.theta,))
-        fit = better(cold, fit_tempered(hypothesis, short, noise, nominal.theta))
+        many = fit_multistart(hypothesis, short, noise, places=(nominal.theta,))
+        fit = better(many, fit_tempered(hypothesis, short, noise, nominal.theta))
         if not fit.objective > beaten:
             break
         found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))

@@ -7,7 +7,7 @@ data say nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -116,6 +116,27 @@ class Hypothesis:
         sensors = {k: v for k, v in self.robot.sensors.items() if k != name}
         free = tuple(f for f in self.free if not f.startswith(name + "."))
         return Hypothesis(replace(self.robot, effects=effects, sensors=sensors), free)
+
+    def fixing(self, held: Collection[str], theta: Array) -> Hypothesis:
+        """The hypothesis with the free parameters `held` fixed at what they are at theta (K,)."""
+        at, robot = Coordinates(self).robot(theta), self.robot
+        parameters = {**robot.parameters, **{k: v for k, v in at.parameters.items() if k in held}}
+
+        def some(
+            table: Mapping[str, Mapping[str, float]], now: Mapping[str, Mapping[str, float]]
+        ) -> dict[str, dict[str, float]]:
+            return {
+                e: {k: now[e][k] if f"{e}.{k}" in held else v for k, v in own.items()}
+                for e, own in table.items()
+            }
+
+        robot = replace(
+            robot,
+            parameters=parameters,
+            effects=some(robot.effects, at.effects),
+            sensors=some(robot.sensors, at.sensors),
+        )
+        return Hypothesis(robot, tuple(name for name in self.free if name not in held))
 
 
 def nominal_hypothesis(robot: Robot, free: tuple[str, ...] = NOMINAL_FREE) -> Hypothesis:

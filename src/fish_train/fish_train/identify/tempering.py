@@ -59,7 +59,7 @@ def lead(
     """Where stages of falling IMU noise lead all but `held` from theta, gates open; it ends at what noise cannot explain."""
     theta = theta.copy()
     first = [i for i, name in enumerate(hypothesis.free) if name not in held]
-    coarse = _fixing(hypothesis, theta, held) if held else hypothesis
+    coarse = hypothesis.fixing(held, theta)
     for factor, iterations in stages:
         wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
         fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN)
@@ -74,14 +74,6 @@ def _with(hypothesis: Hypothesis, theta: Array, names: tuple[str, ...], value: f
     moved = theta.copy()
     moved[[hypothesis.free.index(name) for name in names]] += value
     return moved
-
-
-def _fixing(hypothesis: Hypothesis, theta: Array, held: tuple[str, ...]) -> Hypothesis:
-    """The hypothesis with the parameters `held` fixed at theta."""
-    robot = Coordinates(hypothesis).robot(theta)
-    fixed = {name: robot.parameters[name] for name in hypothesis.free if name in held}
-    free = tuple(name for name in hypothesis.free if name not in held)
-    return Hypothesis(hypothesis.robot.with_parameters(**fixed), free)
 
 
 def close(

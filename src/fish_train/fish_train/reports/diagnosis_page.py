@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from fish_train.diagnose.diagnosis import Diagnosis
-from fish_train.diagnose.search import Ranked, Round
+from fish_train.diagnose.ranking import Ranked
+from fish_train.diagnose.search import Round
 from fish_train.reports.before_after import before_after
 from fish_train.reports.diagnosis_figures import (
     force_against_covariates,
