@@ -31,10 +31,8 @@ def from_nominal(fit: Fit, experiment: Experiment) -> Fit:
     A candidate found from a base in a poor optimum may stay there: a rudder that stops, rightly found, left 2300 times usual
     water; led so it leaves less than usual (docs/blind_studies.md, the nineteenth).
     """
-    start, short = (
-        np.where(Coordinates(fit.hypothesis).is_log, 0.0, fit.theta),
-        shorten(experiment, FIRST_STEPS),
-    )
+    start = np.where(Coordinates(fit.hypothesis).is_log, 0.0, fit.theta)
+    short = shorten(experiment, FIRST_STEPS)
     led = fit_tempered(fit.hypothesis, short, usual_noise(short), start, held=TAIL_INERTIAS)
     return better(fit, settle_base(evaluate(fit.hypothesis, led.theta, experiment, led.noise), experiment))
 

@@ -15,6 +15,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_train.diagnose.decide import parameter_count
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, TOO_STRONG, excess
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment, shorten
@@ -73,14 +74,11 @@ def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Prog
     promising = sorted(names, key=lambda name: -promise(found[name]))[:POLISHED]
     polished = on_all_cores(lambda name: climb(found[name], short, POLISH_ITERATIONS), promising)
     found |= zip(promising, polished, strict=True)
-    if (
-        excess(base).max() > TOO_STRONG
-        and max(fit.objective for fit in found.values()) < reference.objective + STUCK
-    ):
+    best = max(fit.objective for fit in found.values())
+    if excess(base).max() > TOO_STRONG and best < reference.objective + STUCK:
         progress("ranking all once more, to the end")
-        found = dict(
-            zip(names, on_all_cores(lambda name: climb(found[name], short, LONG), names), strict=True)
-        )
+        ended = on_all_cores(lambda name: climb(found[name], short, LONG), names)
+        found = dict(zip(names, ended, strict=True))
     gains = [Ranked(name, fit.objective - reference.objective, fit.theta) for name, fit in found.items()]
     return tuple(sorted(gains, key=lambda r: -r.gain))
 
@@ -88,7 +86,7 @@ def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Prog
 def crowd(hypothesis: Hypothesis) -> list[str]:
     """Free parameters of the effects that have very many."""
     owner = {free: free.split(".")[0] for free in hypothesis.free if "." in free}
-    return [free for free, name in owner.items() if len(specification(name)) > MANY]
+    return [free for free, name in owner.items() if parameter_count(name) > MANY]
 
 
 def holding(base: Fit, experiment: Experiment) -> Fit:

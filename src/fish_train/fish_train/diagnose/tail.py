@@ -63,7 +63,7 @@ def finer_tails(
     after the tenth), if its optimum is found. So a fit from many places, the ratios to nominal values that fewer links came to
     among them, which goes on from the best only, competes with one led from these ratios all the way: on another fish of
     five links that was 1400 nats better with four, and the other no gain (ibid., the nineteenth). The better of the two came
-    as far as `fit_cold` goes with its further ways (ibid., the twenty-first).
+    as far as `fit_cold` goes with its further ways (ibid., after the twentieth).
     """
     found, beaten = [], log_posterior(best.hypothesis, best.theta, short, best.noise)
     noise = usual_noise(short)

@@ -119,23 +119,9 @@ class Hypothesis:
 
     def fixing(self, held: Collection[str], theta: Array) -> Hypothesis:
         """The hypothesis with the free parameters `held` fixed at what they are at theta (K,)."""
-        at, robot = Coordinates(self).robot(theta), self.robot
-        parameters = {**robot.parameters, **{k: v for k, v in at.parameters.items() if k in held}}
-
-        def some(
-            table: Mapping[str, Mapping[str, float]], now: Mapping[str, Mapping[str, float]]
-        ) -> dict[str, dict[str, float]]:
-            return {
-                e: {k: now[e][k] if f"{e}.{k}" in held else v for k, v in own.items()}
-                for e, own in table.items()
-            }
-
-        robot = replace(
-            robot,
-            parameters=parameters,
-            effects=some(robot.effects, at.effects),
-            sensors=some(robot.sensors, at.sensors),
-        )
+        coordinates = Coordinates(self)
+        stays = np.array([name in held for name in self.free], dtype=bool)
+        robot = coordinates.robot(np.where(stays, theta, coordinates.origin()))
         return Hypothesis(robot, tuple(name for name in self.free if name not in held))
 
 
