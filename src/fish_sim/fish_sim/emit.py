@@ -6,6 +6,8 @@ double) lets one core advance 4 or 8 fish at once.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi
 
 BINARY = {casadi.OP_ADD: "+", casadi.OP_SUB: "-", casadi.OP_MUL: "*", casadi.OP_DIV: "/"}
@@ -49,33 +51,89 @@ def emit(function: casadi.Function) -> str:
     outputs = [f"V *restrict o{k}" for k in range(function.n_out())]
     head = f"static void {function.name()}({', '.join(inputs + outputs)})"
     body = [f"  {_instruction(function, k)}" for k in range(function.n_instructions())]
-    work = [f"  V w{k};" for k in range(function.sz_w())]
-    return "\n".join([head, "{", *work, *_zero_outputs(function), *body, "}", ""])
+    zeros = _zero_outputs(function, range(function.n_out()))
+    return "\n".join([head, "{", *_registers(function), *zeros, *body, "}", ""])
 
 
-def _zero_outputs(function: casadi.Function) -> list[str]:
+def emit_split(function: casadi.Function) -> str:
+    """C text of a JVP for many directions at one point, the second half of its arguments and of its outputs the tangents'.
+
+    `name_given(const V *i0, .., V *o0, .., V *shared)` computes once what no tangent changes, NAME_SHARED numbers of it for
+    `name_along(const V *shared, const V *di0, .., V *do0, ..)`: a third of the instructions of the fish's rates, most divisions.
+    """
+    name, inputs, outputs = function.name(), function.n_in(), function.n_out()
+    points, values = inputs // 2, outputs // 2
+    source: dict[
+        int, int | None
+    ] = {}  # of a register: the instruction that wrote it, None where a tangent changes it
+    slots: dict[int, int] = {}  # place in `shared` of what an instruction wrote
+    given: list[tuple[int, str]] = []
+    along: list[str] = []
+
+    def passed(register: int) -> str:
+        written = source[register]
+        return f"w{register}" if written is None else f"shared[{slots.setdefault(written, len(slots))}]"
+
+    for k in range(function.n_instructions()):
+        operation, out, arguments = _parts(function, k)
+        if operation == casadi.OP_INPUT:
+            varies = arguments[0] >= points
+        elif operation == casadi.OP_OUTPUT:
+            varies = out[0] >= values
+        else:
+            varies = any(source[a] is None for a in arguments)
+        if varies:
+            along.append(f"  {_instruction(function, k, passed)}")
+        else:
+            given.append((k, f"  {_instruction(function, k)}"))
+        if operation != casadi.OP_OUTPUT:
+            source[out[0]] = None if varies else k
+    kept = [f"  shared[{slots[k]}] = w{_parts(function, k)[1][0]};" if k in slots else "" for k, _ in given]
+    once = [line for (_, text), store in zip(given, kept, strict=True) for line in (text, store) if line]
+    point = [
+        *(f"const V *restrict i{k}" for k in range(points)),
+        *(f"V *restrict o{k}" for k in range(values)),
+    ]
+    tangent = [f"const V *restrict i{k}" for k in range(points, inputs)]
+    tangent += [f"V *restrict o{k}" for k in range(values, outputs)]
+    return "\n".join([
+        f"#define {name.upper()}_SHARED {len(slots)}",
+        f"static void {name}_given({', '.join(point)}, V *restrict shared)",
+        "{", *_registers(function), *_zero_outputs(function, range(values)), *once, "}",
+        f"static void {name}_along(const V *restrict shared, {', '.join(tangent)})",
+        "{", *_registers(function), *_zero_outputs(function, range(values, outputs)), *along, "}", "",
+    ])  # fmt: skip
+
+
+def _registers(function: casadi.Function) -> list[str]:
+    return [f"  V w{k};" for k in range(function.sz_w())]
+
+
+def _zero_outputs(function: casadi.Function, outputs: range) -> list[str]:
     """Structurally zero entries of an output are never assigned by an instruction."""
     lines = []
-    for k in range(function.n_out()):
+    for k in outputs:
         sparsity = function.sparsity_out(k)
         if sparsity.nnz() != sparsity.numel():
             lines.append(f"  for (int j = 0; j < {sparsity.numel()}; ++j) o{k}[j] = v_constant(0.0);")
     return lines
 
 
-def _instruction(function: casadi.Function, k: int) -> str:
-    operation, out, arguments = (
-        function.instruction_id(k),
-        function.instruction_output(k),
-        function.instruction_input(k),
-    )
+def _parts(function: casadi.Function, k: int) -> tuple[int, list[int], list[int]]:
+    """Operation, where its result goes and what it takes: registers, or for inputs and outputs argument and nonzero."""
+    return function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+
+
+def _instruction(function: casadi.Function, k: int, read: Callable[[int], str] = "w{}".format) -> str:
+    """One instruction; `read`: what holds a register's value."""
+    operation, out, arguments = _parts(function, k)
     if operation == casadi.OP_CONST:
         return f"w{out[0]} = v_constant({function.instruction_constant(k)!r});"
     if operation == casadi.OP_INPUT:
         return f"w{out[0]} = i{arguments[0]}[{_row(function.sparsity_in(arguments[0]), arguments[1])}];"
     if operation == casadi.OP_OUTPUT:
-        return f"o{out[0]}[{_row(function.sparsity_out(out[0]), out[1])}] = w{arguments[0]};"
-    names = [f"w{a}" for a in arguments]
+        return f"o{out[0]}[{_row(function.sparsity_out(out[0]), out[1])}] = {read(arguments[0])};"
+    names = [read(a) for a in arguments]
     if operation in BINARY:
         return f"w{out[0]} = {names[0]} {BINARY[operation]} {names[1]};"
     if operation in UNARY_FORM:

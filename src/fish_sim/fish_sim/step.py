@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.compiled import compiler, has_libmvec, lanes, library
-from fish_sim.emit import emit
+from fish_sim.emit import emit, emit_split
 from fish_sim.finite import check_finite
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel
@@ -282,14 +282,12 @@ def kernel_source(structure: Structure, scheme: Scheme, width: int, part: Part) 
 
 
 def tangent_source(structure: Structure, method: str, width: int) -> str:
-    """C text of the step and of rates with tangents, exporting nothing; filters build on it.
+    """C text of the step and of rates with tangents along many directions, exporting nothing; filters build on it.
 
     Every thread sets `substeps`, the integrator's steps in a period, before it steps: one text serves every robot.
     """
-    names, texts = PARTS["tangents"][0], ("step.c",)
-    return (
-        f"static _Thread_local int substeps;\n{_source(structure, method, 'substeps', width, names, texts)}"
-    )
+    text = _source(structure, method, "substeps", width, ("rate", "follow", "follow_jvp"), ("step.c",))
+    return "\n".join(["static _Thread_local int substeps;", text, emit_split(functions(structure).rate_jvp)])
 
 
 def _source(

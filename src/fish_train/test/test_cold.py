@@ -120,11 +120,25 @@ def test_strange_innovations_are_put_down_to_the_likelier_of_sensors_and_model(
     assert tempering.close(fit, None, Noise()) is (model if sensors_are_right else theirs)
 
 
-def without_data(monkeypatch) -> None:
+@pytest.mark.parametrize(
+    ("led", "here", "whole", "best"), [(9.0, 5.0, 70.0, 70.0), (9.0, 5.0, 30.0, 50.0), (7.0, 5.0, 70.0, 50.0)]
+)
+def test_a_fit_led_elsewhere_goes_on_where_it_is_ahead(monkeypatch, led, here, whole, best) -> None:
+    """On shortened trials, of the fit settled there: else whole trials would be settled for nothing."""
+    fit = SimpleNamespace(hypothesis=None, theta="own", noise=None, objective=50.0)
+    other = SimpleNamespace(hypothesis=None, theta="led", noise=None, objective=led)
+    ends = {("own", "short"): here, ("led", "whole"): whole}
+    monkeypatch.setattr(base, "evaluate", lambda _, theta, experiment, __: (theta, experiment))
+    monkeypatch.setattr(base, "settle_base", lambda start, _: SimpleNamespace(objective=ends[start]))
+    assert base.better_of(fit, other, "short", "whole").objective == best
+
+
+def without_data(monkeypatch, reached: float) -> None:
     """`base` shortens, measures and evaluates nothing: where fits begin and which is kept is asked."""
+    ended = SimpleNamespace(objective=reached)
+    monkeypatch.setattr(base, "better_of", lambda fit, *_: max(fit, ended, key=lambda one: one.objective))
     monkeypatch.setattr(base, "shorten", lambda experiment, _: experiment)
     monkeypatch.setattr(base, "usual_noise", lambda _: None)
-    monkeypatch.setattr(base, "evaluate", lambda *_: None)
 
 
 @pytest.mark.parametrize(
@@ -145,9 +159,8 @@ def test_a_fit_whose_innovations_its_own_noise_does_not_explain_is_looked_at_aga
 
     monkeypatch.setattr(base, "excess", lambda _: np.array([left]))
     monkeypatch.setattr(base, "worst_row", lambda _: worst)
-    without_data(monkeypatch)
+    without_data(monkeypatch, other)
     monkeypatch.setattr(base, "fit_tempered", fit_held)
-    monkeypatch.setattr(base, "settle", lambda *_: SimpleNamespace(objective=other))
     assert base.look_again(fit, None).objective == best
     assert (fit.theta == 0.4).all()
 
@@ -166,9 +179,8 @@ def test_a_candidate_is_fitted_from_the_nominal_values_with_its_effect_as_found(
         begun.append((*start, *held))
         return SimpleNamespace(hypothesis=hypothesis, theta=None, noise=None)
 
-    without_data(monkeypatch)
+    without_data(monkeypatch, reached)
     monkeypatch.setattr(base, "fit_tempered", fit_tempered)
-    monkeypatch.setattr(base, "settle_base", lambda *_: SimpleNamespace(objective=reached))
     assert base.from_nominal(fit, None).objective == best
     assert begun == [(0.0, 0.0, 0.8, *tempering.TAIL_INERTIAS)]
 

@@ -38,7 +38,7 @@ def refits(monkeypatch):
 
         monkeypatch.setattr(pruning, "evidence", lambda fit, _: fit.objective)
         monkeypatch.setattr(pruning, "settle_base", lambda fit, _: fit)
-        monkeypatch.setattr(pruning, "switched_off", lambda *_: fit_of(without))
+        monkeypatch.setattr(pruning, "without", lambda *_: fit_of(without))
         monkeypatch.setattr(pruning, "exchanged", exchanged)
         return asked
 

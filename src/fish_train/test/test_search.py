@@ -40,10 +40,10 @@ def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, r
     assert found.base.objective == kept  # what gains too little for a name tells nothing of the base
 
 
-def test_what_gains_far_less_than_it_needs_itself_is_not_refitted(monkeypatch):
-    ranked = tuple(ranking.Ranked(name, 10.0, np.zeros(1)) for name in ("nonuniform_current", "sloshing"))
+def test_what_gains_far_less_than_it_needs_itself_or_no_more_than_chance_is_not_refitted(monkeypatch):
+    ranked = tuple(ranking.Ranked(name, 29.0, np.zeros(1)) for name in ("nonuniform_current", "sloshing"))
     monkeypatch.setattr(search, "rank", lambda *_: ranked)
-    monkeypatch.setattr(search, "refit", lambda *_: SimpleNamespace(objective=10.0))
+    monkeypatch.setattr(search, "refit", lambda *_: SimpleNamespace(objective=29.0))
     monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)
     needed = {"nonuniform_current": 82.0, "sloshing": 30.0}
     found = search.search_round(SimpleNamespace(objective=0.0), needed, None, quiet)

@@ -70,6 +70,20 @@ def test_a_model_that_lacks_nothing_gets_nothing_much(slipping: Experiment) -> N
     assert found.values.get("tip_slip.mobility", 0.0) < 0.03
 
 
+def test_an_effect_with_which_nothing_is_foretold_better_is_not_tried_on_trials_left_out(
+    monkeypatch, slipping: Experiment
+) -> None:
+    """Two costs left out differ by chance: a drag that predicted no better at all was taken so."""
+    costs = {(): 100.0, ("tip_slip",): 99.9}
+
+    def fitted(hypothesis, starts, *_):
+        return module._Tried(hypothesis, starts[0], costs[tuple(hypothesis.names)])
+
+    monkeypatch.setattr(module, "_fitted", fitted)
+    monkeypatch.setattr(module, "_foretells_better", lambda *_: pytest.fail("tried"))
+    assert stand_in(nominal(slipping), ("tip_slip",), slipping, lambda _: None).hypothesis.names == ()
+
+
 def test_a_fit_that_predicts_better_than_what_was_grown_stays(
     slipping: Experiment,
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_train.identify.adapt import settle
+from fish_train.identify.adapt import SETTLED_GAIN, settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, UNWHITE, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.fit import Fit, evaluate
@@ -34,6 +34,14 @@ def from_nominal(fit: Fit, experiment: Experiment) -> Fit:
     start = np.where(Coordinates(fit.hypothesis).is_log, 0.0, fit.theta)
     short = shorten(experiment, FIRST_STEPS)
     led = fit_tempered(fit.hypothesis, short, usual_noise(short), start, held=TAIL_INERTIAS)
+    return better_of(fit, led, short, experiment)
+
+
+def better_of(fit: Fit, led: Fit, short: Experiment, experiment: Experiment) -> Fit:
+    """The fit or one led elsewhere on shortened trials, which goes on to whole ones if it is ahead of the fit settled there."""
+    here = settle_base(evaluate(fit.hypothesis, fit.theta, short, fit.noise), short)
+    if led.objective - here.objective < SETTLED_GAIN:
+        return fit
     return better(fit, settle_base(evaluate(fit.hypothesis, led.theta, experiment, led.noise), experiment))
 
 
@@ -46,10 +54,9 @@ def anneal(fit: Fit, experiment: Experiment) -> Fit:
     """The fit, or where it needs far more than usual water a better optimum that the camera alone leads to."""
     if excess(fit).max() < SUSPICIOUS:
         return fit
-    noise, short = usual_noise(experiment), shorten(experiment, FIRST_STEPS)
-    short_fit = fit_tempered(fit.hypothesis, short, noise, fit.theta)
-    other = settle(evaluate(fit.hypothesis, short_fit.theta, experiment, short_fit.noise), experiment)
-    return better(fit, other)
+    short = shorten(experiment, FIRST_STEPS)
+    led = fit_tempered(fit.hypothesis, short, usual_noise(experiment), fit.theta)
+    return better_of(fit, led, short, experiment)
 
 
 def look_again(fit: Fit, experiment: Experiment) -> Fit:
@@ -62,7 +69,7 @@ def look_again(fit: Fit, experiment: Experiment) -> Fit:
     start, short = fit.theta.copy(), shorten(experiment, FIRST_STEPS)
     start[[i for i, name in enumerate(fit.hypothesis.free) if name in TAIL_INERTIAS]] = 0.0
     led = fit_tempered(fit.hypothesis, short, usual_noise(experiment), start, held=TAIL_INERTIAS)
-    return better(fit, settle(evaluate(fit.hypothesis, led.theta, experiment, led.noise), experiment))
+    return better_of(fit, led, short, experiment)
 
 
 def refine(fit: Fit, experiment: Experiment) -> Fit:

@@ -15,14 +15,13 @@ from fish_train.diagnose.growth import final_fits, grow
 from fish_train.diagnose.law import describe
 from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.diagnose.own_force import has_own_force, own_force
-from fish_train.diagnose.pruning import prune, switched_off
+from fish_train.diagnose.pruning import prune, without
 from fish_train.diagnose.ranking import Progress
 from fish_train.diagnose.split import split_trials, trials_of
 from fish_train.diagnose.stand_in import STRUCTURAL, stand_in
 from fish_train.diagnose.tail import finer_tail
 from fish_train.diagnose.verdict import much_is_left, named
 from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
-from fish_train.identify.adapt import adapt_noise
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
@@ -84,13 +83,12 @@ def shares(
 ) -> dict[str, tuple[Fit, MissingForce]]:
     """Of several effects each one's part: the model less it, with the noise it then needs, and the force that it lacks."""
 
-    def without(name: str) -> tuple[Fit, MissingForce]:
-        less = switched_off(final, name, training)
-        less = evaluate(less.hypothesis, less.theta, training, adapt_noise(less, training))
+    def part(name: str) -> tuple[Fit, MissingForce]:
+        less = without(final, name, training)
         return less, missing_force(less, training)
 
     names = [a.name for a in accepted] if len(accepted) > 1 else []
-    return dict(zip(names, on_all_cores(without, names), strict=True))
+    return dict(zip(names, on_all_cores(part, names), strict=True))
 
 
 def held_out_density(

@@ -13,6 +13,7 @@ from fish_train.diagnose.decide import PLAUSIBLE, TEMPER, Level, parameter_count
 from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.ranking import SCALE, Progress, warm_starts
 from fish_train.diagnose.search import evidence, look_alike
+from fish_train.identify.adapt import adapt_noise
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.fit import Fit, evaluate, log_posterior
 
@@ -24,7 +25,7 @@ def prune(
     kept: list[Accepted] = accepted[-1:]
     for candidate in accepted[:-1]:
         progress(f"without {candidate.name}?")
-        less = settle_base(switched_off(final, candidate.name, training), training)
+        less = settle_base(without(final, candidate.name, training), training)
         samples = float(final.result.samples.sum())
         if final.objective - less.objective < level.enough(samples, parameter_count(candidate.name), 1):
             final = less
@@ -83,6 +84,12 @@ def exchanged(fit: Fit, name: str, other: str, experiment: Experiment) -> Fit:
     starts = warm_starts(less, other, experiment, fit.noise)
     theta = max(starts, key=lambda start: log_posterior(hypothesis, start, experiment, fit.noise))
     return settle_base(evaluate(hypothesis, theta, experiment, fit.noise), experiment)
+
+
+def without(fit: Fit, name: str, experiment: Experiment) -> Fit:
+    """The fit less one effect with the noise that it then needs, its other parameters as they are."""
+    less = switched_off(fit, name, experiment)
+    return evaluate(less.hypothesis, less.theta, experiment, adapt_noise(less, experiment))
 
 
 def switched_off(fit: Fit, name: str, experiment: Experiment) -> Fit:

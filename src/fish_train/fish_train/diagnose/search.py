@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fish_train.diagnose.base import from_nominal, look_again, settle_base
+from fish_train.diagnose.decide import parameter_count
 from fish_train.diagnose.ranking import RANK_ITERATIONS, SCALE, Progress, Ranked, rank, warm_starts
 from fish_train.identify.adapt import adapt_noise, settle
 from fish_train.identify.cold import FIRST_STEPS, TOO_STRONG, better, excess
@@ -104,11 +105,18 @@ def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough
 
 
 def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment, progress: Progress) -> Round:
-    """Rank all names on top of the base and refit the shortlist; nothing that gains far fewer nats than it needs."""
+    """Rank all names on top of the base and refit the shortlist; nothing that gains far fewer nats than it needs.
+
+    Of its gain half a nat per number counts for nothing: so much an effect that is not there gains in the mean (Wilks 1938).
+    """
     names = tuple(needed)
     ranking = rank(base, names, experiment, progress)
     progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
-    chosen = [r for r in shortlist(ranking) if r.gain > WORTH_A_REFIT * needed[r.name]]
+    chosen = [
+        r
+        for r in shortlist(ranking)
+        if r.gain - 0.5 * parameter_count(r.name) > WORTH_A_REFIT * needed[r.name]
+    ]
     if chosen:
         progress("refitting " + ", ".join(r.name for r in chosen))
     fits = on_all_cores(lambda ranked: refit(base, ranked, experiment), chosen)

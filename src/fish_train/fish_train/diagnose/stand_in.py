@@ -6,8 +6,8 @@ ones have many optima. The filter's states follow what was measured (FOLLOWING),
 predictions: it would stand in for what the model lacks.
 
 The structure grows by one effect at a time, of those that the search found nearest and of those that change every stroke
-(STRUCTURAL), while trials left out are foretold better. It describes, for simulation and training; no effect in it is a name of
-the answer. Where the nominal structure predicts better after all, that is taken.
+(STRUCTURAL), while its cost falls and trials left out are foretold better. It describes, for simulation and training; no effect
+in it is a name of the answer. Where the nominal structure predicts better after all, that is taken.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ EVERY = 2.0  # s between start points
 FOLLOWING, CALM = 20.0, 5.0
 STRENGTH = 0.3  # of an effect, in typical ones, from which it is fitted
 ROUNDS = 8  # of states and parameters, in each stage
-SETTLED = 0.005  # of the cost; a round that gains less is the last
+SETTLED = 0.005  # of the cost; a round that gains less is the last, and an effect no help
 FOLDS = 3
 
 
@@ -80,7 +80,8 @@ def stand_in(
         left = [name for name in names if name not in best.hypothesis.names]
         tried = on_all_cores(partial(_grown, best, noise, experiment), left)
         promising = min(tried, key=lambda one: one.cost, default=best)
-        if promising is best or not _foretells_better(best, promising, noise, experiment):
+        falls = best.cost - promising.cost >= SETTLED * best.cost
+        if not falls or not _foretells_better(best, promising, noise, experiment):
             break
         best = promising
         report(f"predictions are better with {', '.join(best.hypothesis.names)}")
@@ -106,13 +107,13 @@ def _grown(best: _Tried, noise: Noise, experiment: Experiment, name: str) -> _Tr
 
 def _fitted(hypothesis: Hypothesis, starts: Sequence[Array], noise: Noise, experiment: Experiment) -> _Tried:
     """By predictions over longer and longer horizons, from the start that ends best."""
-    outlooks = [Unpushed(experiment, hypothesis, EVERY, horizons) for horizons in STAGES]
-    found = []
-    for theta in starts:
-        for outlook in outlooks:
-            cost, theta = _rounds(outlook, theta, noise)
-        found.append(_Tried(hypothesis, theta, cost))
-    return min(found, key=lambda tried: tried.cost)
+
+    def led(theta: Array) -> _Tried:
+        for horizons in STAGES:
+            cost, theta = _rounds(Unpushed(experiment, hypothesis, EVERY, horizons), theta, noise)
+        return _Tried(hypothesis, theta, cost)
+
+    return min(on_all_cores(led, starts), key=lambda tried: tried.cost)
 
 
 def _rounds(outlook: Outlook, theta: Array, noise: Noise) -> tuple[float, Array]:

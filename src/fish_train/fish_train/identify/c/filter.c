@@ -1,7 +1,7 @@
 /* Extended Kalman filter of one trial with forward sensitivities; see filter.py for the model.
 
    Stands behind fish_sim's kernel text: V, LANES, NX, NM, NS, NP, NC, NW, DT, SUBSTEPS (each thread's `substeps`), step,
-   drive_at, rate, rate_jvp, follow_jvp.
+   drive_at, rate, rate_jvp_given and _along, follow, follow_jvp.
    N = NX + 6: motion, wrench on the head, biases of gyro and accelerometer. Directions: N - 3 columns of the
    Jacobian (motion, wrench), then K free parameters; each carries NS + 6 numbers (state, wrench, biases). */
 #include <stdlib.h>
@@ -72,17 +72,20 @@ static void rates(const Settings *c, const Work *f, long K, const double *p, con
                   double *tangent)
 {
   V x[NX], m0[NM], ds[NS], pv[NP], dpv[NP], cmd[NC], zero[NC], m1[NM], dm1[NM], w[NW], dw[NW], out[NX], d_out[NX];
+  V shared[RATE_JVP_SHARED];
   for (int i = 0; i < NC; ++i) { cmd[i] = v_constant(command[i]); zero[i] = v_constant(0.0); }
   for (int k = 0; k < NX; ++k) x[k] = v_constant(motion[k]);
   for (int k = 0; k < NM; ++k) m0[k] = v_constant(f->memory[k]);
   load_parameters(c, f, p, pv);
+  follow(m0, cmd, pv, m1);
+  drive_at(m0, m1, fraction, w);
+  rate_jvp_given(x, w, pv, out, shared);
+  for (int k = 0; k < NX; ++k) rate[k] = LANE(out[k], 0);
   for (; first < last; first += LANES) {
     seed(c, f, K, dp, first, moving, ds, dpv);
     follow_jvp(m0, cmd, pv, ds + NX, zero, dpv, m1, dm1);
-    drive_at(m0, m1, fraction, w);
     drive_at(ds + NX, dm1, fraction, dw);
-    rate_jvp(x, w, pv, ds, dw, dpv, out, d_out);
-    for (int k = 0; k < NX; ++k) rate[k] = LANE(out[k], 0);
+    rate_jvp_along(shared, ds, dw, dpv, d_out);
     for (int l = 0; l < LANES && first + l < last; ++l)
       for (int k = 0; k < NX; ++k) tangent[(first + l) * NX + k] = LANE(d_out[k], l);
   }
