@@ -165,23 +165,21 @@ def test_a_fit_whose_innovations_its_own_noise_does_not_explain_is_looked_at_aga
     assert (fit.theta == 0.4).all()
 
 
-@pytest.mark.parametrize(("reached", "best"), [(7.0, 7.0), (3.0, 5.0)])
-def test_a_candidate_is_fitted_from_the_nominal_values_with_its_effect_as_found(
-    monkeypatch, reached: float, best: float
-) -> None:
+def test_a_candidate_is_led_from_the_nominal_values_with_its_effect_as_found(monkeypatch) -> None:
     hypothesis = nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")).with_effect(
         "rudder_offset", 0.3
     )
-    fit = SimpleNamespace(hypothesis=hypothesis, theta=np.array([0.6, -0.4, 0.8]), objective=5.0)
     begun = []
 
     def fit_tempered(_hypothesis, _experiment, _noise, start, held):
         begun.append((*start, *held))
-        return SimpleNamespace(hypothesis=hypothesis, theta=None, noise=None)
+        return SimpleNamespace(theta="led", noise=None)
 
-    without_data(monkeypatch, reached)
+    without_data(monkeypatch, 0.0)
+    monkeypatch.setattr(base, "evaluate", lambda _, theta, *__: theta)
+    monkeypatch.setattr(base, "settle_base", lambda fit, _: (fit, "settled"))
     monkeypatch.setattr(base, "fit_tempered", fit_tempered)
-    assert base.from_nominal(fit, None).objective == best
+    assert base.led_from_nominal(hypothesis, np.array([0.6, -0.4, 0.8]), None) == ("led", "settled")
     assert begun == [(0.0, 0.0, 0.8, *tempering.TAIL_INERTIAS)]
 
 

@@ -1,7 +1,6 @@
 """Every effect is found from the place and at the strength from which it can be, also beside one of many numbers."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -94,33 +93,3 @@ def test_beside_an_effect_of_many_numbers_these_move_at_the_end_only(monkeypatch
     slow = ranking.rank(base, ["rudder_offset"], experiment, lambda _: None)[0]
     assert first.gain == pytest.approx(slow.gain, rel=0.05) and first.gain > 50.0
     assert len(first.theta) == len(slow.theta) and first.theta[-1] == pytest.approx(slow.theta[-1], rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("left", "near", "climbed"), [(2000.0, -500.0, True), (2000.0, 30.0, False), (10.0, -500.0, False)]
-)
-def test_where_no_candidate_gains_but_much_is_left_all_are_climbed_to_the_end(
-    monkeypatch, left, near, climbed
-):
-    """A tip_slip was 500 nats below the base after the usual few steps: nothing was refitted, and the answer `unexplained`."""
-
-    def fit(name, objective):
-        return SimpleNamespace(
-            name=name, objective=objective, theta=None, hypothesis=nominal_hypothesis(Robot(), ()), noise=None
-        )
-
-    def climb(start, _short, iterations):
-        ends = {"base": 0.0, "tip_slip": 360.0 if iterations == ranking.LONG else near, "payload": 5.0}
-        return fit(start.name, ends[start.name])
-
-    monkeypatch.setattr(ranking, "excess", lambda _: np.array([left]))
-    monkeypatch.setattr(ranking, "shorten", lambda *_: None)
-    monkeypatch.setattr(ranking, "evaluate", lambda *_: fit("base", 0.0))
-    monkeypatch.setattr(ranking, "compile_all", lambda *_: None)
-    monkeypatch.setattr(ranking, "climb", climb)
-    monkeypatch.setattr(ranking, "promise", lambda found: found.objective)
-    monkeypatch.setattr(ranking, "look_afar", lambda _, name, __: fit(name, -700.0))
-    ranked = ranking.rank(fit("base", 0.0), ["payload", "tip_slip"], None, lambda _: None)
-    gains = {"tip_slip": 360.0 if climbed else near, "payload": 5.0}
-    assert {r.name: r.gain for r in ranked} == gains
-    assert ranked[0].gain == max(gains.values())

@@ -1,6 +1,5 @@
 """The search does not mistake a poor optimum for missing physics, and refits what looks like the winner."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -43,6 +42,7 @@ def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, r
 def test_what_gains_far_less_than_it_needs_itself_or_no_more_than_chance_is_not_refitted(monkeypatch):
     ranked = tuple(ranking.Ranked(name, 29.0, np.zeros(1)) for name in ("nonuniform_current", "sloshing"))
     monkeypatch.setattr(search, "rank", lambda *_: ranked)
+    monkeypatch.setattr(search, "excess", lambda _: np.ones(3))
     monkeypatch.setattr(search, "refit", lambda *_: SimpleNamespace(objective=29.0))
     monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)
     needed = {"nonuniform_current": 82.0, "sloshing": 30.0}
@@ -50,36 +50,35 @@ def test_what_gains_far_less_than_it_needs_itself_or_no_more_than_chance_is_not_
     assert set(found.refitted) == {"sloshing"}
 
 
-@pytest.mark.parametrize(
-    ("left", "cold", "asked", "best"),
-    [(2000.0, 4000.0, ["rudder_saturation"], 4000.0), (2000.0, 1010.0, ["rudder_saturation"], 1000.0),
-     (10.0, 4000.0, [], 1000.0)],
-)  # fmt: skip
-def test_the_best_candidate_is_led_from_afar_where_it_leaves_a_force_that_no_pool_has(
-    monkeypatch, left, cold, asked, best
+@pytest.mark.parametrize(("left", "afar"), [(2000.0, True), (10.0, False)])
+def test_where_the_base_leaves_a_force_that_no_pool_has_candidates_are_led_from_the_nominal_values(
+    monkeypatch, left, afar
 ):
-    """A rudder that stops was found so, but left 2300 times usual water, as its base did: nothing was named."""
-    fits = {"rudder_saturation": 1000.0, "rudder_gain": 900.0, "rudder_offset": 100.0}
-    fits = {name: SimpleNamespace(objective=objective) for name, objective in fits.items()}
-    beside = {"rudder_gain": SimpleNamespace(objective=3000.0), "rudder_offset": None}
-    calls = []
-
-    def anew(fit, _):
-        calls.extend(name for name in fits if fits[name] is fit)
-        return SimpleNamespace(objective=cold)
-
-    monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)
+    """A rudder that stops was found otherwise, but left 2300 times usual water, as its base did: nothing was named."""
+    hypothesis = nominal_hypothesis(Robot(), ("tail_stiffness",))
+    base = SimpleNamespace(hypothesis=hypothesis, objective=0.0, noise=None)
+    ranked = {kind: (ranking.Ranked(kind, 900.0, np.zeros(2)),) for kind in ("rudder_lag", "rudder_gain")}
     monkeypatch.setattr(search, "excess", lambda _: np.array([1.0, left, 1.0]))
-    monkeypatch.setattr(search, "from_nominal", anew)
-    monkeypatch.setattr(search, "refit_beside", lambda led, base, name, *_: beside[name])
-    found = search.Round(SimpleNamespace(objective=0.0), (), fits)
-    led = search.from_afar(found, None, 23.0, quiet)
-    assert calls == asked and led.best == "rudder_saturation"
-    assert led.refitted["rudder_saturation"].objective == best
-    assert led.refitted["rudder_gain"].objective == (3000.0 if best > 1000.0 else 900.0)
-    assert led.refitted["rudder_offset"] is fits["rudder_offset"]  # so far behind that it was not refitted
-    nothing = search.from_afar(replace(found, base=SimpleNamespace(objective=990.0)), None, 23.0, quiet)
-    assert nothing.refitted is fits and calls == asked  # what gains too little for a name is left alone
+    monkeypatch.setattr(search, "rank_afar", lambda *_: ranked["rudder_lag"])
+    monkeypatch.setattr(search, "rank", lambda *_: ranked["rudder_gain"])
+    monkeypatch.setattr(search, "led_from_nominal", lambda *_: SimpleNamespace(objective=900.0))
+    monkeypatch.setattr(search, "evaluate", lambda *_: None)
+    monkeypatch.setattr(search, "adapt_noise", lambda *_: None)
+    monkeypatch.setattr(search, "settle", lambda *_: None)
+    monkeypatch.setattr(search, "look_again", lambda *_: SimpleNamespace(objective=800.0))
+    monkeypatch.setattr(search, "evidence", lambda fit: fit.objective)
+    found = search.search_round(base, {"rudder_lag": 23.0, "rudder_gain": 23.0}, None, quiet)
+    gains = {name: fit.objective for name, fit in found.refitted.items()}
+    assert gains == ({"rudder_lag": 900.0} if afar else {"rudder_gain": 800.0})
+
+
+def test_of_very_many_numbers_only_the_leader_is_refitted():
+    def names(**gains):
+        ranked = [ranking.Ranked(name, gain, np.zeros(1)) for name, gain in gains.items()]
+        return [r.name for r in search.shortlist(ranked)]
+
+    assert names(nonuniform_current=700.0, current=650.0) == ["nonuniform_current", "current"]
+    assert names(current=700.0, nonuniform_current=650.0, tether=100.0) == ["current"]
 
 
 def test_a_look_alike_is_refitted_from_where_the_winner_led():

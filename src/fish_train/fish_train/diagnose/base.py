@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fish_sim.robot import Robot
+from fish_train.diagnose.ranking import crowd
 from fish_train.identify.adapt import SETTLED_GAIN, settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, UNWHITE, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.fit import Fit, evaluate
-from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
+from fish_train.identify.hypothesis import Array, Coordinates, Hypothesis, nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.suitable import worst_row
 from fish_train.identify.tempering import TAIL_INERTIAS, fit_tempered
@@ -25,16 +26,21 @@ def fit_base(robot: Robot, experiment: Experiment) -> Fit:
     return settle_base(evaluate(cold.hypothesis, cold.theta, experiment, cold.noise), experiment)
 
 
-def from_nominal(fit: Fit, experiment: Experiment) -> Fit:
-    """The fit or a better one, led by the camera from the nominal values with its effects as strong as they were found.
+def led_from_nominal(hypothesis: Hypothesis, theta: Array, experiment: Experiment) -> Fit:
+    """A candidate from the nominal values, its effects as in theta, led by the camera and settled on whole trials.
 
-    A candidate found from a base in a poor optimum may stay there: a rudder that stops, rightly found, left 2300 times usual
-    water; led so it leaves less than usual (docs/blind_studies.md, the nineteenth).
+    An effect of very many numbers is held until then.
+
+    From a base in a poor optimum it would stay there: a rudder that stops, rightly found, left 2300 times usual water; led so
+    it leaves less than usual (docs/blind_studies.md, the nineteenth).
     """
-    start = np.where(Coordinates(fit.hypothesis).is_log, 0.0, fit.theta)
-    short = shorten(experiment, FIRST_STEPS)
-    led = fit_tempered(fit.hypothesis, short, usual_noise(short), start, held=TAIL_INERTIAS)
-    return better_of(fit, led, short, experiment)
+    start, short = Coordinates(hypothesis).at_nominal(theta), shorten(experiment, FIRST_STEPS)
+    held = crowd(hypothesis)
+    moving = np.array([free not in held for free in hypothesis.free])
+    coarse = hypothesis.fixing(held, theta)
+    led = fit_tempered(coarse, short, usual_noise(short), start[moving], held=TAIL_INERTIAS)
+    start[moving] = led.theta
+    return settle_base(evaluate(hypothesis, start, experiment, led.noise), experiment)
 
 
 def better_of(fit: Fit, led: Fit, short: Experiment, experiment: Experiment) -> Fit:

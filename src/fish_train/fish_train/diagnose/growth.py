@@ -32,6 +32,7 @@ def grow(
         samples = float(base.result.samples.sum())
         needed = {name: level.enough(samples, parameter_count(name), len(names)) for name in names}
         found = settled_round(base, needed, experiment, progress)
+        base = found.base  # or the better optimum of the same model that a candidate led to
         rounds.append(found)
         name = choose(found, trials, len(names), level)
         if name is None:

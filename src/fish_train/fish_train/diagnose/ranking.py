@@ -3,7 +3,7 @@
 That noise is inflated by what the model lacks, and at first the IMU is believed a tenth: there the likelihood has few optima.
 A structural effect (slip, hardening) may be absorbed so deeply that no path leads from the fitted base to the truth, so
 every candidate is tried from the base and from the nominal values, weak and strong. Where the base already leaves no more
-than water does, one step from it is enough.
+than water does, one step from it is enough; where it leaves a force that no pool has, see `ranking_afar`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_train.diagnose.decide import parameter_count
-from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, TOO_STRONG, excess
+from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, excess
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter import prepare
@@ -34,12 +34,10 @@ POLISH_ITERATIONS = 4
 STRENGTH_ITERATIONS = 3  # nearly linear; the climb in everything begins where it ends
 PROMISING_PLACES = 3  # of those that are tried
 POLISHED = 8  # candidates that are ranked with the IMU's own noise
-# where a force acts that no pool has and no candidate gains so many nats, they were not climbed far enough: a tip_slip stood
-# 500 nats below the base after four iterations at the IMU's own noise, 360 above it where it ended (docs/blind_studies.md)
-STUCK, LONG = 20.0, 25
 MANY = 10  # numbers of an effect that are held while others are looked for beside it
 
 Progress = Callable[[str], None]
+Look = Callable[[Fit, str, Experiment], Fit]  # base, name, short trials
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class Ranked:
     """A candidate after the quick ranking."""
 
     name: str
-    gain: float  # nats over the base at the base's noise
+    gain: float  # nats over the base, both at the same noise
     theta: np.ndarray
 
 
@@ -59,28 +57,36 @@ def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Prog
     """
     short = shorten(experiment, FIRST_STEPS)
     reference = climb(evaluate(base.hypothesis, base.theta, short, base.noise), short, POLISH_ITERATIONS)
-    compile_all(base, names, progress)
     near = excess(base).max() < SUSPICIOUS
-    start = reference if near else base
-    held = holding(start, short)
-
-    def look(place: int) -> Fit:
-        name = names[place]
-        progress(f"ranking {name} ({place + 1} of {len(names)})")
-        return releasing((look_near if near else look_afar)(held, name, short), start, name, short)
-
-    found = dict(zip(names, on_all_cores(look, range(len(names))), strict=True))
-    progress("ranking the most promising")
+    start, look = (reference, look_near) if near else (base, look_afar)
+    found = look_for(names, look, start, short, progress)
     promising = sorted(names, key=lambda name: -promise(found[name]))[:POLISHED]
     polished = on_all_cores(lambda name: climb(found[name], short, POLISH_ITERATIONS), promising)
     found |= zip(promising, polished, strict=True)
-    best = max(fit.objective for fit in found.values())
-    if excess(base).max() > TOO_STRONG and best < reference.objective + STUCK:
-        progress("ranking all once more, to the end")
-        ended = on_all_cores(lambda name: climb(found[name], short, LONG), names)
-        found = dict(zip(names, ended, strict=True))
-    gains = [Ranked(name, fit.objective - reference.objective, fit.theta) for name, fit in found.items()]
-    return tuple(sorted(gains, key=lambda r: -r.gain))
+    return by_gain(found, reference.objective)
+
+
+def look_for(
+    names: Sequence[str], look: Look, base: Fit, short: Experiment, progress: Progress
+) -> dict[str, Fit]:
+    """Every candidate where `look` finds it beside what is held of the base, then with everything free."""
+    compile_all(base, names, progress)
+    held = holding(base, short)
+
+    def one(place: int) -> Fit:
+        name = names[place]
+        progress(f"ranking {name} ({place + 1} of {len(names)})")
+        return releasing(look(held, name, short), base, name, short)
+
+    found = dict(zip(names, on_all_cores(one, range(len(names))), strict=True))
+    progress("ranking the most promising")
+    return found
+
+
+def by_gain(found: Mapping[str, Fit], reference: float) -> tuple[Ranked, ...]:
+    """The candidates, what gains most over the reference first."""
+    gains = [Ranked(name, fit.objective - reference, fit.theta) for name, fit in found.items()]
+    return tuple(sorted(gains, key=lambda ranked: -ranked.gain))
 
 
 def crowd(hypothesis: Hypothesis) -> list[str]:
@@ -110,14 +116,22 @@ def releasing(fit: Fit, base: Fit, name: str, experiment: Experiment) -> Fit:
 
 def look_afar(base: Fit, name: str, short: Experiment) -> Fit:
     """A candidate where the base is far from the truth: from the best of all starts, the IMU believed little at first."""
-    own = base.noise
-    wide = replace(open_gates(own), gyro=IMU_DISTRUST * own.gyro, accel=IMU_DISTRUST * own.accel)
+    own, wide = base.noise, distrusting(base.noise, IMU_DISTRUST)
     hypothesis = base.hypothesis.with_effect(name, SCALE)
-    cold = replace(base, theta=np.where(Coordinates(base.hypothesis).is_log, 0.0, base.theta))
-    starts = [*warm_starts(base, name, short, wide), *warm_starts(cold, name, short, wide)]
+    starts = [*warm_starts(base, name, short, wide), *warm_starts(from_nominal(base), name, short, wide)]
     start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, wide))
     fit = climb(in_strength(evaluate(hypothesis, start, short, wide), name, short), short, RANK_ITERATIONS)
     return evaluate(hypothesis, fit.theta, short, own)
+
+
+def distrusting(noise: Noise, factor: float) -> Noise:
+    """The IMU believed so much less, and nothing left out as an outlier."""
+    return replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
+
+
+def from_nominal(base: Fit) -> Fit:
+    """The base at the nominal values, its effects as they are; only `theta` is moved."""
+    return replace(base, theta=Coordinates(base.hypothesis).at_nominal(base.theta))
 
 
 def look_near(base: Fit, name: str, short: Experiment) -> Fit:

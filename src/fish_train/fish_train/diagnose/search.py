@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fish_train.diagnose.base import from_nominal, look_again, settle_base
+from fish_train.diagnose.base import led_from_nominal, look_again, settle_base
 from fish_train.diagnose.decide import parameter_count
-from fish_train.diagnose.ranking import RANK_ITERATIONS, SCALE, Progress, Ranked, rank, warm_starts
+from fish_train.diagnose.ranking import MANY, RANK_ITERATIONS, SCALE, Progress, Ranked, rank, warm_starts
+from fish_train.diagnose.ranking_afar import rank_afar
 from fish_train.identify.adapt import adapt_noise, settle
 from fish_train.identify.cold import FIRST_STEPS, TOO_STRONG, better, excess
 from fish_train.identify.cores import on_all_cores
@@ -21,6 +22,7 @@ from fish_train.identify.fit import Fit, climb, evaluate, log_posterior
 from fish_train.identify.hypothesis import Coordinates
 
 SHORTLIST = 4
+LED_SHORTLIST = 2  # where the camera led the candidates: it tells them apart
 MOST_SEARCHES = 3  # with one base after the other, each a better optimum
 POOR_BASE = 0.5  # share of the best candidate's gain that a better optimum of the base has as well
 # share of the best ranking gain, and of a gain that is enough: a refit on whole trials gains more
@@ -73,16 +75,22 @@ def look_alike(first: str, second: str) -> bool:
     return any(first in group and second in group for group in LOOK_ALIKES)
 
 
-def shortlist(ranking: Sequence[Ranked]) -> list[Ranked]:
-    """The best few and the look-alikes of the very best, as far as they come near it."""
+def shortlist(ranking: Sequence[Ranked], count: int = SHORTLIST) -> list[Ranked]:
+    """The best few and the look-alikes of the very best, as far as they come near it; one of very many numbers if it leads."""
     best = ranking[0]
-    near = [r for r in ranking if r.gain > WORTH_A_REFIT * best.gain]
-    return [r for i, r in enumerate(near) if i < SHORTLIST or look_alike(r.name, best.name)]
+    near = [
+        r
+        for r in ranking
+        if r.gain > WORTH_A_REFIT * best.gain and (r is best or parameter_count(r.name) <= MANY)
+    ]
+    return [r for i, r in enumerate(near) if i < count or look_alike(r.name, best.name)]
 
 
 def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
-    """A candidate on whole trials with its own noise, from the ranking's optimum."""
+    """A candidate on whole trials with its own noise, from the ranking's optimum; led once more where the base is far off."""
     hypothesis = base.hypothesis.with_effect(ranked.name, SCALE)
+    if excess(base).max() > TOO_STRONG:
+        return led_from_nominal(hypothesis, ranked.theta, experiment)
     start = evaluate(hypothesis, ranked.theta, experiment, base.noise)
     # the base's noise has taken the mismatch in, also as sensor noise
     start = evaluate(hypothesis, ranked.theta, experiment, adapt_noise(start, experiment))
@@ -110,11 +118,12 @@ def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment,
     Of its gain half a nat per number counts for nothing: so much an effect that is not there gains in the mean (Wilks 1938).
     """
     names = tuple(needed)
-    ranking = rank(base, names, experiment, progress)
+    ranked, count = (rank_afar, LED_SHORTLIST) if excess(base).max() > TOO_STRONG else (rank, SHORTLIST)
+    ranking = ranked(base, names, experiment, progress)
     progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
     chosen = [
         r
-        for r in shortlist(ranking)
+        for r in shortlist(ranking, count)
         if r.gain - 0.5 * parameter_count(r.name) > WORTH_A_REFIT * needed[r.name]
     ]
     if chosen:
@@ -122,28 +131,8 @@ def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment,
     fits = on_all_cores(lambda ranked: refit(base, ranked, experiment), chosen)
     refitted = dict(zip((r.name for r in chosen), fits, strict=True))
     enough = min(needed.values())
-    found = from_afar(Round(base, ranking, refitted), experiment, enough, progress)
+    found = Round(base, ranking, refitted)
     return with_look_alikes(found, names, experiment, enough, progress)
-
-
-def from_afar(found: Round, experiment: Experiment, enough: float, progress: Progress) -> Round:
-    """The round with its best candidate led from the nominal values if it needs a force that no pool has, its rivals from there.
-
-    At once, also where more may be missing: from the poor optimum other names would be found beside the right one.
-    """
-    best = found.best
-    if best is None or found.gain(best) < enough or excess(found.refitted[best]).max() <= TOO_STRONG:
-        return found
-    progress(f"fitting {best} once more, from the nominal values")
-    led = from_nominal(found.refitted[best], experiment)
-    if led.objective - found.refitted[best].objective < enough:
-        return found
-    refitted = {**found.refitted, best: led}
-    for name in found.refitted.keys() - {best}:
-        fit = refit_beside(led, found.base, name, experiment, enough)
-        if fit is not None:
-            refitted[name] = better(fit, refitted[name])
-    return replace(found, refitted=refitted)
 
 
 def with_look_alikes(

@@ -157,6 +157,10 @@ class Coordinates:
         """theta of the hypothesis's start values."""
         return self.encode(self.start)
 
+    def at_nominal(self, theta: Array) -> Array:
+        """theta with the nominal parameters at the robot's own values, the effects as they are."""
+        return np.where(self.is_log, 0.0, theta)
+
     def encode(self, values: Array) -> Array:
         """theta of physical values."""
         linear = (values - self.neutral) / self.scale
