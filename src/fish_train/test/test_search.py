@@ -72,13 +72,14 @@ def test_where_the_base_leaves_a_force_that_no_pool_has_candidates_are_led_from_
     assert gains == ({"rudder_lag": 900.0} if afar else {"rudder_gain": 800.0})
 
 
-def test_of_very_many_numbers_only_the_leader_is_refitted():
+def test_of_those_that_the_camera_led_two_are_refitted_and_of_very_many_numbers_only_the_best():
     def names(**gains):
         ranked = [ranking.Ranked(name, gain, np.zeros(1)) for name, gain in gains.items()]
-        return [r.name for r in search.shortlist(ranked)]
+        return [r.name for r in search.led_shortlist(ranked)]
 
-    assert names(nonuniform_current=700.0, current=650.0) == ["nonuniform_current", "current"]
-    assert names(current=700.0, nonuniform_current=650.0, tether=100.0) == ["current"]
+    assert names(nonuniform_current=700.0, current=650.0, tether=600.0) == ["nonuniform_current", "current"]
+    assert names(current=700.0, nonuniform_current=650.0, tether=600.0) == ["current", "tether"]
+    assert names(current=700.0, tether=100.0) == ["current"]
 
 
 def test_a_look_alike_is_refitted_from_where_the_winner_led():

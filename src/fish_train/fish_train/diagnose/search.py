@@ -22,7 +22,7 @@ from fish_train.identify.fit import Fit, climb, evaluate, log_posterior
 from fish_train.identify.hypothesis import Coordinates
 
 SHORTLIST = 4
-LED_SHORTLIST = 2  # where the camera led the candidates: it tells them apart
+LED_SHORTLIST = 2
 MOST_SEARCHES = 3  # with one base after the other, each a better optimum
 POOR_BASE = 0.5  # share of the best candidate's gain that a better optimum of the base has as well
 # share of the best ranking gain, and of a gain that is enough: a refit on whole trials gains more
@@ -75,15 +75,18 @@ def look_alike(first: str, second: str) -> bool:
     return any(first in group and second in group for group in LOOK_ALIKES)
 
 
-def shortlist(ranking: Sequence[Ranked], count: int = SHORTLIST) -> list[Ranked]:
-    """The best few and the look-alikes of the very best, as far as they come near it; one of very many numbers if it leads."""
+def shortlist(ranking: Sequence[Ranked]) -> list[Ranked]:
+    """The best few and the look-alikes of the very best, as far as they come near it."""
     best = ranking[0]
-    near = [
-        r
-        for r in ranking
-        if r.gain > WORTH_A_REFIT * best.gain and (r is best or parameter_count(r.name) <= MANY)
-    ]
-    return [r for i, r in enumerate(near) if i < count or look_alike(r.name, best.name)]
+    near = [r for r in ranking if r.gain > WORTH_A_REFIT * best.gain]
+    return [r for i, r in enumerate(near) if i < SHORTLIST or look_alike(r.name, best.name)]
+
+
+def led_shortlist(ranking: Sequence[Ranked]) -> list[Ranked]:
+    """The best and the next near it where the camera led them, which tells them apart; of very many numbers the best only."""
+    best = ranking[0]
+    near = [r for r in ranking if r.gain > WORTH_A_REFIT * best.gain]
+    return [best, *(r for r in near[1:] if parameter_count(r.name) <= MANY)][:LED_SHORTLIST]
 
 
 def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
@@ -118,13 +121,11 @@ def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment,
     Of its gain half a nat per number counts for nothing: so much an effect that is not there gains in the mean (Wilks 1938).
     """
     names = tuple(needed)
-    ranked, count = (rank_afar, LED_SHORTLIST) if excess(base).max() > TOO_STRONG else (rank, SHORTLIST)
+    ranked, few = (rank_afar, led_shortlist) if excess(base).max() > TOO_STRONG else (rank, shortlist)
     ranking = ranked(base, names, experiment, progress)
     progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
     chosen = [
-        r
-        for r in shortlist(ranking, count)
-        if r.gain - 0.5 * parameter_count(r.name) > WORTH_A_REFIT * needed[r.name]
+        r for r in few(ranking) if r.gain - 0.5 * parameter_count(r.name) > WORTH_A_REFIT * needed[r.name]
     ]
     if chosen:
         progress("refitting " + ", ".join(r.name for r in chosen))
