@@ -165,22 +165,28 @@ def test_a_fit_whose_innovations_its_own_noise_does_not_explain_is_looked_at_aga
     assert (fit.theta == 0.4).all()
 
 
-def test_a_candidate_is_led_from_the_nominal_values_with_its_effect_as_found(monkeypatch) -> None:
-    hypothesis = nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")).with_effect(
-        "rudder_offset", 0.3
-    )
+@pytest.mark.parametrize(("name", "moves"), [("rudder_offset", True), ("nonuniform_current", False)])
+def test_a_candidate_is_led_from_the_nominal_values_with_its_effect_as_found(
+    monkeypatch, name, moves
+) -> None:
+    """One of very many numbers stays as it is until all is free on whole trials."""
+    hypothesis = nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")).with_effect(name, 0.3)
+    effect = np.full(len(hypothesis.free) - 2, 0.8)
     begun = []
 
     def fit_tempered(_hypothesis, _experiment, _noise, start, held):
-        begun.append((*start, *held))
-        return SimpleNamespace(theta="led", noise=None)
+        begun.append((start.copy(), held))
+        return SimpleNamespace(theta=start + 1.0, noise=None)
 
     without_data(monkeypatch, 0.0)
     monkeypatch.setattr(base, "evaluate", lambda _, theta, *__: theta)
-    monkeypatch.setattr(base, "settle_base", lambda fit, _: (fit, "settled"))
+    monkeypatch.setattr(base, "settle_base", lambda theta, _: theta)
     monkeypatch.setattr(base, "fit_tempered", fit_tempered)
-    assert base.led_from_nominal(hypothesis, np.array([0.6, -0.4, 0.8]), None) == ("led", "settled")
-    assert begun == [(0.0, 0.0, 0.8, *tempering.TAIL_INERTIAS)]
+    found = base.led_from_nominal(hypothesis, np.array([0.6, -0.4, *effect]), None)
+    ((start, held),) = begun
+    assert held == tempering.TAIL_INERTIAS
+    np.testing.assert_allclose(start, [0.0, 0.0, *(effect if moves else ())])
+    np.testing.assert_allclose(found, [1.0, 1.0, *(effect + 1.0 if moves else effect)])
 
 
 def test_a_slow_strong_force_is_found_from_a_fast_one() -> None:
