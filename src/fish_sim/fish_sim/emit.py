@@ -47,9 +47,8 @@ CALL = {
 
 def emit(function: casadi.Function) -> str:
     """C text of `static void name(const V *i0, .., V *o0, ..)` for a CasADi SX function with dense arguments."""
-    inputs = [f"const V *restrict i{k}" for k in range(function.n_in())]
-    outputs = [f"V *restrict o{k}" for k in range(function.n_out())]
-    head = f"static void {function.name()}({', '.join(inputs + outputs)})"
+    arguments = _arguments(range(function.n_in()), range(function.n_out()))
+    head = f"static void {function.name()}({arguments})"
     body = [f"  {_instruction(function, k)}" for k in range(function.n_instructions())]
     zeros = _zero_outputs(function, range(function.n_out()))
     return "\n".join([head, "{", *_registers(function), *zeros, *body, "}", ""])
@@ -63,11 +62,10 @@ def emit_split(function: casadi.Function) -> str:
     """
     name, inputs, outputs = function.name(), function.n_in(), function.n_out()
     points, values = inputs // 2, outputs // 2
-    source: dict[
-        int, int | None
-    ] = {}  # of a register: the instruction that wrote it, None where a tangent changes it
+    # of a register: the instruction that wrote it, None where a tangent changes it
+    source: dict[int, int | None] = {}
     slots: dict[int, int] = {}  # place in `shared` of what an instruction wrote
-    given: list[tuple[int, str]] = []
+    given: list[int] = []
     along: list[str] = []
 
     def passed(register: int) -> str:
@@ -85,23 +83,28 @@ def emit_split(function: casadi.Function) -> str:
         if varies:
             along.append(f"  {_instruction(function, k, passed)}")
         else:
-            given.append((k, f"  {_instruction(function, k)}"))
+            given.append(k)
         if operation != casadi.OP_OUTPUT:
             source[out[0]] = None if varies else k
-    kept = [f"  shared[{slots[k]}] = w{_parts(function, k)[1][0]};" if k in slots else "" for k, _ in given]
-    once = [line for (_, text), store in zip(given, kept, strict=True) for line in (text, store) if line]
-    point = [
-        *(f"const V *restrict i{k}" for k in range(points)),
-        *(f"V *restrict o{k}" for k in range(values)),
-    ]
-    tangent = [f"const V *restrict i{k}" for k in range(points, inputs)]
-    tangent += [f"V *restrict o{k}" for k in range(values, outputs)]
+    once = []
+    for k in given:
+        once.append(f"  {_instruction(function, k)}")
+        if k in slots:
+            once.append(f"  shared[{slots[k]}] = w{_parts(function, k)[1][0]};")
+    point = _arguments(range(points), range(values))
+    tangent = _arguments(range(points, inputs), range(values, outputs))
     return "\n".join([
         f"#define {name.upper()}_SHARED {len(slots)}",
-        f"static void {name}_given({', '.join(point)}, V *restrict shared)",
+        f"static void {name}_given({point}, V *restrict shared)",
         "{", *_registers(function), *_zero_outputs(function, range(values)), *once, "}",
-        f"static void {name}_along(const V *restrict shared, {', '.join(tangent)})",
+        f"static void {name}_along(const V *restrict shared, {tangent})",
         "{", *_registers(function), *_zero_outputs(function, range(values, outputs)), *along, "}", "",
+    ])  # fmt: skip
+
+
+def _arguments(inputs: range, outputs: range) -> str:
+    return ", ".join([
+        *(f"const V *restrict i{k}" for k in inputs), *(f"V *restrict o{k}" for k in outputs)
     ])  # fmt: skip
 
 

@@ -8,6 +8,7 @@ name leaves little then. A rudder 87 ms late, of which the other ranking saw not
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from fish_train.diagnose.ranking import (
     POLISHED,
@@ -39,7 +40,7 @@ def rank_afar(
     """All candidates and the base led by the camera on short trials; the IMU gains weight for the most promising ones."""
     short = shorten(experiment, FIRST_STEPS)
     noise = usual_noise(short)
-    found = look_for(names, look_led, base, short, progress)
+    found = look_for(names, partial(look_led, noise=noise), base, short, progress)
     promising = sorted(names, key=lambda name: -found[name].objective)[:POLISHED]
 
     def further(name: str) -> Fit:
@@ -52,9 +53,9 @@ def rank_afar(
     return by_gain(ends, max(fit.objective for fit in bases))
 
 
-def look_led(base: Fit, name: str, short: Experiment) -> Fit:
+def look_led(base: Fit, name: str, short: Experiment, noise: Noise) -> Fit:
     """A candidate from the nominal values, strong or weak, as far as the camera alone leads."""
-    noise, hypothesis = usual_noise(short), base.hypothesis.with_effect(name, SCALE)
+    hypothesis = base.hypothesis.with_effect(name, SCALE)
     wide = distrusting(noise, STAGES[0][0])
     starts = warm_starts(from_nominal(base), name, short, wide)
     start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, wide))

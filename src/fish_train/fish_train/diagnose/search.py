@@ -132,8 +132,7 @@ def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment,
     fits = on_all_cores(lambda ranked: refit(base, ranked, experiment), chosen)
     refitted = dict(zip((r.name for r in chosen), fits, strict=True))
     enough = min(needed.values())
-    found = Round(base, ranking, refitted)
-    return with_look_alikes(found, names, experiment, enough, progress)
+    return with_look_alikes(Round(base, ranking, refitted), names, experiment, enough, progress)
 
 
 def with_look_alikes(
