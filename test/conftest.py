@@ -46,9 +46,15 @@ class Run:
         """Listen until something is so; every node must be alive meanwhile."""
         deadline = time.monotonic() + PATIENCE
         while not there():
-            assert time.monotonic() < deadline, f"{what} did not come within {PATIENCE:.0f} s"
+            if time.monotonic() > deadline:
+                pytest.fail(f"{what} did not come within {PATIENCE:.0f} s; seen: {self.seen()}")
             self.listen(0.05)
             check_running(self.nodes)
+
+    def seen(self) -> str:
+        """What was last heard of robot and nodes, and what the nodes logged, for a message."""
+        logged = {process.spec.name: process.last_words() for process in self.nodes.running.values()}
+        return f"{self.watch.sight}, {self.watch.levels}, {self.watch.diagnostics}, {logged}"
 
     def progress(self) -> float:
         """Arc length along the path [m], followed in order."""

@@ -101,6 +101,10 @@ def test_a_killed_node_resumes(spec, resumed):
     assert places.planned < places.before + GLIDE  # and leaves nothing out
 
 
+def test_no_node_uses_the_shared_memory_that_a_kill_can_spoil(resumed):
+    assert resumed.mapped and not [line for line in resumed.mapped if "/dev/shm/fastrtps" in line]
+
+
 def test_a_run_with_kills_is_back_on_the_path_at_its_end(resumed):
     score = score_trial(read_trial(resumed.recording))
     assert score.finished
@@ -138,6 +142,7 @@ class Resumed:
 
     recording: Path
     places: dict[NodeSpec, Places] = field(default_factory=dict)
+    mapped: list[str] = field(default_factory=list)  # memory of every node, /proc/PID/maps
 
 
 @pytest.fixture(scope="module")
@@ -152,6 +157,8 @@ def resumed(tmp_path_factory) -> Resumed:
             seen.places[spec] = kill_and_restart(run, spec, pause=1.5 if spec is FUSION else 0.0)
         run.until(run.finished, "the end of the path")
         run.listen(0.5)  # the estimate may be there a little before the fish
+        for node in run.nodes.running.values():
+            seen.mapped.extend(Path(f"/proc/{node.pid}/maps").read_text().splitlines())
         run.nodes.stop([RECORDER])
     return seen
 
@@ -177,10 +184,7 @@ def kill_and_restart(run: Run, spec, pause: float) -> Places:
 
 
 def swim_without_estimates(run: Run, duration: float) -> None:
-    """Until the commands are so much [simulated s] younger than the last estimate.
-
-    Not real time: who publishes to a node that was killed may be held up for seconds by the middleware.
-    """
+    """Until the commands are so much [simulated s] younger than the last estimate."""
     commands: list[JointState] = []
     subscription = run.watch.create_subscription(JointState, "joint_command", commands.append, 50)
     deadline = time.monotonic() + PATIENCE

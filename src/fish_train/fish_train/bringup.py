@@ -17,6 +17,7 @@ from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from .errors import UserError
 
 NAMESPACE = "/fish"
+FAST_DDS, PROFILE = "rmw_fastrtps_cpp", "FASTRTPS_DEFAULT_PROFILES_FILE"
 Parameters = Mapping[str, object]
 
 
@@ -98,6 +99,19 @@ def command(spec: NodeSpec, parameters: Parameters | None = None, namespace: str
     return line
 
 
+def middleware() -> dict[str, str]:
+    """What keeps a robot's messages on this computer, and a node that was killed from making others deaf.
+
+    Fast DDS: config/loopback.xml, and the discovery range left to it (LOCALHOST would add shared memory again).
+    Another middleware, or a profile of the caller's own: the discovery range alone.
+    """
+    if os.environ.get("RMW_IMPLEMENTATION", FAST_DDS) == FAST_DDS:
+        profile = str(Path(get_package_share_directory("fish_train")) / "config" / "loopback.xml")
+        if os.environ.get(PROFILE, profile) == profile:
+            return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", PROFILE: profile}
+    return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
 def environment(domain: int) -> dict[str, str]:
     """The environment of every node: an own DDS domain on this machine only, one thread for small matrices.
 
@@ -105,7 +119,7 @@ def environment(domain: int) -> dict[str, str]:
     gets both (inherited) or, where a caller dropped the path, neither.
     """
     env = dict(os.environ)
-    env.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", PYTHONUNBUFFERED="1")
+    env.update(middleware(), ROS_DOMAIN_ID=str(domain), PYTHONUNBUFFERED="1")
     env.setdefault("OMP_NUM_THREADS", "1")
     if not env.get("LD_LIBRARY_PATH"):
         env.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)

@@ -70,7 +70,24 @@ def test_children_inherit_the_wheels_guard_only_with_the_library_path(monkeypatc
     monkeypatch.setenv("LD_LIBRARY_PATH", "somewhere")
     child = bringup.environment(7)
     assert child["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] == "1"
-    assert (child["ROS_DOMAIN_ID"], child["ROS_AUTOMATIC_DISCOVERY_RANGE"]) == ("7", "LOCALHOST")
+    assert child["ROS_DOMAIN_ID"] == "7"
+
+
+def test_messages_stay_on_this_computer_with_any_middleware(monkeypatch):
+    for variable in ("RMW_IMPLEMENTATION", bringup.PROFILE):
+        monkeypatch.delenv(variable, raising=False)
+    ours = bringup.middleware()
+    assert "type>UDPv4" in Path(ours[bringup.PROFILE]).read_text()
+    assert ours["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
+    monkeypatch.setenv(
+        bringup.PROFILE, ours[bringup.PROFILE]
+    )  # as a process sees it that runs in this environment
+    assert bringup.middleware() == ours
+    monkeypatch.setenv(bringup.PROFILE, "their.xml")
+    assert bringup.middleware() == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    monkeypatch.delenv(bringup.PROFILE)
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
+    assert bringup.middleware() == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
 class Recorded(types.SimpleNamespace):

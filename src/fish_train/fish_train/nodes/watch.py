@@ -23,7 +23,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from fish_control.path_tracker import PathTracker
-from fish_train.bringup import NAMESPACE
+from fish_train.bringup import NAMESPACE, middleware
 from fish_train.score import path_from_points
 from fish_train.swim import Sight
 
@@ -71,7 +71,7 @@ def watching(domain: int) -> Iterator[tuple[WatchNode, Callable[[float], None]]]
 
     Signals stay with the caller: ROS installs no handlers.
     """
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    os.environ.update(middleware())
     context = Context()
     rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
     node = WatchNode(context)
