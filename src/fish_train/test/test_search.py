@@ -50,18 +50,30 @@ def test_what_gains_far_less_than_it_needs_itself_or_no_more_than_chance_is_not_
     assert set(found.refitted) == {"sloshing"}
 
 
-@pytest.mark.parametrize(("left", "afar"), [(2000.0, True), (10.0, False)])
+@pytest.mark.parametrize(
+    ("left", "ranking_gain", "refit_gain", "afar"),
+    [
+        (2000.0, 900.0, 900.0, True),
+        (10.0, 900.0, 900.0, False),
+        (40.0, -64.0, 900.0, False),
+        (40.0, 13.0, -2.0, False),
+    ],
+)
 def test_where_the_base_leaves_a_force_that_no_pool_has_candidates_are_led_from_the_nominal_values(
-    monkeypatch, left, afar
+    monkeypatch, left, ranking_gain, refit_gain, afar
 ):
-    """A rudder that stops was found otherwise, but left 2300 times usual water, as its base did: nothing was named."""
+    """A rudder that stops was found otherwise, but left 2300 times usual water, as its base did: nothing was named.
+
+    A payload and a camera's scale were not found so beside a base that left 47 and 36 times usual water, and are from near.
+    """
     hypothesis = nominal_hypothesis(Robot(), ("tail_stiffness",))
     base = SimpleNamespace(hypothesis=hypothesis, objective=0.0, noise=None)
-    ranked = {kind: (ranking.Ranked(kind, 900.0, np.zeros(2)),) for kind in ("rudder_lag", "rudder_gain")}
+    gains = {"rudder_lag": ranking_gain, "rudder_gain": 900.0}
+    ranked = {kind: (ranking.Ranked(kind, gain, np.zeros(2)),) for kind, gain in gains.items()}
     monkeypatch.setattr(search, "excess", lambda _: np.array([1.0, left, 1.0]))
     monkeypatch.setattr(search, "rank_afar", lambda *_: ranked["rudder_lag"])
     monkeypatch.setattr(search, "rank", lambda *_: ranked["rudder_gain"])
-    monkeypatch.setattr(search, "led_from_nominal", lambda *_: SimpleNamespace(objective=900.0))
+    monkeypatch.setattr(search, "led_from_nominal", lambda *_: SimpleNamespace(objective=refit_gain))
     monkeypatch.setattr(search, "evaluate", lambda *_: None)
     monkeypatch.setattr(search, "adapt_noise", lambda *_: None)
     monkeypatch.setattr(search, "settle", lambda *_: None)

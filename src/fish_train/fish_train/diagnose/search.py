@@ -5,8 +5,9 @@ Every hypothesis refits all nominal parameters: an effect counts only for what t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -34,6 +35,9 @@ LOOK_ALIKES = (
     ("rudder_offset", "camera_heading_offset", "hull_asymmetry"),
     ("current", "nonuniform_current"),
 )
+Rank = Callable[[Fit, Sequence[str], Experiment, Progress], tuple[Ranked, ...]]
+Few = Callable[[Sequence[Ranked]], list[Ranked]]
+Refit = Callable[[Fit, Experiment, Ranked], Fit]
 
 
 @dataclass(frozen=True)
@@ -89,15 +93,26 @@ def led_shortlist(ranking: Sequence[Ranked]) -> list[Ranked]:
     return [best, *(r for r in near[1:] if parameter_count(r.name) <= MANY)][:LED_SHORTLIST]
 
 
-def refit(base: Fit, ranked: Ranked, experiment: Experiment) -> Fit:
-    """A candidate on whole trials with its own noise, from the ranking's optimum; led once more where the base is far off."""
+def refit(base: Fit, experiment: Experiment, ranked: Ranked) -> Fit:
+    """A candidate on whole trials with its own noise, from the ranking's optimum."""
     hypothesis = base.hypothesis.with_effect(ranked.name, SCALE)
-    if excess(base).max() > TOO_STRONG:
-        return led_from_nominal(hypothesis, ranked.theta, experiment)
     start = evaluate(hypothesis, ranked.theta, experiment, base.noise)
     # the base's noise has taken the mismatch in, also as sensor noise
     start = evaluate(hypothesis, ranked.theta, experiment, adapt_noise(start, experiment))
     return look_again(settle(start, experiment), experiment)
+
+
+def refit_led(base: Fit, experiment: Experiment, ranked: Ranked) -> Fit:
+    """A candidate on whole trials with its own noise, led by the camera once more: the base is far off."""
+    return led_from_nominal(base.hypothesis.with_effect(ranked.name, SCALE), ranked.theta, experiment)
+
+
+def worth_a_refit(ranked: Ranked, needed: float) -> bool:
+    """Whether a candidate may gain what it needs.
+
+    Half a nat per number counts for nothing: so much an effect that is not there gains in the mean (Wilks 1938).
+    """
+    return ranked.gain - 0.5 * parameter_count(ranked.name) > WORTH_A_REFIT * needed
 
 
 def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough: float) -> Fit | None:
@@ -118,21 +133,24 @@ def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough
 def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment, progress: Progress) -> Round:
     """Rank all names on top of the base and refit the shortlist; nothing that gains far fewer nats than it needs.
 
-    Of its gain half a nat per number counts for nothing: so much an effect that is not there gains in the mean (Wilks 1938).
+    A base that leaves a force no pool has is ranked from afar first, and as any other where nothing is found so: 40 times
+    usual water may be near enough.
     """
-    names = tuple(needed)
-    ranked, few = (rank_afar, led_shortlist) if excess(base).max() > TOO_STRONG else (rank, shortlist)
-    ranking = ranked(base, names, experiment, progress)
-    progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
-    chosen = [
-        r for r in few(ranking) if r.gain - 0.5 * parameter_count(r.name) > WORTH_A_REFIT * needed[r.name]
-    ]
-    if chosen:
-        progress("refitting " + ", ".join(r.name for r in chosen))
-    fits = on_all_cores(lambda ranked: refit(base, ranked, experiment), chosen)
-    refitted = dict(zip((r.name for r in chosen), fits, strict=True))
-    enough = min(needed.values())
-    return with_look_alikes(Round(base, ranking, refitted), names, experiment, enough, progress)
+    names, enough = tuple(needed), min(needed.values())
+    ways: list[tuple[Rank, Few, Refit]] = [(rank, shortlist, refit)]
+    if excess(base).max() > TOO_STRONG:
+        ways.insert(0, (rank_afar, led_shortlist, refit_led))
+    for ranked, few, again in ways:
+        ranking = ranked(base, names, experiment, progress)
+        progress("first: " + ", ".join(f"{r.name} {r.gain:.0f}" for r in ranking[:5]) + " nats")
+        chosen = [r for r in few(ranking) if worth_a_refit(r, needed[r.name])]
+        if chosen:
+            progress("refitting " + ", ".join(r.name for r in chosen))
+        fits = on_all_cores(partial(again, base, experiment), chosen)
+        found = Round(base, ranking, dict(zip((r.name for r in chosen), fits, strict=True)))
+        if found.best is not None and found.gain(found.best) >= enough:
+            break
+    return with_look_alikes(found, names, experiment, enough, progress)
 
 
 def with_look_alikes(
