@@ -165,7 +165,7 @@ def test_a_fish_at_rest_ends_drifting_with_the_current():
     np.testing.assert_allclose(last[4:6], [0.03, -0.02], rtol=0.01)
 
 
-def test_nonuniform_current_is_incompressible_closed_at_the_walls_and_has_its_own_gradient():
+def test_nonuniform_current_is_incompressible_closed_beyond_the_walls_and_has_its_own_gradient():
     p, z = namespace("nonuniform_current"), SimpleNamespace()
     flow = EFFECTS["nonuniform_current"].water
     h = 1e-6

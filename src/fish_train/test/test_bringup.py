@@ -79,9 +79,8 @@ def test_messages_stay_on_this_computer_with_any_middleware(monkeypatch):
     ours = bringup.middleware()
     assert "type>UDPv4" in Path(ours[bringup.PROFILE]).read_text()
     assert ours["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
-    monkeypatch.setenv(
-        bringup.PROFILE, ours[bringup.PROFILE]
-    )  # as a process sees it that runs in this environment
+    # as a process sees it that runs in this environment
+    monkeypatch.setenv(bringup.PROFILE, ours[bringup.PROFILE])
     assert bringup.middleware() == ours
     monkeypatch.setenv(bringup.PROFILE, "their.xml")
     assert bringup.middleware() == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}

@@ -10,9 +10,9 @@ from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
 SOURCE = "linear expansion and first stream-function modes of a basin; strengths are an assumption"
-# half waves along and across the pool, down to 0.53 m: what resolves an eddy of 0.3 m radius
+# half waves along and across the pool and its margin, down to 0.57 m: what resolves an eddy of 0.3 m radius
 LONG, WIDE = tuple(range(1, 9)), tuple(range(1, 5))
-MARGIN = 0.15  # m; nothing in a steady pattern makes it end right at the walls where the fish does not swim
+MARGIN = 0.15  # m beyond the walls where the gyres close: a flow seen on the fish's tracks need not close at the walls
 LENGTH, WIDTH = pool.LENGTH + 2.0 * MARGIN, pool.WIDTH + 2.0 * MARGIN
 MODES = tuple(product(LONG, WIDE))
 
