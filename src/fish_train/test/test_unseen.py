@@ -14,7 +14,7 @@ from fish_train.diagnose.split import Trials
 from fish_train.diagnose.unseen import gain_left_out, gain_unseen, on_all, predicted
 from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
-from fish_train.identify.fit import evaluate
+from fish_train.identify.fit import climb, evaluate
 from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.suitable import OPEN
 from fish_train.identify.synthetic import program, record
@@ -101,6 +101,18 @@ def test_a_check_too_calm_to_tell_passes_the_question_on_to_every_trial_in_turn(
     assert max(gain, expected) < SMALLEST_CHECK
     assert (gain_left_out(base, on_all(fit, training)) > 30.0) is there
     assert holds_elsewhere(base, fit, trials, 30, Level()) is there
+
+
+def test_a_fit_reaches_the_optimum_of_all_trials_however_far_it_is(monkeypatch):
+    """A base short of it promises a flow gains that nobody could keep: two vortices were refused so."""
+    flowing = Robot().with_effect("nonuniform_current", shear_x=0.2, gyre_11=0.1, gyre_21=-0.08, gyre_22=0.06)
+    training = swum(flowing, ("sines", "turn"))
+    hypothesis = nominal_hypothesis(Robot()).with_effect("nonuniform_current", 0.3)
+    far = evaluate(hypothesis, Coordinates(hypothesis).origin(), training.select([0]), Noise())
+    near = on_all(far, training)
+    assert climb(near, training, 10).objective - near.objective < unseen.NEAR
+    monkeypatch.setattr(unseen, "MOST_ITERATIONS", 3)
+    assert near.objective - on_all(far, training).objective > 10.0  # it was far
 
 
 def test_every_measurement_of_unseen_trials_counts(monkeypatch):
