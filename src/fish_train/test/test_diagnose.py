@@ -346,6 +346,18 @@ def test_effects_share_out_their_gains_and_name_plausible_rivals_only(monkeypatc
     assert first["evidence"]["log_likelihood_gain"] == 300.0 and first["kind"] == "physics"
 
 
+@pytest.mark.parametrize(("foretold", "p_value"), [(None, 0.0872), (38.0, 30 * np.exp(-38.0 / 4.0))])
+def test_an_effect_that_stands_on_trials_left_out_in_turn_is_as_sure_as_these_say(
+    monkeypatch, foretold, p_value
+):
+    for part in ("where_entry", "effect_parameters"):
+        monkeypatch.setattr(answers, part, lambda *_: {})
+    monkeypatch.setattr(answers, "competition", lambda a, _: {a.name: 1.0})
+    weak = Accepted("wave_drag", SimpleNamespace(gain=lambda _: 28.0, ranking=range(30)), {}, foretold)
+    entry = answers.effect_entry(SimpleNamespace(accepted=(weak,), final=None), weak)
+    assert entry["evidence"]["p_value"] == pytest.approx(p_value, rel=0.01)
+
+
 def test_of_two_effects_each_has_its_own_place():
     experiment = swim(
         truth(hull_asymmetry={"sway": 0.0, "yaw": 0.2}, tether={"stiffness": 0.6, "length": 0.0})

@@ -1,11 +1,13 @@
-"""A model that grows keeps the best optimum that the search came to."""
+"""A model that grows keeps the best optimum that the search came to, and prefers a name to a law that foretells no better."""
 
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from fish_train.diagnose import growth
 from fish_train.diagnose.decide import Level
+from fish_train.diagnose.law import Description
 from fish_train.diagnose.search import Round
 from fish_train.diagnose.split import Trials
 
@@ -24,3 +26,39 @@ def test_where_nothing_is_added_the_better_optimum_that_a_candidate_led_to_is_ke
     monkeypatch.setattr(growth, "choose", lambda *_: None)
     base, rounds, accepted = growth.grow(poor, Trials(None, None, ()), ("current",), Level(), lambda _: None)
     assert base is better and len(rounds) == 1 and not accepted
+
+
+@pytest.mark.parametrize(
+    ("law", "wave_drag", "kept", "named"),
+    [
+        (34.0, 38.0, 11.0, ["wave_drag"]),  # as good as the law
+        (34.0, 38.0, 4.0, []),  # but not where it was not fitted: the check asks for half of 9
+        (90.0, 38.0, 11.0, []),  # the law foretells what no name does
+        (34.0, 28.0, 11.0, []),  # chance might foretell as much, with 30 names tried
+        (20.0, 38.0, 11.0, []),  # nothing is left
+    ],
+)
+def test_a_name_that_foretells_as_well_as_the_law_of_what_is_left_takes_its_place(
+    monkeypatch, law, wave_drag, kept, named
+):
+    """A hump of drag at a speed hardly reached had gained 28 nats on the searched trials, of 34 that were asked."""
+    fits = {name: SimpleNamespace(name=name, objective=28.0) for name in ("quadratic_drag", "wave_drag")}
+    base = SimpleNamespace(name="base")
+    foretold = {"quadratic_drag": wave_drag - 2.0, "wave_drag": wave_drag}
+    monkeypatch.setattr(growth, "on_all", lambda fit, _: fit)
+    monkeypatch.setattr(growth, "strength_z", lambda *_: 8.0)
+    monkeypatch.setattr(growth, "evidence", lambda fit: foretold[fit.name])
+    monkeypatch.setattr(
+        growth, "describe", lambda *_: Description({"surge": law, "sway": 0.0, "yaw": 1.0}, {}, 1e4)
+    )
+    monkeypatch.setattr(growth, "gain_unseen", lambda base, fit, _: (kept, 9.0))
+    monkeypatch.setattr(growth, "gain_left_out", lambda base, fit: foretold[fit.name])
+    found = Round(base, tuple(range(30)), fits)
+    accepted = growth.instead_of_a_law(found, Trials(None, None, (0,)), Level())
+    assert [a.name for a in accepted] == named
+    assert all(a.foretold == wave_drag and a.contest == fits for a in accepted)
+
+
+def test_where_nothing_was_refitted_no_law_is_sought(monkeypatch):
+    monkeypatch.setattr(growth, "on_all", lambda *_: pytest.fail("nothing to compare a law with"))
+    assert growth.instead_of_a_law(Round(None, (), {}), Trials(None, None, (0,)), Level()) == []

@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from fish_train.diagnose import verdict as verdicts
 from fish_train.diagnose.answer import bootstrap_interval, whiteness
-from fish_train.diagnose.decide import TEMPER, p_value, strength_z
+from fish_train.diagnose.decide import TEMPER, Level, p_value, p_value_unseen, strength_z
 from fish_train.diagnose.locate import MissingForce, covariate_shares, dof_shares, place_shares, time_shares
 from fish_train.diagnose.own_force import intervals, regimes, size
 from fish_train.identify.filter_types import Noise
@@ -159,6 +159,11 @@ def test_p_values_are_of_the_tempered_ratio_times_the_names_tried() -> None:
     """chi square with two degrees of freedom is exponential."""
     assert p_value(5.0 * TEMPER, 2, 3) == pytest.approx(3.0 * np.exp(-5.0))
     assert p_value(-1.0, 1, 1) == 1.0 and p_value(0.1, 2, 30) == 1.0
+
+
+def test_what_is_just_enough_on_unseen_trials_has_the_p_value_of_the_level() -> None:
+    assert p_value_unseen(Level(0.01).enough_unseen(0.0, 30), 30) == pytest.approx(0.01)
+    assert p_value_unseen(-5.0, 30) == 1.0
 
 
 def test_a_strength_is_as_sure_as_at_its_own_place() -> None:

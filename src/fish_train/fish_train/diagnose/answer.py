@@ -9,7 +9,7 @@ import numpy as np
 
 from fish_sim.robot import Robot
 from fish_train.diagnose import locate
-from fish_train.diagnose.decide import PLAUSIBLE, p_value, parameter_count
+from fish_train.diagnose.decide import PLAUSIBLE, p_value, p_value_unseen, parameter_count
 from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.own_force import intervals, regimes
@@ -65,7 +65,9 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         "parameters": effect_parameters(d.final, name),
         "evidence": {
             "log_likelihood_gain": gains[name],
-            "p_value": p_value(gains[name], parameter_count(name), tried),
+            "p_value": p_value(gains[name], parameter_count(name), tried)
+            if accepted.foretold is None
+            else p_value_unseen(accepted.foretold, tried),
             "probability": probability[name],
         },
         "share": gains[name] / sum(gains.values()),

@@ -53,6 +53,11 @@ def p_value(gain: float, parameters: int, candidates: int) -> float:
     return float(min(1.0, candidates * chi2.sf(2.0 * max(gain, 0.0) / TEMPER, parameters)))
 
 
+def p_value_unseen(gain: float, candidates: int) -> float:
+    """Of a tempered likelihood ratio on unseen data, times the number of candidates tried (Markov, as in `enough_unseen`)."""
+    return float(min(1.0, candidates * np.exp(-max(gain, 0.0) / TEMPER)))
+
+
 def probabilities(log_evidence: dict[str, float]) -> dict[str, float]:
     """Of competing hypotheses, equally probable beforehand."""
     odds = softmax(list(log_evidence.values()))

@@ -25,6 +25,7 @@ class Accepted:
     round: Round
     # name -> fit, its own among them: of its round, or in its place of the final model
     contest: dict[str, Fit]
+    foretold: float | None = None  # nats on training trials left out in turn, where it stands on these
 
 
 @dataclass(frozen=True)

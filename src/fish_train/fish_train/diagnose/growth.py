@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from fish_train.diagnose.base import anneal, refine
 from fish_train.diagnose.decide import SMALLEST_CHECK, SMALLEST_Z, Level, parameter_count, strength_z
 from fish_train.diagnose.diagnosis import Accepted
+from fish_train.diagnose.law import describe
 from fish_train.diagnose.pruning import simplest
 from fish_train.diagnose.ranking import Progress
 from fish_train.diagnose.search import Round, evidence, look_alike, settled_round
@@ -97,6 +98,35 @@ def holds_elsewhere(base: Fit, fit: Fit, trials: Trials, tried: int, level: Leve
     if expected < SMALLEST_CHECK:
         return gain_left_out(base, everywhere) > level.enough_unseen(float(base.result.samples.sum()), tried)
     return gain > max(FAIR_SHARE * expected, SMALLEST_CHECK)
+
+
+def instead_of_a_law(found: Round, trials: Trials, level: Level) -> list[Accepted]:
+    """The name that foretells every training trial from the others as well as the law that the base leaves there does.
+
+    For where no name gained enough on the searched trials alone and yet a law is left on all: it is called unexplained only
+    if it foretells better than the names. These keep a fair share of their promise on the check, however little.
+    """
+    if not found.refitted:
+        return []
+    base, tried = on_all(found.base, trials.training), len(found.ranking)
+    law = describe(base, trials.training)
+    lawful = law.lawful(level)
+    if not lawful:
+        return []
+    needed = max(
+        sum(law.gain[dof] for dof in lawful) - SMALLEST_CHECK, level.enough_unseen(law.samples, tried)
+    )
+    foretold = {}
+    for name, fit in found.refitted.items():
+        everywhere = on_all(fit, trials.training)
+        gain, expected = gain_unseen(base, everywhere, trials.check)
+        if strength_z(fit, name) > SMALLEST_Z and gain > FAIR_SHARE * expected:
+            foretold[name] = gain_left_out(base, everywhere)
+    good = {name: found.refitted[name] for name, nats in foretold.items() if nats > needed}
+    if not good:
+        return []
+    name = simplest(max(good, key=lambda name: evidence(good[name])), good, level)
+    return [Accepted(name, found, found.refitted, foretold[name])]
 
 
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:

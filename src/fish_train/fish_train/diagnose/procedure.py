@@ -11,7 +11,7 @@ from fish_sim.robot import Robot
 from fish_train.diagnose.base import fit_base
 from fish_train.diagnose.decide import Level
 from fish_train.diagnose.diagnosis import Accepted, Diagnosis
-from fish_train.diagnose.growth import final_fits, grow
+from fish_train.diagnose.growth import final_fits, grow, instead_of_a_law
 from fish_train.diagnose.law import describe
 from fish_train.diagnose.locate import MissingForce, missing_force
 from fish_train.diagnose.own_force import has_own_force, own_force
@@ -55,6 +55,9 @@ def diagnose(
     finer = finer_tail(rounds[0].base, base, robot, trials, level, progress)
     if finer is not None:
         base, rounds, accepted = grow(finer, trials, names, level, progress)
+    if not accepted:
+        accepted = instead_of_a_law(rounds[-1], trials, level)
+        base = accepted[0].contest[accepted[0].name] if accepted else base
     progress("fitting all training trials")
     training = trials.training
     nominal, final = final_fits(base, rounds, training)
