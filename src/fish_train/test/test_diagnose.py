@@ -96,6 +96,7 @@ def test_a_finer_tail_must_gain_on_unseen_trials_but_not_what_the_truth_would(
     monkeypatch.setattr(tail, "evidence", lambda fit: fit.objective)
     monkeypatch.setattr(tail, "on_all", lambda fit, _: fit)
     monkeypatch.setattr(tail, "gain_unseen", lambda *_: (gain, 1000.0))
+    monkeypatch.setattr(tail, "reheat", lambda fit, _: fit)
     found = tail.finer_tail(nominal, nominal, None, Trials(None, None, (0,)), Level(), lambda _: None)
     assert found is (finer if accepted else None)
 

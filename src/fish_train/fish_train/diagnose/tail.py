@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fish_sim.robot import MAX_LINKS, Robot, nominal_parameters
+from fish_train.diagnose.base import reheat
 from fish_train.diagnose.decide import SMALLEST_CHECK, Level
 from fish_train.diagnose.law import describe
 from fish_train.diagnose.ranking import Progress
@@ -46,6 +47,7 @@ def finer_tail(
     gain = finer.objective - nominal.objective
     if gain < level.enough(float(nominal.result.samples.sum()), 1, len(MORE)):
         return None
+    finer = reheat(finer, experiment)
     # half of what the truth would gain there is too much to ask: no number of links is the truth, and none is a name
     on_training = on_all(nominal, trials.training), on_all(finer, trials.training)
     if trials.check and not gain_unseen(*on_training, trials.check)[0] > SMALLEST_CHECK:
