@@ -51,6 +51,7 @@ def gain_unseen(base: Fit, fit: Fit, unseen: Sequence[int]) -> tuple[float, floa
     return predicted(fit, unseen) - predicted(base, unseen), 0.5 * float(np.nansum(apart**2))
 
 
-def gain_left_out(base: Fit, fit: Fit) -> float:
-    """Nats by which one fit to all trials foretells each from the others better than another fit does."""
-    return sum(gain_unseen(base, fit, [i])[0] for i in range(len(fit.log_likelihood)))
+def gain_left_out(base: Fit, fit: Fit) -> tuple[float, float]:
+    """`gain_unseen` of every trial by the others, summed."""
+    gains = [gain_unseen(base, fit, [i]) for i in range(len(fit.log_likelihood))]
+    return sum(gain for gain, _ in gains), sum(expected for _, expected in gains)
