@@ -139,6 +139,9 @@ def without_data(monkeypatch, reached: float) -> None:
     monkeypatch.setattr(base, "better_of", lambda fit, *_: max(fit, ended, key=lambda one: one.objective))
     monkeypatch.setattr(base, "shorten", lambda experiment, _: experiment)
     monkeypatch.setattr(base, "usual_noise", lambda _: None)
+    monkeypatch.setattr(
+        base, "evaluate", lambda _, theta, __, noise: SimpleNamespace(theta=theta, noise=noise)
+    )
 
 
 @pytest.mark.parametrize(
@@ -179,8 +182,7 @@ def test_a_candidate_is_led_from_the_nominal_values_with_its_effect_as_found(
         return SimpleNamespace(theta=start + 1.0, noise=None)
 
     without_data(monkeypatch, 0.0)
-    monkeypatch.setattr(base, "evaluate", lambda _, theta, *__: theta)
-    monkeypatch.setattr(base, "settle_base", lambda theta, _: theta)
+    monkeypatch.setattr(base, "settle_base", lambda fit, _: fit.theta)
     monkeypatch.setattr(base, "fit_tempered", fit_tempered)
     found = base.led_from_nominal(hypothesis, np.array([0.6, -0.4, *effect]), None)
     ((start, held),) = begun

@@ -9,6 +9,7 @@ from fish_train.diagnose.ranking import crowd
 from fish_train.identify.adapt import SETTLED_GAIN, settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, UNWHITE, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
+from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import Array, Coordinates, Hypothesis, nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
@@ -29,18 +30,23 @@ def fit_base(robot: Robot, experiment: Experiment) -> Fit:
 def led_from_nominal(hypothesis: Hypothesis, theta: Array, experiment: Experiment) -> Fit:
     """A candidate from the nominal values, its effects as in theta, led by the camera and settled on whole trials.
 
-    An effect of very many numbers is held until then.
-
     From a base in a poor optimum it would stay there: a rudder that stops, rightly found, left 2300 times usual water; led so
     it leaves less than usual (docs/blind_studies.md, the nineteenth).
     """
     start, short = Coordinates(hypothesis).at_nominal(theta), shorten(experiment, FIRST_STEPS)
-    held = crowd(hypothesis)
-    moving = np.array([free not in held for free in hypothesis.free])
-    coarse = hypothesis.fixing(held, theta)
-    led = fit_tempered(coarse, short, usual_noise(short), start[moving], held=TAIL_INERTIAS)
-    start[moving] = led.theta
-    return settle_base(evaluate(hypothesis, start, experiment, led.noise), experiment)
+    led = led_by_the_camera(hypothesis, start, short, usual_noise(short), TAIL_INERTIAS)
+    return settle_base(evaluate(hypothesis, led.theta, experiment, led.noise), experiment)
+
+
+def led_by_the_camera(
+    hypothesis: Hypothesis, start: Array, short: Experiment, noise: Noise, held: tuple[str, ...] = ()
+) -> Fit:
+    """`fit_tempered` from a start, the numbers of an effect that has very many held there: what they can absorb comes after."""
+    crowded, theta = crowd(hypothesis), start.copy()
+    moving = np.array([free not in crowded for free in hypothesis.free])
+    led = fit_tempered(hypothesis.fixing(crowded, start), short, noise, start[moving], held=held)
+    theta[moving] = led.theta
+    return evaluate(hypothesis, theta, short, led.noise)
 
 
 def better_of(fit: Fit, led: Fit, short: Experiment, experiment: Experiment) -> Fit:
@@ -61,7 +67,7 @@ def anneal(fit: Fit, experiment: Experiment) -> Fit:
     if excess(fit).max() < SUSPICIOUS:
         return fit
     short = shorten(experiment, FIRST_STEPS)
-    led = fit_tempered(fit.hypothesis, short, usual_noise(experiment), fit.theta)
+    led = led_by_the_camera(fit.hypothesis, fit.theta, short, usual_noise(experiment))
     return better_of(fit, led, short, experiment)
 
 
@@ -85,7 +91,7 @@ def look_again(fit: Fit, experiment: Experiment) -> Fit:
         return fit
     start, short = fit.theta.copy(), shorten(experiment, FIRST_STEPS)
     start[[i for i, name in enumerate(fit.hypothesis.free) if name in TAIL_INERTIAS]] = 0.0
-    led = fit_tempered(fit.hypothesis, short, usual_noise(experiment), start, held=TAIL_INERTIAS)
+    led = led_by_the_camera(fit.hypothesis, start, short, usual_noise(experiment), TAIL_INERTIAS)
     return better_of(fit, led, short, experiment)
 
 
