@@ -39,6 +39,30 @@ def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, r
     assert found.base.objective == kept  # what gains too little for a name tells nothing of the base
 
 
+@pytest.mark.parametrize(("ahead", "whole"), [(30.0, True), (10.0, False)])
+def test_a_base_is_restarted_on_whole_trials_only_where_that_leads_on_shortened_ones(
+    monkeypatch, ahead, whole
+):
+    """A parameter and noise fitted to the shortened trials gain a little there anyway."""
+    settled = []
+
+    def settle(fit, trials):
+        settled.append(trials)
+        return SimpleNamespace(theta=fit.theta, noise=fit.noise, objective=100.0 + ahead)
+
+    monkeypatch.setattr(search, "shorten", lambda *_: "short")
+    monkeypatch.setattr(search, "log_posterior", lambda _, theta, trials, noise: 100.0)
+    monkeypatch.setattr(
+        search, "evaluate", lambda _, theta, __, noise: SimpleNamespace(theta=theta, noise=noise)
+    )
+    monkeypatch.setattr(search, "settle_base", settle)
+    base = SimpleNamespace(hypothesis=None, theta=np.zeros(2), noise="its own", objective=100.0)
+    rival = SimpleNamespace(theta=np.ones(3), noise="the rival's")
+    found = search.restart_base(base, rival, "whole")
+    assert settled == (["short", "whole"] if whole else ["short"])
+    assert (found is base) is not whole and (not whole or (found.theta == 1.0).all())
+
+
 def test_what_gains_far_less_than_it_needs_itself_or_no_more_than_chance_is_not_refitted(monkeypatch):
     ranked = tuple(ranking.Ranked(name, 29.0, np.zeros(1)) for name in ("nonuniform_current", "sloshing"))
     monkeypatch.setattr(search, "rank", lambda *_: ranked)
