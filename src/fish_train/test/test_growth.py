@@ -48,16 +48,18 @@ def test_a_name_that_foretells_as_well_as_the_law_of_what_is_left_takes_its_plac
     monkeypatch.setattr(growth, "on_all", lambda fit, _: fit)
     monkeypatch.setattr(growth, "strength_z", lambda *_: 8.0)
     monkeypatch.setattr(growth, "evidence", lambda fit: foretold[fit.name])
-    monkeypatch.setattr(
-        growth, "describe", lambda *_: Description({"surge": law, "sway": 0.0, "yaw": 1.0}, {}, 1e4)
-    )
+    left = Description({"surge": law, "sway": 0.0, "yaw": 1.0}, {}, 1e4)
     monkeypatch.setattr(growth, "gain_left_out", lambda base, fit: (foretold[fit.name], promised))
     found = Round(base, tuple(range(30)), fits)
-    accepted = growth.instead_of_a_law(found, Trials(None, None, (0,)), Level())
+    told: list[str] = []
+    accepted = growth.instead_of_a_law(found, left, Trials(None, None, (0,)), Level(), told.append)
     assert [a.name for a in accepted] == named
     assert all(a.foretold == wave_drag and a.contest == fits for a in accepted)
+    assert [line.split()[1] for line in told] == named
 
 
-def test_where_nothing_was_refitted_no_law_is_sought(monkeypatch):
-    monkeypatch.setattr(growth, "on_all", lambda *_: pytest.fail("nothing to compare a law with"))
-    assert growth.instead_of_a_law(Round(None, (), {}), Trials(None, None, (0,)), Level()) == []
+def test_where_nothing_was_refitted_the_law_stays(monkeypatch):
+    """No candidate was promising enough to be fitted: none can take the law's place."""
+    monkeypatch.setattr(growth, "on_all", lambda *_: pytest.fail("nothing to compare the law with"))
+    left, nothing = Description({"surge": 34.0, "sway": 0.0, "yaw": 1.0}, {}, 1e4), Round(None, (), {})
+    assert not growth.instead_of_a_law(nothing, left, Trials(None, None, (0,)), Level(), lambda _: None)

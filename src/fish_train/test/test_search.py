@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
-from fish_train.diagnose import ranking, search
+from fish_train.diagnose import base, ranking, search
 from fish_train.diagnose.decide import TEMPER, probabilities
 from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
@@ -39,28 +39,29 @@ def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, r
     assert found.base.objective == kept  # what gains too little for a name tells nothing of the base
 
 
-@pytest.mark.parametrize(("ahead", "whole"), [(30.0, True), (10.0, False)])
-def test_a_base_is_restarted_on_whole_trials_only_where_that_leads_on_shortened_ones(
-    monkeypatch, ahead, whole
-):
-    """A parameter and noise fitted to the shortened trials gain a little there anyway."""
+@pytest.mark.parametrize("ahead", [True, False])
+def test_a_base_is_restarted_on_whole_trials_only_where_that_leads_on_shortened_ones(monkeypatch, ahead):
+    """Both are settled there: parameters and noise fitted to the shortened trials alone gain a little anyway."""
     settled = []
 
     def settle(fit, trials):
-        settled.append(trials)
-        return SimpleNamespace(theta=fit.theta, noise=fit.noise, objective=100.0 + ahead)
+        settled.append((trials, *fit.theta))
+        return SimpleNamespace(
+            theta=fit.theta, noise=fit.noise, objective=130.0 if ahead and any(fit.theta) else 100.0
+        )
 
+    for module in (search, base):
+        monkeypatch.setattr(
+            module, "evaluate", lambda _, theta, __, noise: SimpleNamespace(theta=theta, noise=noise)
+        )
+        monkeypatch.setattr(module, "settle_base", settle)
     monkeypatch.setattr(search, "shorten", lambda *_: "short")
     monkeypatch.setattr(search, "log_posterior", lambda _, theta, trials, noise: 100.0)
-    monkeypatch.setattr(
-        search, "evaluate", lambda _, theta, __, noise: SimpleNamespace(theta=theta, noise=noise)
-    )
-    monkeypatch.setattr(search, "settle_base", settle)
-    base = SimpleNamespace(hypothesis=None, theta=np.zeros(2), noise="its own", objective=100.0)
-    rival = SimpleNamespace(theta=np.ones(3), noise="the rival's")
-    found = search.restart_base(base, rival, "whole")
-    assert settled == (["short", "whole"] if whole else ["short"])
-    assert (found is base) is not whole and (not whole or (found.theta == 1.0).all())
+    own = SimpleNamespace(hypothesis=None, theta=np.zeros(1), noise="its own", objective=100.0)
+    rival = SimpleNamespace(theta=np.ones(2), noise="the rival's")
+    found = search.restart_base(own, rival, "whole")
+    assert settled == [("short", 1.0), ("short", 0.0), *([("whole", 1.0)] if ahead else [])]
+    assert (found is own) is not ahead and (not ahead or (found.theta == 1.0).all())
 
 
 def test_what_gains_far_less_than_it_needs_itself_or_no_more_than_chance_is_not_refitted(monkeypatch):

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fish_train.diagnose.base import anneal, refine
 from fish_train.diagnose.decide import SMALLEST_CHECK, SMALLEST_Z, Level, parameter_count, strength_z
 from fish_train.diagnose.diagnosis import Accepted
-from fish_train.diagnose.law import describe
+from fish_train.diagnose.law import Description
 from fish_train.diagnose.pruning import simplest
 from fish_train.diagnose.ranking import Progress
 from fish_train.diagnose.search import Round, evidence, look_alike, settled_round
@@ -102,20 +102,19 @@ def holds_elsewhere(base: Fit, fit: Fit, trials: Trials, tried: int, level: Leve
     return gain > max(FAIR_SHARE * expected, SMALLEST_CHECK)
 
 
-def instead_of_a_law(found: Round, trials: Trials, level: Level) -> list[Accepted]:
-    """The name that foretells every training trial from the others as well as the law that the base leaves there does.
+def instead_of_a_law(
+    found: Round, law: Description, trials: Trials, level: Level, progress: Progress
+) -> list[Accepted]:
+    """The name that foretells every training trial from the others as well as the law that the nominal fit leaves there does.
 
     For where no name gained enough on the searched trials alone and yet a law is left on all: it is called unexplained only
     if it foretells better than the names. These keep a fair share of their promise on all; on the two or three of the check
     so little is a matter of luck.
     """
-    if not found.refitted:
+    lawful = law.lawful(level)
+    if not lawful or not found.refitted:
         return []
     base, tried = on_all(found.base, trials.training), len(found.ranking)
-    law = describe(base, trials.training)
-    lawful = law.lawful(level)
-    if not lawful:
-        return []
     needed = max(
         sum(law.gain[dof] for dof in lawful) - SMALLEST_CHECK, level.enough_unseen(law.samples, tried)
     )
@@ -128,6 +127,7 @@ def instead_of_a_law(found: Round, trials: Trials, level: Level) -> list[Accepte
     if not good:
         return []
     name = simplest(max(good, key=lambda name: evidence(good[name])), good, level)
+    progress(f"found {name} instead of a law: {foretold[name]:.0f} nats on trials left out")
     return [Accepted(name, found, found.refitted, foretold[name])]
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_train.diagnose.base import fit_base
+from fish_train.diagnose.base import fit_base, refine
 from fish_train.diagnose.decide import Level
 from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.growth import final_fits, grow, instead_of_a_law
@@ -55,12 +55,12 @@ def diagnose(
     finer = finer_tail(rounds[0].base, base, robot, trials, level, progress)
     if finer is not None:
         base, rounds, accepted = grow(finer, trials, names, level, progress)
-    if not accepted:
-        accepted = instead_of_a_law(rounds[-1], trials, level)
-        base = accepted[0].contest[accepted[0].name] if accepted else base
     progress("fitting all training trials")
     training = trials.training
     nominal, final = final_fits(base, rounds, training)
+    if not accepted:
+        accepted = instead_of_a_law(rounds[-1], describe(nominal, training), trials, level, progress)
+        final = refine(accepted[0].contest[accepted[0].name], training) if accepted else nominal
     final, accepted = prune(final, accepted, training, level, progress)
     progress("locating the missing force")
     force = missing_force(nominal, training)

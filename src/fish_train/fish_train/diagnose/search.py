@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from fish_train.diagnose.base import led_from_nominal, look_again, settle_base
+from fish_train.diagnose.base import better_of, led_from_nominal, look_again, settle_base
 from fish_train.diagnose.decide import parameter_count
 from fish_train.diagnose.ranking import MANY, RANK_ITERATIONS, SCALE, Progress, Ranked, rank, warm_starts
 from fish_train.diagnose.ranking_afar import rank_afar
@@ -28,8 +28,6 @@ MOST_SEARCHES = 3  # with one base after the other, each a better optimum
 POOR_BASE = 0.5  # share of the best candidate's gain that a better optimum of the base has as well
 # share of the best ranking gain, and of a gain that is enough: a refit on whole trials gains more
 WORTH_A_REFIT = 0.2
-# nats on shortened trials: more than their own parameters and noise gain there over those of the whole ones
-WORTH_WHOLE_TRIALS = 20.0
 LOOK_ALIKES = (
     ("tip_slip", "wake_memory", "tail_joint_damping"),
     ("rudder_lag", "rudder_delay"),
@@ -195,15 +193,9 @@ def settled_round(
 
 
 def restart_base(base: Fit, rival: Fit, experiment: Experiment) -> Fit:
-    """The base refitted from a rival's nominal parameters and noise: a base in a poor optimum looks like missing physics.
-
-    On whole trials only where it is ahead on shortened ones.
-    """
+    """The base refitted from a rival's nominal parameters and noise: a base in a poor optimum looks like missing physics."""
     theta, short = rival.theta[: len(base.theta)], shorten(experiment, FIRST_STEPS)
-    here = log_posterior(base.hypothesis, base.theta, short, base.noise)
     noises = (base.noise, rival.noise)
     noise = max(noises, key=lambda n: log_posterior(base.hypothesis, theta, short, n))
     led = settle_base(evaluate(base.hypothesis, theta, short, noise), short)
-    if led.objective - here < WORTH_WHOLE_TRIALS:
-        return base
-    return better(base, settle_base(evaluate(base.hypothesis, led.theta, experiment, led.noise), experiment))
+    return better_of(base, led, short, experiment)

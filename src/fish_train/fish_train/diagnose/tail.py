@@ -52,7 +52,7 @@ def finer_tail(
     on_training = on_all(nominal, trials.training), on_all(finer, trials.training)
     if trials.check and not gain_unseen(*on_training, trials.check)[0] > SMALLEST_CHECK:
         return None
-    progress(f"the tail needs {finer.robot.links} links: {gain:.0f} nats")
+    progress(f"the tail needs {finer.robot.links} links: {finer.objective - nominal.objective:.0f} nats")
     return finer
 
 
