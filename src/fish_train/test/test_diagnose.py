@@ -195,14 +195,16 @@ def test_finer_tails_are_tried_where_much_is_left_or_follows_a_law(monkeypatch, 
 
 
 @pytest.mark.parametrize(
-    ("cold", "led", "tried", "kept"),
-    [({4: 5.0, 5: 9.0}, {4: 1.0, 5: 1.0}, [4, 5], [5.0, 9.0]), ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, [4], []),
-     ({4: -5.0, 5: 1.0}, {4: 3.0, 5: 8.0}, [4, 5], [3.0, 8.0])],
+    ("cold", "led", "held", "tried", "kept"),
+    [({4: 5.0, 5: 9.0}, {4: 1.0, 5: 1.0}, {}, [4, 5], [5.0, 9.0]),
+     ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, {4: -2.0}, [4], []),
+     ({4: -5.0, 5: 1.0}, {4: 3.0, 5: 8.0}, {}, [4, 5], [3.0, 8.0]),
+     ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, {4: 2.0}, [4, 5], [2.0, 9.0])],
 )  # fmt: skip
-def test_another_link_is_tried_where_the_one_before_gained_fitted_cold_or_from_fewer(
-    monkeypatch, cold, led, tried, kept
+def test_another_link_is_tried_where_the_one_before_gained_cold_or_from_fewer_or_with_inertias_held(
+    monkeypatch, cold, led, held, tried, kept
 ):
-    fewer = SimpleNamespace(hypothesis=None, theta="fewer", noise=None)
+    fewer, further = SimpleNamespace(hypothesis=None, theta="fewer", noise=None), held
     calls = []
 
     def reaches(objective):
@@ -213,9 +215,9 @@ def test_another_link_is_tried_where_the_one_before_gained_fitted_cold_or_from_f
         assert places == ("fewer",)
         return reaches(cold[links])
 
-    def led_fit(links, _experiment, _noise, theta):
-        assert theta == "fewer"
-        return reaches(led[links])
+    def led_fit(links, _experiment, _noise, theta="nominal", held=()):
+        assert (theta, held) in (("fewer", ()), ("nominal", tail.TAIL_INERTIAS))
+        return reaches(further[links] if held else led[links])
 
     monkeypatch.setattr(tail, "log_posterior", lambda *_: 0.0)
     monkeypatch.setattr(tail, "usual_noise", lambda _: None)

@@ -21,7 +21,7 @@ from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.fit import Fit, evaluate, log_posterior
 from fish_train.identify.hypothesis import nominal_hypothesis
 from fish_train.identify.sensor_noise import usual_noise
-from fish_train.identify.tempering import fit_tempered
+from fish_train.identify.tempering import TAIL_INERTIAS, fit_tempered
 
 MORE = (1, 2)  # links that are tried beyond the robot's
 
@@ -65,7 +65,8 @@ def finer_tails(
     after the tenth), if its optimum is found. So a fit from many places, the ratios to nominal values that fewer links came to
     among them, which goes on from the best only, competes with one led from these ratios all the way: on another fish of
     five links that was 1400 nats better with four, and the other no gain (ibid., the nineteenth). The better of the two came
-    as far as `fit_cold` goes with its further ways (ibid., after the twentieth).
+    as far as `fit_cold` goes with its further ways (ibid., after the twentieth), but on two other fish not as far as fewer
+    links: with four, held in its inertias until the IMU's full weight, 480 and 1800 nats farther (ibid., the twenty-third).
     """
     found, beaten = [], log_posterior(best.hypothesis, best.theta, short, best.noise)
     noise = usual_noise(short)
@@ -76,6 +77,8 @@ def finer_tails(
         hypothesis = nominal_hypothesis(with_links(robot, links))
         many = fit_multistart(hypothesis, short, noise, places=(nominal.theta,))
         fit = better(many, fit_tempered(hypothesis, short, noise, nominal.theta))
+        if not fit.objective > beaten:
+            fit = better(fit, fit_tempered(hypothesis, short, noise, held=TAIL_INERTIAS))
         if not fit.objective > beaten:
             break
         found.append(settle(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment))
