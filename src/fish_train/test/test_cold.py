@@ -140,7 +140,9 @@ def without_data(monkeypatch, reached: float) -> None:
     monkeypatch.setattr(base, "shorten", lambda experiment, _: experiment)
     monkeypatch.setattr(base, "usual_noise", lambda _: None)
     monkeypatch.setattr(
-        base, "evaluate", lambda _, theta, __, noise: SimpleNamespace(theta=theta, noise=noise)
+        base,
+        "evaluate",
+        lambda hypothesis, theta, _, noise: SimpleNamespace(hypothesis=hypothesis, theta=theta, noise=noise),
     )
 
 

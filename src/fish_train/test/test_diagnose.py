@@ -194,21 +194,28 @@ def test_finer_tails_are_tried_where_much_is_left_or_follows_a_law(monkeypatch, 
     assert len(calls) == tried
 
 
+WATER = {-0.5: 4.0, -0.25: 10.0}  # that fits of these objectives leave; others leave 15
+
+
 @pytest.mark.parametrize(
-    ("cold", "led", "held", "tried", "kept"),
-    [({4: 5.0, 5: 9.0}, {4: 1.0, 5: 1.0}, {}, [4, 5], [5.0, 9.0]),
-     ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, {4: -2.0}, [4], []),
-     ({4: -5.0, 5: 1.0}, {4: 3.0, 5: 8.0}, {}, [4, 5], [3.0, 8.0]),
-     ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, {4: 2.0}, [4, 5], [2.0, 9.0])],
+    ("cold", "led", "held", "settled", "tried", "kept"),
+    [({4: 5.0, 5: 9.0}, {4: 1.0, 5: 1.0}, {}, {}, [4, 5], [5.0, 9.0]),
+     ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, {4: -2.0}, {}, [4], [-1.0]),
+     ({4: -5.0, 5: 1.0}, {4: 3.0, 5: 8.0}, {}, {}, [4, 5], [3.0, 8.0]),
+     ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, {4: 2.0}, {}, [4, 5], [2.0, 9.0]),
+     ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, {}, {-1.0: 6.0}, [4, 5], [6.0, 9.0]),
+     ({4: -5.0, 5: 9.0}, {4: -1.0, 5: 1.0}, {4: 2.0}, {2.0: -7.0}, [4], [-1.0]),
+     ({4: -5.0, 5: 9.0}, {4: -0.5, 5: 1.0}, {}, {}, [4, 5], [-0.5, 9.0]),
+     ({4: -5.0, 5: 9.0}, {4: -0.25, 5: 1.0}, {4: -2.0}, {}, [4], [-0.25])],
 )  # fmt: skip
-def test_another_link_is_tried_where_the_one_before_gained_cold_or_from_fewer_or_with_inertias_held(
-    monkeypatch, cold, led, held, tried, kept
+def test_another_link_is_tried_where_the_one_before_gained_on_whole_trials_or_leaves_little_water(
+    monkeypatch, cold, led, held, settled, tried, kept
 ):
-    fewer, further = SimpleNamespace(hypothesis=None, theta="fewer", noise=None), held
+    fewer, further = SimpleNamespace(theta="fewer", objective=0.0), held
     calls = []
 
     def reaches(objective):
-        return SimpleNamespace(hypothesis=objective, theta=None, noise=None, objective=objective)
+        return SimpleNamespace(objective=objective)
 
     def many_fit(links, *_args, places):
         calls.append(links)
@@ -219,15 +226,19 @@ def test_another_link_is_tried_where_the_one_before_gained_cold_or_from_fewer_or
         assert (theta, held) in (("fewer", ()), ("nominal", tail.TAIL_INERTIAS))
         return reaches(further[links] if held else led[links])
 
-    monkeypatch.setattr(tail, "log_posterior", lambda *_: 0.0)
+    def on_whole(fit, experiment):
+        assert experiment == "whole"
+        return reaches(settled.get(fit.objective, fit.objective))
+
     monkeypatch.setattr(tail, "usual_noise", lambda _: None)
     monkeypatch.setattr(tail, "with_links", lambda _, links: links)
     monkeypatch.setattr(tail, "nominal_hypothesis", lambda links: links)
     monkeypatch.setattr(tail, "fit_multistart", many_fit)
     monkeypatch.setattr(tail, "fit_tempered", led_fit)
-    monkeypatch.setattr(tail, "evaluate", lambda objective, *_: objective)
-    monkeypatch.setattr(tail, "settle", lambda objective, _: objective)
-    assert tail.finer_tails(Robot(), fewer, fewer, None, None, lambda _: None) == kept
+    monkeypatch.setattr(tail, "carry_over", on_whole)
+    monkeypatch.setattr(tail, "excess", lambda fit: np.array([WATER.get(fit.objective, 15.0)]))
+    found = tail.finer_tails(Robot(), fewer, fewer, "whole", "short", lambda _: None)
+    assert [fit.objective for fit in found] == kept
     assert calls == tried
 
 

@@ -24,7 +24,7 @@ def fit_base(robot: Robot, experiment: Experiment) -> Fit:
     """The nominal model, fitted cold on the start of every trial, continued on the whole."""
     short = shorten(experiment, FIRST_STEPS)
     cold = fit_cold(nominal_hypothesis(robot), short, usual_noise(short))
-    return settle_base(evaluate(cold.hypothesis, cold.theta, experiment, cold.noise), experiment)
+    return carry_over(cold, experiment)
 
 
 def led_from_nominal(hypothesis: Hypothesis, theta: Array, experiment: Experiment) -> Fit:
@@ -35,7 +35,7 @@ def led_from_nominal(hypothesis: Hypothesis, theta: Array, experiment: Experimen
     """
     start, short = Coordinates(hypothesis).at_nominal(theta), shorten(experiment, FIRST_STEPS)
     led = led_by_the_camera(hypothesis, start, short, usual_noise(short), TAIL_INERTIAS)
-    return settle_base(evaluate(hypothesis, led.theta, experiment, led.noise), experiment)
+    return carry_over(led, experiment)
 
 
 def led_by_the_camera(
@@ -51,8 +51,7 @@ def led_by_the_camera(
 
 def better_of(fit: Fit, led: Fit, short: Experiment, experiment: Experiment) -> Fit:
     """The fit or one led elsewhere on shortened trials, which goes on to whole ones if it is ahead of the fit settled there."""
-    here = settle_base(evaluate(fit.hypothesis, fit.theta, short, fit.noise), short)
-    if led.objective - here.objective < SETTLED_GAIN:
+    if led.objective - carry_over(fit, short).objective < SETTLED_GAIN:
         return fit
     return better(fit, settle_base(evaluate(fit.hypothesis, led.theta, experiment, led.noise), experiment))
 
@@ -60,6 +59,11 @@ def better_of(fit: Fit, led: Fit, short: Experiment, experiment: Experiment) -> 
 def settle_base(fit: Fit, experiment: Experiment) -> Fit:
     """`settle`, which a model that lacks something would drag on: its noise has taken in what it lacks."""
     return settle(fit, experiment, ROUNDS_OF_A_WRONG_MODEL if excess(fit).max() > SUSPICIOUS else ROUNDS)
+
+
+def carry_over(fit: Fit, experiment: Experiment) -> Fit:
+    """A fit of other trials, or of their first seconds, settled on these."""
+    return settle_base(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment)
 
 
 def anneal(fit: Fit, experiment: Experiment) -> Fit:
@@ -97,5 +101,5 @@ def look_again(fit: Fit, experiment: Experiment) -> Fit:
 
 def refine(fit: Fit, experiment: Experiment) -> Fit:
     """A fit carried over to other trials; where it leaves far more there, the camera leads it to a better optimum."""
-    settled = settle_base(evaluate(fit.hypothesis, fit.theta, experiment, fit.noise), experiment)
+    settled = carry_over(fit, experiment)
     return anneal(settled, experiment) if excess(settled).max() > GROWN * excess(fit).max() else settled
