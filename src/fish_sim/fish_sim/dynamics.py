@@ -325,7 +325,7 @@ def tip_force(slip: Scalar, A: Scalar, b: Scalar, grip: Grip | None, xp: Any) ->
         return -(b + slip / tau) / A
     held = 1.0 - grip.share
     tau = tau * xp.exp(-((STIFF_GRIP * grip.mobility / (A * tau)) ** 2))
-    return -(held * (slip + tau * b) + grip.share * grip.wake) / (grip.mobility + held * tau * A)
+    return -(held * (slip + tau * b) + grip.late) / (grip.mobility + held * tau * A)
 
 
 def solve(
@@ -370,11 +370,10 @@ def tip_normal(chain: Chain) -> list[Scalar]:
 
 
 def combine(grips: Sequence[Grip]) -> Grip | None:
-    """Several finite grips act in series: mobilities add; late shares add."""
+    """Several finite grips act in series: mobilities add, and so do shares and what is late."""
     if not grips:
         return None
-    share = sum((g.share for g in grips), 0.0)
-    return Grip(sum((g.mobility for g in grips), 0.0), share, sum((g.wake for g in grips), 0.0))
+    return Grip(*(sum((getattr(g, part) for g in grips), 0.0) for part in ("mobility", "share", "late")))
 
 
 def energy(q: Sequence[Scalar], qd: Sequence[Scalar], alpha: Scalar, r: SimpleNamespace, xp: Any) -> Scalar:

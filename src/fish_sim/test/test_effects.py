@@ -260,6 +260,21 @@ def test_wake_memory_without_share_is_tip_slip(strokes):
     np.testing.assert_allclose(wake[:, :12], plain[:, :12], atol=1e-11)
 
 
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.9])
+def test_tip_force_with_a_memory_is_that_of_the_slip_now_and_of_the_slip_as_it_was(share):
+    """The law of the docstring, and a wake that has settled leaves the grip of `tip_slip`, whatever its share."""
+    robot = Robot().with_effect("wake_memory", mobility=1.0, share=share)
+    stepper = Stepper(robot.structure, compiled=False)
+    state = stepper.rest()
+    state[6:12] = (0.1, 0.05, 0.3, 0.2, -0.4, 0.6)
+    slip = float(stepper.outputs(state, np.zeros(2), stepper.parameters(robot))["slip"])
+    for wake in (-2.0 * slip, 0.0, slip):
+        state[stepper.layout.state.index("wake_memory.wake")] = wake
+        out = stepper.outputs(state, np.zeros(2), stepper.parameters(robot))
+        assert out["tip_force"] == pytest.approx(-((1.0 - share) * slip + share * wake) / 1.0, rel=1e-6)
+    assert out["tip_force"] == pytest.approx(-slip, rel=1e-6)
+
+
 def test_states_of_effects_follow_their_equations(strokes):
     """A phase that turns at its frequency, an angle that sums up the speed, a wake that lags behind the slip."""
     robot = Robot(links=1).with_effect("sloshing", sine=0.02, frequency=0.7)

@@ -51,14 +51,14 @@ class Drive:
 
 @dataclass(frozen=True)
 class Grip:
-    """How the tail's tip holds the water: force = -(1/mobility) (slip (1 - share) + wake share).
+    """How the tail's tip holds the water: force = -((1 - share) slip + late) / mobility.
 
     mobility 0 is the no-slip constraint of the nominal model.
     """
 
     mobility: Scalar = 0.0  # m/(N s)
     share: Scalar = 0.0  # part of the grip that follows the slip late
-    wake: Scalar = 0.0  # m/s, the late slip
+    late: Scalar = 0.0  # m/s, that share of the slip as it was
 
 
 class Effect:
