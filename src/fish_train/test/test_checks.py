@@ -109,15 +109,18 @@ def test_wrong_type(tmp_path):
     )
 
 
-def test_wrong_frame(tmp_path):
+@pytest.mark.parametrize("first", [0, 40])
+def test_wrong_frame(tmp_path, first):
     def other(i, t, m):
-        m.header = build.header(samples.ns(0.005 + i / 30), "map")
+        m.header = build.header(samples.ns(0.005 + i / 30), "map" if i >= first else "pool")
         return t, m
 
     result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/camera/pose", other))
-    assert "'map', expected 'pool'" in problem(result, "wrong_frame", "camera/pose").text
+    text = problem(result, "wrong_frame", "camera/pose").text
+    assert f"{60 - first} of 60 messages in frame 'map', expected 'pool'" in text
     assert len(result.camera) == 60
-    assert result.clean().camera is None
+    kept = result.clean().camera
+    assert (0 if kept is None else len(kept)) == first
 
 
 def test_stamps_never_set(tmp_path):

@@ -1,14 +1,16 @@
 """Folders of trials: order, bad trials, mixed robots, several processes."""
 
 import re
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import recording_samples as samples
 
-from fish_train.recordings import RecordingError, read_dataset
+from fish_train.recordings import RecordingError, read_dataset, read_trial
 from fish_train.recordings.dataset import check_set
+from fish_train.recordings.recover import recover
 
 
 def kinds(data):
@@ -48,6 +50,35 @@ def test_nothing_to_read(tmp_path, folder):
     (tmp_path / "empty").mkdir()
     with pytest.raises(RecordingError, match="no recording|does not exist"):
         read_dataset(tmp_path / folder)
+
+
+def test_a_folder_of_bare_files_is_a_folder_of_trials(tmp_path):
+    for name in ("trial_0", "trial_1"):
+        made = samples.robot_recording(tmp_path / name, duration=0.3)
+        (made / f"{name}.mcap").rename(tmp_path / f"{name}.mcap")
+        shutil.rmtree(made)
+    assert [trial.name for trial in read_dataset(tmp_path)] == ["trial_0", "trial_1"]
+    with pytest.raises(RecordingError, match="2 storage files.*give one of the recordings in it"):
+        read_trial(tmp_path)
+    with pytest.raises(RecordingError, match="2 recordings.*recover one of them at a time"):
+        recover(tmp_path, tmp_path / "mended")
+
+
+def test_parts_of_a_split_recording_are_one_that_can_be_mended(tmp_path):
+    messages, folder = samples.robot_messages(0.4), tmp_path / "swim"
+    folder.mkdir()
+    for k, half in enumerate((messages[: len(messages) // 2], messages[len(messages) // 2 :])):
+        made = samples.write_mcap(tmp_path / f"half_{k}", half)
+        (made / f"half_{k}.mcap").rename(folder / f"swim_{k}.mcap")
+    with pytest.raises(RecordingError, match="2 storage files.*fish_train recover .*swim"):
+        read_dataset(folder)
+    assert recover(folder, tmp_path / "mended").count == len(messages)
+
+
+def test_a_file_and_a_folder_of_one_name_are_told_apart(tmp_path):
+    made = samples.robot_recording(tmp_path / "a", duration=0.3)
+    shutil.copy(made / "a.mcap", tmp_path / "a.mcap")
+    assert [trial.name for trial in read_dataset(tmp_path)] == ["a", "a.mcap"]
 
 
 def test_mixed_robots(tmp_path):

@@ -1,5 +1,6 @@
 """Recordings as an experiment: what cannot be used is said, and robots are not mixed."""
 
+import numpy as np
 import pytest
 import recording_samples as samples
 
@@ -30,3 +31,33 @@ def test_a_set_without_a_usable_trial_says_why(tmp_path):
     samples.write_mcap(tmp_path / "a", messages)
     with pytest.raises(UserError, match="no trial can be used: .*camera"):
         read_experiment(tmp_path)
+
+
+def test_trials_of_one_name_are_told_apart_by_their_folders(tmp_path):
+    for place in ("may/swims/a", "june/swims/a", "june/swims/b"):
+        samples.robot_recording(tmp_path / place)
+    experiment, _ = read_experiment(tmp_path / "may" / "swims", tmp_path / "june" / "swims")
+    assert experiment.names == ("may/swims/a", "june/swims/a", "b")
+
+
+def test_a_recording_given_twice_is_refused(tmp_path):
+    samples.robot_recording(tmp_path / "a")
+    with pytest.raises(UserError, match="a: given twice; expected every recording once"):
+        read_experiment(tmp_path, tmp_path / "a")
+
+
+def test_an_imu_without_an_orientation_still_measures(tmp_path):
+    """Level, as far as anybody knows: the rates and forces of the axes it was mounted by."""
+
+    def unknown(i, t, m):
+        if i % 2:
+            m.orientation_covariance[0] = -1.0
+        return t, m
+
+    messages = samples.robot_messages()
+    samples.write_mcap(tmp_path / "known" / "a", messages)
+    samples.write_mcap(tmp_path / "half" / "a", samples.changed(messages, "/fish/imu/data", unknown))
+    known, half = (read_experiment(tmp_path / name)[0] for name in ("known", "half"))
+    assert np.isfinite(half.gyro).sum() == np.isfinite(known.gyro).sum() > 100
+    np.testing.assert_allclose(half.gyro, known.gyro, atol=1e-12)
+    assert half.start_at_rest == known.start_at_rest

@@ -46,11 +46,11 @@ def read_model(path: Path | None) -> Robot:
 def read_experiment(*paths: Path) -> tuple[Experiment, list[str]]:
     """All usable trials under the paths on the filter's grid, and what was left out and why.
 
-    Raises UserError when no trial can be used, or when the trials are not of one robot.
+    Raises UserError when no trial can be used, when one is given twice, or when the trials are not of one robot.
     """
     from fish_train.identify.experiment import ExperimentError, build_experiment
     from fish_train.recordings import read_dataset
-    from fish_train.recordings.dataset import check_set
+    from fish_train.recordings.dataset import check_set, told_apart
 
     read, trials, left_out = [], [], []
     with user_errors():
@@ -58,6 +58,7 @@ def read_experiment(*paths: Path) -> tuple[Experiment, list[str]]:
             data = read_dataset(path, progress=True)
             left_out += [problem.text for problem in data.problems if problem.kind == "unreadable_trial"]
             read += list(data)
+        read = told_apart(read)
     for problem in check_set(read):
         if problem.kind == "mixed_robots":
             raise UserError(problem.text)

@@ -5,7 +5,7 @@ With R from imu_link to a level frame with the z axis up, from the IMU's own ori
     (a_x, a_y, a_z) = R_z(-psi) R f,   level forward and left;   r = (R omega)_z
 
 Without it a roll of 0.03 rad puts 0.3 m/s^2 of gravity on the accelerometer's left axis, as much as the strokes do.
-Without an orientation the IMU is taken to stay level.
+Readings without an orientation are taken as those of an IMU that stays level.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from fish_train.recordings.trial import Imu
 
 Array = NDArray[np.float64]
 
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])  # quaternion x, y, z, w of no turn
+
 
 def level(imu: Imu) -> tuple[Array, Array]:
     """Yaw rate (N,) [rad/s] about the vertical and specific force (N, 2) [m/s^2] level forward and left."""
-    if imu.orientation is None:
-        return imu.gyro[:, 2], imu.accel[:, :2]
-    R = rotation(imu.orientation)
+    given = np.isfinite(imu.orientation).all(axis=1)
+    R = rotation(np.where(given[:, None], imu.orientation, LEVEL))
     rate, force = np.einsum("nj,nj->n", R[:, 2], imu.gyro), np.einsum("nij,nj->ni", R, imu.accel)
     psi = np.arctan2(R[:, 1, 0], R[:, 0, 0])
     cos, sin = np.cos(psi), np.sin(psi)

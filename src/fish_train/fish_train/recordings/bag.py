@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,7 +19,8 @@ from .message_types import typestore
 from .problem import RecordingError
 
 STAMP_PREFIX = 16  # bytes kept of messages nobody decodes: enough for the stamp of a header
-SUFFIXES = (".mcap", ".db3", ".bag")
+PARTS = (".mcap", ".db3")  # of files in a rosbag2 folder
+SUFFIXES = (*PARTS, ".bag")
 
 
 @dataclass
@@ -50,8 +52,21 @@ class RawBag:
 def is_recording(path: Path) -> bool:
     """Whether `path` looks like one recording (not: is readable)."""
     if path.is_dir():
-        return (path / "metadata.yaml").exists() or any(path.glob("*.mcap")) or any(path.glob("*.db3"))
+        return (path / "metadata.yaml").exists() or bool(parts(path))
     return path.suffix in SUFFIXES
+
+
+def parts(folder: Path) -> list[Path]:
+    """Storage files of the one recording in a folder without metadata.yaml; [] where they are recordings of their own.
+
+    rosbag2 splits a long recording into <folder>_0, <folder>_1 and so on.
+    """
+    inside = sorted(folder.iterdir())
+    files = [p for p in inside if p.suffix in PARTS]
+    split = re.compile(rf"{re.escape(folder.name)}_\d+")
+    own = len(files) == 1 or all(split.fullmatch(file.stem) for file in files)
+    beside = bool(files) and any(is_recording(p) for p in inside if p.is_dir())
+    return files if own and not beside else []
 
 
 def is_pool_bag(bag: RawBag) -> bool:
@@ -109,9 +124,12 @@ def storage(path: Path) -> Path:
     files = sorted(p for p in path.iterdir() if p.suffix in SUFFIXES)
     if len(files) == 1:
         return files[0]
+    if parts(path):
+        advice = f"'fish_train recover {path}' writes a new metadata.yaml"
+    else:
+        advice = "give one of the recordings in it" if files else "there is no recording in it"
     raise RecordingError(
-        f"{path}: no metadata.yaml and {len(files)} storage files; expected a rosbag2 directory. "
-        "'fish_train recover' writes a new metadata.yaml"
+        f"{path}: no metadata.yaml and {len(files)} storage files; expected a rosbag2 directory; {advice}"
     )
 
 

@@ -66,17 +66,18 @@ def flag_samples(
     return flags
 
 
-def check_stream(stream: Stream, rule: TopicRule) -> Iterator[Problem]:
-    """Problems of one topic: flagged samples, frame, gaps."""
+def check_stream(stream: Stream, rule: TopicRule, frames: np.ndarray | None) -> Iterator[Problem]:
+    """Problems of one topic: flagged samples, frames (N,) of its messages if they have any, gaps."""
     for bit, (severity, kind, text) in FLAG_TEXTS.items():
         where = np.flatnonzero(stream.flags & bit)
         if len(where):
             what = f"{len(where)} of {len(stream)} {text}"
             yield Problem(severity, kind, stream.topic, what, len(where), float(stream.t_arrival[where[0]]))
-    wrong = int(np.count_nonzero(stream.flags & WRONG_FRAME))
-    if wrong:
-        text = f"{wrong} of {len(stream)} messages in frame {stream.frame_id!r}, expected {rule.frame!r}"
-        yield Problem("error", "wrong_frame", stream.topic, text, wrong)
+    wrong = stream.flags & WRONG_FRAME > 0
+    if frames is not None and wrong.any():
+        other = ", ".join(map(repr, sorted(set(frames[wrong]))))
+        text = f"{wrong.sum()} of {len(stream)} messages in frame {other}, expected {rule.frame!r}"
+        yield Problem("error", "wrong_frame", stream.topic, text, int(wrong.sum()))
     yield from _gaps(stream)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,7 @@ def read_dataset(
             problems.append(Problem("error", "unreadable_trial", "", f"{source.name} left out: {result}"))
     if not trials:
         raise RecordingError("; ".join(problem.text for problem in problems))
+    trials = told_apart(trials)
     problems += check_set(trials)
     return DataSet(path.name, path, tuple(trials), tuple(problems))
 
@@ -95,8 +97,28 @@ def _read_one(job: tuple[Path, TopicMap]) -> Trial | str:
         return str(error)
 
 
-def check_set(trials: list[Trial]) -> Iterator[Problem]:
-    """Problems of the set as a whole: one trial, several robots, names that are not unique."""
+def told_apart(trials: Sequence[Trial]) -> list[Trial]:
+    """The trials, those of one name renamed by as much of their paths as tells them apart.
+
+    Raises:
+        RecordingError: a recording is there twice.
+    """
+    namesakes: dict[str, list[tuple[str, ...]]] = {}
+    for trial in trials:
+        namesakes.setdefault(trial.name, []).append(trial.path.resolve().parts)
+
+    def name(trial: Trial) -> str:
+        paths, own = namesakes[trial.name], trial.path.resolve().parts
+        if paths.count(own) > 1:
+            raise RecordingError(f"{trial.path}: given twice; expected every recording once")
+        ends = (own[-count:] for count in range(1, len(own) + 1))
+        return "/".join(next(end for end in ends if sum(p[-len(end) :] == end for p in paths) == 1))
+
+    return [replace(t, name=name(t)) if len(namesakes[t.name]) > 1 else t for t in trials]
+
+
+def check_set(trials: Sequence[Trial]) -> Iterator[Problem]:
+    """Problems of the set as a whole: one trial, several robots."""
     if len(trials) == 1:
         text = "a single trial: nothing can be held out, errors on unseen data cannot be stated"
         yield Problem("warning", "one_trial", "", text)
@@ -111,7 +133,7 @@ def check_set(trials: list[Trial]) -> Iterator[Problem]:
             )
 
 
-def _identities(trials: list[Trial]) -> dict[str, dict[str, list[str]]]:
+def _identities(trials: Sequence[Trial]) -> dict[str, dict[str, list[str]]]:
     """What a robot is known by -> value -> names of trials with that value."""
     found: dict[str, dict[str, list[str]]] = {
         "robot": {},

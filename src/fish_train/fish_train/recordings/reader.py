@@ -142,7 +142,7 @@ class _Assembly:
             values["names"] = decoded.names
         values |= {"topic": decoded.topic, "frame_id": frame, "t": t, "t_arrival": t_arrival, "flags": flags}
         stream = ROLES[role].stream(**values)
-        self.problems += checks.check_stream(stream, rule)
+        self.problems += checks.check_stream(stream, rule, decoded.frames)
         return stream
 
     def paths(self, axis: TimeAxis) -> tuple[ReferencePath, ...]:

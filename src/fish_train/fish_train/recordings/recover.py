@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 from mcap.records import Channel, Schema
 
+from .bag import is_recording
 from .mcap_walk import Walk, walk_file
 from .mcap_writer import McapRecording
 from .message_types import MessageType, message_type
@@ -34,11 +35,11 @@ def recover(path: Path, out: Path) -> Recovery:
     """Write what is left of a recording to a new rosbag2 directory.
 
     Args:
-        path: .mcap file, or directory with .mcap files.
+        path: .mcap file, or directory with the .mcap files of one recording.
         out: directory to be made.
 
     Raises:
-        RecordingError: not MCAP, or not one message is left.
+        RecordingError: not MCAP, files of several recordings, or not one message is left.
     """
     walks = [walk_file(file) for file in _files(path)]
     if not any(walk.messages for walk in walks):
@@ -58,6 +59,11 @@ def _files(path: Path) -> list[Path]:
     if not path.exists():
         raise RecordingError(f"{path}: does not exist")
     files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    if len(files) > 1 and not is_recording(path):
+        raise RecordingError(
+            f"{path}: {len(files)} recordings, each complete in one file by their names; recover one of them at a time "
+            f"(the parts of one recording are {path.name}_0.mcap, {path.name}_1.mcap and so on, as rosbag2 names them)"
+        )
     if not files or files[0].suffix != ".mcap":
         raise RecordingError(
             f"{path}: expected an .mcap file or a folder with one; a sqlite3 recording cut off is lost, "

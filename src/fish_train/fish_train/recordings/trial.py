@@ -84,7 +84,7 @@ class Imu(Stream):
 
     gyro: np.ndarray  # (N, 3) angular velocity [rad/s]
     accel: np.ndarray  # (N, 3) specific force, gravity included [m/s^2]
-    orientation: np.ndarray | None  # (N, 4) quaternion x, y, z, w, no absolute heading; None if not given
+    orientation: np.ndarray  # (N, 4) quaternion x, y, z, w, no absolute heading; NaN where not given
 
 
 @dataclass(frozen=True, kw_only=True)
