@@ -189,6 +189,22 @@ def test_the_verdict_is_given_against_the_best_baseline_of_each_number() -> None
     assert verdict({"identified": mine}) == []
 
 
+def test_the_verdict_names_the_horizons_that_were_measured_and_counts_what_diverges() -> None:
+    def sizes(rms: float, *counts: int) -> ErrorSizes:
+        table = np.where(np.array(counts)[:, None] > 0, rms, np.nan) * np.ones(3)
+        return ErrorSizes((1.0, 2.0, 5.0), table, np.zeros((1, 3, 3)), np.array([counts]))
+
+    def said(mine: ErrorSizes, theirs: ErrorSizes) -> str:
+        errors = {"identified": mine, "constant": theirs}
+        return verdict(errors | {f"{name}_ahead": sizes for name, sizes in errors.items()})[0]
+
+    assert said(sizes(0.01, 3, 2, 0), sizes(0.02, 3, 2, 0)).endswith("heading and speed at 1 s, 2 s")
+    assert said(sizes(0.01, 0, 0, 0), sizes(0.02, 0, 0, 0)).startswith("no trial is long enough to compare")
+    for ended, gone in ((1, 2), (0, 3)):
+        text = said(sizes(0.01, 3, ended, 0), sizes(0.02, 3, 3, 0))
+        assert text.endswith(f"does NOT beat the baselines in {gone} of 3 predictions at 2 s, which diverge")
+
+
 def test_a_fit_that_predicts_worse_than_what_it_began_with_is_told_from_one_as_good() -> None:
     def sizes(*position: float) -> ErrorSizes:
         rms = np.array([(p, 0.1, 0.1) for p in position])

@@ -294,12 +294,21 @@ def verdict(errors: dict[str, ErrorSizes]) -> list[str]:
 
 
 def _against(errors: dict[str, ErrorSizes], suffix: str) -> str:
-    """Horizon by horizon: each number against the best of the baselines."""
+    """Each number against the best of the baselines, at the horizons that the trials are long enough for.
+
+    What the physics cannot predict because it diverges is lost: errors are those of the predictions that it ends.
+    """
     names = [name + suffix for name in BASELINES if name + suffix in errors]
     mine = errors["identified" + suffix]
     terms = f" where all know {PEEK:g} s of what comes" if suffix else ""
+    ended, expected = mine.counts.sum(0), np.max([errors[name].counts.sum(0) for name in names], axis=0)
+    compared = [(i, h) for i, h in enumerate(mine.horizons) if expected[i]]
+    if not compared:
+        return f"no trial is long enough to compare the physics model with the baselines{terms}"
     lost = []
-    for i, h in enumerate(mine.horizons):
+    for i, h in compared:
+        if ended[i] < expected[i]:
+            lost.append(f"{expected[i] - ended[i]} of {expected[i]} predictions at {h:g} s, which diverge")
         for j, quantity in enumerate(("position", "heading", "speed")):
             best = min(names, key=lambda name: np.nan_to_num(errors[name].rms[i, j], nan=np.inf))
             if mine.rms[i, j] >= (theirs := errors[best].rms[i, j]):
@@ -307,4 +316,5 @@ def _against(errors: dict[str, ErrorSizes], suffix: str) -> str:
                 lost.append(f"{quantity} at {h:g} s ({mine.rms[i, j]:.3g} against {theirs:.3g}, {by})")
     if lost:
         return f"the physics model does NOT beat the baselines{terms} in {', '.join(lost)}"
-    return f"the physics model beats all baselines{terms} in position, heading and speed at every horizon"
+    at = " s, ".join(f"{h:g}" for _, h in compared)
+    return f"the physics model beats all baselines{terms} in position, heading and speed at {at} s"
