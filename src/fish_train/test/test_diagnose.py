@@ -11,9 +11,10 @@ import pytest
 
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot, load_robot, save_robot
+from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.commands.diagnose import without_wrench
 from fish_train.diagnose import answer as answers
-from fish_train.diagnose import base, procedure, pruning, tail
+from fish_train.diagnose import base, procedure, pruning, ranking, tail
 from fish_train.diagnose import verdict as verdicts
 from fish_train.diagnose.answer import answer
 from fish_train.diagnose.decide import Level, probabilities
@@ -23,7 +24,7 @@ from fish_train.diagnose.law import Description
 from fish_train.diagnose.locate import dof_shares
 from fish_train.diagnose.split import Trials, split_trials, trials_of
 from fish_train.diagnose.tail import with_links
-from fish_train.diagnose.vocabulary import candidates, kind_of, out_of_reach
+from fish_train.diagnose.vocabulary import NoCandidateError, candidates, kind_of, known, out_of_reach
 from fish_train.identify.adapt import settle
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
@@ -245,8 +246,11 @@ def test_another_link_is_tried_where_the_one_before_gained_on_whole_trials_or_le
 def test_what_the_data_cannot_say_is_said():
     still = swim(Robot(), kinds=("straight", "straight"), duration=2.0)
     reasons = out_of_reach(still)
-    assert reasons["rudder_lag"] == "the rudder never moved"
-    assert "current" not in reasons
+    unseen = {name for name, why in reasons.items() if why == "the rudder never moved"}
+    assert {"rudder_lag", "rudder_gain", "rudder_placement"} <= unseen
+    assert (
+        "rudder_offset" not in reasons and "current" not in reasons
+    )  # a fish told to swim straight may circle
     blind = type(still)(**{**still.__dict__, "gyro": np.full_like(still.gyro, np.nan)})
     assert out_of_reach(blind)["gyro_scale"] == "no IMU was recorded"
     drifting = type(still)(**{**still.__dict__, "commands": still.commands * [0.0, 1.0]})
@@ -255,13 +259,46 @@ def test_what_the_data_cannot_say_is_said():
     held = np.stack([still.commands[..., 0], np.full_like(still.commands[..., 1], 0.2)], axis=-1)
     held[150:, 1] = 0.0  # what pads a trial of 1.5 s is no command
     turned = type(still)(**{**still.__dict__, "commands": held, "steps": still.steps - [0, len(held) - 150]})
-    assert out_of_reach(turned)["rudder_lag"] == "the rudder never moved"
+    told = {name for name, why in out_of_reach(turned).items() if why == "the rudder's command never changed"}
+    assert told == {
+        "rudder_lag",
+        "rudder_delay",
+        "rudder_backlash",
+    }  # the others turn the fin by another angle
+
+
+def test_a_rudder_that_stands_off_is_told_from_straight_swims():
+    """Nothing was steered, and the fish circles: what it is named, not that it is out of reach."""
+    straight = swim(truth(rudder_offset={"offset": 0.08}), kinds=("straight",), duration=3.0)
+    straight = replace(straight, commands=straight.commands * [1.0, 0.0])
+    nominal = base.fit_base(Robot(), straight)
+    gains = {
+        r.name: r.gain
+        for r in ranking.rank(nominal, ("rudder_offset", "camera_scale"), straight, lambda _: None)
+    }
+    assert "rudder_offset" not in out_of_reach(straight)
+    assert gains["rudder_offset"] > gains["camera_scale"] + 100.0
+
+
+def test_names_that_cannot_be_judged_are_no_candidates_and_without_one_the_reasons_are_said():
+    still = swim(Robot(), kinds=("straight",), duration=1.0)
+    with pytest.raises(NoCandidateError, match=r"could be judged \(rudder_lag: the rudder never moved\)"):
+        procedure.diagnose(still, Robot(), names=["rudder_lag"])
+    given = Robot().with_effect("current", x=0.03)
+    with pytest.raises(NoCandidateError, match="current: the given robot has it"):
+        procedure.diagnose(still, given, names=["current"])
+    assert known(["current", "tether", "current"]) == ("current", "tether")
 
 
 def test_an_effect_of_the_user_competes_with_the_others(monkeypatch):
     monkeypatch.setitem(EFFECTS, "mine", EFFECTS["quadratic_drag"])
     assert "mine" in candidates()
     assert kind_of("mine") == "physics"
+
+
+def test_a_sensor_error_competes_once_the_filter_knows_it(monkeypatch):
+    monkeypatch.setitem(SENSOR_EFFECTS, "mine", SENSOR_EFFECTS["camera_scale"])
+    assert "mine" not in candidates()
 
 
 def test_only_known_names_compete():

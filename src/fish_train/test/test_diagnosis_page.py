@@ -1,9 +1,13 @@
 """What a diagnosis says to people: its sentence, its tables, its figures."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from fish_train.diagnose.diagnosis import Diagnosis
 from fish_train.reports.diagnosis_figures import binned_means, moves_water
+from fish_train.reports.diagnosis_page import _fit_table
 from fish_train.reports.verdict_sentence import sentence
 
 
@@ -80,3 +84,21 @@ def test_a_covariate_that_never_changes_or_was_never_measured_has_no_curve():
 )
 def test_a_picture_of_the_water_is_for_effects_that_move_it(name, moves):
     assert moves_water(name) is moves
+
+
+@pytest.mark.parametrize(
+    ("held", "interval", "title", "gain"),
+    [
+        (["c", "f"], [0.1, 0.4], "held-out trials", "0.250 nats per sample, 95 % interval 0.100 to 0.400."),
+        (["c"], [np.nan, np.nan], "held-out trials", "0.250 nats per sample."),
+        ([], [0.1, 0.4], "too few to hold any out", "0.250 nats per sample, 95 % interval 0.100 to 0.400."),
+    ],
+)
+def test_errors_are_said_to_be_of_held_out_trials_only_where_some_were(held, interval, title, gain):
+    density = {"nominal": 1.0, "refitted": 2.0, "with_effects": 2.25}
+    entries = {name: {"rms": {}, "log_density_per_sample": value} for name, value in density.items()}
+    fit = {**entries, "model_yaml": None, "held_out_trials": held, "improvement_ci95": interval}
+    split = SimpleNamespace(held_out=held)
+    table = _fit_table({"fit": fit}, Diagnosis.unseen_are.fget(SimpleNamespace(split=split)))
+    assert title in table.title and ("held-out" in table.title) is bool(held)
+    assert table.note.endswith(gain)

@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from fish_sim.robot import Robot, save_robot
+from fish_train.errors import UserError
 from fish_train.json_file import write_json
 
 
@@ -35,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.diagnose.decide import Level
     from fish_train.diagnose.procedure import diagnose
     from fish_train.diagnose.verdict import corrected
-    from fish_train.diagnose.vocabulary import known
+    from fish_train.diagnose.vocabulary import NoCandidateError, known
     from fish_train.reports.diagnosis_page import write_diagnosis_page
     from fish_train.reports.verdict_sentence import sentence
 
@@ -55,7 +56,10 @@ def run(args: argparse.Namespace) -> int:
             if not console.is_terminal:
                 console.print(f"{time.monotonic() - start:5.0f} s  {text}")
 
-        result = diagnose(experiment, robot, level, say, names)
+        try:
+            result = diagnose(experiment, robot, level, say, names)
+        except NoCandidateError as error:
+            raise UserError(str(error)) from error
         content = {**answer(result), "left_out": left_out}
     write_json(args.out / "diagnosis.json", content)
     fit = corrected(result)

@@ -14,6 +14,7 @@ from fish_train.diagnose.diagnosis import Accepted, Diagnosis
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.own_force import intervals, regimes
 from fish_train.diagnose.pruning import odds
+from fish_train.diagnose.ranking import Ranked
 from fish_train.diagnose.verdict import much_is_left, named, unexplained_share, verdict
 from fish_train.diagnose.vocabulary import kind_of
 from fish_train.identify.cold import excess
@@ -23,6 +24,7 @@ from fish_train.identify.hypothesis import effect_class, specification
 from fish_train.identify.prediction import predict, prediction_errors
 
 HORIZONS = (1.0, 2.0, 5.0)
+LAGS = 20  # samples of a row over which residuals must be white
 STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in surge, sway and yaw"
 
 
@@ -37,9 +39,14 @@ def answer(d: Diagnosis) -> dict[str, Any]:
         "fit": fit_entry(d),
         "next_experiment": next_experiment([a.name for a in named(d)], rivals(d), grows_with),
         "out_of_reach": d.unreachable,
-        "ranking": [{"name": r.name, "gain": r.gain} for r in d.rounds[0].ranking],
+        "ranking": [ranking_entry(ranked) for ranked in d.rounds[0].ranking],
         "refitted": [refitted_entry(d, name, fit) for name, fit in d.rounds[0].refitted.items()],
     }
+
+
+def ranking_entry(ranked: Ranked) -> dict[str, Any]:
+    """A candidate as the first quick ranking saw it, with the numbers it took: later versions may give it others."""
+    return {"name": ranked.name, "gain": ranked.gain, "free_parameters": parameter_count(ranked.name)}
 
 
 def refitted_entry(d: Diagnosis, name: str, fit: Fit) -> dict[str, Any]:
@@ -128,8 +135,15 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
         "description": "; ".join(law(d, dof) for dof in d.description.lawful(d.level))
-        or f"{STRONG.format(*excess(d.final))}; no law in place, time, speed, rotor, rudder or heading was found for it",
+        or f"{STRONG.format(*excess(d.final))}; {no_law(d)}",
     }
+
+
+def no_law(d: Diagnosis) -> str:
+    """Why no law of the remaining force is told."""
+    if len(d.split.training) < 2:
+        return "a single training trial: no law of it could be judged"
+    return "no law in place, time, speed, rotor, rudder or heading was found for it"
 
 
 def law(d: Diagnosis, dof: str) -> str:
@@ -178,14 +192,16 @@ def held_out_errors(d: Diagnosis, robot: Robot, noise: Noise) -> dict[str, dict[
 
 
 def bootstrap_interval(gain: np.ndarray) -> list[float]:
-    """95 % interval of the mean gain per trial, by resampling trials."""
+    """95 % interval of the mean gain per trial, by resampling trials; NaN of a single trial, which tells no spread."""
+    if len(gain) < 2:
+        return [float("nan")] * 2
     rng = np.random.default_rng(0)
     means = rng.choice(gain, (4000, len(gain))).mean(axis=1)
     return [float(q) for q in np.quantile(means, [0.025, 0.975])]
 
 
-def whiteness(fit: Fit, lags: int = 20) -> dict[str, float]:
-    """Ljung-Box p value of each row of innovations (the worst trial's, times the number of trials)."""
+def whiteness(fit: Fit) -> dict[str, float]:
+    """Ljung-Box p value over LAGS samples of each row of innovations (the worst trial's, times the number of trials)."""
     from statsmodels.stats.diagnostic import acorr_ljungbox
 
     values = {}
@@ -194,8 +210,8 @@ def whiteness(fit: Fit, lags: int = 20) -> dict[str, float]:
         for m in range(fit.result.whitened.shape[1]):
             series = fit.result.whitened[:, m, row]
             series = series[np.isfinite(series)]
-            if len(series) > 3 * lags:
-                p.append(float(acorr_ljungbox(series, [lags])["lb_pvalue"].iloc[0]))
+            if len(series) > 3 * LAGS:
+                p.append(float(acorr_ljungbox(series, [LAGS])["lb_pvalue"].iloc[0]))
         if p:
             values[name] = min(1.0, min(p) * len(p))
     return values

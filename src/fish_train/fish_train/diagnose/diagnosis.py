@@ -58,3 +58,8 @@ class Diagnosis:
     def unseen(self) -> Experiment:
         """The held-out trials, or where there are too few the training trials."""
         return self.experiment.select(self.split.held_out or self.split.training)
+
+    @property
+    def unseen_are(self) -> str:
+        """What the trials are on which predictions are shown."""
+        return "held-out trials" if self.split.held_out else "the training trials, too few to hold any out"

@@ -87,19 +87,19 @@ def energy(force: MissingForce, scale: Array) -> Array:
 
 
 def time_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """The windows of 2 s that hold most of the missing force."""
+    """The windows of 2 s that hold most of the missing force; the last one of a trial ends with it."""
     e, step = energy(force, scale), int(WINDOW / DT)
-    total = np.nansum(e)
+    total, lengths = np.nansum(e), np.isfinite(e).sum(axis=0)
     rows: list[dict[str, Any]] = [
-        {"trial": name, "from": k * DT, "to": min(k + step, len(e)) * DT, "share": float(np.nansum(e[k : k + step, m]) / total)}
-        for m, name in enumerate(force.names)
-        for k in range(0, len(e), step)
+        {"trial": name, "from": k * DT, "to": min(k + step, length) * DT, "share": float(np.nansum(e[k : k + step, m]) / total)}
+        for m, (name, length) in enumerate(zip(force.names, lengths.tolist(), strict=True))
+        for k in range(0, length, step)
     ]  # fmt: skip
     return sorted(rows, key=lambda r: -r["share"])[:STRONGEST]
 
 
 def place_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """The cells of the pool's map with most of the missing force for the time spent there."""
+    """The cells of the pool's map with most of the missing force."""
     e, x, y = (a.ravel() for a in (energy(force, scale), force.covariates["x"], force.covariates["y"]))
     good = np.isfinite(e)
     edges = [
@@ -117,7 +117,11 @@ def place_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
 
 
 def covariate_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """For every covariate, the contiguous range of quantile bins with above-average missing force."""
+    """For every covariate, the contiguous range of quantile bins in which the missing force is denser than on average.
+
+    contrast: the densest bin's share of the force over its share of the samples. A covariate that rests at a value, as a rudder
+    does, has fewer bins, and one of many samples.
+    """
     e = energy(force, scale).ravel()
     rows: list[dict[str, Any]] = []
     for name, values in force.covariates.items():
@@ -127,15 +131,16 @@ def covariate_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
         good = np.isfinite(e) & np.isfinite(v)
         if np.ptp(v[good]) < 1e-6:
             continue
-        edges = np.quantile(v[good], np.linspace(0, 1, BINS + 1))
-        index = np.clip(np.searchsorted(edges, v[good], side="right") - 1, 0, BINS - 1)
-        share = np.bincount(index, e[good], BINS) / e[good].sum()
-        low = high = int(np.argmax(share))
-        while low > 0 and share[low - 1] > 1.0 / BINS:
+        edges = np.unique(np.quantile(v[good], np.linspace(0, 1, BINS + 1)))
+        bins = len(edges) - 1
+        index = np.clip(np.searchsorted(edges, v[good], side="right") - 1, 0, bins - 1)
+        share = np.bincount(index, e[good], bins) / e[good].sum()
+        dense = share * len(index) / np.maximum(np.bincount(index, minlength=bins), 1)
+        low = high = int(np.argmax(dense))
+        while low > 0 and dense[low - 1] > 1.0:
             low -= 1
-        while high < BINS - 1 and share[high + 1] > 1.0 / BINS:
+        while high < bins - 1 and dense[high + 1] > 1.0:
             high += 1
-        contrast = float(share.max() * BINS)
         rows.append({"name": name, "range": [float(edges[low]), float(edges[high + 1])],
-                     "share": float(share[low : high + 1].sum()), "contrast": contrast})  # fmt: skip
+                     "share": float(share[low : high + 1].sum()), "contrast": float(dense.max())})  # fmt: skip
     return sorted(rows, key=lambda r: -r["contrast"])[:STRONGEST]

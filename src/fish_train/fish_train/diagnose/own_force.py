@@ -34,14 +34,15 @@ def has_own_force(name: str) -> bool:
 def own_force(fit: Fit, name: str, experiment: Experiment) -> MissingForce:
     """The push of an effect (see `has_own_force`) of a fit along the smoothed motion, as a wrench W on the head.
 
-    B W = q''(effect) - q''(no effect), rows of the head; B = d q'' / d wrench. Nothing of the water's noise is in it.
+    B W = q''(effect) - q''(no effect), rows of the head; B = d q'' / d wrench. Nothing of the water's noise is in it. Without
+    the effect all its parameters are neutral: the mean of a flow, which is no strength of its own, pushes as well.
     """
     xi, _, memory = smoothed(fit, experiment)
     stepper, nq = Coordinates(fit.hypothesis).stepper, fit.robot.links + 3
     effect, values = EFFECTS[name], fit.robot.effects[name]
-    neutral = {key: effect.parameters[key].value for key in effect.strength}
+    neutral = {key: effect.parameters[key].value for key in values}
     p = stepper.parameters(fit.robot)
-    p_without = stepper.parameters(fit.robot.with_effect(name, **{**values, **neutral}))
+    p_without = stepper.parameters(fit.robot.with_effect(name, **neutral))
     motion = np.nan_to_num(xi[..., :-6].reshape(-1, xi.shape[2] - 6))
     drive = drive_at(memory[:-1, :, :2], memory[1:, :, :2], 0.0).reshape(-1, 4)
     still = (np.zeros_like(motion), np.zeros_like(drive))

@@ -21,7 +21,7 @@ from fish_train.diagnose.split import split_trials, trials_of
 from fish_train.diagnose.stand_in import STRUCTURAL, stand_in
 from fish_train.diagnose.tail import finer_tail
 from fish_train.diagnose.verdict import much_is_left, named
-from fish_train.diagnose.vocabulary import candidates, known, out_of_reach
+from fish_train.diagnose.vocabulary import NoCandidateError, candidates, known, unjudged
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
@@ -40,14 +40,17 @@ def diagnose(
 ) -> Diagnosis:  # fmt: skip
     """Answer for one experiment; `progress` gets a line at every step.
 
-    names: what competes, by default every registered effect and sensor error; an effect of your own is registered by
-    `fish_sim.effects.EFFECTS[name] = YourEffect`. Raises ValueError for a name that is not known.
+    names: what competes, by default all of `candidates()`; an effect of your own is registered by
+    `fish_sim.effects.EFFECTS[name] = YourEffect`. Raises ValueError for a name that is not known,
+    NoCandidateError if none of the names can be judged.
     """
     level, split = level or Level(), split_trials(experiment)
-    reasons = out_of_reach(experiment)
     names = known(names or candidates())
-    unreachable = {name: reasons[name] for name in names if name in reasons}
-    names = tuple(name for name in names if name not in reasons)
+    unreachable = {name: why for name, why in unjudged(experiment, robot).items() if name in names}
+    names = tuple(name for name in names if name not in unreachable)
+    if not names:
+        reasons = "; ".join(f"{name}: {why}" for name, why in unreachable.items())
+        raise NoCandidateError(f"no candidate is left that could be judged ({reasons})")
     trials = trials_of(experiment, split)
     progress("fitting the nominal model")
     base = fit_base(robot, trials.searched)

@@ -7,28 +7,43 @@ from collections.abc import Sequence
 import numpy as np
 
 from fish_sim.effects import EFFECTS
+from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.identify.experiment import Experiment
+from fish_train.identify.hypothesis import SENSOR_FIELDS
 
 NOT_A_NAME = ("disturbance",)  # the latent wrench itself
+STILL = 1e-3  # rad, rad/s: a command that varies less says nothing
+SEEN_STILL = ("rudder_offset",)  # acts on a rudder that is told to stay at zero
+SEEN_MOVING = ("rudder_lag", "rudder_delay", "rudder_backlash")  # act when the command changes
+
+
+class NoCandidateError(ValueError):
+    """Nothing that competes can be judged on the recordings; the text says why."""
 
 
 def candidates() -> tuple[str, ...]:
-    """All names: every registered effect and sensor error. An effect a user registers competes like the others."""
-    return (*(name for name in EFFECTS if name not in NOT_A_NAME), *SENSOR_EFFECTS)
+    """All names: every registered effect, one of a user's own like the others, and the sensor errors that the filter knows."""
+    return (*(name for name in EFFECTS if name not in NOT_A_NAME), *SENSOR_FIELDS)
 
 
 def known(names: Sequence[str]) -> tuple[str, ...]:
-    """The names, checked. Raises ValueError for one that is no candidate."""
+    """The names, each once. Raises ValueError for one that is no candidate."""
     for name in names:
         if name not in candidates():
             raise ValueError(f"unknown candidate {name!r}; known: {', '.join(candidates())}")
-    return tuple(names)
+    return tuple(dict.fromkeys(names))
 
 
 def kind_of(name: str) -> str:
     """physics, actuator or sensor."""
     return "sensor" if name in SENSOR_EFFECTS else EFFECTS[name].kind
+
+
+def unjudged(experiment: Experiment, robot: Robot) -> dict[str, str]:
+    """Candidates about which nothing can be said beside this robot and these recordings, with the reason."""
+    given = dict.fromkeys((*robot.effects, *robot.sensors), "the given robot has it")
+    return out_of_reach(experiment) | given
 
 
 def out_of_reach(experiment: Experiment) -> dict[str, str]:
@@ -37,10 +52,12 @@ def out_of_reach(experiment: Experiment) -> dict[str, str]:
     if not np.isfinite(experiment.gyro).any():
         reasons |= dict.fromkeys(("gyro_scale", "imu_misalignment"), "no IMU was recorded")
     rotor, rudder = experiment.given_commands.T
-    if np.ptp(rudder) < 1e-3:
-        still = [name for name in EFFECTS if name.startswith("rudder_")]
-        reasons |= dict.fromkeys(still, "the rudder never moved")
-    if np.ptp(rotor) < 1e-3:
-        still = ["rotor_lag", "rotor_saturation", "battery_sag", "rotor_imbalance"]
-        reasons |= dict.fromkeys(still, "the rotor never moved")
+    if np.abs(rudder).max() < STILL:
+        unseen = [name for name in EFFECTS if name.startswith("rudder_") and name not in SEEN_STILL]
+        reasons |= dict.fromkeys(unseen, "the rudder never moved")
+    elif np.ptp(rudder) < STILL:
+        reasons |= dict.fromkeys(SEEN_MOVING, "the rudder's command never changed")
+    if np.ptp(rotor) < STILL:
+        unseen = ["rotor_lag", "rotor_saturation", "battery_sag", "rotor_imbalance"]
+        reasons |= dict.fromkeys(unseen, "the rotor never moved")
     return reasons

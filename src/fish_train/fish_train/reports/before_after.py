@@ -18,7 +18,7 @@ NOTE = (
 
 
 def before_after(d: Diagnosis) -> Figure:
-    """Paths (upper row) and surge speeds (lower row) of up to MOST_TRIALS held-out trials."""
+    """Paths (upper row) and surge speeds (lower row) of up to MOST_TRIALS trials, held-out ones if there are any."""
     which = (d.split.held_out or d.split.training)[:MOST_TRIALS]
     experiment = d.experiment.select(which)
     shown = {"refitted": (d.nominal, REFITTED)}
@@ -36,9 +36,8 @@ def before_after(d: Diagnosis) -> Figure:
         figure.update_xaxes(title="time (s)", row=2, col=m + 1)
     figure.update_yaxes(title="y (m)", row=1, col=1)
     figure.update_yaxes(title="surge speed (m/s)", row=2, col=1)
-    return Figure(
-        "Held-out trials, measured and simulated, before and after", styled(figure, 660, titled=True), NOTE
-    )
+    title = f"Measured and simulated, before and after: {d.unseen_are}"
+    return Figure(title, styled(figure, 660, titled=True), NOTE)
 
 
 def _lines(figure: go.Figure, swim: Swim, measured: bool, label: str, colour: str, column: int) -> None:

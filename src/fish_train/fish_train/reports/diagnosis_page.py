@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from fish_train.diagnose.answer import LAGS
 from fish_train.diagnose.diagnosis import Diagnosis
 from fish_train.diagnose.ranking import Ranked
 from fish_train.diagnose.search import Round
@@ -24,12 +27,14 @@ from fish_train.reports.verdict_sentence import sentence
 
 Content = dict[str, Any]
 
+DENSITY = "log_density_per_sample"
+
 
 def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) -> None:
     """Write report.html."""
     blocks: list[Text | Table | Figure] = [
         *(_found(entry) for entry in content["effects"]),
-        _fit_table(content),
+        _fit_table(content, d.unseen_are),
         before_after(d),
         Figure(
             "Missing force over the pool",
@@ -66,22 +71,24 @@ def _found(effect: Content) -> Table:
     )
 
 
-def _fit_table(content: Content) -> Table:
+def _fit_table(content: Content, trials: str) -> Table:
+    """Errors on `trials`; the gain with its interval, where more than one trial tells how far it spreads."""
     fit, rows = content["fit"], []
     for label in ("nominal", "refitted", "with_effects"):
         entry = fit[label]
         cells = [_errors(v) for v in entry["rms"].values()]
-        rows.append([label.replace("_", " "), *cells, f"{entry['log_density_per_sample']:.3f}"])
+        rows.append([label.replace("_", " "), *cells, f"{entry[DENSITY]:.3f}"])
     if fit["model_yaml"]:
         cells = [_errors(v) for v in fit["model_yaml"]["rms"].values()]
         helped = ", ".join(fit["model_yaml"]["effects"]) or "no effects"
         rows.append([f"model.yaml: fitted to predict over seconds, described with {helped}", *cells, ""])
     header = ["model", *(f"{h}: m / rad / m/s" for h in fit["nominal"]["rms"]), "log density per sample"]
     low, high = fit["improvement_ci95"]
-    held = fit["held_out_trials"]
-    spread = f"95 % interval {low:.3f} to {high:.3f}" if len(held) > 1 else f"{low:.3f}"
-    note = f"Held out: {', '.join(held) or 'none'}. Gain of the effects over the refitted model: {spread} nats per sample."
-    return Table("Prediction errors on held-out trials, before and after", header, rows, note)
+    gain = f"{fit['with_effects'][DENSITY] - fit['refitted'][DENSITY]:.3f} nats per sample"
+    spread = f", 95 % interval {low:.3f} to {high:.3f}" if np.isfinite(low) else ""
+    held = ", ".join(fit["held_out_trials"]) or "none"
+    note = f"Held out: {held}. Gain of the effects over the refitted model: {gain}{spread}."
+    return Table(f"Prediction errors on {trials}, before and after", header, rows, note)
 
 
 def _errors(rms: Mapping[str, float]) -> str:
@@ -120,7 +127,7 @@ def _whiteness(content: Content) -> Table:
         [name, f"{p['before'][name]:.3g}", f"{p['after'].get(name, float('nan')):.3g}"]
         for name in p["before"]
     ]
-    note = "Ljung-Box over 0.2 s, worst trial, Bonferroni. Small: something is left in the residuals."
+    note = f"Ljung-Box over {LAGS} samples of each row, worst trial, Bonferroni. Small: something is left in the residuals."
     return Table("Are the residuals white?", ["row", "before", "after"], rows, note)
 
 
