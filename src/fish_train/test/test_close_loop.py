@@ -144,6 +144,15 @@ def test_the_gap_is_shared_out_by_hand() -> None:
     assert [box.y[0] for box in loop_figure(rows).data] == pytest.approx([30.0, 14.0, 10.0])
 
 
+def test_a_run_that_diverges_is_no_gap_that_is_missing() -> None:
+    rows = [
+        row(name, size, size) for name, size in {"nominal": 0.03, "corrected": np.nan, "true": 0.01}.items()
+    ]
+    assert [r[2] for r in loop_table(rows).rows] == ["0%", "unknown: a run diverged", "100%"]
+    rows = [replace(rows[0]), replace(rows[2], candidate="corrected"), replace(rows[1], candidate="true")]
+    assert {r[2] for r in loop_table(rows).rows} == {"unknown: a run diverged"}
+
+
 def test_every_speed_has_a_gap_of_its_own() -> None:
     slow = {"nominal": 0.05, "corrected": 0.05, "true": 0.04}
     fast = {"nominal": 0.03, "corrected": 0.012, "true": 0.01}

@@ -16,6 +16,7 @@ import pytest
 from prove_samples import diagnosis, small
 
 from fish_train.commands.main import main
+from fish_train.commands.typed import words_after
 from fish_train.diagnose.locate import MissingForce
 from fish_train.diagnose.own_force import acting, f1, own_force, regimes
 from fish_train.identify.filter_types import Noise
@@ -256,6 +257,18 @@ def test_the_own_force_of_a_drag_is_its_equation() -> None:
     np.testing.assert_allclose(push.wrench[..., 1:], 0.0, atol=1e-6)
 
 
+def test_the_own_force_of_a_flow_is_that_of_all_of_it() -> None:
+    """The mean of a flow that differs hardly from place to place pushes as the uniform current does."""
+    push = {}
+    for name, values in (("current", {"x": 0.05}), ("nonuniform_current", {"mean_x": 0.05, "shear_x": 1e-4})):
+        world = World("single", 3, {name: values}, count=2, duration=2.0)
+        experiment = as_experiment(make_readings(world), True)
+        hypothesis, theta = with_truth(world, world.names)
+        push[name] = own_force(evaluate(hypothesis, theta, experiment, Noise()), name, experiment).wrench
+    size = np.abs(push["current"]).max()
+    np.testing.assert_allclose(push["nonuniform_current"], push["current"], atol=0.05 * size)
+
+
 def test_the_oracle_and_the_rivals_by_hand() -> None:
     def sight(gain: float) -> Sight:
         return Sight(gain, 1, [[0.02] * 3, [0.04] * 3, [0.1] * 3], [[0.01] * 3, [0.02] * 3, [0.05] * 3])
@@ -352,3 +365,10 @@ def test_a_competitor_finds_the_law_it_was_shown() -> None:
     name, share = _sparse(force(0.01), force(0.01))
     assert name == "current" and share < 1.0
     assert _sparse(force(0.0), force(0.0))[0] is None
+
+
+@pytest.mark.parametrize(
+    "argv", [["fish_train", "prove", "--seed", "7"], ["lib/fish_train/prove", "--seed", "7"]]
+)
+def test_the_command_is_recorded_whichever_way_it_was_called(argv) -> None:
+    assert words_after("prove", argv) == ["--seed", "7"]

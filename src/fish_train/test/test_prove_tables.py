@@ -102,13 +102,23 @@ def test_rivals_of_the_tool_choose_by_penalised_gain_or_held_out_error() -> None
 
 
 def test_information_criteria_cost_as_in_their_definitions() -> None:
-    """Half of 2 k and half of k ln n: a current has two numbers; n counts what 2 trials of 10 s measure."""
-    for encoder, imu_and_encoder in ((True, 4), (False, 3)):
-        world = replace(CURRENT, count=2, duration=10.0, encoder=encoder)
-        score = score_world(world, diagnosis())
-        measured = 2 * 10 * (100 * imu_and_encoder + 30 * 3)
-        assert bic_cost("current", score) == pytest.approx(0.5 * 2 * log(measured))
-        assert aic_cost("current", score) == 2.0
+    """Half of 2 k and half of k ln n: a current has two numbers; n counts what the ranking sees of training trials."""
+    for count, duration, seen in ((3, 6.0, 2 * 6), (9, 12.0, 4 * 8)):
+        for encoder, imu_and_encoder in ((True, 4), (False, 3)):
+            world = replace(CURRENT, count=count, duration=duration, encoder=encoder)
+            score = score_world(world, diagnosis())
+            measured = seen * (100 * imu_and_encoder + 30 * 3)
+            assert bic_cost("current", score) == pytest.approx(0.5 * 2 * log(measured))
+            assert aic_cost("current", score) == 2.0
+
+
+def test_a_name_costs_the_numbers_that_it_took_in_its_answer() -> None:
+    """`nonuniform_current` has had 11, 17 and 37."""
+    result = diagnosis()
+    result["diagnosis"]["ranking"][0]["free_parameters"] = 17
+    score = score_world(CURRENT, result)
+    assert aic_cost("current", score) == 17.0
+    assert aic_cost("quadratic_drag", score) == aic_cost("quadratic_drag", replace(score, free={})) > 0.0
 
 
 def test_what_was_asked_is_counted_over_its_own_worlds() -> None:
@@ -230,12 +240,16 @@ def test_competitors_are_judged_on_worlds_with_one_name_and_on_nulls() -> None:
     calm = replace(
         answered("null", (), verdict="no_mismatch"), ranking={"current": 4.0}, held_out={"current": 0.02}
     )
-    others = [answered("outside", ("jet",)), answered("two", ("current", "tip_slip")), failed("null")]
+    silent = answered(
+        "null", (), verdict="no_mismatch"
+    )  # no name was refitted: the held-out error had no choice
+    silent = replace(silent, ranking={"current": 1.0}, held_out={})
+    others = [silent, answered("outside", ("jet",)), answered("two", ("current", "tip_slip")), failed("null")]
     rows = criterion_table([found, calm, *others]).rows
     assert [[row[0], *(cell.split(" =")[0] for cell in row[1:])] for row in rows] == [
-        ["this tool", "0/1", "0/1"],
-        ["AIC", "1/1", "1/1"],  # 4 nats for two numbers
-        ["BIC", "1/1", "0/1"],
+        ["this tool", "0/1", "0/2"],
+        ["AIC", "1/1", "1/2"],  # 4 nats for two numbers
+        ["BIC", "1/1", "0/2"],
         ["smallest held-out error", "1/1", "0/1"],
     ]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import secrets
+import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -28,6 +29,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from fish_train.commands.typed import words_after
 from fish_train.errors import UserError
 
 if TYPE_CHECKING:
@@ -158,7 +160,7 @@ def _study(args: argparse.Namespace, console: Console) -> Study:
     about = {
         "seed": seed,
         "began": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": " ".join(["fish_train", "prove", *sys.argv[2:]]),
+        "command": shlex.join(["fish_train", "prove", *words_after("prove", sys.argv)]),
         "worlds": args.worlds,
         "groups": args.groups,
         "trials": args.trials,

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from rich.console import Console
 
+from fish_train.commands.typed import words_after
 from fish_train.errors import UserError
 
 from .inputs import read_model
@@ -167,9 +168,8 @@ def parse_settings(settings: list[str]) -> dict[str, Any]:
 
 def command_line(argv: list[str]) -> list[str]:
     """What the user typed after the verb, folders left out: it goes into files that travel."""
-    after = argv[argv.index("train") + 1 :] if "train" in argv else argv[1:]
     kept, skip = [], False
-    for word in after:
+    for word in words_after("train", argv):
         if skip or word in ("--resume", "--overwrite"):
             skip = False
         elif word in ("--out", "--jobs"):

@@ -51,6 +51,7 @@ class Score:
     parameters: tuple[ParameterError, ...]
     rms: Mapping[str, Any]  # model -> horizon -> errors, as in diagnosis.json
     ranking: Mapping[str, float]  # name -> quick gain, nats
+    free: Mapping[str, int]  # name -> numbers it took in the ranking; empty in answers that do not tell
     seconds: float
     error: str = ""  # why there is no answer
     # refitted name -> position error 2 s ahead on held-out trials [m]
@@ -109,21 +110,21 @@ def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] 
     unnamed = bool(world.names) and not names
     d = result.get("diagnosis")
     if d is None:
-        names_given, none = frozenset[str](), float("nan")
         return Score(
-            world,
-            names,
-            unnamed,
-            FAILED,
-            (),
-            names_given,
-            none,
-            (),
-            (),
-            {},
-            {},
-            result["seconds"],
-            result["error"],
+            world=world,
+            truth=names,
+            unnamed=unnamed,
+            verdict=FAILED,
+            named=(),
+            answered=frozenset(),
+            probability=float("nan"),
+            kinds=(),
+            parameters=(),
+            rms={},
+            ranking={},
+            free={},
+            seconds=result["seconds"],
+            error=result["error"],
         )
     effects = d["effects"]
     rivals = {rival["name"] for e in effects for rival in e["rivals"]}
@@ -140,6 +141,7 @@ def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] 
         parameters=tuple(p for e in effects for p in _parameter_errors(world, e)),
         rms={k: fit[k]["rms"] for k in ("nominal", "refitted", "with_effects") if k in fit},
         ranking={r["name"]: number(r["gain"], -np.inf) for r in d.get("ranking", ())},
+        free={r["name"]: r["free_parameters"] for r in d.get("ranking", ()) if "free_parameters" in r},
         seconds=result["seconds"],
         held_out={r["name"]: _position(r["held_out_rms"]) for r in d.get("refitted", ())},
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
+from fish_sim.model import DT
 from fish_train.json_file import number
 from fish_train.prove.groups import GROUPS
 from fish_train.prove.score import Score
@@ -243,7 +244,7 @@ def criterion_table(scores: Sequence[Score]) -> Table:
         alarms = [choice(s, cost) is not None for s in nothing]
         rows.append([name, str(Share(sum(right), len(right))), str(Share(sum(alarms), len(alarms)))])
     right = [smallest_error(s) in s.truth for s in hidden]
-    alarms = [smallest_error(s) is not None for s in nothing]
+    alarms = [smallest_error(s) is not None for s in nothing if s.held_out]
     rows.append(
         ["smallest held-out error", str(Share(sum(right), len(right))), str(Share(sum(alarms), len(alarms)))]
     )
@@ -253,7 +254,7 @@ def criterion_table(scores: Sequence[Score]) -> Table:
     note = (
         "Worlds with one hidden name, and nulls. AIC and BIC choose among the quick refits of all names on the search "
         "trials; the smallest held-out position error 2 s ahead among the refitted nominal model and the names refitted "
-        "with their own noise."
+        "with their own noise: for this one nulls count where the tool refitted a name at all."
     )
     return Table("Competitors", ["method", "right name first", "false alarms"], rows, note)
 
@@ -273,19 +274,23 @@ def smallest_error(score: Score) -> str | None:
 
 def aic_cost(name: str, score: Score) -> float:
     """Nats for the free parameters of a name."""
-    del score
-    return float(_free(name))
+    return float(_free(name, score))
 
 
 def bic_cost(name: str, score: Score) -> float:
-    """Nats: half the logarithm of the number of measurements for each parameter."""
-    samples = (
-        score.world.count * score.world.duration * (100.0 * (4 if score.world.encoder else 3) + 3 * 30.0)
-    )
-    return 0.5 * _free(name) * float(np.log(samples))
+    """Nats: half the logarithm of the number of measurements that the ranking saw, for each parameter."""
+    from fish_train.diagnose.split import SEARCH_TRIALS
+    from fish_train.identify.cold import FIRST_STEPS
+
+    world = score.world
+    trials = min(SEARCH_TRIALS, world.count - world.count // 3)  # a third is held out
+    seconds = min(world.duration, DT * FIRST_STEPS)
+    samples = trials * seconds * (100.0 * (4 if world.encoder else 3) + 3 * 30.0)
+    return 0.5 * _free(name, score) * float(np.log(samples))
 
 
-def _free(name: str) -> int:
+def _free(name: str, score: Score) -> int:
+    """Numbers of a name as its answer tells; of answers that do not, as it has them now."""
     from fish_train.diagnose.decide import parameter_count
 
-    return parameter_count(name)
+    return score.free[name] if name in score.free else parameter_count(name)

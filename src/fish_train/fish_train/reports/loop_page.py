@@ -105,6 +105,8 @@ def _resampled(errors: Array, runs: NDArray[np.int64], random: np.random.Generat
 
 
 def _share(sizes: Mapping[str, Array], name: str) -> str:
+    if not all(np.isfinite(sizes[n]).all() for n in (FIRST, name, LAST)):
+        return "unknown: a run diverged"
     share, low, high = gap_share(sizes[FIRST], sizes[name], sizes[LAST])
     if not np.isfinite(share):
         return "no gap"
