@@ -119,7 +119,12 @@ class Excitation:
         self._held, self._left = rudder, STOPPING
 
     def command(self, dt: float) -> Command:
-        """Advance by dt [s]; amplitude and frequency move at bounded rates, so that the rotor's speed does not jump."""
+        """Advance by dt [s]; amplitude and frequency move at bounded rates, so that the rotor's speed does not jump.
+
+        On their ways between two rows the two together may ask more of the rotor than either row does:
+
+            phi_dot = min(A, FASTEST_ROTOR / w) w sin(phase)
+        """
         if self.over:
             wanted = Row(self.time, 0.0, self._frequency, self._braking(dt))
         else:
@@ -129,7 +134,8 @@ class Excitation:
         self._frequency = _towards(self._frequency, wanted.frequency, FREQUENCY_RATE * dt)
         w = 2.0 * math.pi * self._frequency
         self._phase = math.fmod(self._phase + w * dt, 2.0 * math.pi)
-        return Command(self._phase, self._amplitude * w * math.sin(self._phase), wanted.rudder)
+        amplitude = min(self._amplitude, FASTEST_ROTOR / w)
+        return Command(self._phase, amplitude * w * math.sin(self._phase), wanted.rudder)
 
     def _braking(self, dt: float) -> float:
         """Rudder [rad] after the end."""

@@ -28,6 +28,9 @@ START_STD = (
 FASTEST_SWIM = 0.6  # m/s, poses of one fish are no farther apart
 FASTEST_TURN = 4.0  # rad/s
 SILENT_POSES = 3  # that arrive without an IMU sample in between say that the IMU is dead; stamps alone cannot
+OLD_POSES = (
+    3  # in a row, from before the history, say that the clock was set back when no IMU is there to say it
+)
 
 
 @dataclass(frozen=True)
@@ -81,14 +84,18 @@ class Fusion:
         self._candidates: list[tuple[float, Array]] = []  # poses in a row that agree with each other
         self._last_pose_time = self._last_imu_time = -math.inf
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
+        self._old_poses = 0  # in a row, from before the history
+
+    def _restart(self) -> None:
+        self._clear()
+        self.counts["restarted"] += 1
 
     def add_imu(self, time: float, yaw_rate: float, forward: float, left: float) -> bool:
         """A sample stamped `time` [s]: gyro [rad/s], specific force [m/s^2]. False if it was not used."""
         if not all(map(math.isfinite, (time, yaw_rate, forward, left))):
             return self._refuse("imu_not_finite")
         if time < self._last_imu_time - self.config.history:  # the clock was set back: a restarted simulation
-            self._clear()
-            self.counts["restarted"] += 1
+            self._restart()
         if time <= self._last_imu_time:
             return self._refuse("imu_out_of_order")
         self._last_imu_time, self._poses_in_a_row = time, 0
@@ -112,6 +119,10 @@ class Fusion:
         self._poses_in_a_row += 1
         if imu_lives and time > self._last_imu_time + self.config.imu_timeout:
             return self._refuse("pose_from_future")
+        old = not imu_lives and time < self._last_pose_time - self.config.history
+        self._old_poses = self._old_poses + 1 if old else 0
+        if self._old_poses >= OLD_POSES:
+            self._restart()
         if self._timeline is None:
             return self._start(time, camera.pose)
         if time <= self._timeline.first.time:
@@ -130,11 +141,11 @@ class Fusion:
     def estimate(self, silence: float = 0.0) -> Estimate | None:
         """State at the newest IMU sample, without an IMU at the newest pose; None before the first.
 
-        silence: s since a measurement was used; with it the sensors' stamps say what is lost.
+        silence: s since a measurement was used; with it the sensors' stamps say what is lost. Negative counts as 0.
         """
         if self._timeline is None:
             return None
-        now = self._timeline.last.time + silence
+        now = self._timeline.last.time + max(0.0, silence)
         imu_lost = now - self._last_imu_time > self.config.imu_timeout
         # a camera whose clock is a little ahead must not hold the estimate at its stamp until the IMU is there
         moment = self._timeline.last if imu_lost else self._timeline.at(self._last_imu_time)

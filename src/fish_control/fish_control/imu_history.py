@@ -18,7 +18,7 @@ class ImuHistory:
     """Samples in the order of their stamps."""
 
     def __init__(self, reach: float) -> None:
-        self._reach = reach  # s, a sample says nothing about moments farther away
+        self.reach = reach  # s, a sample says nothing about moments farther away
         self._times: list[float] = []
         self._samples: list[InertialSample] = []
 
@@ -30,8 +30,8 @@ class ImuHistory:
     def at(self, time: float) -> InertialSample | None:
         """Linear between the neighbouring samples; if only one is in reach, that one; None without any."""
         i = bisect.bisect_right(self._times, time)
-        before = i - 1 if i > 0 and time - self._times[i - 1] <= self._reach else None
-        after = i if i < len(self._times) and self._times[i] - time <= self._reach else None
+        before = i - 1 if i > 0 and time - self._times[i - 1] <= self.reach else None
+        after = i if i < len(self._times) and self._times[i] - time <= self.reach else None
         if before is None or after is None:
             only = before if before is not None else after
             return None if only is None else self._samples[only]
@@ -42,6 +42,10 @@ class ImuHistory:
             a.forward + share * (b.forward - a.forward),
             a.left + share * (b.left - a.left),
         )
+
+    def times(self, start: float, end: float) -> list[float]:
+        """Stamps [s] of the samples between `start` and `end`, without those two."""
+        return self._times[bisect.bisect_right(self._times, start) : bisect.bisect_left(self._times, end)]
 
     def forget(self, before: float) -> None:
         """Drop samples older than `before` [s]."""

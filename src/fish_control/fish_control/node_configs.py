@@ -12,6 +12,7 @@ from fish_control.planner import FASTEST, SLOWEST
 from fish_control.reference_path import End
 
 Resume = Literal["auto", "manual"]
+LARGEST_VARIANCE = 1.0  # m^2, rad^2 and their rates; fusion marks what it has lost with 1e4
 
 
 def require_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:
@@ -46,6 +47,7 @@ class PlannerConfig:
         ""  # progress for a restart after a crash; empty: in the system's folder for temporary files
     )
     resume_timeout: float = 10.0  # s, older progress is not resumed; 0 never resumes
+    largest_variance: float = LARGEST_VARIANCE  # of a pose; nothing is planned from one that is lost
 
     def __post_init__(self) -> None:
         require_range("speed", self.speed, SLOWEST, FASTEST, "m/s")
@@ -54,6 +56,7 @@ class PlannerConfig:
         require_range("margin", self.margin, 0.0, 1.0, "m")
         require_range("rate_hz", self.rate_hz, 1.0, 100.0, "Hz")
         require_range("resume_timeout", self.resume_timeout, 0.0, 3600.0, "s")
+        require_range("largest_variance", self.largest_variance, 1e-6, 1e3, "")
         self.tracker()
 
     def ending(self) -> End | None:
@@ -80,7 +83,7 @@ class ControllerConfig:
     robot_hash: str = ""  # refuse weights trained for another robot; empty: accept any
     odometry_timeout: float = 0.15  # s
     target_timeout: float = 0.25  # s
-    largest_variance: float = 1.0  # m^2, rad^2 and their rates; fusion marks what it has lost with 1e4
+    largest_variance: float = LARGEST_VARIANCE  # of an estimate that is not lost
     resume: str = "auto"  # after a stop: auto when all is well; manual when service resume is called
     resume_delay: float = 0.5  # s, how long all must be well before auto resumes
 
@@ -113,7 +116,7 @@ class ExciterConfig:
     horizon: float = 1.0  # s, how far ahead the guard looks
     margin: float = 0.15  # m, nearer to a wall the fish must not be then
     odometry_timeout: float = 0.5  # s
-    largest_variance: float = 1.0  # m^2, rad^2 and their rates; fusion marks what it has lost with 1e4
+    largest_variance: float = LARGEST_VARIANCE  # of an estimate that is not lost
 
     def __post_init__(self) -> None:
         require_range("begin", self.begin, 0.0, 3600.0, "s")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 SAMPLE_SPACING = 0.005  # m, nominal; a tenth of the smallest error that matters (cross-track of a few cm)
+LONGEST = 200.0  # m; the tables with which so long a path is followed take 1 GB
 
 End = Literal["stop", "loop"]
 Array = NDArray[np.float64]
@@ -115,20 +116,29 @@ def _checked_vertices(points: ArrayLike, name: str, closed: bool) -> Array:
         raise PathError(f"path '{name}': points have shape {vertices.shape}, expected (M, 2)")
     if not np.all(np.isfinite(vertices)):
         raise PathError(f"path '{name}': point {np.argwhere(~np.isfinite(vertices))[0][0]} is not finite")
+    length = _steps(np.vstack([vertices, vertices[:1]]) if closed else vertices).sum()
+    if not length <= LONGEST:
+        raise PathError(f"path '{name}': {length:g} m long, expected at most {LONGEST:g} m")
     if closed and len(vertices) > 1 and np.allclose(vertices[0], vertices[-1], atol=1e-9):
         vertices = vertices[:-1]
-    distinct = np.r_[True, np.linalg.norm(np.diff(vertices, axis=0), axis=1) > 1e-9]
-    vertices = vertices[distinct]
+    vertices = vertices[np.r_[True, _steps(vertices) > 1e-9]]
     if len(vertices) < (3 if closed else 2):
         raise PathError(f"path '{name}': {len(vertices)} distinct points; {3 if closed else 2} are needed")
     return vertices
+
+
+def _steps(vertices: Array) -> Array:
+    """Distances [m] from one vertex to the next; infinite where they overflow."""
+    with np.errstate(over="ignore"):
+        steps: Array = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
+    return steps
 
 
 def _resample(vertices: Array, closed: bool, spacing: float) -> tuple[Array, float]:
     """Even samples along the polyline, and their exact distance along it."""
     if closed:
         vertices = np.vstack([vertices, vertices[:1]])
-    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1))]
+    s = np.r_[0.0, np.cumsum(_steps(vertices))]
     intervals = max(int(round(s[-1] / spacing)), 3)
     s_even = np.linspace(0.0, s[-1], intervals + 1)
     samples = np.column_stack([np.interp(s_even, s, vertices[:, 0]), np.interp(s_even, s, vertices[:, 1])])

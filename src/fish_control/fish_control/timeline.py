@@ -81,7 +81,7 @@ class Timeline:
         keep = self._place(before) - 1
         if keep > 0:
             del self._moments[:keep]
-            self._imu.forget(self.first.time - 0.1)
+            self._imu.forget(self.first.time - self._imu.reach)
 
     def _place(self, time: float) -> int:
         return max(bisect.bisect_right(self._moments, time, key=lambda moment: moment.time), 1)
@@ -105,5 +105,14 @@ class Timeline:
             before = current
 
     def _advance(self, start: float, end: float) -> None:
-        if end > start:
-            self._filter.advance(end - start, self._imu.at(start), self._imu.at(end))
+        """Predict from `start` to `end` [s], from one IMU sample to the next.
+
+        There are samples in between, without moments of their own, where a late pose began the timeline. What the head
+        did in a gap longer than a sample's reach the gap's ends do not tell.
+        """
+        if end <= start:
+            return
+        for time in (*self._imu.times(start, end), end):
+            known = time - start <= self._imu.reach
+            self._filter.advance(time - start, *(self._imu.at(t) if known else None for t in (start, time)))
+            start = time

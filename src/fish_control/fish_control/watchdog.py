@@ -97,13 +97,22 @@ def estimate_fault(signs: EstimateSigns, timeout: float, largest_variance: float
     """
     if not signs.finite:
         return "odometry is not finite"
-    fault = _age_fault("odometry", signs.age, timeout)
-    if fault is not None:
-        return fault
-    if not signs.pose_variance <= largest_variance:
-        return "camera lost: fusion does not vouch for the pose"
+    return _age_fault("odometry", signs.age, timeout) or loss(signs, largest_variance)
+
+
+def loss(signs: EstimateSigns, largest_variance: float) -> str | None:
+    """Which sensor an estimate of any age lacks, None if none; a variance that is no number is one too many."""
+    if lost_pose := pose_loss(signs, largest_variance):
+        return lost_pose
     if not signs.twist_variance <= largest_variance:
         return "IMU lost: fusion does not vouch for the velocity"
+    return None
+
+
+def pose_loss(signs: EstimateSigns, largest_variance: float) -> str | None:
+    """The same for who needs no velocity."""
+    if not signs.pose_variance <= largest_variance:
+        return "camera lost: fusion does not vouch for the pose"
     return None
 
 

@@ -51,6 +51,21 @@ def test_the_rotor_s_speed_does_not_jump_between_rows():
     assert speed[-1] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("slow", "fast"), [((24.0, 1.0), (6.0, 4.0)), ((120.0, 0.2), (6.0, 4.0)), ((48.0, 0.5), (12.0, 2.0))]
+)
+@pytest.mark.parametrize("accelerates", [True, False])
+def test_between_two_rows_the_rotor_is_not_asked_for_more_than_a_row_may_ask(slow, fast, accelerates):
+    """Amplitude and frequency move at their own rates: the amplitude of one row meets the frequency of the other."""
+    first, second = (slow, fast) if accelerates else (fast, slow)
+    program = Program((Row(0.0, *first, 0.0), Row(12.0, *second, 0.0)))
+    rows = commands(Excitation(program), program.duration + 1.0)
+    assert 0.99 * FASTEST_ROTOR < np.abs(rows[:, 1]).max() <= FASTEST_ROTOR + 1e-9
+    w = 2.0 * math.pi * fast[1]
+    largest = FASTEST_ROTOR * w + 24.0 * w + slow[0] * 2.0 * math.pi * 4.0  # rad/s^2; and it does not jump
+    assert np.abs(np.diff(rows[:, 1])).max() < largest * DT
+
+
 def test_a_program_begins_in_the_middle_and_ends_at_rest():
     program = Program((Row(0.0, 8.0, 2.0, 0.2), Row(5.0, 8.0, 2.0, -0.2)))
     excitation = Excitation(program, begin=4.0, end=6.0)

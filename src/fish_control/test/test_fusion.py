@@ -142,6 +142,44 @@ def test_what_the_imu_said_before_the_first_pose_came_is_not_lost():
     assert estimate.twist[2] == pytest.approx(truth(estimate.time)[1], abs=0.05)
 
 
+def heading_errors(fusion, events):
+    """Feed; (N, 3) of time, error of the heading and spread claimed, after every IMU sample."""
+    rows = []
+    for event in events:
+        feed(fusion, [event])
+        estimate = fusion.estimate()
+        if event[1] == "imu" and estimate is not None and not estimate.camera_lost:
+            rows.append((event[0], pose_error(estimate)[2], np.sqrt(estimate.pose_covariance[2, 2])))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("begin", [0.5, 0.6, 0.7, 0.8])
+def test_late_poses_begin_where_the_imu_has_been_since(begin):
+    fusion = Fusion()
+    events = measurements(3.0, seed=7, latency=0.3, gyro_bias=0.0)
+    _, error, spread = heading_errors(fusion, [e for e in events if e[1] == "imu" or e[2] > begin]).T
+    assert fusion.counts["started"] == 1 and fusion.counts["pose_outlier"] == 0
+    assert np.abs(error).max() < 0.05 and spread.max() < 0.12  # rad, of the pose that began it and no more
+
+
+def test_late_poses_find_a_carried_fish_where_the_imu_has_been_since():
+    fusion, moved = Fusion(), np.array([0.8, -0.5, 0.0])
+    events = measurements(6.0, seed=7, latency=0.3)
+    carried = [(*e[:3], e[3] + moved) if e[1] == "camera" and e[2] > 3.0 else e for e in events]
+    time, error, spread = heading_errors(fusion, carried).T
+    assert fusion.counts["reacquired"] == 1
+    assert np.abs(error[time > 4.0]).max() < 0.05 and spread[time > 4.0].max() < 0.12
+
+
+@pytest.mark.parametrize("gap", [0.15, 0.3, 0.5, 1.0, 60.0])
+def test_when_both_sensors_were_silent_nobody_knows_what_happened_meanwhile(gap):
+    """The IMU's last sample before and its first after say nothing about half a stroke or more in between."""
+    fusion, events = Fusion(), measurements(5.0 + gap, seed=8, latency=0.0)
+    _, error, spread = heading_errors(fusion, [e for e in events if not 3.0 < e[2] < 3.0 + gap]).T
+    assert np.all(np.abs(error) < 5.0 * spread + 0.02) and fusion.counts["pose_outlier"] == 0
+    assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
+
+
 @pytest.mark.parametrize("turn", [np.pi, 1.5, -1.5])
 def test_a_wrong_heading_among_the_first_frames_does_not_start_the_filter(turn):
     fusion, seen = Fusion(), 0
@@ -287,6 +325,34 @@ def test_a_clock_set_back_starts_anew():
     assert fusion.counts["restarted"] == 1
     assert fusion.estimate().time < 3.0
     assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.02
+
+
+def test_a_clock_set_back_starts_anew_without_an_imu_too():
+    fusion, poses = Fusion(), [e for e in measurements(2.0) if e[1] == "camera"]
+    feed(fusion, [(a + 100, k, s + 100, v) for a, k, s, v in poses])
+    feed(fusion, poses)
+    assert fusion.counts["restarted"] == 1 and fusion.counts["started"] == 2
+    assert fusion.counts["pose_too_late"] == 2  # a straggler says nothing about the clock, three do
+    assert fusion.estimate().time < 3.0
+    assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.05
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_single_poses_from_long_ago_do_not_set_the_clock_back(imu):
+    """With an IMU that lives they may even come in a row: it would say so."""
+    fusion = Fusion()
+    for k, event in enumerate(e for e in measurements(6.0) if imu or e[1] == "camera"):
+        feed(fusion, [event])
+        old = event[0] > 3.0 and (k % 2 == 0 or (imu and event[1] == "camera"))
+        assert not (old and fusion.add_pose(event[2] - 2.5, truth(event[2] - 2.5)[0]))
+    assert fusion.counts["pose_too_late"] > 40 and fusion.counts["restarted"] == 0
+
+
+def test_a_negative_silence_takes_back_no_loss():
+    """The node's clock may be set back while the sensors' is not."""
+    fusion = Fusion()
+    feed(fusion, [e for e in measurements(4.0) if e[1] == "camera" or e[2] < 2.0])
+    assert fusion.estimate().imu_lost and fusion.estimate(-90.0).imu_lost
 
 
 def test_nothing_is_estimated_before_poses_agree():

@@ -34,3 +34,11 @@ def test_forgotten_samples_are_gone():
     imu = history()
     imu.forget(1.005)
     assert imu.at(1.0) == (1.0, 3.0, 0.0)
+
+
+def test_stamps_between_two_times_leave_those_two_out():
+    imu = history()
+    imu.add(1.02, InertialSample(0.0, 0.0, 0.0))
+    assert imu.times(0.0, 2.0) == [1.0, 1.01, 1.02]
+    assert imu.times(1.0, 1.02) == [1.01]
+    assert imu.times(1.01, 1.02) == imu.times(1.02, 1.0) == []

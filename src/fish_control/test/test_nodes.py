@@ -192,6 +192,20 @@ def test_fusion_judges_by_silence_not_by_the_difference_of_the_clocks(bench):
     b.until(lambda: b.said(b"\x02", "camera and IMU lost"))  # nothing comes any more
 
 
+def test_fusion_vouches_for_nothing_silent_when_its_clock_is_set_back(bench):
+    node, clock = bench(FusionNode).node, [100.0]
+    node._now = lambda: clock[0]
+    for k in range(60):
+        clock[0] = 100.0 + k / 30.0
+        pose = PoseWithCovarianceStamped()
+        pose.header.stamp = to_stamp(clock[0])
+        node._on_pose(pose)
+    clock[0] = 10.0
+    assert not node._estimate().camera_lost  # it has just been set back
+    clock[0] = 11.0
+    assert node._estimate().camera_lost
+
+
 def test_fusion_is_not_stopped_by_one_pose_from_the_future(bench):
     b = bench(FusionNode)
     b.listen("odometry/filtered", Odometry)
@@ -262,6 +276,39 @@ def test_planner_plans_at_half_the_rate_of_the_odometry(bench):
     assert len(b.heard["control/target"]) == 50
 
 
+def test_planner_does_not_follow_an_estimate_that_fusion_has_lost(bench, tmp_path):
+    b = bench(PlannerNode, path="I", start="nearest")  # from y = -0.85 m to 0.85 m
+    node, t = b.node, b.now()
+    said = []
+    node._target.publish = said.append
+    node._on_odometry(odometry(t, y=0.6, yaw=1.57, variance=LOST_VARIANCE))
+    assert (
+        node._plan is None and not said
+    )  # it has not begun either: nearest to a place where the fish is not
+    for k in range(10):
+        node._on_odometry(odometry(t + 0.1 + 0.02 * k, y=-0.5, yaw=1.57))
+    progress, count, kept = (
+        node._planner.tracker.progress,
+        len(said),
+        (tmp_path / "progress.json").read_text(),
+    )
+    assert progress == pytest.approx(0.35, abs=0.01) and count == 10
+    for k in range(400):  # drifts past the end
+        node._on_odometry(odometry(t + 0.3 + 0.01 * k, y=-0.5 + 0.005 * k, yaw=1.57, variance=LOST_VARIANCE))
+    assert (node._planner.tracker.progress, len(said), node._planner.finished) == (progress, count, False)
+    assert (tmp_path / "progress.json").read_text() == kept
+    b.until(lambda: b.said(b"\x01", "camera lost: fusion does not vouch for the pose; nothing is planned"))
+    node._on_odometry(odometry(t + 4.4, y=-0.4, yaw=1.57))
+    assert node._planner.tracker.progress == pytest.approx(0.45, abs=0.01) and len(said) == count + 1
+    b.until(lambda: b.said(b"\x00", "following letter I"))
+
+
+def test_planner_needs_no_imu_to_know_how_far_it_is(bench):
+    node = bench(PlannerNode, path="I").node
+    node._on_odometry(odometry(10.0, y=-0.5, yaw=1.57, twist_variance=LOST_VARIANCE))
+    assert node._plan is not None
+
+
 def test_planner_that_was_killed_resumes_where_it_was(bench, tmp_path):
     first = bench(PlannerNode, path="I")
     first.listen("tracking/error", Vector3Stamped)
@@ -307,6 +354,15 @@ def test_planner_follows_a_path_from_a_topic_and_refuses_one_through_the_wall(be
     b.say("odometry/filtered", odometry(b.now(), x=-0.9))
     b.until(lambda: b.heard["control/target"])
     assert b.heard["control/target"][0].pose.position.x == pytest.approx(-0.5, abs=1e-3)
+
+
+@pytest.mark.parametrize("x", [1e13, 1e308])
+def test_planner_survives_a_path_to_a_far_point(bench, x):
+    node, message = bench(PlannerNode, path="topic").node, Path()
+    message.poses = [PoseStamped(), PoseStamped(), PoseStamped()]
+    message.poses[1].pose.position.x, message.poses[2].pose.position.x = x, -x
+    node._on_path(message)
+    assert "m long, expected at most 200 m" in node._problem and node._planner is None
 
 
 def drive(b, seconds, **changes):
@@ -398,6 +454,20 @@ def test_controller_with_manual_resume_waits_for_its_service(bench):
     assert resume().success
     drive(b, 0.8)
     assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
+
+
+@pytest.mark.parametrize("lost", ["variance", "twist_variance"])
+def test_controller_learns_nothing_of_the_water_from_an_estimate_that_fusion_has_lost(bench, lost):
+    node = bench(ControllerNode).node
+    for k in range(20):
+        node._on_odometry(odometry(10.0 + 0.01 * k, u=0.0))
+    learned = node._controller._observer.state
+    for k in range(20, 400):  # of a drifting accelerometer
+        node._on_odometry(odometry(10.0 + 0.01 * k, u=0.01 * k, **{lost: LOST_VARIANCE}))
+    assert node._controller._observer.state == learned and node._controller._motion.surge == 0.0
+    assert node._odometry_time == pytest.approx(13.99)  # the watchdog sees that it comes, and why not to swim
+    signs = node._signs(14.0)
+    assert not node._watchdog.check(14.0, signs) and "lost" in node._watchdog.reason
 
 
 def test_controller_glides_when_no_speed_is_wanted(bench):

@@ -62,6 +62,22 @@ def test_unusable_points_are_refused(points, said):
         ReferencePath.from_points(points, name="drawn")
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("points", "closed", "length"),
+    [
+        ([[0.0, 0.0], [0.0, 201.0]], False, "201"),
+        ([[0.0, 0.0], [90.0, 0.0], [90.0, 20.0]], True, "202.195"),
+        ([[0.0, 0.0], [1e13, 0.0]], False, "1e\\+13"),
+        ([[0.0, 0.0], [1e308, 0.0], [-1e308, 0.0]], False, "inf"),
+        ([[0.0, 0.0], [1e308, 0.0], [-1e308, 0.0]], True, "inf"),
+    ],
+)
+def test_a_path_that_is_too_long_is_refused_before_memory_is_asked_for(points, closed, length):
+    with pytest.raises(PathError, match=f"'drawn': {length} m long, expected at most 200 m"):
+        ReferencePath.from_points(points, name="drawn", closed=closed)
+
+
 def test_unknown_end_lists_the_known():
     with pytest.raises(PathError, match="known: stop, loop"):
         ReferencePath.from_points([[0, 0], [1, 0]], name="drawn", end="bounce")

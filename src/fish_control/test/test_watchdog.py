@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from fish_control.node_configs import ControllerConfig
-from fish_control.watchdog import EstimateSigns, Signs, Watchdog
+from fish_control.watchdog import EstimateSigns, Signs, Watchdog, loss, pose_loss
 
 SURE = EstimateSigns(0.01, True, 1e-5, 1e-4)
 GOOD = Signs(SURE, 0.02)
@@ -56,6 +56,17 @@ def test_clocks_that_differ_by_little_are_no_fault():
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_a_variance_that_is_no_number_is_a_fault(value):
     assert not swimming().check(0.01, but(pose_variance=value))
+
+
+@pytest.mark.parametrize("variance", [1.01, 1e4, math.nan])
+def test_what_is_lost_is_lost_at_any_age(variance):
+    no_pose, no_twist = (
+        replace(SURE, age=99.0, **{k: variance}) for k in ("pose_variance", "twist_variance")
+    )
+    assert pose_loss(no_pose, 1.0) == loss(no_pose, 1.0) == "camera lost: fusion does not vouch for the pose"
+    assert pose_loss(no_twist, 1.0) is None
+    assert loss(no_twist, 1.0) == "IMU lost: fusion does not vouch for the velocity"
+    assert loss(replace(SURE, age=99.0), 1.0) is None
 
 
 @pytest.mark.parametrize("said", FAULTS)

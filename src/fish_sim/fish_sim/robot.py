@@ -154,9 +154,13 @@ def _check_value(where: str, parameter: Parameter, value: Any) -> float:
         expected += " (YAML reads 1e-3 as text: write 1.0e-3)"
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise RobotError(f"{where}: got {value!r}; expected {expected}")
-    if not math.isfinite(value) or not parameter.lowest <= value <= parameter.highest:
+    try:
+        number = float(value)
+    except OverflowError:  # YAML's whole numbers have no end; nobody wants to read this one
+        raise RobotError(f"{where}: got a whole number beyond every float; expected {expected}") from None
+    if not math.isfinite(number) or not parameter.lowest <= number <= parameter.highest:
         raise RobotError(f"{where}: got {value!r} {parameter.unit}; expected {expected}")
-    return float(value)
+    return number
 
 
 def _check_effects(
@@ -191,7 +195,7 @@ def _from_content(content: Any) -> Robot:
     if not isinstance(content, dict):
         raise RobotError(f"got {type(content).__name__}; expected a table with format, links, parameters")
     known = {"format", "name", "links", "parameters", "effects", "sensors", "notes"}
-    if unknown := sorted(set(content) - known):
+    if unknown := sorted(map(str, set(content) - known)):
         raise RobotError(f"{unknown[0]}: unknown field; known: {', '.join(sorted(known))}")
     if content.get("format") != FORMAT:
         raise RobotError(f"format: got {content.get('format')!r}; expected {FORMAT}")

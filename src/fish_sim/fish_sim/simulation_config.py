@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fish_sim import pool
+from fish_sim.sensors import changes_camera_poses
 from fish_sim.sensors.settings import SensorSettings
 
 
@@ -55,3 +57,13 @@ class SimulatorConfig(SimulationConfig):
             raise ValueError(f"lockstep = {self.lockstep}: expected 0 to 60 s")
         if self.camera not in ("image", "pose"):
             raise ValueError(f"camera = {self.camera!r}: expected 'image' or 'pose'")
+
+    def idle_sensors(self, sensors: Iterable[str]) -> str:
+        """What to say of a robot's sensor effects (names) that do nothing as the camera is set; empty if all act."""
+        idle = [f"sensors.{name}" for name in sensors if changes_camera_poses(name)]
+        if self.camera == "pose" or not idle:
+            return ""
+        return (
+            f"{', '.join(idle)} of {self.robot_file}: without effect on the camera node's pictures"
+            f" (camera:={self.camera}); with camera:=pose they act, on camera/pose"
+        )

@@ -50,15 +50,19 @@ def rollout(
     """
     if not generic and start.device.type == "cpu" and start.dtype == torch.float64:
         lead = torch.broadcast_shapes(start.shape[:-1], commands.shape[1:-1], parameters.shape[:-1])
-        commands = (
-            commands.expand(len(commands), *lead, commands.shape[-1]) if commands.ndim > 2 else commands
-        )
-        states: Tensor = _Rollout.apply(start, commands, parameters, stepper)
+        states: Tensor = _Rollout.apply(start, _for_all(commands, lead), parameters, stepper)
         return states
     steps = [start]
     for command in commands:
         steps.append(_generic_step(steps[-1], command, parameters, stepper))
     return torch.stack(torch.broadcast_tensors(*steps))
+
+
+def _for_all(commands: Tensor, lead: tuple[int, ...]) -> Tensor:
+    """(T, ..., 2) as (T, *lead, 2); batch axes are added behind the time's, broadcasting would add them before."""
+    times, *batch, width = commands.shape
+    missing = len(lead) - len(batch)
+    return commands.reshape(times, *[1] * missing, *batch, width).expand(times, *lead, width)
 
 
 def step(

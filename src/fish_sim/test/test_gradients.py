@@ -100,6 +100,28 @@ def test_torch_gradients_are_those_of_the_adjoint(strokes):
         assert_allclose(value.grad.numpy(), gradient, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("lead", "batch"),
+    [((3,), ()), ((4,), ()), ((2, 3), ()), ((2, 3), (3,)), ((4, 3), (3,)), ((2, 3), (1, 3))],
+)
+def test_commands_that_a_batch_shares_collect_the_gradients_of_all(strokes, lead, batch):
+    """4 periods: a batch axis may be as long as the time's, and is none of it."""
+    stepper, start, p = case({}, links=1)
+    random = torch.Generator().manual_seed(4)
+    starts = torch.tensor(start).repeat(*lead, 1)
+    starts += 0.1 * torch.randn(starts.shape, dtype=torch.float64, generator=random)
+    commands = torch.tensor(strokes(4)).reshape(4, *[1] * len(batch), 2).repeat(1, *batch, 1)
+    commands += 0.1 * torch.randn(commands.shape, dtype=torch.float64, generator=random)
+    weights = torch.randn(5, *lead, len(start), dtype=torch.float64, generator=random)
+    gradients = {}
+    for generic in (True, False):
+        values = [v.clone().requires_grad_() for v in (starts, commands, torch.tensor(p))]
+        (torch_step.rollout(*values, stepper, generic=generic) * weights).sum().backward()
+        gradients[generic] = [v.grad for v in values]
+    for one, other in zip(gradients[True], gradients[False], strict=True):
+        torch.testing.assert_close(one, other, rtol=1e-9, atol=1e-10)
+
+
 def test_gradcheck_of_a_short_rollout(strokes):
     stepper, start, p = case({"quadratic_drag": typical("quadratic_drag")})
     values = [torch.tensor(v, requires_grad=True) for v in (start, strokes(2), p)]

@@ -14,6 +14,7 @@ from fish_sim.sensors.encoder import Encoder
 from fish_sim.sensors.imu import Imu
 from fish_sim.sensors.overhead_camera import OverheadCamera
 from fish_sim.sensors.settings import SensorSettings
+from fish_sim.simulation_config import SimulatorConfig
 
 VOCABULARY = ("camera_latency", "camera_heading_offset", "camera_scale", "gyro_scale", "imu_misalignment")
 NONE = SensorDistortion({})
@@ -46,6 +47,16 @@ def test_description_is_complete_and_zero_strength_is_the_truth(name):
     assert effect.pose_delay(p) == 0.0
     assert effect.pose(p, 0.4, -0.2, 1.0, NUMPY) == (0.4, -0.2, 1.0)
     np.testing.assert_allclose(effect.imu(p, 0.3, 0.1, 0.7, NUMPY), (0.3, 0.1, 0.7), atol=1e-16)
+
+
+def test_camera_effects_are_idle_unless_the_camera_gives_poses():
+    image = SimulatorConfig(robot_file="blue.yaml").idle_sensors(VOCABULARY)
+    assert image == (
+        "sensors.camera_latency, sensors.camera_heading_offset, sensors.camera_scale of blue.yaml: without effect on"
+        " the camera node's pictures (camera:=image); with camera:=pose they act, on camera/pose"
+    )
+    assert SimulatorConfig(camera="pose").idle_sensors(VOCABULARY) == ""
+    assert SimulatorConfig().idle_sensors(("gyro_scale", "imu_misalignment")) == ""
 
 
 def test_each_sensor_effect_does_what_its_name_says():

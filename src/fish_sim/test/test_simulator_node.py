@@ -215,6 +215,15 @@ def test_a_robot_file_is_used_and_a_broken_one_refused(tmp_path):
         rclpy.try_shutdown()
 
 
+@pytest.mark.parametrize("camera", ["image", "pose"])
+def test_camera_effects_that_a_picture_does_not_show_are_said_at_the_start(tmp_path, capfd, camera):
+    save_robot(Robot().with_effect("camera_scale", factor=1.05), tmp_path / "robot.yaml")
+    Bench({**FAST, "robot_file": tmp_path / "robot.yaml", "camera": camera, "paused": True}).close()
+    said = [line for line in capfd.readouterr().err.splitlines() if "sensors.camera_scale" in line]
+    assert len(said) == (camera == "image")
+    assert all("WARN" in line and "robot.yaml" in line and "camera:=pose" in line for line in said)
+
+
 def test_shipped_parameters_are_those_of_the_dataclass():
     file = Path(__file__).parent.parent / "config" / "simulator.yaml"
     values = yaml.safe_load(file.read_text())["/**"]["ros__parameters"]

@@ -38,8 +38,7 @@ from fish_control.nodes.messages import (
     yaw_of,
 )
 from fish_control.nodes.start import read_parameters, run
-from fish_control.planner import motion_is_finite
-from fish_control.watchdog import Signs, Watchdog
+from fish_control.watchdog import Signs, Watchdog, loss
 
 
 class ControllerNode(Node):
@@ -75,10 +74,10 @@ class ControllerNode(Node):
         self.create_timer(1.0, self._report)
 
     def _on_odometry(self, message: Odometry) -> None:
-        motion = motion_of(message)
         self._odometry, self._odometry_time = message, seconds(message.header.stamp)
-        if motion_is_finite(motion):
-            self._controller.observe(self._odometry_time, motion)
+        signs = estimate_signs(message, self._odometry_time)
+        if signs.finite and not loss(signs, self._config.largest_variance):  # the water is learned from it
+            self._controller.observe(self._odometry_time, motion_of(message))
 
     def _on_twist(self, message: TwistStamped) -> None:
         speed, yaw_rate = message.twist.linear.x, message.twist.angular.z

@@ -73,7 +73,9 @@ class FusionNode(Node):
 
     def _estimate(self) -> Estimate | None:
         """Lost is what is silent for too long, even where the sensors' clock is not this node's."""
-        return self._fusion.estimate(self._now() - self._used)
+        now = self._now()
+        self._used = min(self._used, now)  # a clock that was set back does not vouch for what is silent
+        return self._fusion.estimate(now - self._used)
 
     def _publish(self, estimate: Estimate | None) -> None:
         if estimate is None:

@@ -5,7 +5,7 @@ control/twist (50 Hz, base_link): wanted surge speed (m/s; 0 after the end of th
 speed times the curvature of the path). tracking/error: x cross-track (m, positive: robot left of the path), y
 heading (rad, of the way over ground, mean over the stroke), z speed (m/s); wanted minus actual. reference/path and
 reference/speed (transient local) on change; with path:=topic the path is taken from reference/path instead.
-Decisions are in Planner.
+While fusion does not vouch for the pose nothing is planned. Decisions are in Planner.
 """
 
 import math
@@ -24,13 +24,23 @@ from std_msgs.msg import Float64, Header
 
 from fish_control.line_of_sight import Motion
 from fish_control.node_configs import PlannerConfig
-from fish_control.nodes.messages import ERROR, OK, WARN, diagnostics, motion_of, seconds, to_quaternion
+from fish_control.nodes.messages import (
+    ERROR,
+    OK,
+    WARN,
+    diagnostics,
+    estimate_signs,
+    motion_of,
+    seconds,
+    to_quaternion,
+)
 from fish_control.nodes.start import read_parameters, run
 from fish_control.paths import make_path, read_arguments
-from fish_control.planner import Plan, Planner, motion_is_finite
+from fish_control.planner import Plan, Planner
 from fish_control.pool import check_inside_pool
 from fish_control.progress_file import ProgressFile, path_digest
 from fish_control.reference_path import PathError, ReferencePath
+from fish_control.watchdog import pose_loss
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PATH_STEP = 0.02  # m between poses of the published path
@@ -54,6 +64,7 @@ class PlannerNode(Node):
         self._planned = -math.inf  # s, stamp of the last odometry that was planned for
         self._said_speed = math.nan
         self._bad_odometry = 0
+        self._loss: str | None = None  # why nothing is planned from the newest odometry
         self._problem = ""
         if config.path == "topic":
             self.create_subscription(Path, "reference/path", self._on_path, LATCHED)
@@ -92,10 +103,12 @@ class PlannerNode(Node):
 
     def _on_odometry(self, message: Odometry) -> None:
         time, motion = seconds(message.header.stamp), motion_of(message)
-        if not motion_is_finite(motion):
+        signs = estimate_signs(message, time)
+        if not signs.finite:
             self._bad_odometry += 1
             return
-        if self._planner is None:
+        self._loss = pose_loss(signs, self._config.largest_variance)
+        if self._planner is None or self._loss:  # the target goes stale, so that the controller stops
             return
         if self._fresh:
             self._fresh = False
@@ -147,6 +160,8 @@ class PlannerNode(Node):
             values["progress_m"] = f"{self._plan.at.progress:.3f}"
             values["length_m"] = f"{path.length:.3f}"
             values["cross_track_m"] = f"{self._plan.errors.cross_track:.4f}"
+        if self._loss:
+            level, message = WARN, f"{self._loss}; nothing is planned"
         problem = self._problem or self._progress.problem
         if problem:
             level, message = ERROR, problem

@@ -3,7 +3,8 @@
 In: joint_command (sensor_msgs/JointState, names rotor and rudder; rotor: velocity in rad/s, rudder: position
 in rad). Out, 100 Hz: joint_states (rotor encoder), imu/data, sim/odometry (nav_msgs/Odometry, the truth,
 pool -> base_link), sim/joint_states (tail_1 .. relative angles, rad), /clock; 1 Hz: battery_state,
-/diagnostics; with camera:=pose also camera/pose. Services: pause (SetBool), reset (Trigger).
+/diagnostics; with camera:=pose also camera/pose, on which alone the robot file's camera effects act. Services: pause
+(SetBool), reset (Trigger).
 
 Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
 nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause.
@@ -45,6 +46,8 @@ class SimulatorNode(Node):
         super().__init__("simulator", namespace="fish")
         self._config = config = read_parameters(self, SimulatorConfig)
         robot = load_robot(config.robot_file) if config.robot_file else Robot()
+        if idle := config.idle_sensors(robot.sensors):
+            self.get_logger().warning(idle)
         self._simulation = Simulation(robot, config)
         self._follows_wall = (
             config.real_time_factor == 1.0

@@ -14,3 +14,9 @@ SENSOR_EFFECTS: dict[str, type[SensorEffect]] = {
     "gyro_scale": GyroScale,
     "imu_misalignment": ImuMisalignment,
 }
+
+
+def changes_camera_poses(name: str) -> bool:
+    """Whether a sensor effect is one of the camera; a rendered picture does not show it."""
+    effect = SENSOR_EFFECTS[name]
+    return effect.pose is not SensorEffect.pose or effect.pose_delay is not SensorEffect.pose_delay
