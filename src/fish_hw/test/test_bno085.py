@@ -2,17 +2,20 @@
 
 import errno
 import math
+import random
 import struct
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from fish_hw.devices import bno085
 from fish_hw.devices.bno085 import Bno085
-from fish_hw.devices.bno085_rvc import Bno085Rvc
+from fish_hw.devices.bno085_rvc import Bno085Rvc, attitude
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.imu_driver import ImuDriver
-from fish_hw.devices.reconnect import Loss
+from fish_hw.devices.reconnect import Doubt, Loss
+from fish_hw.devices.rotation import conjugate, rotate
 from fish_hw.devices.status import ERROR, OK, WARN
 from fish_hw.emulators.bno085 import YAW_FREQUENCY, YAW_RATE, Bno085Emulator
 from fish_hw.emulators.i2c_bus import I2cBusEmulator
@@ -117,6 +120,32 @@ def test_interrupt_line_gives_the_time_and_spares_empty_reads():
     assert not any(data == bytes(4) for data in reads)
     assert max(len(data) for data in reads) < 64  # what there is, no more: 40 bytes take a millisecond
     assert without[-1].time_s - samples[-1].time_s == pytest.approx(0.004, abs=1e-6)
+
+
+def test_start_reads_only_while_the_interrupt_line_is_low():
+    bench = Bench()
+    line = Line(bench, age_s=0.0)
+    read, high = bench.bus.read, []
+
+    def watched(address: int, count: int) -> bytes:
+        if not line.is_low():
+            high.append(count)
+        return read(address, count)
+
+    bench.bus.read = watched
+    bench.bno = Bno085(bench.bus, 0x4A, 10000, line, bench.clock, bench.sleep)
+    bench.bno.start()
+    assert high == []
+
+
+def test_a_line_that_is_never_low_is_named_and_nothing_is_read():
+    bench = Bench()
+    line = Line(bench, age_s=0.0)
+    line.is_low = lambda: False  # H_INTN is wired to another line
+    bench.bus.read = lambda address, count: pytest.fail("read while the line is high")
+    bench.bno = Bno085(bench.bus, 0x4A, 10000, line, bench.clock, bench.sleep)
+    with pytest.raises(DeviceError, match="check that H_INTN is wired"):
+        bench.bno.start()
 
 
 def test_a_poll_waits_for_the_interrupt_until_there_is_a_sample():
@@ -489,6 +518,106 @@ def test_rvc_has_its_own_rate_whatever_is_asked(asked_hz):
     bench.driver.connect()
     bench.run(2.0)
     assert bench.driver.status().level == OK
+
+
+def tilted_frames(indices, pitch: float = 0.0, roll: float = 0.0, milli_g=(0, 0, 1000)) -> list[bytes]:
+    a = tuple(rvc.STANDARD_GRAVITY * value / 1000 for value in milli_g)
+    return [rvc.encode(rvc.RvcMessage(i % 256, 1e-3 * i, pitch, roll, a)) for i in indices]
+
+
+def up_in_sensor_axes(sample) -> tuple[float, float, float]:
+    return rotate(conjugate(sample.orientation), (0.0, 0.0, 1.0))
+
+
+def test_rvc_attitude_and_acceleration_agree_in_the_datasheets_frame():
+    """pitch -1.10 deg, roll 20.85 deg, acceleration -371, -20, 977 mg."""
+    body = bytes.fromhex("01 00 92 FF 25 08 8D FE EC FF D1 03 00 00 00")
+    frames = [b"\xaa\xaa" + bytes([i]) + body + bytes([(i + sum(body)) & 0xFF]) for i in (0xDE, 0xDF)]
+    [sample] = Bno085Rvc(RecordedStream([b"".join(frames)]), clock=lambda: 0.0).poll(0.0)
+    length = math.hypot(*sample.acceleration)
+    cosine = sum(u * a / length for u, a in zip(up_in_sensor_axes(sample), sample.acceleration, strict=True))
+    assert math.degrees(math.acos(cosine)) < 0.1
+
+
+def test_rvc_turns_are_applied_as_yaw_then_pitch_about_x_then_roll_about_y():
+    generator = random.Random(4)
+    for _ in range(20):
+        yaw, pitch, roll = generator.uniform(-3, 3), generator.uniform(-1.5, 1.5), generator.uniform(-3, 3)
+        cy, sy, cp, sp, cr, sr = (f(angle) for angle in (yaw, pitch, roll) for f in (math.cos, math.sin))
+        z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+        x = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
+        y = np.array([[cr, 0, sr], [0, 1, 0], [-sr, 0, cr]])
+        q = attitude(rvc.RvcMessage(0, yaw, pitch, roll, (0.0, 0.0, 0.0)))
+        for axis in np.eye(3):
+            assert rotate(q, tuple(axis)) == pytest.approx(z @ x @ y @ axis)
+
+
+def rvc_bench(frames: list[bytes], **settings) -> DriverBench:
+    bench = DriverBench(ImuSettings(interface="rvc", **settings), RecordedStream(frames))
+    bench.driver.connect()
+    return bench
+
+
+def test_attitude_that_disagrees_with_the_acceleration_is_said_once():
+    upright, turned = tilted_frames(range(300)), tilted_frames(range(300, 900), roll=math.radians(25.0))
+    bench = rvc_bench([*upright, *turned, *tilted_frames(range(900, 1300))], mount_roll=0.4)
+    bench.run(2.9)
+    assert bench.events == [] and bench.driver.status().level == OK
+    bench.run(6.0)  # two whole windows, and the one in which it began
+    [event] = bench.events
+    assert isinstance(event, Doubt) and event.startswith("IMU: attitude and acceleration disagree by")
+    status = bench.driver.status()
+    said = "attitude and acceleration disagree by 25 deg on where up is: roll and pitch are wrong"
+    assert (status.level, status.message) == (WARN, said)
+    bench.run(4.0)  # held level again
+    assert bench.driver.status().level == OK and len(bench.events) == 1
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        tilted_frames(
+            range(500), roll=math.radians(20.85), pitch=math.radians(-1.1), milli_g=(-371, -20, 977)
+        ),
+        tilted_frames(range(500), roll=math.radians(9.0)),
+        tilted_frames(range(500), roll=math.radians(25.0), milli_g=(0, 0, 1060)),  # not at rest
+        [
+            frame for i in range(500) for frame in tilted_frames([i], milli_g=((-1) ** i * 310, 0, 1000))
+        ],  # sways
+    ],
+    ids=["the datasheet's frame", "9 deg", "1.06 g", "swaying by 17 deg"],
+)
+def test_attitude_that_agrees_or_cannot_be_judged_is_not_doubted(frames):
+    bench = rvc_bench(frames)
+    bench.run(4.9)
+    assert bench.events == [] and bench.driver.status().level == OK
+
+
+def test_a_disagreement_is_not_said_again_after_the_sensor_was_lost():
+    turned = tilted_frames(range(300), roll=math.radians(25.0))
+    bench = rvc_bench([*turned, TransportError("unplugged"), *turned])
+    bench.run(2.9)
+    assert bench.driver.status().level == WARN
+    bench.run(4.0)
+    assert [event for event in bench.events if isinstance(event, Doubt)] == bench.events[:1]
+
+
+def still_frames(indices) -> list[bytes]:
+    return [rvc.encode(rvc.RvcMessage(i % 256, 0.3, 0.0, 0.0, (0.0, 0.0, 9.8))) for i in indices]
+
+
+def test_rvc_frozen_values_are_told_from_silence_though_a_poll_may_bring_half_a_frame():
+    halves = [half for frame in still_frames(range(250)) for half in (frame[:10], frame[10:])]
+    for offset in (0, 1):  # which half the watchdog meets
+        bench = rvc_bench(halves[offset:])
+        bench.run(1.5)
+        assert bench.events == ["IMU: values stand still for 1.0 s"]
+
+
+def test_rvc_silence_after_two_equal_samples_is_no_samples():
+    bench = rvc_bench([*rvc_frames(range(5), 1.0), *still_frames(range(5, 10))])
+    bench.run(1.5)
+    assert bench.events == ["IMU: no samples for 1.0 s"]
 
 
 def test_rvc_port_lost_and_silent():

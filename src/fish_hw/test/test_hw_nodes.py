@@ -21,7 +21,7 @@ from waiting import wait_until
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.camera_calibration import CalibrationError
 from fish_hw.devices.imu_sample import ImuSample
-from fish_hw.devices.reconnect import Loss
+from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.usb_camera import jpeg_size
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
@@ -278,15 +278,17 @@ def test_a_step_that_raises_ends_the_node_and_leaves_the_device_safe(graph, tmp_
     assert g.node.failure == "the device's thread ended unexpectedly"
 
 
-def test_losses_are_logged_as_errors(graph, monkeypatch):
+def test_losses_are_logged_as_errors_and_doubts_as_warnings(graph, monkeypatch):
     g = graph(RudderNode, backend="emulator")
     said = []
     logger = SimpleNamespace(
-        info=lambda text: said.append(("info", text)), error=lambda text: said.append(("error", text))
+        info=lambda text: said.append(("info", text)),
+        warning=lambda text: said.append(("warning", text)),
+        error=lambda text: said.append(("error", text)),
     )
     monkeypatch.setattr(g.node, "get_logger", lambda: logger)
-    g.node.log_events([Loss("gone"), "back"])
-    assert ("error", "gone") in said and ("info", "back") in said
+    g.node.log_events([Loss("gone"), "back", Doubt("odd")])
+    assert {("error", "gone"), ("info", "back"), ("warning", "odd")} <= set(said)
 
 
 def test_absent_port_is_refused(graph):

@@ -334,6 +334,18 @@ def test_jpeg_size_of_damaged_data():
     assert jpeg_size(b"\xff\xd8\xff\xe0\x00\x00" * 5) is None  # a segment of length 0
 
 
+@pytest.mark.parametrize("size", [(0xFFFF, 0xFFFF), (0x8000 | 48, 0x8000 | 64)])
+def test_a_header_with_a_bit_error_in_the_size_is_no_picture(size):
+    """More pixels than OpenCV takes (2^30), which it says with an exception."""
+    jpeg = encode_jpeg(picture(), 90)
+    at = jpeg.index(b"\xff\xc0") + 5
+    height, width = size
+    damaged = jpeg[:at] + height.to_bytes(2, "big") + width.to_bytes(2, "big") + jpeg[at + 4 :]
+    assert jpeg_size(damaged) == (width, height)
+    assert decode_jpeg(damaged) is None
+    assert decode_jpeg(jpeg) is not None
+
+
 def test_walking_square_walks():
     clock = Clock()
     source = WalkingSquare(SETTINGS, clock, clock.sleep)

@@ -80,6 +80,34 @@ def test_a_sample_is_stamped_in_the_middle_of_its_exchange():
     assert sample.time_s == pytest.approx((before + vertiq._clock.now) / 2, abs=0.001)
 
 
+class TimedStream(RecordedStream):
+    """Reads that find nothing take their whole time; every write is dated."""
+
+    def __init__(self, clock: SteppedClock) -> None:
+        super().__init__()
+        self.clock, self.sent = clock, []
+
+    def write(self, data: bytes) -> None:
+        self.sent.append(self.clock.now)
+        super().write(data)
+
+    def read(self, timeout_s: float) -> bytes:
+        got = super().read(timeout_s)
+        self.clock.now += 0.002 if got else timeout_s
+        return got
+
+
+@pytest.mark.parametrize("ask", [lambda v: v.drive(10.0), lambda v: v.measure()], ids=["drive", "measure"])
+def test_a_sample_behind_an_unanswered_question_is_stamped_between_its_own_question_and_answer(ask):
+    clock = SteppedClock()
+    stream = TimedStream(clock)
+    vertiq = Vertiq(stream, clock=clock)
+    assert vertiq.read(reg.DERATE) == [None]  # older firmware has no such register
+    stream.chunks.extend([b"", b"", VELOCITY_REPLY + ANGLE_REPLY])
+    sample = ask(vertiq)
+    assert sample.time_s == pytest.approx((stream.sent[-1] + clock.now) / 2, abs=0.0005)
+
+
 def test_an_exchange_ends_with_its_last_answer():
     vertiq, _ = recorded(b"", VELOCITY_REPLY + ANGLE_REPLY)
     vertiq.measure()

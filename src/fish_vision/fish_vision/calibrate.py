@@ -6,10 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fish_vision.calibration import R_DOWN, CalibrationError, Lens, Mount
+from fish_vision.calibration import NEAREST, R_DOWN, Array, CalibrationError, Lens, Mount
 from fish_vision.segmentation import Image
 
 BOARDS_MIN = 4  # pictures needed to tell lens from board poses
+TILT_MIN = 15.0  # deg between two of the boards: alike ones fit a lens of any focal length
+FOCAL_STD_MAX = 0.03  # share of the focal length; a usual set of pictures gives less than 0.005
 POINTS_MIN = 4
 
 
@@ -28,7 +30,8 @@ def lens_from_chessboards(
         Lens, root mean square reprojection error (pixels), numbers of the pictures in which the board was
         found.
     Raises:
-        CalibrationError: pictures of different sizes, or the board in fewer than BOARDS_MIN of them.
+        CalibrationError: pictures of different sizes, the board in fewer than BOARDS_MIN of them, or boards
+            that leave the focal length open.
     """
     sizes = {picture.shape[1::-1] for picture in pictures}
     if len(sizes) > 1:
@@ -46,8 +49,33 @@ def lens_from_chessboards(
     board = np.column_stack([grid, np.zeros(len(grid))]).astype(np.float32)
     size = sizes.pop()
     boards, places = [board] * len(found), list(found.values())
-    rms, K, D, _, _ = cv2.calibrateCamera(boards, places, size, None, None, flags=cv2.CALIB_FIX_K3)
-    return Lens(size, np.asarray(K, float), np.asarray(D, float).ravel()[:5]), float(rms), list(found)
+    rms, K, D, rotations, _, deviations, *_ = cv2.calibrateCameraExtended(
+        boards, places, size, np.eye(3), np.zeros(5), flags=cv2.CALIB_FIX_K3
+    )
+    lens = Lens(size, np.asarray(K, float), np.asarray(D, float).ravel()[:5])
+    _check_determined(lens.K, np.asarray(deviations, float).ravel(), rotations)
+    return lens, float(rms), list(found)
+
+
+def _check_determined(K: Array, deviations: Array, rotations: Sequence[Array]) -> None:
+    """Refuse boards that are all tilted alike, or too little for the focal length to be known.
+
+    The standard deviations alone do not show the first: copies of one picture, or boards square to the camera,
+    lead into a narrow minimum far from the lens, with a small error and a small deviation.
+    """
+    normals = np.array([cv2.Rodrigues(rotation)[0][:, 2] for rotation in rotations])
+    tilt = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0).min())))
+    if not tilt >= TILT_MIN:
+        raise CalibrationError(
+            f"the boards' tilts differ by {tilt:.1f} deg at most: expected {TILT_MIN:.0f} or more; tilt the board, "
+            "20 to 45 deg, to another side in every picture"
+        )
+    share = float(np.max(deviations[:2] / np.diag(K)[:2]))  # of fx, fy
+    if not share <= FOCAL_STD_MAX:
+        raise CalibrationError(
+            f"the pictures leave the focal length uncertain by {100 * share:.1f} %: expected "
+            f"{100 * FOCAL_STD_MAX:.0f} % at most; tilt the board more and take more pictures"
+        )
 
 
 def _board(picture: Image, corners: tuple[int, int]) -> np.ndarray | None:
@@ -63,8 +91,8 @@ def mount_from_points(lens: Lens, points: ArrayLike, pixels: ArrayLike) -> tuple
     Returns:
         Mount, root mean square reprojection error (pixels).
     Raises:
-        CalibrationError: fewer than POINTS_MIN points, or points that fix no pose (not
-            finite, on one line).
+        CalibrationError: fewer than POINTS_MIN points, points that fix no pose (not finite, on one line), or
+            a camera that is not above all of them.
     """
     points = np.ascontiguousarray(points, float).reshape(-1, 3)
     pixels = np.ascontiguousarray(pixels, float).reshape(-1, 2)
@@ -76,10 +104,21 @@ def mount_from_points(lens: Lens, points: ArrayLike, pixels: ArrayLike) -> tuple
         raise CalibrationError("points or pixels are not all finite: expected numbers")
     if np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6) < 2:
         raise CalibrationError("all points lie on one line: expected points spread over the pool")
-    _, rotation, t = cv2.solvePnP(points, pixels, lens.K, lens.D, flags=cv2.SOLVEPNP_SQPNP)
-    rotation, t = cv2.solvePnPRefineLM(points, pixels, lens.K, lens.D, rotation, t)
+    try:
+        _, rotation, t = cv2.solvePnP(points, pixels, lens.K, lens.D, flags=cv2.SOLVEPNP_SQPNP)
+        rotation, t = cv2.solvePnPRefineLM(points, pixels, lens.K, lens.D, rotation, t)
+    except cv2.error as error:
+        raise CalibrationError(
+            f"no camera sees the points at these pixels ({error.err}): expected each point's own pixel"
+        ) from error
     R = cv2.Rodrigues(rotation)[0]
     seen = cv2.projectPoints(points, rotation, t, lens.K, lens.D)[0].reshape(-1, 2)
     rms = float(np.sqrt(np.mean(np.sum((seen - pixels) ** 2, axis=1))))
     position, tilt = (-R.T @ t).ravel(), cv2.Rodrigues(R @ R_DOWN)[0].ravel()
+    highest = float(points[:, 2].max())
+    if not position[2] - highest >= NEAREST:
+        raise CalibrationError(
+            f"the camera comes out at z = {position[2]:.3f} m, not above the points at {highest:.3f} m: is y counted "
+            "downwards, or are the points in another order than the pixels?"
+        )
     return Mount(tuple(map(float, position)), tuple(map(float, tilt))), rms

@@ -17,7 +17,7 @@ R_DOWN = np.diag([1.0, -1.0, -1.0])  # optical axes of an untilted camera: right
 MODELS = {"plumb_bob": 5, "rational_polynomial": 8}  # distortion model -> number of coefficients
 POOL = (4.27, 2.13)  # m, along pool x and y
 FOCAL_MIN = 1.0  # pixels; a real lens has hundreds
-NEAREST = 0.01  # m from the camera to the plane of the markers
+NEAREST = 0.01  # m from the camera down to the plane of the markers
 
 
 class CalibrationError(ValueError):
@@ -87,10 +87,11 @@ class Calibration:
 
     def __init__(self, lens: Lens, mount: Mount, plane_height: float = 0.0) -> None:
         self.lens, self.plane_height = lens, plane_height
-        if abs(mount.position[2] - plane_height) < NEAREST:
+        # from below the picture is mirrored, and every turn with it
+        if mount.position[2] - plane_height < NEAREST:
             raise CalibrationError(
-                f"camera_position = {list(mount.position)} lies in the plane of the markers, z = {plane_height}: "
-                "expected the place of the camera above the pool; run calibrate"
+                f"camera_position = {list(mount.position)} lies in the plane of the markers, z = {plane_height}, "
+                "or below it: expected the place of the camera above the pool; run calibrate"
             )
         R = mount.R
         t = -R @ np.asarray(mount.position, float)

@@ -11,6 +11,8 @@ from fish_vision.calibration import Mount
 from fish_vision.pose import MarkerLayout
 from fish_vision.segmentation import HUES, ColourRange
 
+NODE_NAMES = ("/**", "/fish/tracker")  # the parts of a params file that the node takes
+
 
 @dataclass(frozen=True)
 class TrackerConfig:
@@ -85,20 +87,40 @@ class TrackerConfig:
 
 
 def config_from_file(path: Path) -> TrackerConfig:
-    """Parameters from a ROS params file (the part under `/**` or `/fish/tracker`).
+    """Parameters from a ROS params file, as the node reads it: those under `/**` and under `/fish/tracker`;
+    what stands further down in the file wins.
 
     Raises:
-        ValueError: not such a file, an unknown parameter, or a value out of range.
+        ValueError: not such a file, an unknown parameter, or a value of the wrong type or out of range.
     """
+    default = TrackerConfig()
     try:
         content = yaml.safe_load(path.read_text())
-        part = content.get("/fish/tracker", content.get("/**"))["ros__parameters"]
-        values: dict[str, Any] = {
-            key: tuple(value) if isinstance(value, list) else value for key, value in part.items()
-        }
-        return TrackerConfig(**values)
+        parts = [part["ros__parameters"] for name, part in content.items() if name in NODE_NAMES]
+        values = {key: value for part in parts for key, value in part.items()}
+        likes = {key: getattr(default, key) for key in values}
     except (OSError, UnicodeDecodeError, yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"{path}: not a params file of the tracker ({error})") from error
+    if not parts:
+        raise ValueError(
+            f"{path}: not a params file of the tracker (expected one of {', '.join(NODE_NAMES)})"
+        )
+    return TrackerConfig(**{key: in_type_of(key, value, likes[key]) for key, value in values.items()})
+
+
+def in_type_of(name: str, given: Any, like: Any) -> Any:
+    """given in the type of like: whole numbers may stand for floats, lists for tuples.
+
+    Raises:
+        ValueError: another type; names the parameter, what came and what was expected.
+    """
+    if isinstance(like, tuple) and not isinstance(given, str | bytes) and hasattr(given, "__iter__"):
+        return tuple(in_type_of(name, item, like[0]) for item in given)
+    if isinstance(like, float) and isinstance(given, int) and not isinstance(given, bool):
+        return float(given)
+    if type(given) is not type(like):
+        raise ValueError(f"{name} = {given!r}: expected {type(like).__name__} as in {like!r}")
+    return given
 
 
 _LISTS = (

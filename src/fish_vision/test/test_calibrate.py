@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from fish_vision import calibrate
 from fish_vision.calibrate import lens_from_chessboards, mount_from_points
 from fish_vision.calibration import Calibration, CalibrationError, Lens, Mount, undistort
 
@@ -47,7 +48,12 @@ def board_picture(
 
 
 @pytest.fixture(scope="module")
-def pictures() -> list[np.ndarray]:
+def rays() -> np.ndarray:
+    return rays_of_pixels(3)
+
+
+@pytest.fixture(scope="module")
+def pictures(rays: np.ndarray) -> list[np.ndarray]:
     poses = [
         ((0.0, 0.0, 0.0), (-0.15, -0.1, 0.5)),
         ((0.5, 0.0, 0.1), (-0.25, -0.15, 0.6)),
@@ -56,7 +62,6 @@ def pictures() -> list[np.ndarray]:
         ((0.0, -0.5, 0.2), (-0.10, -0.20, 0.6)),
         ((0.4, 0.4, -0.2), (-0.15, -0.05, 0.5)),
     ]
-    rays = rays_of_pixels(3)
     return [board_picture(rays, 3, *pose) for pose in poses]
 
 
@@ -73,6 +78,34 @@ def test_lens_is_recovered_from_chessboards(pictures: list[np.ndarray]) -> None:
 def test_too_few_boards_are_refused(pictures: list[np.ndarray]) -> None:
     with pytest.raises(CalibrationError, match="found in 2 of 3"):
         lens_from_chessboards([*pictures[:2], np.zeros_like(pictures[0])], CORNERS, SQUARE)
+
+
+@pytest.mark.parametrize("number", [0, 1], ids=["square to the camera", "tilted"])
+def test_copies_of_one_picture_are_refused(pictures: list[np.ndarray], number: int) -> None:
+    with pytest.raises(CalibrationError, match="tilts differ by 0.0 deg.*tilt the board"):
+        lens_from_chessboards([pictures[number]] * 4, CORNERS, SQUARE)
+
+
+def test_boards_that_are_not_tilted_are_refused(rays: np.ndarray) -> None:
+    places = [(-0.15, -0.1, 0.5), (-0.25, -0.15, 0.6), (-0.05, -0.12, 0.55), (-0.2, -0.02, 0.6)]
+    flat = [board_picture(rays, 3, (0.0, 0.0, 0.0), place) for place in places]
+    with pytest.raises(CalibrationError, match="tilts differ by .* expected 15 or more"):
+        lens_from_chessboards(flat, CORNERS, SQUARE)
+
+
+def test_an_uncertain_focal_length_is_refused(pictures: list[np.ndarray]) -> None:
+    """Two poses, one of them square to the camera: the fit is good, and its focal length 9 % wrong."""
+    few = [pictures[0], pictures[0], pictures[1], pictures[1]]
+    with pytest.raises(CalibrationError, match=r"focal length uncertain by [4-7]\.. %: expected 3 % at most"):
+        lens_from_chessboards(few, CORNERS, SQUARE)
+
+
+def test_a_usual_set_of_pictures_is_far_from_being_refused(
+    pictures: list[np.ndarray], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(calibrate, "FOCAL_STD_MAX", calibrate.FOCAL_STD_MAX / 20)
+    monkeypatch.setattr(calibrate, "TILT_MIN", 3 * calibrate.TILT_MIN)
+    lens_from_chessboards(pictures, CORNERS, SQUARE)
 
 
 def test_pictures_of_different_sizes_are_refused(pictures: list[np.ndarray]) -> None:
@@ -121,3 +154,18 @@ def test_points_that_are_no_numbers_are_refused(bad: float) -> None:
 def test_points_that_fix_no_pose_are_refused(points: list, message: str) -> None:
     with pytest.raises(CalibrationError, match=message):
         mount_from_points(TRUE, points, [[float(i), 0.0] for i in range(len(points))])
+
+
+@pytest.mark.parametrize("height", [0.0, 0.2])
+def test_a_camera_below_the_points_is_refused(height: float) -> None:
+    points, pixels = corners_and_pixels(height)
+    lens = Lens.from_camera_info(1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07])
+    for mirrored in (points * [1, -1, 1], points[[3, 2, 1, 0, 4]]):
+        with pytest.raises(CalibrationError, match="not above the points.*is y counted downwards"):
+            mount_from_points(lens, mirrored[:4], pixels[:4])
+
+
+def test_points_that_all_have_the_same_pixel_are_refused() -> None:
+    points, pixels = corners_and_pixels(0.0)
+    with pytest.raises(CalibrationError, match="no camera sees the points at these pixels"):
+        mount_from_points(TRUE, points, np.full_like(pixels, 100.0))

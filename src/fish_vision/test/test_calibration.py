@@ -142,6 +142,13 @@ def test_a_camera_in_the_plane_of_the_markers_is_refused(height: float) -> None:
         Calibration(lens(), Mount((0.0, 0.0, height), (0.0, 0.0, 0.0)), height)
 
 
+@pytest.mark.parametrize("height", [0.0, 0.3])
+def test_a_camera_under_the_water_is_refused(height: float) -> None:
+    """It looks up at the pool's centre, which is in the picture, but mirrored."""
+    with pytest.raises(CalibrationError, match="in the plane of the markers.*or below it"):
+        Calibration(lens(), Mount((0.0, 0.0, -3.0), (np.pi, 0.0, 0.0)), height)
+
+
 def test_a_lens_that_sends_pixels_nowhere_is_refused() -> None:
     d = (0.0, 0.0, 1e200, 0.0, 0.0)
     straight_down = Mount((0.0, 0.0, 3.0), (0.0, 0.0, 0.0))  # whose pool centre is not distorted

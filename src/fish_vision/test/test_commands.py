@@ -105,6 +105,34 @@ def test_calibrate_mount_refuses_other_files(
     assert message in error and error.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda rows: rows * [1, -1, 1, 1], "is y counted downwards"),
+        (lambda rows: np.column_stack([rows[:, :2], rows[::-1, 2:]]), "in another order than the pixels"),
+        (lambda rows: np.column_stack([rows[:, :2], np.full((4, 2), 100.0)]), "no camera sees the points"),
+    ],
+    ids=["y downwards", "pixels in reverse", "one pixel"],
+)
+def test_calibrate_mount_refuses_points_that_no_camera_above_sees(
+    files: Path, monkeypatch, capsys, change, message
+) -> None:
+    rows = change(np.loadtxt(files / "points.csv", delimiter=",", skiprows=1))
+    np.savetxt(files / "points.csv", rows, delimiter=",", header="x,y,u,v", comments="")
+    mount = ("mount", files / "points.csv", "--lens", files / "lens.yaml", "--out", files / "mount.yaml")
+    assert call(calibrate, monkeypatch, *mount) == 1
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert not (files / "mount.yaml").exists()
+
+
+def test_check_image_says_which_parameter_has_the_wrong_type(files: Path, monkeypatch, capsys) -> None:
+    (files / "params.yaml").write_text("/**: {ros__parameters: {tail_links: 3.0}}")
+    arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / "out.png")
+    assert call(check_image, monkeypatch, files / "fish.png", *arguments) == 1
+    assert capsys.readouterr().err == "check_image: tail_links = 3.0: expected int as in 3\n"
+
+
 def test_calibrate_mount_refuses_mistaken_points(files: Path, monkeypatch, capsys) -> None:
     rows = (files / "points.csv").read_text().splitlines()
     x, y, u, v = rows[1].split(",")

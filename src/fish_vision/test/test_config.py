@@ -38,7 +38,54 @@ def test_a_bad_value_is_refused_with_its_name(field: str, value: object) -> None
         TrackerConfig(**{field: value})
 
 
-@pytest.mark.parametrize("text", [None, "", "a: 1", "/**: {ros__parameters: {colour_of_front: 3}}", "a: ["])
+ALL = "/**:\n  ros__parameters: {camera_tilt: [0, 0.1, 0], pixel_std: 0.03}\n"
+OWN = "/fish/tracker:\n  ros__parameters: {pixel_std: 0.07, max_speed: 2}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "pixel_std"), [(ALL + OWN, 0.07), (OWN + ALL, 0.03)], ids=["own last", "all last"]
+)
+def test_the_two_parts_of_a_file_are_merged(tmp_path: Path, text: str, pixel_std: float) -> None:
+    """As ROS does: test_tracker_node compares with the node."""
+    path = tmp_path / "params.yaml"
+    path.write_text(text + "/fish/camera:\n  ros__parameters: {device: emulator}\n")
+    config = config_from_file(path)
+    assert (config.pixel_std, config.camera_tilt, config.max_speed) == (pixel_std, (0.0, 0.1, 0.0), 2.0)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("tail_links: 3.0", "tail_links = 3.0: expected int as in 3"),
+        ("front_colour: [a, 36, 110, 90]", "front_colour = 'a': expected int"),
+        ("front_colour: 20", "front_colour = 20: expected tuple"),
+        ("pixel_std: fast", "pixel_std = 'fast': expected float"),
+        ("use_raw: 1", "use_raw = 1: expected bool"),
+        ("max_speed: true", "max_speed = True: expected float"),
+    ],
+)
+def test_a_value_of_the_wrong_type_is_refused_with_its_name(
+    tmp_path: Path, setting: str, message: str
+) -> None:
+    path = tmp_path / "params.yaml"
+    path.write_text(f"/**: {{ros__parameters: {{{setting}}}}}")
+    with pytest.raises(ValueError, match=message):
+        config_from_file(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        None,
+        "",
+        "a: 1",
+        "[]",
+        "/**: 3",
+        "/**: {ros__parameters: 3}",
+        "/**: {ros__parameters: {colour_of_front: 3}}",
+        "a: [",
+    ],
+)
 def test_a_file_that_is_no_params_file_is_refused_with_its_name(tmp_path: Path, text: str | None) -> None:
     path = tmp_path / "params.yaml"
     if text is not None:

@@ -20,6 +20,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState  # noqa: E402
 
+from fish_vision.config import config_from_file  # noqa: E402
 from fish_vision.nodes.tracker import TrackerNode  # noqa: E402
 from fish_vision.picture import to_jpeg  # noqa: E402
 
@@ -101,6 +102,23 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
     made = Bench(MOUNT | getattr(request, "param", {}))
     yield made
     made.close()
+
+
+@pytest.mark.parametrize("own_first", [False, True])
+def test_check_image_reads_a_params_file_as_the_node_does(tmp_path: Path, own_first: bool) -> None:
+    parts = ["/**:\n  ros__parameters: {pixel_std: 0.03, max_speed: 1.0}\n"]
+    parts.insert(
+        0 if own_first else 1, "/fish/tracker:\n  ros__parameters: {pixel_std: 0.07, tail_links: 2}\n"
+    )
+    path = tmp_path / "params.yaml"
+    path.write_text("".join(parts))
+    rclpy.init(args=["--ros-args", "--params-file", str(path)], domain_id=DOMAIN)
+    node = TrackerNode()
+    try:
+        assert config_from_file(path) == node._config
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
 
 
 def check_pose(msg: PoseWithCovarianceStamped) -> None:

@@ -37,6 +37,7 @@ MAX_RATE = 60.5  # rad/s, magnitude; the sensor ends at 2000 deg/s per axis
 UNIT_TOLERANCE = 0.02
 OLDEST_S, NEWEST_S = 1.0, 0.05  # before and after the read; a bit error in the time base leads anywhere
 HINT = "check power, wiring, PS0/PS1 = 00, the address (0x4a or 0x4b) and the bus speed (400 kHz)"
+LINE_HINT = "; the hub is read only while int_line is low: check that H_INTN is wired to it"
 
 
 @dataclass
@@ -128,7 +129,7 @@ class Bno085:
 
     def _wait_for_product(self) -> ProductId:
         for _ in range(START_READS):
-            cargo = self._read_cargo()
+            cargo = self._read_cargo() if self._has_data() else None
             if cargo is not None:
                 self._take(cargo, self._read_s)
             if self._product is not None:
@@ -136,16 +137,20 @@ class Bno085:
             self._sleep(START_READ_WAIT_S)
         raise DeviceError(
             f"no BNO085 answers at 0x{self._address:02x} ({self.counters.bus_errors} bus errors,"
-            f" {self.counters.bad_packets} bad packets); {HINT}"
+            f" {self.counters.bad_packets} bad packets); {HINT}{'' if self._data_ready is None else LINE_HINT}"
         )
 
     def _drain(self) -> None:
         """Read what the hub says about its reset."""
         for _ in range(START_READS):
-            cargo = self._read_cargo()
+            cargo = self._read_cargo() if self._has_data() else None
             if cargo is None:
                 return
             self._take(cargo, self._read_s)
+
+    def _has_data(self) -> bool:
+        """Whether the hub may be read; a read while its line is high stretches the clock."""
+        return self._data_ready is None or self._data_ready.is_low()
 
     def _request_features(self) -> None:
         self._newest.clear()

@@ -1,5 +1,12 @@
 """BNO085 in its UART-RVC mode: attitude and acceleration at 100 Hz from a serial port, nothing to set.
 
+The datasheet (1000-3927, section 1.3.5.2) contradicts itself on the axes: its text calls pitch the rotation
+about Y and roll the one about X, but in its example frame (pitch -1.10 deg, roll 20.85 deg, acceleration
+-371, -20, 977 mg) that puts "up" 30.7 deg beside the acceleration, and R_z(yaw) R_x(pitch) R_y(roll) 0.1 deg.
+The numbers are followed here. To check them on the bench, tilt the sensor and hold it still, first about one
+axis, then about the other: the driver warns when attitude and acceleration disagree. That cannot show the sign
+of yaw, which the example leaves open: turn the sensor counter-clockwise, seen from above; yaw must grow.
+
 There is no gyroscope in the stream. The angular velocity is the difference of two attitudes 10 ms apart
 (resolution 0.017 rad/s), and the sample is stamped half-way between them.
 """
@@ -8,7 +15,7 @@ import time
 from collections.abc import Callable
 
 from fish_hw.devices.imu_sample import ImuSample
-from fish_hw.devices.rotation import Quaternion, from_yaw_pitch_roll, mean_rate
+from fish_hw.devices.rotation import Quaternion, from_yaw_pitch_roll, mean_rate, multiply
 from fish_hw.protocol.rvc import FRAME_BYTES, PERIOD_S, RvcMessage, RvcParser
 from fish_hw.transport.interfaces import ByteStream
 
@@ -41,7 +48,7 @@ class Bno085Rvc:
         return samples
 
     def _sample(self, message: RvcMessage, time_s: float) -> ImuSample | None:
-        orientation = from_yaw_pitch_roll(message.yaw, message.pitch, message.roll)
+        orientation = attitude(message)
         last, self._last = self._last, (message.index, orientation)
         if last is None:
             return None
@@ -52,3 +59,10 @@ class Bno085Rvc:
         dt = frames * PERIOD_S
         rate = mean_rate(last[1], orientation, dt)
         return ImuSample(time_s - dt / 2, orientation, rate, message.acceleration, FULL_ACCURACY)
+
+
+def attitude(message: RvcMessage) -> Quaternion:
+    """Sensor axes to the level frame: R_z(yaw) R_x(pitch) R_y(roll)."""
+    return multiply(
+        from_yaw_pitch_roll(message.yaw, 0.0, message.pitch), from_yaw_pitch_roll(0.0, message.roll, 0.0)
+    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from fish_hw.devices.bno085 import Bno085
 from fish_hw.devices.bno085_rvc import Bno085Rvc
 from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.gravity_check import GravityCheck
 from fish_hw.devices.imu_sample import ImuSample, Mounting
 from fish_hw.devices.reconnect import Link
 from fish_hw.devices.status import ERROR, OK, WARN, Status
@@ -123,7 +124,8 @@ class ImuDriver:
         self._sensor: I2cSensor | SerialSensor | None = None
         self._link = Link("IMU")
         self._last: ImuSample | None = None
-        self._changed_time = 0.0
+        self._upright = GravityCheck()
+        self._changed_time = self._sample_time = 0.0
         self._newest_s = -math.inf
         self._rated = (0, clock())
 
@@ -140,8 +142,9 @@ class ImuDriver:
             )
         else:
             self._sensor = SerialSensor(self._open_stream, self._clock)
-        self._changed_time = self._clock()
+        self._changed_time = self._sample_time = self._clock()
         self._last = None
+        self._upright.restart()
         self._newest_s = -math.inf
         self._rated = (self.samples, self._clock())
 
@@ -175,6 +178,8 @@ class ImuDriver:
             return Status(ERROR, "no samples", values)
         if self._last is not None and self._last.accuracy == UNRELIABLE:
             return Status(WARN, "the sensor calls its values unreliable", values)
+        if self._upright.trouble:
+            return Status(WARN, self._upright.trouble, values)
         if not SLOWEST_RATE * sensor.rate_hz <= rate <= FASTEST_RATE * sensor.rate_hz:
             return Status(WARN, f"{rate:.0f} samples/s instead of {sensor.rate_hz:.0f}", values)
         return Status(OK, f"{rate:.0f} samples/s", values)
@@ -202,10 +207,15 @@ class ImuDriver:
             elif values != (last.orientation, last.angular_velocity, last.acceleration):
                 self._changed_time = self._clock()
                 events += self._link.works()
+            events += self._upright.add(sample)
         self.samples += len(samples)
-        silence = self._clock() - self._changed_time
+        now = self._clock()
+        if samples:
+            self._sample_time = now
+        silence = now - self._changed_time
         if silence > self._settings.watchdog_s:
-            what = "values stand still" if samples else "no samples"
+            # neither the poll that notices nor two equal samples before a silence may decide what it is called
+            what = "values stand still" if now - self._sample_time < silence / 2 else "no samples"
             raise DeviceError(f"IMU: {what} for {self._settings.watchdog_s} s")
         return events
 

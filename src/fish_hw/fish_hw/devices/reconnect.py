@@ -8,6 +8,10 @@ class Loss(str):
     """An event that tells of a lost device: logged as an error."""
 
 
+class Doubt(str):
+    """An event that tells of a device whose values cannot be right: logged as a warning."""
+
+
 class Link:
     """The way to one device: doubling waits between attempts, from FIRST_WAIT_S to LONGEST_WAIT_S.
 

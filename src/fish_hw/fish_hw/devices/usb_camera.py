@@ -168,7 +168,10 @@ def encode_jpeg(image: np.ndarray, quality: int) -> bytes:
 
 def decode_jpeg(jpeg: bytes) -> np.ndarray | None:
     """BGR image (height, width, 3) of a JPEG, None if it is damaged beyond reading."""
-    return cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    try:
+        return cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:  # a bit error in the header makes a picture larger than OpenCV takes
+        return None
 
 
 def jpeg_size(jpeg: bytes) -> tuple[int, int] | None:

@@ -81,6 +81,7 @@ class Vertiq:
         self._reply_timeout_s = reply_timeout_s
         self._clock = clock
         self._unanswered = False
+        self._asked_s = 0.0  # when the newest question went out
         self._last: RotorSample | None = None
 
     def drive(self, velocity: float) -> RotorSample | None:
@@ -163,7 +164,6 @@ class Vertiq:
         return None if answer is None else False
 
     def _measure(self, commands: list[Message]) -> RotorSample | None:
-        asked = self._clock()
         velocity, angle = self._exchange(commands, (reg.OBS_VELOCITY, reg.OBS_ANGLE))
         if velocity is None or angle is None:
             return None
@@ -171,7 +171,7 @@ class Vertiq:
         if not (math.isfinite(speed) and math.isfinite(wrapped)):
             self.counters.unexpected += 1
             return None
-        time_s = (asked + self._clock()) / 2
+        time_s = (self._asked_s + self._clock()) / 2
         self._last = RotorSample(time_s, self._unwrap(self._sign * wrapped, time_s), self._sign * speed)
         return self._last
 
@@ -191,6 +191,7 @@ class Vertiq:
             self._send(commands)
             commands = []
             self._drain(self._reply_timeout_s)
+        self._asked_s = self._clock()
         self._send([*commands, *(register.get(self._module) for register in registers)])
         answers = self._collect(registers)
         self._unanswered = len(answers) < len(registers)

@@ -17,7 +17,7 @@ from rclpy.node import Node
 
 from fish_hw.devices.camera_calibration import CalibrationError
 from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.reconnect import Loss
+from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.status import WARN, Status
 from fish_hw.nodes.parameters import read_settings
 from fish_hw.nodes.worker import Worker
@@ -114,10 +114,12 @@ class DeviceNode(Node):
                 raise
 
     def log_events(self, events: list[str]) -> None:
-        """One line per event, losses as errors."""
+        """One line per event, losses as errors, doubts as warnings."""
         for event in events:
             if isinstance(event, Loss):
                 self.get_logger().error(event)
+            elif isinstance(event, Doubt):
+                self.get_logger().warning(event)
             else:
                 self.get_logger().info(event)
 

@@ -19,7 +19,10 @@ PERIOD_S = 0.01  # fixed by the hub
 
 @dataclass(frozen=True)
 class RvcMessage:
-    """Attitude as yaw, pitch, roll [rad] (applied in this order) and specific force [m/s^2], sensor axes."""
+    """Attitude as yaw, pitch, roll [rad] (applied in this order) and specific force [m/s^2], sensor axes.
+
+    The datasheet contradicts itself on the axes of pitch and roll: see devices/bno085_rvc.
+    """
 
     index: int
     yaw: float

@@ -3,12 +3,14 @@
 import sys
 from collections.abc import Callable
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+
+from fish_vision.config import in_type_of
 
 Config = TypeVar("Config")
 
@@ -26,19 +28,8 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
         like = getattr(default, field.name)
         start = list(like) if isinstance(like, tuple) else like
         given = node.declare_parameter(field.name, start, ParameterDescriptor(dynamic_typing=True)).value
-        values[field.name] = _as(field.name, given, like)
+        values[field.name] = in_type_of(field.name, given, like)
     return kind(**values)
-
-
-def _as(name: str, given: Any, like: Any) -> Any:
-    """given in the type of like: whole numbers may stand for floats, lists for tuples."""
-    if isinstance(like, tuple) and not isinstance(given, str | bytes) and hasattr(given, "__iter__"):
-        return tuple(_as(name, item, like[0]) for item in given)
-    if isinstance(like, float) and isinstance(given, int) and not isinstance(given, bool):
-        return float(given)
-    if type(given) is not type(like):
-        raise ValueError(f"{name} = {given!r}: expected {type(like).__name__} as in {like!r}")
-    return given
 
 
 def _init() -> None:
