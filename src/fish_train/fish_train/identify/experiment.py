@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fish_sim.model import DT
 from fish_train.identify.coasting import driven
 from fish_train.identify.level import level
+from fish_train.identify.resample import on_grid
 from fish_train.recordings.trial import Trial
 
 Array = NDArray[np.float64]
@@ -122,8 +123,8 @@ def _grid(trial: Trial) -> dict[str, Array]:
     nothing = np.full(count, np.nan)
     gyro, accel = nothing, np.full((count, 2), np.nan)
     if imu is not None:
-        gyro, accel = (_nearest(imu.t, felt, t) for felt in level(imu))
-    measured = nothing if encoder is None else _nearest(encoder.t, encoder.speed, t)
+        gyro, accel = (on_grid(imu.t, felt, t, DT) for felt in level(imu))
+    measured = nothing if encoder is None else on_grid(encoder.t, encoder.speed, t, DT)
     speed, measured = driven(c.rotor_speed[held], measured)
     return {
         "commands": np.column_stack([speed, c.rudder[held]]),
@@ -133,15 +134,6 @@ def _grid(trial: Trial) -> dict[str, Array]:
         "frame_t": camera.t[seen] - start,
         "frame_pose": np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])[seen],
     }
-
-
-def _nearest(t: Array, values: Array, grid: Array) -> Array:
-    """Each sample once, at its nearest grid point; NaN at grid points without one."""
-    out = np.full((len(grid), *values.shape[1:]), np.nan)
-    index = np.round((t - grid[0]) / DT).astype(int)
-    inside = (index >= 0) & (index < len(grid))
-    out[index[inside]] = values[inside]
-    return out
 
 
 def shorten(experiment: Experiment, steps: int) -> Experiment:
