@@ -116,10 +116,19 @@ def test_a_run_off_its_path_or_unfinished_has_failed() -> None:
     trace, path = straight_trace(0.01)
     unfinished = replace(trace, finished=np.array([False]))
     assert measure(unfinished, 0, path).failure == "did not reach the end in time"
-    assert measure(unfinished, 0, make_path("circle")).failure == ""  # which has no end
     far = trace.cross_track.copy()
     far[-100:] = 0.4
     assert "left the path" in measure(replace(trace, cross_track=far), 0, path).failure
+
+
+@pytest.mark.parametrize(("radius", "failure"), [(0.3, ""), (0.35, "did not go round in time")])
+def test_a_run_that_stays_on_a_closed_path_without_going_round_has_failed(
+    radius: float, failure: str
+) -> None:
+    """It swims 2 m of a circle, then stands on it: of a small one that is a lap, which has no end otherwise."""
+    trace, _ = straight_trace(0.001)
+    path = make_path("circle", radius=radius)
+    assert measure(replace(trace, finished=np.array([False])), 0, path).failure == failure
 
 
 class BurstingPlant(FishSimPlant):
@@ -218,7 +227,8 @@ def test_a_study_of_short_swims(tmp_path: Path) -> None:
     write_rows(tmp_path / "runs.csv", rows)
     assert len((tmp_path / "runs.csv").read_text().splitlines()) == 4
     write_study_page(tmp_path / "page.html", rows)
-    assert "steady" in (tmp_path / "page.html").read_text()
+    page = (tmp_path / "page.html").read_text()
+    assert "steady" in page and "a closed one for the time of 2 laps" in page
 
 
 def sizes(cross_track: float, speed: float) -> ErrorSizes:

@@ -1,5 +1,6 @@
 """A run on disk: exact resume, roll-back of diverging training, weights that the controller reads."""
 
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -9,18 +10,26 @@ import pytest
 import torch
 
 from fish_control.contract import INPUTS, Contract
+from fish_control.control_law import ControlLimits, Gains
 from fish_control.gains_file import read_gains_file, write_gains_file
+from fish_control.line_of_sight import GuidanceConfig
+from fish_control.path_batch import TrackerConfig
 from fish_control.policy import Policy
 from fish_sim.robot import Robot
 from fish_train.errors import UserError
+from fish_train.evaluation.candidates import read_candidate
+from fish_train.training import seeds
 from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
 from fish_train.training.config import TrainConfig, make_config
+from fish_train.training.episodes import CERTAIN
 from fish_train.training.fleet import WindowResult
-from fish_train.training.network import FORMS, from_tensors, split, to_tensors
+from fish_train.training.loop import Law
+from fish_train.training.network import FORMS, from_tensors, split, to_tensors, weight_count
 from fish_train.training.run import CHECKPOINT, Job, Status, run
 from fish_train.training.run_log import RunLog, read_curve
 from fish_train.training.search import search
 from fish_train.training.trainer import Trainer
+from fish_train.training.weights_output import SCHEDULE, write_weights
 
 SHORT = {
     "batch": 3,
@@ -80,6 +89,48 @@ def test_a_checkpoint_of_another_recipe_is_refused(tmp_path: Path) -> None:
         load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 3))
 
 
+# of another robot
+LAW = Law(
+    limits=ControlLimits(curvature_gain=0.3, throttle_quadratic=9.0),
+    guidance=GuidanceConfig(slip_arm=0.1),
+    tracker=TrackerConfig(lookahead=0.5),
+)
+
+
+def constant(law: Law | None = None) -> Trainer:
+    return Trainer(short(), Robot(), 3, law, form=FORMS["constant"])
+
+
+@pytest.fixture
+def nothing_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing swims, building the loop of another law or robot would only take time."""
+    monkeypatch.setenv("FISH_SIM_NO_COMPILER", "1")
+
+
+def test_a_checkpoint_of_another_law_is_refused(tmp_path: Path, nothing_compiled: None) -> None:
+    file = tmp_path / CHECKPOINT
+    save_checkpoint(file, constant(LAW))
+    with pytest.raises(UserError, match="limits.curvature_gain was 0.3, is 0.21.* give --robot as it was"):
+        load_checkpoint(file, constant())
+    measured_again = replace(LAW, limits=replace(LAW.limits, curvature_gain=0.3 * (1.0 + 1e-12)))
+    load_checkpoint(file, constant(measured_again))
+
+
+def test_a_checkpoint_of_old_which_did_not_note_its_law_has_the_nominal_one(
+    tmp_path: Path, nothing_compiled: None
+) -> None:
+    file = tmp_path / CHECKPOINT
+    save_checkpoint(file, constant())
+    with np.load(file) as content:
+        arrays = dict(content)
+    plain = json.loads(str(arrays.pop("plain")))
+    del plain["law"]
+    np.savez(file, plain=np.array(json.dumps(plain)), **arrays)
+    load_checkpoint(file, constant())
+    with pytest.raises(UserError, match="made before checkpoints noted the law's feed-forward.* start anew"):
+        load_checkpoint(file, constant(LAW))
+
+
 def test_a_checkpoint_may_be_read_by_whom_the_user_lets(tmp_path: Path) -> None:
     trainer, before = Trainer(short(), Robot(), 3, form=FORMS["constant"]), os.umask(0o027)
     try:
@@ -96,6 +147,48 @@ def test_a_warm_start_from_other_scales_is_refused(tmp_path: Path) -> None:
     write_gains_file(file, Policy(contract, to_tensors(Trainer(short(), Robot(), 3).weights)))
     with pytest.raises(UserError, match="other scales"):
         run(job(tmp_path / "run", warm_start=file), lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        ("nowhere.safetensors", "nowhere.safetensors: cannot be read"),
+        ("run/gains.safetensors", "--overwrite deletes; copy it"),
+    ],
+)
+def test_a_run_is_not_overwritten_by_one_that_cannot_start(start: str, said: str, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / CHECKPOINT).write_bytes(b"days of work")
+    write_gains_file(folder / "gains.safetensors", Policy(Contract(), to_tensors(np.zeros(weight_count()))))
+    with pytest.raises(UserError, match=said):
+        run(job(folder, overwrite=True, warm_start=tmp_path / start), lambda _: None)
+    assert (folder / CHECKPOINT).read_bytes() == b"days of work"
+    assert (folder / "gains.safetensors").exists()
+
+
+def test_a_robot_that_cannot_be_trained_leaves_the_run_that_was_to_be_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> Trainer:
+        raise UserError("not this robot")
+
+    (tmp_path / CHECKPOINT).write_bytes(b"days of work")
+    monkeypatch.setattr("fish_train.training.run.Trainer", refuse)
+    with pytest.raises(UserError, match="not this robot"):
+        run(job(tmp_path, overwrite=True), lambda _: None)
+    assert (tmp_path / CHECKPOINT).read_bytes() == b"days of work"
+
+
+def test_of_several_seeds_none_begins_where_one_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "2").mkdir()
+    (tmp_path / "2" / CHECKPOINT).write_bytes(b"days of work")
+    monkeypatch.setattr(seeds, "worker_pool", lambda *_: pytest.fail("workers were started"))
+    with pytest.raises(UserError, match="2: holds a training run; continue it with --resume"):
+        seeds.run_all([job(tmp_path / name) for name in "12"], 2, lambda _: None)
+    assert not (tmp_path / "1").exists()
 
 
 def test_a_run_finishes_and_its_weights_are_those_of_torch(tmp_path: Path) -> None:
@@ -138,6 +231,26 @@ def test_a_run_out_of_updates_says_which_level_it_did_not_pass(tmp_path: Path) -
     last = run(hard, lambda _: None)
     assert last.state == "stopped" and last.progress.level == 0
     assert "(sinusoid 1 m x 0.5, 0.0001 m)" in last.message and "expected below 0.0001 m" in last.message
+    assert "stopped at max_updates 20 before" in last.message and "max_updates can be raised" in last.message
+
+
+@pytest.mark.parametrize(("updates", "seconds"), [(4, float("inf")), (1000, 0.0)])
+def test_a_run_at_its_limit_goes_on_only_when_it_is_raised(
+    updates: int, seconds: float, tmp_path: Path
+) -> None:
+    whole = job(tmp_path / "whole", form="constant")
+    run(whole, lambda _: None)
+    parts = replace(whole, folder=tmp_path / "parts", resume=True)
+    limited = replace(parts, config=replace(parts.config, max_updates=updates), max_seconds=seconds)
+    assert run(limited, lambda _: None).state == "stopped"
+    curve, file = read_curve(parts.folder), parts.folder / "gains.safetensors"
+    made = file.stat().st_mtime_ns
+    again = run(limited, lambda _: None)
+    assert again.state == "stopped" and "before the level was passed" in again.message
+    assert read_curve(parts.folder) == curve and file.stat().st_mtime_ns == made
+    assert run(parts, lambda _: None).state == "finished"
+    found, expected = (read_gains_file(k.folder / "gains.safetensors").tensors for k in (parts, whole))
+    assert np.array_equal(found["gains"], expected["gains"])
 
 
 def test_a_finished_run_resumed_keeps_its_card(tmp_path: Path) -> None:
@@ -149,6 +262,52 @@ def test_a_finished_run_resumed_keeps_its_card(tmp_path: Path) -> None:
     (tmp_path / "model_card.md").write_text("of an earlier stop")
     run(job(tmp_path, form="constant", resume=True), lambda _: None)
     assert "training finished" in (tmp_path / "model_card.md").read_text()
+
+
+def test_a_finished_run_resumed_keeps_its_weights_and_what_they_say(tmp_path: Path) -> None:
+    run(job(tmp_path, form="constant"), lambda _: None)
+    again = replace(job(tmp_path, form="constant", resume=True), command="fish_train paper")
+    run(again, lambda _: None)
+    file = tmp_path / "gains.safetensors"
+    assert read_gains_file(file).contract.note == "trained by: fish_train train"
+    write_gains_file(file, Policy.constant(Gains(*[0.05] * 6)))  # of an earlier stop
+    run(again, lambda _: None)
+    assert read_gains_file(file).contract.note == "trained by: fish_train paper"
+
+
+def test_a_schedule_is_swum_on_the_law_it_was_trained_with(tmp_path: Path, nothing_compiled: None) -> None:
+    trainer = Trainer(short(), Robot(), 3, LAW, form=FORMS["schedule"])
+    write_weights(tmp_path, trainer, "fish_train train")
+    file = tmp_path / SCHEDULE
+    found = read_candidate(str(file))
+    assert found.law == LAW and np.array_equal(found.gains.weights, trainer.weights)
+    content = json.loads(file.read_text())
+    file.write_text(json.dumps({"form": "schedule", "weights": content["weights"]}))  # as it was of old
+    assert read_candidate(str(file)).law == Law()
+    for broken, said in (
+        ({**content, "limits": {}}, "limits lacks amplitude_rate"),
+        ({k: v for k, v in content.items() if k != "guidance"}, "'guidance'"),
+        ({**content, "lookahead": 5.0}, "lookahead is 5.0 m"),
+    ):
+        file.write_text(json.dumps(broken))
+        with pytest.raises(UserError, match=said):
+            read_candidate(str(file))
+
+
+def test_robots_differ_in_what_is_uncertain_of_them_and_not_in_their_effects(
+    nothing_compiled: None,
+) -> None:
+    robot = Robot().with_effect("rudder_placement", tip_share=0.9).with_effect("current", x=0.03, y=-0.02)
+    trainer = Trainer(short(batch=50), robot, 3)
+    own = dict(zip(trainer._stepper.layout.parameters, robot.vector(), strict=True))
+    drawn = dict(zip(own, trainer.fleet.parameters.T, strict=True))
+    for name, values in drawn.items():
+        if name in CERTAIN or "." in name:
+            assert (values == own[name]).all(), name
+        else:
+            share = values / own[name]
+            assert 0.8 <= share.min() < 0.9 and 1.1 < share.max() <= 1.2, name
+    assert {"rudder_placement.tip_share", "current.y", "head_inertia", "rotor_inertia"} < set(drawn)
 
 
 def test_what_was_logged_after_the_checkpoint_is_forgotten(tmp_path: Path) -> None:
@@ -200,11 +359,18 @@ def test_a_search_says_so_on_its_card(tmp_path: Path, short_search: None) -> Non
 
 def test_search_does_not_lose_against_its_start(short_search: None) -> None:
     said: list[str] = []
-    trainer = Trainer(short(), Robot(), 3, form=FORMS["constant"])
+    trainer = constant()
     bank = trainer.ladder_bank()
     found, weights = search(trainer, said.append)
-    again = Trainer(short(), Robot(), 3, form=FORMS["constant"])
-    fleet = again.draw_fleet(again.ladder_bank())
-    assert again.rollout_cost(weights, fleet.copy(), bank) == pytest.approx(found)
-    assert found <= again.rollout_cost(again.weights, fleet.copy(), bank)
+    again = constant()
+    fleet, noise = again.draw_fleet(again.ladder_bank()), again.draw_noise()
+    assert again.rollout_cost(weights, fleet.copy(), bank, noise) == pytest.approx(found)
+    assert found <= again.rollout_cost(again.weights, fleet.copy(), bank, noise)
+    assert again.rollout_cost(weights, fleet.copy(), bank) != pytest.approx(found)  # what is seen has errors
     assert said and "generation 1" in said[0]
+
+
+def test_a_search_may_start_with_gains_at_the_ends_of_their_ranges(short_search: None) -> None:
+    config = short(start_speed_kd=0.0, start_steering_kp=1.0)
+    found, weights = search(Trainer(config, Robot(), 3, form=FORMS["constant"]), lambda _: None)
+    assert np.isfinite(found) and np.abs(weights).max() <= 3.0

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     console, robot = Console(), read_model(args.robot)
     folder = args.training or args.out / "training"
     args.out.mkdir(parents=True, exist_ok=True)
-    curves, levels = trained(folder, args.training_seeds, robot, args.jobs, console)
+    curves, levels = trained(folder, args.training_seeds, robot, args.robot, args.jobs, console)
     candidate = read_policy("trained gains", args.weights or folder / "seed_1" / "gains.safetensors")
     condition = make_condition(robot)
     cells = make_cells(paper.LETTERS, paper.SPEEDS, range(args.seeds))
@@ -78,9 +79,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def trained(
-    folder: Path, seeds: int, robot: Robot, jobs: int, console: Console
+    folder: Path, seeds: int, robot: Robot, file: Path | None, jobs: int, console: Console
 ) -> tuple[Sequence[Sequence[CurveRow]], int]:
-    """Curves of the seeds, trained or continued where they are not finished; and the number of levels."""
+    """Curves of the seeds, trained or continued where they are not finished; and the number of levels. file: the robot's."""
     from fish_train.training.config import TrainConfig
     from fish_train.training.curriculum import make_levels
     from fish_train.training.display import Display
@@ -88,9 +89,16 @@ def trained(
     from fish_train.training.run_log import read_curve
     from fish_train.training.seeds import run_all
 
-    config = TrainConfig()
+    from .train import robot_law
+
+    config, law = TrainConfig(), robot_law(robot, file, console)
+    of_robot = [] if file is None else ["--robot", file.name]
+
+    def command(seed: int) -> str:
+        return shlex.join(["fish_train", "train", *of_robot, "--seed", str(seed)])
+
     todo = [
-        Job(folder / f"seed_{seed}", config, robot, seed, f"fish_train train --seed {seed}", resume=True)
+        Job(folder / f"seed_{seed}", config, robot, seed, command(seed), resume=True, law=law)
         for seed in range(1, seeds + 1)
     ]
     with Display(console) as display:

@@ -57,9 +57,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--jobs", type=int, default=os.cpu_count() or 1, help="runs side by side (default: %(default)s)"
     )
     parser.add_argument(
-        "--max-seconds", type=float, default=float("inf"), help="stop each run after this time"
+        "--max-seconds",
+        type=float,
+        default=float("inf"),
+        help="stop each run after this time, all its starts together",
     )
-    parser.add_argument("--resume", action="store_true", help="continue runs that were stopped or killed")
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="continue runs that were stopped or killed, also with a higher max_updates",
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace runs that are there")
 
 

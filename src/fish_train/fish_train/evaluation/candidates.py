@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_control.contract import OUTPUTS
+from fish_control.contract import OUTPUTS, Contract
 from fish_control.control_law import Gains
 from fish_control.gains_file import GainsFileError, read_gains_file, require_fit
 from fish_control.path_batch import TrackerConfig
@@ -17,6 +17,9 @@ from fish_train.evaluation.gains_source import PolicyGains, ScheduledGains
 from fish_train.evaluation.study import Candidate
 from fish_train.training.loop import CONTROL_PERIOD, Law
 from fish_train.training.network import FORMS, weight_count
+
+# of a schedule, with the names and checks of a weights file's contract
+LAW_KEYS = ("lookahead", "limits", "guidance")
 
 
 def read_candidate(text: str) -> Candidate:
@@ -35,16 +38,17 @@ def read_policy(name: str, path: Path) -> Candidate:
         require_fit(policy, path, CONTROL_PERIOD, policy.contract.lookahead)
     except GainsFileError as error:
         raise UserError(str(error)) from error
-    c = policy.contract
-    tracker = TrackerConfig(lookahead=c.lookahead)
-    return Candidate(name, PolicyGains(policy), Law(limits=c.limits, guidance=c.guidance, tracker=tracker))
+    return Candidate(name, PolicyGains(policy), _law(policy.contract, path))
 
 
 def read_schedule(name: str, path: Path) -> Candidate:
-    """The coefficients of scheduled gains."""
+    """The coefficients of scheduled gains with the law they were made for; a file of old, without one: the nominal fish's."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         weights = np.array(content["weights"], dtype=float)
+        has_law = any(key in content for key in LAW_KEYS)
+        given = {key: content[key] for key in LAW_KEYS} if has_law else {}
+        contract = Contract.from_json({**Contract(layers=()).to_json(), **given})
     except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
         raise UserError(
             f"{path}: not a schedule written by fish_train train --form schedule ({error})"
@@ -52,7 +56,16 @@ def read_schedule(name: str, path: Path) -> Candidate:
     expected = weight_count(FORMS["schedule"].layers)
     if weights.shape != (expected,):
         raise UserError(f"{path}: weights have shape {weights.shape}; expected ({expected},)")
-    return Candidate(name, ScheduledGains(weights))
+    return Candidate(name, ScheduledGains(weights), _law(contract, path))
+
+
+def _law(contract: Contract, path: Path) -> Law:
+    """What a file says of the law its gains were made for."""
+    try:
+        tracker = TrackerConfig(lookahead=contract.lookahead)
+    except ValueError as error:
+        raise UserError(f"{path}: {error}") from error
+    return Law(limits=contract.limits, guidance=contract.guidance, tracker=tracker)
 
 
 def constant_candidate(text: str) -> Candidate:

@@ -67,17 +67,19 @@ def measure(trace: Trace, run: int, path: ReferencePath) -> RunMetrics:
     )
     first = int(np.argmax(near)) if near.any() else len(time)
     approach = float(time[first] - time[0]) if near.any() else float("nan")
-    failure = _failure(trace, run, path, errors[first:, 0])
+    arrived = bool(trace.finished[run] or (path.closed and progress[-1] >= path.length))
+    failure = _failure(arrived, path, errors[first:, 0])
     return RunMetrics(_sizes(errors[first:]), _sizes(errors), approach, failure)
 
 
-def _failure(trace: Trace, run: int, path: ReferencePath, settled: Array) -> str:
+def _failure(arrived: bool, path: ReferencePath, settled: Array) -> str:
+    """What went wrong; arrived: at the end of an open path, once round a closed one, which has time for more."""
     if len(settled) == 0:
         return "never came onto the path"
     if np.abs(settled).max() > LOST:
         return f"left the path by more than {LOST} m"
-    if not path.closed and not trace.finished[run]:
-        return "did not reach the end in time"
+    if not arrived:
+        return "did not go round in time" if path.closed else "did not reach the end in time"
     return ""
 
 

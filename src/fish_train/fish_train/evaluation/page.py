@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from fish_train.evaluation.cells import LAPS
 from fish_train.evaluation.study import Row
 from fish_train.evaluation.tables import cell_table, ratio_table, summary_table, unique
 from fish_train.reports.page import Block, write_page
@@ -20,4 +21,5 @@ def write_study_page(path: Path, rows: Sequence[Row]) -> None:
         for condition in conditions:
             mine = [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]
             blocks.append(cell_table(mine, f"{candidate}: {condition}"))
-    write_page(path, "Evaluation", f"{len(rows)} simulated runs from rest, each path swum once.", blocks)
+    lead = f"{len(rows)} simulated runs from rest: an open path to its end, a closed one for the time of {LAPS:g} laps."
+    write_page(path, "Evaluation", lead, blocks)

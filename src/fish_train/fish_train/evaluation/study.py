@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import csv
-import multiprocessing
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -23,6 +20,7 @@ from fish_train.evaluation.plant import FishSimPlant, Plant
 from fish_train.evaluation.sensing import FusedSensing, PerfectSensing, Sensing
 from fish_train.training.episodes import CERTAIN
 from fish_train.training.loop import Law
+from fish_train.training.worker_pool import worker_pool
 
 LARGEST_BATCH = 16  # runs
 MakePlant = Callable[[Sequence[Robot], Sequence[int], float], Plant]
@@ -125,10 +123,8 @@ def _in_processes(
     report: Callable[[int, int], None] | None = None,
 ) -> list[Any]:
     """work(*task) for every task, one core for each process; results in order."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     results = []
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+    with worker_pool(jobs) as pool:
         futures = [pool.submit(work, *task) for task in tasks]
         for done, future in enumerate(futures, start=1):
             results.append(future.result())

@@ -56,7 +56,7 @@ class TrainConfig:
     start_heading: float = 0.1  # rad, std of the start's heading error
     start_rest: float = 0.05  # share of fish that start at rest; the others at 0.5 to 1 of the wanted speed
     # robustness, all off in the default recipe
-    randomise: float = 0.0  # relative half-width of the robot's drags, stiffness and added masses
+    randomise: float = 0.0  # relative half-width of drags, stiffness, inertias, added masses; effects stay
     noise_position: float = 0.0  # m, std of what the loop sees
     noise_heading: float = 0.0  # rad
     noise_speed: float = 0.0  # m/s

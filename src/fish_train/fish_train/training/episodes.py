@@ -27,7 +27,8 @@ class Episodes:
     def __init__(self, config: TrainConfig, robot: Robot, stepper: Stepper, tracker: TrackerConfig) -> None:
         self._config, self._stepper, self._tracker = config, stepper, tracker
         self._parameters = stepper.parameters(robot)
-        self._uncertain = np.array([name not in CERTAIN for name in stepper.layout.parameters])
+        # parameters of effects (`effect.parameter`) have ranges of their own, and places in the pool are no shares
+        self._uncertain = np.array([n not in CERTAIN and "." not in n for n in stepper.layout.parameters])
 
     def start(self, bank: PathBank, rng: np.random.Generator) -> Fleet:
         """A batch, some at rest, most near the wanted speed, scattered about random places on random paths."""
@@ -76,7 +77,7 @@ class Episodes:
         return plant
 
     def _robots(self, batch: int, rng: np.random.Generator) -> Array:
-        """Parameter vectors (B, NP); uncertain ones multiplied by 1 +- randomise."""
+        """Parameter vectors (B, NP); uncertain ones multiplied by 1 +- randomise, effects as they are."""
         if self._config.randomise == 0.0:
             return np.tile(self._parameters, (batch, 1))
         factors = rng.uniform(-1.0, 1.0, (batch, len(self._parameters))) * self._config.randomise

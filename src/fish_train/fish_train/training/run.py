@@ -21,7 +21,13 @@ from fish_train.training.network import FORMS, LAYERS, Array, from_tensors
 from fish_train.training.run_log import RunLog
 from fish_train.training.search import search
 from fish_train.training.trainer import Progress, Trainer, TrainingDiverged
-from fish_train.training.weights_output import CARD, training_state, write_card, write_weights
+from fish_train.training.weights_output import (
+    CARD,
+    holds_weights,
+    training_state,
+    write_card,
+    write_weights,
+)
 
 CHECKPOINT = "checkpoint.npz"
 CHECKPOINT_PERIOD = 5.0  # s
@@ -65,8 +71,9 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
     Diverging training is rolled back to the last good checkpoint, whose weights are handed out, and said.
     """
     torch.set_num_threads(1)
+    # whatever can be refused is refused before --overwrite deletes a run
+    trainer = Trainer(job.config, job.robot, job.seed, job.law, check_job(job), FORMS[job.form])
     checkpoint = prepare_folder(job)
-    trainer = Trainer(job.config, job.robot, job.seed, job.law, warm_weights(job), FORMS[job.form])
     if checkpoint.exists():
         load_checkpoint(checkpoint, trainer)
     else:
@@ -86,7 +93,8 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
                 f"training diverged at update {at} ({error}); rolled back to update {trainer.update}, whose "
                 "weights are kept. Use a smaller learning_rate or clip"
             )
-    write_weights(job.folder, trainer, job.command)
+    if not holds_weights(job.folder, trainer):  # what an earlier start handed out keeps its note
+        write_weights(job.folder, trainer, job.command)
     made, card = training_state(trainer), job.folder / CARD
     # a run that was finished before has no episode to tell of; its card does
     if not card.exists() or made not in card.read_text(encoding="utf-8"):
@@ -129,32 +137,46 @@ class _Session:
         """Until finished or out of budget; the state it ended in."""
         trainer, saved = self._trainer, time.monotonic()
         while not trainer.finished:
-            progress = trainer.step()
-            if progress is None:
-                continue
-            self.progress = progress
-            self._log.add(self.seconds, progress)
-            self._report(self.status("training"))
-            over = trainer.update >= self._job.config.max_updates or self.seconds >= self._job.max_seconds
-            if over or time.monotonic() - saved >= CHECKPOINT_PERIOD:
+            # a run that was at its limit before this start goes no further; the first start swims one episode at least
+            limit = self._limit() if trainer.update > 0 else ""
+            if limit or time.monotonic() - saved >= CHECKPOINT_PERIOD:
                 self._save()
                 saved = time.monotonic()
-            if over:
+            if limit:
                 return "stopped"
-        self._trainer.end_episode_early()
+            self._episode()
+        trainer.end_episode_early()
         self._save()
         return "finished"
 
+    def _limit(self) -> str:
+        """The limit that the run has reached, as the user gave it; empty: none."""
+        if self._trainer.update >= self._job.config.max_updates:
+            return f"max_updates {self._job.config.max_updates}"
+        return f"--max-seconds {self._job.max_seconds:g}" if self.seconds >= self._job.max_seconds else ""
+
+    def _episode(self) -> None:
+        """Swim and tell one episode; the polish may end within it."""
+        progress = None
+        while progress is None and not self._trainer.finished:
+            progress = self._trainer.step()
+        if progress is not None:
+            self.progress = progress
+            self._log.add(self.seconds, progress)
+            self._report(self.status("training"))
+
     def what_is_left(self) -> str:
         """Why a run that was stopped did not finish: a level that noise does not let pass looks like one that takes long."""
-        trainer = self._trainer
+        trainer, limit = self._trainer, self._limit()
+        more = f"{limit.split()[0]} can be raised with --resume"
         if trainer.passed_all:
-            return "stopped in the polish, every level passed"
+            return f"stopped at {limit} in the polish, every level passed; {more}"
         level = trainer.levels[trainer.level]
         return (
-            f"stopped before the level was passed ({level.name}): mean |cross-track| of the last episodes "
+            f"stopped at {limit} before the level was passed ({level.name}): mean |cross-track| of the last episodes "
             f"{trainer.criterion.mean:.4f} m, expected below {level.threshold:g} m over {self._job.config.criterion_episodes} "
-            "episodes; where it falls no further (noise, latency and randomise set a floor) raise thresholds"
+            f"episodes; {more}; where the error falls no further (noise, latency and randomise set a floor) start anew "
+            "with higher thresholds"
         )
 
     def _save(self) -> None:
@@ -171,15 +193,28 @@ class _Session:
         )
 
 
+def check_job(job: Job) -> Array | None:
+    """Refuse a run that cannot start, with nothing touched yet; the weights it starts from, None without a file."""
+    there = (job.folder / CHECKPOINT).exists()
+    if there and not (job.resume or job.overwrite):
+        raise UserError(
+            f"{job.folder}: holds a training run; continue it with --resume or replace it with --overwrite"
+        )
+    if (
+        there and job.overwrite and job.warm_start is not None
+        and job.warm_start.resolve().is_relative_to(job.folder.resolve())
+    ):  # fmt: skip
+        raise UserError(
+            f"--warm-start {job.warm_start}: is of the run that --overwrite deletes; copy it to another folder first"
+        )
+    return warm_weights(job)
+
+
 def prepare_folder(job: Job) -> Path:
     """The run's folder, empty or to be continued; the path of its checkpoint."""
     checkpoint = job.folder / CHECKPOINT
     if checkpoint.exists() and job.overwrite:
         shutil.rmtree(job.folder)
-    elif checkpoint.exists() and not job.resume:
-        raise UserError(
-            f"{job.folder}: holds a training run; continue it with --resume or replace it with --overwrite"
-        )
     job.folder.mkdir(parents=True, exist_ok=True)
     return checkpoint
 

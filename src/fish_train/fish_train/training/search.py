@@ -25,10 +25,12 @@ def search(trainer: Trainer, report: Callable[[str], None]) -> tuple[float, Arra
     """(mean stage cost, flat weights) of the best candidate found."""
     bank = trainer.ladder_bank()
     fleets = [trainer.draw_fleet(bank) for _ in range(EPISODES)]
+    noises = [trainer.draw_noise() for _ in fleets]  # the same for all candidates, like the fleets
+    swims = list(zip(fleets, noises, strict=True))
     count = weight_count(trainer.form.layers)
 
     def cost(weights: Array) -> float:
-        value = float(np.mean([trainer.rollout_cost(weights, fleet.copy(), bank) for fleet in fleets]))
+        value = float(np.mean([trainer.rollout_cost(weights, f.copy(), bank, noise) for f, noise in swims]))
         return value if np.isfinite(value) else 1e6
 
     def said(intermediate_result: OptimizeResult) -> None:
@@ -37,7 +39,7 @@ def search(trainer: Trainer, report: Callable[[str], None]) -> tuple[float, Arra
     found = differential_evolution(
         cost,
         [(-REACH, REACH)] * count,
-        x0=trainer.weights,
+        x0=np.clip(trainer.weights, -REACH, REACH),  # gains that start at an end of their range are beyond
         popsize=POPULATION,
         maxiter=GENERATIONS[count],
         tol=1e-4,

@@ -103,16 +103,28 @@ class Trainer:
             [p for level in ladder for p in level.paths(self.config, rng, POLISH_PHASES)], self.law.tracker
         )
 
-    def rollout_cost(self, weights: Array, fleet: Fleet, bank: PathBank) -> float:
+    def rollout_cost(self, weights: Array, fleet: Fleet, bank: PathBank, noise: Array | None = None) -> float:
         """Mean stage cost of an episode from a fleet's state on a bank's paths; the fleet is advanced."""
         self._loop.set_bank(bank)
-        steps = self._episode_windows * self._window
-        cost = np.array(self.config.cost)
-        return self._loop.window(weights, fleet, steps, cost, gradient=False, hold=self.config.hold).cost
+        cost, hold = np.array(self.config.cost), self.config.hold
+        result = self._loop.window(
+            weights, fleet, self._episode_steps, cost, noise, gradient=False, hold=hold
+        )
+        return result.cost
+
+    @property
+    def _episode_steps(self) -> int:
+        """Control periods."""
+        return self._episode_windows * self._window
 
     def draw_fleet(self, bank: PathBank) -> Fleet:
         """The start of an episode."""
         return self._episodes.start(bank, self.rng)
+
+    def draw_noise(self) -> Array | None:
+        """Errors of what the fish see through an episode, for `rollout_cost`; None without noise."""
+        self._noise.reset(self.rng)
+        return self._noise.window(self._episode_steps, self.rng)
 
     @property
     def finished(self) -> bool:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from fish_control.contract import Contract
-from fish_control.gains_file import write_gains_file
+from fish_control.gains_file import read_gains_file, write_gains_file
 from fish_control.policy import Policy
 from fish_sim.ops import NUMPY
+from fish_train.json_file import write_json
 from fish_train.training.loop import CONTROL_PERIOD, Law, gains_of
 from fish_train.training.network import to_tensors
 from fish_train.training.trainer import Progress, Trainer
@@ -53,12 +55,33 @@ def make_policy(trainer: Trainer, note: str) -> Policy:
 
 
 def write_weights(folder: Path, trainer: Trainer, command: str) -> None:
-    """Weights file; of a schedule, which no controller loads, its coefficients."""
+    """Weights file; of a schedule, which no controller loads, its coefficients and the law they are for."""
     if trainer.form.inputs == "schedule":
-        content = {"form": "schedule", "command": command, "weights": trainer.weights.tolist()}
-        (folder / SCHEDULE).write_text(json.dumps(content, indent=1), encoding="utf-8")
+        law: Law = trainer.law
+        content = {
+            "form": "schedule",
+            "command": command,
+            "lookahead": law.tracker.lookahead,
+            "limits": asdict(law.limits),
+            "guidance": asdict(law.guidance),
+            "weights": trainer.weights,
+        }
+        write_json(folder / SCHEDULE, content)
     else:
         write_gains_file(folder / WEIGHTS, make_policy(trainer, f"trained by: {command}"))
+
+
+def holds_weights(folder: Path, trainer: Trainer) -> bool:
+    """Whether what is handed out in the folder has the trainer's numbers already; a file that cannot be read has not."""
+    try:
+        if trainer.form.inputs == "schedule":
+            content = json.loads((folder / SCHEDULE).read_text(encoding="utf-8"))
+            return bool(content["weights"] == trainer.weights.tolist())
+        there = read_gains_file(folder / WEIGHTS).tensors
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+    ours = make_policy(trainer, "").tensors
+    return there.keys() == ours.keys() and all(np.array_equal(there[name], ours[name]) for name in ours)
 
 
 def write_card(

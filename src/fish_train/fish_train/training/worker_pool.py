@@ -1,0 +1,50 @@
+"""Worker processes that end with their work: neither an error nor Ctrl-C leaves one of them running."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+
+
+@contextmanager
+def worker_pool(
+    workers: int, prepare: Callable[..., object] | None = None, *given: object
+) -> Iterator[ProcessPoolExecutor]:
+    """A pool of `workers`, one core each; prepare(*given) runs in each of them first.
+
+    An error or Ctrl-C in the `with` ends the workers at once, in the midst of what they do, and nothing that waits starts.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")  # inherited
+    others = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, context, _begin, (prepare, given))
+    try:
+        yield pool
+    except BaseException:
+        own = set(multiprocessing.active_children()) - others
+        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in own:  # waiting for them could take hours, or for ever where nobody reads what they say
+            worker.terminate()
+        raise
+    pool.shutdown()
+
+
+def _begin(prepare: Callable[..., object] | None, given: tuple[object, ...]) -> None:
+    """In a worker: Ctrl-C, which reaches all of them, is for the pool's process to answer, whose end is theirs."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    owner = multiprocessing.parent_process()
+    assert owner is not None  # this is a worker
+
+    def watch() -> None:
+        owner.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+    if prepare is not None:
+        prepare(*given)
