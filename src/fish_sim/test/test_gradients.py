@@ -76,6 +76,20 @@ def test_tangents_equal_finite_differences_and_adjoints_equal_tangents(name, str
     assert_allclose(gradient[indices], forward @ weights, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize(("name", "inwards"), [("rudder_delay", 1e-5), ("rudder_backlash", 1e-6)])
+def test_at_the_end_of_its_range_a_parameter_has_the_slope_towards_the_inside(name, inwards, strokes):
+    """Searches stand there: half of the slope, as of a kink in mid-range, would lead them and all others astray."""
+    stepper, start, p = case({name: {}}, links=1)
+    (k,) = (i for i, n in enumerate(parameter_names(stepper.layout.structure)) if n.startswith(name + "."))
+    t = 0.01 * np.arange(PERIODS)
+    commands = np.column_stack([strokes(PERIODS)[:, 0], 0.3 + 0.1 * t])  # the servo is slewing, then dragging one way
+    (tangent,) = tangents(stepper, start, commands, p, [k])
+    q = p.copy()
+    q[k] += inwards
+    difference = (stepper.rollout(start, commands, q)[-1] - stepper.rollout(start, commands, p)[-1]) / inwards
+    assert np.abs(tangent - difference).max() < 1e-3 * np.abs(difference).max()
+
+
 def test_tangents_along_start_and_commands_equal_finite_differences(strokes):
     stepper, start, p = case({"tip_slip": typical("tip_slip"), "rudder_lag": typical("rudder_lag")})
     commands = strokes(PERIODS)

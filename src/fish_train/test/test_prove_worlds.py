@@ -144,7 +144,10 @@ def test_worlds_of_a_group_are_what_the_group_says() -> None:
     assert {w.trials for w in drawn("feedback")} == {"closed"}
     assert {w.trials for w in drawn("absorbed")} == {"one_speed"}
     assert {w.noise for w in drawn("noise")} == {0.5, 1.0, 2.0, 4.0}
-    assert {w.strength for w in drawn("ladder")} == {0.125, 0.25, 0.5, 1.0, 2.0}
+    ladder = drawn("ladder")
+    assert {w.strength for w in ladder} == {0.125, 0.25, 0.5, 1.0, 2.0}
+    weak = {name for w in ladder if w.strength < 1.0 for name in w.names}
+    assert weak.isdisjoint({"rudder_saturation", "rotor_saturation"})  # no command reaches a weak limit
     assert all(len(w.names) == 2 for w in drawn("two")) and not any(w.names for w in drawn("null"))
     assert {w.names[0] for w in drawn("sensor")} == set(SENSOR_EFFECTS)
     assert {w.names[0] for w in drawn("outside")} == set(OUTSIDE)

@@ -15,7 +15,7 @@ class BatterySag(Effect):
 
         speed = command max(0, 1 - sag load),   load' = ((command / 100 rad/s)^2 - load) / time_constant
 
-    The load is the smoothed square of the speed, 0 at the start; a long time constant means running down.
+    The load is the smoothed square of the commanded speed, 0 at the start; a long time constant means running down.
     """
 
     name = "battery_sag"

@@ -14,7 +14,8 @@ class RudderBacklash(Effect):
 
         alpha <- max(servo - play, min(servo + play, alpha))
 
-    It starts at 0 (centred).
+    It starts at 0 (centred). Without play, where searches stand, all three are one, and the derivative is that of a rudder
+    that is dragged along.
     """
 
     name = "rudder_backlash"
@@ -28,5 +29,6 @@ class RudderBacklash(Effect):
 
     @staticmethod
     def linkage(p: Values, m: Values, servo: Scalar, dt: float, xp: Any) -> Followed:
-        dragged = xp.fmax(servo - p.play, xp.fmin(servo + p.play, m.dragged))
+        ahead, behind = servo - p.play, servo + p.play
+        dragged = xp.where(m.dragged < ahead, ahead, xp.where(m.dragged > behind, behind, m.dragged))
         return dragged, {"dragged": dragged}

@@ -13,9 +13,10 @@ LENGTH = 30  # commands remembered: 0.3 s at 10 ms
 class RudderDelay(Effect):
     """The servo executes the command given `delay` ago.
 
-        target(k) = sum_j hat(delay / dt - j) command(k - j),   hat(a) = max(0, 1 - |a|)
+        target(k) = command(k) + sum_j clip(delay / dt - j, 0, 1) (command(k - j - 1) - command(k - j)),   j = 0, 1, ...
 
-    A fractional delay interpolates linearly between past commands. Commands before the start are 0 (centred).
+    A fractional delay interpolates linearly between past commands. Commands before the start are 0 (centred). Nothing is clipped
+    at the ends of the delay's range: at 0, where searches stand, half of the derivative would be lost.
     """
 
     name = "rudder_delay"
@@ -30,6 +31,10 @@ class RudderDelay(Effect):
     @staticmethod
     def rudder(p: Values, m: Values, command: Scalar, dt: float, xp: Any) -> Followed:
         commands = [command, *(getattr(m, key) for key in RudderDelay.memory)]
-        periods = p.delay / dt
-        target = sum(xp.fmax(0.0, 1.0 - xp.fabs(periods - j)) * c for j, c in enumerate(commands))
+        target = command
+        for j in range(LENGTH):
+            share = p.delay / dt - j
+            share = share if j == 0 else xp.fmax(share, 0.0)
+            share = share if j == LENGTH - 1 else xp.fmin(share, 1.0)
+            target = target + share * (commands[j + 1] - commands[j])
         return target, dict(zip(RudderDelay.memory, commands, strict=False))

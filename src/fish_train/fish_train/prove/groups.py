@@ -38,6 +38,7 @@ ELSEWHERE = {  # parameters that say where or when; drawn afresh in every world
 }
 SIGNED = ("current", "nonuniform_current", "hull_asymmetry", "rudder_offset", "camera_heading_offset", "imu_misalignment",
           "rotor_imbalance", "compass", "jet", "vortex")  # fmt: skip
+LIMITS = ("rudder_saturation", "rotor_saturation")  # act by being small
 HIDDEN_BY_THE_ENCODER = ("rotor_lag", "rotor_saturation", "battery_sag")
 ABSORBED = (
     "quadratic_drag",
@@ -129,8 +130,10 @@ def noise(random: Random, number: int) -> World:
 
 
 def ladder(random: Random, number: int) -> World:
-    """A ladder of strengths, for power curves."""
-    return _world("ladder", random, (str(random.choice(candidates())),), _turn(STRENGTHS, number))
+    """A ladder of strengths, for power curves. A weak limit is one that no command reaches: nothing would be hidden."""
+    strength = _turn(STRENGTHS, number)
+    names = [name for name in candidates() if strength >= 1.0 or name not in LIMITS]
+    return _world("ladder", random, (str(random.choice(names)),), strength)
 
 
 def two(random: Random, number: int) -> World:

@@ -146,7 +146,7 @@ class Jet(Effect):
 
 
 class TurningThrust(Effect):
-    """The hull banks in a turn and the keel pushes it outwards: Y = k |r| r u.
+    """The hull banks in a turn and the keel pushes it inwards: Y = k |r| r u.
 
     r [rad/s] yaw rate, u [m/s] surge, k [N s^3/(m rad^2)].
     """
