@@ -65,10 +65,10 @@ $(VENV)/.dev: requirements-dev.txt constraints.txt $(VENV)/.train
 setup: $(VENV)/.dev
 
 # --- build ----------------------------------------------------------------------------------------------------------------
-# The command fish_train stands beside colcon's executables in the environment's folder of commands.
+# The command fish_train in the environment's folder of commands runs colcon's executable, or says what to source.
 install/.built: $(VENV)/.run colcon.meta $(SOURCES)
 	@$(ACTIVATE); colcon build
-	@ln -sfn ../../install/fish_train/lib/fish_train/fish_train $(VENV)/bin/fish_train
+	@ln -sfn ../../src/fish_train/bin/fish_train $(VENV)/bin/fish_train
 	@touch $@
 
 build: install/.built

@@ -8,6 +8,7 @@ import pytest
 from test_demo import PROGRAM, assert_one_line
 
 from fish_train.domain import choose_domain, domain_in_use
+from fish_train.identify.experiment import build_experiment
 from fish_train.recordings import read_dataset
 
 # slow enough for the guard never to stop it where the plan puts it
@@ -49,6 +50,14 @@ def test_the_recording_holds_what_the_program_says(swum):
     zero_crossings = np.count_nonzero(np.diff(np.sign(rotor[moves])))
     seconds = np.ptp(trial.commands.t[moves])
     assert zero_crossings / (2.0 * seconds) == pytest.approx(2.5, rel=0.05)
+
+
+def test_a_command_acts_from_its_stamp_on_however_busy_the_computer_is(swum):
+    """The encoder tells what was commanded in the period before, to its noise: a command late by a period is 9 rad/s off."""
+    _, folder, _ = swum
+    experiment = build_experiment([longest(folder)])
+    behind = experiment.encoder[6:, 0] - experiment.commands[5:-1, 0, 0]
+    assert np.nanstd(behind) < 0.4 and np.nanmax(np.abs(behind)) < 2.0
 
 
 def test_the_fish_turns_left_from_rest(swum):

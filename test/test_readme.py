@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fish_control.excitation import LAST_ROW
 from fish_train.commands.verbs import VERBS
+from fish_train.diagnose.vocabulary import known
 from fish_train.prove.judge import judge_studies
 from fish_train.prove.score import score_world
 from fish_train.prove.study import Study
@@ -29,6 +31,22 @@ def test_the_example_effect_is_the_one_that_a_test_executes():
     assert len(examples) == 2
     for example in examples:
         assert example in page
+
+
+def test_the_diagnosis_from_python_can_be_pasted():
+    """Its imports, its recordings and its names; the call itself takes a minute."""
+    (example,) = re.findall(r"```python\n(.*?)```", section("## Which physics is missing"), re.DOTALL)
+    imports, rest = example.split("\n\n", 1)
+    names: dict[str, object] = {}
+    exec(imports, names)
+    used = set(re.findall(r"\b([a-zA-Z_]+)\(", rest)) - {"list", "print"}
+    assert used == set(names) - {"__builtins__"}
+    assert (ROOT / re.search(r'read_dataset\("(.*?)"\)', rest)[1]).is_dir()
+    known(json.loads(re.search(r"names=(\[.*?\])", rest)[1]))
+
+
+def test_the_readme_says_how_long_a_programs_last_row_lasts():
+    assert f"the last row lasts {LAST_ROW:g} s" in README
 
 
 def test_every_verb_is_listed():

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fish_control.excitation import LAST_ROW
 from fish_control.fusion import FusionConfig
 from fish_control.gains_file import read_gains_file
 from fish_control.node_configs import ControllerConfig, ExciterConfig, PlannerConfig
@@ -26,6 +27,11 @@ def test_yaml_holds_the_dataclass(name, kind):
     parameters = yaml.safe_load((CONFIG / f"{name}.yaml").read_text())["/**"]["ros__parameters"]
     assert parameters == asdict(kind())
     assert list(parameters) == list(asdict(kind()))
+
+
+def test_the_exciters_comment_says_how_long_the_last_row_lasts():
+    (end,) = [line for line in (CONFIG / "exciter.yaml").read_text().splitlines() if " end:" in line]
+    assert end.endswith(f"its end, {LAST_ROW:g} s after its last row begins")
 
 
 def test_shipped_weights_fit_the_shipped_controller():

@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.executors import SingleThreadedExecutor
@@ -22,7 +22,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
 from fish_control.fusion import LOST_VARIANCE
-from fish_control.nodes import controller, exciter, fusion, planner
+from fish_control.nodes import controller, exciter, fusion, planner, rivals
 from fish_control.nodes.controller import ControllerNode
 from fish_control.nodes.exciter import ExciterNode
 from fish_control.nodes.fusion import FusionNode
@@ -544,6 +544,26 @@ def test_exciter_without_its_guard_swims_without_looking(bench, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("kind", "output", "topic"),
+    [
+        (FusionNode, Odometry, "odometry/filtered"),
+        (ControllerNode, JointState, "joint_command"),
+        (ExciterNode, JointState, "joint_command"),
+        (PlannerNode, PoseStamped, "control/target"),
+    ],
+)
+def test_a_second_node_of_the_same_kind_is_warned_of_on_diagnostics_and_console(
+    bench, tmp_path, monkeypatch, capfd, kind, output, topic
+):
+    monkeypatch.setattr(rivals, "PATIENCE_S", 0.0)
+    b = exciter_bench(bench, tmp_path) if kind is ExciterNode else bench(kind)
+    b.other.create_publisher(output, topic, 10)
+    b.until(lambda: b.said(DiagnosticStatus.WARN, f"another publisher of /fish/{topic}"))
+    said = [line for line in capfd.readouterr().err.splitlines() if "another publisher" in line]
+    assert len(said) == 1 and "[WARN]" in said[0]
+
+
+@pytest.mark.parametrize(
     ("main", "parameter", "said"),
     [
         (planner.main, "path:='7'", "unknown letter '7'; known: A B"),
@@ -552,6 +572,14 @@ def test_exciter_without_its_guard_swims_without_looking(bench, tmp_path):
         (planner.main, "speed:=fast", "speed is 'fast', expected float"),
         (planner.main, "path_args:='{height: 2.2}'", "this must stay within |y| <= 0.965"),
         (planner.main, "path_args:='{'", "expected YAML"),
+        (
+            planner.main,
+            "sped:=0.1",
+            "unknown parameter sped (did you mean speed?); known: capture_distance, ",
+        ),
+        (controller.main, "lokahead:=0.4", "unknown parameter lokahead (did you mean lookahead?)"),
+        (fusion.main, "foo:=1", "unknown parameter foo; known: "),
+        (exciter.main, "use_sim_tme:=true", "unknown parameter use_sim_tme; known: begin, "),
         (controller.main, "weights_file:=nowhere.safetensors", "nowhere.safetensors: cannot be read"),
         (controller.main, f"weights_file:={__file__}", "not a safetensors file"),
         (controller.main, "lookahead:=0.5", "does not fit: lookahead is 0.4, this controller runs at 0.5"),
@@ -577,6 +605,21 @@ def test_letters_that_yaml_takes_for_something_else(graph, key, tmp_path):
     node.destroy_node()
     rclpy.try_shutdown()
     assert name == f"letter {key}"
+
+
+def test_parameters_of_ros_itself_are_no_mistakes(graph):
+    rclpy.init()
+    names = (
+        "use_sim_time",
+        "start_type_description_service",
+        "qos_overrides./parameter_events.publisher.depth",
+    )
+    values = [f"{name}:={value}" for name, value in zip(names, ("true", "false", "3"), strict=True)]
+    node = FusionNode(cli_args=["--ros-args", *(word for value in values for word in ("-p", value))])
+    follows_clock = node.get_parameter("use_sim_time").value
+    node.destroy_node()
+    rclpy.try_shutdown()
+    assert follows_clock
 
 
 def test_a_program_that_cannot_start_exits_with_1(tmp_path):

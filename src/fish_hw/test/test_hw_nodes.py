@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,6 +26,7 @@ from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.usb_camera import jpeg_size
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
+from fish_hw.nodes import entry
 from fish_hw.nodes.camera import CameraNode
 from fish_hw.nodes.imu import ImuNode
 from fish_hw.nodes.rotor import RotorNode
@@ -291,15 +293,23 @@ def test_losses_are_logged_as_errors_and_doubts_as_warnings(graph, monkeypatch):
     assert {("error", "gone"), ("info", "back"), ("warning", "odd")} <= set(said)
 
 
+@pytest.mark.parametrize("node_class", [RotorNode, RudderNode, ImuNode, CameraNode])
+def test_a_misspelt_parameter_is_refused_before_the_device_is_opened(graph, node_class):
+    with pytest.raises(ValueError, match=r"unknown parameter rate_zh \(did you mean rate_hz\?\); known: "):
+        graph(node_class, rate_zh=50.0, use_sim_time="true")
+
+
 def test_absent_port_is_refused(graph):
     with pytest.raises(PortUnavailable, match="there is no such port; available:"):
         graph(RotorNode, port="/dev/ttyX9")
 
 
-def test_port_that_appears_later(graph, tmp_path):
+def test_port_that_appears_later(graph, tmp_path, capfd):
     g = graph(RudderNode, chip=str(tmp_path / "pwmchip0"), startup_timeout_s=60)
     diagnostics = g.listen(DiagnosticArray, "/diagnostics")
     assert g.spin(lambda: bool(diagnostics) and diagnostics[-1].status[0].level == DiagnosticStatus.ERROR)
+    said = [line for line in capfd.readouterr().err.splitlines() if diagnostics[-1].status[0].message in line]
+    assert any("trying for" not in line for line in said)  # the status itself, beside the first try's error
     chip = PwmChipEmulator(tmp_path / "pwmchip0")
     assert g.spin(lambda: chip.channel.joinpath("enable").read_text() == "1\n")
 
@@ -397,3 +407,14 @@ def test_missing_port_is_one_line_and_an_exit_code():
     assert process.returncode == 1
     assert output.startswith("rotor: cannot open serial port /dev/ttyX9: there is no such port; available: ")
     assert output.count("\n") == 1
+
+
+@pytest.mark.parametrize("flag", ["-h", "--help"])
+@pytest.mark.parametrize("name", ["rotor", "rudder", "imu", "camera"])
+def test_help_says_what_a_node_is_and_starts_nothing(name, flag, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [name, flag])
+    monkeypatch.setattr(rclpy, "init", lambda *_, **__: pytest.fail("started"))
+    assert getattr(entry, name)() == 0
+    usage, what, parameters = capsys.readouterr().out.splitlines()
+    assert usage.startswith(f"usage: {name} ") and what
+    assert Path(parameters.split(": ")[1]).name == f"{name}.yaml" and Path(parameters.split(": ")[1]).exists()

@@ -370,7 +370,7 @@ def tip_normal(chain: Chain) -> list[Scalar]:
 
 
 def combine(grips: Sequence[Grip]) -> Grip | None:
-    """Several finite grips in one: mobilities add, as in series, and so do shares, which then hold for the whole slip, and what is late."""
+    """Several finite grips in one: mobilities add, as in series, and so do shares, then of the whole slip, and what is late."""
     if not grips:
         return None
     return Grip(*(sum((getattr(g, part) for g in grips), 0.0) for part in ("mobility", "share", "late")))

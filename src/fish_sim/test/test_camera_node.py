@@ -123,12 +123,15 @@ def test_lost_frames_are_counted_not_sent(bench: Bench) -> None:
     assert not bench.got["jpeg"]
 
 
-def test_diagnostics_say_what_is_missing_and_nan_is_ignored(bench: Bench) -> None:
+def test_diagnostics_say_what_is_missing_and_nan_is_ignored(
+    bench: Bench, capfd: pytest.CaptureFixture[str]
+) -> None:
     bench.send(FishPose(float("nan"), 0.0, 0.0), bench.now())
     assert bench.spin_until(lambda: bool(bench.got["diagnostics"]))
     status = bench.got["diagnostics"][0].status[0]
     assert status.name == "/fish/camera" and status.level == DiagnosticStatus.WARN
     assert "sim/odometry" in status.message and not bench.got["jpeg"]
+    assert status.message in capfd.readouterr().err
 
 
 def test_stamps_of_another_clock_are_noticed_but_frames_flow(bench: Bench) -> None:
@@ -147,4 +150,7 @@ def test_bad_parameters_are_refused_with_their_name() -> None:
     rclpy.try_shutdown()
     with pytest.raises(ValueError, match="distortion"):
         Bench({"distortion": "none"})
+    rclpy.try_shutdown()
+    with pytest.raises(ValueError, match=r"unknown parameter rate_h \(did you mean rate_hz"):
+        Bench({"rate_h": 3.0})
     rclpy.try_shutdown()

@@ -1,5 +1,8 @@
 """Waiting for the loop on made-up clocks."""
 
+import pytest
+
+from fish_sim.model import DT
 from fish_sim.nodes.lockstep import AHEAD, Lockstep
 
 
@@ -17,6 +20,16 @@ def test_time_stands_until_the_last_one_has_answered():
     assert not lockstep.may_advance(1.0 + 2.0 * AHEAD, 0.2)
     lockstep.answered("controller", 1.0 + 1.5 * AHEAD)
     assert lockstep.may_advance(1.0 + 2.0 * AHEAD, 0.3)
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_who_answers_to_every_so_many_periods_is_waited_for_in_each_of_these(every):
+    lockstep = Lockstep(1.0)
+    lockstep.answered("exciter", 0.0)
+    for k in range(every, 20, every):
+        lockstep.answered("exciter", DT * k)
+        assert all(lockstep.may_advance(DT * (k + ahead), 0.0) for ahead in range(every))
+        assert not lockstep.may_advance(DT * (k + every), 0.0)
 
 
 def test_the_silent_is_given_up_after_the_patience_until_heard_again():

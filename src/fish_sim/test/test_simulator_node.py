@@ -19,6 +19,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_srvs.srv import SetBool, Trigger
 
+from fish_sim.nodes import rivals
 from fish_sim.nodes.simulator import SimulatorNode
 from fish_sim.robot import Robot, RobotError, save_robot
 from fish_sim.simulation_config import SimulatorConfig
@@ -213,6 +214,22 @@ def test_a_robot_file_is_used_and_a_broken_one_refused(tmp_path):
             SimulatorNode()
     finally:
         rclpy.try_shutdown()
+
+
+def test_a_second_simulator_is_warned_of_on_diagnostics_and_console(bench, monkeypatch, capfd):
+    monkeypatch.setattr(rivals, "PATIENCE_S", 0.0)
+    bench.peer.create_publisher(Odometry, "sim/odometry", 10)
+    warning = "another publisher of /fish/sim/odometry"
+    bench.until(lambda: any(warning in array.status[0].message for array in bench.got["/diagnostics"]))
+    assert bench.got["/diagnostics"][-1].status[0].level == DiagnosticStatus.WARN
+    said = [line for line in capfd.readouterr().err.splitlines() if warning in line]
+    assert len(said) == 1 and "[WARN]" in said[0]
+
+
+def test_a_misspelt_parameter_is_refused():
+    with pytest.raises(ValueError, match=r"unknown parameter start_z \(did you mean start_"):
+        Bench({"start_z": 0.0})
+    rclpy.try_shutdown()
 
 
 @pytest.mark.parametrize("camera", ["image", "pose"])

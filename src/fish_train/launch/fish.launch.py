@@ -22,6 +22,7 @@ ARGUMENTS = {
     "config": ("", "folder of parameter files that override the installed ones of the same name"),
     "namespace": (NAMESPACE, "namespace of all nodes"),
     "path": ("R", "letter or path family"),
+    "path_args": ("", "YAML, arguments of the path family: '{radius: 0.6}'"),
     "speed": ("0.2", "surge speed, m/s"),
     "program": ("", "program of stroke and rudder to swim open loop, instead of path and speed"),
     "begin": ("0.0", "s of the program's time"),
@@ -36,6 +37,7 @@ def _node(spec: NodeSpec, config: str) -> Node:
     }
     if spec == PLANNER:
         parameters["path"] = ParameterValue(LaunchConfiguration("path"), value_type=str)
+        parameters["path_args"] = ParameterValue(LaunchConfiguration("path_args"), value_type=str)
         parameters["speed"] = ParameterValue(LaunchConfiguration("speed"), value_type=float)
     if spec == EXCITER:
         parameters["program_file"] = ParameterValue(LaunchConfiguration("program"), value_type=str)

@@ -150,6 +150,21 @@ def test_with_a_program_the_exciter_takes_the_place_of_planner_and_controller(la
     assert {"program_file", "begin", "end"} < set(nodes[-1].parameters[1])
 
 
+def test_the_launch_file_hands_the_planner_its_path_and_arguments_as_text(launch_file):
+    [*arguments, opaque] = launch_file["generate_launch_description"]().args[0]
+    [planner] = [
+        node
+        for node in opaque.function({"robot": "sim", "program": "", "config": ""})
+        if node.executable == "planner"
+    ]
+    for name in ("path", "path_args"):
+        given = planner.parameters[-1][name]
+        assert (
+            given.args[0].args == (name,) and given.value_type is str
+        )  # else launch reads {radius: 0.6} as a dict
+        assert name in {argument.args[0] for argument in arguments}
+
+
 def test_the_launch_file_refuses_an_unknown_robot(launch_file):
     [*_, opaque] = launch_file["generate_launch_description"]().args[0]
     with pytest.raises(RuntimeError, match="known: sim, real"):

@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from fish_train.diagnose.diagnosis import Diagnosis
+from fish_train.diagnose.locate import MissingForce
+from fish_train.diagnose.vocabulary import candidates
 from fish_train.reports.diagnosis_figures import binned_means, moves_water
-from fish_train.reports.diagnosis_page import _fit_table
+from fish_train.reports.diagnosis_page import (
+    EVIDENCE_NOTE,
+    NAT,
+    _acts_in_a_range,
+    _fit_table,
+    _found,
+    _whiteness,
+)
 from fish_train.reports.verdict_sentence import sentence
 
 
@@ -20,11 +29,11 @@ def effect(name: str, parameters: dict[str, tuple[float, float]], rivals=()) -> 
     }
 
 
-def content(*effects: dict, links: int = 3) -> dict:
+def content(*effects: dict, links: int = 3, held=("trial_02",)) -> dict:
     return {
         "verdict": "missing_physics",
         "effects": list(effects),
-        "fit": {"tail_links": {"given": 3, "used": links}},
+        "fit": {"tail_links": {"given": 3, "used": links}, "held_out_trials": list(held)},
     }
 
 
@@ -64,6 +73,77 @@ def test_what_no_name_explains_is_told_with_the_names_that_would_help(nearest, t
     assert sentence({**content(), "verdict": "unexplained", "unexplained": left}) == told
 
 
+def nothing_found(tried, **options) -> str:
+    ranking = [{"name": name} for name in tried]
+    return sentence({**content(**options), "verdict": "no_mismatch", "ranking": ranking})
+
+
+def test_that_nothing_is_missing_is_said_only_where_every_name_was_tried():
+    told = "no_mismatch: with refitted parameters "
+    everything = candidates()
+    many = len(everything)
+    assert nothing_found(everything) == told + "the model explains these recordings; nothing is missing."
+    assert nothing_found(everything[:3]) == (
+        f"{told}none of the 3 candidates tried (of {many}) is needed; of the others nothing is known."
+    )
+    assert nothing_found(["current"]) == (
+        f"{told}current, the one candidate tried (of {many}), is not needed; of the others nothing is known."
+    )
+
+
+def test_that_no_trial_could_be_held_out_is_said():
+    assert nothing_found(["current"], held=()).endswith(
+        " With fewer than three trials nothing could be held out."
+    )
+
+
+@pytest.mark.parametrize(
+    ("dof", "told"),
+    [
+        (
+            {"surge": 0.01, "sway": 0.4, "yaw": 0.59},
+            "Of the force that was missing without it (variance over that of the water's) acts "
+            "1% in surge, 40% in sway, 59% in yaw.",
+        ),
+        ({"surge": 0.0, "sway": 0.0, "yaw": 0.0}, "No force was missing without it."),
+    ],
+)
+def test_shares_are_of_the_force_that_was_missing(dof, told):
+    found = effect("quadratic_drag", {"surge": (0.6, 0.06)})
+    assert told in _found({**found, "equation": "X = -c |u| u", "where": {"dof": dof}}).note
+
+
+@pytest.mark.parametrize(
+    ("acts_s", "f1", "shown"),
+    [
+        (2.0, 0.93, True),  # near a wall
+        (5.0, 0.845, False),  # the drag of the example, everywhere: where it is swum fast
+        (5.0, 0.96, True),
+        (9.0, 0.99, False),  # nearly always
+        (2.0, 0.5, False),  # now and then, and no covariate tells when
+        (10.0, 1.0, False),  # always
+    ],
+)
+def test_when_an_effect_acts_is_shown_where_a_range_tells_it(acts_s, f1, shown):
+    where = {
+        "time": [{"trial": "a", "from": 1.0, "to": 1.0 + acts_s, "share": 1.0}],
+        "covariates": [{"name": "x", "range": [-0.6, 1.0], "f1": f1}],
+    }
+    wrench = np.full((1500, 1, 3), np.nan)
+    wrench[:1000] = 0.1  # 10 s, what follows is beyond the trial's end
+    diagnosis = SimpleNamespace(pushes={"drag": MissingForce(("a",), wrench, wrench, {})})
+    assert _acts_in_a_range({"name": "drag", "where": where}, diagnosis) is shown
+    assert not _acts_in_a_range({"name": "camera_latency", "where": where}, diagnosis)  # does not push
+
+
+def test_nats_and_p_values_are_explained():
+    p = {"before": {"gyro": 0.001}, "after": {"gyro": 0.4}}
+    table = _whiteness({"fit": {"residual_whiteness_p": p}})
+    assert list(table.header) == ["row", "p before", "p after"] and table.rows == [["gyro", "0.001", "0.4"]]
+    assert "Below 0.05 something is left" in table.note
+    assert NAT in EVIDENCE_NOTE and "unit of log-likelihood" in NAT
+
+
 def test_bins_of_a_rudder_that_stays_at_its_stop_hold_means_and_no_zeros():
     random = np.random.default_rng(0)
     rudder = np.clip(random.normal(0.0, 1.0, 2000), -0.5, 0.5)
@@ -101,4 +181,4 @@ def test_errors_are_said_to_be_of_held_out_trials_only_where_some_were(held, int
     split = SimpleNamespace(held_out=held)
     table = _fit_table({"fit": fit}, Diagnosis.unseen_are.fget(SimpleNamespace(split=split)))
     assert title in table.title and ("held-out" in table.title) is bool(held)
-    assert table.note.endswith(gain)
+    assert table.note.endswith(gain) and NAT in table.note

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import recording_samples as samples
 
+from fish_control.excitation import LAST_ROW
 from fish_train.commands import main as command
 from fish_train.commands.verbs import VERBS
 
@@ -83,6 +84,37 @@ def test_inspect_prints_and_plots(tmp_path, capsys):
     html = page.read_text()
     assert "a: path in the pool" in html and "1 gaps, longest 1.010 s" in html
     assert "<script src=" not in html and "Plotly.newPlot" in html
+
+
+def test_inspect_of_the_folder_one_is_in_is_called_after_it(tmp_path, monkeypatch):
+    (tmp_path / "set").mkdir()
+    samples.robot_recording(tmp_path / "set" / "a")
+    monkeypatch.chdir(tmp_path / "set")
+    assert command.main(["inspect", "."]) == 0
+    assert "<h1>Recording set</h1>" in Path("inspect_set.html").read_text()
+
+
+def test_scores_of_two_recordings_are_pages_of_their_own(tmp_path, monkeypatch):
+    (tmp_path / "report.html").write_text("a demo's")
+    for name in ("trial_1", "trial_2"):
+        samples.robot_recording(tmp_path / name)
+    assert command.main(["score", str(tmp_path / "trial_1")]) == 0
+    monkeypatch.chdir(tmp_path / "trial_2")
+    assert command.main(["score", "."]) == 0
+    for name in ("trial_1", "trial_2"):
+        assert f"<h1>Run {name}</h1>" in (tmp_path / f"score_{name}.html").read_text()
+    assert (tmp_path / "report.html").read_text() == "a demo's"
+
+
+def test_excite_says_how_long_the_last_row_lasts(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        command.main(["excite", "--help"])
+    assert f"the last row lasts {LAST_ROW:g} s" in " ".join(capsys.readouterr().out.split())
+    program = tmp_path / "program.yaml"
+    program.write_text("- {t: 7, amplitude: 5, frequency: 2, rudder: 0}")
+    assert command.main(["excite", str(program), "--begin", "50"]) == 1
+    expected = "expected 0 to 12 s: the program lasts 15 s (8 s from its last row on), a swim at least 3 s"
+    assert expected in capsys.readouterr().err
 
 
 def test_inspect_without_page(tmp_path, capsys, monkeypatch):

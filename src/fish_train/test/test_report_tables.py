@@ -40,6 +40,14 @@ def test_prediction_errors_are_in_millimetres_and_milliradians() -> None:
     ]
     assert table.rows[0] == ["physics, identified", "12.3", "45", "6.7", "200", "", "30", "9 / 1"]
     assert table.rows[1][0] == "linear ARX, with 0.5 s of what comes"
+    assert " after 1 and 5 s, " in table.note and "which the baselines are usually given" in table.note
+
+
+def test_the_caption_of_predictions_speaks_of_nothing_that_is_not_there() -> None:
+    sizes = ErrorSizes((2.0,), np.ones((1, 3)), np.zeros((2, 1, 3)), np.ones((2, 1)))
+    note = error_table({"model": sizes}).note
+    assert " after 2 s, " in note and "starts from what was measured before." in note
+    assert "below" not in note and "baselines" not in note
 
 
 def test_parameters_stand_beside_their_errors_their_start_and_whether_they_are_known() -> None:

@@ -64,6 +64,21 @@ def test_camera_computer_with_another_clock(tmp_path):
     np.testing.assert_allclose(trial.camera.t, np.arange(0.005, 5, 1 / 30) + shortest, atol=1e-6)
 
 
+def test_a_simulation_has_one_clock_however_unsteady(tmp_path):
+    """Simulated time that waits for a busy computer: the camera's stamps are no other clock's that drifts in its own way."""
+    rng = np.random.default_rng(1)
+    messages = []
+    for arrival_ns, topic, message in samples.robot_messages(10.0):
+        t = (arrival_ns - samples.START_NS) * 1e-9
+        wall = t + 0.2 * t**1.5 + rng.exponential(0.0005)
+        messages.append((samples.START_NS + round(1e9 * wall), topic, message))
+    truth = [(a, "/fish/sim/odometry", samples.build.odometry(samples.ns(0.01 * i), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+             for i, a in enumerate(np.linspace(messages[0][0], messages[-1][0], 1000).astype(int).tolist())]  # fmt: skip
+    trial = read_trial(samples.write_mcap(tmp_path / "a", sorted(messages + truth, key=lambda m: m[0])))
+    assert [clock.clock for clock in trial.clocks] == ["robot"]
+    np.testing.assert_allclose(trial.camera.t - trial.imu.t[0], np.arange(0.005, 10, 1 / 30), atol=1e-6)
+
+
 @pytest.mark.parametrize("factor", [0.5, 3.0])
 def test_simulation_time_against_wall_time(tmp_path, factor):
     """A simulation that runs at another speed than the wall clock is read in simulation time."""

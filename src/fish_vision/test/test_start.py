@@ -2,12 +2,14 @@
 
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 import rclpy
 from rclpy.node import Node
 from std_msgs.msg import Header
 
+from fish_vision.nodes import entry
 from fish_vision.nodes.start import read_parameters, run
 
 pytestmark = pytest.mark.ros
@@ -58,7 +60,7 @@ class Mistaken(Node):
 def read(*overrides: str) -> Config:
     arguments = ["--ros-args"] + [a for text in overrides for a in ("-p", text)]
     rclpy.init(args=arguments)
-    node = Node("reader")
+    node = Node("reader", automatically_declare_parameters_from_overrides=True)
     try:
         return read_parameters(node, Config)
     finally:
@@ -78,6 +80,14 @@ def test_parameters_come_from_the_dataclass_and_the_command_line() -> None:
 def test_a_value_of_the_wrong_type_is_refused_with_its_name(override: str) -> None:
     with pytest.raises(ValueError, match=override.split(":")[0]):
         read(override)
+
+
+def test_an_unknown_name_is_refused_and_the_nearest_suggested() -> None:
+    assert read("use_sim_time:=false", "qos_overrides./h.publisher.depth:=3", "count:=5").count == 5
+    with pytest.raises(
+        ValueError, match=r"^unknown parameter cuont, x \(did you mean count\?\); known: count, name"
+    ):
+        read("cuont:=5", "x:=1", "rate:=2.0")
 
 
 def test_a_callback_that_meets_the_end_is_no_error() -> None:
@@ -110,3 +120,16 @@ def test_refused_parameters_give_one_line_and_1(capsys: pytest.CaptureFixture[st
 
     assert run(refuse, "node") == 1
     assert capsys.readouterr().err == "node: rate = -1: expected a positive number\n"
+
+
+@pytest.mark.parametrize("flag", ["-h", "--help"])
+@pytest.mark.parametrize("name", ["tracker"])
+def test_help_says_what_a_node_is_and_starts_nothing(
+    name: str, flag: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", [name, flag])
+    monkeypatch.setattr(rclpy, "init", lambda *_, **__: pytest.fail("started"))
+    assert getattr(entry, name)() == 0
+    usage, what, parameters = capsys.readouterr().out.splitlines()
+    assert usage.startswith(f"usage: {name} ") and what
+    assert Path(parameters.split(": ")[1]).name == f"{name}.yaml" and Path(parameters.split(": ")[1]).exists()

@@ -181,7 +181,9 @@ def test_bad_images_are_said_and_the_next_good_one_is_tracked(bench: Bench) -> N
     assert bench.tracker._statistics.refused == {"no calibration": 1, "bad image": 3}
 
 
-def test_bad_calibrations_are_said_and_a_good_one_mends_it(bench: Bench) -> None:
+def test_bad_calibrations_are_said_and_a_good_one_mends_it(
+    bench: Bench, capfd: pytest.CaptureFixture[str]
+) -> None:
     for changes, text in (
         ({"k": [0.0] * 9}, "not calibrated"),
         (
@@ -194,13 +196,20 @@ def test_bad_calibrations_are_said_and_a_good_one_mends_it(bench: Bench) -> None
         bench.send_info(**changes)
         assert bench.says(text)
         assert bench.got["diagnostics"][-1].status[0].level == DiagnosticStatus.ERROR
+    said = [line for line in capfd.readouterr().err.splitlines() if "not calibrated" in line]
+    assert len(said) == 1 and "[ERROR]" in said[0]  # on the console too, and once
     bench.send_info()
     bench.send_jpeg(to_jpeg(PICTURE, 95))
     assert bench.spin_until(lambda: bool(bench.got["pose"]))
 
 
 def test_bad_parameters_are_refused_with_their_name() -> None:
-    for name, value in (("area_min", 5.0), ("front_colour", [1, 2, 3]), ("camera_tilt", "flat")):
+    for name, value in (
+        ("area_min", 5.0),
+        ("front_colour", [1, 2, 3]),
+        ("camera_tilt", "flat"),
+        ("area_mni", 1.0),
+    ):
         with pytest.raises(ValueError, match=name):
             Bench({name: value})
         rclpy.try_shutdown()

@@ -13,7 +13,6 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
@@ -30,13 +29,13 @@ from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
-    diagnostics,
     estimate_signs,
     joint_command,
     motion_of,
     seconds,
     yaw_of,
 )
+from fish_control.nodes.reporter import Reporter
 from fish_control.nodes.start import read_parameters, run
 from fish_control.watchdog import Signs, Watchdog, loss
 
@@ -45,7 +44,9 @@ class ControllerNode(Node):
     """Topics in and out of Controller."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("controller", namespace="fish", **options)
+        super().__init__(
+            "controller", namespace="fish", automatically_declare_parameters_from_overrides=True, **options
+        )
         self._config = config = read_parameters(self, ControllerConfig)
         file = config.weights_file or installed_weights()
         policy = read_gains_file(file)
@@ -64,7 +65,7 @@ class ControllerNode(Node):
     def _create_interfaces(self) -> None:
         self._command = self.create_publisher(JointState, "joint_command", 10)
         self._gains = self.create_publisher(Float64MultiArray, "control/gains", 10)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._reporter = Reporter(self, self._command)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_subscription(TwistStamped, "control/twist", self._on_twist, 10)
         self.create_subscription(Vector3Stamped, "tracking/error", self._on_error, 10)
@@ -137,8 +138,7 @@ class ControllerNode(Node):
         delays = self._latency.percentiles()
         if delays is not None:
             values["latency_p50_ms"], values["latency_p99_ms"] = (f"{1e3 * delay:.1f}" for delay in delays)
-        now = self.get_clock().now().to_msg()
-        self._diagnostics.publish(diagnostics(now, self.get_fully_qualified_name(), level, message, values))
+        self._reporter.report(level, message, values)
 
 
 def installed_weights() -> str:

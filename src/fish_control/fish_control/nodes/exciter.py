@@ -10,7 +10,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -23,11 +22,11 @@ from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
-    diagnostics,
     estimate_signs,
     joint_command,
     motion_of,
 )
+from fish_control.nodes.reporter import Reporter
 from fish_control.nodes.start import read_parameters, run
 
 LEVELS: dict[State, bytes] = {"waiting": WARN, "before a wall": WARN, "lost": ERROR}  # the others are well
@@ -37,7 +36,9 @@ class ExciterNode(Node):
     """Topics in and out of Exciter."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("exciter", namespace="fish", **options)
+        super().__init__(
+            "exciter", namespace="fish", automatically_declare_parameters_from_overrides=True, **options
+        )
         config = read_parameters(self, ExciterConfig)
         if not config.program_file:
             raise ValueError(
@@ -50,7 +51,7 @@ class ExciterNode(Node):
         self._now = math.nan
         self._said: State | None = None
         self._command = self.create_publisher(JointState, "joint_command", 10)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._reporter = Reporter(self, self._command)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_timer(1.0 / config.command_rate_hz, self._tick)
         self.create_timer(1.0, self._report)
@@ -74,14 +75,12 @@ class ExciterNode(Node):
 
     def _report(self) -> None:
         self._said = self._exciter.state
-        now = self.get_clock().now().to_msg()
         values: dict[str, object] = {
             "time_s": f"{self._excitation.time:.2f}",
             "end_s": f"{self._excitation.end:.2f}",
             "over": str(self._excitation.over).lower(),
         }
-        name, level = self.get_fully_qualified_name(), LEVELS.get(self._said, OK)
-        self._diagnostics.publish(diagnostics(now, name, level, self._exciter.reason, values))
+        self._reporter.report(LEVELS.get(self._said, OK), self._exciter.reason, values)
 
 
 def main() -> None:

@@ -7,7 +7,6 @@ pool -> base_link is broadcast where tf2_msgs is installed. Decisions are in Fus
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
@@ -19,7 +18,6 @@ from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
-    diagnostics,
     planar_covariance,
     seconds,
     to_covariance,
@@ -27,6 +25,7 @@ from fish_control.nodes.messages import (
     to_stamp,
     yaw_of,
 )
+from fish_control.nodes.reporter import Reporter
 from fish_control.nodes.start import read_parameters, run
 
 try:
@@ -41,11 +40,13 @@ class FusionNode(Node):
     """Topics in and out of Fusion."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("fusion", namespace="fish", **options)
+        super().__init__(
+            "fusion", namespace="fish", automatically_declare_parameters_from_overrides=True, **options
+        )
         self._fusion = Fusion(read_parameters(self, FusionConfig))
         self._odometry = self.create_publisher(Odometry, "odometry/filtered", 10)
         self._transform = self.create_publisher(TFMessage, "/tf", 10) if TFMessage else None
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._reporter = Reporter(self, self._odometry)
         self.create_subscription(Imu, "imu/data", self._on_imu, SENSORS)
         self.create_subscription(PoseWithCovarianceStamped, "camera/pose", self._on_pose, SENSORS)
         self.create_timer(1.0, lambda: self._report(self._estimate()))
@@ -99,8 +100,7 @@ class FusionNode(Node):
         if estimate is not None:
             values["gyro_bias_rad_s"] = f"{estimate.gyro_bias:.5f}"
             values["position_std_m"] = f"{np.sqrt(estimate.pose_covariance[0, 0]):.4f}"
-        now, name = self.get_clock().now().to_msg(), self.get_fully_qualified_name()
-        self._diagnostics.publish(diagnostics(now, name, level, self._said, values))
+        self._reporter.report(level, self._said, values)
 
 
 def to_odometry(estimate: Estimate) -> Odometry:

@@ -15,7 +15,6 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
@@ -28,12 +27,12 @@ from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
-    diagnostics,
     estimate_signs,
     motion_of,
     seconds,
     to_quaternion,
 )
+from fish_control.nodes.reporter import Reporter
 from fish_control.nodes.start import read_parameters, run
 from fish_control.paths import make_path, read_arguments
 from fish_control.planner import Plan, Planner
@@ -50,13 +49,15 @@ class PlannerNode(Node):
     """Topics in and out of Planner."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("planner", namespace="fish", **options)
+        super().__init__(
+            "planner", namespace="fish", automatically_declare_parameters_from_overrides=True, **options
+        )
         self._config = config = read_parameters(self, PlannerConfig)
         self._target = self.create_publisher(PoseStamped, "control/target", 10)
         self._twist = self.create_publisher(TwistStamped, "control/twist", 10)
         self._error = self.create_publisher(Vector3Stamped, "tracking/error", 10)
         self._speed = self.create_publisher(Float64, "reference/speed", LATCHED)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._reporter = Reporter(self, self._target)
         self._progress = ProgressFile(FilePath(config.state_file or default_state_file(self.get_namespace())))
         self._planner: Planner | None = None
         self._plan: Plan | None = None
@@ -165,8 +166,7 @@ class PlannerNode(Node):
         problem = self._problem or self._progress.problem
         if problem:
             level, message = ERROR, problem
-        now = self.get_clock().now().to_msg()
-        self._diagnostics.publish(diagnostics(now, self.get_fully_qualified_name(), level, message, values))
+        self._reporter.report(level, message, values)
 
 
 def configured_path(config: PlannerConfig) -> ReferencePath:

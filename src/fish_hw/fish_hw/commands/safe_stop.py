@@ -7,6 +7,7 @@ and go on with the last pulse.
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from fish_hw.devices.rudder_driver import RudderDriver
@@ -24,7 +25,7 @@ def stop_rotor(path: Path) -> None:
 
     An emulator has nothing to stop.
     """
-    settings = read_parameter_file(path, RotorSettings)
+    settings = read_parameter_file(path, RotorSettings, partial(_warn, "rotor"))
     if settings.port == "emulator":
         return
     port = SerialPort(settings.port, settings.baud)
@@ -39,12 +40,17 @@ def stop_rudder(path: Path) -> None:
 
     An emulator has nothing to stop.
     """
-    settings = read_parameter_file(path, RudderSettings)
+    settings = read_parameter_file(path, RudderSettings, partial(_warn, "rudder"))
     if settings.backend == "emulator":
         return
     driver = RudderDriver(settings, lambda: open_output(settings))
     driver.connect()  # this centres
     driver.close()
+
+
+def _warn(device: str, text: str) -> None:
+    """A mistake that must not keep the robot from being stopped, least of all after a crash."""
+    print(f"safe_stop: {device}: {text}; stopping it all the same", file=sys.stderr)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

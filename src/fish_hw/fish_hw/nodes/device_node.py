@@ -20,6 +20,7 @@ from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.status import WARN, Status
 from fish_hw.nodes.parameters import read_settings
+from fish_hw.nodes.status_log import StatusLog
 from fish_hw.nodes.worker import Worker
 from fish_hw.transport.errors import TransportError
 
@@ -59,7 +60,7 @@ class DeviceNode(Node):
     """
 
     def __init__(self, name: str, settings_class: type[Any]) -> None:
-        super().__init__(name, namespace=NAMESPACE)
+        super().__init__(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
         self.settings = read_settings(self, settings_class)
         self.failure = ""
         self._device: Device | None = None
@@ -67,6 +68,7 @@ class DeviceNode(Node):
         self._worker: Worker | None = None
         self._give_up_s = time.monotonic() + self.settings.startup_timeout_s
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._log = StatusLog(self.get_logger())
         self.create_timer(1.0, self._on_diagnostics)
 
     def start(self, device: Device, step: Callable[[], None], period_s: float, emulated: bool) -> None:
@@ -145,6 +147,7 @@ class DeviceNode(Node):
         status = self._device.status()
         if self._emulated:  # nobody should go to the pool with it
             status = Status(max(status.level, WARN), f"{status.message} (emulated device)", status.values)
+        self._log.say(bytes([status.level]), status.message)
         message = DiagnosticArray()
         message.header.stamp = self.get_clock().now().to_msg()
         message.status = [

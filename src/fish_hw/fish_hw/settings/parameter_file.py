@@ -1,21 +1,22 @@
 """Settings from a ROS parameter file, for commands that run without ROS."""
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
 
-from fish_hw.settings.checks import in_type_of
+from fish_hw.settings.checks import in_type_of, unknown_names
 
 Settings = TypeVar("Settings")
 
 
-def read_parameter_file(path: Path, settings_class: type[Settings]) -> Settings:
-    """Settings of the first entry's ros__parameters.
+def read_parameter_file(path: Path, settings_class: type[Settings], warn: Callable[[str], None]) -> Settings:
+    """Settings of the first entry's ros__parameters; parameters that are unknown are said to `warn` and left out.
 
     Raises:
-        ValueError: unreadable file, unknown parameter or refused value; names the file.
+        ValueError: unreadable file or refused value; names the file.
     """
     try:
         document: Any = yaml.safe_load(path.read_text())
@@ -25,11 +26,11 @@ def read_parameter_file(path: Path, settings_class: type[Settings]) -> Settings:
     if parameters is None:
         raise ValueError(f"{path}: expected a node name with ros__parameters below it")
     defaults = asdict(settings_class())  # type: ignore[call-overload]
-    unknown = sorted(str(name) for name in set(parameters) - set(defaults))
-    if unknown:
-        raise ValueError(f"{path}: unknown {', '.join(unknown)}; known: {', '.join(sorted(defaults))}")
+    if unknown := unknown_names(parameters, defaults):
+        warn(f"{path}: {unknown}")
+    known = {name: value for name, value in parameters.items() if name in defaults}
     try:
-        values = {name: in_type_of(defaults[name], value, name) for name, value in parameters.items()}
+        values = {name: in_type_of(defaults[name], value, name) for name, value in known.items()}
         return settings_class(**values)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error

@@ -25,6 +25,7 @@ from fish_sim.camera.fish import FishPose
 from fish_sim.camera.renderer import PoolRenderer
 from fish_sim.camera.timing import FrameClock, History
 from fish_sim.nodes.start import read_parameters, run
+from fish_sim.nodes.status_log import StatusLog
 
 QUEUE = 10
 BLUR_STEP = 0.002  # s of exposure per drawn pose
@@ -45,7 +46,7 @@ class CameraNode(Node):
     """Draws the fish where the simulation says it was and sends the picture as late as a camera would."""
 
     def __init__(self) -> None:
-        super().__init__("camera", namespace="fish")
+        super().__init__("camera", namespace="fish", automatically_declare_parameters_from_overrides=True)
         self._config = config = read_parameters(self, CameraConfig)
         self._renderer = PoolRenderer(config.model(), config.shape(), config.look())
         self._random = np.random.default_rng(config.seed + 1)
@@ -58,6 +59,7 @@ class CameraNode(Node):
         self._raw = self.create_publisher(Image, "camera/image_raw", QUEUE) if config.publish_raw else None
         self._info = self.create_publisher(CameraInfo, "camera/camera_info", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
+        self._log = StatusLog(self.get_logger())
         self.create_subscription(JointState, "sim/joint_states", self._on_joints, QUEUE)
         self.create_subscription(Odometry, "sim/odometry", self._on_odometry, QUEUE)
         self._release = self.create_timer(1.0, self._send_due)  # armed for each frame
@@ -154,6 +156,7 @@ class CameraNode(Node):
             )
         elif rate == 0:
             status.level, status.message = DiagnosticStatus.WARN, "no frame in the last second"
+        self._log.say(status.level, status.message)
         counts = {"frames_per_second": rate, "sent": self._sent, "dropped": self._dropped}
         counts["skipped"] = self._clock_of_frames.skipped
         status.values = [KeyValue(key=key, value=str(value)) for key, value in counts.items()]

@@ -30,7 +30,9 @@ from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.lockstep import Lockstep
 from fish_sim.nodes.pacer import Pacer
+from fish_sim.nodes.rivals import Rivals
 from fish_sim.nodes.start import read_parameters, run
+from fish_sim.nodes.status_log import StatusLog
 from fish_sim.robot import Robot, load_robot
 from fish_sim.simulation import Readings, Simulation
 from fish_sim.simulation_config import SimulatorConfig
@@ -43,7 +45,7 @@ class SimulatorNode(Node):
     """Messages in and out; physics and sensors are in Simulation, the pace in Pacer."""
 
     def __init__(self) -> None:
-        super().__init__("simulator", namespace="fish")
+        super().__init__("simulator", namespace="fish", automatically_declare_parameters_from_overrides=True)
         self._config = config = read_parameters(self, SimulatorConfig)
         robot = load_robot(config.robot_file) if config.robot_file else Robot()
         if idle := config.idle_sensors(robot.sensors):
@@ -77,6 +79,8 @@ class SimulatorNode(Node):
         self._tail = self.create_publisher(JointState, "sim/joint_states", QUEUE)
         self._battery = self.create_publisher(BatteryState, "battery_state", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
+        self._log = StatusLog(self.get_logger())
+        self._rivals = Rivals(self._odometry.topic_name, self.count_publishers, self.get_logger().warning)
         self._camera = (
             self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE) if camera_pose else None
         )
@@ -119,6 +123,8 @@ class SimulatorNode(Node):
             return
         if not self._lockstep.may_advance(self._simulation.time, time.monotonic()):
             self._restart_pace()
+            # who missed the newest message, which nobody sends again, would wait for the time that waits for it
+            self._clock_publisher.publish(ClockMessage(clock=self._stamp(self._simulation.time)))
             return
         lost = self._pacer.lost
         periods = self._pacer.due(time.monotonic())
@@ -163,6 +169,9 @@ class SimulatorNode(Node):
         self._reported = (now, simulated, lost)
         pace = (simulated - simulated_then) / (now - then)
         level, text = self._judge(pace, lost - lost_then)
+        self._log.say(level, text)
+        if warning := self._rivals.warning():
+            level, text = max(level, DiagnosticStatus.WARN), f"{text}; {warning}"
         values = {
             "real_time_factor": f"{pace:.3f}",
             "simulated_s": f"{simulated:.2f}",

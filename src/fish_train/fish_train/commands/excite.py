@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from fish_control.excitation import Program, read_program
+from fish_control.excitation import LAST_ROW, Program, read_program
 from fish_sim.robot import Robot
 from fish_train.bringup import EXCITER, RECORDER, ROBOTS, SIMULATED, NodeSpec, open_loop
 from fish_train.commands.inputs import read_model, terminal, user_errors
@@ -32,11 +32,16 @@ from fish_train.swim import Robot as Running
 
 SIMULATOR, CAMERA = SIMULATED
 EXCITER_NAME = "fish/exciter"
+PATIENCE = 2.0  # s that simulated time waits for a node
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("program", type=Path, help="diagnosis.json, or a JSON or YAML file of rows")
+    parser.add_argument(
+        "program",
+        type=Path,
+        help=f"diagnosis.json, or a JSON or YAML file of rows; the last row lasts {LAST_ROW:g} s",
+    )
     parser.add_argument("--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims")
     parser.add_argument("--begin", type=float, default=0.0, help="s of the program's time to begin at (0)")
     parser.add_argument("--plan", action="store_true", help="only list the swims and where the fish is put")
@@ -50,7 +55,10 @@ def run(args: argparse.Namespace) -> int:
     with user_errors():
         program = read_program(args.program)
         if not 0.0 <= args.begin <= program.duration - SHORTEST:
-            raise UserError(f"begin is {args.begin:g} s, expected 0 to {program.duration - SHORTEST:g} s")
+            raise UserError(
+                f"begin is {args.begin:g} s, expected 0 to {program.duration - SHORTEST:g} s: the program lasts "
+                f"{program.duration:g} s ({LAST_ROW:g} s from its last row on), a swim at least {SHORTEST:g} s"
+            )
         if args.plan:
             print_table(terminal(), plan_table(excursions(program, robot, args.begin)))
             return 0
@@ -104,15 +112,20 @@ def _swim_all(
 def parameters(
     args: argparse.Namespace, swim: Excursion, folder: Path, name: str
 ) -> dict[NodeSpec, dict[str, object]]:
-    """What one swim changes in the nodes' parameter files."""
+    """What one swim changes in the nodes' parameter files.
+
+    All follow the simulator's clock, which waits for them: a command acts from its stamp on, however busy the computer is. With
+    clocks of their own it acts at the simulator's next step, which in a recording is a late rudder.
+    """
     start: dict[str, object] = {"start_x": swim.x, "start_y": swim.y, "start_heading": swim.heading}
     if args.robot:
         start["robot_file"] = str(args.robot.resolve())
-    return {
-        SIMULATOR: start,
+    changed: dict[NodeSpec, dict[str, object]] = {
+        SIMULATOR: {**start, "lockstep": PATIENCE},
         EXCITER: {"program_file": str(args.program.resolve()), "begin": swim.begin, "end": swim.end},
         RECORDER: {"output": str((folder / "recordings").resolve()), "name": name},
     }
+    return {spec: {"use_sim_time": True, **changed.get(spec, {})} for spec in open_loop(ROBOTS["sim"])}
 
 
 def _swim(

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from fish_train.commands.named_path import named_path
+
 if TYPE_CHECKING:
     from fish_train.recordings.topic_map import TopicMap
     from fish_train.reports.page import Table as Sheet
@@ -31,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.recordings import read_dataset
     from fish_train.reports.recording_tables import problems_table, tables, trials_table
 
-    data = read_dataset(args.recording, _topic_map(args), progress=True)
+    data = read_dataset(named_path(args.recording), _topic_map(args), progress=True)
     console = Console()
     if not console.is_terminal:
         console.width = FILE_WIDTH

@@ -59,7 +59,7 @@ def next_experiment(found: list[str], rivals: list[str], grows_with: str | None 
     names = rivals or found
     if not names and grows_with is None:
         why, program = (
-            "nothing is missing; to see more, swim faster than these data do: " + STRAIGHT_STEPS[0],
+            "nothing was found missing; to see more, swim faster than these data do: " + STRAIGHT_STEPS[0],
             STRAIGHT_STEPS[1],
         )
     elif not names:

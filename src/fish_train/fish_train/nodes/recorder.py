@@ -31,7 +31,7 @@ class RecorderNode(Node):
     """Finds topics, subscribes raw, hands bytes to a McapRecording."""
 
     def __init__(self) -> None:
-        super().__init__("recorder", namespace="fish")
+        super().__init__("recorder", namespace="fish", automatically_declare_parameters_from_overrides=True)
         self._config = read_parameters(self, RecorderConfig)
         directory = self._config.directory(datetime.now())
         custom = {"robot": self._config.robot} if self._config.robot else {}

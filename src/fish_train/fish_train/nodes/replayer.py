@@ -34,7 +34,7 @@ class ReplayerNode(Node):
     """Publishes what a Playback says is due."""
 
     def __init__(self) -> None:
-        super().__init__("replayer", namespace="fish")
+        super().__init__("replayer", namespace="fish", automatically_declare_parameters_from_overrides=True)
         config = read_parameters(self, ReplayerConfig)
         self._playback = Playback(config, self.get_namespace())
         self._loop, self._sent, self._rounds, self._latest_ns = config.loop, 0, 0, 0

@@ -15,7 +15,7 @@ from .namespace import find_namespace, full_name
 from .problem import Problem, RecordingError
 from .streams import Decoded, decode_paths, decode_topic, stamps_of_prefixes
 from .summary import summarise
-from .time_axis import Stamps, TimeAxis, build_axis
+from .time_axis import MASTER, Stamps, TimeAxis, build_axis
 from .topic_map import TopicMap, TopicRule
 from .trial import ReferencePath, Stream, TopicSummary, Trial
 
@@ -57,6 +57,8 @@ class _Assembly:
             self.namespace = find_namespace(names, topics) if found is None else found
         except RecordingError as error:
             raise RecordingError(f"{bag.path}: {error}") from error
+        truth = topics.rules.get("truth")  # where a simulator speaks, all stamps are of its clock
+        self.simulated = truth is not None and full_name(self.namespace, truth.topic) in names
 
     def trial(self) -> Trial:
         mapped = self.decode()
@@ -128,7 +130,8 @@ class _Assembly:
             text = f"all {len(decoded.stamp_ns)} stamps are the same; times of arrival are used"
             self.problems.append(Problem("warning", "no_stamps", decoded.topic, text))
             return None
-        return Stamps(decoded.topic, rule.clock, decoded.stamp_ns, decoded.arrival_ns)
+        clock = MASTER if self.simulated else rule.clock
+        return Stamps(decoded.topic, clock, decoded.stamp_ns, decoded.arrival_ns)
 
     def stream(self, role: str, mapped: _Mapped, axis: TimeAxis) -> Stream:
         decoded, rule, stamps = mapped.decoded, mapped.rule, mapped.stamps

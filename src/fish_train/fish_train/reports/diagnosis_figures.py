@@ -18,13 +18,15 @@ from fish_sim.effects.effect import Effect, Flow
 from fish_sim.model import DT
 from fish_sim.pool import LENGTH, WIDTH
 from fish_train.diagnose.diagnosis import Diagnosis
-from fish_train.diagnose.locate import DOFS
+from fish_train.diagnose.locate import DOFS, MissingForce
 from fish_train.diagnose.own_force import ACTIVE
 from fish_train.reports.page import Figure, styled
 
 COLOURS = {"surge": "#5b6bd6", "sway": "#1fa774", "yaw": "#e07b39"}
 SHOWN = 4000  # points of a scatter
 BINS = 15  # of a covariate, about equally full
+NOT_ALWAYS = 0.75  # share of the time: an effect that acts for longer may be said to act all the time
+MISTAKEN = 1 / 3  # of what F1 lacks where an effect is said to act all the time
 Content = dict[str, Any]
 Array = NDArray[np.float64]
 
@@ -119,6 +121,20 @@ def water_over_the_pool(effect: Content, d: Diagnosis) -> Figure:
     )
     note = f"longest arrow: {fastest:.3g} m/s; where the fish never was (no grey) the arrows only continue what it met"
     return Figure(f"The water with {effect['name']}", _in_pool(figure), note)
+
+
+def tells_when(where: Content, push: MissingForce) -> bool:
+    """Whether an effect acts part of the time, and the most telling range of a covariate really tells when; push: its force.
+
+    To say that it acts all the time has an F1 of 2 p / (1 + p), p the share of time in which it acts. A drag acts everywhere,
+    above the threshold of `acting` now and then, and a range of any covariate that holds most of the samples reaches about as
+    much. A range tells if it leaves less than MISTAKEN of what that F1 lacks.
+    """
+    seconds = DT * float(np.isfinite(push.wrench[..., 0]).sum())
+    p = sum(row["to"] - row["from"] for row in where["time"]) / seconds
+    always = 2.0 * p / (1.0 + p)
+    best = max((row["f1"] for row in where["covariates"]), default=0.0)
+    return bool(p < NOT_ALWAYS and 1.0 - best < MISTAKEN * (1.0 - always))
 
 
 def when_it_acts(effect: Content) -> Figure:

@@ -19,6 +19,7 @@ from fish_train.reports.diagnosis_figures import (
     force_over_time,
     moves_water,
     program,
+    tells_when,
     water_over_the_pool,
     when_it_acts,
 )
@@ -28,6 +29,7 @@ from fish_train.reports.verdict_sentence import sentence
 Content = dict[str, Any]
 
 DENSITY = "log_density_per_sample"
+NAT = "A nat is a unit of log-likelihood: by n nats more, what was measured is e^n times as probable."
 
 
 def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) -> None:
@@ -48,7 +50,7 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
         ),
         Figure("Missing force against covariates", force_against_covariates(d)),
         *(water_over_the_pool(entry, d) for entry in content["effects"] if moves_water(entry["name"])),
-        *(when_it_acts(entry) for entry in content["effects"] if entry["name"] in d.pushes),
+        *(when_it_acts(entry) for entry in content["effects"] if _acts_in_a_range(entry, d)),
         *_evidence(d),
         _whiteness(content),
         Text("Next experiment", content["next_experiment"]["why"]),
@@ -60,15 +62,31 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
     write_page(path, f"Diagnosis of {name}", sentence(content), blocks)
 
 
+def _acts_in_a_range(effect: Content, d: Diagnosis) -> bool:
+    """Whether an effect pushes, and by a range of a covariate can be told when."""
+    push = d.pushes.get(effect["name"])
+    return push is not None and tells_when(effect["where"], push)
+
+
 def _found(effect: Content) -> Table:
     """Equation, parameters, where it acts and what it could be mistaken for."""
     rows = [[k, f"{p['value']:.4g}", f"{p['std']:.2g}", p["unit"]] for k, p in effect["parameters"].items()]
-    shares = ", ".join(f"{share:.0%} in {dof}" for dof, share in effect["where"]["dof"].items())
     rivals = ", ".join(f"{r['name']} (probability {r['probability']:.2f})" for r in effect["rivals"])
-    note = f"{effect['equation']}. What it explains: {shares}. Could be mistaken for: {rivals or 'nothing else that was tried'}."
+    note = (
+        f"{effect['equation']}. {_explains(effect['where']['dof'])} "
+        f"Could be mistaken for: {rivals or 'nothing else that was tried'}."
+    )
     return Table(
         f"What is missing: {effect['name']}", ["parameter", "value", "standard error", "unit"], rows, note
     )
+
+
+def _explains(shares: Mapping[str, float]) -> str:
+    """How the force that was missing without an effect is shared among the degrees of freedom."""
+    if not any(shares.values()):
+        return "No force was missing without it."
+    parts = ", ".join(f"{share:.0%} in {dof}" for dof, share in shares.items())
+    return f"Of the force that was missing without it (variance over that of the water's) acts {parts}."
 
 
 def _fit_table(content: Content, trials: str) -> Table:
@@ -87,7 +105,7 @@ def _fit_table(content: Content, trials: str) -> Table:
     gain = f"{fit['with_effects'][DENSITY] - fit['refitted'][DENSITY]:.3f} nats per sample"
     spread = f", 95 % interval {low:.3f} to {high:.3f}" if np.isfinite(low) else ""
     held = ", ".join(fit["held_out_trials"]) or "none"
-    note = f"Held out: {held}. Gain of the effects over the refitted model: {gain}{spread}."
+    note = f"Held out: {held}. {NAT} Gain of the effects over the refitted model: {gain}{spread}."
     return Table(f"Prediction errors on {trials}, before and after", header, rows, note)
 
 
@@ -97,7 +115,7 @@ def _errors(rms: Mapping[str, float]) -> str:
 
 EVIDENCE_HEADER = ("name", "quick gain, nats", "refitted gain, nats", "parameters")
 EVIDENCE_NOTE = (
-    "Every candidate is fitted together with all nominal parameters and the noise; "
+    f"{NAT} Every candidate is fitted together with all nominal parameters and the noise; "
     "gains are over the refitted model, so what its parameters absorb does not count."
 )
 
@@ -121,14 +139,20 @@ def _evidence_row(found: Round, ranked: Ranked) -> list[str]:
     return [ranked.name, f"{ranked.gain:.0f}", f"{found.gain(ranked.name):.0f}", values]
 
 
+WHITENESS_NOTE = (
+    "p of the Ljung-Box test: how probable residuals are that repeat themselves as much as these over "
+    f"{LAGS} samples, were nothing but noise left in them; the worst trial's, times the number of trials (Bonferroni). "
+    "Below 0.05 something is left in a row; near 1 nothing is seen there. Before: refitted; after: with the effects."
+)
+
+
 def _whiteness(content: Content) -> Table:
     p = content["fit"]["residual_whiteness_p"]
     rows = [
         [name, f"{p['before'][name]:.3g}", f"{p['after'].get(name, float('nan')):.3g}"]
         for name in p["before"]
     ]
-    note = f"Ljung-Box over {LAGS} samples of each row, worst trial, Bonferroni. Small: something is left in the residuals."
-    return Table("Are the residuals white?", ["row", "before", "after"], rows, note)
+    return Table("Are the residuals white?", ["row", "p before", "p after"], rows, WHITENESS_NOTE)
 
 
 def _unreachable(d: Diagnosis) -> str:

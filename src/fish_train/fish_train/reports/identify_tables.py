@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -32,12 +32,23 @@ def error_table(errors: Mapping[str, ErrorSizes], title: str = "Prediction error
         ]
         for name, e in errors.items()
     ]
+    return Table(title, header, rows, _error_note(errors, horizons))
+
+
+def _error_note(errors: Mapping[str, ErrorSizes], horizons: Sequence[float]) -> str:
+    """What the columns and rows that are there mean."""
+    *most, last = (f"{h:g}" for h in horizons)
+    after = f"{', '.join(most)} and {last}" if most else last
     note = (
-        "Rms errors of position, heading and surge speed after 1, 2 and 5 s, averaged over strokes in measurement and "
-        f"prediction alike. All start from what was measured before; below the same with {PEEK:g} s of what comes: the "
+        f"Rms errors of position, heading and surge speed after {after} s, averaged over strokes in measurement and "
+        "prediction alike; last how many predictions they are of, at each horizon. "
+    )
+    if not any(name.endswith(AHEAD) for name in errors):
+        return note + "Every prediction starts from what was measured before."
+    return note + (
+        f"All start from what was measured before; below the same with {PEEK:g} s of what comes: the "
         "camera's stroke means at the start, which the baselines are usually given, and for the physics a smoothed state."
     )
-    return Table(title, header, rows, note)
 
 
 def _label(name: str) -> str:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
+from fish_train.diagnose.vocabulary import candidates
+
 Content = dict[str, Any]
 
 MOST_NUMBERS = 4  # of an effect, told one by one
 
 
 def sentence(content: Content) -> str:
-    """The verdict in one sentence, and in a second one whether the tail needed more links."""
-    links = content["fit"]["tail_links"]
-    if links["given"] == links["used"]:
-        return _verdict(content)
-    return f"{_verdict(content)} The tail is modelled with {links['used']} links instead of {links['given']}."
+    """The verdict in one sentence, and in further ones whether trials were held out and the tail needed more links."""
+    links, told = content["fit"]["tail_links"], [_verdict(content)]
+    if not content["fit"]["held_out_trials"]:
+        told.append("With fewer than three trials nothing could be held out.")
+    if links["given"] != links["used"]:
+        told.append(f"The tail is modelled with {links['used']} links instead of {links['given']}.")
+    return " ".join(told)
 
 
 def _verdict(content: Content) -> str:
@@ -25,7 +29,19 @@ def _verdict(content: Content) -> str:
         nearest = ", ".join(content["unexplained"]["nearest"])
         aside = f" Without explaining the most of it, {nearest} would help." if nearest else ""
         return f"unexplained: {content['unexplained']['description']}.{aside}"
-    return "no_mismatch: with refitted parameters the model explains these recordings; nothing is missing."
+    return f"no_mismatch: {_nothing_found([entry['name'] for entry in content['ranking']])}"
+
+
+def _nothing_found(tried: list[str]) -> str:
+    """Only where every name competed may it be said that nothing is missing: one that did not may be what is needed."""
+    everything = len(set(tried) | set(candidates()))
+    if len(tried) == everything:
+        return "with refitted parameters the model explains these recordings; nothing is missing."
+    if len(tried) == 1:
+        needed = f"{tried[0]}, the one candidate tried (of {everything}), is not needed"
+    else:
+        needed = f"none of the {len(tried)} candidates tried (of {everything}) is needed"
+    return f"with refitted parameters {needed}; of the others nothing is known."
 
 
 def _effect(effect: Content) -> str:

@@ -26,6 +26,7 @@ from fish_vision.calibration import Calibration, CalibrationError, Lens
 from fish_vision.config import TrackerConfig
 from fish_vision.nodes.heap import keep_freed_memory
 from fish_vision.nodes.start import read_parameters, run
+from fish_vision.nodes.status_log import StatusLog
 from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
 from fish_vision.statistics import Statistics
 from fish_vision.tracker import Detection, Tracker
@@ -40,7 +41,7 @@ class TrackerNode(Node):
     """Messages in and out; the work is in Tracker."""
 
     def __init__(self) -> None:
-        super().__init__("tracker", namespace="fish")
+        super().__init__("tracker", namespace="fish", automatically_declare_parameters_from_overrides=True)
         cv2.setNumThreads(1)  # one small region per image: more threads only take time from other nodes
         self._config = read_parameters(self, TrackerConfig)
         self._info: tuple[Any, ...] | None = None  # fields of the camera_info in use
@@ -55,6 +56,7 @@ class TrackerNode(Node):
         if self._config.debug_image:
             self._debug = self.create_publisher(CompressedImage, "camera/debug/compressed", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
+        self._log = StatusLog(self.get_logger())
         self.create_subscription(CameraInfo, "camera/camera_info", self._on_info, qos_profile_sensor_data)
         kind, topic = (
             (Image, "camera/image_raw")
@@ -121,6 +123,7 @@ class TrackerNode(Node):
     def _report(self) -> None:
         """Diagnostics, once a second."""
         level, message = self._state()
+        self._log.say(level, message)
         status = DiagnosticStatus(name=self.get_fully_qualified_name(), level=level, message=message)
         status.hardware_id = "overhead camera"
         status.values = [KeyValue(key=key, value=value) for key, value in self._statistics.values().items()]
