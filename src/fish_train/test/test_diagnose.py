@@ -22,7 +22,7 @@ from fish_train.diagnose.diagnosis import Accepted
 from fish_train.diagnose.experiment_plan import next_experiment
 from fish_train.diagnose.law import Description
 from fish_train.diagnose.locate import dof_shares
-from fish_train.diagnose.split import Trials, split_trials, trials_of
+from fish_train.diagnose.split import Trials, excitation, split_trials, trials_of
 from fish_train.diagnose.tail import with_links
 from fish_train.diagnose.vocabulary import NoCandidateError, candidates, kind_of, known, out_of_reach
 from fish_train.identify.adapt import settle
@@ -322,6 +322,20 @@ def test_the_search_uses_the_four_training_trials_that_are_excited_most():
     split = split_trials(replace(fish, commands=still))
     assert split.held_out == (2, 5, 8)
     assert split.search == (0, 3, 4, 7) and split.check == (1, 6)
+
+
+def test_what_pads_a_shorter_trial_does_not_excite():
+    """A steady circle of half the length is no step of the rudder."""
+    fish = swim(Robot(), kinds=("sines",) * 6, duration=2.0)
+    commands = np.stack([np.sin(0.2 * np.arange(fish.length)), np.zeros(fish.length)], axis=-1)
+    commands = np.repeat(commands[:, None], 6, axis=1)
+    commands[..., 1] = 0.3 * np.sin(0.1 * np.arange(fish.length))[:, None]
+    commands[:, 3] = [1.0, 0.4]
+    commands[100:, 3] = 0.0
+    strength = excitation(
+        replace(fish, commands=commands, steps=np.where(np.arange(6) == 3, 100, fish.steps))
+    )
+    assert strength[3] == pytest.approx(0.0, abs=1e-9) and strength[0] > 1.0
 
 
 def test_a_search_sees_the_training_trials_and_knows_which_of_them_it_has_not_fitted():

@@ -13,6 +13,7 @@ from fish_train.identify.filter_compiled import compiled_passes
 from fish_train.identify.filter_numpy import Filter
 from fish_train.identify.filter_types import Noise, Problem
 from fish_train.identify.fit import evaluate
+from fish_train.identify.fixed_lag import smoothed
 from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, nominal_hypothesis
 from fish_train.identify.smoother import smooth
 from fish_train.identify.synthetic import program, record
@@ -130,6 +131,18 @@ def record_pushed(robot: Robot):
         synthetic._swim = original
 
 
+def test_near_a_trials_end_the_fixed_lag_smoother_is_that_of_the_whole_trial():
+    data, _ = experiment(Robot(), 2.0, ("sines",))
+    starts = np.array([[0, data.length - back] for back in (60, 30, 5, 1)])
+    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    inputs = coordinates.filter_inputs(np.zeros(0))
+    history = run_filter(data, coordinates.stepper, *inputs, Noise(), keep=True).history
+    whole, deviation = smooth(history)
+    off = smoothed(data, Robot(), Noise(), starts, 0.5) - whole[starts[:, 1], 0]
+    assert np.abs(off / deviation[starts[:, 1], 0])[1:].max() < 1e-6  # the end is nearer than the lag
+    assert np.abs(off / deviation[starts[:, 1], 0])[0].max() < 0.5
+
+
 def smoothed_surge(data, noise: Noise) -> float:
     fit = evaluate(nominal_hypothesis(Robot(), ()), np.zeros(0), data, noise, keep=True)
     xi, _ = smooth(fit.result.history)
@@ -164,13 +177,20 @@ def test_a_short_trial_is_smoothed_beside_a_long_one_as_alone():
     np.testing.assert_allclose(smoothed(uneven)[:90, 1], smoothed(uneven.select([1]))[:, 0], atol=1e-9)
 
 
-def test_a_filter_that_diverges_says_from_where():
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_filter_that_diverges_says_from_where(compiled):
     data, _ = experiment(Robot(), 1.0, ("sines", "steps"))
     commands = data.commands.copy()
     commands[40:, 1, 0] = 1e9  # rad/s
     coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
     inputs = coordinates.filter_inputs(np.zeros(0))
-    result = run_filter(replace(data, commands=commands), coordinates.stepper, *inputs, Noise(), keep=True)
+    problem = Problem(replace(data, commands=commands), coordinates.stepper, *inputs)
+    if compiled:
+        (result,) = compiled_passes(problem, [Noise()], keep=True) or [None]
+        if result is None:
+            pytest.skip("no compiler")
+    else:
+        result = Filter(problem, Noise()).run(keep=True)
     lost = ~np.isfinite(result.history.filtered).all(axis=2)
     assert not lost[:, 0].any() and not lost[:41, 1].any() and lost[50:, 1].all()
     assert np.isfinite(result.log_likelihood[0]) and not np.isfinite(result.log_likelihood[1])

@@ -163,6 +163,19 @@ def test_a_late_camera_is_taken_out_and_given_to_the_robot() -> None:
     assert raw.rms[0, 0] == pytest.approx(result.errors["identified"].rms[0, 0], rel=0.3)
 
 
+def test_trials_left_out_say_nothing_of_the_noise_either(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def usual(experiment: Experiment) -> Noise:
+        seen.append(experiment.names)
+        raise RuntimeError("enough")
+
+    monkeypatch.setattr("fish_train.identify.identification.usual_noise", usual)
+    with pytest.raises(RuntimeError, match="enough"):
+        identify(experiment_of(("sines",) * 3, 1.0), Robot(), hold_out=3)
+    assert [len(names) for names in seen] == [2]
+
+
 def test_parameters_that_only_their_sum_or_difference_tells_are_entangled() -> None:
     covariance = np.array([[4.0, -3.9, 0.1], [-3.9, 4.0, 0.0], [0.1, 0.0, 1.0]])
     fit = SimpleNamespace(covariance=covariance, hypothesis=SimpleNamespace(free=("a", "b", "c")))

@@ -11,7 +11,7 @@ from fish_sim.robot import Robot
 from fish_train.identify.experiment import Experiment, Frames, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
-from fish_train.identify.hypothesis import nominal_hypothesis
+from fish_train.identify.hypothesis import Coordinates, nominal_hypothesis
 from fish_train.identify.identification import is_wrong
 from fish_train.identify.outlook import Outlook, _huber, fit_outlook
 from fish_train.identify.synthetic import program, record
@@ -47,6 +47,37 @@ def test_truth_comes_back(outlook: Outlook) -> None:
     found = fit_outlook(start, outlook.experiment)
     for name, value in found.values.items():
         assert value == pytest.approx(TRUTH.parameters[name], rel=0.1), name
+
+
+def test_a_sensor_error_keeps_the_value_and_the_covariance_of_the_fit(outlook: Outlook) -> None:
+    """Predictions are of the fish: they say nothing of it, and the prior alone would draw it to nothing."""
+    turned = tuple(Frames(f.t, f.pose + [0.0, 0.0, 0.3]) for f in outlook.experiment.frames)
+    seen = replace(outlook.experiment, frames=turned)
+    hypothesis = nominal_hypothesis(Robot(), FREE).with_effect("camera_heading_offset", 0.3)
+    theta = Coordinates(hypothesis).encode(np.array([*truths(), 0.3]))
+    start = evaluate(hypothesis, theta, seen, NOISE)
+    found = fit_outlook(start, seen)
+    name = "camera_heading_offset.offset"
+    assert found.values[name] == pytest.approx(0.3, abs=1e-9)
+    assert found.standard_errors[name] == pytest.approx(start.standard_errors[name], rel=0.3)
+    assert found.values["head_drag_surge"] == pytest.approx(TRUTH.parameters["head_drag_surge"], rel=0.1)
+
+
+def truths() -> np.ndarray:
+    return np.array([TRUTH.parameters[name] for name in FREE])
+
+
+def test_what_the_data_do_not_determine_is_as_unsure_as_the_prior() -> None:
+    """A rudder that never moves says nothing of the servo's rate limit."""
+    random = np.random.default_rng(4)
+    commands = np.stack([program("straight", 6.0, random) for _ in range(2)], axis=1)
+    straight, _ = record(TRUTH, commands, NOISE, random)
+    hypothesis = nominal_hypothesis(Robot(), ("head_drag_surge", "servo_rate_limit"))
+    made = Outlook(straight, hypothesis)
+    made.start_from(made.coordinates.origin(), NOISE)
+    deviation = np.sqrt(np.diag(np.linalg.inv(made.normal(made.coordinates.origin()))))
+    assert deviation[1] == pytest.approx(made.coordinates.prior[1], rel=1e-6)
+    assert deviation[0] < 0.5 * made.coordinates.prior[0]
 
 
 CAMERA_ERRORS = {

@@ -115,6 +115,18 @@ def test_an_unexplained_force_dies_away_with_the_waters_time(quiet: Experiment) 
     assert np.abs(found[120] - free[120]).max() > 0.01
 
 
+def test_a_filter_lost_for_good_predicts_nothing_from_there_on(quiet: Experiment) -> None:
+    """No image comes after it with which it could begin anew."""
+    commands, frames = quiet.commands.copy(), list(quiet.frames)
+    commands[400:430, 1, 0] = 1e9  # rad/s
+    seen = frames[1].t < 4.0
+    frames[1] = Frames(frames[1].t[seen], frames[1].pose[seen])
+    lost = replace(quiet, commands=commands, frames=tuple(frames))
+    found = predict(lost, Robot(), Noise(), 1.0, every=0.5, first=1.0)
+    counts = prediction_errors(found, (1.0,)).counts[:, 0]
+    assert counts[0] > counts[1] > 0
+
+
 def test_velocities_of_the_body_are_those_of_the_pool_turned() -> None:
     """Heading north-west and moving west: ahead and to the left alike."""
     state = np.zeros((1, 14))

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fish_train.identify.experiment import Experiment
+
+Array = NDArray[np.float64]
 
 SEARCH_TRIALS = 4  # the search's cost is proportional to them; the final fits use all training trials
 
@@ -41,8 +44,19 @@ def split_trials(experiment: Experiment) -> Split:
     count = len(experiment.names)
     held = tuple(i for i in range(count) if i % 3 == 2)
     training = tuple(i for i in range(count) if i % 3 != 2)
-    rudder = experiment.commands[..., 1].std(axis=0) + 0.2 * np.abs(experiment.commands[..., 1]).mean(axis=0)
-    rotor = experiment.commands[..., 0].std(axis=0)
-    strength = rotor / (rotor.max() + 1e-12) * (0.2 + rudder / (rudder.max() + 1e-12))
+    strength = excitation(experiment)
     chosen = sorted(training, key=lambda i: -strength[i])[:SEARCH_TRIALS]
     return Split(training, held, tuple(sorted(chosen)), tuple(i for i in training if i not in chosen))
+
+
+def excitation(experiment: Experiment) -> Array:
+    """(M,) how strongly and differently the commands of each trial move the fish, 1.2 at most.
+
+    rotor (0.2 + rudder), each over its largest: the standard deviation of the speed, and that of the rudder's angle and a
+    fifth of its mean size. Of each trial's own samples: zeros that pad it to the longest are no commands.
+    """
+    own = np.arange(len(experiment.commands))[:, None] < experiment.steps
+    speed, angle = np.moveaxis(experiment.commands, -1, 0)
+    rudder = angle.std(axis=0, where=own) + 0.2 * np.abs(angle).mean(axis=0, where=own)
+    rotor = speed.std(axis=0, where=own)
+    return np.asarray(rotor / (rotor.max() + 1e-12) * (0.2 + rudder / (rudder.max() + 1e-12)))

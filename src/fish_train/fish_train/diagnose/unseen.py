@@ -44,8 +44,9 @@ def predicted(fit: Fit, unseen: Sequence[int]) -> float:
 def gain_unseen(base: Fit, fit: Fit, unseen: Sequence[int]) -> tuple[float, float]:
     """Nats by which one fit to all trials foretells some better than another, and those that it would were it true.
 
-    With r the whitened innovations of the fit, white if it is true, and r + d those of the base under the same noise, the gain
-    sum((r + d)^2 - r^2) / 2 is sum(d^2) / 2 in the mean: much where the effect acts, little on trials that do not excite it.
+    With r the whitened innovations of the fit, white if it is true, and r + d those of the base, each under its own noise, the
+    gain sum((r + d)^2 - r^2) / 2 is sum(d^2) / 2 in the mean: much where the effect acts, little on trials that do not excite
+    it. Where the two noises differ that is rough: the log determinants are left out of it, and d holds the change of scale.
     """
     apart = (fit.result.whitened - base.result.whitened)[:, list(unseen)]
     return predicted(fit, unseen) - predicted(base, unseen), 0.5 * float(np.nansum(apart**2))

@@ -42,9 +42,13 @@ class Filter:
         self.memory, self.d_memory = self._follow_commands()
 
     def run(self, keep: bool = False) -> FilterResult:
-        """Filter all trials; keep=True stores the history for the smoother."""
+        """Filter all trials; keep=True stores the history for the smoother.
+
+        A trial whose state is not finite any more is lost: it takes no further part, its log likelihood is -inf.
+        """
         T, M, K, n = self.experiment.length, self.trials, self.free, self.n
-        xi, P = first_state(self.experiment, self.stepper.layout, self.sensors, self.noise)
+        start, start_P = first_state(self.experiment, self.stepper.layout, self.sensors, self.noise)
+        xi, P = start, start_P
         D = np.zeros((M, n, K))  # of motion, wrench and biases; that of the memory is self.d_memory
         sums, lost = _Sums(M, K, T), np.zeros(M, dtype=bool)
         history = _empty_history(T, M, n, self.memory) if keep else None
@@ -56,16 +60,19 @@ class Filter:
         for k in range(T):
             if history is not None:
                 history.predicted[k], history.predicted_P[k] = xi, P
-            active = k < self.experiment.steps
+            active = (k < self.experiment.steps) & ~lost
             xi, P, D = self._measure(k, xi, P, D, active, sums)
             if history is not None:
-                history.filtered[k], history.filtered_P[k] = xi, P
+                history.filtered[k], history.filtered_P[k] = np.where(lost[:, None], np.nan, xi), P
             if k == T - 1:
                 break
             xi, F, D = self._predict(k, xi, D, decay)
-            lost |= (k + 1 < self.experiment.steps) & ~np.isfinite(xi[:, 0])
             P = F @ P @ F.transpose(0, 2, 1) + Q
             P = 0.5 * (P + P.transpose(0, 2, 1))
+            gone = ~np.isfinite(xi).all(axis=1) | ~np.isfinite(P).all(axis=(1, 2))
+            lost |= gone & (k + 1 < self.experiment.steps)
+            # of such a trial nothing is used from here on, but numbers have to stand beside those of the others
+            xi[gone], P[gone], D[gone] = start[gone], start_P[gone], 0.0
             if history is not None:
                 history.transition[k] = F
         self._encoder(sums)
@@ -289,11 +296,12 @@ def _update(
     """Kalman update of the trials in `use`; innovations beyond `gate` (squared, normalised) are left out."""
     xi, P, D = state
     PHt = P @ H.transpose(0, 2, 1)
-    S = H @ PHt + R
-    L = np.linalg.cholesky(S)
+    S, L, sound = _factored(H @ PHt + R)
+    use = use & sound
     e = np.where(use[:, None], e, 0.0)
     white = np.linalg.solve(L, e[..., None])[..., 0]
     use = use & (np.sum(white**2, axis=1) < gate)
+    e = np.where(use[:, None], e, 0.0)
     white = np.where(use[:, None], white, 0.0)
     J = np.where(use[:, None, None], -np.linalg.solve(L, dh), 0.0)  # derivative of the whitened innovation
     K = np.where(use[:, None, None], np.linalg.solve(S, PHt.transpose(0, 2, 1)).transpose(0, 2, 1), 0.0)
@@ -310,6 +318,33 @@ def _update(
     sums.normal += J.transpose(0, 2, 1) @ J
     sums.whitened[k, use, rows] = white[use]
     return xi, P, D
+
+
+def _factored(S: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """(S, L, which): S (M, 3, 3) and its lower Cholesky factors; the unit matrix for both where S has none or no inverse.
+
+    Rounding leaves a filter neither that is about to be lost.
+    """
+    try:
+        return S, _factor(S), np.ones(len(S), dtype=bool)
+    except np.linalg.LinAlgError:
+        sound = np.array([_is_sound(own) for own in S], dtype=bool)
+        S = np.where(sound[:, None, None], S, np.eye(3))
+        return S, _factor(S), sound
+
+
+def _factor(S: Array) -> Array:
+    """The Cholesky factor. Raises LinAlgError where S has none, or no inverse."""
+    np.linalg.inv(S)
+    return np.asarray(np.linalg.cholesky(S), dtype=np.float64)
+
+
+def _is_sound(S: Array) -> bool:
+    try:
+        _factor(S)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def _empty_history(T: int, M: int, n: int, memory: Array) -> History:

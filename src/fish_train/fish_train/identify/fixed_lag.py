@@ -39,8 +39,13 @@ def smoothed(
 
 def _at(history: History, starts: NDArray[np.int64], steps: int, ahead: float) -> Array:
     """(S, N) of one trial: the smoother runs back from `ahead` after each start, or from the trial's end."""
-    rows = np.minimum(starts + np.arange(round(ahead / DT) + 1)[:, None], steps - 1)
+    rows = starts + np.arange(round(ahead / DT) + 1)[:, None]
+    beyond, rows = rows >= steps, np.minimum(rows, steps - 1)
     windows = {f.name: getattr(history, f.name)[rows, 0] for f in fields(History)}
+    # all windows are as long, and past a trial's end its last row stands in: there the smoother shall find nothing that was
+    # not foretold, or it would take in the last measurement once more at every step
+    for predicted, filtered in (("predicted", "filtered"), ("predicted_P", "filtered_P")):
+        windows[predicted][beyond] = windows[filtered][beyond]
     good = np.isfinite(windows["filtered"]).all(axis=(0, 2))
     out = np.full((len(starts), history.filtered.shape[2]), np.nan)
     out[good] = smooth(History(**{name: values[:, good] for name, values in windows.items()}))[0][0]

@@ -106,13 +106,14 @@ def identify(
     A delay of the camera that the gyro shows is taken out of all trials first, so that horizons count from the moment an
     image was taken, and goes into the robot that comes back.
     """
-    began, noise = time.monotonic(), noise or usual_noise(experiment)
+    began = time.monotonic()
     train, held = split(len(experiment.names), hold_out)
     lag = Alignment(0.0, np.nan, np.nan)
     if "camera_latency" not in (*robot.sensors, *effects):
         lag = align(experiment.select(train))
         experiment = moved_back(experiment, lag.delay)
     training, held_out = experiment.select(train), experiment.select(held) if held else None
+    noise = noise or usual_noise(training)  # what trials left out say of the sensors takes no part either
     hypothesis = nominal_hypothesis(robot, free)
     for name in effects:
         hypothesis = hypothesis.with_effect(name, EFFECT_START)

@@ -9,7 +9,8 @@ Piroddi 2010; the robust weights are Huber's):
                     + 1/2 |theta / prior|^2
 
 from the filter's states at start points every second, by Gauss-Newton with forward sensitivities. The states are estimated
-anew with the parameters found, a few times; sensor errors keep their values.
+anew with the parameters found, a few times; sensor errors move no fish and keep their values. Standard errors are those of
+J' W J / s^2 + diag(1 / prior^2), s^2 the mean of min(e^2, ROBUST^2): what the data do not determine is as unsure as the prior.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from fish_sim.model import DT
 from fish_train.identify.alignment import moved_back
 from fish_train.identify.experiment import Experiment
-from fish_train.identify.filter_types import WRENCH, Noise
+from fish_train.identify.filter_types import WRENCH, Noise, SensorModel
 from fish_train.identify.fit import Fit, evaluate
 from fish_train.identify.hypothesis import Coordinates, Hypothesis
 from fish_train.identify.motion import HALF_WINDOW, stroke_mean
@@ -73,23 +74,33 @@ class Outlook:
         self.coordinates = Coordinates(hypothesis)
         self.experiment, self.horizons = experiment, horizons
         self.starts = start_points(experiment, every, WARM_UP)
-        self.targets: dict[int, list[Target]] = {}
-        sensors = self.coordinates.filter_inputs(self.coordinates.origin())[2]
-        seen = moved_back(experiment, sensors.camera_latency)
+        self.sensors = self.coordinates.filter_inputs(self.coordinates.origin())[2]
+        self.moving = np.ones(len(hypothesis.free), dtype=bool)  # the fish: all but sensor errors
+        self.moving[list(self.sensors.free.values())] = False
+        self.targets = self._targets(self.sensors)
+
+    def _targets(self, sensors: SensorModel) -> dict[int, list[Target]]:
+        """What such sensors saw, less their errors, by trial."""
+        targets: dict[int, list[Target]] = {}
+        seen = moved_back(self.experiment, sensors.camera_latency)
         shown = np.array([sensors.camera_scale, sensors.camera_scale, 1.0])
         for row, (m, k) in enumerate(self.starts.tolist()):
             frames = seen.frames[m]
             truth = (frames.pose - [0.0, 0.0, sensors.camera_heading_offset]) / shown
             found = [
                 target
-                for h in horizons
-                if (target := _target(row, frames.t, truth, k, h, int(experiment.steps[m])))
+                for h in self.horizons
+                if (target := _target(row, frames.t, truth, k, h, int(self.experiment.steps[m])))
             ]
             if found:
-                self.targets.setdefault(m, []).extend(found)
+                targets.setdefault(m, []).extend(found)
+        return targets
 
     def start_from(self, theta: Array, noise: Noise) -> None:
-        """Take the start states from the filter with theta."""
+        """Take the start states from the filter with theta, and what is to be foretold from its sensors."""
+        sensors = self.coordinates.filter_inputs(theta)[2]
+        if sensors != self.sensors:
+            self.sensors, self.targets = sensors, self._targets(sensors)
         robot = self.coordinates.robot(theta)
         plain = {k: v for k, v in robot.effects.items() if k != "disturbance"}
         self.estimates, self.noise = estimate(self.experiment, replace(robot, effects=plain), noise), noise
@@ -131,7 +142,7 @@ class Outlook:
             for _ in range(6):
                 damped = normal + damping * np.diag(np.diag(normal))
                 move = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
-                tried = self.coordinates.clip(theta + move)
+                tried = self._moved(theta, move)
                 cost = self.cost(tried)
                 if cost < best:
                     break
@@ -154,23 +165,28 @@ class Outlook:
         self.start_from(theta, noise)
         best, moved = self.cost(theta), self.minimise(theta, iterations)
         for share in shares:
-            tried = self.coordinates.clip(theta + share * (moved - theta))
+            tried = self._moved(theta, share * (moved - theta))
             self.start_from(tried, noise)
             cost = self.cost(tried)
             if cost < best:
                 return cost, tried
         return best, theta
 
+    def _moved(self, theta: Array, move: Array) -> Array:
+        """Theta a step further within the physical ranges; sensor errors stay to the last bit."""
+        return np.where(self.moving, self.coordinates.clip(theta + move), theta)
+
     def _normal(self, e: Array, J: Array, theta: Array) -> tuple[Array, Array]:
-        prior = self.coordinates.prior
-        weight = np.minimum(1.0, ROBUST / np.maximum(np.abs(e), 1e-9))
-        gradient = J.T @ (weight * e) + theta / prior**2
-        return gradient, J.T @ (weight[:, None] * J) + np.diag(1.0 / prior**2)
+        """(gradient (K,), Gauss-Newton matrix (K, K)) of the cost; a sensor error has no gradient, so that it stays."""
+        gradient = J.T @ (_weight(e) * e) + theta / self.coordinates.prior**2
+        normal = J.T @ (_weight(e)[:, None] * J) + np.diag(1.0 / self.coordinates.prior**2)
+        return np.where(self.moving, gradient, 0.0), normal
 
     def normal(self, theta: Array) -> Array:
-        """(K, K) Gauss-Newton matrix of the cost, in units of the errors' own variance."""
+        """(K, K) whose inverse is the covariance, J' W J / s^2 + diag(1 / prior^2)."""
         e, J = self.errors(theta)
-        return self._normal(e, J, theta)[1] / max(float(np.mean(np.minimum(e**2, ROBUST**2))), 1e-12)
+        variance = max(float(np.mean(np.minimum(e**2, ROBUST**2))), 1e-12)
+        return J.T @ (_weight(e)[:, None] * J) / variance + np.diag(1.0 / self.coordinates.prior**2)
 
     def _of_targets(self, p: Array, dp: Array) -> tuple[Array, Array]:
         """Errors (R, 4) and slopes (R, 4, K) of all targets, trial by trial."""
@@ -221,6 +237,11 @@ def _huber(e: Array) -> Array:
     return np.where(size < ROBUST, 0.5 * e**2, ROBUST * size - 0.5 * ROBUST**2)
 
 
+def _weight(e: Array) -> Array:
+    """Huber's weights of errors."""
+    return np.minimum(1.0, ROBUST / np.maximum(np.abs(e), 1e-9))
+
+
 def _target(row: int, t: Array, pose: Array, k: int, horizon: float, steps: int) -> Target | None:
     """The stroke mean `horizon` after grid point k; None where the frames do not cover it."""
     centre = k * DT + horizon
@@ -254,7 +275,8 @@ def _error(target: Target, pose: Array, d_pose: Array) -> tuple[Array, Array]:
 def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] = lambda _: None) -> Fit:
     """The fit that predicts best over seconds, from a fit's values or its hypothesis's start values: both go one round.
 
-    The states come from its noise, or one with a calm unexplained force, whichever predicts better.
+    The states come from its noise, or one with a calm unexplained force, whichever predicts better. Sensor errors keep the
+    values and the covariance that they have in the fit.
     """
     outlook = Outlook(experiment, fit.hypothesis)
     if not outlook.targets:
@@ -275,7 +297,7 @@ def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] 
         return *outlook.improve(theta, noise, shares=(1.0,)), noise
 
     report("fitting the outlook from two starts")
-    starts = (outlook.coordinates.origin(), fit.theta)
+    starts = (np.where(outlook.moving, outlook.coordinates.origin(), fit.theta), fit.theta)
     best, theta, noise = min((one_round(*better_noise(t)[1:]) for t in starts), key=lambda found: found[0])
     for i in range(1, ROUNDS):
         report(f"fitting the outlook, round {i + 1} of {ROUNDS}, cost {best:.0f}")
@@ -285,4 +307,6 @@ def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] 
             break
     best, theta, noise = better_noise(theta)
     outlook.start_from(theta, noise)
-    return replace(evaluate(fit.hypothesis, theta, experiment, noise), normal=outlook.normal(theta))
+    normal, kept = outlook.normal(theta), np.ix_(~outlook.moving, ~outlook.moving)
+    normal[kept] = np.linalg.inv(fit.covariance[kept])
+    return replace(evaluate(fit.hypothesis, theta, experiment, noise), normal=normal)

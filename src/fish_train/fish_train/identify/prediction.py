@@ -195,8 +195,14 @@ def _simulate(
     experiment: Experiment, robot: Robot, noise: Noise, starts: NDArray[np.int64], state: Array, wrench: Array,
     length: int,
 ) -> Array:  # fmt: skip
-    """(length + 1, S, 3) poses from state (S, NS) at the start points, NaN beyond the end of the trial."""
+    """(length + 1, S, 3) poses from state (S, NS) at the start points, NaN beyond the end of the trial.
+
+    NaN throughout where the state is: the filter is lost there for good, and nothing can be predicted.
+    """
     trial, start = starts.T
+    wrench = np.nan_to_num(
+        wrench
+    )  # the state says that the filter is lost; the simulator takes finite parameters only
     stepper = Stepper.of(nominal_hypothesis(robot).robot)
     p = np.tile(stepper.parameters(nominal_hypothesis(robot).robot), (len(trial), 1))
     at = [stepper.layout.parameters.index(name) for name in WRENCH]
