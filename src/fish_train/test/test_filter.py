@@ -83,12 +83,29 @@ def test_the_transition_is_the_derivative_of_the_simulators_step():
             )
 
 
-def test_gradient_is_zero_in_the_mean_and_a_missing_sensor_costs_nothing_but_its_samples():
+def test_gradient_is_zero_in_the_mean_and_as_large_as_the_normal_matrix_says_at_the_truth():
+    """The score's variance is the information; of a drag that is 5 % off the score is far from zero."""
+    data, _ = experiment(Robot(), 3.0, ("sines", "steps", "random", "sines", "steps", "random"))
+    free = ("head_drag_surge", "head_drag_sway", "head_drag_yaw", "head_inertia", "tail_stiffness")
+
+    def score(robot: Robot):
+        result = evaluate(nominal_hypothesis(robot, free), np.zeros(len(free)), data, Noise()).result
+        return result.gradient.sum(0) / np.sqrt(np.diagonal(result.normal.sum(0)))
+
+    right = score(Robot())
+    assert np.abs(right).max() < 3.5
+    assert 0.3 < np.sqrt(np.mean(right**2)) < 1.8  # of five that are not independent
+    off = score(Robot().with_parameters(head_drag_yaw=1.05 * Robot().parameters["head_drag_yaw"]))
+    assert abs(off[free.index("head_drag_yaw")]) > 5.0
+
+
+def test_a_missing_sensor_costs_nothing_but_its_samples():
     data, _ = experiment(Robot(), 6.0, ("sines",))
     blind = replace(data, accel=np.full_like(data.accel, np.nan), gyro=np.full_like(data.gyro, np.nan))
     fit = evaluate(nominal_hypothesis(Robot()), np.zeros(len(NOMINAL_FREE)), blind, Noise())
     assert np.isfinite(fit.objective)
-    assert fit.result.samples[0] < 0.5 * evaluate(fit.hypothesis, fit.theta, data, Noise()).result.samples[0]
+    seeing = evaluate(fit.hypothesis, fit.theta, data, Noise())
+    assert fit.result.samples[0] == seeing.result.samples[0] - 3 * data.length
 
 
 def test_smoother_finds_a_known_wrench():

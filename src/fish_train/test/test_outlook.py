@@ -63,6 +63,20 @@ def test_a_sensor_error_keeps_the_value_and_the_covariance_of_the_fit(outlook: O
     assert found.values["head_drag_surge"] == pytest.approx(TRUTH.parameters["head_drag_surge"], rel=0.1)
 
 
+def test_what_is_to_be_foretold_is_what_the_sensors_at_theta_saw_not_those_at_the_hypothesis_s_start(
+    outlook: Outlook,
+) -> None:
+    turned = tuple(Frames(f.t, f.pose + [0.0, 0.0, 0.3]) for f in outlook.experiment.frames)
+    hypothesis = nominal_hypothesis(Robot(), FREE).with_effect("camera_heading_offset", 0.3)
+    made = Outlook(replace(outlook.experiment, frames=turned), hypothesis)
+    theta = Coordinates(hypothesis).encode(np.array([*truths(), 0.3]))
+    size = {}
+    for offset in (theta[-1], made.coordinates.origin()[-1], theta[-1]):
+        made.start_from(np.array([*theta[:-1], offset]), NOISE)
+        size[offset] = np.sqrt(np.mean(np.square(made.errors(theta, False)[0])))
+    assert size[theta[-1]] < 0.3 * size[made.coordinates.origin()[-1]]
+
+
 def truths() -> np.ndarray:
     return np.array([TRUTH.parameters[name] for name in FREE])
 

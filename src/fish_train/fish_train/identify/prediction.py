@@ -200,9 +200,8 @@ def _simulate(
     NaN throughout where the state is: the filter is lost there for good, and nothing can be predicted.
     """
     trial, start = starts.T
-    wrench = np.nan_to_num(
-        wrench
-    )  # the state says that the filter is lost; the simulator takes finite parameters only
+    # the simulator takes finite parameters only; the state tells where the filter is lost
+    wrench = np.nan_to_num(wrench)
     stepper = Stepper.of(nominal_hypothesis(robot).robot)
     p = np.tile(stepper.parameters(nominal_hypothesis(robot).robot), (len(trial), 1))
     at = [stepper.layout.parameters.index(name) for name in WRENCH]
