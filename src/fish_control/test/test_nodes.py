@@ -22,12 +22,13 @@ from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
 from fish_control.fusion import LOST_VARIANCE
-from fish_control.nodes import controller, exciter, fusion, planner, rivals
+from fish_control.nodes import controller, exciter, fusion, planner
 from fish_control.nodes.controller import ControllerNode
 from fish_control.nodes.exciter import ExciterNode
 from fish_control.nodes.fusion import FusionNode
 from fish_control.nodes.messages import seconds, to_quaternion, to_stamp, yaw_of
 from fish_control.nodes.planner import PlannerNode
+from fish_node import rivals
 
 pytestmark = pytest.mark.ros
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

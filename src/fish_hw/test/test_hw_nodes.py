@@ -7,7 +7,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,7 +25,6 @@ from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.usb_camera import jpeg_size
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
-from fish_hw.nodes import entry
 from fish_hw.nodes.camera import CameraNode
 from fish_hw.nodes.imu import ImuNode
 from fish_hw.nodes.rotor import RotorNode
@@ -407,14 +405,3 @@ def test_missing_port_is_one_line_and_an_exit_code():
     assert process.returncode == 1
     assert output.startswith("rotor: cannot open serial port /dev/ttyX9: there is no such port; available: ")
     assert output.count("\n") == 1
-
-
-@pytest.mark.parametrize("flag", ["-h", "--help"])
-@pytest.mark.parametrize("name", ["rotor", "rudder", "imu", "camera"])
-def test_help_says_what_a_node_is_and_starts_nothing(name, flag, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", [name, flag])
-    monkeypatch.setattr(rclpy, "init", lambda *_, **__: pytest.fail("started"))
-    assert getattr(entry, name)() == 0
-    usage, what, parameters = capsys.readouterr().out.splitlines()
-    assert usage.startswith(f"usage: {name} ") and what
-    assert Path(parameters.split(": ")[1]).name == f"{name}.yaml" and Path(parameters.split(": ")[1]).exists()

@@ -19,7 +19,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_srvs.srv import SetBool, Trigger
 
-from fish_sim.nodes import rivals
+from fish_node import rivals
 from fish_sim.nodes.simulator import SimulatorNode
 from fish_sim.robot import Robot, RobotError, save_robot
 from fish_sim.simulation_config import SimulatorConfig

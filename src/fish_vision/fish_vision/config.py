@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any
 
 import yaml
 
+from fish_node.parameters import in_type_of
 from fish_vision.calibration import Mount
 from fish_vision.pose import MarkerLayout
 from fish_vision.segmentation import HUES, ColourRange
@@ -106,21 +106,6 @@ def config_from_file(path: Path) -> TrackerConfig:
             f"{path}: not a params file of the tracker (expected one of {', '.join(NODE_NAMES)})"
         )
     return TrackerConfig(**{key: in_type_of(key, value, likes[key]) for key, value in values.items()})
-
-
-def in_type_of(name: str, given: Any, like: Any) -> Any:
-    """given in the type of like: whole numbers may stand for floats, lists for tuples.
-
-    Raises:
-        ValueError: another type; names the parameter, what came and what was expected.
-    """
-    if isinstance(like, tuple) and not isinstance(given, str | bytes) and hasattr(given, "__iter__"):
-        return tuple(in_type_of(name, item, like[0]) for item in given)
-    if isinstance(like, float) and isinstance(given, int) and not isinstance(given, bool):
-        return float(given)
-    if type(given) is not type(like):
-        raise ValueError(f"{name} = {given!r}: expected {type(like).__name__} as in {like!r}")
-    return given
 
 
 _LISTS = (

@@ -105,7 +105,8 @@ def test_a_usual_set_of_pictures_is_far_from_being_refused(
 ) -> None:
     monkeypatch.setattr(calibrate, "FOCAL_STD_MAX", calibrate.FOCAL_STD_MAX / 20)
     monkeypatch.setattr(calibrate, "TILT_MIN", 3 * calibrate.TILT_MIN)
-    lens_from_chessboards(pictures, CORNERS, SQUARE)
+    _, _, found = lens_from_chessboards(pictures, CORNERS, SQUARE)
+    assert found == list(range(len(pictures)))
 
 
 def test_pictures_of_different_sizes_are_refused(pictures: list[np.ndarray]) -> None:

@@ -36,8 +36,8 @@ from fish_control.nodes.messages import (
     yaw_of,
 )
 from fish_control.nodes.reporter import Reporter
-from fish_control.nodes.start import read_parameters, run
 from fish_control.watchdog import Signs, Watchdog, loss
+from fish_node.nodes.start import read_parameters, run
 
 
 class ControllerNode(Node):
@@ -159,6 +159,6 @@ def to_message(gains: Gains) -> Float64MultiArray:
     return message
 
 
-def main() -> None:
+def main() -> int:
     """Entry point."""
-    run(ControllerNode, "controller")
+    return run(ControllerNode, "controller")

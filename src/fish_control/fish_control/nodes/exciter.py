@@ -27,7 +27,7 @@ from fish_control.nodes.messages import (
     motion_of,
 )
 from fish_control.nodes.reporter import Reporter
-from fish_control.nodes.start import read_parameters, run
+from fish_node.nodes.start import read_parameters, run
 
 LEVELS: dict[State, bytes] = {"waiting": WARN, "before a wall": WARN, "lost": ERROR}  # the others are well
 
@@ -83,6 +83,6 @@ class ExciterNode(Node):
         self._reporter.report(LEVELS.get(self._said, OK), self._exciter.reason, values)
 
 
-def main() -> None:
+def main() -> int:
     """Entry point."""
-    run(ExciterNode, "exciter")
+    return run(ExciterNode, "exciter")

@@ -26,7 +26,7 @@ from fish_control.nodes.messages import (
     yaw_of,
 )
 from fish_control.nodes.reporter import Reporter
-from fish_control.nodes.start import read_parameters, run
+from fish_node.nodes.start import read_parameters, run
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -126,6 +126,6 @@ def to_transform(odometry: Odometry) -> TransformStamped:
     return message
 
 
-def main() -> None:
+def main() -> int:
     """Entry point."""
-    run(FusionNode, "fusion")
+    return run(FusionNode, "fusion")

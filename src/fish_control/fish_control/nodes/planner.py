@@ -33,13 +33,13 @@ from fish_control.nodes.messages import (
     to_quaternion,
 )
 from fish_control.nodes.reporter import Reporter
-from fish_control.nodes.start import read_parameters, run
 from fish_control.paths import make_path, read_arguments
 from fish_control.planner import Plan, Planner
 from fish_control.pool import check_inside_pool
 from fish_control.progress_file import ProgressFile, path_digest
 from fish_control.reference_path import PathError, ReferencePath
 from fish_control.watchdog import pose_loss
+from fish_node.nodes.start import read_parameters, run
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PATH_STEP = 0.02  # m between poses of the published path
@@ -195,6 +195,6 @@ def to_message(path: ReferencePath, stamp: Any) -> Path:
     return message
 
 
-def main() -> None:
+def main() -> int:
     """Entry point."""
-    run(PlannerNode, "planner")
+    return run(PlannerNode, "planner")

@@ -5,8 +5,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from fish_control.nodes.messages import WARN, diagnostics
-from fish_control.nodes.rivals import Rivals
-from fish_control.nodes.status_log import StatusLog
+from fish_node.nodes.status_log import StatusLog
+from fish_node.rivals import Rivals
 
 
 class Reporter:

@@ -19,10 +19,11 @@ from fish_hw.devices.camera_calibration import CalibrationError
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.status import WARN, Status
-from fish_hw.nodes.parameters import read_settings
-from fish_hw.nodes.status_log import StatusLog
 from fish_hw.nodes.worker import Worker
+from fish_hw.settings.checks import in_type_of
 from fish_hw.transport.errors import TransportError
+from fish_node.nodes.start import read_parameters
+from fish_node.nodes.status_log import StatusLog
 
 NAMESPACE = "fish"
 END_TIMEOUT_S = 2.0
@@ -61,7 +62,7 @@ class DeviceNode(Node):
 
     def __init__(self, name: str, settings_class: type[Any]) -> None:
         super().__init__(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-        self.settings = read_settings(self, settings_class)
+        self.settings = read_parameters(self, settings_class, in_type_of)
         self.failure = ""
         self._device: Device | None = None
         self._emulated = False

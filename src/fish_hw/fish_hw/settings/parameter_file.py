@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 
 import yaml
 
-from fish_hw.settings.checks import in_type_of, unknown_names
+from fish_hw.settings.checks import in_type_of
+from fish_node.parameters import unknown_names
 
 Settings = TypeVar("Settings")
 
@@ -30,7 +31,7 @@ def read_parameter_file(path: Path, settings_class: type[Settings], warn: Callab
         warn(f"{path}: {unknown}")
     known = {name: value for name, value in parameters.items() if name in defaults}
     try:
-        values = {name: in_type_of(defaults[name], value, name) for name, value in known.items()}
+        values = {name: in_type_of(name, value, defaults[name]) for name, value in known.items()}
         return settings_class(**values)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error

@@ -20,12 +20,12 @@ from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.start import read_parameters, run
+from fish_node.nodes.status_log import StatusLog
 from fish_sim.camera.config import CameraConfig
 from fish_sim.camera.fish import FishPose
 from fish_sim.camera.renderer import PoolRenderer
 from fish_sim.camera.timing import FrameClock, History
-from fish_sim.nodes.start import read_parameters, run
-from fish_sim.nodes.status_log import StatusLog
 
 QUEUE = 10
 BLUR_STEP = 0.002  # s of exposure per drawn pose

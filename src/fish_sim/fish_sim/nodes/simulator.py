@@ -26,13 +26,13 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
+from fish_node.nodes.start import read_parameters, run
+from fish_node.nodes.status_log import StatusLog
+from fish_node.rivals import Rivals
 from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.lockstep import Lockstep
 from fish_sim.nodes.pacer import Pacer
-from fish_sim.nodes.rivals import Rivals
-from fish_sim.nodes.start import read_parameters, run
-from fish_sim.nodes.status_log import StatusLog
 from fish_sim.robot import Robot, load_robot
 from fish_sim.simulation import Readings, Simulation
 from fish_sim.simulation_config import SimulatorConfig

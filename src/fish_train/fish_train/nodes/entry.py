@@ -1,26 +1,8 @@
-"""Where the installed executables start: a signal that comes while Python still imports a node ends it with 0 too."""
+"""Entry points of the installed executables."""
 
-import importlib
-import signal
+from functools import partial
 
+from fish_node.entry import start
 
-def _start(name: str) -> int | None:
-    """Import a node and run it."""
-    try:
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        node = importlib.import_module(f"fish_train.nodes.{name}")
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # from here on the node's own affair
-        status: int | None = node.main()
-    except KeyboardInterrupt:
-        return 0
-    return status
-
-
-def recorder() -> int | None:
-    """Entry point."""
-    return _start("recorder")
-
-
-def replayer() -> int | None:
-    """Entry point."""
-    return _start("replayer")
+recorder = partial(start, "fish_train", "recorder")
+replayer = partial(start, "fish_train", "replayer")

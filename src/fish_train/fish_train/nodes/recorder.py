@@ -18,7 +18,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from fish_sim.nodes.start import read_parameters, run
+from fish_node.nodes.start import read_parameters, run
 from fish_train.errors import UserError
 from fish_train.nodes.raw_topics import from_profile, message_class, to_profile
 from fish_train.recordings.mcap_writer import McapRecording, Topic

@@ -22,7 +22,7 @@ from rosbags.interfaces import Connection
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool
 
-from fish_sim.nodes.start import read_parameters, run
+from fish_node.nodes.start import read_parameters, run
 from fish_train.errors import UserError
 from fish_train.nodes.raw_topics import message_class, to_profile
 from fish_train.recordings.playback import Playback, PlaybackClock, ReplayerConfig, offered_qos

@@ -1,43 +1,7 @@
-"""Where the installed executables start: a signal that comes while Python still imports a node ends it with 0 too.
+"""Entry points of the installed executables."""
 
-With --help a node says what it is and is not started: a driver would open its device.
-"""
+from functools import partial
 
-import importlib
-import signal
-import sys
-from pathlib import Path
-from types import ModuleType
+from fish_node.entry import start
 
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-
-
-def _start(name: str) -> int | None:
-    """Import a node and run it, or say what it is."""
-    try:
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        node = importlib.import_module(f"fish_vision.nodes.{name}")
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # from here on the node's own affair
-        if {"-h", "--help"} & set(sys.argv[1:]):
-            print(_help(name, node))
-            return 0
-        status: int | None = node.main()
-    except KeyboardInterrupt:
-        return 0
-    return status
-
-
-def _help(name: str, node: ModuleType) -> str:
-    """How the node is started, what it does, and where its parameters stand."""
-    try:
-        share = Path(get_package_share_directory("fish_vision"))
-    except (PackageNotFoundError, OSError):  # no workspace is sourced: run from the source tree
-        share = Path(__file__).parents[2]
-    usage = f"usage: {name} [--ros-args -r __ns:=/fish --params-file FILE -p NAME:=VALUE ...]"
-    what, file = (node.__doc__ or "").partition("\n")[0], share / "config" / f"{name}.yaml"
-    return f"{usage}\n{what}\nparameters, their units and values: {file}"
-
-
-def tracker() -> int | None:
-    """Entry point."""
-    return _start("tracker")
+tracker = partial(start, "fish_vision", "tracker")

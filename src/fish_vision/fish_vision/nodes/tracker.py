@@ -21,12 +21,12 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.start import read_parameters, run
+from fish_node.nodes.status_log import StatusLog
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, CalibrationError, Lens
 from fish_vision.config import TrackerConfig
 from fish_vision.nodes.heap import keep_freed_memory
-from fish_vision.nodes.start import read_parameters, run
-from fish_vision.nodes.status_log import StatusLog
 from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
 from fish_vision.statistics import Statistics
 from fish_vision.tracker import Detection, Tracker

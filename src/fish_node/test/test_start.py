@@ -1,16 +1,14 @@
-"""How the nodes of this package start and stop."""
+"""How nodes start and stop."""
 
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 import rclpy
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from fish_sim.nodes import entry
-from fish_sim.nodes.start import read_parameters, run
+from fish_node.nodes.start import read_parameters, run
 
 pytestmark = pytest.mark.ros
 
@@ -120,16 +118,3 @@ def test_refused_parameters_give_one_line_and_1(capsys: pytest.CaptureFixture[st
 
     assert run(refuse, "node") == 1
     assert capsys.readouterr().err == "node: rate = -1: expected a positive number\n"
-
-
-@pytest.mark.parametrize("flag", ["-h", "--help"])
-@pytest.mark.parametrize("name", ["simulator", "camera"])
-def test_help_says_what_a_node_is_and_starts_nothing(
-    name: str, flag: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(sys, "argv", [name, flag])
-    monkeypatch.setattr(rclpy, "init", lambda *_, **__: pytest.fail("started"))
-    assert getattr(entry, name)() == 0
-    usage, what, parameters = capsys.readouterr().out.splitlines()
-    assert usage.startswith(f"usage: {name} ") and what
-    assert Path(parameters.split(": ")[1]).name == f"{name}.yaml" and Path(parameters.split(": ")[1]).exists()

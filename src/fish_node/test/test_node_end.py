@@ -1,14 +1,11 @@
 """A node's end: what a signal brings about is no failure, what cannot start is one line, a mistake shows its traceback."""
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 
-from fish_control.nodes import entry, start
+from fish_node.nodes import start
 
 
 def run(monkeypatch, error, alive):
@@ -40,22 +37,11 @@ def test_a_mistake_in_a_callback_is_no_refused_parameter(monkeypatch, error):
         run(monkeypatch, error, alive=True)
 
 
-def test_what_cannot_start_says_why(monkeypatch):
+def test_what_cannot_start_says_why(monkeypatch, capsys):
     def refuse():
         raise ValueError("speed is -1.0,\n expected at least 0")
 
     replaced = {"init": lambda: None, "ok": lambda: False, "try_shutdown": lambda: None}
     monkeypatch.setattr(start, "rclpy", SimpleNamespace(**replaced))
-    with pytest.raises(SystemExit, match="planner: speed is -1.0, expected at least 0"):
-        start.run(refuse, "planner")
-
-
-@pytest.mark.parametrize("flag", ["-h", "--help"])
-@pytest.mark.parametrize("name", ["fusion", "planner", "controller", "exciter"])
-def test_help_says_what_a_node_is_and_starts_nothing(name, flag, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", [name, flag])
-    monkeypatch.setattr(rclpy, "init", lambda *_, **__: pytest.fail("started"))
-    assert getattr(entry, name)() == 0
-    usage, what, parameters = capsys.readouterr().out.splitlines()
-    assert usage.startswith(f"usage: {name} ") and what
-    assert Path(parameters.split(": ")[1]).name == f"{name}.yaml" and Path(parameters.split(": ")[1]).exists()
+    assert start.run(refuse, "planner") == 1
+    assert capsys.readouterr().err == "planner: speed is -1.0, expected at least 0\n"

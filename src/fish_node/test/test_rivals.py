@@ -1,6 +1,6 @@
 """A second node that publishes the same is noticed, one that takes over is not."""
 
-from fish_sim.nodes.rivals import Rivals
+from fish_node.rivals import Rivals
 
 
 def test_only_who_stays_is_a_rival():

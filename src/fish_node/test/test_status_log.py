@@ -1,9 +1,9 @@
 """What a node says of itself, once on the console."""
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.logging import LoggingSeverity, get_logger
+from rclpy.logging import get_logger
 
-from fish_hw.nodes.status_log import QUIET_S, StatusLog
+from fish_node.nodes.status_log import QUIET_S, StatusLog
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -53,10 +53,14 @@ def test_what_comes_and_goes_fills_no_log_and_the_last_word_holds():
     assert console.said[-1] == ("warning", "no image")
 
 
-def test_one_logger_takes_every_level():
+def test_one_logger_takes_every_level(capfd):
     """rclpy refuses two levels from one line of code."""
-    logger = get_logger("status_log")
-    logger.set_level(LoggingSeverity.FATAL)
-    log = StatusLog(logger)
+    log = StatusLog(get_logger("status_log"))
     for level in (OK, WARN, ERROR, OK):
         log.say(level, f"level {level!r}")
+    said = "".join(capfd.readouterr())
+    assert [word for word in ("[INFO]", "[WARN]", "[ERROR]") if word in said] == [
+        "[INFO]",
+        "[WARN]",
+        "[ERROR]",
+    ]

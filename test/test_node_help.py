@@ -1,0 +1,27 @@
+"""Every node's executable with --help says what it is and starts nothing."""
+
+import importlib
+import sys
+from pathlib import Path
+
+import pytest
+import rclpy
+
+NODES = {
+    "fish_sim": ("simulator", "camera"),
+    "fish_vision": ("tracker",),
+    "fish_control": ("fusion", "planner", "controller", "exciter"),
+    "fish_hw": ("rotor", "rudder", "imu", "camera"),
+    "fish_train": ("recorder", "replayer"),
+}
+
+
+@pytest.mark.parametrize("flag", ["-h", "--help"])
+@pytest.mark.parametrize(("package", "name"), [(p, name) for p, names in NODES.items() for name in names])
+def test_help_says_what_a_node_is_and_starts_nothing(package, name, flag, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [name, flag])
+    monkeypatch.setattr(rclpy, "init", lambda *_, **__: pytest.fail("started"))
+    assert getattr(importlib.import_module(f"{package}.nodes.entry"), name)() == 0
+    usage, what, parameters = capsys.readouterr().out.splitlines()
+    assert usage.startswith(f"usage: {name} ") and what
+    assert Path(parameters.split(": ")[1]).name == f"{name}.yaml" and Path(parameters.split(": ")[1]).exists()
