@@ -20,7 +20,7 @@ from fish_train.evaluation.plant import FishSimPlant, Plant
 from fish_train.evaluation.sensing import FusedSensing, PerfectSensing, Sensing
 from fish_train.training.episodes import CERTAIN
 from fish_train.training.loop import Law
-from fish_train.training.worker_pool import worker_pool
+from fish_train.worker_pool import worker_pool
 
 LARGEST_BATCH = 16  # runs
 MakePlant = Callable[[Sequence[Robot], Sequence[int], float], Plant]

@@ -9,7 +9,7 @@ from concurrent.futures import Future, wait
 from typing import Any
 
 from fish_train.training.run import Job, Status, check_job, run
-from fish_train.training.worker_pool import worker_pool
+from fish_train.worker_pool import worker_pool
 
 POLL = 0.2  # s between looks at what the processes say
 _messages: Any = None  # the queue of a worker process, set when it starts
