@@ -75,7 +75,7 @@ def test_a_signal_while_python_imports_a_node_ends_it_with_0(spec, number, monke
         assert name == f"{spec.package}.nodes.{spec.executable}"
         signal.raise_signal(number)
 
-    monkeypatch.setattr(entry.importlib, "import_module", interrupted)
+    monkeypatch.setattr(importlib, "import_module", interrupted)
     try:
         assert getattr(entry, spec.executable)() == 0
     finally:

@@ -22,7 +22,7 @@ def in_type_of(name: str, given: Any, like: Any) -> Any:
     if isinstance(like, str) and len(like) == 1 and isinstance(given, bool):
         return "Y" if given else "N"
     if type(given) is not type(like):
-        raise ValueError(f"{name} = {given!r}: expected {type(like).__name__} as in {like!r}")
+        raise ValueError(f"{name} is {given!r}, expected {type(like).__name__} such as {like!r}")
     return given
 
 

@@ -130,7 +130,7 @@ def test_check_image_says_which_parameter_has_the_wrong_type(files: Path, monkey
     (files / "params.yaml").write_text("/**: {ros__parameters: {tail_links: 3.0}}")
     arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / "out.png")
     assert call(check_image, monkeypatch, files / "fish.png", *arguments) == 1
-    assert capsys.readouterr().err == "check_image: tail_links = 3.0: expected int as in 3\n"
+    assert capsys.readouterr().err == "check_image: tail_links is 3.0, expected int such as 3\n"
 
 
 def test_calibrate_mount_refuses_mistaken_points(files: Path, monkeypatch, capsys) -> None:

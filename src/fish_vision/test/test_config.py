@@ -56,12 +56,12 @@ def test_the_two_parts_of_a_file_are_merged(tmp_path: Path, text: str, pixel_std
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("tail_links: 3.0", "tail_links = 3.0: expected int as in 3"),
-        ("front_colour: [a, 36, 110, 90]", "front_colour = 'a': expected int"),
-        ("front_colour: 20", "front_colour = 20: expected tuple"),
-        ("pixel_std: fast", "pixel_std = 'fast': expected float"),
-        ("use_raw: 1", "use_raw = 1: expected bool"),
-        ("max_speed: true", "max_speed = True: expected float"),
+        ("tail_links: 3.0", "tail_links is 3.0, expected int such as 3"),
+        ("front_colour: [a, 36, 110, 90]", "front_colour is 'a', expected int"),
+        ("front_colour: 20", "front_colour is 20, expected tuple"),
+        ("pixel_std: fast", "pixel_std is 'fast', expected float"),
+        ("use_raw: 1", "use_raw is 1, expected bool"),
+        ("max_speed: true", "max_speed is True, expected float"),
     ],
 )
 def test_a_value_of_the_wrong_type_is_refused_with_its_name(

@@ -20,7 +20,6 @@ from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.status import WARN, Status
 from fish_hw.nodes.worker import Worker
-from fish_hw.settings.checks import in_type_of
 from fish_hw.transport.errors import TransportError
 from fish_node.nodes.start import read_parameters
 from fish_node.nodes.status_log import StatusLog
@@ -62,7 +61,7 @@ class DeviceNode(Node):
 
     def __init__(self, name: str, settings_class: type[Any]) -> None:
         super().__init__(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-        self.settings = read_parameters(self, settings_class, in_type_of)
+        self.settings = read_parameters(self, settings_class)
         self.failure = ""
         self._device: Device | None = None
         self._emulated = False

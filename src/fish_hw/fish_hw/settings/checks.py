@@ -1,7 +1,6 @@
 """Checks shared by the settings; each error names the field, its value and what is allowed."""
 
 import math
-from typing import Any
 
 
 def require_range(name: str, value: float, low: float, high: float) -> None:
@@ -14,12 +13,3 @@ def require_choice(name: str, value: object, choices: tuple[object, ...]) -> Non
     """ValueError unless value is one of choices."""
     if value not in choices:
         raise ValueError(f"{name} is {value!r}, expected one of {', '.join(repr(c) for c in choices)}")
-
-
-def in_type_of(name: str, value: Any, default: Any) -> Any:
-    """value, of the same type as default; a whole number may stand for a float (rate_hz:=100)."""
-    if isinstance(default, float) and type(value) is int:
-        return float(value)
-    if type(value) is not type(default):
-        raise ValueError(f"{name} is {value!r}, expected {type(default).__name__} such as {default!r}")
-    return value

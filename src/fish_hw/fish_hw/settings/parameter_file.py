@@ -7,8 +7,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from fish_hw.settings.checks import in_type_of
-from fish_node.parameters import unknown_names
+from fish_node.parameters import in_type_of, unknown_names
 
 Settings = TypeVar("Settings")
 

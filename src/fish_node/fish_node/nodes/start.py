@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
@@ -14,16 +14,12 @@ from rclpy.node import Node
 from fish_node.parameters import in_type_of, unknown_names
 
 Config = TypeVar("Config")
-Convert = Callable[[str, Any, Any], Any]
 
 
-def read_parameters(node: Node, kind: type[Config], convert: Convert = in_type_of) -> Config:
+def read_parameters(node: Node, kind: type[Config]) -> Config:
     """Declare every field of a dataclass as ROS parameter and read them; the defaults are those of the dataclass.
 
     The node must have been made with automatically_declare_parameters_from_overrides: a misspelt name would go unnoticed.
-
-    Args:
-        convert: makes of a name, what was given and the default a value of the field, or raises ValueError.
 
     Raises:
         ValueError: an unknown name, or a value of the wrong type or out of range, naming parameter, value and
@@ -38,7 +34,7 @@ def read_parameters(node: Node, kind: type[Config], convert: Convert = in_type_o
             node.undeclare_parameter(name)
         start = list(like) if isinstance(like, tuple) else like
         given = node.declare_parameter(name, start, ParameterDescriptor(dynamic_typing=True)).value
-        values[name] = convert(name, given, like)
+        values[name] = in_type_of(name, given, like)
     return kind(**values)
 
 
