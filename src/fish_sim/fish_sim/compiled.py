@@ -18,6 +18,7 @@ import tempfile
 from pathlib import Path
 
 FLAGS = (
+    "-O3",
     "-march=native",
     "-fno-math-errno",
     "-freciprocal-math",
@@ -70,18 +71,18 @@ def has_libmvec() -> bool:
     return platform.machine() in ("x86_64", "AMD64")
 
 
-def library(source: str, optimise: str = "-O3") -> ctypes.CDLL | None:
+def library(source: str) -> ctypes.CDLL | None:
     """The loaded library for a C text, compiled if it is not in the cache; None without a working compiler."""
     cc = compiler()
     if cc is None:
         return None
-    key = hashlib.sha256("\n".join([source, cc, _processor(), optimise, *FLAGS]).encode()).hexdigest()[:24]
+    key = hashlib.sha256("\n".join([source, cc, _processor(), *FLAGS]).encode()).hexdigest()[:24]
     try:
         folder = cache_folder()
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{key}.so"
         if not path.exists():
-            _compile(cc, optimise, source, path)
+            _compile(cc, source, path)
         return ctypes.CDLL(str(path))
     except (OSError, subprocess.CalledProcessError) as error:
         detail = error.stderr.decode()[:400] if isinstance(error, subprocess.CalledProcessError) else error
@@ -99,11 +100,11 @@ def _processor() -> str:
     return "\n".join(sorted({line for line in lines if line.startswith(("model name", "flags"))}))
 
 
-def _compile(cc: str, optimise: str, source: str, path: Path) -> None:
+def _compile(cc: str, source: str, path: Path) -> None:
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         text, built = Path(folder) / "kernel.c", Path(folder) / "kernel.so"
         text.write_text(source)
         libraries = ["-lmvec"] if has_libmvec() else []
-        command = [cc, optimise, *FLAGS, str(text), "-o", str(built), *libraries, "-lm"]
+        command = [cc, *FLAGS, str(text), "-o", str(built), *libraries, "-lm"]
         subprocess.run(command, check=True, capture_output=True)
         built.replace(path)

@@ -6,8 +6,6 @@ double) lets one core advance 4 or 8 fish at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import casadi
 
 BINARY = {casadi.OP_ADD: "+", casadi.OP_SUB: "-", casadi.OP_MUL: "*", casadi.OP_DIV: "/"}
@@ -54,54 +52,6 @@ def emit(function: casadi.Function) -> str:
     return "\n".join([head, "{", *_registers(function), *zeros, *body, "}", ""])
 
 
-def emit_split(function: casadi.Function) -> str:
-    """C text of a JVP for many directions at one point, the second half of its arguments and of its outputs the tangents'.
-
-    `name_given(const V *i0, .., V *o0, .., V *shared)` computes once what no tangent changes, NAME_SHARED numbers of it for
-    `name_along(const V *shared, const V *di0, .., V *do0, ..)`: a third of the instructions of the fish's rates, most divisions.
-    """
-    name, inputs, outputs = function.name(), function.n_in(), function.n_out()
-    points, values = inputs // 2, outputs // 2
-    # of a register: the instruction that wrote it, None where a tangent changes it
-    source: dict[int, int | None] = {}
-    slots: dict[int, int] = {}  # place in `shared` of what an instruction wrote
-    given: list[int] = []
-    along: list[str] = []
-
-    def passed(register: int) -> str:
-        written = source[register]
-        return f"w{register}" if written is None else f"shared[{slots.setdefault(written, len(slots))}]"
-
-    for k in range(function.n_instructions()):
-        operation, out, arguments = _parts(function, k)
-        if operation == casadi.OP_INPUT:
-            varies = arguments[0] >= points
-        elif operation == casadi.OP_OUTPUT:
-            varies = out[0] >= values
-        else:
-            varies = any(source[a] is None for a in arguments)
-        if varies:
-            along.append(f"  {_instruction(function, k, passed)}")
-        else:
-            given.append(k)
-        if operation != casadi.OP_OUTPUT:
-            source[out[0]] = None if varies else k
-    once = []
-    for k in given:
-        once.append(f"  {_instruction(function, k)}")
-        if k in slots:
-            once.append(f"  shared[{slots[k]}] = w{_parts(function, k)[1][0]};")
-    point = _arguments(range(points), range(values))
-    tangent = _arguments(range(points, inputs), range(values, outputs))
-    return "\n".join([
-        f"#define {name.upper()}_SHARED {len(slots)}",
-        f"static void {name}_given({point}, V *restrict shared)",
-        "{", *_registers(function), *_zero_outputs(function, range(values)), *once, "}",
-        f"static void {name}_along(const V *restrict shared, {tangent})",
-        "{", *_registers(function), *_zero_outputs(function, range(values, outputs)), *along, "}", "",
-    ])  # fmt: skip
-
-
 def _arguments(inputs: range, outputs: range) -> str:
     return ", ".join([
         *(f"const V *restrict i{k}" for k in inputs), *(f"V *restrict o{k}" for k in outputs)
@@ -127,16 +77,15 @@ def _parts(function: casadi.Function, k: int) -> tuple[int, list[int], list[int]
     return function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
 
 
-def _instruction(function: casadi.Function, k: int, read: Callable[[int], str] = "w{}".format) -> str:
-    """One instruction; `read`: what holds a register's value."""
+def _instruction(function: casadi.Function, k: int) -> str:
     operation, out, arguments = _parts(function, k)
     if operation == casadi.OP_CONST:
         return f"w{out[0]} = v_constant({function.instruction_constant(k)!r});"
     if operation == casadi.OP_INPUT:
         return f"w{out[0]} = i{arguments[0]}[{_row(function.sparsity_in(arguments[0]), arguments[1])}];"
     if operation == casadi.OP_OUTPUT:
-        return f"o{out[0]}[{_row(function.sparsity_out(out[0]), out[1])}] = {read(arguments[0])};"
-    names = [read(a) for a in arguments]
+        return f"o{out[0]}[{_row(function.sparsity_out(out[0]), out[1])}] = w{arguments[0]};"
+    names = [f"w{a}" for a in arguments]
     if operation in BINARY:
         return f"w{out[0]} = {names[0]} {BINARY[operation]} {names[1]};"
     if operation in UNARY_FORM:

@@ -150,6 +150,7 @@ class Functions:
     """CasADi functions of a structure; arguments are columns, a matrix argument maps over its columns.
 
     rate(x, w, p) -> x'; rate_jvp(x, w, p, dx, dw, dp) -> (x', dx'); rate_vjp(x, w, p, g) -> (gx, gw, gp);
+    rate_and_vjp(x, w, p, g) -> (x', gx, gw, gp);
     follow, follow_jvp, follow_vjp likewise of (m, c, p) -> m'; outputs(x, w, p) -> (q'', tip_force, slip).
     Each is built when it is first asked for: a search takes dozens of structures and needs little of each.
     """
@@ -172,6 +173,7 @@ class Functions:
     rate = cached_property(lambda self: self._motion.function())
     rate_jvp = cached_property(lambda self: self._motion.jvp())
     rate_vjp = cached_property(lambda self: self._motion.vjp())
+    rate_and_vjp = cached_property(lambda self: self._motion.value_and_vjp())
     follow = cached_property(lambda self: self._memory.function())
     follow_jvp = cached_property(lambda self: self._memory.jvp())
     follow_vjp = cached_property(lambda self: self._memory.vjp())
@@ -212,11 +214,19 @@ class Expression:
 
     def vjp(self) -> casadi.Function:
         """(inputs, adjoint of the value) -> adjoints of the inputs."""
+        adjoint, reverse = self._reverse()
+        return casadi.Function(f"{self.name}_vjp", [*self.inputs, adjoint], casadi.cse(reverse))
+
+    def value_and_vjp(self) -> casadi.Function:
+        """(inputs, adjoint of the value) -> (value, adjoints of the inputs)."""
+        adjoint, reverse = self._reverse()
+        inputs, values = [*self.inputs, adjoint], [self.value, *reverse]
+        return casadi.Function(f"{self.name}_and_vjp", inputs, casadi.cse(values))
+
+    def _reverse(self) -> tuple[casadi.SX, list[casadi.SX]]:
         adjoint = casadi.SX.sym("g", *self.value.shape)
         reverse = casadi.jtimes(self.value, casadi.vertcat(*self.inputs), adjoint, True)
         cuts = [0]
         for v in self.inputs:
             cuts.append(cuts[-1] + v.shape[0])
-        return casadi.Function(
-            f"{self.name}_vjp", [*self.inputs, adjoint], casadi.cse(casadi.vertsplit(reverse, cuts))
-        )
+        return adjoint, casadi.vertsplit(reverse, cuts)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.compiled import compiler, has_libmvec, lanes, library
-from fish_sim.emit import emit, emit_split
+from fish_sim.emit import emit
 from fish_sim.finite import check_finite
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel
@@ -281,13 +281,15 @@ def kernel_source(structure: Structure, scheme: Scheme, width: int, part: Part) 
     return _source(structure, scheme.method, str(scheme.substeps), width, *PARTS[part])
 
 
-def tangent_source(structure: Structure, method: str, width: int) -> str:
-    """C text of the step and of rates with tangents along many directions, exporting nothing; filters build on it.
+def filter_source(structure: Structure, method: str, width: int) -> str:
+    """C text of the step and of rates with their slopes, exporting nothing; filters build on it.
 
     Every thread sets `substeps`, the integrator's steps in a period, before it steps: one text serves every robot.
     """
-    text = _source(structure, method, "substeps", width, ("rate", "follow", "follow_jvp"), ("step.c",))
-    return "\n".join(["static _Thread_local int substeps;", text, emit_split(functions(structure).rate_jvp)])
+    names = ("rate", "rate_and_vjp", "follow", "follow_jvp")
+    return "static _Thread_local int substeps;\n" + _source(
+        structure, method, "substeps", width, names, ("step.c",)
+    )
 
 
 def _source(
@@ -311,6 +313,7 @@ def _definitions(layout: Layout, method: Method, substeps: str, width: int) -> l
     """Sizes and the tableau as C text."""
     sizes = {
         "LANES": width,
+        "NQ": layout.links + 3,
         "NX": len(layout.motion),
         "NM": len(layout.memory),
         "NS": len(layout.state),

@@ -1,15 +1,11 @@
 """Compiled kernels: cached, thread-safe, and dispensable."""
 
-import ctypes
 from concurrent.futures import ThreadPoolExecutor
-from importlib.resources import files
 
-import casadi
 import numpy as np
 import pytest
 
 from fish_sim import compiled, step
-from fish_sim.emit import emit_split
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.robot import Robot
 from fish_sim.step import Scheme, Stepper
@@ -72,30 +68,3 @@ def test_threads_share_a_kernel(strokes):
     with ThreadPoolExecutor(8) as pool:
         for states in pool.map(lambda _: swim(strokes, batch=16), range(32)):
             np.testing.assert_array_equal(states, alone)
-
-
-@pytest.mark.skipif(compiled.compiler() is None, reason="no C compiler on this computer")
-def test_what_no_tangent_changes_is_computed_once_and_the_tangents_are_the_same(fresh):
-    """An output without a tangent, one that is an argument, and a product of both kinds among them."""
-    x, dx = casadi.SX.sym("x", 3), casadi.SX.sym("dx", 3)
-    value = casadi.vertcat(x[0] * casadi.sin(x[1]), 2.0, x[2], casadi.sqrt(x[0] / x[2]))
-    whole = casadi.Function("toy", [x, dx], [value, casadi.jtimes(value, x, dx)])
-    text = "\n".join([
-        "#define LANES 1", (files("fish_sim") / "c" / "vector.h").read_text(), emit_split(whole),
-        "void given(const V *x, V *y, V *s) { toy_given(x, y, s); }",
-        "void along(const V *s, const V *dx, V *dy) { toy_along(s, dx, dy); }",
-        "int shared(void) { return TOY_SHARED; }",
-    ])  # fmt: skip
-    loaded = compiled.library(text)
-    point, value, kept = np.array([0.7, 0.4, 1.3]), np.empty(4), np.empty(loaded.shared())
-    assert len(kept) < whole.n_instructions() / 2
-
-    def call(name, *arrays):
-        getattr(loaded, name)(*(ctypes.c_void_p(a.ctypes.data) for a in arrays))
-
-    call("given", point, value, kept)
-    for direction in np.eye(3):
-        tangent = np.full(4, np.nan)
-        call("along", kept, direction, tangent)
-        expected = [v.full().ravel() for v in whole(point, direction)]
-        np.testing.assert_allclose([value, tangent], expected, rtol=1e-12, atol=1e-15)

@@ -35,12 +35,13 @@ def encoder_terms(experiment: Experiment, noise: Noise, rotor: Array, d_rotor: A
     inside = sampled & (r**2 < noise.gate_encoder)
     pull, J = np.where(inside, r, 0.0), -np.where(inside[..., None], d_rotor, 0.0) / noise.encoder
     samples = sampled.sum(axis=0)
+    rows, columns = J.transpose(1, 2, 0), J.transpose(1, 0, 2)  # by trial
     return EncoderTerms(
         -0.5 * np.sum(np.minimum(r**2, noise.gate_encoder), axis=0)
         - samples * np.log(noise.encoder * np.sqrt(2.0 * np.pi)),
         samples,
-        np.einsum("tm,tmk->mk", pull, J),
-        np.einsum("tmj,tmk->mjk", J, J),
+        (rows @ pull.T[..., None])[..., 0],
+        rows @ columns,
         np.where(sampled, r, np.nan),
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from fish_sim.compiled import lanes, library
 from fish_sim.model import DT, Structure
-from fish_sim.step import Stepper, tangent_source
+from fish_sim.step import Stepper, filter_source
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.encoder import encoder_terms
 from fish_train.identify.filter_types import (
@@ -41,7 +41,6 @@ class Settings(ctypes.Structure):
         *((f"slope_{name}", ctypes.c_double) for name in SENSORS),
         *((f"free_{name}", ctypes.c_long) for name in SENSORS),
         ("wrench_at", ctypes.c_long * 3),
-        ("links", ctypes.c_long),
         ("substeps", ctypes.c_long),
         ("wrench_decay", ctypes.c_double),
         ("wrench_variance", ctypes.c_double * 3),
@@ -61,7 +60,7 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
         *(sensors.slope.get(name, 1.0) for name in SENSORS),
         *(sensors.free.get(name, -1) for name in SENSORS),
         (ctypes.c_long * 3)(*(stepper.layout.parameters.index(name) for name in WRENCH)),
-        stepper.layout.links, stepper.scheme.substeps, decay, (ctypes.c_double * 3)(*variance),
+        stepper.scheme.substeps, decay, (ctypes.c_double * 3)(*variance),
         noise.gyro, noise.accel, noise.camera_position, noise.camera_heading, noise.gate_imu, noise.gate_camera,
     )  # fmt: skip
 
@@ -70,8 +69,7 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
 def filter_library(structure: Structure, method: str) -> ctypes.CDLL | None:
     """The compiled filter of a structure under an integrator, or None without a compiler."""
     text = (files("fish_train") / "identify" / "c" / "filter.c").read_text()
-    # a search compiles a kernel for every candidate: -O2 runs as fast as -O3 here and takes less than half as long to build
-    return library(tangent_source(structure, method, lanes()) + text, "-O2")
+    return library(filter_source(structure, method, lanes()) + text)
 
 
 def compiled_passes(problem: Problem, noises: Sequence[Noise], keep: bool) -> list[FilterResult] | None:
@@ -118,11 +116,13 @@ class _Job:
         arrays = (self.commands, self.imu, self.offset, self.pose)
         results = (self.sums, self.gradient, self.normal, self.whitened)
         history = None if self.history is None else _at(self.history[m])
-        self.loaded.filter_trial(
+        failed = self.loaded.filter_trial(
             ctypes.c_long(int(self.experiment.steps[m])), ctypes.c_long(self.K), *(_at(a[m]) for a in arrays),
             _at(self.p), _at(self.dp), ctypes.byref(self.settings), _at(self.start[m]), _at(self.start_P[m]),
             _at(self.memory0[m]), _at(self.d_memory0[m]), *(_at(a[m]) for a in results), history,
         )  # fmt: skip
+        if failed:
+            raise MemoryError(f"no memory for the derivatives along {self.K} free parameters")
 
     def result(self) -> FilterResult:
         """Sums of all trials, the encoder's among them."""
