@@ -45,40 +45,28 @@ CALL = {
 
 def emit(function: casadi.Function) -> str:
     """C text of `static void name(const V *i0, .., V *o0, ..)` for a CasADi SX function with dense arguments."""
-    arguments = _arguments(range(function.n_in()), range(function.n_out()))
-    head = f"static void {function.name()}({arguments})"
+    inputs, outputs = range(function.n_in()), range(function.n_out())
+    arguments = [*(f"const V *restrict i{k}" for k in inputs), *(f"V *restrict o{k}" for k in outputs)]
+    registers = [f"  V w{k};" for k in range(function.sz_w())]
     body = [f"  {_instruction(function, k)}" for k in range(function.n_instructions())]
-    zeros = _zero_outputs(function, range(function.n_out()))
-    return "\n".join([head, "{", *_registers(function), *zeros, *body, "}", ""])
+    head = f"static void {function.name()}({', '.join(arguments)})"
+    return "\n".join([head, "{", *registers, *_zero_outputs(function), *body, "}", ""])
 
 
-def _arguments(inputs: range, outputs: range) -> str:
-    return ", ".join([
-        *(f"const V *restrict i{k}" for k in inputs), *(f"V *restrict o{k}" for k in outputs)
-    ])  # fmt: skip
-
-
-def _registers(function: casadi.Function) -> list[str]:
-    return [f"  V w{k};" for k in range(function.sz_w())]
-
-
-def _zero_outputs(function: casadi.Function, outputs: range) -> list[str]:
+def _zero_outputs(function: casadi.Function) -> list[str]:
     """Structurally zero entries of an output are never assigned by an instruction."""
     lines = []
-    for k in outputs:
+    for k in range(function.n_out()):
         sparsity = function.sparsity_out(k)
         if sparsity.nnz() != sparsity.numel():
             lines.append(f"  for (int j = 0; j < {sparsity.numel()}; ++j) o{k}[j] = v_constant(0.0);")
     return lines
 
 
-def _parts(function: casadi.Function, k: int) -> tuple[int, list[int], list[int]]:
-    """Operation, where its result goes and what it takes: registers, or for inputs and outputs argument and nonzero."""
-    return function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-
-
 def _instruction(function: casadi.Function, k: int) -> str:
-    operation, out, arguments = _parts(function, k)
+    operation = function.instruction_id(k)
+    # registers; of inputs and outputs the argument and its nonzero
+    out, arguments = function.instruction_output(k), function.instruction_input(k)
     if operation == casadi.OP_CONST:
         return f"w{out[0]} = v_constant({function.instruction_constant(k)!r});"
     if operation == casadi.OP_INPUT:
