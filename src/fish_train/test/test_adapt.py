@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
+from fish_train.identify import adapt
 from fish_train.identify.adapt import NOISE_MOVES, Reach, adapt_noise, settle
 from fish_train.identify.cores import on_all_cores
 from fish_train.identify.experiment import Experiment
@@ -71,3 +73,15 @@ def test_items_are_worked_on_in_their_order_and_an_error_is_raised() -> None:
     assert on_all_cores(lambda n: n * n, range(5)) == [0, 1, 4, 9, 16]
     with pytest.raises(ZeroDivisionError):
         on_all_cores(lambda n: 1 // n, [1, 0])
+
+
+def test_where_every_move_diverges_the_noise_stays(fish: Experiment, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And no warning of NumPy reaches the user."""
+    fit = fitted(fish, Noise())
+    kept = adapt.starts(fit, fish, Reach.NEAR)
+    monkeypatch.setattr(
+        adapt, "likelihoods", lambda _h, _t, _e, n: np.where([m in kept for m in n], 0.0, -np.inf)
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert adapt_noise(fit, fish, reach=Reach.NEAR) == kept[0]

@@ -97,6 +97,8 @@ def adapt_noise(
     for _ in range(rounds):
         for change in moves:
             low, high = values([change(noise, 0.5), change(noise, 2.0)])
+            if np.isinf(low) and np.isinf(high):
+                continue
             curvature, slope = low + high - 2.0 * best, 0.5 * (high - low)
             parabola = np.isfinite(curvature) and curvature < 0
             octaves = -slope / curvature if parabola else np.sign(np.nan_to_num(slope)) * 2.0
