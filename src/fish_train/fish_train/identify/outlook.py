@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_train.identify.alignment import moved_back
+from fish_train.identify.cores import cores, on_all_cores
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import WRENCH, Noise, SensorModel
 from fish_train.identify.fit import Fit, evaluate
@@ -192,7 +193,9 @@ class Outlook:
         """Errors (R, 4) and slopes (R, 4, K) of all targets, trial by trial."""
         targets = [target for found in self.targets.values() for target in found]
         rows = sorted({target.start for target in targets})
-        pose, d_pose = self._simulate(self.starts[rows], p, dp)
+        shares = np.array_split(self.starts[rows], min(cores(), len(rows)))
+        simulated = on_all_cores(lambda starts: self._simulate(starts, p, dp), shares)
+        pose, d_pose = (np.concatenate(parts, axis=1) for parts in zip(*simulated, strict=True))
         column = {row: i for i, row in enumerate(rows)}
         e, J = np.empty((len(targets), 4)), np.empty((len(targets), 4, len(dp)))
         for i, target in enumerate(targets):

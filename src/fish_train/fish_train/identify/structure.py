@@ -8,7 +8,6 @@ and so on. Trials that are held out of the whole identification take no part.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ from multiprocessing import get_context
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_train.identify.cores import cores
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate
@@ -83,7 +83,7 @@ def choose_effects(
         left = [name for name in names if name not in fit.hypothesis.names]
         screened, judged = list[_Tried](), list[_Judged]()
         # forked, so that a user's own effects are registered there as well
-        with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
+        with ProcessPoolExecutor(cores(), get_context("fork")) as pool:
             for tried in pool.map(partial(_screen, fit, experiment), left):
                 screened.append(tried)
                 report(f"effect {number + 1}: tried {tried.name} ({len(screened)} of {len(left)})")
