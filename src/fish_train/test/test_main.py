@@ -41,6 +41,15 @@ def test_no_such_entry_point():
         command.swim_faster  # noqa: B018
 
 
+@pytest.mark.parametrize(("verb", "package"), [("prove", "statsmodels"), ("train", "torch")])
+def test_a_package_that_is_not_installed_is_one_line(verb, package):
+    """After `make build` alone there is no statsmodels and no torch."""
+    code = f"import sys; sys.modules[{package!r}] = None; from fish_train.commands.main import main; sys.exit(main([{verb!r}]))"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    said = f"fish_train {verb}: the Python package {package} is not installed; `make setup`, or "
+    assert (ended.returncode, ended.stderr.startswith(said), ended.stderr.count("\n")) == (1, True, 1)
+
+
 @pytest.mark.parametrize("verb", ["inspect", "recover"])
 def test_bad_path_is_one_line(capsys, verb):
     assert command.main([verb, "/nowhere/at/all"]) == 1

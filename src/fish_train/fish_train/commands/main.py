@@ -13,6 +13,10 @@ from fish_train.errors import UserError
 
 from .verbs import VERBS
 
+BRINGS_PACKAGES = (
+    "`make setup`, or `pip install -r requirements-diagnose.txt -r requirements-train.txt`, brings it"
+)
+
 
 class OneLineParser(argparse.ArgumentParser):
     """Says what is wrong with an argument in one line; usage comes with --help."""
@@ -44,12 +48,20 @@ def usage() -> str:
 
 def run_verb(verb: str, argv: list[str] | None = None) -> int:
     """Parse the arguments of one verb and run it; errors the user can mend become one line and status 1."""
-    module = import_module(f"{__package__}.{verb}")
-    parser = OneLineParser(prog=f"fish_train {verb}", description=module.__doc__)
-    module.add_arguments(parser)
-    args = parser.parse_args(argv)
     try:
-        return int(module.run(args))
+        module = import_module(f"{__package__}.{verb}")
+        parser = OneLineParser(prog=f"fish_train {verb}", description=module.__doc__)
+        module.add_arguments(parser)
+        return int(module.run(parser.parse_args(argv)))
+    except ModuleNotFoundError as error:
+        missing = (error.name or "").split(".")[0]
+        if not missing or missing.startswith("fish_"):
+            raise
+        print(
+            f"fish_train {verb}: the Python package {missing} is not installed; {BRINGS_PACKAGES}",
+            file=sys.stderr,
+        )
+        return 1
     except UserError as error:  # what a library says of a file in it may have several lines
         print(f"fish_train {verb}: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
