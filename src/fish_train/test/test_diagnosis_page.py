@@ -13,6 +13,7 @@ from fish_train.reports.diagnosis_page import (
     EVIDENCE_NOTE,
     NAT,
     _acts_in_a_range,
+    _evidence_row,
     _fit_table,
     _found,
     _whiteness,
@@ -142,6 +143,12 @@ def test_nats_and_p_values_are_explained():
     assert list(table.header) == ["row", "p before", "p after"] and table.rows == [["gyro", "0.001", "0.4"]]
     assert "Below 0.05 something is left" in table.note
     assert NAT in EVIDENCE_NOTE and "unit of log-likelihood" in NAT
+
+
+def test_a_quick_fit_that_diverged_says_so():
+    found = SimpleNamespace(refitted={})
+    rows = [_evidence_row(found, SimpleNamespace(name="tip_slip", gain=g)) for g in (12.4, -np.inf)]
+    assert [row[1] for row in rows] == ["12", "diverged"] and "Diverged: " in EVIDENCE_NOTE
 
 
 def test_bins_of_a_rudder_that_stays_at_its_stop_hold_means_and_no_zeros():

@@ -116,7 +116,8 @@ def _errors(rms: Mapping[str, float]) -> str:
 EVIDENCE_HEADER = ("name", "quick gain, nats", "refitted gain, nats", "parameters")
 EVIDENCE_NOTE = (
     f"{NAT} Every candidate is fitted together with all nominal parameters and the noise; "
-    "gains are over the refitted model, so what its parameters absorb does not count."
+    "gains are over the refitted model, so what its parameters absorb does not count. "
+    "Diverged: at the quick fit's values the model does not follow the recordings at all."
 )
 
 
@@ -132,11 +133,12 @@ def _evidence(d: Diagnosis) -> list[Table]:
 
 def _evidence_row(found: Round, ranked: Ranked) -> list[str]:
     fit = found.refitted.get(ranked.name)
+    quick = f"{ranked.gain:.0f}" if np.isfinite(ranked.gain) else "diverged"
     if fit is None:
-        return [ranked.name, f"{ranked.gain:.0f}", "", ""]
+        return [ranked.name, quick, "", ""]
     own = {k: v for k, v in fit.values.items() if k.startswith(ranked.name + ".")}
     values = ", ".join(f"{k.split('.')[1]} {v:.4g} ± {fit.standard_errors[k]:.2g}" for k, v in own.items())
-    return [ranked.name, f"{ranked.gain:.0f}", f"{found.gain(ranked.name):.0f}", values]
+    return [ranked.name, quick, f"{found.gain(ranked.name):.0f}", values]
 
 
 WHITENESS_NOTE = (
