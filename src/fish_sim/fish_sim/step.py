@@ -118,7 +118,7 @@ class Stepper:
         states = np.empty((len(commands) + 1, *start.shape))
         states[0] = start
         self._kernel(len(start)).rollout(states, commands, parameters)
-        return states.reshape(len(states), *shape, -1)
+        return states.reshape(len(states), *shape, states.shape[-1])
 
     def rollout_jvp(
         self,
@@ -145,7 +145,7 @@ class Stepper:
         states, tangents = (np.empty((len(commands) + 1, *start.shape)) for _ in range(2))
         states[0], tangents[0] = start, ds
         self._kernel(len(start), "tangents").rollout_jvp(states, tangents, commands, dc, parameters, dp)
-        return tuple(a.reshape(len(a), *shape, -1) for a in (states, tangents))  # type: ignore[return-value]
+        return tuple(a.reshape(len(a), *shape, a.shape[-1]) for a in (states, tangents))  # type: ignore[return-value]
 
     def rollout_vjp(
         self, states: Array, commands: Array, parameters: Array, g_states: Array
@@ -160,9 +160,9 @@ class Stepper:
             flat[0], commands, parameters, flat[1], g_start, g_commands, g_parameters
         )
         return (
-            g_start.reshape(*shape, -1),
-            g_commands.reshape(len(commands), *shape, -1),
-            g_parameters.reshape(*shape, -1),
+            g_start.reshape(*shape, g_start.shape[-1]),
+            g_commands.reshape(len(commands), *shape, 2),
+            g_parameters.reshape(*shape, g_parameters.shape[-1]),
         )
 
     def rates_jvp(
@@ -240,7 +240,7 @@ class Stepper:
         self._check_width("parameters", parameters, len(self.layout.parameters))
         shape = np.broadcast_shapes(start.shape[:-1], commands.shape[1:-1], parameters.shape[:-1])
         batch = int(np.prod(shape, dtype=int))
-        flat_start = np.broadcast_to(start, (*shape, start.shape[-1])).reshape(batch, -1)
+        flat_start = np.broadcast_to(start, (*shape, start.shape[-1])).reshape(batch, start.shape[-1])
         if commands.ndim == 2:
             flat_commands = commands[:, None]
         else:
@@ -250,7 +250,8 @@ class Stepper:
         if parameters.ndim == 1:
             flat_parameters = parameters[None]
         else:
-            flat_parameters = np.broadcast_to(parameters, (*shape, parameters.shape[-1])).reshape(batch, -1)
+            width = parameters.shape[-1]
+            flat_parameters = np.broadcast_to(parameters, (*shape, width)).reshape(batch, width)
         arrays = (np.ascontiguousarray(a) for a in (flat_start, flat_commands, flat_parameters))
         return (*arrays, shape)  # type: ignore[return-value]
 

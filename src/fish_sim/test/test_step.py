@@ -130,6 +130,19 @@ def test_a_diverging_batch_element_is_flagged_and_leaves_the_others_alone(stroke
     np.testing.assert_allclose(states[:, [0, 2, 3, 5]], np.tile(alone[:, None], (1, 4, 1)), atol=1e-12)
 
 
+def test_a_batch_of_none_is_no_error(strokes):
+    stepper = Stepper.of(Robot())
+    start, p = stepper.rest(), stepper.parameters(Robot())
+    commands = strokes(1)
+    states = stepper.rollout(np.empty((0, len(start))), commands, p)
+    assert states.shape == (len(commands) + 1, 0, len(start))
+    none = np.empty((0, len(start))), np.zeros((len(commands), 0, 2)), np.empty((0, len(p)))
+    tangents = stepper.rollout_jvp(np.empty((0, len(start))), commands, p, *none)[1]
+    adjoints = stepper.rollout_vjp(states, commands, np.empty((0, len(p))), np.zeros_like(states))
+    assert tangents.shape == states.shape
+    assert [a.shape for a in adjoints] == [(0, len(start)), (len(commands), 0, 2), (0, len(p))]
+
+
 def test_wrong_shapes_and_other_robots_are_refused():
     stepper = Stepper(Robot().structure, compiled=False)
     p = stepper.parameters(Robot())

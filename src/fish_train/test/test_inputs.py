@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import recording_samples as samples
 
+from fish_train.commands import main as command
 from fish_train.commands.inputs import read_experiment
 from fish_train.errors import UserError
 
@@ -16,6 +17,22 @@ def test_what_cannot_be_read_is_left_out_and_said(tmp_path):
     experiment, left_out = read_experiment(tmp_path)
     assert experiment.names == ("a", "b")
     assert len(left_out) == 1 and "c left out" in left_out[0] and "recover" in left_out[0]
+
+
+def test_recordings_of_a_laboratory_with_its_own_names(tmp_path, capsys):
+    samples.robot_recording(tmp_path / "ours" / "a")
+    own = {"/fish/camera/pose": "/tracking/head", "/fish/joint_command": "/fish/motors"}
+    messages = [(t, own.get(topic, topic), *rest) for t, topic, *rest in samples.robot_messages()]
+    samples.write_mcap(tmp_path / "theirs" / "a", messages)
+    names = tmp_path / "topics.yaml"
+    names.write_text("topics: {camera: {topic: /tracking/head}, commands: {topic: motors}}\n")
+    for folder, options in (("ours", []), ("theirs", ["--topics", str(names), "--namespace", "/fish"])):
+        out = ["--out", str(tmp_path / folder / "robot"), "--hold-out", "0"]
+        assert command.main(["identify", str(tmp_path / folder), *out, *options]) == 0
+    fits = [(tmp_path / folder / "robot" / "robot.yaml").read_text() for folder in ("ours", "theirs")]
+    assert fits[0] == fits[1]
+    assert command.main(["diagnose", str(tmp_path / "theirs"), "--out", str(tmp_path / "out")]) == 1
+    assert "no trial can be used" in capsys.readouterr().err
 
 
 def test_two_robots_are_refused_also_from_two_folders(tmp_path):

@@ -129,6 +129,13 @@ def test_nothing_is_foretold_of_what_lies_beyond_a_trial_s_end(outlook: Outlook)
     assert 450 < max(last) <= 498
 
 
+def test_trials_too_short_to_be_foretold_have_no_errors(outlook: Outlook) -> None:
+    short = Outlook(shorten(outlook.experiment, 150), nominal_hypothesis(Robot(), FREE))
+    short.start_from(np.zeros(len(FREE)), NOISE)
+    e, J = short.errors(np.zeros(len(FREE)))
+    assert e.shape == (0,) and J.shape == (0, len(FREE)) and short.cost(np.zeros(len(FREE))) == 0.0
+
+
 def test_sensors_far_noisier_than_said_tell_of_a_wrong_model(outlook: Outlook) -> None:
     fit = evaluate(nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE)
     assert not is_wrong(fit, NOISE)

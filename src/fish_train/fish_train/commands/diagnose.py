@@ -9,6 +9,13 @@ from pathlib import Path
 from rich.console import Console
 
 from fish_sim.robot import Robot, save_robot
+from fish_train.commands.inputs import (
+    add_topic_arguments,
+    read_experiment,
+    read_model,
+    topic_map,
+    user_errors,
+)
 from fish_train.errors import UserError
 from fish_train.json_file import write_json
 
@@ -28,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--candidates", metavar="NAME,NAME", help="what competes (default: every name of the vocabulary)"
     )
+    add_topic_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -40,14 +48,12 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.reports.diagnosis_page import write_diagnosis_page
     from fish_train.reports.verdict_sentence import sentence
 
-    from .inputs import read_experiment, read_model, user_errors
-
     console, start = Console(stderr=True), time.monotonic()
     robot = read_model(args.robot)
     with user_errors():
         level = Level(args.false_alarms)
         names = known(args.candidates.split(",")) if args.candidates else None
-    experiment, left_out = read_experiment(*args.dataset)
+    experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
     args.out.mkdir(parents=True, exist_ok=True)
     with console.status("diagnosing") as status:
 

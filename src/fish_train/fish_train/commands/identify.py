@@ -11,6 +11,15 @@ from pathlib import Path
 
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from fish_train.commands.inputs import (
+    add_topic_arguments,
+    read_experiment,
+    read_model,
+    terminal,
+    topic_map,
+    user_errors,
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
@@ -33,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="effects that the model gets besides, their parameters free (default: none; see diagnose), or 'choose': those "
         "that predict training trials better that are left out in turn",
     )
+    add_topic_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -45,11 +55,9 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.reports.identify_tables import error_table, parameter_table
     from fish_train.score_table import print_table
 
-    from .inputs import read_experiment, read_model, terminal, user_errors
-
     console, chosen = terminal(), args.effects == "choose"
     robot = read_model(args.robot)
-    experiment, left_out = read_experiment(*args.dataset)
+    experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar, user_errors():
         task, began = bar.add_task("identifying", total=None), time.monotonic()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,7 @@ FILE_WIDTH = 160  # columns when the output is not a terminal
 if TYPE_CHECKING:
     from fish_sim.robot import Robot
     from fish_train.identify.experiment import Experiment
+    from fish_train.recordings.topic_map import TopicMap
 
 
 def terminal() -> Console:
@@ -43,8 +45,27 @@ def read_model(path: Path | None) -> Robot:
         return Robot() if path is None else load_robot(path)
 
 
-def read_experiment(*paths: Path) -> tuple[Experiment, list[str]]:
+def add_topic_arguments(parser: argparse.ArgumentParser) -> None:
+    """How the topics of recordings are called."""
+    parser.add_argument("--topics", type=Path, help="YAML topic map (default: the names of the format)")
+    parser.add_argument("--namespace", help="robot's namespace (default: found from the topics)")
+
+
+def topic_map(args: argparse.Namespace) -> TopicMap:
+    """What these arguments say."""
+    from dataclasses import replace
+
+    from fish_train.recordings import TopicMap, load_topic_map
+
+    with user_errors():
+        topics = load_topic_map(args.topics) if args.topics else TopicMap()
+    return topics if args.namespace is None else replace(topics, namespace=args.namespace)
+
+
+def read_experiment(*paths: Path, topics: TopicMap | None = None) -> tuple[Experiment, list[str]]:
     """All usable trials under the paths on the filter's grid, and what was left out and why.
+
+    topics: which topic is what; None: the default names.
 
     Raises UserError when no trial can be used, when one is given twice, or when the trials are not of one robot.
     """
@@ -55,7 +76,7 @@ def read_experiment(*paths: Path) -> tuple[Experiment, list[str]]:
     read, trials, left_out = [], [], []
     with user_errors():
         for path in paths:
-            data = read_dataset(path, progress=True)
+            data = read_dataset(path, topics, progress=True)
             left_out += [problem.text for problem in data.problems if problem.kind == "unreadable_trial"]
             read += list(data)
         read = told_apart(read)

@@ -9,22 +9,20 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from fish_train.commands.inputs import add_topic_arguments, terminal, topic_map
 from fish_train.commands.named_path import named_path
 
 if TYPE_CHECKING:
-    from fish_train.recordings.topic_map import TopicMap
     from fish_train.reports.page import Table as Sheet
 
 COLOURS = {"error": "red", "warning": "yellow"}
-FILE_WIDTH = 160  # columns when the output is not a terminal
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recording", type=Path, help="rosbag2 folder, .mcap, .db3 or .bag file, or a folder of them"
     )
-    parser.add_argument("--topics", type=Path, help="YAML topic map (default: the names of the format)")
-    parser.add_argument("--namespace", help="robot's namespace (default: found from the topics)")
+    add_topic_arguments(parser)
     parser.add_argument("--html", type=Path, help="page to write (default: inspect_<name>.html here)")
     parser.add_argument("--no-html", action="store_true", help="print only")
 
@@ -33,10 +31,8 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.recordings import read_dataset
     from fish_train.reports.recording_tables import problems_table, tables, trials_table
 
-    data = read_dataset(named_path(args.recording), _topic_map(args), progress=True)
-    console = Console()
-    if not console.is_terminal:
-        console.width = FILE_WIDTH
+    data = read_dataset(named_path(args.recording), topic_map(args), progress=True)
+    console = terminal()
     if len(data) > 1:
         _print(console, trials_table(data))
     for trial in data:
@@ -50,15 +46,6 @@ def run(args: argparse.Namespace) -> int:
         write_recording_page(data, page)
         console.print(f"page: {page}", highlight=False, soft_wrap=True)
     return 0
-
-
-def _topic_map(args: argparse.Namespace) -> TopicMap:
-    from dataclasses import replace
-
-    from fish_train.recordings import TopicMap, load_topic_map
-
-    topics = load_topic_map(args.topics) if args.topics else TopicMap()
-    return topics if args.namespace is None else replace(topics, namespace=args.namespace)
 
 
 def _print(console: Console, sheet: Sheet) -> None:

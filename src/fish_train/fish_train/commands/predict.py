@@ -11,6 +11,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from fish_train.commands.inputs import (
+    add_topic_arguments,
+    read_experiment,
+    read_model,
+    terminal,
+    topic_map,
+    user_errors,
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
@@ -22,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("predictions.csv"), help="table (default: %(default)s)"
     )
+    add_topic_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -33,11 +43,9 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.reports.identify_tables import error_table
     from fish_train.score_table import print_table
 
-    from .inputs import read_experiment, read_model, terminal, user_errors
-
     console = terminal()
     model = read_model(args.model)
-    experiment, left_out = read_experiment(args.recording)
+    experiment, left_out = read_experiment(args.recording, topics=topic_map(args))
     with user_errors():
         noise = suitable_noise(experiment, model, usual_noise(experiment))
         predictions = predict(experiment, model, noise, args.horizon)

@@ -31,7 +31,7 @@ def smoothed(
         history = run_filter(alone, coordinates.stepper, p, dp, sensors, noise, keep=True).history
         assert history is not None
         parts[m] = _at(history, starts[starts[:, 0] == m, 1], int(alone.steps[0]), ahead)
-    out = np.full((len(starts), next(iter(parts.values())).shape[1] if parts else 0), np.nan)
+    out = np.full((len(starts), next(iter(parts.values())).shape[1]), np.nan)
     for m, states in parts.items():
         out[starts[:, 0] == m] = states
     return out

@@ -193,7 +193,7 @@ class Outlook:
         """Errors (R, 4) and slopes (R, 4, K) of all targets, trial by trial."""
         targets = [target for found in self.targets.values() for target in found]
         rows = sorted({target.start for target in targets})
-        shares = np.array_split(self.starts[rows], min(cores(), len(rows)))
+        shares = np.array_split(self.starts[rows], max(1, min(cores(), len(rows))))
         simulated = on_all_cores(lambda starts: self._simulate(starts, p, dp), shares)
         pose, d_pose = (np.concatenate(parts, axis=1) for parts in zip(*simulated, strict=True))
         column = {row: i for i, row in enumerate(rows)}

@@ -172,7 +172,7 @@ def predict(
     sensors = Coordinates(nominal_hypothesis(robot, free=())).filter_inputs(np.zeros(0))[2]
     length = int(np.ceil((horizon + HALF_WINDOW) / DT)) + 1
     state, wrench = estimates.state[start, trial], estimates.wrench[start, trial]
-    if ahead:
+    if ahead and len(starts):
         nx = len(Coordinates(nominal_hypothesis(robot, free=())).stepper.layout.motion)
         known = smoothed(experiment, robot, noise, starts, ahead)
         good = np.isfinite(known).all(axis=1)
