@@ -74,6 +74,17 @@ def test_calibrate_mount_names_the_line_that_is_no_number(files: Path, monkeypat
     assert not (files / "mount.yaml").exists()
 
 
+def test_calibrate_overwrites_no_parameters_of_the_user(files: Path, monkeypatch, capsys) -> None:
+    before = (files / "params.yaml").read_text()
+    for what in (
+        ("mount", files / "points.csv", "--lens", files / "lens.yaml"),
+        ("lens", "no.png", "--corners", "8x6", "--square", "0.03"),
+    ):
+        assert call(calibrate, monkeypatch, *what, "--out", files / "params.yaml") == 1
+        assert "params.yaml: exists already; expected a new file" in capsys.readouterr().err
+    assert (files / "params.yaml").read_text() == before
+
+
 @pytest.mark.parametrize("square", ["nan", "inf"])
 def test_calibrate_lens_refuses_a_square_without_a_size(
     files: Path, monkeypatch, capsys, square: str

@@ -37,19 +37,28 @@ def arguments() -> argparse.ArgumentParser:
     return parser
 
 
+def new_file(path: Path) -> Path:
+    """The path, where nothing is yet: a params file may hold keys of the user's own. Raises CalibrationError."""
+    if path.exists():
+        raise CalibrationError(f"{path}: exists already; expected a new file, as calibrate overwrites none")
+    return path
+
+
 def calibrate_lens(args: argparse.Namespace) -> None:
     """Write a camera calibration file."""
+    out = new_file(args.out)
     sides = args.corners.lower().split("x")
     if len(sides) != 2 or not all(s.isdigit() and int(s) > 2 for s in sides) or not 0.0 < args.square < inf:
         raise CalibrationError(f"--corners {args.corners} --square {args.square}: expected like 8x6 and 0.03")
     pictures = [read_picture(path) for path in args.pictures]
     lens, rms, used = lens_from_chessboards(pictures, (int(sides[0]), int(sides[1])), args.square)
-    args.out.write_text(yaml.safe_dump(lens_document(lens, "overhead"), sort_keys=False))
+    out.write_text(yaml.safe_dump(lens_document(lens, "overhead"), sort_keys=False))
     print(f"{args.out}: board found in {len(used)} of {len(pictures)} pictures, error {rms:.3f} pixels rms")
 
 
 def calibrate_mount(args: argparse.Namespace) -> None:
     """Write a params file with camera_position and camera_tilt."""
+    out = new_file(args.out)
     rows = read_points(args.points)
     points = np.column_stack([rows[:, :2], np.full(len(rows), args.height)])
     mount, rms = mount_from_points(read_lens(args.lens), points, rows[:, 2:])
@@ -59,7 +68,7 @@ def calibrate_mount(args: argparse.Namespace) -> None:
             "a point is mistaken or the lens file is of another camera"
         )
     values = {"camera_position": list(mount.position), "camera_tilt": list(mount.tilt)}
-    args.out.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
+    out.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
     print(
         f"{args.out}: {len(rows)} points, error {rms:.2f} pixels rms, camera {mount.position[2]:.3f} m high"
     )
