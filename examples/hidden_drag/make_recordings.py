@@ -1,9 +1,14 @@
-"""Write the recordings of this example again: a fish with form drag that its model lacks, and other drags and stiffness."""
+"""Write the recordings of this example again: a fish with form drag that its model lacks, and other drags and stiffness.
+
+Into this example's own folder, whose recordings are replaced, or into a new or empty folder that is given.
+"""
 
 import shutil
 import sys
 from pathlib import Path
 
+from fish_train.commands.output_folder import new_folder
+from fish_train.errors import UserError
 from fish_train.prove.build import make_world
 from fish_train.prove.world import World
 
@@ -21,7 +26,19 @@ WORLD = World(
     },
 )
 
+OWN = Path(__file__).parent / "recordings"
+
+
+def folder_of(words: list[str]) -> Path:
+    """The folder to write into, empty or not there: what lies in a folder that is not this script's stays. Raises UserError."""
+    if words:
+        return new_folder(Path(words[0]), "hidden_drag")
+    shutil.rmtree(OWN, ignore_errors=True)
+    return OWN
+
+
 if __name__ == "__main__":
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "recordings"
-    shutil.rmtree(folder, ignore_errors=True)
-    make_world(WORLD, folder)
+    try:
+        make_world(WORLD, folder_of(sys.argv[1:]))
+    except UserError as error:
+        sys.exit(str(error))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import runpy
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +18,7 @@ from fish_sim.robot import Robot
 from fish_sim.scheme import default_scheme
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_train.diagnose.vocabulary import candidates
+from fish_train.errors import UserError
 from fish_train.identify.experiment import build_experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
@@ -46,6 +49,20 @@ def test_worlds_are_drawn_from_the_seed_alone() -> None:
     assert hidden == {*candidates(), *OTHER_FORMS}
     with pytest.raises(ValueError, match="known: single"):
         groups.draw_worlds(3, ["nonsense"], 0)
+
+
+def test_the_example_s_script_deletes_nothing_that_it_has_not_written(tmp_path: Path) -> None:
+    script = Path(__file__).parents[3] / "examples" / "hidden_drag" / "make_recordings.py"
+    folder_of = runpy.run_path(str(script))["folder_of"]
+    (tmp_path / "thesis.txt").touch()
+    with pytest.raises(UserError, match="exists and is not empty"):
+        folder_of([str(tmp_path)])
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+    assert folder_of([str(tmp_path / "new")]) == tmp_path / "new"
+    own = folder_of.__globals__["OWN"]
+    assert own == script.parent / "recordings"
+    folder_of.__globals__["OWN"] = tmp_path
+    assert folder_of([]) == tmp_path and not tmp_path.exists()
 
 
 def test_no_outside_effect_is_in_the_vocabulary() -> None:
