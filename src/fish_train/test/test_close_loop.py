@@ -18,9 +18,11 @@ from fish_train.evaluation.feed_forward import law_of_robot
 from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
 from fish_train.evaluation.plant import FishSimPlant
 from fish_train.evaluation.study import Condition, Row
-from fish_train.prove import close_loop, gain_search
+from fish_train.prove import close_loop, gain_search, loop_folder
 from fish_train.prove.close_loop import JUDGE_SEEDS, Plan, loop_world
 from fish_train.prove.gain_search import search
+from fish_train.prove.loop_folder import prepare
+from fish_train.prove.study import StudyError
 from fish_train.reports.loop_page import gap_share, loop_figure, loop_table, speed_table
 from fish_train.training.loop import Law
 
@@ -36,6 +38,52 @@ def test_what_the_loop_cannot_conceal_is_said() -> None:
     assert loop_world("nothing", 1, 3, 4.0).effects == {}
     with pytest.raises(ValueError, match="concealed: got 'storm'; expected one of nothing, "):
         loop_world("storm", 1, 3, 4.0)
+
+
+def test_the_folder_of_a_loop_serves_its_own_world_alone(tmp_path: Path, monkeypatch) -> None:
+    def plan(concealed: str = "wind", seed: int = 1, **changes) -> Plan:
+        out = tmp_path / "out"
+        return Plan(loop_world(concealed, seed, 3, 4.0), out / "recordings", out, **changes)
+
+    made = []
+    monkeypatch.setattr(loop_folder, "make_world", lambda world, folder: made.append(world) or folder.mkdir())
+    prepare(plan())
+    prepare(plan(search=8, trainings=5))  # goes on: neither changes what is kept
+    assert made == [plan().world] and (tmp_path / "out" / "recordings").exists()
+    with pytest.raises(
+        StudyError, match=r"holds a loop of seed 1, got 7; effects \{'wind': .*, got \{'ballast': .*: ask"
+    ):
+        prepare(plan("ballast", 7))
+    for changed in (
+        {"speeds": (0.1,)},
+        {"training": ("--set", "latency=0.2")},
+        {"nominal": tmp_path / "robot.yaml"},
+    ):
+        with pytest.raises(StudyError, match=next(iter(changed)).replace("nominal", "robot")):
+            prepare(plan(**changed))
+    (tmp_path / "out" / "loop.json").unlink()
+    with pytest.raises(StudyError, match="has no loop.json.*choose another --out, or move"):
+        prepare(plan())
+    assert len(made) == 1
+
+
+def test_recordings_of_a_loop_that_were_interrupted_are_made_again(tmp_path: Path, monkeypatch) -> None:
+    plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path)
+
+    def make(world, folder: Path, trials: int = 3) -> None:
+        for k in range(trials):
+            (folder / f"trial_{k:02d}").mkdir(parents=True)
+        if trials < world.count:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(loop_folder, "make_world", lambda world, folder: make(world, folder, 2))
+    with pytest.raises(KeyboardInterrupt):
+        prepare(plan)
+    assert not plan.recordings.exists()
+    monkeypatch.setattr(loop_folder, "make_world", make)
+    prepare(plan)
+    assert len(list(plan.recordings.iterdir())) == 3
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["loop.json", "recordings"]
 
 
 def test_a_search_on_the_plant_goes_on_where_it_was_stopped(tmp_path, monkeypatch) -> None:

@@ -179,8 +179,8 @@ def _study(args: argparse.Namespace, console: Console) -> Study:
 def _close_loop(args: argparse.Namespace, console: Console) -> int:
     """Recordings of the second plant, three trainings, a search on the plant, one table and page."""
     from fish_train.evaluation.study import write_rows
-    from fish_train.prove.build import make_world
     from fish_train.prove.close_loop import Plan, close_loop, loop_world
+    from fish_train.prove.loop_folder import prepare
     from fish_train.reports.loop_page import loop_figure, loop_table, speed_table
     from fish_train.reports.page import Block, Figure, write_page
     from fish_train.score_table import print_table
@@ -189,10 +189,9 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
 
     with user_errors():
         world = loop_world(args.close_loop, 1 if args.seed is None else args.seed, args.trials, args.duration)
-        recordings = args.out / "recordings"
-        if not recordings.exists():
-            make_world(world, recordings)
-        rows = close_loop(Plan(world, recordings, args.out, search=args.search), args.jobs, console.print)
+        plan = Plan(world, args.out / "recordings", args.out, search=args.search)
+        prepare(plan)
+        rows = close_loop(plan, args.jobs, console.print)
     result = [loop_table(rows), speed_table(rows)]
     for table in result:
         print_table(console, table)
