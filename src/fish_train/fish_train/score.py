@@ -2,7 +2,7 @@
 
     e_y   = n(s) . (p - p(s))        cross-track [m], positive: head left of the path; s: progress, in order
     e_psi = wrap(chi(s) - <psi>)     heading [rad]; <psi>: mean over one stroke of the rotor (0.5 s)
-    e_u   = u_ref - u                speed [m/s], the head's surge speed, each stroke's ripple included
+    e_u   = u_ref - u                speed [m/s], the head's surge speed, each stroke's ripple included; u_ref: commanded then
 
 The approach phase lasts until, for the first time, the head is within 0.05 m of the path, the heading
 within 0.3 rad of the path's and the surge speed within 20 % of the commanded one (both averaged over a
@@ -21,7 +21,7 @@ from fish_control.path_tracker import PathTracker
 from fish_control.reference_path import PathError, ReferencePath
 
 from .errors import UserError
-from .recordings.trial import Odometry, Trial
+from .recordings.trial import Odometry, ReferenceSpeed, Trial
 from .recordings.trial import ReferencePath as RecordedPath
 
 Array = NDArray[np.float64]
@@ -64,7 +64,7 @@ class RunScore:
 
     source: str
     path: ReferencePath
-    reference_speed: float  # m/s
+    reference_speed: Array  # m/s, commanded
     t: Array
     position: Array  # (N, 2) m
     speed: Array  # (N,) m/s, surge
@@ -121,7 +121,18 @@ def score_trial(trial: Trial) -> RunScore:
         path = path_from_points(given.points)
     except PathError as error:
         raise UserError(f"{trial.name}: reference/path cannot be scored against: {error}") from error
-    return score_motion(motion, path, float(speeds[last]), given.t, source, end)
+    return score_motion(motion, path, commanded_speed(trial.reference_speed, motion.t), given.t, source, end)
+
+
+def commanded_speed(said: ReferenceSpeed, t: Array) -> Array:
+    """The speed in force at each of the times: the last one said, before the first the first; one at least is above 0.
+
+    A 0 ends a path and is no speed to swim at: from there on the next one counts, after the last the last.
+    """
+    positive = np.flatnonzero(said.speed > 0.0)
+    in_force = np.maximum(np.searchsorted(said.t, t, side="right") - 1, 0)
+    held = np.minimum(np.searchsorted(positive, in_force), len(positive) - 1)
+    return np.asarray(said.speed[positive[held]], dtype=float)
 
 
 def _last_path(trial: Trial) -> RecordedPath:
@@ -150,14 +161,18 @@ def path_from_points(points: Array) -> ReferencePath:
 def score_motion(
     motion: Odometry,
     path: ReferencePath,
-    reference_speed: float,
+    reference_speed: float | Array,
     start: float,
     source: str,
     end: float = np.inf,
 ) -> RunScore:
-    """Errors of a motion on a path followed in order, from time `start` [s] to `end`, the path's end or the motion's."""
+    """Errors of a motion on a path followed in order, from time `start` [s] to `end`, the path's end or the motion's.
+
+    reference_speed: one for all samples of the motion, or of each [m/s].
+    """
     said = bool(len(motion)) and bool(motion.t[-1] >= end)
-    motion = motion.take((motion.t >= start) & (motion.t <= end))
+    within = (motion.t >= start) & (motion.t <= end)
+    wanted, motion = np.broadcast_to(reference_speed, motion.t.shape)[within], motion.take(within)
     if not len(motion):
         raise UserError("no pose was recorded after the path was given; nothing to score")
     tracker = PathTracker(path)
@@ -165,23 +180,17 @@ def score_motion(
         tracker.reset(tracker.nearest(motion.pose[0, :2]))
     points = [tracker.update(position) for position in motion.pose[:, :2]]
     n = next((k + 1 for k, point in enumerate(points) if point.finished), len(points))
-    motion, points = motion.take(np.arange(n)), points[:n]
+    motion, points, wanted = motion.take(np.arange(n)), points[:n], wanted[:n]
     chi = np.array([point.heading for point in points])
     progress = np.array([point.progress for point in points])
     cross_track = np.array([point.cross_track_error for point in points])
     psi = np.unwrap(motion.psi)
     heading = _wrap(chi - stroke_mean(motion.t, psi))
-    speed_error = reference_speed - motion.u
-    on_path = (
-        (progress > progress[0])
-        & (np.abs(cross_track) < NEAR_PATH)
-        & (np.abs(heading) < NEAR_HEADING)
-        & (np.abs(stroke_mean(motion.t, speed_error)) < NEAR_SPEED * reference_speed)
-    )
+    speed_error = wanted - motion.u
     return RunScore(
         source=source,
         path=path,
-        reference_speed=reference_speed,
+        reference_speed=wanted,
         t=motion.t,
         position=motion.pose[:, :2],
         speed=motion.u,
@@ -190,9 +199,22 @@ def score_motion(
         heading=heading,
         head_angle=_wrap(chi - psi),
         speed_error=speed_error,
-        settled=int(np.argmax(on_path)) if on_path.any() else n,
+        settled=first_settled(motion.t, progress, cross_track, heading, speed_error, wanted),
         finished=points[-1].finished or said,
     )
+
+
+def first_settled(
+    t: Array, progress: Array, cross_track: Array, heading: Array, speed_error: Array, wanted: float | Array
+) -> int:
+    """The first sample after the approach phase, N if the run never got there; wanted: speed [m/s]."""
+    near = (
+        (progress > progress[0])
+        & (np.abs(cross_track) < NEAR_PATH)
+        & (np.abs(heading) < NEAR_HEADING)
+        & (np.abs(stroke_mean(t, speed_error)) < NEAR_SPEED * wanted)
+    )
+    return int(np.argmax(near)) if near.any() else len(t)
 
 
 def stroke_mean(t: Array, value: Array) -> Array:

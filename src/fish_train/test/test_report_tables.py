@@ -142,7 +142,7 @@ def test_the_page_of_a_run_sets_the_approach_apart(run) -> None:
         "9.0 s at 0.20 m/s, 1.80 m of the path; the fish did not end on the path's end. "
         "Scored against the simulator's true pose."
     )
-    assert [line.y[100] for line in _speed(run).data] == pytest.approx([0.19, 0.19])
+    assert [line.y[100] for line in _speed(run).data] == pytest.approx([0.19, 0.19, 0.2])
     assert (
         _pool_note(run) == f"The approach phase took {run.approach_s:.1f} s." and 4.0 < run.approach_s < 5.1
     )

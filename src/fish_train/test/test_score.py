@@ -10,7 +10,15 @@ from fish_control.reference_path import ReferencePath
 from fish_train.errors import UserError
 from fish_train.recordings.trial import Odometry, ReferenceSpeed, Trial
 from fish_train.recordings.trial import ReferencePath as RecordedPath
-from fish_train.score import Summary, path_from_points, score_motion, score_trial, stroke_mean
+from fish_train.reports.run_page import write_run_page
+from fish_train.score import (
+    Summary,
+    commanded_speed,
+    path_from_points,
+    score_motion,
+    score_trial,
+    stroke_mean,
+)
 
 STRAIGHT = ReferencePath.from_points([[-1.0, 0.0], [1.0, 0.0]], name="straight")
 
@@ -175,8 +183,52 @@ def test_the_last_commanded_speed_is_the_one_of_the_last_path(tmp_path):
         replace(trial.reference_paths[0], t=2.0),
     )
     score = score_trial(replace(trial, reference_speed=speeds, reference_paths=paths))
-    assert score.reference_speed == 0.25 and score.finished
+    assert set(score.reference_speed) == {0.25} and score.finished
     assert (score.t[0], score.t[-1]) == pytest.approx((2.0, 6.0))
+
+
+def changing_speed(tmp_path):
+    """0.1 m/s for 5 s, then 0.2 m/s on the same path, the fish exactly as fast as it is told to be; 0 at the end."""
+    t = np.arange(0.0, 12.5, 0.01)
+    x = -1.0 + 0.1 * t + 0.1 * np.maximum(t - 5.0, 0.0)
+    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([x, 0.0 * t]))
+    stamps = np.array([0.5, 5.0, 12.4])
+    said = replace(
+        trial.reference_speed,
+        t=stamps, t_arrival=stamps, flags=np.zeros(3, np.uint8), speed=np.array([0.1, 0.2, 0.0]),
+    )  # fmt: skip
+    return replace(trial, truth=motion(t, x, 0.0, 0.0, np.where(t < 5.0, 0.1, 0.2)), reference_speed=said)
+
+
+def test_a_speed_that_changes_on_the_way_is_wanted_from_then_on(tmp_path):
+    score = score_trial(changing_speed(tmp_path))
+    assert score.approach_s < 0.05
+    assert np.abs(score.speed_error).max() < 1e-9
+    # before the first is said it is wanted already, and still when 0 is said at the end
+    assert (score.t[0], score.reference_speed[0]) == (0.0, 0.1)
+    assert (score.t[-1], score.reference_speed[-1]) == pytest.approx((12.4, 0.2))
+
+
+def test_the_page_shows_every_speed_that_was_wanted(tmp_path):
+    trial = changing_speed(tmp_path)
+    write_run_page(tmp_path / "page.html", "a", trial, score_trial(trial), [])
+    assert "12.4 s at 0.10 to 0.20 m/s" in (tmp_path / "page.html").read_text()
+
+
+def test_a_single_speed_is_wanted_throughout_whatever_zeros_are_said(tmp_path):
+    """Nothing of a recording with one speed depends on when it was said."""
+    t = np.arange(0.0, 9.0, 0.01)
+    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]))
+    for stamps, speeds in (
+        ([0.0, 8.0], [0.2, 0.0]),
+        ([0.0, 3.0, 8.0], [0.0, 0.2, 0.0]),
+        ([0.0, 2.0, 4.0], [0.2, 0.0, 0.2]),
+    ):
+        said = replace(
+            trial.reference_speed, t=np.array(stamps), speed=np.array(speeds),
+            t_arrival=np.array(stamps), flags=np.zeros(len(stamps), np.uint8),
+        )  # fmt: skip
+        assert set(commanded_speed(said, t)) == {0.2}
 
 
 def test_a_speed_of_0_that_was_said_before_the_path_does_not_end_it(tmp_path):
@@ -247,4 +299,4 @@ def test_a_path_that_is_said_again_does_not_start_the_run_anew(tmp_path):
     score = score_trial(Trial(name="a", truth=truth, reference_speed=speed, reference_paths=paths, **common))
     assert score.t[0] == pytest.approx(0.5) and score.finished
     assert score.approach_s == pytest.approx(0.01)  # it is swum along from its second sample on
-    assert score.reference_speed == 0.2
+    assert set(score.reference_speed) == {0.2}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fish_control.reference_path import ReferencePath
 from fish_train.evaluation.follow import Trace
-from fish_train.score import NEAR_HEADING, NEAR_PATH, NEAR_SPEED, stroke_mean
+from fish_train.score import first_settled, stroke_mean
 from fish_train.training.loop import CONTROL_PERIOD
 
 Array = NDArray[np.float64]
@@ -59,14 +59,8 @@ def measure(trace: Trace, run: int, path: ReferencePath) -> RunMetrics:
     errors = np.column_stack(
         [cross_track, heading, speed_error, trace.alpha[rows, run], trace.throttle[rows, run]]
     )
-    near = (
-        (progress > progress[0])
-        & (np.abs(cross_track) < NEAR_PATH)
-        & (np.abs(heading) < NEAR_HEADING)
-        & (np.abs(stroke_mean(time, speed_error)) < NEAR_SPEED * speed)
-    )
-    first = int(np.argmax(near)) if near.any() else len(time)
-    approach = float(time[first] - time[0]) if near.any() else float("nan")
+    first = first_settled(time, progress, cross_track, heading, speed_error, speed)
+    approach = float(time[first] - time[0]) if first < len(time) else float("nan")
     arrived = bool(trace.finished[run] or (path.closed and progress[-1] >= path.length))
     failure = _failure(arrived, path, errors[first:, 0])
     return RunMetrics(_sizes(errors[first:]), _sizes(errors), approach, failure)

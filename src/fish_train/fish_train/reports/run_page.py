@@ -37,8 +37,12 @@ def write_run_page(path: Path, title: str, trial: Trial, score: RunScore, tables
 def _lead(score: RunScore) -> str:
     distance = score.progress[-1] - score.progress[0]
     end = "reached the end of the path" if score.finished else "did not end on the path's end"
+    slowest, fastest = (
+        f"{speed:.2f}" for speed in (score.reference_speed.min(), score.reference_speed.max())
+    )
+    wanted = slowest if slowest == fastest else f"{slowest} to {fastest}"
     return (
-        f"{score.t[-1] - score.t[0]:.1f} s at {score.reference_speed:.2f} m/s, {distance:.2f} m of the path; "
+        f"{score.t[-1] - score.t[0]:.1f} s at {wanted} m/s, {distance:.2f} m of the path; "
         f"the fish {end}. Scored against {SOURCES[score.source]}."
     )
 
@@ -103,7 +107,8 @@ def _speed(score: RunScore) -> go.Figure:
     figure = go.Figure()
     figure.add_scatter(x=t, y=score.speed, name="surge speed", line={"color": GREY, "width": 1})
     figure.add_scatter(x=t, y=stroke_mean(score.t, score.speed), name="stroke mean", line={"color": BLUE})
-    figure.add_hline(y=score.reference_speed, line={"color": ORANGE, "dash": "dash"})
+    commanded = {"color": ORANGE, "dash": "dash", "shape": "hv"}
+    figure.add_scatter(x=t, y=score.reference_speed, name="commanded", line=commanded, mode="lines")
     figure.update_xaxes(title="time [s]")
     figure.update_yaxes(title="m/s")
     return styled(figure)
