@@ -18,10 +18,11 @@ from fish_train.evaluation.feed_forward import law_of_robot
 from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
 from fish_train.evaluation.plant import FishSimPlant
 from fish_train.evaluation.study import Condition, Row
-from fish_train.prove import close_loop, gain_search, loop_folder
+from fish_train.prove import close_loop, gain_search, loop_folder, mujoco_plant
 from fish_train.prove.close_loop import JUDGE_SEEDS, Plan, loop_world
 from fish_train.prove.gain_search import search
 from fish_train.prove.loop_folder import prepare
+from fish_train.prove.mujoco_plant import MujocoError, MujocoPlant
 from fish_train.prove.study import StudyError
 from fish_train.reports.loop_page import gap_share, loop_figure, loop_table, speed_table
 from fish_train.training.loop import Law
@@ -84,6 +85,46 @@ def test_recordings_of_a_loop_that_were_interrupted_are_made_again(tmp_path: Pat
     prepare(plan)
     assert len(list(plan.recordings.iterdir())) == 3
     assert sorted(p.name for p in tmp_path.iterdir()) == ["loop.json", "recordings"]
+
+
+class Engine:
+    """Stands in for MuJoCo: a fish drifts ahead by 1 mm a step, and bursts when its rotor is driven faster than 100 rad/s."""
+
+    def __init__(self) -> None:
+        joint, body = SimpleNamespace(qposadr=[3]), SimpleNamespace(id=0)
+        model = SimpleNamespace(
+            joint=lambda _: joint, body=lambda _: body, opt=SimpleNamespace(wind=np.zeros(3))
+        )
+        self.MjModel = SimpleNamespace(from_xml_string=lambda _: model)
+
+    def MjData(self, model) -> SimpleNamespace:
+        sizes = {"qpos": 4, "qvel": 4, "ctrl": 2, "sensordata": 6, "xfrc_applied": (1, 6)}
+        return SimpleNamespace(
+            **{k: np.zeros(n) for k, n in sizes.items()}, warning=SimpleNamespace(number=np.zeros(8, int))
+        )
+
+    def mj_resetData(self, model, data) -> None:
+        data.qpos[:], data.warning.number[:] = 0.0, 0
+
+    def mj_step(self, model, data, steps) -> None:
+        data.qpos[0] += 1e-3 * steps
+        data.warning.number[6] += data.ctrl[0] > 100.0
+
+
+def test_a_fish_that_becomes_unstable_is_a_run_that_diverged_and_the_others_swim_on(monkeypatch) -> None:
+    monkeypatch.setattr(mujoco_plant, "_mujoco", Engine)
+    plant = MujocoPlant("", 3, 0.0, np.random.default_rng(0))
+    swimmer = close_loop.Swimmer(plant)
+    swimmer.reset(np.zeros((3, 3)))
+    calm, fast = np.zeros((3, 2)), np.array([[0.0, 0.0], [200.0, 0.0], [0.0, 0.0]])
+    for commands in (calm, fast, calm):
+        swimmer.step(commands)
+    assert np.isnan(swimmer.motion[1]).all()
+    np.testing.assert_allclose(swimmer.motion[[0, 2], 0], 3 * 20 * 1e-3)
+    swimmer.reset(np.zeros((3, 3)))
+    assert np.isfinite(swimmer.motion).all()
+    with pytest.raises(MujocoError, match="the engine became unstable"):  # no data set is made of it
+        plant.step(fast)
 
 
 def test_a_search_on_the_plant_goes_on_where_it_was_stopped(tmp_path, monkeypatch) -> None:

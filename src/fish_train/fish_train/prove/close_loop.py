@@ -12,6 +12,7 @@ trainings are alike (TRAINING), several of each model, as one says little: all o
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -33,7 +34,7 @@ from fish_train.evaluation.plant import Plant
 from fish_train.evaluation.study import Candidate, Condition, Row, run_study
 from fish_train.prove.gain_search import Say, search
 from fish_train.prove.mujoco_effects import CONCEALED
-from fish_train.prove.mujoco_plant import MujocoPlant
+from fish_train.prove.mujoco_plant import MujocoError, MujocoPlant
 from fish_train.prove.world import World
 from fish_train.training.loop import Law
 
@@ -70,18 +71,19 @@ class SecondPlant:
 
 
 class Swimmer:
-    """The evaluation's view of a plant: nobody asks what an IMU felt."""
+    """The evaluation's view of a plant: nobody asks what an IMU felt, and a fish that becomes unstable is a run that diverged."""
 
     def __init__(self, plant: MujocoPlant) -> None:
         self._plant, self.reset = plant, plant.reset
 
     def step(self, commands: Array) -> None:
         """One period."""
-        self._plant.step(commands)
+        with contextlib.suppress(MujocoError):  # the motion says it: NaN of this fish, the others swim on
+            self._plant.step(commands)
 
     @property
     def motion(self) -> Array:
-        """(M, 6)."""
+        """(M, 6); NaN of fish that became unstable."""
         return self._plant.motion
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fish_train.prove.instruments import Errors
 from fish_train.prove.swim import Inertial
-from fish_train.prove.world import World
+from fish_train.prove.world import NoWorld, World
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ NOMINAL = {
 }
 
 
-class MujocoError(RuntimeError):
+class MujocoError(NoWorld):
     """The plant cannot be had or has become unstable; the message says which."""
 
 
@@ -153,11 +153,17 @@ class MujocoPlant:
         for data, pose in zip(self._data, poses, strict=True):
             self._engine.mj_resetData(self._model, data)
             data.qpos[:3], data.qvel[:2] = pose, self._model.opt.wind[:2]
+        self._unstable = np.zeros(len(poses), dtype=bool)
         self._at = np.zeros((len(poses), 2))  # rotor speed, rudder that the drivers ask for
         self._push = self._size * self._random.standard_normal((len(poses), 3))
 
     def step(self, commands: Array) -> Inertial:
-        """One period: the drivers' set-points move linearly to the commands, the rudder's at most at the servo's rate."""
+        """One period: the drivers' set-points move linearly to the commands, the rudder's at most at the servo's rate.
+
+        Raises MujocoError when a fish has become unstable, after all others have swum this period too: its motion is NaN from
+        then on, and who can do without it may go on.
+        """
+        before = self._unstable.copy()
         target = np.clip(commands[:, 1], -SERVO_RANGE, SERVO_RANGE)
         reach = SERVO_RATE * PERIOD
         goal = np.column_stack(
@@ -168,9 +174,13 @@ class MujocoPlant:
         kept = np.exp(-PERIOD / WATER_TIME)
         fresh = self._random.standard_normal(self._push.shape)
         self._push = kept * self._push + np.sqrt(1.0 - kept**2) * self._size * fresh
+        if (self._unstable & ~before).any():
+            raise MujocoError("the engine became unstable")
         return Inertial(*felt.T)
 
     def _step_one(self, m: int, start: Array, goal: Array) -> tuple[float, float, float]:
+        if self._unstable[m]:
+            return np.nan, np.nan, np.nan
         data = self._data[m]
         cos, sin = np.cos(data.qpos[2]), np.sin(data.qpos[2])
         X, Y, N = self._push[m]
@@ -183,8 +193,8 @@ class MujocoPlant:
             if j == 1:  # the engine's sensors speak of the start of the last step
                 felt = float(data.sensordata[2]), float(data.sensordata[3]), float(data.sensordata[4])
                 self._engine.mj_step(self._model, data, STEPS - 1)
-        if not np.isfinite(data.qpos).all() or data.warning.number.any():
-            raise MujocoError("the engine became unstable")
+        # the engine warns and puts an unstable fish back to its start
+        self._unstable[m] = not np.isfinite(data.qpos).all() or data.warning.number.any()
         return felt
 
     @property
@@ -194,14 +204,14 @@ class MujocoPlant:
 
     @property
     def motion(self) -> Array:
-        """(M, 6): pose, surge, sway [m/s], yaw rate [rad/s]."""
+        """(M, 6): pose, surge, sway [m/s], yaw rate [rad/s]; NaN of fish that became unstable."""
         rows = []
         for data in self._data:
             x, y, heading = data.qpos[:3]
             vx, vy, rate = data.qvel[:3]
             cos, sin = np.cos(heading), np.sin(heading)
             rows.append([x, y, heading, cos * vx + sin * vy, cos * vy - sin * vx, rate])
-        return np.array(rows)
+        return np.where(self._unstable[:, None], np.nan, np.array(rows))
 
     @property
     def rotor_speed(self) -> Array:

@@ -21,9 +21,8 @@ from typing import Any
 
 from fish_train.json_file import write_json
 from fish_train.prove.build import make_world
-from fish_train.prove.mujoco_plant import MujocoError
 from fish_train.prove.study import Study, StudyError, read_json
-from fish_train.prove.world import World
+from fish_train.prove.world import NoWorld, World
 
 DIAGNOSE = (sys.executable, "-m", "fish_train.commands.main", "diagnose")
 LONGEST = 3600.0  # s, one diagnosis
@@ -54,7 +53,7 @@ def run_world(job: Job) -> str:
     began = time.monotonic()
     try:
         make_world(job.world, recordings)
-    except MujocoError as error:  # would happen again
+    except NoWorld as error:  # would happen again
         answer: dict[str, Any] = {"diagnosis": None, "error": f"no world: {error}"}
     else:
         began = time.monotonic()

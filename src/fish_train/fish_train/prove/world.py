@@ -9,6 +9,10 @@ from typing import Any
 Values = Mapping[str, Mapping[str, float]]  # name -> parameter -> value
 
 
+class NoWorld(ValueError):
+    """A world that cannot be made, now or again; the message says why."""
+
+
 @dataclass(frozen=True)
 class World:
     """Everything a data set is made from, numbers drawn; `seed` draws the rest (programs, noise)."""
