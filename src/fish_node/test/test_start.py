@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import pytest
 import rclpy
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_msgs.msg import Header
 
 from fish_node.nodes.start import read_parameters, run
@@ -86,6 +87,23 @@ def test_an_unknown_name_is_refused_and_the_nearest_suggested() -> None:
         ValueError, match=r"^unknown parameter cuont, x \(did you mean count\?\); known: count, name"
     ):
         read("cuont:=5", "x:=1", "rate:=2.0")
+
+
+@pytest.mark.parametrize("given", [[], ["-p", "rate:=3.0"]], ids=["default", "given at the start"])
+def test_a_change_at_run_time_is_refused_and_changes_nothing(given: list[str]) -> None:
+    """It was reported as set, unchecked, and did nothing: the node had read its parameters."""
+    rclpy.init(args=["--ros-args", *given])
+    node = Node("reader", automatically_declare_parameters_from_overrides=True)
+    try:
+        before = read_parameters(node, Config)
+        changes = [Parameter("rate", value=-7.0), Parameter("name", value=4), Parameter("place", value=[2.0])]
+        results = node.set_parameters(changes)
+        assert [result.successful for result in results] == [False] * 3
+        assert all("read-only" in result.reason for result in results)
+        assert node.get_parameter("rate").value == before.rate
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
 
 
 def test_a_callback_that_meets_the_end_is_no_error() -> None:

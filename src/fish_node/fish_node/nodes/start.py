@@ -19,7 +19,8 @@ Config = TypeVar("Config")
 def read_parameters(node: Node, kind: type[Config]) -> Config:
     """Declare every field of a dataclass as ROS parameter and read them; the defaults are those of the dataclass.
 
-    The node must have been made with automatically_declare_parameters_from_overrides: a misspelt name would go unnoticed.
+    They are read once: a change at run time is refused, since it would be reported as set and do nothing. The node must
+    have been made with automatically_declare_parameters_from_overrides: a misspelt name would go unnoticed.
 
     Raises:
         ValueError: an unknown name, or a value of the wrong type or out of range, naming parameter, value and
@@ -28,12 +29,13 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
     defaults = asdict(kind())  # type: ignore[call-overload]
     if unknown := unknown_names(node.get_parameters_by_prefix(""), defaults):
         raise ValueError(unknown)
+    descriptor = ParameterDescriptor(dynamic_typing=True, read_only=True)
     values = {}
     for name, like in defaults.items():
         if node.has_parameter(name):  # declared with the type that came, which may not be the right one
             node.undeclare_parameter(name)
         start = list(like) if isinstance(like, tuple) else like
-        given = node.declare_parameter(name, start, ParameterDescriptor(dynamic_typing=True)).value
+        given = node.declare_parameter(name, start, descriptor).value
         values[name] = in_type_of(name, given, like)
     return kind(**values)
 
