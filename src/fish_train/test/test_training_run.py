@@ -18,6 +18,7 @@ from fish_control.policy import Policy
 from fish_sim.robot import Robot
 from fish_train.errors import UserError
 from fish_train.evaluation.candidates import read_candidate
+from fish_train.evaluation.paper_page import training_blocks
 from fish_train.training import seeds
 from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
 from fish_train.training.config import TrainConfig, make_config
@@ -28,7 +29,7 @@ from fish_train.training.network import FORMS, from_tensors, split, to_tensors, 
 from fish_train.training.run import CHECKPOINT, Job, Status, run
 from fish_train.training.run_log import RunLog, read_curve
 from fish_train.training.search import search
-from fish_train.training.trainer import Trainer
+from fish_train.training.trainer import Trainer, TrainingDiverged
 from fish_train.training.weights_output import SCHEDULE, write_weights
 
 SHORT = {
@@ -341,6 +342,46 @@ def test_diverging_training_is_said_and_rolled_back(tmp_path: Path, monkeypatch:
     assert "rolled back to update 0" in last.message and "smaller learning_rate" in last.message
     weights = from_tensors(read_gains_file(tmp_path / "run" / "gains.safetensors").tensors)
     assert np.array_equal(weights, good.weights)
+    assert any(status.progress is not None for status in statuses)  # of updates that are no more
+    assert last.progress is None and read_curve(tmp_path / "run") == []
+    card = (tmp_path / "run" / "model_card.md").read_text()
+    assert "training diverged, rolled back to level 0 of 2 after 0 updates" in card
+    assert "last training episode" not in card and "stopped" not in card
+
+
+def test_a_diverged_run_tells_of_the_checkpoint_whose_weights_it_hands_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Diverges in its fourth episode, the checkpoint from before the third."""
+    calls, honest = 0, Trainer.step
+
+    def step(self):
+        nonlocal calls
+        calls += 1
+        # one episode is three updates of 0.4 s
+        monkeypatch.setattr("fish_train.training.run.CHECKPOINT_PERIOD", 0.0 if calls <= 6 else np.inf)
+        if calls == 11:
+            raise TrainingDiverged("cost nan")
+        return honest(self)
+
+    hard = job(tmp_path, form="constant")
+    hard = replace(hard, config=replace(hard.config, thresholds=(1e-4,)))
+    monkeypatch.setattr(Trainer, "step", step)
+    statuses: list[Status] = []
+    last = run(hard, statuses.append)
+    told = [status.progress.update for status in statuses[:-1]]
+    assert last.state == "diverged" and told == [3, 6, 9]
+    assert last.progress.update == 6 and "rolled back to update 6" in last.message
+    curve = read_curve(tmp_path)
+    assert [row.update for row in curve] == [3, 6]
+    assert f"({last.progress.name}): mean |cross-track| {curve[-1].cross_track:.4f} m" in (
+        card := (tmp_path / "model_card.md").read_text()
+    )
+    assert "training diverged, rolled back to level 0 of 2 after 6 updates" in card
+    (note,) = training_blocks([curve, []], 2)
+    assert "0 of 2 seeds passed all 2 levels" in note.note and "1 of 2 seeds diverged" in note.note
+    (text,) = training_blocks([[]], 2)
+    assert "1 of 1 seeds diverged" in text.text
 
 
 @pytest.fixture

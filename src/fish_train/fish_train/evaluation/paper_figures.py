@@ -106,9 +106,9 @@ def gains_figure(trace: Trace, run: int) -> go.Figure:
 
 
 def _smooth(values: Sequence[float], width: int = 9) -> Array:
-    """Running mean, shorter at the ends."""
-    ones = np.ones(width)
+    """Running mean, shorter at the ends and over a curve that is shorter itself."""
     v = np.asarray(values, dtype=float)
+    ones = np.ones(min(width, len(v)))
     return np.convolve(v, ones, "same") / np.convolve(np.ones(len(v)), ones, "same")
 
 

@@ -46,14 +46,18 @@ def open_loop_blocks(robot: Robot) -> list[Block]:
 
 
 def training_blocks(curves: Sequence[Sequence[CurveRow]], levels: int) -> list[Block]:
-    """The curve over seeds and how many came to the end."""
-    done = sum(curve[-1].level >= levels for curve in curves)
-    seconds = [curve[-1].seconds for curve in curves]
+    """The curve over seeds and how many came to the end; a seed rolled back to its beginning has no row to show."""
+    title, told = f"Training, {len(curves)} seeds", [curve for curve in curves if curve]
+    without = f"{len(curves) - len(told)} of {len(curves)} seeds diverged before their first checkpoint and have no curve."
+    if not told:
+        return [Text(title, without)]
+    done = sum(curve[-1].level >= levels for curve in told)
+    seconds = [curve[-1].seconds for curve in told]
     note = (
         f"{done} of {len(curves)} seeds passed all {levels} levels; {np.mean(seconds):.0f} s each on average "
-        f"(longest {max(seconds):.0f} s)."
+        f"(longest {max(seconds):.0f} s)." + (f" {without}" if len(told) < len(curves) else "")
     )
-    return [Figure(f"Training, {len(curves)} seeds", training_figure(curves), note)]
+    return [Figure(title, training_figure(told), note)]
 
 
 def simulation_blocks(candidate: Candidate, condition: Condition) -> list[Block]:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import torch
 
@@ -31,7 +32,7 @@ from fish_train.training.weights_output import (
 
 CHECKPOINT = "checkpoint.npz"
 CHECKPOINT_PERIOD = 5.0  # s
-STATES = ("training", "finished", "stopped", "diverged")
+State = Literal["training", "finished", "stopped", "diverged"]
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Status:
     """What the display shows of a run."""
 
     seed: int
-    state: str  # of STATES
+    state: State
     levels: int
     seconds: float
     rate: float  # environment steps per second since this start
@@ -68,7 +69,8 @@ class Status:
 def run(job: Job, report: Callable[[Status], None]) -> Status:
     """Train to the end of the recipe; returns the last status.
 
-    Diverging training is rolled back to the last good checkpoint, whose weights are handed out, and said.
+    Diverging training is rolled back to the last good checkpoint, whose weights are handed out, and said: status, curve and
+    card tell of these weights and of no update after them.
     """
     torch.set_num_threads(1)
     # whatever can be refused is refused before --overwrite deletes a run
@@ -83,11 +85,12 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
     with RunLog(job.folder, trainer.update) as log:
         session = _Session(job, trainer, log, report)
         try:
-            state = session.train()
+            state: State = session.train()
             message = session.what_is_left() if state == "stopped" else ""
         except TrainingDiverged as error:
             at = trainer.update
             load_checkpoint(checkpoint, trainer)
+            session.roll_back()
             state = "diverged"
             message = (
                 f"training diverged at update {at} ({error}); rolled back to update {trainer.update}, whose "
@@ -95,7 +98,7 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
             )
     if not holds_weights(job.folder, trainer):  # what an earlier start handed out keeps its note
         write_weights(job.folder, trainer, job.command)
-    made, card = training_state(trainer), job.folder / CARD
+    made, card = training_state(trainer, diverged=state == "diverged"), job.folder / CARD
     # a run that was finished before has no episode to tell of; its card does
     if not card.exists() or made not in card.read_text(encoding="utf-8"):
         write_card(job.folder, trainer, made, session.progress, session.seconds, job.command)
@@ -108,7 +111,7 @@ def _search(job: Job, trainer: Trainer, report: Callable[[Status], None]) -> Sta
     """Hand out what differential evolution finds."""
     began = time.monotonic()
 
-    def status(state: str, message: str) -> Status:
+    def status(state: State, message: str) -> Status:
         return Status(job.seed, state, len(trainer.levels), time.monotonic() - began, 0.0, None, message)
 
     cost, weights = search(trainer, lambda text: report(status("training", text)))
@@ -128,12 +131,15 @@ class _Session:
         self._job, self._trainer, self._log, self._report = job, trainer, log, report
         self._began, self._first = time.monotonic(), trainer.update
         self.progress: Progress | None = None
+        self._saved: Progress | None = (
+            None  # what the checkpoint's last episode was like, None: one of an earlier start
+        )
 
     @property
     def seconds(self) -> float:
         return self._log.seconds + time.monotonic() - self._began
 
-    def train(self) -> str:
+    def train(self) -> Literal["finished", "stopped"]:
         """Until finished or out of budget; the state it ended in."""
         trainer, saved = self._trainer, time.monotonic()
         while not trainer.finished:
@@ -182,8 +188,14 @@ class _Session:
     def _save(self) -> None:
         self._log.flush()
         save_checkpoint(self._job.folder / CHECKPOINT, self._trainer)
+        self._saved = self.progress
 
-    def status(self, state: str, message: str = "") -> Status:
+    def roll_back(self) -> None:
+        """Forget what was told after the checkpoint, which the trainer is at again."""
+        self.progress = self._saved
+        self._log.roll_back(self._trainer.update)
+
+    def status(self, state: State, message: str = "") -> Status:
         """For the display."""
         trainer, c = self._trainer, self._job.config
         steps = (trainer.update - self._first) * c.batch * c.unroll

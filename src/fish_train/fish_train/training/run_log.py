@@ -1,4 +1,4 @@
-"""The training curve of a run: a CSV file and TensorBoard events, cut back to the checkpoint on resume."""
+"""The training curve of a run: a CSV file and TensorBoard events, cut back to the checkpoint on resume and on divergence."""
 
 from __future__ import annotations
 
@@ -25,9 +25,13 @@ class RunLog:
 
     def __init__(self, folder: Path, update: int) -> None:
         """Keep the rows up to `update`, drop what was written after the checkpoint."""
-        path = folder / CURVE
+        self._folder = folder
+        self.seconds = self._open(update)  # spent before this start
+
+    def _open(self, update: int) -> float:
+        """Cut both at `update` and go on from there; the seconds of the last row that is kept."""
+        path = self._folder / CURVE
         kept = [row for row in _rows(path) if int(row["update"]) <= update] if path.exists() else []
-        self.seconds = float(kept[-1]["seconds"]) if kept else 0.0  # spent before this start
         fresh = path.with_suffix(".new")
         with fresh.open("w", newline="", encoding="utf-8") as stream:
             table = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
@@ -36,7 +40,13 @@ class RunLog:
         os.replace(fresh, path)
         self._file = path.open("a", newline="", encoding="utf-8")
         self._table = csv.DictWriter(self._file, COLUMNS, lineterminator="\n")
-        self._events = SummaryWriter(str(folder / "tensorboard"), purge_step=update + 1)
+        self._events = SummaryWriter(str(self._folder / "tensorboard"), purge_step=update + 1)
+        return float(kept[-1]["seconds"]) if kept else 0.0
+
+    def roll_back(self, update: int) -> None:
+        """Drop the rows after `update`; the seconds before this start stay what they were."""
+        self._close()
+        self._open(update)
 
     def add(self, seconds: float, progress: Progress) -> None:
         """One episode."""
@@ -59,6 +69,9 @@ class RunLog:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._close()
+
+    def _close(self) -> None:
         self._file.close()
         self._events.close()
 

@@ -91,9 +91,10 @@ def write_card(
     (folder / CARD).write_text(model_card(trainer, made, last, seconds, command), encoding="utf-8")
 
 
-def training_state(trainer: Trainer) -> str:
-    """How far training came."""
-    state = "finished" if trainer.finished else f"stopped at level {trainer.level} of {len(trainer.levels)}"
+def training_state(trainer: Trainer, diverged: bool = False) -> str:
+    """How far training came; diverged: and that it went no further than this, rolled back."""
+    how = "diverged, rolled back to" if diverged else "stopped at"
+    state = "finished" if trainer.finished else f"{how} level {trainer.level} of {len(trainer.levels)}"
     return f"training {state} after {trainer.update} updates"
 
 
