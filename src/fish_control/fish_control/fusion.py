@@ -46,6 +46,8 @@ class FusionConfig(MotionNoise):
     reacquire_time: float = 1.0  # s of poses that agree, but not with the estimate: start anew from them
     start_frames: int = 3  # poses that must agree before the first estimate
     camera_offset: float = 0.0  # s, added to camera stamps (negative if images are older than their stamps)
+    largest_accel: float = 20.0  # m/s^2 in the plane; a sample above it is wrong (trials reach 1.84)
+    largest_yaw_rate: float = 12.0  # rad/s; a sample above it is wrong (trials reach 5.3)
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -91,9 +93,16 @@ class Fusion:
         self.counts["restarted"] += 1
 
     def add_imu(self, time: float, yaw_rate: float, forward: float, left: float) -> bool:
-        """A sample stamped `time` [s]: gyro [rad/s], specific force [m/s^2]. False if it was not used."""
+        """A sample stamped `time` [s]: gyro [rad/s], specific force [m/s^2]. False if it was not used.
+
+        What no fish does is a damaged sample, such as one of a flipped bit: it would move a trusted pose, and the camera,
+        which contradicts it, would be refused until reacquire_time.
+        """
         if not all(map(math.isfinite, (time, yaw_rate, forward, left))):
             return self._refuse("imu_not_finite")
+        largest = self.config.largest_accel, self.config.largest_yaw_rate
+        if math.hypot(forward, left) > largest[0] or abs(yaw_rate) > largest[1]:
+            return self._refuse("imu_implausible")
         if time < self._last_imu_time - self.config.history:  # the clock was set back: a restarted simulation
             self._restart()
         if time <= self._last_imu_time:

@@ -221,6 +221,39 @@ def test_values_that_are_not_finite_are_counted_and_dropped(bad):
     np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
 
 
+@pytest.mark.parametrize("wrong", [(60.5, 0, 0), (-12.5, 0, 0), (0, 136, 0), (0, 15, -15), (0, 3e38, 3e38)])
+def test_one_damaged_imu_sample_neither_moves_the_pose_nor_locks_the_camera_out(wrong):
+    """Such values pass the driver; one had moved the pose by up to 1.5 m, and the camera was an outlier for a second."""
+    fusion, errors = Fusion(), []
+    for event in measurements(4.0, seed=1):
+        if event[1] == "imu" and event[2] == pytest.approx(2.0):
+            assert not fusion.add_imu(event[2], *wrong)
+            continue
+        feed(fusion, [event])
+        if event[0] > 1.0:
+            errors.append(np.abs(pose_error(fusion.estimate())))
+    assert fusion.counts["imu_implausible"] == 1
+    assert fusion.counts["pose_outlier"] == 0 and fusion.counts["reacquired"] == 0
+    assert np.all(np.max(errors, axis=0) < [0.015, 0.015, 0.05])
+    assert not fusion.estimate().imu_lost
+
+
+def test_what_a_fish_does_is_no_damage_and_the_bounds_are_parameters():
+    """The fastest of the real trials, with room."""
+    assert Fusion().add_imu(1.0, 6.0, 2.0, -2.0)
+    fusion = Fusion(FusionConfig(largest_accel=1.0, largest_yaw_rate=30.0))
+    assert fusion.add_imu(1.0, 25.0, 0.0, 0.0) and not fusion.add_imu(1.01, 0.0, 0.8, 0.8)
+
+
+def test_an_imu_that_only_says_what_cannot_be_is_lost():
+    fusion = Fusion()
+    for event in measurements(4.0):
+        damaged = event[1] == "imu" and event[2] > 2.0
+        feed(fusion, [(*event[:3], [100.0, 0.0, 0.0]) if damaged else event])
+    assert fusion.estimate().imu_lost and not fusion.estimate().camera_lost
+    assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.05
+
+
 def test_too_late_and_repeated_measurements_are_dropped():
     fusion = Fusion()
     feed(fusion, measurements(3.0))
@@ -381,6 +414,8 @@ def test_camera_offset_moves_the_stamps():
         ("gyro_noise", 0.0),
         ("imu_timeout", np.nan),
         ("camera_offset", -0.5),
+        ("largest_accel", 0.0),
+        ("largest_yaw_rate", np.inf),
     ],
 )
 def test_config_names_field_and_value(field, value):

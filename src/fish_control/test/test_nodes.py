@@ -80,6 +80,11 @@ class Bench:
         statuses = [s for array in self.heard["/diagnostics"] for s in array.status if s.name == own]
         return bool(statuses) and statuses[-1].level == level and text in statuses[-1].message
 
+    def values(self):
+        """Of the newest status on /diagnostics."""
+        newest = self.heard["/diagnostics"][-1:]
+        return {pair.key: pair.value for array in newest for pair in array.status[0].values}
+
     def close(self):
         for node in self.executor.get_nodes():
             node.destroy_node()
@@ -231,12 +236,15 @@ def test_fusion_survives_values_that_are_no_numbers(bench):
     bad.angular_velocity.z = math.nan
     bad.header.stamp = to_stamp(b.now() + 10.0)
     b.say("imu/data", bad)
+    bad.angular_velocity.z = 3e38  # a number, of a flipped bit
+    b.say("imu/data", bad)
     pose = PoseWithCovarianceStamped()  # a quaternion of zeros
     pose.header.stamp = to_stamp(b.now())
     pose.pose.pose.orientation.w = 0.0
     b.say("camera/pose", pose)
     b.spin(0.2)
     assert all(math.isfinite(m.pose.pose.position.x) for m in b.heard["odometry/filtered"])
+    b.until(lambda: b.values().get("imu_implausible") == b.values().get("imu_not_finite") == "1")
 
 
 def test_planner_publishes_path_target_twist_error_and_speed(bench):
