@@ -14,6 +14,7 @@ from fish_control.line_of_sight import GuidanceConfig
 from fish_sim.robot import Robot, save_robot
 from fish_train.commands.main import main
 from fish_train.commands.paper import trained
+from fish_train.commands.train import command_line
 from fish_train.evaluation.feed_forward import law_of_robot
 from fish_train.training.loop import Law
 
@@ -95,6 +96,10 @@ def test_the_papers_training_on_a_robot_has_that_robots_law(
         (["train", "--max-seconds", "nan"], "--max-seconds nan: expected at least 0 s"),
         (["train", "--max-seconds", "-1"], "--max-seconds -1: expected at least 0 s"),
         (["train", "--form", "constant", "--search", "--max-seconds", "9"], "leave out --max-seconds"),
+        (
+            ["train", "--form", "constant", "--search", "--resume"],
+            "--search --resume: a search cannot be continued",
+        ),
         (["evaluate"], "nothing to evaluate"),
         (["evaluate", "--constant", "1,2"], "got 2 numbers"),
         ([*EVALUATE, GAINS], "constant: more than one of --weights and --constant has this name"),
@@ -126,6 +131,22 @@ def test_bad_input_is_one_line(
     assert main(arguments) == 1
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("typed", "kept"),
+    [
+        (
+            "--out=/home/me/runs --robot=/home/me/fish/model.yaml --jobs=4 --seed=3",
+            "--robot=model.yaml --seed=3",
+        ),
+        ("--out /home/me/runs --robot /home/me/fish/model.yaml --jobs 4", "--robot model.yaml"),
+        ("--ou=/home/me/runs --jo 4 --res --seeds 2", "--seeds 2"),
+        ("--overwrite --set=batch=2 unroll=3 --config ../r/e.yaml", "--set=batch=2 unroll=3 --config e.yaml"),
+    ],
+)
+def test_the_command_that_travels_with_the_weights_names_no_folder(typed: str, kept: str) -> None:
+    assert command_line(["fish_train", "train", *typed.split()]) == kept.split()
 
 
 def test_what_resume_and_overwrite_contradict_about_is_left_alone(tmp_path: Path) -> None:

@@ -145,6 +145,11 @@ def check_flags(args: argparse.Namespace) -> None:
         raise UserError(
             "--search --max-seconds: a search ends after its own number of generations; leave out --max-seconds"
         )
+    if args.search and args.resume:
+        raise UserError(
+            "--search --resume: a search cannot be continued, it begins anew; leave out --resume, and give --overwrite where "
+            "it shall replace a run"
+        )
     if not args.max_seconds >= 0.0:
         raise UserError(f"--max-seconds {args.max_seconds:g}: expected at least 0 s")
     if args.resume and args.overwrite:
@@ -177,10 +182,16 @@ def command_line(argv: list[str]) -> list[str]:
     """What the user typed after the verb, folders left out: it goes into files that travel."""
     kept, skip = [], False
     for word in words_after("train", argv):
-        if skip or word in ("--resume", "--overwrite"):
+        flag, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
+        if skip or _is(flag, "--resume", "--overwrite"):
             skip = False
-        elif word in ("--out", "--jobs"):
-            skip = True
+        elif _is(flag, "--out", "--jobs"):
+            skip = not equals
         else:
-            kept.append(Path(word).name if "/" in word else word)
+            kept.append(flag + equals + (Path(value).name if "/" in value else value))
     return kept
+
+
+def _is(flag: str, *names: str) -> bool:
+    """Whether a flag means one of these; argparse takes a beginning that no other flag has for the whole."""
+    return len(flag) > len("--") and any(name.startswith(flag) for name in names)
