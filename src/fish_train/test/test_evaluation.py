@@ -376,6 +376,17 @@ def test_a_weights_file_the_node_refuses_is_refused_here(tmp_path: Path) -> None
             read_candidate(str(tmp_path / "w.safetensors"))
 
 
+def test_a_weights_file_may_lie_in_a_folder_named_after_its_recipe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = Path("lr=1e-4/gains.safetensors")
+    file.parent.mkdir()
+    write_gains_file(file, Policy.constant(Gains(*[0.05] * 6)))
+    assert read_candidate(str(file)).name == "lr=1e-4/gains"
+    assert read_candidate(f"slow={file}").name == "slow"
+
+
 @pytest.mark.parametrize("off", [1.0, -0.3, float("nan")])
 def test_parameters_are_off_by_a_share(off: float) -> None:
     with pytest.raises(ValueError, match=f"off: got {off:g}; expected a share"):

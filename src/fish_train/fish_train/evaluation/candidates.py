@@ -23,8 +23,8 @@ LAW_KEYS = ("lookahead", "limits", "guidance")
 
 
 def read_candidate(text: str) -> Candidate:
-    """`[NAME=]FILE` of a weights file (.safetensors) or of a schedule (.json)."""
-    name, equals, rest = text.partition("=")
+    """`[NAME=]FILE` of a weights file (.safetensors) or of a schedule (.json); a file's own path may have a `=` in it."""
+    name, equals, rest = ("", "", text) if Path(text).is_file() else text.partition("=")
     path = Path(rest if equals else text)
     name = name if equals else f"{path.parent.name}/{path.stem}" if path.parent.name else path.stem
     return read_schedule(name, path) if path.suffix == ".json" else read_policy(name, path)
