@@ -260,17 +260,28 @@ def test_ratios_to_the_nominal_condition() -> None:
     assert list(ratios.values()) == [pytest.approx((1.5, 1.5))] * 16
 
 
-def test_the_table_of_ratios_names_the_worst_cell_and_leaves_failed_runs_out() -> None:
+def test_the_table_of_ratios_names_the_worst_cell_and_counts_one_that_failed_as_above_twice() -> None:
     worse = rows_of(1.5, "worse")
     third = worse[2].metrics.settled
     worse[2] = replace(
         worse[2], metrics=replace(worse[2].metrics, settled=replace(third, speed_rmse=3.0 * third.speed_rmse))
     )
     worse[5] = replace(worse[5], metrics=replace(worse[5].metrics, failure="lost"))
-    (line,) = ratio_table([*rows_of(1.0, "nominal"), *worse], "nominal", "t").rows
-    cell = worse[2].cell
-    assert line[2] == "1" and line[-1] == "1 of 15"
+    table = ratio_table([*rows_of(1.0, "nominal"), *worse], "nominal", "t")
+    (line,), cell = table.rows, worse[2].cell
+    assert line[2] == "1" and line[-1] == "2 of 16" and "counts as above twice" in table.note
     assert line[4].endswith(f"4.50 ({cell.path} {cell.speed:g} m/s)")
+
+
+def test_a_cell_that_fails_under_the_nominal_condition_too_or_in_part_is_not_counted_as_lost() -> None:
+    def failed(row: Row) -> Row:
+        return replace(row, metrics=replace(row.metrics, failure="lost"))
+
+    nominal, worse = rows_of(1.0, "nominal"), rows_of(1.5, "worse")
+    again = replace(worse[6], cell=replace(worse[6].cell, seed=1))
+    nominal[5], worse[5], worse[6] = failed(nominal[5]), failed(worse[5]), failed(worse[6])
+    (line,) = ratio_table([*nominal, *worse, again], "nominal", "t").rows
+    assert line[-1] == "0 of 15"
 
 
 def test_tables_are_means_over_the_runs_that_did_not_fail_in_millimetres() -> None:
@@ -285,7 +296,8 @@ def test_tables_are_means_over_the_runs_that_did_not_fail_in_millimetres() -> No
     assert (shown["runs"], shown["failed"]) == ("3", "1")
     assert (shown["cross-track RMSE, mm"], shown["speed RMSE, mm/s"]) == ("12", "25")
     assert (shown["cross-track RMSE *, mm"], shown["speed RMSE *, mm/s"]) == ("24", "50")
-    assert cell_table(rows, "t").rows == [["R", "12.0 / 25.0"]]
+    assert cell_table(rows, "t").rows == [["R", "12.0 / 25.0 (1 of 3 failed)"]]
+    assert cell_table(rows[:2], "t").rows == [["R", "12.0 / 25.0"]]
     assert cell_table(rows[2:], "t").rows == [["R", "failed"]]
 
 
