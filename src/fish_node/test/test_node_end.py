@@ -26,8 +26,12 @@ def run(monkeypatch, error, alive):
     return ended
 
 
-def test_publishing_after_a_signal_has_shut_the_context_down_is_no_failure(monkeypatch):
-    ended = run(monkeypatch, RCLError("Failed to publish: publisher's context is invalid"), alive=False)
+@pytest.mark.parametrize(
+    "error",
+    [RCLError("Failed to publish: publisher's context is invalid"), RuntimeError("not ok"), ValueError("x")],
+)
+def test_what_a_signal_that_has_shut_the_context_down_brings_about_is_no_failure(monkeypatch, error):
+    ended = run(monkeypatch, error, alive=False)
     assert ended == ["destroyed", "shut down"]
 
 
@@ -41,7 +45,7 @@ def test_what_cannot_start_says_why(monkeypatch, capsys):
     def refuse():
         raise ValueError("speed is -1.0,\n expected at least 0")
 
-    replaced = {"init": lambda: None, "ok": lambda: False, "try_shutdown": lambda: None}
+    replaced = {"init": lambda: None, "ok": lambda: True, "try_shutdown": lambda: None}
     monkeypatch.setattr(start, "rclpy", SimpleNamespace(**replaced))
     assert start.run(refuse, "planner") == 1
     assert capsys.readouterr().err == "planner: speed is -1.0, expected at least 0\n"

@@ -1,6 +1,9 @@
 """How nodes start and stop."""
 
+import os
+import signal
 import sys
+import time
 from dataclasses import dataclass
 
 import pytest
@@ -56,6 +59,20 @@ class Mistaken(Node):
         self.create_timer(0.01, lambda: int("x"))
 
 
+class Signalled(Node):
+    """A signal comes while it is made, and what it does next fails for that."""
+
+    def __init__(self, number: signal.Signals, error: Exception | None) -> None:
+        super().__init__("signalled")
+        os.kill(os.getpid(), number)
+        deadline = time.monotonic() + 20.0
+        while self.context.ok() and time.monotonic() < deadline:  # SIGINT interrupts this
+            time.sleep(0.001)
+        if error is not None:
+            raise error
+        self.create_publisher(Header, "h", 1)
+
+
 def read(*overrides: str) -> Config:
     arguments = ["--ros-args"] + [a for text in overrides for a in ("-p", text)]
     rclpy.init(args=arguments)
@@ -104,6 +121,27 @@ def test_a_change_at_run_time_is_refused_and_changes_nothing(given: list[str]) -
     finally:
         node.destroy_node()
         rclpy.shutdown()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "error", [None, ValueError("half made"), RuntimeError("half made"), OSError("half made")], ids=repr
+)
+def test_a_signal_while_the_node_is_made_is_a_clean_end(
+    number: signal.Signals, error: Exception | None, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert run(lambda: Signalled(number, error), "signalled") == 0
+    assert "half made" not in capfd.readouterr().err and not rclpy.ok()
+
+
+@pytest.mark.parametrize("kind", [Stopped, Mistaken])
+def test_only_a_node_that_ends_cleanly_is_told_of_its_end(kind: type[Node]) -> None:
+    told: list[str] = []
+    try:
+        run(kind, "node", lambda node: told.append(node.get_name()))
+    except ValueError:
+        told.append("an error")
+    assert told == {Stopped: ["stopped"], Mistaken: ["an error"]}[kind]
 
 
 def test_a_callback_that_meets_the_end_is_no_error() -> None:

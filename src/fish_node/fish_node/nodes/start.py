@@ -14,6 +14,8 @@ from rclpy.node import Node
 from fish_node.parameters import in_type_of, unknown_names
 
 Config = TypeVar("Config")
+Made = TypeVar("Made", bound=Node)
+REFUSALS = (ValueError, OSError, RCLError)  # of arguments, of parameters, of files that they name
 
 
 def read_parameters(node: Node, kind: type[Config]) -> Config:
@@ -40,27 +42,44 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
     return kind(**values)
 
 
-def run(make_node: Callable[[], Node], name: str) -> int:
+def run(make_node: Callable[[], Made], name: str, at_end: Callable[[Made], None] | None = None) -> int:
     """Spin a node until SIGINT or SIGTERM: 0; or 1 and one line on stderr if its arguments are refused.
 
-    Errors of callbacks are the caller's.
+    A signal may come while the node is still being made: its context ends there and then, and whatever that makes fail is
+    no failure. Errors of callbacks are the caller's.
+
+    Args:
+        make_node: the node's class.
+        name: for the line on stderr.
+        at_end: is handed the node on the clean way out, not after an error.
     """
-    node = None
     try:
         rclpy.init()
-        node = make_node()
-        rclpy.spin(node)
-    except (ValueError, OSError, RCLError) as error:
-        if node is None:
-            print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
-            return 1
-        # not a refused parameter but a mistake in a callback, or one that published after a signal had ended the context
-        if rclpy.ok() or not isinstance(error, RCLError):
+    except REFUSALS as error:
+        return _refused(name, error)
+    node = None
+    try:
+        try:
+            node = make_node()
+            rclpy.spin(node)
+        except (KeyboardInterrupt, ExternalShutdownException):
+            pass
+        except Exception:
+            if rclpy.ok():
+                raise
+        if node is not None and at_end is not None:
+            at_end(node)
+    except REFUSALS as error:
+        if node is not None:  # not a refused argument but a mistake in a callback
             raise
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return 0
+        return _refused(name, error)
     finally:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _refused(name: str, error: Exception) -> int:
+    print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
+    return 1
