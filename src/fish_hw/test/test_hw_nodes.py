@@ -22,14 +22,18 @@ from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.camera_calibration import CalibrationError
 from fish_hw.devices.imu_sample import ImuSample
 from fish_hw.devices.reconnect import Doubt, Loss
+from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.usb_camera import jpeg_size
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
 from fish_hw.nodes.camera import CameraNode
+from fish_hw.nodes.device_node import run
 from fish_hw.nodes.imu import ImuNode
 from fish_hw.nodes.rotor import RotorNode
 from fish_hw.nodes.rudder import RudderNode
+from fish_hw.nodes.worker import Worker
 from fish_hw.transport.errors import PortUnavailable
+from fish_hw.transport.sysfs_pwm import SysfsPwm
 
 pytestmark = pytest.mark.ros
 DOMAIN = 145 + os.getpid() % 50  # tests of other packages, at 141 to 144, run beside this one
@@ -42,9 +46,14 @@ class Graph:
     def __init__(self, node_class: Callable, parameters: dict) -> None:
         arguments = [a for k, v in parameters.items() for a in ("-p", f"{k}:={v}")]
         rclpy.init(args=["--ros-args", *arguments], domain_id=DOMAIN)
+        node = None
         try:
-            self.node = node_class()
+            self.node = node = node_class()
+            node.begin()
         except Exception:
+            if node is not None:
+                node.close()
+                node.destroy_node()
             rclpy.try_shutdown()
             raise
         self.peer = rclpy.create_node("peer", namespace="fish")
@@ -372,6 +381,49 @@ def test_signals_end_with_zero(first):
         output, _ = process.communicate(timeout=TIMEOUT_S)
         assert process.returncode == 0, f"{name}: {output}"
         assert "Traceback" not in output, name
+
+
+@pytest.fixture
+def own_process(monkeypatch):
+    """This process as that of a node: run() takes its arguments. It must not leave the signals ignored as run() does."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    return lambda *arguments: monkeypatch.setattr(sys, "argv", ["node", "--ros-args", *arguments])
+
+
+def signalled(number: signal.Signals, after: Callable) -> Callable:
+    """`after`, followed by a signal that has done its work when this returns; SIGINT interrupts it."""
+
+    def wrapped(*arguments):
+        result = after(*arguments)
+        os.kill(os.getpid(), number)
+        assert wait_until(lambda: not rclpy.ok(), TIMEOUT_S)
+        return result
+
+    return wrapped
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", ["node made", "output opened", "pulses on", "connected", "worker made"])
+def test_a_signal_at_any_moment_of_the_start_leaves_the_device_safe(
+    own_process, tmp_path, monkeypatch, capfd, number, moment
+):
+    chip = PwmChipEmulator(tmp_path / "pwmchip0")
+    own_process("-p", f"chip:={chip.chip}")
+    make_node = signalled(number, RudderNode) if moment == "node made" else RudderNode
+    places = {
+        "output opened": (RudderNode, "_open_output"),
+        "pulses on": (SysfsPwm, "start"),
+        "connected": (RudderDriver, "connect"),
+        "worker made": (Worker, "__init__"),
+    }
+    if moment in places:
+        owner, name = places[moment]
+        monkeypatch.setattr(owner, name, signalled(number, getattr(owner, name)))
+    run(make_node, "rudder")
+    assert chip.read("enable") == 0
+    assert moment in ("node made", "output opened") or chip.read("duty_cycle") == 1_500_000
+    assert "Traceback" not in capfd.readouterr().err and not rclpy.ok()
 
 
 def driven_rotor(emulator: VertiqEmulator, graph: Callable) -> tuple[subprocess.Popen, Graph]:

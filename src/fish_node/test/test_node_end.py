@@ -49,3 +49,17 @@ def test_what_cannot_start_says_why(monkeypatch, capsys):
     monkeypatch.setattr(start, "rclpy", SimpleNamespace(**replaced))
     assert start.run(refuse, "planner") == 1
     assert capsys.readouterr().err == "planner: speed is -1.0, expected at least 0\n"
+
+
+def test_a_signal_that_shuts_the_context_down_at_the_same_moment_is_no_failure(monkeypatch):
+    """rclpy looks whether it is still there, and then shuts it down."""
+    tries = []
+
+    def try_shutdown():
+        tries.append(None)
+        if len(tries) == 1:
+            raise RCLError("failed to shutdown: rcl_shutdown already called on the given context")
+
+    monkeypatch.setattr(start, "rclpy", SimpleNamespace(try_shutdown=try_shutdown))
+    start.shut_down()
+    assert len(tries) == 2  # the second finds it gone, and forgets it

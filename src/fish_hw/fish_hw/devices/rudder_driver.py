@@ -74,13 +74,14 @@ class RudderDriver:
         """Open the output and centre; PortUnavailable or TransportError if it cannot."""
         output = self._open_output()
         self._pulse_ns = self.servo.centre_ns()
+        self._checked = self._connected_s = self._clock()
+        self._output = output  # before there are pulses: close() ends them, too, if a signal interrupts this
         try:
             output.start(self._pulse_ns)
         except TransportError:
             output.close()
+            self._output = None
             raise
-        self._output = output
-        self._checked = self._connected_s = self._clock()
 
     def command(self, alpha: float) -> None:
         """Take a commanded angle [rad]."""

@@ -38,7 +38,7 @@ class CameraNode(DeviceNode):
             else None
         )
         self._camera = UsbCamera(settings, self._open_source)
-        self.start(self._camera, self._cycle, 0.5 / settings.rate_hz, settings.device == "emulator")
+        self.use(self._camera, self._cycle, 0.5 / settings.rate_hz, settings.device == "emulator")
 
     def _open_source(self) -> FrameSource:
         if self.settings.device == "emulator":

@@ -21,7 +21,7 @@ from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.status import WARN, Status
 from fish_hw.nodes.worker import Worker
 from fish_hw.transport.errors import TransportError
-from fish_node.nodes.start import read_parameters
+from fish_node.nodes.start import read_parameters, shut_down
 from fish_node.nodes.status_log import StatusLog
 
 NAMESPACE = "fish"
@@ -64,6 +64,7 @@ class DeviceNode(Node):
         self.settings = read_parameters(self, settings_class)
         self.failure = ""
         self._device: Device | None = None
+        self._repeat: tuple[Callable[[], None], float] | None = None  # step, period [s]
         self._emulated = False
         self._worker: Worker | None = None
         self._give_up_s = time.monotonic() + self.settings.startup_timeout_s
@@ -71,10 +72,17 @@ class DeviceNode(Node):
         self._log = StatusLog(self.get_logger())
         self.create_timer(1.0, self._on_diagnostics)
 
-    def start(self, device: Device, step: Callable[[], None], period_s: float, emulated: bool) -> None:
-        """Connect and begin to repeat step; a device that is absent is waited for as the settings say."""
-        self._emulated = emulated
-        self._device = device
+    def use(self, device: Device, step: Callable[[], None], period_s: float, emulated: bool) -> None:
+        """What begin() is to connect, and what it is to repeat then."""
+        self._device, self._repeat, self._emulated = device, (step, period_s), emulated
+
+    def begin(self) -> None:
+        """Connect and begin to repeat the step; a device that is absent is waited for as the settings say.
+
+        Apart from the constructor: a signal may come at any moment, and only a node that its caller has can be closed.
+        """
+        assert self._device is not None and self._repeat is not None  # the constructor ends with use()
+        device, (step, period_s) = self._device, self._repeat
         try:
             device.connect()
         except (TransportError, DeviceError) as error:
@@ -82,7 +90,7 @@ class DeviceNode(Node):
                 raise
             self.get_logger().error(f"{error}; trying for {self.settings.startup_timeout_s} s")
         else:
-            self.get_logger().info("emulated device ready" if emulated else "device ready")
+            self.get_logger().info("emulated device ready" if self._emulated else "device ready")
         self._worker = Worker(lambda: self._step(device, step), period_s, self._on_failure)
         self._worker.start()
 
@@ -163,7 +171,11 @@ class DeviceNode(Node):
 
 
 def run(make_node: Callable[[], DeviceNode], name: str) -> None:
-    """Run a node until SIGINT or SIGTERM (exit code 0), or until it cannot go on (one line, exit code 1)."""
+    """Run a node until SIGINT or SIGTERM (exit code 0), or until it cannot go on (one line, exit code 1).
+
+    A signal may come while the node is being made or opens its device: what it makes fail is no failure, and the device is
+    left safe.
+    """
     try:
         rclpy.init()
     except (RCLError, ValueError) as error:
@@ -173,15 +185,16 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
     try:
         executor = SingleThreadedExecutor()  # before the node: a signal while it is made upsets rclpy.spin
         node = make_node()
+        node.begin()
         executor.add_node(node)
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
-    except EXPECTED as error:
-        failure = one_line(error)
-    except RCLError:
-        if rclpy.ok():  # else a signal came while the node was being made
-            raise
+    except Exception as error:
+        if rclpy.ok():  # else the context's end brought it about
+            if not isinstance(error, EXPECTED):
+                raise
+            failure = one_line(error)
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not interrupt the way to safety
             signal.signal(number, signal.SIG_IGN)
@@ -189,7 +202,7 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
             node.close()
             failure = failure or node.failure
             node.destroy_node()
-        rclpy.try_shutdown()
+        shut_down()
     if failure:
         sys.exit(f"{name}: {failure}")
 

@@ -38,7 +38,7 @@ class RotorNode(DeviceNode):
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_service(Trigger, "~/clear_faults", self._on_clear_faults)
         self.create_timer(BATTERY_PERIOD_S, self._on_battery)
-        self.start(self._driver, self._cycle, 1.0 / self.settings.rate_hz, self._emulator is not None)
+        self.use(self._driver, self._cycle, 1.0 / self.settings.rate_hz, self._emulator is not None)
 
     def _open_port(self) -> ByteStream:
         port = self.settings.port if self._emulator is None else self._emulator.port

@@ -29,7 +29,7 @@ class RudderNode(DeviceNode):
         self._driver = RudderDriver(self.settings, self._open_output)
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
         emulated = self.settings.backend == "emulator"
-        self.start(self._driver, self._cycle, 1.0 / self.settings.rate_hz, emulated)
+        self.use(self._driver, self._cycle, 1.0 / self.settings.rate_hz, emulated)
 
     def _open_output(self) -> PwmOutput:
         if self.settings.backend == "emulator":

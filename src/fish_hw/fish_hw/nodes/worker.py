@@ -20,9 +20,10 @@ class Worker:
         self._thread.start()
 
     def stop(self, timeout_s: float) -> None:
-        """Ask for the end and wait for it."""
+        """Ask for the end and wait for it; a signal may have come before the thread was started."""
         self._stop.set()
-        self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            self._thread.join(timeout_s)
 
     def _run(self) -> None:
         due = time.monotonic()

@@ -76,8 +76,16 @@ def run(make_node: Callable[[], Made], name: str, at_end: Callable[[Made], None]
     finally:
         if node is not None:
             node.destroy_node()
-        rclpy.try_shutdown()
+        shut_down()
     return 0
+
+
+def shut_down() -> None:
+    """End the context. After a signal its own thread may be doing the same, and the slower of the two fails."""
+    try:
+        rclpy.try_shutdown()
+    except RCLError:
+        rclpy.try_shutdown()
 
 
 def _refused(name: str, error: Exception) -> int:
