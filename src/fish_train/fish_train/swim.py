@@ -1,4 +1,4 @@
-"""One run of the started robot, watched until it ends: progress, end of path or time, nodes that fail."""
+"""One run of the started robot, watched until it ends: progress, end of path or time, nodes that fail or hang."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from rich.status import Status
 
 from fish_control.path_tracker import PathTracker
 
-from .bringup import NodeSpec
+from .bringup import CONTROL, NodeSpec
 from .errors import UserError
 from .interruption import Interruption
 from .processes import NodeProcesses
 
+FUSION = CONTROL[1]  # says odometry/filtered
 START_TIMEOUT = 30.0  # s in which each thing that is waited for must come
+STILL_TIMEOUT = 30.0  # s of real time without any new stamp of the estimate, however slow the computer
 LOOK_PERIOD = 0.1  # s between looks at the robot
 LAST_LOOK = 0.5  # s after the end of the path: the estimate may be there a little before the fish
 
@@ -91,9 +93,11 @@ class Robot:
         """Until the end of the path, one lap of a closed one, the end of the time or Ctrl-C; the reason."""
         sight, tracker = self._seen()
         first, lap_start = sight.stamp, tracker.progress
+        patience = Patience(self.nodes)
         while (t := sight.stamp - first) < duration and not self.interruption.asked:
             self._look()
             sight, tracker = self._seen()
+            patience.heed(sight)
             on_path = tracker.update((sight.x, sight.y))
             line.update(
                 f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
@@ -115,6 +119,28 @@ class Robot:
     def _look(self) -> None:
         self.listen(LOOK_PERIOD)
         check_running(self.nodes)
+
+
+class Patience:
+    """Ends a run whose estimate stands still: its time is told by the robot's stamps, and would never be over."""
+
+    def __init__(self, nodes: NodeProcesses) -> None:
+        self._nodes = nodes
+        self._stamp, self._since = float("nan"), time.monotonic()
+
+    def heed(self, sight: Sight | None) -> None:
+        """Called with what was last seen, look after look.
+
+        Raises:
+            UserError: for a long time nothing new, though every node lives.
+        """
+        if sight is not None and sight.stamp != self._stamp:
+            self._stamp, self._since = sight.stamp, time.monotonic()
+        elif time.monotonic() - self._since > STILL_TIMEOUT:
+            raise UserError(
+                f"no new odometry/filtered for {STILL_TIMEOUT:g} s: {FUSION.name}, or a node that it hears (simulator, camera, "
+                f"tracker), hangs; see {self._nodes.running[FUSION].log} and the logs beside it; what was recorded is kept"
+            )
 
 
 def check_running(nodes: NodeProcesses) -> None:

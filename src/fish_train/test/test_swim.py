@@ -2,6 +2,8 @@
 
 import os
 import signal
+import time
+from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 
 import pytest
@@ -9,10 +11,11 @@ from rich.console import Console
 
 from fish_control.path_tracker import PathTracker
 from fish_control.paths import make_path
-from fish_train.bringup import NodeSpec
+from fish_train.bringup import ROBOTS, NodeSpec
+from fish_train.commands import excite
 from fish_train.errors import UserError
 from fish_train.interruption import Interruption
-from fish_train.swim import Robot, Sight
+from fish_train.swim import FUSION, Robot, Sight
 
 NODE = NodeSpec("test", "node", "none.yaml")
 
@@ -38,7 +41,8 @@ class Fish:
 @pytest.fixture
 def nodes():
     """Nodes that run on."""
-    return SimpleNamespace(cpu_times=lambda: {NODE: 1.0}, ended=lambda: [])
+    running = {FUSION: SimpleNamespace(log="logs/fusion.log")}
+    return SimpleNamespace(cpu_times=lambda: {NODE: 1.0}, ended=lambda: [], running=running)
 
 
 @pytest.fixture
@@ -83,6 +87,61 @@ def test_a_node_that_ends_is_said_with_its_last_words(nodes, interruption):
     fish.events[1.0] = lambda: setattr(nodes, "ended", lambda: [dead])
     with pytest.raises(UserError, match="test/node ended with status 3: no such weights"):
         swim(fish, nodes, interruption)
+
+
+class Stuck(Fish):
+    """Nothing new is heard of it from the second second on; whoever listens waits."""
+
+    @property
+    def sight(self):
+        self.time = min(self.time, 2.0)
+        return super().sight
+
+    def listen(self, seconds):
+        time.sleep(0.01)
+        super().listen(seconds)
+
+
+def test_a_robot_of_which_nothing_new_is_heard_is_not_waited_for(nodes, interruption, monkeypatch):
+    monkeypatch.setattr("fish_train.swim.STILL_TIMEOUT", 0.3)
+    with pytest.raises(UserError, match="no new odometry/filtered for 0.3 s: .*hangs; see logs/fusion.log"):
+        swim(Stuck(make_path("circle")), nodes, interruption)
+
+
+def test_a_slow_robot_is_waited_for(nodes, interruption, monkeypatch):
+    """A stamp now and then is enough, its own time as slow as it will."""
+    monkeypatch.setattr("fish_train.swim.STILL_TIMEOUT", 0.3)
+
+    class Slow(Fish):
+        def listen(self, seconds):
+            time.sleep(0.1)
+            super().listen(0.1 * seconds)
+
+    fish = Slow(make_path("circle"))
+    assert swim(fish, nodes, interruption, 0.1).reason == "after 0 s"
+
+
+def test_an_experiment_ends_when_nothing_new_is_heard_of_the_robot(tmp_path, monkeypatch):
+    """Its nodes are ended like those of any other run that fails."""
+    monkeypatch.setattr("fish_train.swim.STILL_TIMEOUT", 0.3)
+    fish, ended = Stuck(make_path("circle")), []
+    fish.sees, fish.diagnostics = lambda _: True, {excite.EXCITER_NAME: {"over": "false", "time_s": "2"}}
+
+    @contextmanager
+    def started(domain, logs):
+        try:
+            yield SimpleNamespace(
+                start=lambda *_: None, ended=lambda: [], running={FUSION: SimpleNamespace(log="fusion.log")}
+            )
+        finally:
+            ended.append(domain)
+
+    monkeypatch.setattr(excite, "NodeProcesses", started)
+    monkeypatch.setattr(excite, "watching", lambda _: nullcontext((fish, fish.listen)))
+    changed = dict.fromkeys(excite.open_loop(ROBOTS["sim"]), {})
+    with pytest.raises(UserError, match="no new odometry/filtered for 0.3 s: .*see fusion.log"):
+        excite._swim(7, changed, tmp_path, SimpleNamespace(asked=False), Console(quiet=True))
+    assert ended == [7]
 
 
 def test_waiting_can_be_interrupted(nodes, interruption):

@@ -27,7 +27,7 @@ from fish_train.nodes.watch import watching
 from fish_train.processes import NodeProcesses
 from fish_train.reports.page import Table
 from fish_train.score_table import print_table
-from fish_train.swim import LOOK_PERIOD, check_running
+from fish_train.swim import LOOK_PERIOD, Patience, check_running
 from fish_train.swim import Robot as Running
 
 SIMULATOR, CAMERA = SIMULATED
@@ -145,11 +145,13 @@ def _swim(
         running.wait_for(lambda: watch.sight is not None, "odometry/filtered")
         nodes.start(EXCITER, changed[EXCITER])
         running.wait_for(lambda: EXCITER_NAME in watch.diagnostics, "exciter")
+        patience = Patience(nodes)
         with console.status("") as line:
             while watch.diagnostics[EXCITER_NAME]["over"] != "true" and not interruption.asked:
                 listen(LOOK_PERIOD)
                 check_running(nodes)
                 at = watch.sight
+                patience.heed(at)
                 line.update(
                     f"{watch.diagnostics[EXCITER_NAME]['time_s']} s of the program   "
                     + (f"x {at.x:+.2f} m  y {at.y:+.2f} m   speed {at.speed:.2f} m/s" if at else "")
