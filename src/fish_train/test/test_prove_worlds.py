@@ -23,7 +23,7 @@ from fish_train.identify.experiment import build_experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import evaluate
 from fish_train.identify.synthetic import FULL_SPEED
-from fish_train.prove import groups
+from fish_train.prove import build, groups
 from fish_train.prove.build import make_readings, make_world
 from fish_train.prove.fish_sim_plant import FishSimPlant
 from fish_train.prove.instruments import TRANSPORT, Errors, Instruments
@@ -32,9 +32,11 @@ from fish_train.prove.mujoco_plant import MujocoPlant, model_text
 from fish_train.prove.oracle import as_experiment, with_truth
 from fish_train.prove.other_forms import OTHER_FORMS
 from fish_train.prove.outside import OUTSIDE, known_to_the_plant
+from fish_train.prove.runner import Job, run_world
+from fish_train.prove.study import read_json
 from fish_train.prove.swim import Inertial, Readings, swim
 from fish_train.prove.truths import truths_of
-from fish_train.prove.world import World
+from fish_train.prove.world import NoWorld, World
 from fish_train.recordings import read_dataset
 
 
@@ -222,8 +224,6 @@ def test_the_water_pushes_a_fish_as_long_and_as_hard_as_it_says() -> None:
 
 
 def test_a_program_whose_way_fits_nowhere_is_swum_more_slowly(monkeypatch: pytest.MonkeyPatch) -> None:
-    from fish_train.prove import build
-
     asked = []
 
     def find_start(way: np.ndarray, *_: object) -> tuple[float, float, float] | None:
@@ -238,6 +238,29 @@ def test_a_program_whose_way_fits_nowhere_is_swum_more_slowly(monkeypatch: pytes
     )
     first, _ = make_readings(small("null"))
     assert first.commands[0, :, 0] == pytest.approx([build.SLOWER**2] * 2)  # both fit at the third try
+
+
+def test_a_program_at_one_speed_is_swum_more_slowly_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def find_start(way: np.ndarray, *_: object) -> tuple[float, float, float] | None:
+        asked.append(way)
+        return None if len(asked) in (2, 4) else (0.0, 0.0, 0.0)  # the second of three trials, twice
+
+    monkeypatch.setattr(build, "find_start", find_start)
+    (one,) = of_trials("one_speed")
+    rotor = one.commands[..., 0]
+    np.testing.assert_allclose(rotor[:, 1], build.SLOWER**2 * rotor[:, 0])
+    assert np.array_equal(rotor[:, 2], rotor[:, 0]) and len(asked) == 5
+
+
+def test_a_fish_that_fits_nowhere_into_the_pool_is_no_world(tmp_path: Path, monkeypatch) -> None:
+    """It began at the centre and swam through the walls."""
+    monkeypatch.setattr(build, "find_start", lambda *_: None)
+    with pytest.raises(NoWorld, match="2 of 2 trials of 4 s fit nowhere into the pool, 12 programs tried"):
+        make_readings(small("null"))
+    run_world(Job("a", small("null"), tmp_path, ("false",)))
+    assert read_json(tmp_path / "result.json")["error"].startswith("no world: 2 of 2 trials")
 
 
 def test_recordings_are_as_noisy_as_the_filter_takes_them_to_be() -> None:

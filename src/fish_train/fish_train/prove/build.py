@@ -28,7 +28,7 @@ from fish_train.prove.trials import (
     feedback_paths,
     open_loop,
 )
-from fish_train.prove.world import World
+from fish_train.prove.world import NoWorld, World
 
 Array = NDArray[np.float64]
 MakePlant = Callable[[int], Plant]  # number of fish -> plant
@@ -53,7 +53,12 @@ def make_world(world: World, folder: Path) -> None:
 
 
 def make_readings(world: World) -> list[Readings]:
-    """The trials of a world: open loop first, then under feedback. Raises ValueError for a plant that is not known."""
+    """The trials of a world: open loop first, then under feedback.
+
+    Raises:
+        NoWorld: no program keeps the fish off the walls, or the engine became unstable.
+        ValueError: the plant is not known.
+    """
     random = np.random.default_rng(world.seed)
     if world.plant == "fish_sim":
         with known_to_the_plant():
@@ -93,14 +98,14 @@ def _trials(world: World, make: MakePlant, errors: Errors, random: np.random.Gen
 def _open(
     world: World, make: MakePlant, errors: Errors, random: np.random.Generator, count: int, steps: int
 ) -> Readings:
-    """A program whose way fits nowhere into the pool is drawn again, a little slower."""
+    """A program whose way fits nowhere into the pool is drawn again, a little slower. Raises NoWorld after TRIES."""
     kinds = np.array([OPEN[i % len(OPEN)] for i in range(count)])
     calm, lost = np.ones(count), np.ones(count, dtype=bool)
     table, starts = np.zeros((steps, count, 2)), np.zeros((count, 3))
     for _ in range(TRIES):
         table[:, lost] = open_loop(kinds[lost], world.duration, random, calm[lost])
         if world.trials == "one_speed":
-            table = at_one_speed(table)
+            table = at_one_speed(table, calm)
         which = np.flatnonzero(lost)
         ways = _way(make, table[:, which])
         for m, way in zip(which, np.moveaxis(ways, 1, 0), strict=True):
@@ -110,6 +115,11 @@ def _open(
         if not lost.any():
             break
         calm[lost] *= SLOWER
+    else:
+        raise NoWorld(
+            f"{lost.sum()} of {count} trials of {world.duration:g} s fit nowhere into the pool, {TRIES} programs tried for each,"
+            " every one slower: ask for shorter trials"
+        )
     instruments = Instruments(steps, count, world.noise, errors, random)
     return swim(make(count), starts, OpenLoop(table), instruments, steps)
 

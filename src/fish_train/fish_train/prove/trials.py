@@ -102,12 +102,12 @@ def open_loop(kinds: Iterable[str], duration: float, random: np.random.Generator
     return table * np.stack([calm, np.ones_like(calm)], axis=-1)
 
 
-def at_one_speed(table: Array) -> Array:
-    """The same programs with one amplitude of the rotor from the first second on."""
+def at_one_speed(table: Array, calm: Array) -> Array:
+    """The same programs with one amplitude of the rotor from the first second on, slowed by `calm` (M,)."""
     t = PERIOD * np.arange(len(table))
     amplitude = FULL_SPEED * np.sqrt(ONE_SPEED) * np.minimum(1.0, t)
-    rotor = np.repeat((amplitude * np.sin(2.0 * np.pi * STROKE * t))[:, None], table.shape[1], axis=1)
-    return np.stack([rotor, table[..., 1]], axis=-1)
+    rotor = amplitude * np.sin(2.0 * np.pi * STROKE * t)
+    return np.stack([rotor[:, None] * calm, table[..., 1]], axis=-1)
 
 
 def feedback_paths(
