@@ -5,11 +5,13 @@ import sys
 from argparse import ArgumentParser
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import recording_samples as samples
 
 from fish_control.excitation import LAST_ROW
+from fish_sim.robot import Robot
 from fish_train.commands import main as command
 from fish_train.commands.verbs import VERBS
 
@@ -101,6 +103,25 @@ def test_inspect_of_the_folder_one_is_in_is_called_after_it(tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path / "set")
     assert command.main(["inspect", "."]) == 0
     assert "<h1>Recording set</h1>" in Path("inspect_set.html").read_text()
+
+
+def test_diagnose_of_the_folder_one_is_in_is_called_after_it(tmp_path, monkeypatch):
+    """The diagnosis itself takes a minute, and is not what names the page."""
+    titles, robot = [], SimpleNamespace(robot=Robot(), standard_errors={})
+    for name, stand_in in {
+        "diagnose.procedure.diagnose": lambda *_: None,
+        "diagnose.answer.answer": lambda _: {},
+        "diagnose.verdict.corrected": lambda _: robot,
+        "reports.verdict_sentence.sentence": lambda _: "nothing",
+        "reports.diagnosis_page.write_diagnosis_page": lambda _, title, *__: titles.append(title),
+    }.items():
+        monkeypatch.setattr(f"fish_train.{name}", stand_in)
+    (tmp_path / "set").mkdir()
+    samples.robot_recording(tmp_path / "set" / "a")
+    monkeypatch.chdir(tmp_path / "set")
+    for given in (".", "../set", "a/.."):
+        assert command.main(["diagnose", given, "--out", str(tmp_path / "out")]) == 0
+    assert titles == ["set", "set", "set"]
 
 
 def test_scores_of_two_recordings_are_pages_of_their_own(tmp_path, monkeypatch):

@@ -16,6 +16,8 @@ from fish_train.commands.inputs import (
     topic_map,
     user_errors,
 )
+from fish_train.commands.named_path import named_path
+from fish_train.commands.writable import writable_folder
 from fish_train.errors import UserError
 from fish_train.json_file import write_json
 
@@ -54,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         level = Level(args.false_alarms)
         names = known(args.candidates.split(",")) if args.candidates else None
     experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
-    args.out.mkdir(parents=True, exist_ok=True)
+    writable_folder(args.out)
     with console.status("diagnosing") as status:
 
         def say(text: str) -> None:
@@ -72,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     save_robot(
         without_wrench(fit.robot), args.out / "model.yaml", fit.standard_errors, notes=sentence(content)
     )
-    write_diagnosis_page(args.out / "report.html", args.dataset[0].name, content, result)
+    write_diagnosis_page(args.out / "report.html", named_path(args.dataset[0]).name, content, result)
     for text in left_out:
         print(f"left out: {text}")
     print(sentence(content))

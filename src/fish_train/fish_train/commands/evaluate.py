@@ -1,7 +1,8 @@
 """How well gains follow paths: any weights on any paths, speeds, plants and seeds.
 
 Without --perfect every run goes through the camera model (noise, jitter, loss, latency), the IMU model and the
-robot's own fusion. Writes runs.csv and a page; prints the table.
+robot's own fusion. Writes runs.csv and a page; prints the table. Ctrl-C ends the study; the runs that are finished are
+written to runs_partial.csv and evaluation_partial.html.
 """
 
 from __future__ import annotations
@@ -10,11 +11,16 @@ import argparse
 import os
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import Progress
 
+from fish_train.commands.writable import partial_file, writable_folder
 from fish_train.errors import UserError
+
+if TYPE_CHECKING:
+    from fish_train.evaluation.study import Row
 
 LOG_WIDTH = 200  # characters, where the output is no terminal
 
@@ -58,8 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_train.evaluation.candidates import constant_candidate, read_candidate
     from fish_train.evaluation.cells import make_cells, read_path
     from fish_train.evaluation.conditions import make_condition, robust_conditions
-    from fish_train.evaluation.page import write_study_page
-    from fish_train.evaluation.study import run_study, write_rows
+    from fish_train.evaluation.study import run_study
     from fish_train.evaluation.tables import ratio_table, summary_table
     from fish_train.score_table import print_table
 
@@ -85,21 +90,34 @@ def run(args: argparse.Namespace) -> int:
     console, began = Console(), time.monotonic()
     if not console.is_terminal:
         console = Console(width=LOG_WIDTH)
-    with Progress(console=console, transient=True) as progress:
-        task = progress.add_task(f"{len(candidates) * len(conditions) * len(cells)} runs", total=None)
-        rows = run_study(
-            candidates,
-            conditions,
-            cells,
-            args.jobs,
-            lambda done, total: progress.update(task, completed=done, total=total),
-        )
-    args.out.mkdir(parents=True, exist_ok=True)
-    write_rows(args.out / "runs.csv", rows)
-    write_study_page(args.out / "evaluation.html", rows)
+    total, nominal = len(candidates) * len(conditions) * len(cells), conditions[0].name
+    folder = writable_folder(args.out)
+    table, page = folder / "runs.csv", folder / "evaluation.html"
+    finished: dict[int, list[Row]] = {}
+    try:
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task(f"{total} runs", total=None)
+            rows = run_study(
+                candidates,
+                conditions,
+                cells,
+                args.jobs,
+                lambda done, batches: progress.update(task, completed=done, total=batches),
+                finished.__setitem__,
+            )
+    except KeyboardInterrupt:
+        rows = [row for _, batch in sorted(finished.items()) for row in batch]
+        if rows:
+            table, page = partial_file(table), partial_file(page)
+            write_study(table, page, rows, nominal)
+            console.print(
+                f"{len(rows)} of {total} runs; {table.name} and {page.name} in {folder}", soft_wrap=True
+            )
+        raise
+    write_study(table, page, rows, nominal)
     print_table(console, summary_table(rows, "Tracking"))
     if args.robust:
-        print_table(console, ratio_table(rows, conditions[0].name, "Robustness"))
+        print_table(console, ratio_table(rows, nominal, "Robustness"))
     failed = [row for row in rows if row.metrics.failure]
     for row in failed[:20]:
         cell = f"{row.cell.path} at {row.cell.speed:g} m/s, seed {row.cell.seed}"
@@ -108,9 +126,18 @@ def run(args: argparse.Namespace) -> int:
         )
     spent = time.monotonic() - began
     console.print(
-        f"{len(rows)} runs in {spent:.0f} s; runs.csv and evaluation.html in {args.out}", soft_wrap=True
+        f"{len(rows)} runs in {spent:.0f} s; {table.name} and {page.name} in {folder}", soft_wrap=True
     )
     return 1 if failed else 0
+
+
+def write_study(table: Path, page: Path, rows: list[Row], nominal: str) -> None:
+    """All runs as CSV, and the page; nominal: the condition that the others are compared with."""
+    from fish_train.evaluation.page import write_study_page
+    from fish_train.evaluation.study import write_rows
+
+    write_rows(table, rows)
+    write_study_page(page, rows, nominal)
 
 
 def check_conditions(args: argparse.Namespace) -> None:

@@ -19,6 +19,7 @@ from fish_train.commands.inputs import (
     topic_map,
     user_errors,
 )
+from fish_train.commands.writable import writable_folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     console, chosen = terminal(), args.effects == "choose"
     robot = read_model(args.robot)
     experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
+    writable_folder(args.out)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar, user_errors():
         task, began = bar.add_task("identifying", total=None), time.monotonic()
@@ -75,7 +77,6 @@ def run(args: argparse.Namespace) -> int:
             effects=() if chosen else tuple(name for name in args.effects.split(",") if name),
             choose_from=tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else (),
         )
-    args.out.mkdir(parents=True, exist_ok=True)
     write_identification(args.out, result, left_out)
     write_identify_page(args.out / "report.html", result, left_out)
     print_table(console, parameter_table(result))

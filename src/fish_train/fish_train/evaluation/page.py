@@ -11,12 +11,12 @@ from fish_train.evaluation.tables import cell_table, ratio_table, summary_table,
 from fish_train.reports.page import Block, write_page
 
 
-def write_study_page(path: Path, rows: Sequence[Row]) -> None:
-    """Tables of a study; the first condition is the one the others are compared with."""
+def write_study_page(path: Path, rows: Sequence[Row], nominal: str | None = None) -> None:
+    """Tables of a study; nominal: the condition that the others are compared with, None: the first."""
     conditions = unique(rows, lambda r: r.condition)
     blocks: list[Block] = [summary_table(rows, "Tracking")]
     if len(conditions) > 1:
-        blocks.append(ratio_table(rows, conditions[0], "Robustness"))
+        blocks.append(ratio_table(rows, nominal or conditions[0], "Robustness"))
     for candidate in unique(rows, lambda r: r.candidate):
         for condition in conditions:
             mine = [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]

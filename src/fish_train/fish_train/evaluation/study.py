@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -95,15 +96,22 @@ def run_study(
     cells: Sequence[Cell],
     jobs: int,
     report: Callable[[int, int], None] | None = None,
+    keep: Callable[[int, list[Row]], object] | None = None,
 ) -> list[Row]:
-    """Everything against everything, `jobs` processes; cells of like duration swim together."""
+    """Everything against everything, `jobs` processes; cells of like duration swim together.
+
+    keep: hears of each batch when it is finished, and of its place in the order.
+    """
     tasks = [(c, d, batch) for c in candidates for d in conditions for batch in _batches(cells, jobs)]
     if jobs > 1:
-        found = _in_processes(evaluate, tasks, jobs, report)
+        found = _in_processes(evaluate, tasks, jobs, report, keep)
         return [row for rows in found for row in rows]
     rows: list[Row] = []
     for done, task in enumerate(tasks, start=1):
-        rows += evaluate(*task)
+        batch = evaluate(*task)
+        rows += batch
+        if keep is not None:
+            keep(done - 1, batch)
         if report is not None:
             report(done, len(tasks))
     return rows
@@ -121,16 +129,18 @@ def _in_processes(
     tasks: Sequence[tuple[Any, ...]],
     jobs: int,
     report: Callable[[int, int], None] | None = None,
+    keep: Callable[[int, Any], object] | None = None,
 ) -> list[Any]:
-    """work(*task) for every task, one core for each process; results in order."""
-    results = []
+    """work(*task) for every task, one core for each process; results in order, and to `keep` with their place as they come."""
     with worker_pool(jobs) as pool:
-        futures = [pool.submit(work, *task) for task in tasks]
-        for done, future in enumerate(futures, start=1):
-            results.append(future.result())
+        places = {pool.submit(work, *task): place for place, task in enumerate(tasks)}
+        for done, future in enumerate(as_completed(places), start=1):
+            result = future.result()
+            if keep is not None:
+                keep(places[future], result)
             if report is not None:
                 report(done, len(tasks))
-    return results
+    return [future.result() for future in places]
 
 
 def swim_all(
