@@ -35,7 +35,7 @@ from fish_train.prove.study import Study, StudyError, read_json
 from fish_train.prove.tables import Share
 from fish_train.prove.tool_version import tool_digest
 from fish_train.prove.where import dof_overlap, overlap, stated_range, stated_times, true_push
-from fish_train.prove.world import World
+from fish_train.prove.world import NoWorld, World
 
 TOOL = (sys.executable, str(Path(__file__).with_name("fake_tool.py")))
 
@@ -328,6 +328,42 @@ def test_the_judge_sees_a_hidden_current_as_the_oracle_does(monkeypatch: pytest.
     for key, true in world.effects["current"].items():
         name = f"current.{key}"
         assert looked.true.values[name] == pytest.approx(true, abs=4.0 * looked.true.standard_errors[name])
+
+
+def test_a_world_without_an_answer_is_judged_and_counts_as_not_right(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The oracle sees its current; neither the tool nor a table of it may lose the world."""
+    seen: list[Looked] = []
+    monkeypatch.setattr(judging, "look", lambda *given: seen.append(look(*given)) or seen[-1])
+    monkeypatch.setattr(judging, "compete", lambda *_: Rivals("current", 0.5, 0.6))
+    monkeypatch.setattr(judging, "spread", lambda work, tasks, jobs, cluster: map(work, tasks))
+    kinds = (("single", 1), ("null", 1), ("null", 0))
+    worlds = [small(group, number, encoder=True, seed=k) for k, (group, number) in enumerate(kinds)]
+    study = Study.create(tmp_path / "study", worlds, {"seed": 1, "tool": tool_digest()})
+    for name in study.worlds:
+        study.place(name).mkdir(parents=True)
+        write_json(
+            study.place(name) / "result.json", {"seconds": 1.0, "diagnosis": None, "error": "exit status 3"}
+        )
+    scores = [score_world(w, study.results[n]) for n, w in study.reveal().items()]
+    oracle, (against, rivals) = judging.judge_studies([study], scores, 1, lambda _: None)
+    assert worlds[1].links > 3 and worlds[2].links == 3  # of more links no structure is the true one
+    assert len(seen) == 2 and {s.held_out.names for s in seen} == {("trial_02",)}
+    assert oracle == {worlds[0].seed: True}
+    assert against.rows[0][2] == "0% of 1"
+    assert [row[1].split(" =")[0] for row in rivals.rows[:2]] == ["0/1", "1/1"]
+    assert rivals.rows[0][2] == "–" and rivals.rows[1][2].startswith(
+        "1/1"
+    )  # no answer, no evidence of few alarms
+
+
+def test_what_could_not_be_made_is_judged_as_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(world: World) -> None:
+        raise NoWorld("a fish that fits nowhere")
+
+    monkeypatch.setattr(judging, "make_readings", lost)
+    assert judge(small("single", 1), None)["sight"] is None
 
 
 def test_the_judge_sees_what_has_no_name(monkeypatch: pytest.MonkeyPatch) -> None:

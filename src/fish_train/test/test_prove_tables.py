@@ -101,6 +101,19 @@ def test_rivals_of_the_tool_choose_by_penalised_gain_or_held_out_error() -> None
     assert smallest_error(score_world(CURRENT, lost)) == "current"
 
 
+def test_a_world_without_an_answer_is_right_for_no_method() -> None:
+    scores = [
+        answered("single", ("current",), "current"),
+        failed("single", "current"),
+        answered("null", (), verdict="no_mismatch"),
+        failed("null"),
+    ]
+    rows = {row[0]: [cell.split(" =")[0] for cell in row[1:]] for row in criterion_table(scores).rows}
+    assert rows["this tool"] == ["1/2", "0/1"]
+    assert all(right.endswith("/2") and alarms.endswith("/1") for right, alarms in rows.values())
+    assert choice(scores[1], lambda *_: 0.0) is None and smallest_error(scores[1]) is None
+
+
 def test_information_criteria_cost_as_in_their_definitions() -> None:
     """Half of 2 k and half of k ln n: a current has two numbers; n counts what the ranking sees of training trials."""
     for count, duration, seen in ((3, 6.0, 2 * 6), (9, 12.0, 4 * 8)):

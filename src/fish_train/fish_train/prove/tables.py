@@ -156,7 +156,7 @@ def name_table(scores: Sequence[Score]) -> Table:
 
 
 def failure_table(scores: Sequence[Score]) -> Table:
-    """Worlds on which the tool gave no answer; they count as wrong everywhere."""
+    """Worlds on which the tool gave no answer; they count as not right everywhere."""
     rows = [
         [s.world.group, ", ".join(s.world.names) or "nothing", " ".join(s.error.split())[:200]]
         for s in scores
@@ -236,8 +236,11 @@ def power_table(steps: Sequence[Power]) -> Table:
 
 def criterion_table(scores: Sequence[Score]) -> Table:
     """AIC and BIC over the tool's own quick refits of all candidates, on the same worlds."""
-    judged = [s for s in scores if s.ranking and not s.unnamed and len(s.truth) < 2]
-    hidden, nothing = [s for s in judged if s.truth], [s for s in judged if s.world.group == "null"]
+    judged = [s for s in scores if not s.unnamed and len(s.truth) < 2]
+    hidden, nothing = (
+        [s for s in judged if s.truth],
+        [s for s in judged if s.world.group == "null" and s.ranking],
+    )
     rows = []
     for name, cost in (("AIC", aic_cost), ("BIC", bic_cost)):
         right = [choice(s, cost) in s.truth for s in hidden]
@@ -254,13 +257,16 @@ def criterion_table(scores: Sequence[Score]) -> Table:
     note = (
         "Worlds with one hidden name, and nulls. AIC and BIC choose among the quick refits of all names on the search "
         "trials; the smallest held-out position error 2 s ahead among the refitted nominal model and the names refitted "
-        "with their own noise: for this one nulls count where the tool refitted a name at all."
+        "with their own noise: for this one nulls count where the tool refitted a name at all. In a world "
+        "without an answer there are no fits to choose among: no method is right there, and such nulls do not count."
     )
     return Table("Competitors", ["method", "right name first", "false alarms"], rows, note)
 
 
 def choice(score: Score, cost: Callable[[str, Score], float]) -> str | None:
-    """The name with the best penalised likelihood; None if the nominal model has it."""
+    """The name with the best penalised likelihood; None if the nominal model has it, or nothing was ranked."""
+    if not score.ranking:
+        return None
     best = max(score.ranking, key=lambda n: score.ranking[n] - cost(n, score))
     return best if score.ranking[best] > cost(best, score) else None
 
