@@ -64,9 +64,57 @@ def test_every_dependency_is_pinned_and_has_a_reason(file):
         assert re.search(rf"\b{re.escape(package.split('[')[0].lower())}\b", table), package
 
 
-def test_links_lead_somewhere():
-    for target in re.findall(r"\]\(([^)#:]+)\)", README):
-        assert (ROOT / target).exists(), target
+def prose(page):
+    """A page without its code, in which # begins a comment and not a heading."""
+    return re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+
+
+def anchors(page):
+    """What GitHub calls the page's headings: small letters, words joined by hyphens, namesakes numbered from 1 on."""
+    names = []
+    for title in re.findall(r"^#{1,6} +(.+?) *#* *$", prose(page), re.MULTILINE):
+        shown = re.sub(r"\[(.*?)\]\(.*?\)", r"\1", title)
+        names.append(re.sub(r"[^\w\- ]", "", shown.lower()).replace(" ", "-"))
+    before = [names[:k].count(name) for k, name in enumerate(names)]
+    return [f"{name}-{n}" if n else name for name, n in zip(names, before, strict=True)]
+
+
+def dead_links(page):
+    """Targets within the project that are not there: files, and headings of Markdown pages."""
+    dead = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+        file, _, anchor = target.partition("#")
+        place = page.parent / file if file else page
+        if re.match(r"[a-z]+:", target):  # not of the project
+            continue
+        if not place.exists() or (anchor and place.suffix == ".md" and anchor not in anchors(place)):
+            dead.append(target)
+    return dead
+
+
+@pytest.mark.parametrize(
+    "page", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))], ids=lambda page: page.name
+)
+def test_links_lead_somewhere(page):
+    assert dead_links(page) == []
+
+
+def test_a_link_to_a_heading_that_is_not_there_is_dead(tmp_path):
+    (tmp_path / "there.md").write_text(
+        "# What `it` is (2)\n```\n# no heading\n```\n## Twice 2\n## Twice\n## Twice\n"
+    )
+    page = tmp_path / "page.md"
+    alive = (
+        "there.md",
+        "there.md#what-it-is-2",
+        "there.md#twice-2",
+        "there.md#twice-1",
+        "#here",
+        "https://a.b/#c",
+    )
+    dead = ("gone.md", "gone.md#twice", "there.md#no-heading", "there.md#twice-3", "#there")
+    page.write_text("# Here\n" + " ".join(f"[a]({target})" for target in (*alive, *dead)))
+    assert dead_links(page) == list(dead)
 
 
 @pytest.fixture(scope="module")
