@@ -60,7 +60,7 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     study = Study.create(
         tmp_path_factory.mktemp("ran") / "study",
         three_worlds(),
-        {"seed": 1, "began": "today", "command": "test"},
+        {"seed": 1, "began": "today", "command": "test", "tool": tool_digest()},
     )
     seals, done = read_json(study.folder / "seals.json"), []
     left = study.place("world_0000") / "recordings" / "half"  # of a run that was killed
@@ -119,7 +119,8 @@ def test_an_opened_study_has_the_labels_that_were_sealed(study: Study) -> None:
 
 def test_finished_studies_of_one_version_are_pooled(study: Study, tmp_path: Path) -> None:
     other = Study(Path(shutil.copytree(study.folder, tmp_path / "other")))
-    write_json(other.folder / "study.json", {"seed": 2, "began": "later", "command": "again"})
+    about = {**study.about, "seed": 2, "began": "later", "command": "again"}
+    write_json(other.folder / "study.json", about)
     result = other.place("world_0002") / "result.json"
     kept = result.read_bytes()
     result.unlink()
@@ -134,6 +135,63 @@ def test_finished_studies_of_one_version_are_pooled(study: Study, tmp_path: Path
     assert main([*pool[:2], str(study.folder), str(newer.folder), *pool[4:]]) == 1
     with pytest.raises(StudyError, match="got version 0123456789abcdef of the tool, expected"):
         newer.check_tool(tool_digest())
+
+
+def retold(file: Path, tool: str | None) -> None:
+    """The same file, made by another version of the tool (None: of a time that told none)."""
+    content = {k: v for k, v in read_json(file).items() if k != "tool"}
+    write_json(file, content if tool is None else {**content, "tool": tool})
+
+
+def test_answers_of_two_versions_make_no_study(study: Study) -> None:
+    own = tool_digest()
+    assert {result["tool"] for result in study.results.values()} == {own}
+    files = [study.place(name) / "result.json" for name in study.worlds]
+    retold(files[0], None)  # of before the file told it
+    assert len(study.results) == 3
+    retold(files[2], "0123456789abcdef")
+    with pytest.raises(
+        StudyError, match=f"got result.json in world_0002 of 0123456789abcdef, expected version {own}"
+    ):
+        study.results  # noqa: B018
+
+
+def test_a_tool_that_changes_while_a_study_runs_stops_it(tmp_path: Path) -> None:
+    study = Study.create(tmp_path / "study", [small("null")], {"seed": 1, "tool": "0123456789abcdef"})
+    with pytest.raises(StudyError, match="world_0000: got version .* of the tool, expected 0123456789abcdef"):
+        run_study(study, 1, lambda _: None, TOOL)
+    assert study.open_worlds == ["world_0000"]
+
+
+def test_a_study_is_judged_by_its_own_tool(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(judging, "spread", lambda work, tasks, jobs, cluster: map(work, tasks))
+    monkeypatch.setattr(judging, "judge", lambda world, diagnosis: {"sight": None})
+    scores = [score_world(w, study.results[n]) for n, w in study.reveal().items()]
+
+    def judge_it() -> None:
+        judging.judge_studies([study], scores, 1, lambda _: None)
+
+    judge_it()
+    files = [study.place(name) / "judged.json" for name in study.worlds]
+    assert {read_json(file)["tool"] for file in files} == {tool_digest()}
+    retold(files[0], None)
+    judge_it()
+    retold(files[1], "0123456789abcdef")
+    with pytest.raises(
+        StudyError, match="got judged.json in world_0001 of 0123456789abcdef, expected version"
+    ):
+        judge_it()
+    for name in study.worlds:  # a study of another tool: what is judged is read, nothing is judged anew
+        retold(study.place(name) / "result.json", "0123456789abcdef")
+        retold(study.place(name) / "judged.json", "0123456789abcdef")
+    retold(study.folder / "study.json", "0123456789abcdef")
+    judge_it()
+    files[2].unlink()
+    with pytest.raises(
+        StudyError, match="1 worlds are not judged yet, .* check out the version that the study ran with"
+    ):
+        judge_it()
+    assert not files[2].exists()
 
 
 @pytest.fixture

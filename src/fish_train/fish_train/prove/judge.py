@@ -22,8 +22,9 @@ from fish_train.prove.oracle import Sight, as_experiment, detects, look
 from fish_train.prove.outside import OUTSIDE, known_to_the_plant
 from fish_train.prove.runner import spread
 from fish_train.prove.score import Score, vocabulary
-from fish_train.prove.study import Study, read_json
+from fish_train.prove.study import Study, StudyError, read_json
 from fish_train.prove.tables import Share
+from fish_train.prove.tool_version import the_tool, tool_digest
 from fish_train.prove.where import dof_overlap, overlap, stated_range, stated_times, true_push
 from fish_train.prove.world import NoWorld, World
 from fish_train.reports.page import Table
@@ -41,13 +42,19 @@ class Task:
     world: World
     place: Path
     diagnosis: Mapping[str, Any] | None  # None: the tool gave no answer
+    version: str = ""  # of the tool that the study examines; "": any
+
+    @property
+    def file(self) -> Path:
+        """The judgement."""
+        return self.place / "judged.json"
 
 
 def judge_world(task: Task) -> str:
     """Write judged.json; returns the world's name."""
-    path = task.place / "judged.json"
-    if not path.exists():
-        write_json(path, judge(task.world, task.diagnosis))
+    if not task.file.exists():
+        version = the_tool(task.version, f"{task.name}, to be judged")
+        write_json(task.file, {**judge(task.world, task.diagnosis), "tool": version})
     return task.name
 
 
@@ -98,17 +105,17 @@ def judge_studies(
     done: Callable[[str], None],
     cluster: str = "",
 ) -> tuple[dict[int, bool], list[Table]]:
-    """(seed -> whether the oracle detects, tables) of studies whose labels are open."""
-    tasks = []
-    for study in studies:
-        results = study.results
-        tasks += [
-            Task(name, world, study.place(name).resolve(), results[name]["diagnosis"])
-            for name, world in study.worlds.items()
-        ]
+    """(seed -> whether the oracle detects, tables) of studies whose labels are open.
+
+    Raises StudyError where the tool here is not the study's and a judgement is missing, or where one is of another tool.
+    """
+    of_study = {study: _tasks(study) for study in studies}
+    tasks = [task for own in of_study.values() for task in own]
     for name in spread(judge_world, tasks, jobs, cluster):
         done(name)
-    judged = {t.world.seed: read_json(t.place / "judged.json") for t in tasks}
+    for study, own in of_study.items():
+        study.check_files("judged.json", {t.name: read_json(t.file) for t in own})
+    judged = {t.world.seed: read_json(t.file) for t in tasks}
     sights = {seed: Sight.read(content["sight"]) for seed, content in judged.items() if content["sight"]}
     nulls = [sights[t.world.seed] for t in tasks if not t.world.names and t.world.seed in sights]
     seen = {
@@ -118,6 +125,22 @@ def judge_studies(
     }
     rivals = {seed: content["rivals"] for seed, content in judged.items() if content.get("rivals")}
     return seen, [judged_table(scores, judged, sights, seen), rivals_table(scores, rivals)]
+
+
+def _tasks(study: Study) -> list[Task]:
+    """One for each world, judged already or not. Raises StudyError where one is not, and the tool here is not the study's."""
+    results, version = study.results, study.about.get("tool", "")
+    tasks = [
+        Task(name, world, study.place(name).resolve(), results[name]["diagnosis"], version)
+        for name, world in study.worlds.items()
+    ]
+    missing = sum(not task.file.exists() for task in tasks)
+    if missing and (digest := tool_digest()) != version:
+        raise StudyError(
+            f"{study.folder}: {missing} worlds are not judged yet, and the tool here is version {digest}, expected"
+            f" {version or 'unknown'}, as the study has: check out the version that the study ran with and give --oracle there"
+        )
+    return tasks
 
 
 def judged_table(

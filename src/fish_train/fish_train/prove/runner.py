@@ -22,6 +22,7 @@ from typing import Any
 from fish_train.json_file import write_json
 from fish_train.prove.build import make_world
 from fish_train.prove.study import Study, StudyError, read_json
+from fish_train.prove.tool_version import the_tool
 from fish_train.prove.world import NoWorld, World
 
 DIAGNOSE = (sys.executable, "-m", "fish_train.commands.main", "diagnose")
@@ -42,6 +43,7 @@ class Job:
     tool: tuple[str, ...] = DIAGNOSE
     keep: bool = False  # the recordings
     threads: int = 1  # of the tool
+    version: str = ""  # of the tool that the study examines; "": any
 
 
 def run_world(job: Job) -> str:
@@ -51,17 +53,20 @@ def run_world(job: Job) -> str:
         shutil.rmtree(left, ignore_errors=True)
     job.place.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
+    error = ""
     try:
         make_world(job.world, recordings)
-    except NoWorld as error:  # would happen again
-        answer: dict[str, Any] = {"diagnosis": None, "error": f"no world: {error}"}
-    else:
+    except NoWorld as problem:  # would happen again
+        error = f"no world: {problem}"
+    version = the_tool(job.version, job.name)
+    answer: dict[str, Any] = {"diagnosis": None, "error": error}
+    if not error:
         began = time.monotonic()
         answer = _run_tool(job, recordings, out)
     seconds = time.monotonic() - began
     if not job.keep:
         shutil.rmtree(recordings, ignore_errors=True)
-    write_json(job.place / "result.json", {"seconds": seconds, **answer})
+    write_json(job.place / "result.json", {"seconds": seconds, "tool": version, **answer})
     return job.name
 
 
@@ -111,9 +116,10 @@ def run_study(
 ) -> None:
     """Run every world without a result; `done` hears each name. cluster: address of a Dask scheduler."""
     threads = max(1, len(os.sched_getaffinity(0)) // max(jobs, 1))
-    worlds = study.worlds
+    worlds, version = study.worlds, study.about.get("tool", "")
     tasks = [
-        Job(n, worlds[n], study.place(n).resolve(), tuple(tool), keep, threads) for n in study.open_worlds
+        Job(n, worlds[n], study.place(n).resolve(), tuple(tool), keep, threads, version)
+        for n in study.open_worlds
     ]
     for name in spread(run_world, tasks, jobs, cluster):
         done(name)

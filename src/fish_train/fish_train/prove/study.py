@@ -4,6 +4,7 @@ study.json   what was asked for, and of which version of the tool
 seals.json   world -> SHA-256 of salt and label; written before any run
 sealed.json  salts and labels (mode 0600); nothing passes it to the tool
 worlds/world_0001/{recordings, tool, result.json}
+             result.json has the version that answered, and so has judged.json beside it
 labels.json  the opened labels; written when every world has a result
 """
 
@@ -58,6 +59,20 @@ class Study:
                 " two versions make no table: begin another study, or go back to the version that this one began with"
             )
 
+    def check_files(self, kind: str, files: Mapping[str, Mapping[str, Any]]) -> None:
+        """Raise StudyError if a world's file (name -> content) was made by another version of the tool than the study's.
+
+        Files from before they told it are taken for the study's.
+        """
+        own = self.about.get("tool", "")
+        odd = [f"{name} of {f['tool']}" for name, f in files.items() if f.get("tool", own) != own]
+        if odd:
+            more = f" and {len(odd) - 3} more" if len(odd) > 3 else ""
+            raise StudyError(
+                f"{self.folder}: got {kind} in {', '.join(odd[:3])}{more}, expected version {own or 'unknown'} of the tool, as"
+                " the study has: delete these files and make them again with that version"
+            )
+
     @property
     def worlds(self) -> dict[str, World]:
         """Every world, from the sealed labels. For the runner and for the judge, never for the tool."""
@@ -74,9 +89,11 @@ class Study:
 
     @property
     def results(self) -> dict[str, dict[str, Any]]:
-        """What the tool answered, for worlds that have a result."""
+        """What the tool answered, for worlds that have a result. Raises StudyError if not one version answered all."""
         found = {name: self.place(name) / "result.json" for name in self.worlds}
-        return {name: read_json(path) for name, path in found.items() if path.exists()}
+        results = {name: read_json(path) for name, path in found.items() if path.exists()}
+        self.check_files("result.json", results)
+        return results
 
     def reveal(self) -> dict[str, World]:
         """Open the labels and check every seal. Raises StudyError if a world has no result or a seal is broken."""

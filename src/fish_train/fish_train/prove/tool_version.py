@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
+from fish_train.prove.study import StudyError
+
 PARTS = (
     ("fish_sim", ""),
     ("fish_train", "diagnose"),
@@ -26,6 +28,20 @@ def tool_digest() -> str:
         for name, text in sorted(_texts(root / folder if folder else root)):
             digest.update(f"{package} {folder} {name}\n{text}".encode())
     return digest.hexdigest()[:16]
+
+
+def the_tool(expected: str, who: str) -> str:
+    """The digest of the tool that is here now, for who is about to use it. Raises StudyError unless it is the expected one.
+
+    A checkout may change while a study runs, and a cluster's workers may have another. "": any is good.
+    """
+    digest = tool_digest()
+    if expected and digest != expected:
+        raise StudyError(
+            f"{who}: got version {digest} of the tool, expected {expected}, as the study has: go back to that version, then the"
+            " same command goes on"
+        )
+    return digest
 
 
 def code(text: str) -> str:
