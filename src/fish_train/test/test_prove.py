@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -51,7 +52,8 @@ def test_labels_cannot_be_changed_after_the_seal() -> None:
 
 
 def three_worlds() -> list[World]:
-    return [small("single"), small("null"), small("outside", 4)]
+    kinds = (("single", 0), ("null", 0), ("outside", 4))
+    return [small(group, number, seed=k) for k, (group, number) in enumerate(kinds)]
 
 
 @pytest.fixture(scope="module")
@@ -118,9 +120,9 @@ def test_an_opened_study_has_the_labels_that_were_sealed(study: Study) -> None:
 
 
 def test_finished_studies_of_one_version_are_pooled(study: Study, tmp_path: Path) -> None:
-    other = Study(Path(shutil.copytree(study.folder, tmp_path / "other")))
     about = {**study.about, "seed": 2, "began": "later", "command": "again"}
-    write_json(other.folder / "study.json", about)
+    other = Study.create(tmp_path / "other", [replace(w, seed=w.seed + 3) for w in three_worlds()], about)
+    shutil.copytree(study.folder / "worlds", other.folder / "worlds")
     result = other.place("world_0002") / "result.json"
     kept = result.read_bytes()
     result.unlink()
@@ -135,6 +137,20 @@ def test_finished_studies_of_one_version_are_pooled(study: Study, tmp_path: Path
     assert main([*pool[:2], str(study.folder), str(newer.folder), *pool[4:]]) == 1
     with pytest.raises(StudyError, match="got version 0123456789abcdef of the tool, expected"):
         newer.check_tool(tool_digest())
+
+
+def test_no_world_counts_twice(study: Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def pool(*folders: Path) -> str:
+        assert main(["prove", "--pool", *map(str, folders), "--out", str(tmp_path / "pooled")]) == 1
+        return " ".join(capsys.readouterr().err.split())
+
+    again = f"twice, as {study.folder}/worlds/world_0000 and {study.folder}/worlds/world_0000; expected every world once"
+    assert again in pool(study.folder, study.folder)
+    repeated = Study.create(
+        tmp_path / "repeated", three_worlds()[2:], study.about
+    )  # another salt, the same world
+    shutil.copytree(study.place("world_0002"), repeated.place("world_0000"))
+    assert "got the world of seed 2 twice" in pool(study.folder, repeated.folder)
 
 
 def retold(file: Path, tool: str | None) -> None:

@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     """Create or go on, run, open, print, write."""
     from fish_train.prove.judge import judge_studies
     from fish_train.prove.score import score_world
-    from fish_train.prove.study import Study
+    from fish_train.prove.study import Study, check_apart
     from fish_train.prove.truths import truths_of
     from fish_train.reports.prove_page import tables, write_prove_page
     from fish_train.score_table import print_table
@@ -100,6 +100,7 @@ def run(args: argparse.Namespace) -> int:
         studies = [Study(folder) for folder in args.pool] or [_ran(args, console)]
         for study in studies[1:]:
             study.check_tool(studies[0].about.get("tool", ""))
+        check_apart(studies)
         scores: list[Score] = []
         oracle: dict[int, bool] = {}
         for study in studies:

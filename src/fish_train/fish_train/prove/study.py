@@ -112,6 +112,19 @@ class Study:
         return {name: Sealed(**content) for name, content in read_json(self.folder / "sealed.json").items()}
 
 
+def check_apart(studies: Sequence[Study]) -> None:
+    """Raise StudyError if a world is in these studies twice, as it would count twice. Its seed tells it."""
+    seen: dict[int, Path] = {}
+    for study in studies:
+        for name, world in study.worlds.items():
+            if world.seed in seen:
+                raise StudyError(
+                    f"got the world of seed {world.seed} twice, as {seen[world.seed]} and {study.place(name)}; expected every"
+                    " world once: leave one of these studies out"
+                )
+            seen[world.seed] = study.place(name)
+
+
 def read_json(path: Path) -> Any:
     """Content of a JSON file. Raises StudyError if it is not one."""
     try:
