@@ -1,7 +1,8 @@
 """The planner's progress on disk, so that a planner that was killed goes on where it was.
 
 Odometry alone cannot say where on a self-crossing path the robot is, and topics of a killed publisher are gone.
-The file is removed when the planner ends as it should.
+The file is removed when the planner ends as it should, and when a path is sent again that was swum to its end. After an
+error it stays: whoever starts the planner again wants it to go on.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ class ProgressFile:
         self._next_save = -math.inf
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="progress")
         self._writing: Future[None] | None = None
+        self._forgotten = False  # though the file may still be there
         self.problem = ""  # why it could not be written, if so
 
     def recall(self, digest: str, time: float, oldest: float) -> tuple[float, float] | None:
@@ -42,6 +44,8 @@ class ProgressFile:
 
         None if there is none: no file, a damaged one, another path, too old, or from a clock that was ahead.
         """
+        if self._forgotten:
+            return None
         try:
             data = json.loads(self._file.read_text(encoding="utf-8"))
             known, kept, progress = str(data["path"]), float(data["time"]), float(data["progress"])
@@ -57,19 +61,19 @@ class ProgressFile:
             return
         if self._writing is not None and not self._writing.done():
             return
-        self._next_save = time + SAVE_PERIOD
+        self._next_save, self._forgotten = time + SAVE_PERIOD, False
         content = json.dumps({"path": digest, "time": time, "progress": progress})
         self._writing = self._writer.submit(self._replace, content)
 
     def settle(self) -> None:
-        """Wait until what is being written is on disk."""
+        """Wait until the disk is done with what was asked of it last."""
         if self._writing is not None:
             self._writing.result()
 
     def forget(self) -> None:
-        """Remove the file."""
-        self.settle()
-        self._file.unlink(missing_ok=True)
+        """Have the file removed, after what is being written."""
+        self._forgotten = True
+        self._writing = self._writer.submit(self._remove)
 
     def _replace(self, content: str) -> None:
         """In one step: a reader finds the old or the new content."""
@@ -80,3 +84,9 @@ class ProgressFile:
             self.problem = ""
         except OSError as error:
             self.problem = f"progress cannot be kept in {self._file}: {error.strerror}"
+
+    def _remove(self) -> None:
+        try:
+            self._file.unlink(missing_ok=True)
+        except OSError as error:
+            self.problem = f"progress cannot be removed from {self._file}: {error.strerror}"

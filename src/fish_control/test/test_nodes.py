@@ -308,10 +308,13 @@ def test_planner_does_not_follow_an_estimate_that_fusion_has_lost(bench, tmp_pat
     assert (node._planner.tracker.progress, len(said), node._planner.finished) == (progress, count, False)
     node._progress.settle()
     assert (tmp_path / "progress.json").read_text() == kept
-    b.until(lambda: b.said(b"\x01", "camera lost: fusion does not vouch for the pose; nothing is planned"))
-    node._on_odometry(odometry(t + 4.4, y=-0.4, yaw=1.57))
+    lost = odometry(t + 4.3, y=1.5, yaw=1.57, variance=LOST_VARIANCE)
+    words = "camera lost: fusion does not vouch for the pose; nothing is planned"
+    b.until(lambda: node._on_odometry(lost) or b.said(b"\x01", words))
+    found = odometry(t + 4.4, y=-0.4, yaw=1.57)
+    node._on_odometry(found)
     assert node._planner.tracker.progress == pytest.approx(0.45, abs=0.01) and len(said) == count + 1
-    b.until(lambda: b.said(b"\x00", "following letter I"))
+    b.until(lambda: node._on_odometry(found) or b.said(b"\x00", "following letter I"))
 
 
 def test_planner_needs_no_imu_to_know_how_far_it_is(bench):
@@ -346,25 +349,133 @@ def test_planner_follows_a_path_from_a_topic_and_refuses_one_through_the_wall(be
     b = bench(PlannerNode, path="topic")
     b.listen("control/target", PoseStamped)
 
-    def path(half_length):
-        message = Path()
-        message.header.frame_id = "pool"
-        for x in (-half_length, half_length):
-            pose = PoseStamped()
-            pose.pose.position.x = x
-            message.poses.append(pose)
-        return message
-
-    b.say("reference/path", path(3.0), LATCHED)
+    b.say("reference/path", path_message(3.0), LATCHED)
     b.until(lambda: b.said(b"\x02", "path refused: path 'reference/path' reaches"))
     b.say("odometry/filtered", odometry(b.now(), x=-0.9))
     b.spin(0.3)
     assert not b.heard["control/target"]
-    b.say("reference/path", path(1.0), LATCHED)
+    b.say("reference/path", path_message(1.0), LATCHED)
     b.spin(0.3)
     b.say("odometry/filtered", odometry(b.now(), x=-0.9))
     b.until(lambda: b.heard["control/target"])
     assert b.heard["control/target"][0].pose.position.x == pytest.approx(-0.5, abs=1e-3)
+
+
+def path_message(half_length=1.0, frame="pool", pose_frame=""):
+    message = Path()
+    message.header.frame_id = frame
+    for x in (-half_length, half_length):
+        pose = PoseStamped()
+        pose.pose.position.x, pose.header.frame_id = x, pose_frame
+        message.poses.append(pose)
+    return message
+
+
+@pytest.mark.parametrize(("frame", "pose_frame"), [("pool", ""), ("", ""), ("", "pool"), ("pool", "pool")])
+def test_planner_takes_a_path_in_the_pool_or_in_no_frame(bench, frame, pose_frame):
+    node = bench(PlannerNode, path="topic").node
+    node._on_path(path_message(1.0, frame, pose_frame))
+    assert node._planner is not None and not node._problem
+
+
+@pytest.mark.parametrize(
+    ("frame", "pose_frame"), [("base_link", ""), ("pool", "base_link"), ("", "base_link")]
+)
+def test_planner_refuses_a_path_in_another_frame_and_follows_the_one_before(bench, frame, pose_frame):
+    b = bench(PlannerNode, path="topic")
+    b.node._on_path(path_message(1.0))
+    before = b.node._planner
+    b.node._on_path(path_message(0.5, frame, pose_frame))
+    assert b.node._planner is before
+    b.until(lambda: b.said(b"\x02", "path refused: frame_id is 'base_link', expected 'pool' or none"))
+
+
+def swim(node, start, begin, end):
+    """Odometry along the x axis at 0.2 m/s; returns the time after it."""
+    for k in range(round((end - begin) / 0.004)):
+        node._on_odometry(odometry(start + 0.02 * k, x=begin + 0.004 * k))
+        node._progress.settle()
+    return start + (end - begin) / 0.2
+
+
+def test_a_path_sent_again_after_its_end_is_swum_again_and_in_mid_swim_is_harmless(bench):
+    node = bench(PlannerNode, path="topic").node
+    node._on_path(path_message())
+    time = swim(node, 100.0, -1.0, 0.0)
+    node._on_path(path_message())  # in mid-swim
+    time = swim(node, time, 0.0, 0.04)
+    assert node._planner.tracker.progress == pytest.approx(1.04, abs=0.02)
+    time = swim(node, time, 0.04, 1.02)
+    assert node._planner.finished
+    node._on_path(path_message())
+    time = swim(node, time, 0.9, 1.0)  # where it was left, far from the beginning
+    assert not node._planner.finished and node._planner.tracker.progress < 0.3
+    time = swim(node, time, -1.0, -0.5)  # carried to the beginning
+    assert node._planner.tracker.progress == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_planner_that_is_killed_after_the_end_does_not_begin_again_by_itself(bench):
+    first, again = bench(PlannerNode, path="topic").node, bench(PlannerNode, path="topic").node
+    first._on_path(path_message())
+    time = swim(first, 100.0, -1.0, 1.02)
+    again._on_path(path_message())  # latched: its publisher lives
+    swim(again, time, 1.0, 1.1)
+    assert first._planner.finished and again._planner.finished
+
+
+def test_planner_says_that_there_is_no_odometry_any_more(bench):
+    b = bench(PlannerNode, path="I")
+    b.until(lambda: b.said(b"\x00", "waiting for odometry"))
+    b.say("odometry/filtered", odometry(b.now(), y=-0.85, yaw=1.57))
+    b.until(lambda: b.said(b"\x01", "no odometry for ") and b.said(b"\x01", " s; nothing is planned"))
+    there = odometry(b.now(), y=-0.85, yaw=1.57)
+    b.until(lambda: b.say("odometry/filtered", there) or b.said(b"\x00", "following letter I"))
+
+
+def test_planner_says_that_odometry_is_not_finite(bench):
+    b = bench(PlannerNode, path="I")
+    b.node._on_odometry(odometry(b.now(), y=-0.85, yaw=1.57))
+    bad, words = odometry(b.now(), y=math.nan), "odometry is not finite; nothing is planned"
+    b.until(lambda: b.node._on_odometry(bad) or b.said(b"\x01", words))
+
+
+@pytest.mark.parametrize(
+    ("elapsed", "silence"),
+    [
+        ((0.3, 0.3), 0.3),
+        ((0.8, 0.7), 0.7),
+        ((60.0, 0.1), 0.1),  # a clock set ahead, or simulated time that runs fast
+        ((0.01, 3.0), 0.01),  # simulated time that waits for a busy computer
+        ((-50.0, 0.2), -50.0),  # a clock set back
+    ],
+)
+def test_a_silence_is_one_on_both_clocks(bench, elapsed, silence):
+    node = bench(PlannerNode, path="I").node
+    assert node._silence() == 0.0
+    node._clocks = lambda: (1000.0, 7.0)
+    node._on_odometry(odometry(1000.0))
+    node._clocks = lambda: (1000.0 + elapsed[0], 7.0 + elapsed[1])
+    assert node._silence() == pytest.approx(silence)
+
+
+@pytest.mark.parametrize("crash", [True, False])
+def test_a_planner_that_crashes_leaves_its_progress_and_one_that_ends_does_not(tmp_path, monkeypatch, crash):
+    file = tmp_path / "progress.json"
+
+    def spin(node):
+        swim(node, 100.0, -1.0, 0.0)
+        assert file.exists()
+        raise ValueError("a mistake in a callback") if crash else KeyboardInterrupt
+
+    monkeypatch.setattr(rclpy, "spin", spin)
+    arguments = ["path:=straight", 'path_args:="{length: 2.0}"', f"state_file:={file}"]
+    monkeypatch.setattr(sys, "argv", ["node", "--ros-args", *(w for a in arguments for w in ("-p", a))])
+    if crash:
+        with pytest.raises(ValueError, match="a mistake"):
+            planner.main()
+    else:
+        assert planner.main() == 0
+    assert file.exists() == crash
 
 
 @pytest.mark.parametrize("x", [1e13, 1e308])

@@ -71,9 +71,33 @@ def test_a_folder_that_cannot_be_written_is_said_and_not_fatal(tmp_path):
 def test_forgotten_progress_is_gone(file):
     keeper = ProgressFile(file)
     keeper.forget()
-    keeper.keep("a", 1.0, 0.5)
+    keep(keeper, "a", 1.0, 0.5)
     keeper.forget()
+    assert keeper.recall("a", 1.0, oldest=10.0) is None  # whether the disk is done with it or not
+    keeper.settle()
     assert not file.exists()
+    keep(keeper, "a", 2.0, 0.7)
+    assert keeper.recall("a", 2.0, oldest=10.0) == (0.7, 0.0)
+
+
+def test_what_is_being_written_is_forgotten_too(file, monkeypatch):
+    stalled, goes_on = threading.Event(), threading.Event()
+    rename = os.replace
+    monkeypatch.setattr(os, "replace", lambda *args: stalled.set() or goes_on.wait(10.0) and rename(*args))
+    keeper = ProgressFile(file)
+    keeper.keep("a", 1.0, 0.5)
+    assert stalled.wait(10.0)
+    keeper.forget()  # returns: the disk is not waited for
+    goes_on.set()
+    keeper.settle()
+    assert not file.exists()
+
+
+def test_a_file_that_cannot_be_removed_is_said_and_not_fatal(tmp_path):
+    keeper = ProgressFile(tmp_path)  # a folder
+    keeper.forget()
+    keeper.settle()
+    assert f"cannot be removed from {tmp_path}" in keeper.problem
 
 
 def test_a_disk_that_stalls_does_not_hold_up_the_planner(file, monkeypatch):

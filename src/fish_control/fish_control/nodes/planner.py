@@ -4,13 +4,14 @@ control/target (50 Hz, frame pool): position of the lookahead point, orientation
 control/twist (50 Hz, base_link): wanted surge speed (m/s; 0 after the end of the path) and yaw rate (rad/s,
 speed times the curvature of the path). tracking/error: x cross-track (m, positive: robot left of the path), y
 heading (rad, of the way over ground, mean over the stroke), z speed (m/s); wanted minus actual. reference/path and
-reference/speed (transient local) on change; with path:=topic the path is taken from reference/path instead.
-While fusion does not vouch for the pose nothing is planned. Decisions are in Planner.
+reference/speed (transient local) on change; with path:=topic the path is taken from reference/path instead, in the
+frame pool. While fusion is silent or does not vouch for the pose nothing is planned. Decisions are in Planner.
 """
 
 import math
 import os
 import tempfile
+import time
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -43,6 +44,8 @@ from fish_node.nodes.start import read_parameters, run
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PATH_STEP = 0.02  # m between poses of the published path
+FRAMES = ("", "pool")  # that a path may be in; a message by hand often names none
+SILENCE = 0.5  # s without odometry that are worth a warning
 
 
 class PlannerNode(Node):
@@ -65,6 +68,7 @@ class PlannerNode(Node):
         self._planned = -math.inf  # s, stamp of the last odometry that was planned for
         self._said_speed = math.nan
         self._bad_odometry = 0
+        self._heard: tuple[float, float] | None = None  # s, when odometry came last; see _silence
         self._loss: str | None = None  # why nothing is planned from the newest odometry
         self._problem = ""
         if config.path == "topic":
@@ -77,13 +81,15 @@ class PlannerNode(Node):
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_timer(1.0, self._report)
 
-    def destroy_node(self) -> None:
+    def end(self) -> None:
         """A planner that ends as it should leaves no progress behind."""
         self._progress.forget()
-        super().destroy_node()
+        self._progress.settle()
 
     def _follow(self, path: ReferencePath) -> None:
         check_inside_pool(path, self._config.margin)
+        if self._planner is not None and self._planner.finished:
+            self._progress.forget()  # the same path, sent again after its end, is to be swum again
         config = self._config
         self._planner = Planner(path, config.speed, config.tracker(), config.guidance())
         self._digest = path_digest(path)
@@ -93,6 +99,7 @@ class PlannerNode(Node):
         points = [(pose.pose.position.x, pose.pose.position.y) for pose in message.poses]
         closed = len(points) > 3 and math.dist(points[0], points[-1]) < 1e-3
         try:
+            check_frames({message.header.frame_id, *(pose.header.frame_id for pose in message.poses)})
             path = ReferencePath.from_points(
                 points, name="reference/path", closed=closed, end=self._config.ending()
             )
@@ -103,27 +110,29 @@ class PlannerNode(Node):
             self.get_logger().error(self._problem)
 
     def _on_odometry(self, message: Odometry) -> None:
-        time, motion = seconds(message.header.stamp), motion_of(message)
-        signs = estimate_signs(message, time)
+        self._heard = self._clocks()
+        stamp, motion = seconds(message.header.stamp), motion_of(message)
+        signs = estimate_signs(message, stamp)
         if not signs.finite:
             self._bad_odometry += 1
+            self._loss = "odometry is not finite"
             return
         self._loss = pose_loss(signs, self._config.largest_variance)
         if self._planner is None or self._loss:  # the target goes stale, so that the controller stops
             return
         if self._fresh:
             self._fresh = False
-            self._begin(self._planner, time, motion)
-        self._planner.observe(time, motion)
-        if 0.0 <= time - self._planned < 0.75 / self._config.rate_hz:  # stamps jitter
+            self._begin(self._planner, stamp, motion)
+        self._planner.observe(stamp, motion)
+        if 0.0 <= stamp - self._planned < 0.75 / self._config.rate_hz:  # stamps jitter
             return
-        self._planned = time
+        self._planned = stamp
         self._publish(self._planner.plan(motion), message)
-        self._progress.keep(self._digest, time, self._planner.tracker.progress)
+        self._progress.keep(self._digest, stamp, self._planner.tracker.progress)
 
-    def _begin(self, planner: Planner, time: float, motion: Motion) -> None:
+    def _begin(self, planner: Planner, stamp: float, motion: Motion) -> None:
         """Resume a killed planner's progress, or start as the parameters say."""
-        kept = self._progress.recall(self._digest, time, self._config.resume_timeout)
+        kept = self._progress.recall(self._digest, stamp, self._config.resume_timeout)
         if kept is not None:
             progress, age = kept
             travelled = self._config.lookahead + 2.0 * self._config.speed * age
@@ -150,6 +159,19 @@ class PlannerNode(Node):
             self._said_speed = plan.speed
             self._speed.publish(Float64(data=plan.speed))
 
+    def _clocks(self) -> tuple[float, float]:
+        return self.get_clock().now().nanoseconds * 1e-9, time.monotonic()
+
+    def _silence(self) -> float:
+        """s since odometry came, on the clock that says less; 0 before the first.
+
+        Neither a clock that was set ahead is a silence, nor simulated time that runs fast, nor that which waits for a busy
+        computer.
+        """
+        if self._heard is None:
+            return 0.0
+        return min(now - then for now, then in zip(self._clocks(), self._heard, strict=True))
+
     def _report(self) -> None:
         level, message = OK, "waiting for odometry"
         values: dict[str, object] = {"odometry_not_finite": self._bad_odometry}
@@ -163,10 +185,20 @@ class PlannerNode(Node):
             values["cross_track_m"] = f"{self._plan.errors.cross_track:.4f}"
         if self._loss:
             level, message = WARN, f"{self._loss}; nothing is planned"
+        if self._planner is not None and (silence := self._silence()) > SILENCE:
+            level, message = WARN, f"no odometry for {silence:.1f} s; nothing is planned"
         problem = self._problem or self._progress.problem
         if problem:
             level, message = ERROR, problem
         self._reporter.report(level, message, values)
+
+
+def check_frames(frames: set[str]) -> None:
+    """Raise PathError if a path and its poses are not in the pool's frame: its numbers would be taken for the pool's."""
+    if wrong := sorted(frames.difference(FRAMES)):
+        raise PathError(
+            f"frame_id is {wrong[0]!r}, expected 'pool' or none; transform the path before it is sent"
+        )
 
 
 def configured_path(config: PlannerConfig) -> ReferencePath:
@@ -197,4 +229,4 @@ def to_message(path: ReferencePath, stamp: Any) -> Path:
 
 def main() -> int:
     """Entry point."""
-    return run(PlannerNode, "planner")
+    return run(PlannerNode, "planner", PlannerNode.end)
