@@ -477,6 +477,51 @@ def test_a_competitor_finds_the_law_it_was_shown() -> None:
     assert _sparse(force(0.0), force(0.0))[0] is None
 
 
+def test_a_study_goes_on_with_the_same_command_and_with_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(study: Study, *_: object, **__: object) -> None:
+        for name in study.open_worlds:
+            study.place(name).mkdir(parents=True)
+            write_json(
+                study.place(name) / "result.json", {"seconds": 1.0, **diagnosis(verdict="no_mismatch")}
+            )
+
+    monkeypatch.setattr(runner, "run_study", run)
+    out = tmp_path / "study"
+    command = [
+        "prove",
+        "--worlds",
+        "3",
+        "--trials",
+        "4",
+        "--groups",
+        "null",
+        "--seed",
+        "5",
+        "--out",
+        str(out),
+    ]
+    assert main(command) == 0
+    about = read_json(out / "study.json")
+    assert {key: about[key] for key in ("worlds", "trials", "groups", "duration", "seed", "drawn")} == {
+        "worlds": 3, "trials": 4, "groups": ["null"], "duration": 20.0, "seed": 5, "drawn": False,
+    }  # fmt: skip
+    assert "Seed 5 was given" in (out / "report.html").read_text()
+    assert main(command) == 0 and main(["prove", "--out", str(out)]) == 0
+    capsys.readouterr()
+    for option, said in (
+        (["--worlds", "300"], "got worlds 300, expected 3:"),
+        (["--trials", "12", "--seed", "7"], "got trials 12, expected 4; seed 7, expected 5:"),
+        (["--groups", "null", "single"], "got groups ['null', 'single'], expected ['null']:"),
+        (["--duration", "12"], "got duration 12.0, expected 20.0:"),
+    ):
+        assert main(["prove", *option, "--out", str(out)]) == 1
+        assert said in " ".join(capsys.readouterr().err.split())
+    assert main(["prove", "--worlds", "2", "--groups", "null", "--out", str(tmp_path / "drawn")]) == 0
+    assert read_json(tmp_path / "drawn" / "study.json")["drawn"] is True
+
+
 @pytest.mark.parametrize(
     "argv", [["fish_train", "prove", "--seed", "7"], ["lib/fish_train/prove", "--seed", "7"]]
 )

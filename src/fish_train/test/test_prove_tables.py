@@ -28,7 +28,7 @@ from fish_train.prove.tables import (
     smallest_error,
 )
 from fish_train.prove.world import World
-from fish_train.reports.prove_page import _confusion, _power, tables, write_prove_page
+from fish_train.reports.prove_page import _confusion, _power, seeds_sentence, tables, write_prove_page
 
 CURRENT = World("single", 1, {"current": {"x": 0.03, "y": 0.0}})
 
@@ -112,6 +112,21 @@ def test_a_world_without_an_answer_is_right_for_no_method() -> None:
     assert rows["this tool"] == ["1/2", "0/1"]
     assert all(right.endswith("/2") and alarms.endswith("/1") for right, alarms in rows.values())
     assert choice(scores[1], lambda *_: 0.0) is None and smallest_error(scores[1]) is None
+
+
+def test_the_page_says_of_every_seed_whether_it_was_drawn() -> None:
+    drawn, given = (
+        {"seed": 8, "command": "prove", "drawn": True},
+        {"seed": 5, "command": "prove --seed 5", "drawn": False},
+    )
+    old = [
+        {key: about[key] for key in ("seed", "command")} for about in (drawn, given)
+    ]  # of before studies told it
+    for a, b in ((drawn, given), old):
+        assert seeds_sentence([a, a]).startswith("The seeds were drawn at run time; salted hashes")
+        assert seeds_sentence([b]).startswith("Seed 5 was given") and "drawn" not in seeds_sentence([b])
+        assert seeds_sentence([b, b]).startswith("Seeds 5, 5 were given")
+        assert seeds_sentence([a, b]).endswith("first run. The other seeds were drawn at run time.")
 
 
 def test_information_criteria_cost_as_in_their_definitions() -> None:

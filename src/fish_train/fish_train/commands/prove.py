@@ -12,12 +12,12 @@ import secrets
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import (
@@ -38,17 +38,25 @@ if TYPE_CHECKING:
     from fish_train.reports.page import Table
 
 GROUPS = ("single", "absorbed", "feedback", "noise", "ladder", "two", "sensor", "outside", "null")
+# of what makes a study; None until the command line is read, as a study that goes on must not be asked for other things
+DEFAULTS: dict[str, Any] = {
+    "worlds": 300,
+    "groups": list(GROUPS),
+    "trials": 12,
+    "duration": 20.0,
+    "seed": None,
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("--worlds", type=int, default=300, help="number of data sets (default: %(default)s)")
+    parser.add_argument("--worlds", type=int, help=f"number of data sets (default: {DEFAULTS['worlds']})")
     parser.add_argument(
-        "--groups", nargs="+", default=list(GROUPS), metavar="GROUP",
+        "--groups", nargs="+", metavar="GROUP",
         help=f"{', '.join(GROUPS)}, mujoco (needs mujoco); default: all but mujoco",
     )  # fmt: skip
-    parser.add_argument("--trials", type=int, default=12, help="per data set (default: %(default)s)")
-    parser.add_argument("--duration", type=float, default=20.0, help="s of each trial (default: %(default)s)")
+    parser.add_argument("--trials", type=int, help=f"per data set (default: {DEFAULTS['trials']})")
+    parser.add_argument("--duration", type=float, help=f"s of each trial (default: {DEFAULTS['duration']:g})")
     parser.add_argument("--seed", type=int, help="of all worlds (default: drawn now); recorded in study.json")
     parser.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)"
@@ -87,6 +95,7 @@ def run(args: argparse.Namespace) -> int:
 
     from .inputs import terminal, user_errors
 
+    given = _given(args)
     if args.jobs < 1 or args.trials < 3 or not args.duration >= 4.0:
         raise UserError("expected at least one job, three trials and 4 s")
     _need("pysindy", "--oracle", args.oracle)
@@ -97,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     if args.close_loop:
         return _close_loop(args, console)
     with user_errors():
-        studies = [Study(folder) for folder in args.pool] or [_ran(args, console)]
+        studies = [Study(folder) for folder in args.pool] or [_ran(args, given, console)]
         for study in studies[1:]:
             study.check_tool(studies[0].about.get("tool", ""))
         check_apart(studies)
@@ -122,24 +131,31 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _given(args: argparse.Namespace) -> dict[str, Any]:
+    """What of DEFAULTS the command line gives; the rest is filled in."""
+    given = {name: getattr(args, name) for name in DEFAULTS if getattr(args, name) is not None}
+    vars(args).update({name: value for name, value in DEFAULTS.items() if name not in given})
+    return given
+
+
 def _need(module: str, what: str, wanted: bool, file: str = "requirements-bench.txt") -> None:
     """Optional packages are asked for before anything starts."""
     if wanted and find_spec(module) is None:
         raise UserError(f"{what} needs {module}: pip install -r {file} -c constraints.txt")
 
 
-def _ran(args: argparse.Namespace, console: Console) -> Study:
+def _ran(args: argparse.Namespace, given: Mapping[str, Any], console: Console) -> Study:
     """The study of these arguments, every world with a result."""
     from fish_train.prove.runner import run_study
 
-    study = _study(args, console)
+    study = _study(args, given, console)
     with _progress(console, "worlds", len(study.open_worlds)) as done:
         run_study(study, args.jobs, done, keep=args.keep, cluster=args.cluster)
     return study
 
 
-def _study(args: argparse.Namespace, console: Console) -> Study:
-    """A new study, or the one in the folder."""
+def _study(args: argparse.Namespace, given: Mapping[str, Any], console: Console) -> Study:
+    """A new study, or the one in the folder, of which nothing else may be asked than what it is."""
     from dataclasses import replace
 
     from fish_train.prove.groups import draw_worlds
@@ -148,6 +164,7 @@ def _study(args: argparse.Namespace, console: Console) -> Study:
 
     if (args.out / "study.json").exists():
         study = Study(args.out)
+        study.check_asked(given)
         if study.open_worlds:
             study.check_tool(tool_digest())
         console.print(
@@ -160,6 +177,7 @@ def _study(args: argparse.Namespace, console: Console) -> Study:
     worlds = [replace(w, count=args.trials, duration=args.duration) for w in worlds]
     about = {
         "seed": seed,
+        "drawn": args.seed is None,
         "began": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": shlex.join(["fish_train", "prove", *words_after("prove", sys.argv)]),
         "worlds": args.worlds,

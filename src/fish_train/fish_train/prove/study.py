@@ -59,6 +59,20 @@ class Study:
                 " two versions make no table: begin another study, or go back to the version that this one began with"
             )
 
+    def check_asked(self, given: Mapping[str, Any]) -> None:
+        """Raise StudyError if what is given on the command line is not what this study was begun with."""
+        about = self.about
+        differ = [
+            f"{name} {value}, expected {about[name]}"
+            for name, value in given.items()
+            if about.get(name, value) != value
+        ]
+        if differ:
+            raise StudyError(
+                f"{self.folder}: holds a study that was begun with other arguments: got {'; '.join(differ)}: leave them out to go"
+                " on with it, or choose another --out"
+            )
+
     def check_files(self, kind: str, files: Mapping[str, Mapping[str, Any]]) -> None:
         """Raise StudyError if a world's file (name -> content) was made by another version of the tool than the study's.
 

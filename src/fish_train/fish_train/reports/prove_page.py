@@ -65,15 +65,28 @@ def write_prove_page(
             "worlds with one hidden thing or none; first name or verdict",
         )
     )
-    blocks.append(Text("How", " ".join([HOW, *(f"Command: {a['command']}." for a in about)])))
+    blocks.append(
+        Text("How", " ".join([HOW, seeds_sentence(about), *(f"Command: {a['command']}." for a in about)]))
+    )
     write_page(path, "Blind study of the diagnosis", lead, blocks)
 
 
 HOW = (
     "Each world is a fish whose parameters differ from the nominal ones by up to 25 %, with something hidden in it, in its "
     "water, its actuators or its sensors. Its recordings were given to the tool as a process of its own, which gets nothing but "
-    "the folder. The seeds were drawn at run time; salted hashes of all labels were on disk before the first run."
+    "the folder."
 )
+
+
+def seeds_sentence(about: Sequence[Mapping[str, Any]]) -> str:
+    """Whether anybody could know the labels before the run; of older studies the command tells whether a seed was given."""
+    given = [str(a["seed"]) for a in about if not a.get("drawn", "--seed" not in a["command"])]
+    sealed = "salted hashes of all labels were on disk before the first run."
+    if not given:
+        return f"The seeds were drawn at run time; {sealed}"
+    others = "" if len(given) == len(about) else " The other seeds were drawn at run time."
+    which = f"Seed {given[0]} was" if len(given) == 1 else f"Seeds {', '.join(given)} were"
+    return f"{which} given, and whoever knows a seed can know its labels; {sealed}{others}"
 
 
 def _power(steps: Sequence[Power]) -> go.Figure:
