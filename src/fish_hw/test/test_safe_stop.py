@@ -13,8 +13,10 @@ from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
-from fish_hw.settings.parameter_file import read_parameter_file
 from fish_hw.settings.rudder import RudderSettings
+from fish_hw.transport.errors import TransportError
+from fish_hw.transport.sysfs_pwm import SysfsPwm
+from fish_node.parameter_file import read_settings
 
 
 def parameter_file(path, **parameters):
@@ -46,6 +48,36 @@ def test_the_module_of_the_file_is_stopped(tmp_path):
         assert emulator.timeouts == 0
     finally:
         emulator.close()
+
+
+def test_the_device_is_stopped_that_the_node_drives(tmp_path, capsys):
+    """The node's own values, further down in the file, had not been read: another servo was centred, with success."""
+    chips = [rudder_at_the_side(tmp_path / str(k)) for k in range(2)]
+    rudder = tmp_path / "rudder.yaml"
+    values = [{"ros__parameters": {"chip": str(chip.chip), "max_rate": 50.0}} for chip in chips]
+    rudder.write_text(yaml.safe_dump({"/**": values[0], "/fish/rudder": values[1]}))
+    assert main(["--rudder", str(rudder)]) == 0
+    assert [(chip.read("duty_cycle"), chip.read("enable")) for chip in chips] == [
+        (1_900_000, 1),
+        (1_500_000, 0),
+    ]
+    rudder.write_text(yaml.safe_dump({"/red/fish/rudder": values[0], "/blue/fish/rudder": values[1]}))
+    assert main(["--rudder", str(rudder)]) == 1
+    assert chips[0].read("enable") == 1
+    assert "does not read /blue/fish/rudder, /red/fish/rudder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("step", ["set_pulse_ns", "stop"])
+def test_pulses_that_cannot_be_switched_off_are_a_failure(tmp_path, capsys, monkeypatch, step):
+    def refuse(*_):
+        raise TransportError("cannot write 0 to enable")
+
+    monkeypatch.setattr(SysfsPwm, step, refuse)
+    chip = rudder_at_the_side(tmp_path)
+    rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip), max_rate=50.0)
+    assert main(["--rudder", str(rudder)]) == 1
+    assert chip.read("enable") == 1
+    assert capsys.readouterr().err == "safe_stop: rudder: cannot write 0 to enable\n"
 
 
 def test_rudder_is_centred_though_the_rotor_is_gone(tmp_path, capsys):
@@ -128,7 +160,7 @@ def test_unknown_parameters_are_said_but_the_robot_is_stopped(tmp_path, capsys, 
 def test_names_that_are_no_words_are_left_out(tmp_path):
     path, said = tmp_path / "rudder.yaml", []
     path.write_text("/**: {ros__parameters: {1: 1, false: 2, channel: 3}}")
-    assert read_parameter_file(path, RudderSettings, said.append).channel == 3
+    assert read_settings(path, "/fish/rudder", RudderSettings, said.append).channel == 3
     assert len(said) == 1 and "unknown parameter 1, False; known: " in said[0]
 
 
@@ -137,6 +169,8 @@ def test_names_that_are_no_words_are_left_out(tmp_path):
     [
         ("{bad: [", "while parsing"),
         ("[]", "expected a node name with ros__parameters"),
+        ("/fish/rotor: {ros__parameters: {module_id: 3}}", "nothing for the node /fish/rudder"),
+        ("/red/fish/rudder: {ros__parameters: {}}\n/fish/rudder: {ros__parameters: {}}", "of one robot only"),
         ("/**: {ros__parameters: {pwm_hz: 3}}", "pwm_hz is 3.0, expected 40.0 to 333.0"),
         ("/**: {ros__parameters: {pwm_hz: fast}}", "pwm_hz is 'fast', expected float such as 50.0"),
         ("/**: {ros__parameters: {channel: 0.0}}", "channel is 0.0, expected int such as 0"),
@@ -146,5 +180,5 @@ def test_parameter_file_errors_name_file_and_field(tmp_path, text, expected):
     path = tmp_path / "rudder.yaml"
     path.write_text(text)
     with pytest.raises(ValueError, match=r"rudder\.yaml") as caught:
-        read_parameter_file(path, RudderSettings, pytest.fail)
+        read_settings(path, "/fish/rudder", RudderSettings, pytest.fail)
     assert expected in str(caught.value)

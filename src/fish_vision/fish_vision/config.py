@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
-import yaml
-
-from fish_node.parameters import in_type_of
+from fish_node.parameter_file import read_settings
 from fish_vision.calibration import Mount
 from fish_vision.pose import MarkerLayout
 from fish_vision.segmentation import HUES, ColourRange
 
-NODE_NAMES = ("/**", "/fish/tracker")  # the parts of a params file that the node takes
+NODE = "/fish/tracker"
 
 
 @dataclass(frozen=True)
@@ -87,25 +85,16 @@ class TrackerConfig:
 
 
 def config_from_file(path: Path) -> TrackerConfig:
-    """Parameters from a ROS params file, as the node reads it: those under `/**` and under `/fish/tracker`;
-    what stands further down in the file wins.
+    """Parameters from a ROS params file, as the node reads it.
 
     Raises:
-        ValueError: not such a file, an unknown parameter, or a value of the wrong type or out of range.
+        ValueError: not such a file, an unknown parameter, or a value of the wrong type or out of range; names the file.
     """
-    default = TrackerConfig()
-    try:
-        content = yaml.safe_load(path.read_text())
-        parts = [part["ros__parameters"] for name, part in content.items() if name in NODE_NAMES]
-        values = {key: value for part in parts for key, value in part.items()}
-        likes = {key: getattr(default, key) for key in values}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
-        raise ValueError(f"{path}: not a params file of the tracker ({error})") from error
-    if not parts:
-        raise ValueError(
-            f"{path}: not a params file of the tracker (expected one of {', '.join(NODE_NAMES)})"
-        )
-    return TrackerConfig(**{key: in_type_of(key, value, likes[key]) for key, value in values.items()})
+    return read_settings(path, NODE, TrackerConfig, _refuse)
+
+
+def _refuse(text: str) -> None:
+    raise ValueError(text)
 
 
 _LISTS = (

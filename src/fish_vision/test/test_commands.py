@@ -138,10 +138,11 @@ def test_calibrate_mount_refuses_points_that_no_camera_above_sees(
 
 
 def test_check_image_says_which_parameter_has_the_wrong_type(files: Path, monkeypatch, capsys) -> None:
-    (files / "params.yaml").write_text("/**: {ros__parameters: {tail_links: 3.0}}")
-    arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / "out.png")
+    params = files / "params.yaml"
+    params.write_text("/**: {ros__parameters: {tail_links: 3.0}}")
+    arguments = ("--lens", files / "lens.yaml", "--params", params, "--out", files / "out.png")
     assert call(check_image, monkeypatch, files / "fish.png", *arguments) == 1
-    assert capsys.readouterr().err == "check_image: tail_links is 3.0, expected int such as 3\n"
+    assert capsys.readouterr().err == f"check_image: {params}: tail_links is 3.0, expected int such as 3\n"
 
 
 def test_calibrate_mount_refuses_mistaken_points(files: Path, monkeypatch, capsys) -> None:

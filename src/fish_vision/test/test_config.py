@@ -53,6 +53,16 @@ def test_the_two_parts_of_a_file_are_merged(tmp_path: Path, text: str, pixel_std
     assert (config.pixel_std, config.camera_tilt, config.max_speed) == (pixel_std, (0.0, 0.1, 0.0), 2.0)
 
 
+def test_ros_s_own_parameters_are_no_mistake_and_another_robot_s_are_not_taken(tmp_path: Path) -> None:
+    """As in safe_stop: both read a file through fish_node."""
+    path = tmp_path / "params.yaml"
+    path.write_text("/**/tracker:\n  ros__parameters: {use_sim_time: true, pixel_std: 0.03}\n")
+    assert config_from_file(path).pixel_std == 0.03
+    path.write_text("/**/tracker:\n  ros__parameters: {}\n/red/fish/tracker:\n  ros__parameters: {}\n" + OWN)
+    with pytest.raises(ValueError, match=r"/fish/tracker does not read /red/fish/tracker"):
+        config_from_file(path)
+
+
 @pytest.mark.parametrize(
     ("setting", "message"),
     [

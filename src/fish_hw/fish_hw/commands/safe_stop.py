@@ -13,11 +13,11 @@ from pathlib import Path
 from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.devices.vertiq import Vertiq
-from fish_hw.settings.parameter_file import read_parameter_file
 from fish_hw.settings.rotor import RotorSettings
 from fish_hw.settings.rudder import RudderSettings
 from fish_hw.transport.errors import TransportError
 from fish_hw.transport.serial_port import SerialPort
+from fish_node.parameter_file import read_settings
 
 
 def stop_rotor(path: Path) -> None:
@@ -25,7 +25,7 @@ def stop_rotor(path: Path) -> None:
 
     An emulator has nothing to stop.
     """
-    settings = read_parameter_file(path, RotorSettings, partial(_warn, "rotor"))
+    settings = read_settings(path, "/fish/rotor", RotorSettings, partial(_warn, "rotor"))
     if settings.port == "emulator":
         return
     port = SerialPort(settings.port, settings.baud)
@@ -36,16 +36,16 @@ def stop_rotor(path: Path) -> None:
 
 
 def stop_rudder(path: Path) -> None:
-    """Centre the servo and end the pulses as the parameter file says; TransportError if the output is not there.
+    """Centre the servo and end the pulses as the parameter file says; TransportError if that cannot be done.
 
     An emulator has nothing to stop.
     """
-    settings = read_parameter_file(path, RudderSettings, partial(_warn, "rudder"))
+    settings = read_settings(path, "/fish/rudder", RudderSettings, partial(_warn, "rudder"))
     if settings.backend == "emulator":
         return
     driver = RudderDriver(settings, lambda: open_output(settings))
     driver.connect()  # this centres
-    driver.close()
+    driver.make_safe()
 
 
 def _warn(device: str, text: str) -> None:

@@ -102,8 +102,17 @@ class RudderDriver:
             return self._link.lose(str(error), now)
 
     def close(self) -> None:
-        """Centre, then pulses off if the settings say so, but not before the servo has had time to get
-        there."""
+        """Make safe and give the output back, as well as that can be done."""
+        try:
+            self.make_safe()
+        except TransportError as error:
+            self._link.trouble = f"rudder not centred: {error}"
+
+    def make_safe(self) -> None:
+        """Centre, then pulses off if the settings say so, but not before the servo has had time to get there.
+
+        The output is given back in any case. TransportError if it could not be told.
+        """
         if self._output is None:
             return
         travel_s = self._travel_s() + SETTLE_S
@@ -112,10 +121,9 @@ class RudderDriver:
             if self._settings.off_at_exit:
                 self._sleep(travel_s)
                 self._output.stop()
-        except TransportError as error:
-            self._link.trouble = f"rudder not centred: {error}"
-        self._output.close()
-        self._output = None
+        finally:
+            self._output.close()
+            self._output = None
 
     def status(self) -> Status:
         """State in one line with counters."""
