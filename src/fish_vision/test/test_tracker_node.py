@@ -18,6 +18,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped  # noqa: E402
 from pool_picture import CONFIG, discs_of_fish, draw, lens_fields  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
+from rclpy.qos import ReliabilityPolicy  # noqa: E402
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState  # noqa: E402
 
 from fish_vision.config import config_from_file  # noqa: E402
@@ -157,6 +158,24 @@ def test_raw_images_work_and_wrong_encodings_are_said(bench: Bench) -> None:
     bench.send_raw(PICTURE[..., ::-1], "rgb8")
     assert bench.spin_until(lambda: bool(bench.got["pose"]))
     check_pose(bench.got["pose"][0])
+
+
+@pytest.mark.parametrize(
+    ("bench", "topic", "reliability"),
+    [
+        ({"use_raw": True}, "camera/image_raw", ReliabilityPolicy.RELIABLE),
+        ({}, "camera/image_raw/compressed", ReliabilityPolicy.BEST_EFFORT),
+    ],
+    indirect=["bench"],
+)
+def test_raw_images_which_are_many_packets_each_come_reliably(
+    bench: Bench, topic: str, reliability: ReliabilityPolicy
+) -> None:
+    """Best effort had lost four of five: one lost packet is a lost image."""
+    [tracker] = bench.peer.get_subscriptions_info_by_topic(f"/fish/{topic}")
+    assert tracker.qos_profile.reliability == reliability
+    [own] = [s for s in bench.tracker.subscriptions if s.topic_name == f"/fish/{topic}"]
+    assert own.qos_profile.depth == 1  # a late image is worse than a lost one
 
 
 def test_bad_images_are_said_and_the_next_good_one_is_tracked(bench: Bench) -> None:

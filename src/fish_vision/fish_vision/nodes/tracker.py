@@ -1,7 +1,7 @@
 """The tracker node: overhead image to pose of the head and angles of the tail.
 
 In: camera/image_raw/compressed (sensor_msgs/CompressedImage) or, with use_raw, camera/image_raw
-(sensor_msgs/Image); camera/camera_info (sensor_msgs/CameraInfo). Out: camera/pose
+(sensor_msgs/Image, from a reliable publisher); camera/camera_info (sensor_msgs/CameraInfo). Out: camera/pose
 (geometry_msgs/PoseWithCovarianceStamped, frame pool), camera/tail (sensor_msgs/JointState, tail_1 .. relative
 angles, rad), both stamped as the image; with debug_image camera/debug/compressed; /diagnostics. Bad images
 and calibrations are counted and said in the diagnostics.
@@ -32,8 +32,9 @@ from fish_vision.statistics import Statistics
 from fish_vision.tracker import Detection, Tracker
 
 QUEUE = 10
-# a late image is worse than a lost one
+# a late image is worse than a lost one; a raw image is many packets, of which best effort sooner or later loses one
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+NEWEST_RAW = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 UNKNOWN = 1e6  # variance of what an overhead camera does not see: z, roll, pitch
 
 
@@ -58,12 +59,10 @@ class TrackerNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
         self.create_subscription(CameraInfo, "camera/camera_info", self._on_info, qos_profile_sensor_data)
-        kind, topic = (
-            (Image, "camera/image_raw")
-            if self._config.use_raw
-            else (CompressedImage, "camera/image_raw/compressed")
-        )
-        self.create_subscription(kind, topic, self._on_image, NEWEST)
+        if self._config.use_raw:
+            self.create_subscription(Image, "camera/image_raw", self._on_image, NEWEST_RAW)
+        else:
+            self.create_subscription(CompressedImage, "camera/image_raw/compressed", self._on_image, NEWEST)
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_info(self, msg: CameraInfo) -> None:
