@@ -2,8 +2,8 @@
 
 The same nodes with the same parameter files as the pip-only starter (fish_train.bringup); robot:=real takes
 the drivers of fish_hw in place of simulator and simulated camera. config:=FOLDER holds this robot's own values: what stands
-in FOLDER/rotor.yaml, tracker.yaml, ... overrides the installed file of that name. program:=diagnosis.json swims the proposed
-experiment open loop: the exciter takes the place of planner and controller.
+in FOLDER/rotor.yaml, tracker.yaml, ... overrides the installed file of that name, and an argument that is given here overrides
+both. program:=diagnosis.json swims the proposed experiment open loop: the exciter takes the place of planner and controller.
 """
 
 from pathlib import Path
@@ -17,39 +17,46 @@ from launch_ros.parameter_descriptions import ParameterValue
 from fish_train.bringup import CONTROL, EXCITER, NAMESPACE, ROBOTS, NodeSpec, open_loop, parameter_path
 
 PLANNER = CONTROL[2]
+IN_FILE = "; without it what planner.yaml says"
+IN_PROGRAM = "; without it what exciter.yaml says"
 ARGUMENTS = {
     "robot": ("sim", "sim or real"),
     "config": ("", "folder of parameter files that override the installed ones of the same name"),
     "namespace": (NAMESPACE, "namespace of all nodes"),
-    "path": ("R", "letter or path family"),
-    "path_args": ("", "YAML, arguments of the path family: '{radius: 0.6}'"),
-    "speed": ("0.2", "surge speed, m/s"),
+    "path": ("", f"letter or path family{IN_FILE}"),
+    "path_args": ("", f"YAML, arguments of the path family: '{{radius: 0.6}}', '{{}}' for none{IN_FILE}"),
+    "speed": ("", f"surge speed, m/s{IN_FILE}"),
     "program": ("", "program of stroke and rudder to swim open loop, instead of path and speed"),
-    "begin": ("0.0", "s of the program's time"),
-    "end": ("0.0", "s of the program's time; 0: its end"),
-    "use_sim_time": ("false", "nodes follow /clock"),
+    "begin": ("", f"s of the program's time{IN_PROGRAM}"),
+    "end": ("", f"s of the program's time; 0: its end{IN_PROGRAM}"),
+    "use_sim_time": ("", "true: nodes follow /clock; without it what their files say"),
+}
+# parameter of a node: argument that gives it, its type; every node has the first
+OF_EVERY_NODE = {"use_sim_time": ("use_sim_time", bool)}
+OF_NODE: dict[NodeSpec, dict[str, tuple[str, type]]] = {
+    PLANNER: {"path": ("path", str), "path_args": ("path_args", str), "speed": ("speed", float)},
+    EXCITER: {"program_file": ("program", str), "begin": ("begin", float), "end": ("end", float)},
 }
 
 
-def _node(spec: NodeSpec, config: str) -> Node:
-    parameters: dict[str, object] = {
-        "use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
-    }
-    if spec == PLANNER:
-        parameters["path"] = ParameterValue(LaunchConfiguration("path"), value_type=str)
-        parameters["path_args"] = ParameterValue(LaunchConfiguration("path_args"), value_type=str)
-        parameters["speed"] = ParameterValue(LaunchConfiguration("speed"), value_type=float)
-    if spec == EXCITER:
-        parameters["program_file"] = ParameterValue(LaunchConfiguration("program"), value_type=str)
-        parameters["begin"] = ParameterValue(LaunchConfiguration("begin"), value_type=float)
-        parameters["end"] = ParameterValue(LaunchConfiguration("end"), value_type=float)
+def _node(spec: NodeSpec, config: str, context: LaunchContext) -> Node:
+    given = _given(spec, context)
     return Node(
         package=spec.package,
         executable=spec.executable,
         namespace=LaunchConfiguration("namespace"),
-        parameters=[str(parameter_path(spec)), *_own(spec, config), parameters],
+        parameters=[str(parameter_path(spec)), *_own(spec, config), *([given] if given else [])],
         output="screen",
     )
+
+
+def _given(spec: NodeSpec, context: LaunchContext) -> dict[str, ParameterValue]:
+    """What the arguments say of a node's parameters; one that nobody gave must not override the robot's own file."""
+    return {
+        parameter: ParameterValue(LaunchConfiguration(argument), value_type=kind)
+        for parameter, (argument, kind) in {**OF_EVERY_NODE, **OF_NODE.get(spec, {})}.items()
+        if LaunchConfiguration(argument).perform(context)
+    }
 
 
 def _own(spec: NodeSpec, config: str) -> list[str]:
@@ -70,7 +77,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
         raise RuntimeError(
             f"config:={config} holds none of the nodes' parameter files; expected some of {expected}"
         )
-    return [_node(spec, config) for spec in specs]
+    return [_node(spec, config, context) for spec in specs]
 
 
 def generate_launch_description() -> LaunchDescription:

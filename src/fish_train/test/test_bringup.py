@@ -128,56 +128,92 @@ def launch_file(launch_names):
     return launch_names("fish_train", "fish.launch.py")
 
 
-@pytest.mark.parametrize("robot", bringup.ROBOTS)
-def test_the_launch_file_starts_the_table(launch_file, robot):
-    [*arguments, opaque] = launch_file["generate_launch_description"]().args[0]
-    nodes = opaque.function({"robot": robot, "program": "", "config": ""})
-    started = [(node.package, node.executable, node.parameters[0]) for node in nodes]
-    assert started == [
-        (s.package, s.executable, str(bringup.parameter_path(s))) for s in bringup.ROBOTS[robot]
+@pytest.fixture
+def launched(launch_file):
+    """launched(path="S", ...): the nodes that the launch file starts with these arguments, by executable, in order."""
+    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
+    defaults = {name: default for name, (default, _) in launch_file["ARGUMENTS"].items()}
+
+    def nodes(**given):
+        assert given.keys() <= defaults.keys()
+        return {node.executable: node for node in opaque.function({**defaults, **given})}
+
+    return nodes
+
+
+def parameters(node):
+    """Files and, for each parameter in a dict, the argument that it is taken from and its type."""
+    return [
+        given
+        if isinstance(given, str)
+        else {name: (value.args[0].args[0], value.value_type) for name, value in given.items()}
+        for given in node.parameters
     ]
+
+
+@pytest.mark.parametrize("robot", bringup.ROBOTS)
+def test_the_launch_file_starts_the_table(launch_file, launched, robot):
+    started = [(n.package, n.executable, parameters(n)) for n in launched(robot=robot).values()]
+    assert started == [
+        (s.package, s.executable, [str(bringup.parameter_path(s))]) for s in bringup.ROBOTS[robot]
+    ]
+    [*arguments, _] = launch_file["generate_launch_description"]().args[0]
     assert {argument.args[0] for argument in arguments} >= {"robot", "path", "speed", "use_sim_time"}
 
 
 @pytest.mark.parametrize("robot", bringup.ROBOTS)
-def test_with_a_program_the_exciter_takes_the_place_of_planner_and_controller(launch_file, robot):
-    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
-    nodes = opaque.function({"robot": robot, "program": "diagnosis.json", "config": ""})
-    assert [node.executable for node in nodes] == [
+def test_with_a_program_the_exciter_takes_the_place_of_planner_and_controller(launched, robot):
+    nodes = launched(robot=robot, program="diagnosis.json", begin="2.5", end="34")
+    assert list(nodes) == [
         *(s.executable for s in bringup.ROBOTS[robot] if s.executable not in ("planner", "controller")),
         "exciter",
     ]
-    assert {"program_file", "begin", "end"} < set(nodes[-1].parameters[1])
+    given = {"program_file": ("program", str), "begin": ("begin", float), "end": ("end", float)}
+    assert parameters(nodes["exciter"]) == [str(bringup.parameter_path(bringup.EXCITER)), given]
 
 
-def test_the_launch_file_hands_the_planner_its_path_and_arguments_as_text(launch_file):
-    [*arguments, opaque] = launch_file["generate_launch_description"]().args[0]
-    [planner] = [
-        node
-        for node in opaque.function({"robot": "sim", "program": "", "config": ""})
-        if node.executable == "planner"
-    ]
-    for name in ("path", "path_args"):
-        given = planner.parameters[-1][name]
-        assert (
-            given.args[0].args == (name,) and given.value_type is str
-        )  # else launch reads {radius: 0.6} as a dict
-        assert name in {argument.args[0] for argument in arguments}
+def test_the_launch_file_hands_the_planner_its_path_and_arguments_as_text(launched):
+    """Else launch would read {radius: 0.6} as a dict, and N as false."""
+    planner = launched(path="circle", path_args="{radius: 0.6}", speed="0.1")["planner"]
+    given = {"path": ("path", str), "path_args": ("path_args", str), "speed": ("speed", float)}
+    assert parameters(planner) == [str(bringup.parameter_path(bringup.CONTROL[2])), given]
 
 
-def test_the_launch_file_refuses_an_unknown_robot(launch_file):
-    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
+def test_the_launch_file_refuses_an_unknown_robot(launched):
     with pytest.raises(RuntimeError, match="known: sim, real"):
-        opaque.function({"robot": "whale", "program": "", "config": ""})
+        launched(robot="whale")
 
 
-def test_a_robots_own_values_override_the_installed_ones(launch_file, tmp_path):
-    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
-    context = {"robot": "real", "program": "", "config": str(tmp_path)}
+@pytest.mark.parametrize(
+    ("given", "overridden"),
+    [
+        ({}, {}),
+        ({"path": "S"}, {"path": ("path", str)}),
+        (
+            {"speed": "0.1", "use_sim_time": "true"},
+            {"use_sim_time": ("use_sim_time", bool), "speed": ("speed", float)},
+        ),
+    ],
+)
+def test_only_arguments_that_are_given_override_a_robots_own_values(launched, tmp_path, given, overridden):
+    """The arguments' defaults had overridden the robot's own planner.yaml."""
+    own = [tmp_path / "planner.yaml", tmp_path / "fusion.yaml"]
+    for file in own:
+        file.touch()
+    nodes = launched(robot="real", config=str(tmp_path), **given)
+    installed = [str(bringup.parameter_path(spec)) for spec in (bringup.CONTROL[2], bringup.CONTROL[1])]
+    last = [overridden] if overridden else []
+    assert parameters(nodes["planner"]) == [installed[0], str(own[0]), *last]
+    everybody = [{"use_sim_time": overridden["use_sim_time"]}] if "use_sim_time" in overridden else []
+    assert parameters(nodes["fusion"]) == [installed[1], str(own[1]), *everybody]
+
+
+def test_a_robots_own_values_override_the_installed_ones(launched, tmp_path):
+    context = {"robot": "real", "config": str(tmp_path)}
     with pytest.raises(RuntimeError, match=r"holds none of .*; expected some of rotor.yaml, rudder.yaml"):
-        opaque.function(context)
+        launched(**context)
     (tmp_path / "tracker.yaml").touch()
-    files = {node.executable: node.parameters[:-1] for node in opaque.function(context)}
+    files = {name: parameters(node) for name, node in launched(**context).items()}
     assert files["tracker"][1:] == [str(tmp_path / "tracker.yaml")]
     assert all(len(given) == 1 for name, given in files.items() if name != "tracker")
 
