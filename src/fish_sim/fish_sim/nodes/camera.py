@@ -82,7 +82,10 @@ class CameraNode(Node):
         time = _seconds(msg.header)
         self._head.add(time, state)
         self._clock_error = self.get_clock().now().nanoseconds * 1e-9 - time
-        exposure = self._clock_of_frames.due(time - self._config.exposure_s / 2)
+        middle = time - self._config.exposure_s / 2
+        if middle < 0.0:  # of an exposure that began before time did: no stamp says that
+            return
+        exposure = self._clock_of_frames.due(middle)
         if exposure is None:
             return
         if self._random.random() < self._config.drop_rate:

@@ -7,7 +7,8 @@ pool -> base_link), sim/joint_states (tail_1 .. relative angles, rad), /clock; 1
 (SetBool), reset (Trigger).
 
 Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
-nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause.
+nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause, and after a step
+of the wall clock.
 With lockstep it stands still while joint_command or odometry/filtered are behind it (Lockstep), so that a run
 does not depend on how busy the computer is.
 """
@@ -32,7 +33,7 @@ from fish_node.rivals import Rivals
 from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.lockstep import Lockstep
-from fish_sim.nodes.pacer import Pacer
+from fish_sim.nodes.pacer import MAX_LAG, Pacer
 from fish_sim.robot import Robot, load_robot
 from fish_sim.simulation import Readings, Simulation
 from fish_sim.simulation_config import SimulatorConfig
@@ -130,12 +131,28 @@ class SimulatorNode(Node):
         periods = self._pacer.due(time.monotonic())
         if self._pacer.lost > lost:
             self._restart_pace()
+            return
+        if self._wall_stepped(periods):
+            self.get_logger().warning("the wall clock was set: simulated time follows it")
+            self._restart_pace()
+            return
         for _ in range(min(periods, 1) if self._config.lockstep else periods):
             try:
                 self._publish(self._simulation.advance())
             except FloatingPointError as error:
                 self._divergences += 1
                 self.get_logger().error(str(error))
+
+    def _wall_stepped(self, periods: int) -> bool:
+        """Whether simulated time, once it has run `periods`, is not the wall clock's though it should be.
+
+        The pace is that of a clock which is never set: one that NTP corrects after the start had been left behind for ever,
+        and every other node called the stamps stale.
+        """
+        if not self._follows_wall:
+            return False
+        due_ns = self._start_ns + round((self._simulation.time + periods * DT) * 1e9)
+        return abs(time.time_ns() - due_ns) > MAX_LAG * 1e9
 
     def _stamp(self, simulated: float) -> Time:
         seconds, nanoseconds = divmod(self._start_ns + round(simulated * 1e9), 1_000_000_000)
