@@ -58,7 +58,8 @@ class Simulation:
         self._periods = 0  # since the start; a reset does not turn time back
         self.resets = -1
         self.reset()
-        self._stepper.step(self._state, np.zeros(2), self._parameters)  # compiles the kernel now, not later
+        after = self._stepper.step(self._state, np.zeros(2), self._parameters)
+        self._acceleration(self._state, after)  # compiles the kernels now, not later
 
     def reset(self) -> None:
         """Fish at rest at the start pose, no command, sensors and water as at the first start."""
@@ -127,15 +128,27 @@ class Simulation:
         self._push = kept * self._push + math.sqrt(1 - kept**2) * size * self._random.standard_normal(3)
         self._parameters[self._pushed] = self._constant_push + self._push
 
+    def _acceleration(self, before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
+        """Of the head's centre of mass at the end of a period [m/s^2], pool frame: stamps are the moment of measurement.
+
+        The mean over the period would be that of 5 ms earlier, by which a model fitted to such samples is wrong. Rotor and
+        rudder move as in the period that ends; what they do next nobody knows yet.
+        """
+        size, motion = 3 + self._stepper.layout.links, len(self._stepper.layout.motion)
+        (alpha, speed), (alpha_before, speed_before) = after[motion : motion + 2], before[motion : motion + 2]
+        drive = np.array([[alpha, (alpha - alpha_before) / DT, speed, (speed - speed_before) / DT]])
+        now = after[None, :motion]
+        still = (np.zeros_like(now), np.zeros_like(drive), np.zeros_like(self._parameters))
+        rates, _ = self._stepper.rates_jvp(now, drive, self._parameters, *still)
+        return float(rates[0, size]), float(rates[0, size + 1])
+
     def _measure(self, before: np.ndarray, after: np.ndarray) -> Readings:
         links = self._stepper.layout.links
         size, motion = 3 + links, len(self._stepper.layout.motion)
         x, y, heading = after[:3]
         cos, sin = math.cos(heading), math.sin(heading)
         vx, vy, rate = after[size : size + 3]
-        ax, ay = (
-            after[size : size + 2] - before[size : size + 2]
-        ) / DT  # what an IMU's filter sees of a period
+        ax, ay = self._acceleration(before, after)
         speed_before, speed = before[motion + 1], after[motion + 1]
         self._rotor_angle += 0.5 * DT * (speed_before + speed)  # linear within the period
         inertia = self._robot.parameters["rotor_inertia"]
