@@ -325,7 +325,7 @@ def test_port_that_appears_later(graph, tmp_path, capfd):
 
 
 NODES = {
-    "rotor": ["-p", "port:=emulator"],
+    "rotor": ["-p", "port:=emulator", "-p", "reply_timeout_s:=0.2"],  # a busy computer answers late
     "rudder": ["-p", "backend:=emulator"],
     "imu": ["-p", "bus:=emulator"],
     "camera": ["-p", "device:=emulator", "-p", "width:=160", "-p", "height:=120"],
@@ -362,10 +362,14 @@ def start(name: str, *arguments: str) -> subprocess.Popen:
 
 def first_words(process: subprocess.Popen, words: str) -> None:
     """Wait for a line of output that contains words."""
+    said = ""
     for line in process.stdout:
+        said += line
         if words in line:
             return
-    raise AssertionError(f"the process ended without saying {words!r}")
+    raise AssertionError(
+        f"the process ended with {process.wait(TIMEOUT_S)} without saying {words!r}:\n{said}"
+    )
 
 
 @pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
