@@ -42,8 +42,11 @@ class Level:
     def enough_unseen(self, samples: float, tests: int) -> float:
         """Nats that a law chosen and fitted elsewhere must gain, tempered, and not too small: half of a name's.
 
-        Where it is not true its likelihood ratio on unseen data is 1 in the mean, so that it exceeds tests / false_alarms less
-        often than false_alarms / tests (Markov's inequality; Gruenwald, de Heide and Koolen 2024).
+        On one set of unseen trials the likelihood ratio of a law that is not true is 1 in the mean, so that it exceeds
+        tests / false_alarms less often than false_alarms / tests (Markov's inequality; Gruenwald, de Heide and Koolen 2024).
+        Summed over trials left out in turn, as here, that is no theorem: each of them has helped to fit what the others are
+        foretold with, and the product of their ratios need not be 1 in the mean. There the number is an approximation, which
+        `TEMPER` guards.
         """
         return max(TEMPER * float(np.log(tests / self.false_alarms)), 0.5 * SMALLEST_GAIN * samples)
 
@@ -54,7 +57,10 @@ def p_value(gain: float, parameters: int, candidates: int) -> float:
 
 
 def p_value_unseen(gain: float, candidates: int) -> float:
-    """Of a tempered likelihood ratio on unseen data, times the number of candidates tried (Markov, as in `enough_unseen`)."""
+    """Of a tempered likelihood ratio on unseen data, times the number of candidates tried.
+
+    A bound on one set of unseen trials, approximate where they were left out in turn: see `Level.enough_unseen`.
+    """
     return float(min(1.0, candidates * np.exp(-max(gain, 0.0) / TEMPER)))
 
 
