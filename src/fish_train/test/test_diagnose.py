@@ -324,6 +324,25 @@ def test_the_search_uses_the_four_training_trials_that_are_excited_most():
     assert split.search == (0, 3, 4, 7) and split.check == (1, 6)
 
 
+def test_the_held_out_trials_have_no_say_in_what_is_searched():
+    """One of them steers far: measured against it a fast straight swim would excite more than a slow steered one."""
+    fish = swim(Robot(), kinds=("sines",) * 9, duration=2.0)
+    swing = np.sin(0.2 * np.arange(fish.length))[:, None]
+    rotor = np.where(np.arange(9) == 6, 25.0, np.where(np.arange(9) == 7, 0.0, 100.0)) * swing
+    rudder = np.where(np.isin(np.arange(9), (4, 7)), 0.0, 0.3) * swing
+    calm = replace(fish, commands=np.stack([rotor, rudder], axis=-1))
+    far = calm.commands.copy()
+    far[:, 2, 1] = 0.78 * np.sign(swing[:, 0])
+    assert split_trials(calm).search == split_trials(replace(calm, commands=far)).search == (0, 1, 3, 6)
+
+
+def test_what_is_out_of_reach_is_told_by_the_training_trials():
+    """Of three trials the third is held out: that the rudder moved there tells nobody how it moves."""
+    fish = swim(Robot(), kinds=("straight",) * 2 + ("sines",), duration=1.0)
+    with pytest.raises(NoCandidateError, match="rudder_lag: the rudder never moved"):
+        procedure.diagnose(fish, Robot(), names=["rudder_lag"])
+
+
 def test_what_pads_a_shorter_trial_does_not_excite():
     """A steady circle of half the length is no step of the rudder."""
     fish = swim(Robot(), kinds=("sines",) * 6, duration=2.0)
@@ -377,6 +396,12 @@ def test_the_next_experiment_follows_what_is_open():
     assert rivals["why"].startswith("tell rudder_lag from rudder_delay")
     told_apart = next_experiment(["current"], ["quadratic_drag"])  # by what the rival shows best in: coasting
     assert 0.0 in {row["amplitude"] for row in told_apart["program"]}
+
+
+def test_a_gyro_that_reads_too_much_shows_in_circles():
+    """Where the fish goes straight there is nothing to read: the factor's standard error is six times that of circles."""
+    turns = {row["rudder"] for row in next_experiment(["gyro_scale"], [])["program"]}
+    assert turns == {0.5, -0.5}
 
 
 @pytest.mark.parametrize(

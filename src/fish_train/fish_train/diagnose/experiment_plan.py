@@ -38,7 +38,7 @@ COAST: Plan = (
 PLANS = {
     **dict.fromkeys(("quadratic_drag", "dry_friction", "wave_drag", "payload"), COAST),
     **dict.fromkeys(("current", "nonuniform_current", "hull_asymmetry", "tether"), CIRCLES),
-    **dict.fromkeys(("camera_heading_offset", "camera_scale"), CIRCLES),
+    **dict.fromkeys(("camera_heading_offset", "camera_scale", "gyro_scale"), CIRCLES),
     **dict.fromkeys(("tip_slip", "wake_memory", "tail_hardening", "tail_joint_damping", "rotor_imbalance", "rotor_lag"), STROKES),
 }  # fmt: skip
 

@@ -46,12 +46,12 @@ def diagnose(
     """
     level, split = level or Level(), split_trials(experiment)
     names = known(names or candidates())
-    unreachable = {name: why for name, why in unjudged(experiment, robot).items() if name in names}
+    trials = trials_of(experiment, split)
+    unreachable = {name: why for name, why in unjudged(trials.training, robot).items() if name in names}
     names = tuple(name for name in names if name not in unreachable)
     if not names:
         reasons = "; ".join(f"{name}: {why}" for name, why in unreachable.items())
         raise NoCandidateError(f"no candidate is left that could be judged ({reasons})")
-    trials = trials_of(experiment, split)
     progress("fitting the nominal model")
     base = fit_base(robot, trials.searched)
     base, rounds, accepted = grow(base, trials, names, level, progress)

@@ -40,11 +40,14 @@ def trials_of(experiment: Experiment, split: Split) -> Trials:
 
 
 def split_trials(experiment: Experiment) -> Split:
-    """Every third trial is held out; the search uses the most strongly and most differently excited training trials."""
+    """Every third trial is held out; the search uses the most strongly and most differently excited training trials.
+
+    The held-out ones have no say in which these are: excitation is measured against the training trials' own.
+    """
     count = len(experiment.names)
     held = tuple(i for i in range(count) if i % 3 == 2)
     training = tuple(i for i in range(count) if i % 3 != 2)
-    strength = excitation(experiment)
+    strength = dict(zip(training, excitation(experiment.select(training)).tolist(), strict=True))
     chosen = sorted(training, key=lambda i: -strength[i])[:SEARCH_TRIALS]
     return Split(training, held, tuple(sorted(chosen)), tuple(i for i in training if i not in chosen))
 
