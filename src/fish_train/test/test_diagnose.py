@@ -424,6 +424,24 @@ def test_names_stand_unless_they_leave_more_than_they_explain(
     assert verdicts.verdict(found) == verdict and len(verdicts.named(found)) == named
 
 
+@pytest.mark.parametrize(("held", "of", "told"), [((1, 2), "held_out", True), ((), "training", False)])
+def test_what_the_errors_are_of_is_said_and_an_interval_only_of_trials_held_out(monkeypatch, held, of, told):
+    """Of two trials none is held out: what is shown then is how well they were fitted, which is no improvement."""
+    monkeypatch.setattr(answers, "held_out_errors", lambda *_: {})
+    monkeypatch.setattr(answers, "whiteness", lambda _: {})
+    fit = SimpleNamespace(robot=Robot(), noise=Noise())
+    density = {"nominal": np.zeros(2), "refitted": np.zeros(2), "with_effects": np.array([0.3, 0.4])}
+    names = SimpleNamespace(names=("a", "b", "c"))
+    split = SimpleNamespace(held_out=held)
+    found = SimpleNamespace(
+        robot=Robot(), given_noise=Noise(), nominal=fit, final=fit, outlook=None, held_out=density,
+        split=split, experiment=names,
+    )  # fmt: skip
+    entry = answers.fit_entry(found)
+    assert entry["errors_are_of"] == of and len(entry["held_out_trials"]) == len(held)
+    assert bool(np.isfinite(entry["improvement_ci95"]).all()) is told
+
+
 def test_effects_share_out_their_gains_and_name_plausible_rivals_only(monkeypatch):
     def accepted(name, gain):
         return Accepted(name, SimpleNamespace(gain=lambda _: gain, ranking=range(30)), {})

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from fish_train.diagnose import verdict as verdicts
-from fish_train.diagnose.answer import bootstrap_interval, whiteness
+from fish_train.diagnose.answer import mean_interval, whiteness
 from fish_train.diagnose.decide import TEMPER, Level, p_value, p_value_unseen, strength_z
 from fish_train.diagnose.locate import MissingForce, covariate_shares, dof_shares, place_shares, time_shares
 from fish_train.diagnose.own_force import intervals, regimes, size
@@ -160,10 +160,15 @@ def test_the_unexplained_share_is_what_is_left_of_the_density_beyond_usual_water
 def test_the_interval_of_a_mean_gain_is_that_of_the_normal_distribution_for_many_trials() -> None:
     gain = np.random.default_rng(0).normal(0.3, 0.2, 400)
     middle, half = gain.mean(), 1.96 * gain.std() / 20.0
-    assert bootstrap_interval(gain) == pytest.approx([middle - half, middle + half], abs=0.1 * half)
-    assert np.isnan(
-        bootstrap_interval(np.array([0.2]))
-    ).all()  # one trial does not tell how far trials differ
+    assert mean_interval(gain) == pytest.approx([middle - half, middle + half], abs=0.1 * half)
+    assert np.isnan(mean_interval(np.array([0.2]))).all()  # one trial does not tell how far trials differ
+
+
+@pytest.mark.parametrize("trials", [2, 3, 4, 6])
+def test_of_few_trials_the_interval_holds_the_mean_gain_in_95_of_100_cases(trials: int) -> None:
+    gains = np.random.default_rng(trials).normal(0.3, 1.0, (2000, trials))
+    inside = [low <= 0.3 <= high for low, high in map(mean_interval, gains)]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.015)
 
 
 def test_the_worst_trial_tells_whether_residuals_are_white() -> None:

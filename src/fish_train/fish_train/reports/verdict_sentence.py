@@ -15,7 +15,9 @@ def sentence(content: Content) -> str:
     """The verdict in one sentence, and in further ones whether trials were held out and the tail needed more links."""
     links, told = content["fit"]["tail_links"], [_verdict(content)]
     if not content["fit"]["held_out_trials"]:
-        told.append("With fewer than three trials nothing could be held out.")
+        told.append(
+            "With fewer than three trials nothing could be held out: errors are of the trials that were fitted."
+        )
     if links["given"] != links["used"]:
         told.append(f"The tail is modelled with {links['used']} links instead of {links['given']}.")
     return " ".join(told)
