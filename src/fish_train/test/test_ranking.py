@@ -33,6 +33,20 @@ def test_an_effect_is_found_from_the_place_that_promises_most(name, key, hidden,
     assert fit.values[f"{name}.{key}"] == pytest.approx(hidden[key], rel=0.1)
 
 
+@pytest.mark.parametrize("below", [0.95, 0.5, 0.25])
+def test_a_rotor_that_is_limited_is_found_without_its_encoder(below):
+    """No step leads down from a limit that no command reaches, though it is nearer to the truth than any other that is tried."""
+    random = np.random.default_rng(1)
+    commands = np.stack([program(kind, 6.0, random) for kind in ("steps", "sines", "random")], axis=1)
+    limit = below * np.abs(commands[..., 0]).max()
+    seen = record(Robot().with_effect("rotor_saturation", limit=limit), commands, Noise(), random)[0]
+    experiment = replace(seen, encoder=np.full_like(seen.encoder, np.nan))
+    drags = nominal_hypothesis(Robot(), ("head_drag_surge", "head_drag_sway"))
+    base = settle(evaluate(drags, np.zeros(2), experiment, Noise()), experiment)
+    fit = settle(ranking.look_afar(base, "rotor_saturation", experiment), experiment)
+    assert fit.values["rotor_saturation.limit"] == pytest.approx(limit, rel=0.01)
+
+
 @pytest.mark.parametrize("look", [ranking.look_near, ranking.look_afar])
 def test_a_hump_of_drag_is_not_lost_while_it_is_weak(look):
     """A step of its speed and width, which seem free while it is weak, leads a weak hump to where the fish never swims."""

@@ -175,7 +175,8 @@ def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -
 def best_place(base: Fit, name: str, experiment: Experiment, noise: Noise) -> dict[str, float]:
     """Values of the parameters that say where or how fast, of those to be tried, from which the effect gains most.
 
-    The few that promise most are climbed at their place: far from the base a promise is not kept.
+    The few that promise most are climbed at their place: far from the base a promise is not kept. A place where the effect
+    does nothing is none: it would be as good as the base, and no step leads from there to a limit a little below.
     """
     keys = tried(name)
     places = [dict(zip(keys, v, strict=True)) for v in product(*(specification(name)[k].tries for k in keys))]
@@ -183,8 +184,15 @@ def best_place(base: Fit, name: str, experiment: Experiment, noise: Noise) -> di
         return places[0]
     hypothesis = base.hypothesis.with_effect(name, SCALE)
     fits = [evaluate(hypothesis, started(base, name, SCALE, p), experiment, noise) for p in places]
-    promising = sorted(range(len(places)), key=lambda i: -promise(fits[i]))[:PROMISING_PLACES]
+    felt = [i for i, fit in enumerate(fits) if acts(fit, name)] or range(len(places))
+    promising = sorted(felt, key=lambda i: -promise(fits[i]))[:PROMISING_PLACES]
     return places[max(promising, key=lambda i: in_strength(fits[i], name, experiment).objective)]
+
+
+def acts(fit: Fit, name: str) -> bool:
+    """Whether an effect of the fit changes anything: a limit that no command reaches does not, nor a line never taut."""
+    own = [free.startswith(f"{name}.") for free in fit.hypothesis.free]
+    return bool(np.diagonal(fit.result.normal.sum(0))[own].any())
 
 
 def tried(name: str) -> list[str]:
