@@ -16,11 +16,12 @@ import numpy as np
 from fish_train.diagnose.decide import Level
 from fish_train.diagnose.free_force import TERMS, known_to_the_filter
 from fish_train.diagnose.locate import DOFS
+from fish_train.diagnose.portions import portions
 from fish_train.diagnose.quadratic import Quadratic, quadratic
 from fish_train.identify.experiment import Experiment
-from fish_train.identify.filter_types import Array
+from fish_train.identify.filter_types import Array, Noise
 from fish_train.identify.fit import Fit, evaluate
-from fish_train.identify.hypothesis import Coordinates
+from fish_train.identify.hypothesis import Coordinates, Hypothesis
 
 MOST_TERMS = 4  # of a law
 # nats that a term must gain where it is chosen: twice that is beyond chi square of one parameter in 1e-5, for 90 terms in 1e-3
@@ -48,17 +49,26 @@ def describe(fit: Fit, experiment: Experiment) -> Description:
     with known_to_the_filter() as name:
         hypothesis = fit.hypothesis.with_effect(name)
         theta = np.concatenate([fit.theta, np.zeros(len(hypothesis.free) - len(fit.theta))])
-        result = evaluate(hypothesis, theta, experiment, fit.noise).result
+        gradients, normals = costs(hypothesis, theta, experiment, fit.noise)
     prior = Coordinates(fit.hypothesis).prior
-    whole = quadratic(result.gradient, result.normal, fit.theta, prior)
+    whole = quadratic(gradients, normals, fit.theta, prior)
     gains, terms = {}, {}
     for i, dof in enumerate(DOFS):
         first = len(fit.theta) + i * len(TERMS)
         offered = range(first, first + len(TERMS))
         step = whole.best_step(chosen := forward(whole, offered))
         terms[dof] = {TERMS[j - first]: float(step[j]) for j in chosen}
-        gains[dof] = cross_validated(result.gradient, result.normal, fit.theta, prior, offered)
+        gains[dof] = cross_validated(gradients, normals, fit.theta, prior, offered)
     return Description(gains, terms, float(fit.result.samples.sum()))
+
+
+def costs(hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise) -> tuple[Array, Array]:
+    """Gradient (M, K) and Gauss-Newton matrix (M, K, K) of every trial's -log likelihood at theta (K,)."""
+    results = (
+        evaluate(hypothesis, theta, experiment.select(part), noise).result for part in portions(experiment)
+    )
+    gradients, normals = zip(*((result.gradient, result.normal) for result in results), strict=True)
+    return np.concatenate(gradients), np.concatenate(normals)
 
 
 def forward(cost: Quadratic, offered: Sequence[int]) -> list[int]:

@@ -9,9 +9,11 @@ import numpy as np
 
 from fish_sim.model import DT
 from fish_sim.pool import LENGTH, WIDTH
+from fish_train.diagnose.portions import portions
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Array
 from fish_train.identify.fit import Fit, evaluate
+from fish_train.identify.hypothesis import Coordinates
 from fish_train.identify.smoother import smooth
 
 DOFS = ("surge", "sway", "yaw")
@@ -39,10 +41,18 @@ def missing_force(fit: Fit, experiment: Experiment) -> MissingForce:
 
 
 def smoothed(fit: Fit, experiment: Experiment) -> tuple[Array, Array, Array]:
-    """State (T, M, N), its standard deviations, and memory (T + 1, M, NM) given all measurements."""
-    history = evaluate(fit.hypothesis, fit.theta, experiment, fit.noise, keep=True).result.history
-    assert history is not None  # kept
-    return *smooth(history), history.memory
+    """State (T, M, N), its standard deviations, and memory (T + 1, M, NM) given all measurements; 0 beyond a trial's end."""
+    layout = Coordinates(fit.hypothesis).stepper.layout
+    T, M = experiment.length, len(experiment.names)
+    xi, deviation = np.zeros((2, T, M, len(layout.motion) + 6))
+    memory = np.zeros((T + 1, M, len(layout.memory)))
+    for part in portions(experiment):
+        some = experiment.select(part)
+        history = evaluate(fit.hypothesis, fit.theta, some, fit.noise, keep=True).result.history
+        assert history is not None  # kept
+        xi[: some.length, part], deviation[: some.length, part] = smooth(history)
+        memory[: some.length + 1, part] = history.memory
+    return xi, deviation, memory
 
 
 def located(
