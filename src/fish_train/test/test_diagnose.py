@@ -147,6 +147,25 @@ def test_a_hidden_current_is_named_with_its_size(tmp_path):
     assert load_robot(tmp_path / "model.yaml").effects["current"]["x"] == pytest.approx(found["x"]["value"])
 
 
+def test_what_the_given_robot_has_is_refitted_and_no_other_name_takes_its_place(tmp_path):
+    """A rudder that stands askew by more than robot.yaml says is no asymmetry of the hull."""
+    given = Robot().with_effect("rudder_offset", offset=0.06)
+    names = ("hull_asymmetry", "camera_heading_offset", "rudder_offset")
+    result = procedure.diagnose(swim(truth(rudder_offset={"offset": 0.09})), given, names=names)
+    content = answer(result)
+    assert content["verdict"] == "no_mismatch"
+    assert content["out_of_reach"] == {"rudder_offset": "the given robot has it, and its values are refitted"}
+    fit = verdicts.corrected(result)
+    found, error = (table["rudder_offset.offset"] for table in (fit.values, fit.standard_errors))
+    assert found == pytest.approx(0.09, abs=4 * error) and error < 0.002
+    save_robot(without_wrench(fit.robot), tmp_path / "model.yaml", fit.standard_errors, sentence(content))
+    assert load_robot(tmp_path / "model.yaml").effects["rudder_offset"]["offset"] == pytest.approx(found)
+    write_diagnosis_page(tmp_path / "report.html", "given", content, result)
+    page = (tmp_path / "report.html").read_text()
+    for text in ("own effects</h2>", "what the given model lacks"):
+        assert text in page
+
+
 def test_a_payload_is_found_on_the_side_where_it_is():
     """The fit starts on all sides; only mass times place is determined, which must not count against the name."""
     hidden = {"mass": 0.12, "forward": -0.08, "left": 0.02}
@@ -220,6 +239,12 @@ def test_another_link_is_tried_where_the_one_before_gained_on_whole_trials_or_le
     def reaches(objective):
         return SimpleNamespace(objective=objective)
 
+    fewer.hypothesis = SimpleNamespace(free=("head_inertia", "rudder_offset.offset"))
+
+    def finer(links, free):
+        assert free == fewer.hypothesis.free  # of the robot's own effects as well
+        return links
+
     def many_fit(links, *_args, places):
         calls.append(links)
         assert places == ("fewer",)
@@ -235,7 +260,7 @@ def test_another_link_is_tried_where_the_one_before_gained_on_whole_trials_or_le
 
     monkeypatch.setattr(tail, "usual_noise", lambda _: None)
     monkeypatch.setattr(tail, "with_links", lambda _, links: links)
-    monkeypatch.setattr(tail, "nominal_hypothesis", lambda links: links)
+    monkeypatch.setattr(tail, "nominal_hypothesis", finer)
     monkeypatch.setattr(tail, "fit_multistart", many_fit)
     monkeypatch.setattr(tail, "fit_tempered", led_fit)
     monkeypatch.setattr(tail, "carry_over", on_whole)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from fish_sim.robot import Robot
+from fish_train.diagnose.given import given_hypothesis
 from fish_train.diagnose.ranking import crowd
 from fish_train.identify.adapt import SETTLED_GAIN, settle
 from fish_train.identify.cold import FIRST_STEPS, SUSPICIOUS, UNWHITE, better, excess, fit_cold
 from fish_train.identify.experiment import Experiment, shorten
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit, evaluate
-from fish_train.identify.hypothesis import Array, Coordinates, Hypothesis, nominal_hypothesis
+from fish_train.identify.hypothesis import Array, Coordinates, Hypothesis
 from fish_train.identify.sensor_noise import usual_noise
 from fish_train.identify.suitable import worst_row
 from fish_train.identify.tempering import LEADING, TAIL_INERTIAS, close, fit_tempered, lead
@@ -21,10 +22,10 @@ GROWN = 2.0  # a force that more trials make so much stronger comes from a poor 
 
 
 def fit_base(robot: Robot, experiment: Experiment) -> Fit:
-    """The nominal model, fitted cold on the start of every trial, continued on the whole."""
+    """The model as given, fitted cold on the start of every trial, continued on the whole."""
     short = shorten(experiment, FIRST_STEPS)
-    cold = fit_cold(nominal_hypothesis(robot), short, usual_noise(short))
-    return carry_over(cold, experiment)
+    noise = usual_noise(short)
+    return carry_over(fit_cold(given_hypothesis(robot, short, noise), short, noise), experiment)
 
 
 def led_from_nominal(hypothesis: Hypothesis, theta: Array, experiment: Experiment) -> Fit:

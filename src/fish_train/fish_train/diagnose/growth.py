@@ -133,7 +133,7 @@ def instead_of_a_law(
 
 def final_fits(base: Fit, rounds: list[Round], training: Experiment) -> tuple[Fit, Fit]:
     """Nominal and final structure on all training trials, from their optima on the search trials."""
-    if not base.hypothesis.names:
+    if base.hypothesis.names == rounds[0].base.hypothesis.names:
         nominal = refine(base, training)
         return nominal, nominal
     nominal, final = on_all_cores(lambda fit: refine(fit, training), [rounds[0].base, base])

@@ -75,7 +75,7 @@ def finer_tails(
         if links > MAX_LINKS:
             break
         progress(f"fitting the nominal model with {links} tail links")
-        hypothesis = nominal_hypothesis(with_links(robot, links))
+        hypothesis = nominal_hypothesis(with_links(robot, links), nominal.hypothesis.free)
         many = fit_multistart(hypothesis, short, noise, places=(nominal.theta,))
         fit = carry_over(better(many, fit_tempered(hypothesis, short, noise, nominal.theta)), experiment)
         if not promises_more(fit, best):

@@ -42,7 +42,9 @@ def kind_of(name: str) -> str:
 
 def unjudged(experiment: Experiment, robot: Robot) -> dict[str, str]:
     """Candidates about which nothing can be said beside this robot and these recordings, with the reason."""
-    given = dict.fromkeys((*robot.effects, *robot.sensors), "the given robot has it")
+    given = dict.fromkeys(
+        (*robot.effects, *robot.sensors), "the given robot has it, and its values are refitted"
+    )
     return out_of_reach(experiment) | given
 
 

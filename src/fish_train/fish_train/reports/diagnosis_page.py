@@ -10,8 +10,11 @@ import numpy as np
 
 from fish_train.diagnose.answer import LAGS
 from fish_train.diagnose.diagnosis import Diagnosis
+from fish_train.diagnose.given import own_effects, own_parameters
 from fish_train.diagnose.ranking import Ranked
 from fish_train.diagnose.search import Round
+from fish_train.identify.fit import Fit
+from fish_train.identify.hypothesis import specification
 from fish_train.reports.before_after import before_after
 from fish_train.reports.diagnosis_figures import (
     force_against_covariates,
@@ -36,6 +39,7 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
     """Write report.html."""
     blocks: list[Text | Table | Figure] = [
         *(_found(entry) for entry in content["effects"]),
+        *_own_effects(d),
         _fit_table(content, d.unseen_are),
         before_after(d),
         Figure(
@@ -81,6 +85,23 @@ def _found(effect: Content) -> Table:
     )
 
 
+def _own_effects(d: Diagnosis) -> list[Table]:
+    """What became of the effects and sensor errors that the robot was given with."""
+    given = {**d.robot.effects, **d.robot.sensors}
+    rows = [_own_row(name, given, d.final) for name in own_parameters(d.robot)]
+    header = ["parameter", "given", "refitted", "standard error", "unit"]
+    note = "Refitted together with the nominal parameters; these recordings say too little of the others to move them."
+    return [Table("The given robot's own effects", header, rows, note)] if rows else []
+
+
+def _own_row(name: str, given: Mapping[str, Mapping[str, float]], fit: Fit) -> list[str]:
+    effect, key = name.split(".")
+    value, unit = f"{given[effect][key]:.4g}", specification(effect)[key].unit
+    if name not in fit.hypothesis.free:
+        return [name, value, "", "", unit]
+    return [name, value, f"{fit.values[name]:.4g}", f"{fit.standard_errors[name]:.2g}", unit]
+
+
 def _explains(shares: Mapping[str, float]) -> str:
     """How the force that was missing without an effect is shared among the degrees of freedom."""
     if not any(shares.values()):
@@ -124,7 +145,9 @@ EVIDENCE_NOTE = (
 def _evidence(d: Diagnosis) -> list[Table]:
     tables = []
     for number, found in enumerate(d.rounds, 1):
-        base = " + ".join(found.base.hypothesis.names) or "the nominal model"
+        given = own_effects(d.robot)
+        added = [name for name in found.base.hypothesis.names if name not in given]
+        base = " + ".join(added) or ("the given model" if given else "the nominal model")
         rows = [_evidence_row(found, ranked) for ranked in found.ranking]
         title = f"Evidence, round {number}: what {base} lacks"
         tables.append(Table(title, EVIDENCE_HEADER, rows, EVIDENCE_NOTE))
