@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fish_sim.camera.model import CameraModel
+from fish_sim.pool import LENGTH, WIDTH
 
 Array = NDArray[Any]  # float64
 Image = NDArray[Any]  # uint8, (h, w, 3) or (h, w)
 
-POOL = (4.27, 2.13)  # m, along pool x and y; MODEL.md
+POOL = (LENGTH, WIDTH)
 DEPTH = 0.6  # m, of the drawn floor; appearance only
 RIM = 0.05  # m, width of the wall's top
 TILE = 0.305  # m, floor tiles

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from rosbags.interfaces.typing import Typesdict
@@ -10,7 +10,6 @@ from rosbags.interfaces.typing import Typesdict
 from .bag import RawTopic
 from .decode import PATH_TYPE, Role
 from .layout import Block, decode_blocks
-from .problem import Problem
 
 NS_PER_S = 1_000_000_000
 
@@ -26,7 +25,6 @@ class Decoded:
     arrays: dict[str, np.ndarray]  # fields of the role's stream, (N, ...)
     names: tuple[str, ...]
     unreadable: np.ndarray  # positions of messages that cannot be decoded
-    problems: list[Problem] = field(default_factory=list)
 
 
 def decode_topic(raw: RawTopic, role: Role, types: Typesdict, ros1: bool) -> Decoded:
