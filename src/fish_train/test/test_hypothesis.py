@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
+from fish_train.errors import UserError
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
 from fish_train.identify.hypothesis import (
+    NOMINAL_FREE,
     Coordinates,
     Hypothesis,
     effect_class,
     extend,
     nominal_hypothesis,
     start_values,
+    zeros,
 )
 
 NOMINAL = ("head_drag_surge", "tail_stiffness")
@@ -143,3 +147,26 @@ def test_only_strengths_start_at_a_fraction() -> None:
     )
     with pytest.raises(ValueError, match="unknown effect 'magic'; known: "):
         start_values("magic", 1.0)
+
+
+def test_a_parameter_of_zero_stays_zero_and_the_others_are_free() -> None:
+    robot = Robot().with_parameters(fin_drag_surge=0.0, link_drag_surge=0.0)
+    hypothesis = nominal_hypothesis(robot)
+    left_out = {"fin_drag_surge", "link_drag_surge"}
+    assert set(zeros(robot)) == left_out == set(NOMINAL_FREE) - set(hypothesis.free)
+    coordinates = Coordinates(hypothesis)
+    with np.errstate(all="raise"):
+        origin = coordinates.origin()
+        moved = coordinates.robot(origin + 0.3)
+    assert not origin.any()
+    assert moved.parameters["fin_drag_surge"] == 0.0 < moved.parameters["fin_drag_sway"]
+    assert nominal_hypothesis(Robot()).free == NOMINAL_FREE and zeros(Robot()) == ()
+
+
+def test_a_robot_with_a_wrench_of_its_own_is_refused() -> None:
+    """The filter's wrench takes its place; a motion without it would be another robot's."""
+    with pytest.raises(
+        UserError, match="robot 'carp' has the effect disturbance .* expected a robot without it; delete it"
+    ):
+        nominal_hypothesis(replace(Robot(), name="carp").with_effect("disturbance", sway=0.01))
+    nominal_hypothesis(Robot().with_effect("disturbance"))

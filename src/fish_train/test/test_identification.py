@@ -136,6 +136,15 @@ def test_still_fish_does_not_determine_drag() -> None:
     assert "shorter than 7 s" in text
 
 
+def test_a_parameter_that_began_at_zero_is_said_and_stands_in_the_robot() -> None:
+    robot = Robot().with_parameters(fin_drag_surge=0.0)
+    still = record(robot, np.zeros((300, 1, 2)), NOISE, np.random.default_rng(3))[0]
+    result = identify(still, robot, free=("fin_drag_surge", "tail_stiffness"))
+    assert any(text.startswith("fin_drag_surge: 0 in the robot") for text in result.statements)
+    assert result.fit.hypothesis.free == ("tail_stiffness",)
+    assert result.robot.parameters["fin_drag_surge"] == 0.0
+
+
 def test_split() -> None:
     assert split(12, 4) == ([0, 1, 2, 4, 5, 6, 8, 9, 10], [3, 7, 11])
     assert split(3, 4) == ([0, 1], [2])

@@ -19,6 +19,7 @@ from fish_sim.parameter import Parameter
 from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_sim.sensors.sensor_effect import SensorEffect
+from fish_train.errors import UserError
 from fish_train.identify.filter import filter_stepper
 from fish_train.identify.filter_types import SensorModel
 
@@ -126,8 +127,23 @@ class Hypothesis:
 
 
 def nominal_hypothesis(robot: Robot, free: tuple[str, ...] = NOMINAL_FREE) -> Hypothesis:
-    """The robot as it is, its nominal parameters free, with the wrench that the filter drives."""
-    return Hypothesis(robot.with_effect("disturbance"), free)
+    """The robot as it is, its nominal parameters free, with the wrench that the filter drives.
+
+    Parameters that are 0 stay 0: no factor changes them. Raises UserError where the robot has a wrench of its own: the filter's
+    takes its place, and it would be dropped unsaid.
+    """
+    if any(robot.effects.get("disturbance", {}).values()):
+        raise UserError(
+            f"robot {robot.name!r} has the effect disturbance with values other than 0, which stands for what a model does not "
+            "explain and is estimated from recordings; expected a robot without it; delete it, or use an effect with a name"
+        )
+    moved = tuple(name for name in free if robot.parameters.get(name) != 0.0)
+    return Hypothesis(robot.with_effect("disturbance"), moved)
+
+
+def zeros(robot: Robot) -> tuple[str, ...]:
+    """Parameters of a nominal model that would be free if they were not 0 in this robot."""
+    return tuple(name for name in NOMINAL_FREE if robot.parameters[name] == 0.0)
 
 
 def extend(

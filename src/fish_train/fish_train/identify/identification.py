@@ -16,7 +16,7 @@ from fish_train.identify.cold import TOO_STRONG, excess, second_look
 from fish_train.identify.experiment import Experiment
 from fish_train.identify.filter_types import Noise
 from fish_train.identify.fit import Fit
-from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, nominal_hypothesis
+from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, nominal_hypothesis, zeros
 from fish_train.identify.motion import HALF_WINDOW
 from fish_train.identify.outlook import fit_outlook
 from fish_train.identify.prediction import (
@@ -254,6 +254,10 @@ def fit_statements(fit: Fit) -> list[str]:
     out = []
     if names := undetermined(fit):
         out.append(f"the data do not determine {', '.join(names)}: values and errors rest on the prior")
+    if names := zeros(fit.robot):
+        out.append(
+            f"{', '.join(names)}: 0 in the robot that the fit began with, so 0 in the one that came out"
+        )
     for first, second, value in entangled(fit):
         out.append(f"{first} and {second} are hardly told apart (correlation {value:+.3f})")
     if (worst := worst_row(fit)) > 1.5:

@@ -221,7 +221,7 @@ class Outlook:
         pose[0] = state[:, :3]
         for begin in range(0, length, CHUNK):
             end = min(begin + CHUNK, length)
-            P[:, at] = p[at] + wrench * np.exp(-(begin + end) * DT / 2.0 / self.noise.wrench_time)
+            P[:, at] = wrench * np.exp(-(begin + end) * DT / 2.0 / self.noise.wrench_time)
             told = np.repeat(commands[begin:end], K, axis=1)
             if len(dp):
                 still = np.zeros((end - begin, 1, 2))

@@ -205,13 +205,13 @@ def _simulate(
     stepper = Stepper.of(nominal_hypothesis(robot).robot)
     p = np.tile(stepper.parameters(nominal_hypothesis(robot).robot), (len(trial), 1))
     at = [stepper.layout.parameters.index(name) for name in WRENCH]
-    constant, pose = p[:, at].copy(), np.full((length + 1, len(trial), 3), np.nan)
+    pose = np.full((length + 1, len(trial), 3), np.nan)
     k = start + np.arange(length + 1)[:, None]
     commands = experiment.commands[np.minimum(k[:-1], experiment.length - 1), trial]
     pose[0] = state[:, :3]
     for begin in range(0, length, CHUNK):
         end = min(begin + CHUNK, length)
-        p[:, at] = constant + wrench * np.exp(-(begin + end) * DT / 2.0 / noise.wrench_time)
+        p[:, at] = wrench * np.exp(-(begin + end) * DT / 2.0 / noise.wrench_time)
         states = stepper.rollout(state, commands[begin:end], p)
         pose[begin + 1 : end + 1], state = states[1:, :, :3], states[-1]
     pose[k >= experiment.steps[trial]] = np.nan
