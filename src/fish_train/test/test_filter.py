@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -56,6 +57,22 @@ def test_compiled_and_numpy_passes_agree(stiffness, width, monkeypatch):
         a, b = getattr(slow, key), getattr(fast, key)
         np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-8 * np.nanmax(np.abs(a)))
     np.testing.assert_allclose(slow.history.filtered_P, fast.history.filtered_P, rtol=1e-6, atol=1e-12)
+
+
+def test_the_memory_of_all_trials_is_never_held_at_once():
+    """A delay's memory times trials times free parameters would be gigabytes of a day in the pool."""
+    data, _ = experiment(Robot(), 2.0, ("sines", "steps") * 4)
+    coordinates = Coordinates(nominal_hypothesis(Robot()).with_effect("rudder_delay"))
+    problem = Problem(data, coordinates.stepper, *coordinates.filter_inputs(coordinates.origin()))
+    if compiled_passes(problem, [Noise()], keep=False) is None:
+        pytest.skip("no C compiler here")
+    tracemalloc.start()
+    compiled_passes(problem, [Noise()], keep=False)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    rows = data.length * len(data.names) * len(problem.dp)
+    both = 16.0 * rows * len(coordinates.stepper.layout.memory)  # bytes of all memories and their derivatives
+    assert peak < 0.5 * both
 
 
 def test_innovations_are_white_with_unit_variance_at_the_truth():

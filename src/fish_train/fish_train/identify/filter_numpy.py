@@ -19,6 +19,7 @@ from fish_train.identify.filter_types import (
     History,
     Noise,
     Problem,
+    first_commands,
     first_memory,
     first_state,
     place_frames,
@@ -84,7 +85,7 @@ class Filter:
     def _follow_commands(self) -> tuple[Array, Array]:
         """Memory (T + 1, M, NM) and its derivatives (T + 1, M, NM, K): they need no motion."""
         M, K, nm = self.trials, max(self.free, 1), len(self.stepper.layout.memory)
-        start, d_start = first_memory(self.experiment, self.stepper, self.p, self.dp)
+        start, d_start = first_memory(first_commands(self.experiment), self.stepper, self.p, self.dp)
         d_start = d_start.reshape(-1, nm) if self.free else np.zeros((M, nm))
         commands = np.repeat(self.experiment.commands, K, axis=1)
         dp = np.tile(self.dp, (M, 1)) if self.free else np.zeros((M, len(self.p)))

@@ -112,14 +112,18 @@ def place_frames(experiment: Experiment, sensors: SensorModel) -> tuple[Array, A
     return offset, pose
 
 
-def first_memory(experiment: Experiment, stepper: Stepper, p: Array, dp: Array) -> tuple[Array, Array]:
-    """Memory (M, NM) at the first grid point and its derivatives (M, K, NM).
+def first_commands(experiment: Experiment) -> Array:
+    """(M, 2) what servo and motor have followed at the first grid point: the first command, or none of a fish at rest."""
+    return np.zeros((len(experiment.names), 2)) if experiment.start_at_rest else experiment.commands[0]
 
-    At rest it is what a centred command has left (an offset horn stands askew from the start), else what the first one has.
+
+def first_memory(commands: Array, stepper: Stepper, p: Array, dp: Array) -> tuple[Array, Array]:
+    """Memory (M, NM) that such commands (M, 2) have left, and its derivatives (M, K, NM).
+
+    A centred command leaves something too: an offset horn stands askew from the start.
     """
-    M, K = len(experiment.names), len(dp)
-    command = np.zeros((M, 2)) if experiment.start_at_rest else experiment.commands[0]
-    repeated = np.repeat(command, max(K, 1), axis=0)
+    M, K = len(commands), len(dp)
+    repeated = np.repeat(commands, max(K, 1), axis=0)
     directions = np.tile(dp, (M, 1)) if K else np.zeros((M, len(p)))
     memory, tangents = stepper.settled_memory(repeated, p, directions)
     return memory.reshape(M, max(K, 1), -1)[:, 0], tangents.reshape(M, max(K, 1), -1)[:, :K]
