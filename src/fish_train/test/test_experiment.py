@@ -60,16 +60,34 @@ def test_images_keep_their_own_times_and_headings_do_not_wrap(swum: Experiment) 
     assert frames.pose[-1, 2] > np.pi > pose[-1, 2]
 
 
-def test_the_grid_begins_with_the_first_command_and_a_lost_one_is_held(tmp_path: Path) -> None:
+def test_the_grid_begins_with_the_first_command(tmp_path: Path) -> None:
     late = build_experiment([read(tmp_path / "late", without("joint_command", 0.0, 0.5))])
     assert late.steps.tolist() == [151] and not late.start_at_rest  # it turned already
     np.testing.assert_allclose(late.gyro[:150, 0], 0.5 + 0.01 * np.arange(150), atol=1e-9)
     (frames,) = late.frames
     assert -0.005 <= frames.t[0] < 1 / 30
     np.testing.assert_allclose(frames.pose[:, :2], samples.pose(0.5 + frames.t)[:, :2], atol=1e-9)
-    held = build_experiment([read(tmp_path / "held", without("joint_command", 1.0, 1.05))])
-    np.testing.assert_allclose(held.commands[100:105, 0, 1], samples.rudder(0.99), atol=1e-9)
-    np.testing.assert_allclose(held.commands[105, 0, 1], samples.rudder(1.05), atol=1e-9)
+
+
+def test_of_lost_commands_the_encoder_tells_the_rotor_and_a_line_the_rudder(tmp_path: Path) -> None:
+    lost = build_experiment([read(tmp_path / "lost", without("joint_command", 1.0, 1.05))])
+    whole = build_experiment([read(tmp_path / "whole", samples.robot_messages())])
+    hole, t = slice(100, 105), 0.01 * np.arange(100, 105)
+    np.testing.assert_allclose(lost.commands[hole, 0, 0], whole.encoder[101:106, 0], atol=1e-9)
+    assert np.isnan(lost.encoder[101:106]).all()  # what was used is no measurement any more
+    line = np.interp(t, [0.99, 1.05], samples.rudder(np.array([0.99, 1.05])))
+    np.testing.assert_allclose(lost.commands[hole, 0, 1], line, atol=1e-9)
+    kept = np.r_[0:100, 105:201]
+    np.testing.assert_array_equal(lost.commands[kept], whole.commands[kept])
+    kept = np.r_[0:101, 106:201]
+    np.testing.assert_array_equal(lost.encoder[kept], whole.encoder[kept])
+
+
+def test_a_trial_in_which_too_many_commands_were_lost_is_refused(tmp_path: Path) -> None:
+    trial = read(tmp_path / "gap", without("joint_command", 1.0, 1.2))
+    words = r"gap: no joint_command from 0\.99 to 1\.20 s, where one comes every 10 ms; expected at most 0\.1 s without; cut"
+    with pytest.raises(ExperimentError, match=words):
+        build_experiment([trial])
 
 
 def test_trials_stand_side_by_side_padded_to_the_longest(tmp_path: Path) -> None:

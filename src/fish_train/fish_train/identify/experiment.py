@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from fish_sim.model import DT
 from fish_train.identify.coasting import driven
 from fish_train.identify.level import level
+from fish_train.identify.lost_commands import LostCommandsError, told_on_grid
 from fish_train.identify.resample import on_grid
-from fish_train.recordings.trial import Trial
+from fish_train.recordings.trial import Commands, Trial
 
 Array = NDArray[np.float64]
 
@@ -113,7 +114,6 @@ def _grid(trial: Trial) -> dict[str, Array]:
     start, end = c.t[0], c.t[-1] + DT
     count = int(np.floor((end - start) / DT + 1e-6)) + 1
     t = start + DT * np.arange(count)
-    held = np.clip(np.searchsorted(c.t, t + 0.5 * DT, side="right") - 1, 0, len(c.t) - 1)
     imu, encoder, camera = trial.imu, trial.encoder, trial.camera
     seen = (camera.t >= start - 0.5 * DT) & (camera.t <= end)
     if seen.sum() < 3:
@@ -125,15 +125,24 @@ def _grid(trial: Trial) -> dict[str, Array]:
     if imu is not None:
         gyro, accel = (on_grid(imu.t, felt, t, DT) for felt in level(imu))
     measured = nothing if encoder is None else on_grid(encoder.t, encoder.speed, t, DT)
-    speed, measured = driven(c.rotor_speed[held], measured)
+    commands, measured = _told(trial.name, c, t, measured)
+    commands[:, 0], measured = driven(commands[:, 0], measured)
     return {
-        "commands": np.column_stack([speed, c.rudder[held]]),
+        "commands": commands,
         "gyro": gyro,
         "accel": accel,
         "encoder": measured,
         "frame_t": camera.t[seen] - start,
         "frame_pose": np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])[seen],
     }
+
+
+def _told(name: str, c: Commands, t: Array, encoder: Array) -> tuple[Array, Array]:
+    """`told_on_grid` of a trial's commands; raises ExperimentError where too many were lost."""
+    try:
+        return told_on_grid(c.t, np.column_stack([c.rotor_speed, c.rudder]), t, encoder)
+    except LostCommandsError as error:
+        raise ExperimentError(f"{name}: {error}") from error
 
 
 def shorten(experiment: Experiment, steps: int) -> Experiment:
