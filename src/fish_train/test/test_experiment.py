@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 import recording_samples as samples
 
 from fish_train.identify.experiment import Experiment, ExperimentError, build_experiment, shorten
+from fish_train.recordings import message_build as build
 from fish_train.recordings import read_trial
 from fish_train.recordings.trial import Trial
 
@@ -30,6 +33,18 @@ def without(
 
 def read(folder: Path, messages: list[samples.Message]) -> Trial:
     return read_trial(samples.write_mcap(folder, messages))
+
+
+def posed(
+    pose: Callable[[float], np.ndarray], duration: float = 2.0, rate: float = 30.0
+) -> list[samples.Message]:
+    """A robot's messages with these poses instead of its own."""
+    others = [m for m in samples.robot_messages(duration) if m[1] != "/fish/camera/pose"]
+    seen = [
+        (samples.ns(t + 0.025), "/fish/camera/pose", build.camera_pose(samples.ns(t), "pool", pose(t), (4e-6, 4e-6, 1.44e-4)))
+        for t in np.arange(0.005, duration, 1.0 / rate)
+    ]  # fmt: skip
+    return sorted([*others, *seen], key=lambda m: m[0])
 
 
 @pytest.fixture(scope="module")
@@ -102,8 +117,8 @@ def test_trials_stand_side_by_side_padded_to_the_longest(tmp_path: Path) -> None
 
 
 def test_the_rest_of_a_trial_begins_in_motion_with_its_own_clock(swum: Experiment) -> None:
-    rest = swum.rest_of(0, 300)
-    assert rest.steps.tolist() == [201] and swum.start_at_rest and not rest.start_at_rest
+    rest = replace(swum, start_at_rest=True).rest_of(0, 300)
+    assert rest.steps.tolist() == [201] and not rest.start_at_rest
     np.testing.assert_array_equal(rest.gyro, swum.gyro[300:])
     (frames,) = rest.frames
     assert 0.0 <= frames.t[0] < 1 / 30
@@ -117,8 +132,34 @@ def test_a_shortened_experiment_has_its_first_steps(swum: Experiment) -> None:
     assert shorten(swum, 1000).steps.tolist() == [501]
 
 
+def test_a_fish_that_swims_already_is_not_at_rest(swum: Experiment, tmp_path: Path) -> None:
+    """At 0.24 m/s from the first pose on, though it does not turn yet."""
+    assert swum.gyro[0, 0] == 0.0 and not swum.start_at_rest
+    begun = build_experiment([read(tmp_path / "begun", posed(lambda t: samples.pose(max(t - 0.4, 0.0))))])
+    assert begun.start_at_rest
+
+
+def test_a_fast_camera_is_thinned_and_one_that_keeps_to_the_grid_is_not(tmp_path: Path) -> None:
+    for rate, every in ((60.0, 1 / 60.0), (100.0, 0.01), (120.0, 2 / 120.0), (240.0, 3 / 240.0)):
+        (frames,) = build_experiment([read(tmp_path / f"{rate:g}", posed(samples.pose, rate=rate))]).frames
+        np.testing.assert_allclose(np.diff(frames.t), every, atol=1e-8)
+        np.testing.assert_allclose(frames.pose[:, :2], samples.pose(frames.t)[:, :2], atol=1e-9)
+
+
+def test_a_fish_that_is_neither_seen_nor_felt_turn_is_refused(tmp_path: Path) -> None:
+    late = without("camera/pose", 0.0, 1.5, duration=3.0)
+    assert build_experiment([read(tmp_path / "felt", late)]).frames[0].t[0] > 1.5
+    blind = read(tmp_path / "blind", [m for m in late if m[1] != "/fish/imu/data"])
+    with pytest.raises(
+        ExperimentError, match="blind: the first camera pose comes 1.5 s after .* no gyro .* within 1 s"
+    ):
+        build_experiment([blind])
+
+
 def test_who_knows_no_rate_does_not_start_at_rest_unless_told(tmp_path: Path) -> None:
-    blind = read(tmp_path / "blind", without("imu/data"))
+    still = posed(lambda t: np.zeros(3))  # noqa: ARG005
+    blind = read(tmp_path / "blind", [m for m in still if m[1] != "/fish/imu/data"])
+    assert build_experiment([read(tmp_path / "felt", still)]).start_at_rest
     assert not build_experiment([blind]).start_at_rest
     assert build_experiment([blind], start_at_rest=True).start_at_rest
     assert np.isnan(build_experiment([blind]).accel).all()

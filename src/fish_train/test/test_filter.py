@@ -11,10 +11,11 @@ import pytest
 from fish_sim.compiled import lanes
 from fish_sim.robot import Robot
 from fish_train.identify import filter_compiled
+from fish_train.identify.experiment import Frames
 from fish_train.identify.filter import filter_stepper, run_filter
 from fish_train.identify.filter_compiled import compiled_passes
 from fish_train.identify.filter_numpy import Filter
-from fish_train.identify.filter_types import Noise, Problem
+from fish_train.identify.filter_types import Noise, Problem, SensorModel, place_frames
 from fish_train.identify.fit import evaluate
 from fish_train.identify.fixed_lag import smoothed
 from fish_train.identify.hypothesis import NOMINAL_FREE, Coordinates, nominal_hypothesis
@@ -235,6 +236,48 @@ def test_a_filter_that_diverges_says_from_where(compiled):
     lost = ~np.isfinite(result.history.filtered).all(axis=2)
     assert not lost[:, 0].any() and not lost[:41, 1].any() and lost[50:, 1].all()
     assert np.isfinite(result.log_likelihood[0]) and not np.isfinite(result.log_likelihood[1])
+
+
+@pytest.mark.parametrize("rate", [60.0, 100.0, 120.0])
+def test_which_images_are_used_does_not_depend_on_the_latency(rate):
+    """Two at one grid point would overwrite each other, now these and now those: the likelihood would be jagged."""
+    random = np.random.default_rng(3)
+    commands = np.stack([program(kind, 4.0, random) for kind in ("sines", "steps")], axis=1)
+    data, _ = record(Robot(), commands, Noise(), random, rate)
+    for latency in np.arange(0.0, 0.011, 0.0004):
+        offset, pose = place_frames(data, SensorModel(camera_latency=latency))
+        for m, frames in enumerate(data.frames):
+            taken = frames.t - latency
+            inner = (taken > -0.004) & (taken < 3.98)
+            assert np.isin(frames.pose[inner, 0], pose[:, m, 0]).all()
+            used = np.isfinite(offset[:, m])
+            found = np.interp(taken[inner], (0.01 * np.arange(400) + offset[:, m])[used], pose[used, m, 0])
+            np.testing.assert_allclose(found, frames.pose[inner, 0], atol=1e-9)
+            assert np.abs(offset[used, m]).max() <= 0.0055 + 1e-12
+
+
+def test_a_camera_a_little_faster_than_the_grid_loses_no_image_to_another():
+    data, _ = experiment(Robot(), 1.0, ("sines",))
+    t = 0.0002 + 0.009996 * np.arange(99)
+    quick = replace(data, frames=(Frames(t, np.zeros((len(t), 3))),))
+    for latency in np.arange(0.0, 0.01, 0.0001):
+        offset, _ = place_frames(quick, SensorModel(camera_latency=latency))
+        assert np.isfinite(offset).sum() == np.sum(t - latency >= -0.005)
+
+
+@pytest.mark.parametrize("wait", [0.5, 3.0])
+def test_a_camera_that_starts_late_is_believed(wait):
+    """Until then the fish has swum and turned, which nobody saw."""
+    random = np.random.default_rng(1)
+    commands = np.stack([program(kind, 6.0, random) for kind in ("turn", "steps")], axis=1)
+    commands[..., 0] *= 1.5
+    data, _ = record(Robot(), commands, Noise(), random)
+    late = replace(data, frames=tuple(Frames(f.t[f.t > wait], f.pose[f.t > wait]) for f in data.frames))
+    w = evaluate(nominal_hypothesis(Robot(), ()), np.zeros(0), late, Noise()).result.whitened
+    for m, frames in enumerate(late.frames):
+        assert np.hypot(*frames.pose[0, :2]) > (0.1 if wait > 1.0 else 0.0)
+        assert np.isfinite(w[:, m, 3]).sum() == len(frames.t)
+        np.testing.assert_allclose(np.sqrt(np.nanmean(w[:, m] ** 2, axis=0)), 1.0, atol=0.2)
 
 
 def test_a_fast_tail_gets_the_steps_it_needs():

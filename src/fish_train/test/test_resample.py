@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_train.identify.resample import on_grid
+from fish_train.identify.resample import apart, on_grid
 
 DT = 0.01
 GRID = DT * np.arange(2000)
@@ -57,3 +57,18 @@ def test_stamps_close_together_or_twice_throw_nothing_off() -> None:
     found = on_grid(t, noisy, GRID, DT)
     assert np.nanmax(np.abs(found - strokes(GRID))) < 0.3
     assert np.isnan(on_grid(np.array([0.502]), np.array([7.0]), GRID, DT)).all()  # one sample has no slope
+
+
+def test_faster_samples_than_the_grids_are_thinned_and_others_all_kept() -> None:
+    random = np.random.default_rng(4)
+    for rate in (11.0, 30.0, 60.0, 100.0, 100.0 * (1.0 + 5e-5)):
+        t = 0.005 + np.arange(500) / rate
+        assert len(apart(t, DT)) >= 499
+        assert len(apart(t + 1e-9 * random.standard_normal(500), DT)) >= 499
+    for rate in (120.0, 240.0, 1000.0):
+        t = np.sort(np.arange(500) / rate + 1e-3 * random.standard_normal(500))
+        kept = t[apart(t, DT)]
+        assert np.diff(kept).min() > 0.95 * DT - 1e-12
+        slots = np.maximum.accumulate(kept - DT * np.arange(len(kept))) + DT * np.arange(len(kept))
+        assert (slots - kept).max() <= 0.05 * DT + 1e-12  # a grid point each, wherever the grid begins
+    assert len(apart(np.zeros(0), DT)) == 0

@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
+from fish_train.identify.at_rest import starts_at_rest
 from fish_train.identify.coasting import driven
 from fish_train.identify.level import level
 from fish_train.identify.lost_commands import LostCommandsError, told_on_grid
-from fish_train.identify.resample import on_grid
+from fish_train.identify.resample import apart, on_grid
 from fish_train.recordings.trial import Commands, Trial
 
 Array = NDArray[np.float64]
+
+FEWEST_POSES = 3
+UNKNOWN = 1.0  # s from the first command on in which neither camera nor gyro say where the fish heads
 
 
 class ExperimentError(ValueError):
@@ -75,7 +79,7 @@ class Experiment:
 def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None) -> Experiment:
     """Put trials on the grid of their commands.
 
-    start_at_rest None: decided from the first sample of the gyro.
+    start_at_rest None: as `at_rest` finds, where all do.
     What was measured before the first command or after the last one is left out: nobody knows what the rotor did then.
     Raises ExperimentError when commands or camera poses are missing.
     """
@@ -94,36 +98,27 @@ def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None)
         return out
 
     arrays = {key: stack(key) for key in ("commands", "gyro", "accel", "encoder")}
-    rest = _starts_at_rest(arrays) if start_at_rest is None else start_at_rest
+    rest = start_at_rest
+    if rest is None:
+        sensors = [[g[key] for key in ("gyro", "accel", "encoder", "frame_t", "frame_pose")] for g in gridded]
+        rest = all(starts_at_rest(*own) for own in sensors)
     frames = tuple(Frames(g["frame_t"], g["frame_pose"]) for g in gridded)
     return Experiment(tuple(t.name for t in trials), steps, **arrays, frames=frames, start_at_rest=rest)
-
-
-def _starts_at_rest(arrays: dict[str, Array]) -> bool:
-    """No turning yet at the first sample: the gyro reads a bias below 0.1 rad/s."""
-    first = arrays["gyro"][0]
-    return bool(np.all(np.isfinite(first)) and np.max(np.abs(first)) < 0.1)
 
 
 def _grid(trial: Trial) -> dict[str, Array]:
     if trial.commands is None:
         raise ExperimentError(f"{trial.name}: no joint_command; the inputs of the fish are needed")
-    if trial.camera is None or len(trial.camera) < 3:
-        raise ExperimentError(f"{trial.name}: no camera/pose; at least three poses are needed")
-    c = trial.commands
+    c, imu, encoder = trial.commands, trial.imu, trial.encoder
     start, end = c.t[0], c.t[-1] + DT
     count = int(np.floor((end - start) / DT + 1e-6)) + 1
     t = start + DT * np.arange(count)
-    imu, encoder, camera = trial.imu, trial.encoder, trial.camera
-    seen = (camera.t >= start - 0.5 * DT) & (camera.t <= end)
-    if seen.sum() < 3:
-        raise ExperimentError(
-            f"{trial.name}: {seen.sum()} camera poses between the first and the last command; at least three are needed"
-        )
+    frames = _seen(trial, start, end)
     nothing = np.full(count, np.nan)
     gyro, accel = nothing, np.full((count, 2), np.nan)
     if imu is not None:
         gyro, accel = (on_grid(imu.t, felt, t, DT) for felt in level(imu))
+    _check_heading(trial.name, frames, gyro)
     measured = nothing if encoder is None else on_grid(encoder.t, encoder.speed, t, DT)
     commands, measured = _told(trial.name, c, t, measured)
     commands[:, 0], measured = driven(commands[:, 0], measured)
@@ -132,9 +127,34 @@ def _grid(trial: Trial) -> dict[str, Array]:
         "gyro": gyro,
         "accel": accel,
         "encoder": measured,
-        "frame_t": camera.t[seen] - start,
-        "frame_pose": np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])[seen],
+        "frame_t": frames.t,
+        "frame_pose": frames.pose,
     }
+
+
+def _seen(trial: Trial, start: float, end: float) -> Frames:
+    """The camera's poses while commands came; of a camera that is faster than the grid those that each have a grid point."""
+    camera = trial.camera
+    if camera is None or len(camera) < FEWEST_POSES:
+        raise ExperimentError(f"{trial.name}: no camera/pose; at least three poses are needed")
+    seen = (camera.t >= start - 0.5 * DT) & (camera.t <= end)
+    if seen.sum() < FEWEST_POSES:
+        raise ExperimentError(
+            f"{trial.name}: {seen.sum()} camera poses between the first and the last command; at least three are needed"
+        )
+    kept = apart(camera.t[seen], DT)
+    pose = np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])
+    return Frames((camera.t[seen] - start)[kept], pose[seen][kept])
+
+
+def _check_heading(name: str, frames: Frames, gyro: Array) -> None:
+    """Refuse a trial in which the fish may have turned too far before anything tells where it heads."""
+    first = float(frames.t[0])
+    if DT * np.isnan(gyro[: max(round(first / DT), 0)]).sum() > UNKNOWN:
+        raise ExperimentError(
+            f"{name}: the first camera pose comes {first:.1f} s after the first command and no gyro tells how the fish turned "
+            f"until then; expected it within {UNKNOWN:g} s; start the camera before the commands"
+        )
 
 
 def _told(name: str, c: Commands, t: Array, encoder: Array) -> tuple[Array, Array]:

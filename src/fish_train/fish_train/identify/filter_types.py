@@ -31,6 +31,9 @@ GYRO, ACCEL, CAMERA = slice(0, 1), slice(1, 3), slice(3, 6)  # rows of the innov
 ROWS = ("gyro", "accel_forward", "accel_left", "camera_x", "camera_y", "camera_heading")
 ENCODER_ROW = 6
 
+AT_ONCE = 0.1  # s; a first pose that comes within it is the start's, of a camera that runs
+FASTEST, FASTEST_TURN = 0.5, 2.0  # m/s and rad/s of a fish that nobody sees or feels
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -100,12 +103,17 @@ class History:
 
 
 def place_frames(experiment: Experiment, sensors: SensorModel) -> tuple[Array, Array]:
-    """(offset (T, M), pose (T, M, 3)): each camera pose at its nearest grid point, moved back by the latency."""
+    """(offset (T, M), pose (T, M, 3)): each camera pose at its nearest grid point, moved back by the latency.
+
+    One that is a little less than a step after the one before (see `apart`) goes to the grid point after it if need be: which
+    poses are used does not depend on the latency, or the likelihood would jump with it.
+    """
     T, M = experiment.length, len(experiment.names)
     offset, pose = np.full((T, M), np.nan), np.full((T, M, 3), np.nan)
     for m, frames in enumerate(experiment.frames):
         t = frames.t - sensors.camera_latency
-        k = np.round(t / DT).astype(int)
+        order = np.arange(len(t))
+        k = np.maximum.accumulate(np.floor(t / DT + 0.5).astype(int) - order) + order
         inside = (k >= 0) & (k < experiment.steps[m])
         offset[k[inside], m] = (t - k * DT)[inside]
         pose[k[inside], m] = frames.pose[inside]
@@ -132,13 +140,21 @@ def first_memory(commands: Array, stepper: Stepper, p: Array, dp: Array) -> tupl
 def first_state(
     experiment: Experiment, layout: Layout, sensors: SensorModel, noise: Noise
 ) -> tuple[Array, Array]:
-    """Prior of the state (M, N) and its covariance: at the first camera pose with a straight tail."""
+    """Prior of the state (M, N) and its covariance: at the first camera pose with a straight tail.
+
+    Where that pose comes late the fish began elsewhere, at a heading from which the gyro counts to the one seen.
+    """
     M, nq, nx = len(experiment.names), layout.links + 3, len(layout.motion)
     n, rest = nx + 6, experiment.start_at_rest
     xi, variance, P = np.zeros((M, n)), np.zeros(n), np.zeros((M, n, n))
     for m, frames in enumerate(experiment.frames):
         xi[m, :2] = frames.pose[0, :2] / sensors.camera_scale
         xi[m, 2:nq] = frames.pose[0, 2] - sensors.camera_heading_offset
+        if (late := float(frames.t[0]) - sensors.camera_latency) > AT_ONCE:
+            turned, position, heading = _until_seen(experiment.gyro[: experiment.steps[m], m], late, noise)
+            xi[m, 2:nq] -= turned
+            P[m, range(2), range(2)] = position**2
+            P[m, 2:nq, 2:nq] = heading**2
     speed = 1e-3 if rest else noise.start_speed
     variance[:2] = 0.05**2
     variance[2:nq] = 1e-6 if rest else 0.2**2
@@ -146,6 +162,17 @@ def first_state(
     variance[nq + 2 : 2 * nq] = (10.0 * speed) ** 2
     variance[nx : nx + 3] = np.square(noise.wrench)
     variance[nx + 3 :] = np.square([noise.gyro_bias, noise.accel_bias, noise.accel_bias])
-    P[:, range(n), range(n)] = variance
+    P[:, range(n), range(n)] += variance
     P[:, 2:nq, 2:nq] += 0.1**2  # head and tail turn together
     return xi, P
+
+
+def _until_seen(gyro: Array, late: float, noise: Noise) -> tuple[float, float, float]:
+    """(angle [rad] that a fish first seen `late` [s] has turned by then, how far off its start may be [m] and its heading [rad]).
+
+    gyro (T,) [rad/s], NaN without a sample.
+    """
+    before = gyro[: round(late / DT)]
+    felt, waited = np.isfinite(before), late - AT_ONCE
+    unsure = noise.gyro_bias * waited + FASTEST_TURN * DT * float((~felt).sum())
+    return DT * float(before[felt].sum()), FASTEST * waited, unsure

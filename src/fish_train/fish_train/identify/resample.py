@@ -18,13 +18,14 @@ DEGREE = 5
 GAP = 2.5  # periods between two samples that no spline bridges
 CLOSE = 0.3  # periods; across samples so close together, noise would throw a curve far off
 ROUNDING = 1e-6  # s, of stamps
+EARLY = 0.05  # steps by which a sample may come too early to stand alone at its grid point: a clock that runs a little fast
 
 
 def on_grid(t: Array, values: Array, grid: Array, step: float) -> Array:
     """(G, ...) values at the times grid (G,) of samples (N, ...) with stamps t (N,) in order; all times in s.
 
     A grid point has a value where a sample lies within half a step and the samples reach to both sides of it: as many values as
-    there were samples. Elsewhere NaN.
+    there were samples that come every step or more slowly, one at every grid point of faster ones. Elsewhere NaN.
     """
     out = np.full((len(grid), *values.shape[1:]), np.nan)
     if not len(t):
@@ -38,6 +39,19 @@ def on_grid(t: Array, values: Array, grid: Array, step: float) -> Array:
         own = near & (grid >= t[run[0]] - ROUNDING) & (grid <= t[run[-1]] + ROUNDING)
         out[own] = _curve(t[run], values[run], grid[own], period)
     return out
+
+
+def apart(t: Array, step: float) -> NDArray[np.int64]:
+    """Which samples with stamps t (N,) [s] in order to keep so that each finds a grid point of its own, wherever the grid begins.
+
+    Those that come a step or more after each other are all kept. Of faster ones, two at one grid point would have to be one.
+    """
+    kept, free = [], -np.inf
+    for i, now in enumerate(t.tolist()):
+        if now >= free - EARLY * step:
+            kept.append(i)
+            free = max(now, free) + step
+    return np.array(kept, dtype=np.int64)
 
 
 def _curve(t: Array, values: Array, at: Array, period: float) -> Array:

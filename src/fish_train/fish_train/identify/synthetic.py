@@ -16,6 +16,7 @@ from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_train.identify.experiment import Experiment, Frames
 from fish_train.identify.filter_types import WRENCH, Noise
+from fish_train.identify.resample import apart
 
 Array = NDArray[np.float64]
 
@@ -116,11 +117,12 @@ def _imu(stepper: Stepper, p: Array, state: Array, wrench: Array, commands: Arra
 
 
 def _camera(pose: Array, noise: Noise, random: np.random.Generator, rate: float) -> Frames:
-    """Poses at jittered times, some lost."""
+    """Poses at jittered times, some lost, those of a fast camera thinned as those of recordings are."""
     end = DT * (len(pose) - 1)
     t = np.arange(0.0, end, 1.0 / rate)
     t = np.clip(t + JITTER * random.standard_normal(len(t)), 0.0, end)
     t = np.sort(t[random.random(len(t)) > LOST])
+    t = t[apart(t, DT)]
     seen = np.column_stack([np.interp(t, DT * np.arange(len(pose)), pose[:, i]) for i in range(3)])
     sd = np.array([noise.camera_position, noise.camera_position, noise.camera_heading])
     return Frames(t, seen + sd * random.standard_normal(seen.shape))
