@@ -99,7 +99,8 @@ def test_a_finer_tail_must_gain_on_unseen_trials_but_not_what_the_truth_would(
     monkeypatch.setattr(tail, "on_all", lambda fit, _: fit)
     monkeypatch.setattr(tail, "gain_unseen", lambda *_: (gain, 1000.0))
     monkeypatch.setattr(tail, "reheat", lambda fit, _: fit)
-    found = tail.finer_tail(nominal, nominal, None, Trials(None, None, (0,)), Level(), lambda _: None)
+    law = Description({}, {}, 1e4)
+    found = tail.finer_tail(nominal, nominal, law, None, Trials(None, None, (0,)), Level(), lambda _: None)
     assert found is (finer if accepted else None)
 
 
@@ -205,14 +206,19 @@ def test_much_is_left_where_it_is_far_more_than_water_or_follows_a_law(monkeypat
     assert verdicts.much_is_left(found) is much
 
 
-@pytest.mark.parametrize(("left", "gain", "tried"), [(1.0, 5.0, 0), (1.0, 300.0, 1), (9.0, 5.0, 1)])
-def test_finer_tails_are_tried_where_much_is_left_or_follows_a_law(monkeypatch, left, gain, tried):
-    calls = []
+@pytest.mark.parametrize(
+    ("left", "searched", "training", "tried"),
+    [(1.0, 5.0, 5.0, 0), (1.0, 300.0, 5.0, 1), (1.0, 5.0, 300.0, 1), (9.0, 5.0, 5.0, 1)],
+)
+def test_finer_tails_are_tried_where_much_is_left_or_follows_a_law(
+    monkeypatch, left, searched, training, tried
+):
+    calls, law = [], Description({"yaw": training}, {}, 1e4)
     monkeypatch.setattr(tail, "excess", lambda _: np.array([left]))
-    monkeypatch.setattr(tail, "describe", lambda *_: Description({"yaw": gain}, {}, 1e4))
+    monkeypatch.setattr(tail, "describe", lambda *_: Description({"yaw": searched}, {}, 1e4))
     monkeypatch.setattr(tail, "shorten", lambda *_: None)
     monkeypatch.setattr(tail, "finer_tails", lambda *_: calls.append(1) or [])
-    assert tail.finer_tail(None, None, None, Trials(None, None, ()), Level(), lambda _: None) is None
+    assert tail.finer_tail(None, None, law, None, Trials(None, None, ()), Level(), lambda _: None) is None
     assert len(calls) == tried
 
 

@@ -55,16 +55,21 @@ def diagnose(
     progress("fitting the nominal model")
     base = fit_base(robot, trials.searched)
     base, rounds, accepted = grow(base, trials, names, level, progress)
-    finer = finer_tail(rounds[0].base, base, robot, trials, level, progress)
-    if finer is not None:
-        base, rounds, accepted = grow(finer, trials, names, level, progress)
     progress("fitting all training trials")
     training = trials.training
     nominal, final = final_fits(base, rounds, training)
+    law = describe(final, training)
+    finer = finer_tail(rounds[0].base, base, law, robot, trials, level, progress)
+    if finer is not None:
+        base, rounds, accepted = grow(finer, trials, names, level, progress)
+        nominal, final = final_fits(base, rounds, training)
+        law = describe(final, training)
+    described = final
     if not accepted:
-        accepted = instead_of_a_law(rounds[-1], describe(nominal, training), trials, level, progress)
+        accepted = instead_of_a_law(rounds[-1], law, trials, level, progress)
         final = refine(accepted[0].contest[accepted[0].name], training) if accepted else nominal
     final, accepted = prune(final, accepted, training, level, progress)
+    law = law if final is described else describe(final, training)
     progress("locating the missing force")
     force = missing_force(nominal, training)
     remaining = missing_force(final, training) if accepted else force
@@ -76,7 +81,7 @@ def diagnose(
     held = held_out_density(unseen, robot, given_noise, nominal, final)
     found = Diagnosis(
         experiment, split, robot, nominal, final, tuple(rounds), tuple(accepted), unreachable, level,
-        force, parts, pushes, remaining, describe(final, training), given_noise, held,
+        force, parts, pushes, remaining, law, given_noise, held,
     )  # fmt: skip
     if named(found) or not much_is_left(found):
         return found
