@@ -91,13 +91,13 @@ train evaluate paper:
 	@$(FISH_TRAIN) $@ --out '$(or $(OUT),out/$@)' $(ARGS)
 
 # --- tests ----------------------------------------------------------------------------------------------------------------
-# The longest tests, those of fish_train, run beside all the others: both cores stay busy.
+# The longest tests, those of fish_train, run beside all the others and those across packages: both cores stay busy.
 test: setup build
 	@$(WORKSPACE); status=0; \
 		colcon --log-base log/fish_train test --packages-select fish_train --return-code-on-test-failure & \
 		colcon test --packages-skip fish_train --executor sequential --return-code-on-test-failure || status=1; \
-		wait $$! || status=1; colcon test-result --all --verbose || status=1; \
-		python -m pytest test || status=1; exit $$status
+		python -m pytest test || status=1; \
+		wait $$! || status=1; colcon test-result --all --verbose || status=1; exit $$status
 
 lint: setup
 	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_*
