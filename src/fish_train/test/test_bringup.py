@@ -256,7 +256,8 @@ def simulated(monkeypatch):
     yield make
     for node in nodes:
         node.destroy_node()
-    rclpy.try_shutdown()
+    if rclpy.ok():
+        rclpy.shutdown()  # unlike try_shutdown it takes the signal handlers away
 
 
 @pytest.mark.ros

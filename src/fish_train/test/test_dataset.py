@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import signal
 from types import SimpleNamespace
 
 import numpy as np
@@ -119,6 +120,18 @@ def test_trials_of_robots_that_are_built_differently_are_no_set(changes, text):
 def test_a_set_whose_trials_know_less_of_the_robot_is_one():
     unknown = {"tail": None, "battery": SimpleNamespace(voltage=np.array([np.nan]))}
     assert list(check_set([kin("a"), kin("b", **unknown), kin("c", battery=None)])) == []
+
+
+@pytest.mark.timeout(60)
+def test_several_processes_read_where_sigterm_is_caught(tmp_path):
+    """As in a process with a ROS node, whose handler children inherit."""
+    for i in range(4):
+        samples.robot_recording(tmp_path / f"trial_{i}", duration=0.2)
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        assert len(read_dataset(tmp_path, processes=2)) == 4
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_several_processes_read_the_same(tmp_path):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -77,9 +78,10 @@ def _read_all(
     if processes == 1:
         yield from zip(paths, _shown(map(_read_one, jobs), len(paths), progress), strict=True)
         return
-    # fork: a caller's script needs no "if __name__" guard; started before the bar, which brings a thread
-    with multiprocessing.get_context("fork").Pool(processes) as pool:
-        results = pool.imap(_read_one, jobs, chunksize=2)
+    # fork: a caller's script needs no "if __name__" guard; started before the bar, which brings a thread. An executor's workers
+    # end by themselves, a Pool's by SIGTERM, which a caller with a ROS node catches: it waited for ever
+    with ProcessPoolExecutor(processes, get_context("fork")) as pool:
+        results = pool.map(_read_one, jobs, chunksize=2)
         yield from zip(paths, _shown(results, len(paths), progress), strict=True)
 
 
