@@ -428,8 +428,10 @@ def test_planner_says_that_there_is_no_odometry_any_more(bench):
     b.until(lambda: b.said(b"\x00", "waiting for odometry"))
     b.say("odometry/filtered", odometry(b.now(), y=-0.85, yaw=1.57))
     b.until(lambda: b.said(b"\x01", "no odometry for ") and b.said(b"\x01", " s; nothing is planned"))
+    assert b.node._silence() > 0.5
     there = odometry(b.now(), y=-0.85, yaw=1.57)
     b.until(lambda: b.say("odometry/filtered", there) or b.said(b"\x00", "following letter I"))
+    assert b.node._silence() < 0.5
 
 
 def test_planner_says_that_odometry_is_not_finite(bench):
@@ -437,6 +439,7 @@ def test_planner_says_that_odometry_is_not_finite(bench):
     b.node._on_odometry(odometry(b.now(), y=-0.85, yaw=1.57))
     bad, words = odometry(b.now(), y=math.nan), "odometry is not finite; nothing is planned"
     b.until(lambda: b.node._on_odometry(bad) or b.said(b"\x01", words))
+    assert b.node._bad_odometry > 0 and b.node._loss == "odometry is not finite"
 
 
 @pytest.mark.parametrize(

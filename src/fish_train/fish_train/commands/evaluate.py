@@ -10,6 +10,8 @@ from __future__ import annotations
 import argparse
 import os
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -93,42 +95,52 @@ def run(args: argparse.Namespace) -> int:
     total, nominal = len(candidates) * len(conditions) * len(cells), conditions[0].name
     folder = writable_folder(args.out)
     table, page = folder / "runs.csv", folder / "evaluation.html"
+    swim = partial(run_study, candidates, conditions, cells, args.jobs)
+    rows = _swum(swim, total, table, page, nominal, console)
+    write_study(table, page, rows, nominal)
+    print_table(console, summary_table(rows, "Tracking"))
+    if args.robust:
+        print_table(console, ratio_table(rows, nominal, "Robustness"))
+    failed = [row for row in rows if row.metrics.failure]
+    _say_failures(failed, console)
+    spent = time.monotonic() - began
+    console.print(
+        f"{len(rows)} runs in {spent:.0f} s; {table.name} and {page.name} in {folder}", soft_wrap=True
+    )
+    return 1 if failed else 0
+
+
+def _swum(
+    swim: Callable[..., list[Row]], total: int, table: Path, page: Path, nominal: str, console: Console
+) -> list[Row]:
+    """All rows of a study, with progress; Ctrl-C writes those that are finished beside table and page, and goes on up."""
     finished: dict[int, list[Row]] = {}
     try:
         with Progress(console=console, transient=True) as progress:
             task = progress.add_task(f"{total} runs", total=None)
-            rows = run_study(
-                candidates,
-                conditions,
-                cells,
-                args.jobs,
-                lambda done, batches: progress.update(task, completed=done, total=batches),
-                finished.__setitem__,
-            )
+
+            def report(done: int, batches: int) -> None:
+                progress.update(task, completed=done, total=batches)
+
+            return swim(report, finished.__setitem__)
     except KeyboardInterrupt:
         rows = [row for _, batch in sorted(finished.items()) for row in batch]
         if rows:
             table, page = partial_file(table), partial_file(page)
             write_study(table, page, rows, nominal)
             console.print(
-                f"{len(rows)} of {total} runs; {table.name} and {page.name} in {folder}", soft_wrap=True
+                f"{len(rows)} of {total} runs; {table.name} and {page.name} in {table.parent}", soft_wrap=True
             )
         raise
-    write_study(table, page, rows, nominal)
-    print_table(console, summary_table(rows, "Tracking"))
-    if args.robust:
-        print_table(console, ratio_table(rows, nominal, "Robustness"))
-    failed = [row for row in rows if row.metrics.failure]
+
+
+def _say_failures(failed: list[Row], console: Console) -> None:
+    """The first of them, a line each."""
     for row in failed[:20]:
         cell = f"{row.cell.path} at {row.cell.speed:g} m/s, seed {row.cell.seed}"
         console.print(
             f"failed: {row.candidate}, {row.condition}, {cell}: {row.metrics.failure}", soft_wrap=True
         )
-    spent = time.monotonic() - began
-    console.print(
-        f"{len(rows)} runs in {spent:.0f} s; {table.name} and {page.name} in {folder}", soft_wrap=True
-    )
-    return 1 if failed else 0
 
 
 def write_study(table: Path, page: Path, rows: list[Row], nominal: str) -> None:

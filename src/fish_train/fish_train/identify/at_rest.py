@@ -17,9 +17,8 @@ TURNS = 0.1  # rad/s, more than a gyro's bias
 SPINS = 5.0  # rad/s of the rotor; strokes have tens and hundreds
 FIRST_POSES = 0.3  # s
 FEWEST_POSES = 3
-GLIDES = (
-    0.02  # m in FIRST_POSES; at rest the supplied recordings have 14 mm at most, a fish at 0.1 m/s has 30
-)
+# m in FIRST_POSES; at rest the recordings looked at have 14 mm at most, a fish at 0.1 m/s has 30
+GLIDES = 0.02
 
 
 def starts_at_rest(gyro: Array, accel: Array, encoder: Array, t: Array, pose: Array) -> bool:

@@ -237,10 +237,8 @@ def power_table(steps: Sequence[Power]) -> Table:
 def criterion_table(scores: Sequence[Score]) -> Table:
     """AIC and BIC over the tool's own quick refits of all candidates, on the same worlds."""
     judged = [s for s in scores if not s.unnamed and len(s.truth) < 2]
-    hidden, nothing = (
-        [s for s in judged if s.truth],
-        [s for s in judged if s.world.group == "null" and s.ranking],
-    )
+    hidden = [s for s in judged if s.truth]
+    nothing = [s for s in judged if s.world.group == "null" and s.ranking]
     rows = []
     for name, cost in (("AIC", aic_cost), ("BIC", bic_cost)):
         right = [choice(s, cost) in s.truth for s in hidden]

@@ -15,17 +15,19 @@ PARTS = (
     ("fish_train", "diagnose"),
     ("fish_train", "identify"),
     ("fish_train", "recordings"),
+    ("fish_train", "commands/inputs.py"),  # which trials are used
+    ("fish_train", "commands/diagnose.py"),
 )
 KINDS = (".py", ".c", ".h")
 NODES = "nodes"  # folder of what talks ROS; an answer comes from recordings
 
 
 def tool_digest() -> str:
-    """The first 16 digits of the SHA-256 of simulator (less its nodes), identification, diagnosis and reader: names and code."""
+    """The first 16 digits of the SHA-256 of simulator (less its nodes), identification, diagnosis, reader and their commands."""
     digest = hashlib.sha256()
     for package, folder in PARTS:
         root = files(package)
-        for name, text in sorted(_texts(root / folder if folder else root)):
+        for name, text in sorted(_texts(root / folder if folder else root, folder)):
             digest.update(f"{package} {folder} {name}\n{text}".encode())
     return digest.hexdigest()[:16]
 
@@ -55,10 +57,11 @@ def code(text: str) -> str:
     return ast.unparse(tree)
 
 
-def _texts(folder: Traversable, under: str = "") -> Iterable[tuple[str, str]]:
-    for entry in folder.iterdir():
-        if entry.is_dir() and entry.name != NODES:
-            yield from _texts(entry, f"{under}{entry.name}/")
-        elif entry.name.endswith(KINDS):
-            text = entry.read_text(encoding="utf-8")
-            yield under + entry.name, code(text) if entry.name.endswith(".py") else text
+def _texts(place: Traversable, name: str = "") -> Iterable[tuple[str, str]]:
+    if place.is_dir():
+        for entry in place.iterdir():
+            if entry.name != NODES:
+                yield from _texts(entry, f"{name}/{entry.name}".lstrip("/"))
+    elif name.endswith(KINDS):
+        text = place.read_text(encoding="utf-8")
+        yield name, code(text) if name.endswith(".py") else text

@@ -131,9 +131,8 @@ class _Session:
         self._job, self._trainer, self._log, self._report = job, trainer, log, report
         self._began, self._first = time.monotonic(), trainer.update
         self.progress: Progress | None = None
-        self._saved: Progress | None = (
-            None  # what the checkpoint's last episode was like, None: one of an earlier start
-        )
+        # what the checkpoint's last episode was like; None: it is of an earlier start
+        self._saved: Progress | None = None
 
     @property
     def seconds(self) -> float:
