@@ -12,6 +12,8 @@ from fish_control.control_law import ControlLimits
 from fish_control.gains_file import write_gains_file
 from fish_control.hand_tuned import hand_tuned_policy
 from fish_sim.robot import Robot
+from fish_train.commands import prove
+from fish_train.commands.main import main
 from fish_train.errors import UserError
 from fish_train.evaluation.cells import Cell
 from fish_train.evaluation.feed_forward import law_of_robot
@@ -85,6 +87,28 @@ def test_recordings_of_a_loop_that_were_interrupted_are_made_again(tmp_path: Pat
     prepare(plan)
     assert len(list(plan.recordings.iterdir())) == 3
     assert sorted(p.name for p in tmp_path.iterdir()) == ["loop.json", "recordings"]
+
+
+def test_the_command_says_how_long_the_search_is_and_how_many_trainings_there_are(
+    tmp_path, monkeypatch
+) -> None:
+    plans = []
+
+    def loop(plan, jobs, say):
+        plans.append(plan)
+        return [row(n, e) for n, e in {"nominal": 0.03, "corrected": 0.014, "true": 0.01}.items()]
+
+    monkeypatch.setattr(prove, "_need", lambda *_: None)
+    monkeypatch.setattr(loop_folder, "prepare", lambda plan: plan.out.mkdir(exist_ok=True))
+    monkeypatch.setattr(close_loop, "close_loop", loop)
+    out = tmp_path / "out"
+    asked = ["prove", "--close-loop", "wind", "--out", str(out), "--trainings", "6", "--search", "5"]
+    assert main(asked) == 0
+    assert [(p.trainings, p.search, p.world.effects) for p in plans] == [
+        (6, 5, loop_world("wind", 1, 12, 20.0).effects)
+    ]
+    assert sorted(p.name for p in out.iterdir()) == ["loop.html", "runs.csv"]
+    assert main([*asked, "--trainings", "0"]) == 1 and len(plans) == 1
 
 
 class Engine:

@@ -70,6 +70,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--search", type=int, default=40, help="runs of the search on the plant (default: %(default)s)"
     )
+    parser.add_argument(
+        "--trainings", type=int, default=3, help="of each model with --close-loop (default: %(default)s)"
+    )
     parser.add_argument("--keep", action="store_true", help="keep the recordings (15 MB a world)")
     parser.add_argument(
         "--close-loop",
@@ -96,8 +99,8 @@ def run(args: argparse.Namespace) -> int:
     from .inputs import terminal, user_errors
 
     given = _given(args)
-    if args.jobs < 1 or args.trials < 3 or not args.duration >= 4.0:
-        raise UserError("expected at least one job, three trials and 4 s")
+    if min(args.jobs, args.search, args.trainings) < 1 or args.trials < 3 or not args.duration >= 4.0:
+        raise UserError("expected at least one job, search and training, three trials and 4 s")
     _need("pysindy", "--oracle", args.oracle)
     _need("mujoco", "the second plant", bool(args.close_loop) or "mujoco" in args.groups)
     _need("distributed", "--cluster", bool(args.cluster))
@@ -196,7 +199,7 @@ def _study(args: argparse.Namespace, given: Mapping[str, Any], console: Console)
 
 
 def _close_loop(args: argparse.Namespace, console: Console) -> int:
-    """Recordings of the second plant, three trainings, a search on the plant, one table and page."""
+    """Recordings of the second plant, trainings on each model, a search on the plant, one table and page."""
     from fish_train.evaluation.study import write_rows
     from fish_train.prove.close_loop import Plan, close_loop, loop_world
     from fish_train.prove.loop_folder import prepare
@@ -208,7 +211,8 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
 
     with user_errors():
         world = loop_world(args.close_loop, 1 if args.seed is None else args.seed, args.trials, args.duration)
-        plan = Plan(world, args.out / "recordings", args.out, search=args.search)
+        folders = args.out / "recordings", args.out
+        plan = Plan(world, *folders, search=args.search, trainings=args.trainings)
         prepare(plan)
         rows = close_loop(plan, args.jobs, console.print)
     result = [loop_table(rows), speed_table(rows)]
