@@ -144,6 +144,18 @@ def test_stamps_of_another_clock_are_noticed_but_frames_flow(bench: Bench) -> No
     )
 
 
+@pytest.mark.parametrize("bench", [{"exposure_s": 0.004, "latency_s": 0.0}], indirect=True)
+@pytest.mark.parametrize("begin", [0, -1], ids=["at 0", "before 0"])
+def test_a_time_that_begins_at_0_is_outlived(bench: Bench, begin: int) -> None:
+    """The first exposure would have begun before time did; its stamp had ended the node."""
+    for k in range(100 * (1 - begin)):
+        message = Odometry()
+        message.header.stamp.sec, centiseconds = divmod(100 * begin + k, 100)
+        message.header.stamp.nanosec = 10_000_000 * centiseconds
+        bench.camera._on_odometry(message)
+    assert bench.camera._sent == pytest.approx(30, abs=1)  # of the second from 0 on
+
+
 def test_bad_parameters_are_refused_with_their_name() -> None:
     with pytest.raises(ValueError, match="rate_hz"):
         Bench({"rate_hz": -3.0})

@@ -1,4 +1,4 @@
-"""The node table: complete, startable, the same for the pip-only starter and the launch file; simulated nodes on odd clocks."""
+"""The node table: complete, startable, the same for the pip-only starter and the launch file."""
 
 import os
 import runpy
@@ -12,14 +12,8 @@ import yaml
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-import rclpy  # noqa: E402
-from nav_msgs.msg import Odometry  # noqa: E402
-
-from fish_sim.nodes import simulator  # noqa: E402
-from fish_sim.nodes.camera import CameraNode  # noqa: E402
 from fish_train import bringup  # noqa: E402
 from fish_train.bringup import NodeSpec  # noqa: E402
-from fish_train.domain import choose_domain  # noqa: E402
 from fish_train.errors import UserError  # noqa: E402
 
 SOURCE = Path(__file__).parents[2]
@@ -240,104 +234,3 @@ def test_the_drivers_alone_take_a_robots_own_values_in_the_same_way(launch_names
         files = {node.executable: node.parameters for node in opaque.function({"config": config})}
         assert files == {**installed, "rotor": installed["rotor"] + own}
     assert {argument.args[0] for argument in arguments} == {"config", "namespace", *installed}
-
-
-@pytest.fixture
-def simulated(monkeypatch):
-    """simulated(kind, parameter=value, ...): a node of the simulated robot, whose callbacks the test calls itself."""
-    nodes = []
-
-    def make(kind, **parameters):
-        given = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
-        rclpy.init(args=["--ros-args", *given], domain_id=choose_domain())
-        nodes.append(kind())
-        return nodes[-1]
-
-    yield make
-    for node in nodes:
-        node.destroy_node()
-    if rclpy.ok():
-        rclpy.shutdown()  # unlike try_shutdown it takes the signal handlers away
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize("begin", [0, -1], ids=["at 0", "before 0"])
-def test_the_simulated_camera_outlives_a_time_that_begins_at_0(simulated, begin):
-    """The first exposure would have begun before time did; its stamp had ended the node."""
-    camera = simulated(CameraNode, drop_rate=0.0, latency_s=0.0, noise_std=0.0)
-    assert camera._config.exposure_s > 0.0
-    for k in range(100 * (1 - begin)):
-        message = Odometry()
-        message.header.stamp.sec, centiseconds = divmod(100 * begin + k, 100)
-        message.header.stamp.nanosec = 10_000_000 * centiseconds
-        camera._on_odometry(message)
-    assert camera._sent == pytest.approx(camera._config.rate_hz, abs=1)  # of the second from 0 on
-
-
-class Clocks:
-    """Stands for the module time, with a wall clock that can be set."""
-
-    def __init__(self):
-        self.steady, self.wall = 50.0, 1.7e9
-
-    def monotonic(self):
-        return self.steady
-
-    def time_ns(self):
-        return round(self.wall * 1e9)
-
-    def run(self, node, seconds):
-        """Tick for a while; returns how much the last stamp is behind the wall clock [s]."""
-        for _ in range(round(100 * seconds)):
-            self.steady, self.wall = self.steady + 0.01, self.wall + 0.01
-            node._tick()
-        return (
-            self.wall
-            - node._stamp(node._simulation.time).sec
-            - 1e-9 * node._stamp(node._simulation.time).nanosec
-        )
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize("step", [3600.0, 0.5, -0.5, -3600.0])
-def test_the_simulator_follows_a_wall_clock_that_is_set(simulated, monkeypatch, capfd, step):
-    clocks = Clocks()
-    monkeypatch.setattr(simulator, "time", clocks)
-    node = simulated(simulator.SimulatorNode)
-    assert abs(clocks.run(node, 1.0)) < 0.02 and node._simulation.time == pytest.approx(1.0, abs=0.02)
-    clocks.wall += step
-    assert abs(clocks.run(node, 1.0)) < 0.03
-    assert node._simulation.time == pytest.approx(2.0, abs=0.05) and node._pacer.lost == 0.0
-    assert capfd.readouterr().err.count("the wall clock was set") == 1
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(
-    ("parameters", "step"), [({}, 0.1), ({"use_sim_time": "true"}, 60.0), ({"real_time_factor": 2.0}, 60.0)]
-)
-def test_the_simulators_time_stays_even_where_the_wall_clock_hardly_moved_or_is_not_followed(
-    simulated, monkeypatch, parameters, step
-):
-    clocks = Clocks()
-    monkeypatch.setattr(simulator, "time", clocks)
-    node = simulated(simulator.SimulatorNode, **parameters)
-    before = clocks.run(node, 0.5)
-    clocks.wall += step
-    assert clocks.run(node, 0.01) == pytest.approx(before + step, abs=0.05)
-
-
-@pytest.mark.ros
-def test_a_simulator_that_was_held_up_counts_what_it_lost_and_is_not_called_set(
-    simulated, monkeypatch, capfd
-):
-    clocks = Clocks()
-    monkeypatch.setattr(simulator, "time", clocks)
-    node = simulated(simulator.SimulatorNode)
-    clocks.run(node, 0.5)
-    clocks.steady, clocks.wall = clocks.steady + 3.0, clocks.wall + 3.0
-    assert abs(clocks.run(node, 0.5)) < 0.03
-    assert node._pacer.lost == pytest.approx(3.0, abs=0.02)
-    clocks.steady, clocks.wall = clocks.steady + 0.15, clocks.wall + 0.15  # is caught up with
-    assert abs(clocks.run(node, 0.1)) < 0.03
-    assert node._pacer.lost == pytest.approx(3.0, abs=0.02)
-    assert "the wall clock was set" not in capfd.readouterr().err
