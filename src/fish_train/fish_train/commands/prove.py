@@ -211,8 +211,7 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
 
     with user_errors():
         world = loop_world(args.close_loop, 1 if args.seed is None else args.seed, args.trials, args.duration)
-        folders = args.out / "recordings", args.out
-        plan = Plan(world, *folders, search=args.search, trainings=args.trainings)
+        plan = Plan(world, args.out / "recordings", args.out, search=args.search, trainings=args.trainings)
         prepare(plan)
         rows = close_loop(plan, args.jobs, console.print)
     result = [loop_table(rows), speed_table(rows)]
