@@ -19,6 +19,7 @@ from fish_train.prove.truths import truths_of
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
+STUDY = ROOT / "docs" / "studies" / "twentysixth"  # whose table the README shows
 
 
 def section(title):
@@ -120,8 +121,8 @@ def test_a_link_to_a_heading_that_is_not_there_is_dead(tmp_path):
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory):
     """A copy of the study whose table the README shows."""
-    folder = tmp_path_factory.mktemp("study") / "twentysixth"
-    shutil.copytree(ROOT / "docs" / "studies" / "twentysixth", folder)
+    folder = tmp_path_factory.mktemp("study") / STUDY.name
+    shutil.copytree(STUDY, folder)
     return [Study(part) for part in sorted(folder.iterdir())]
 
 
@@ -180,5 +181,5 @@ def test_the_oracles_rows_are_what_the_committed_judgements_give(parts, newest_s
 def test_the_study_counts_every_world_and_seed(newest_study):
     text = section("## Is the diagnosis right? A blind study")
     assert f"of {len(newest_study)} " in text
-    for about in (ROOT / "docs" / "studies" / "twentysixth").glob("*/study.json"):
+    for about in STUDY.glob("*/study.json"):
         assert str(json.loads(about.read_text())["seed"]) in text
