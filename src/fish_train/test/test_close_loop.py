@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -180,10 +181,11 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     def verb(name: str, *arguments: str) -> None:
         verbs.append((name, *arguments))
         out = Path(arguments[arguments.index("--out") + 1])
-        seeds = [f"seed_{k}/gains.safetensors" for k in (1, 2, 3)]
-        for made in {"train": seeds, "identify": ["robot.yaml"], "diagnose": ["model.yaml"]}[name]:
-            (out / made).parent.mkdir(parents=True, exist_ok=True)
-            write_gains_file(out / made, hand_tuned_policy())
+        seed = arguments[arguments.index("--seed") + 1] if name == "train" else ""
+        weights = f"seed_{seed}/gains.safetensors"
+        made = out / {"train": weights, "identify": "robot.yaml", "diagnose": "model.yaml"}[name]
+        made.parent.mkdir(parents=True, exist_ok=True)
+        write_gains_file(made, hand_tuned_policy())
         if name == "train" and "corrected" in str(out):
             raise UserError("a recipe that is not swum to its end")
 
@@ -213,12 +215,12 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     count = Counter(r.candidate for r in rows)
     assert {count[n] / count["true"] for n in ("nominal", "refitted", "corrected")} == {3.0}
     assert list(dict.fromkeys(r.candidate for r in rows)) == ["nominal", "refitted", "corrected", "true"]
-    assert {v[0] for v in verbs[:2]} == {"identify", "diagnose"} and [v[0] for v in verbs[2:]] == [
-        "train"
-    ] * 3
+    assert "trained: 9 of 9" in said
+    assert {v[0] for v in verbs[:2]} == {"identify", "diagnose"} and {v[0] for v in verbs[2:]} == {"train"}
     given = {Path(v[v.index("--out") + 1]).name: v for v in verbs[2:]}
-    assert len({v[v.index("--set") :] for v in given.values()}) == 1  # all trained alike
-    assert all(v[v.index("--seeds") + 1] == "3" for v in given.values())
+    runs = Counter((Path(v[v.index("--out") + 1]).name, v[v.index("--seed") + 1]) for v in verbs[2:])
+    assert runs == Counter(product(given, "123"))  # each model from the same seeds
+    assert len({v[v.index("--set") :] for v in verbs[2:]}) == 1  # all trained alike
     assert "--robot" not in given["nominal"]
     assert str(tmp_path / "out" / "identify" / "robot.yaml") in given["refitted"]
     assert str(tmp_path / "out" / "diagnose" / "model.yaml") in given["corrected"]
@@ -229,6 +231,11 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     done = len(verbs)
     close_loop.close_loop(plan, 2, lambda _: None)
     assert len(verbs) == done  # what is there is used
+    (tmp_path / "out" / "training" / "nominal" / "seed_2" / "gains.safetensors").unlink()  # was stopped
+    close_loop.close_loop(replace(plan, trainings=4), 2, lambda _: None)
+    again = [(Path(v[v.index("--out") + 1]).name, v[v.index("--seed") + 1]) for v in verbs[done:]]
+    assert sorted(again) == [("corrected", "4"), ("nominal", "2"), ("nominal", "4"), ("refitted", "4")]
+    assert all("--resume" in v and "--overwrite" not in v for v in verbs[done:])
 
 
 @pytest.mark.parametrize(("concealed", "kept"), [("wind", set()), ("servo_filter", {"servo_filter"})])

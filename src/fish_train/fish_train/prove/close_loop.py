@@ -15,9 +15,10 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -108,12 +109,7 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
     Rows of all trainings of a model bear its name, one training after the other.
     """
     robots = {"nominal": plan.nominal, **_models(plan, say)}
-    say(f"training on the models {', '.join(robots)}")
-    with ThreadPoolExecutor(jobs) as pool:  # of threads that wait for processes
-        weights = list(pool.map(lambda name: _train(plan, name, robots[name]), robots))
-    candidates = [
-        read_policy(name, file) for name, files in zip(robots, weights, strict=True) for file in files
-    ]
+    candidates = _trained(plan, robots, jobs, say)
     condition = Condition(name="second plant", plant=SecondPlant(plan.world))
     say("searching gains on the plant itself")
     cells = make_cells(plan.paths, plan.speeds, SEARCH_SEEDS)
@@ -149,18 +145,30 @@ def _models(plan: Plan, say: Say) -> dict[str, Path]:
     return files
 
 
-def _train(plan: Plan, name: str, robot: Path | None) -> list[Path]:
-    """Weights of all trainings on one model."""
+def _trained(plan: Plan, robots: Mapping[str, Path | None], jobs: int, say: Say) -> list[Candidate]:
+    """The gains of all trainings on each model, `jobs` of them side by side."""
+    say(f"training on the models {', '.join(robots)}, {plan.trainings} times on each")
+    runs = list(product(robots, range(1, plan.trainings + 1)))
+    candidates = []
+    with ThreadPoolExecutor(jobs) as pool:  # of threads that wait for processes
+        weights = pool.map(lambda run: _train(plan, run[0], robots[run[0]], run[1]), runs)
+        for (name, _), file in zip(runs, weights, strict=True):
+            candidates.append(read_policy(name, file))
+            say(f"trained: {len(candidates)} of {len(runs)}")
+    return candidates
+
+
+def _train(plan: Plan, name: str, robot: Path | None, seed: int) -> Path:
+    """Weights of one training on one model; one that was stopped goes on from its checkpoint."""
     out = plan.out / "training" / name
-    weights = [out / f"seed_{k}" / "gains.safetensors" for k in range(1, plan.trainings + 1)]
-    if not all(file.exists() for file in weights):
+    weights = out / f"seed_{seed}" / "gains.safetensors"
+    if not weights.exists():
         given = ["--robot", str(robot)] if robot else []
-        seeds = ["--seeds", str(plan.trainings), "--jobs", "1"]
         try:
-            _verb("train", "--out", str(out), *seeds, "--overwrite", *given, *plan.training)
+            _verb("train", "--out", str(out), "--seed", str(seed), "--resume", *given, *plan.training)
         except UserError:
             # a recipe that this robot cannot swim to its end leaves gains all the same
-            if not all(file.exists() for file in weights):
+            if not weights.exists():
                 raise
     return weights
 
