@@ -136,7 +136,18 @@ def newest_study(parts):
     ]
 
 
-def test_the_studys_table_is_what_the_committed_answers_give(newest_study):
+def errors_over_the_nominals(parts):
+    """Of model.yaml in position, 2 s ahead on held-out trials, in every world of the second plant."""
+    return [
+        fit["model_yaml"]["rms"]["2 s"]["position_m"] / fit["nominal"]["rms"]["2 s"]["position_m"]
+        for part in parts
+        for name, world in part.reveal().items()
+        if world.group == "mujoco"
+        for fit in [part.results[name]["diagnosis"]["fit"]]
+    ]
+
+
+def test_the_studys_table_is_what_the_committed_answers_give(parts, newest_study):
     asked = {row.what: Share.of(filter(row.among, newest_study), row.is_so) for row in ASKED}
     expected = {
         "right name first, single effects and sensors": asked["right name first, single effects"],
@@ -149,7 +160,9 @@ def test_the_studys_table_is_what_the_committed_answers_give(newest_study):
         "sensor impostors called physics": asked["sensor impostors called physics"],
     }
     rows = re.findall(
-        r"^\| (.*?) \| .*? \| (.*?) \|$", section("## Is the diagnosis right? A blind study"), re.MULTILINE
+        r"^\| (.*?) \|(?: .*?)? \| (.*?) \|$",
+        section("## Is the diagnosis right? A blind study"),
+        re.MULTILINE,
     )
     for what, share in expected.items():
         (measured,) = [cell for first, cell in rows if first.startswith(what)]
@@ -157,6 +170,13 @@ def test_the_studys_table_is_what_the_committed_answers_give(newest_study):
         if "(" in measured:
             low, high = (f"{100 * bound:.0f}" for bound in share.interval)
             assert f"({low} to {high} %)" in measured, what
+    foreign = [score for score in newest_study if score.world.group == "mujoco"]
+    (measured,) = [cell for first, cell in rows if first.startswith("second plant (MuJoCo)")]
+    named, unexplained = (
+        f"{sum(is_so(score) for score in foreign)} of {len(foreign)}"
+        for is_so in (lambda score: bool(score.named), lambda score: score.verdict == "unexplained")
+    )
+    assert measured == f"{named}; {unexplained}; {np.median(errors_over_the_nominals(parts)):.2f}"
     seconds = [score.seconds for score in newest_study]
     (measured,) = [cell for first, cell in rows if first.startswith("seconds per data set")]
     assert measured == f"{np.median(seconds):.0f} ({max(seconds):.0f})"
