@@ -11,17 +11,19 @@ import pytest
 
 from fish_control.control_law import ControlLimits
 from fish_control.gains_file import write_gains_file
-from fish_control.hand_tuned import hand_tuned_policy
+from fish_control.hand_tuned import HAND_TUNED, hand_tuned_policy
+from fish_control.policy import Policy
 from fish_sim.robot import Robot
 from fish_train.commands import prove
 from fish_train.commands.main import main
 from fish_train.errors import UserError
 from fish_train.evaluation.cells import Cell
 from fish_train.evaluation.feed_forward import law_of_robot
+from fish_train.evaluation.gains_source import PolicyGains
 from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
 from fish_train.evaluation.plant import FishSimPlant
-from fish_train.evaluation.study import Condition, Row
-from fish_train.prove import close_loop, gain_search, loop_folder, mujoco_plant
+from fish_train.evaluation.study import Candidate, Condition, Row
+from fish_train.prove import close_loop, gain_search, kept_swims, loop_folder, mujoco_plant
 from fish_train.prove.close_loop import JUDGE_SEEDS, Plan, loop_world
 from fish_train.prove.gain_search import search
 from fish_train.prove.loop_folder import prepare
@@ -197,16 +199,17 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
         assert all(c.law == own for c in candidates)
         return [row(c.name, 0.01, cell=cell) for c in candidates for cell in cells]
 
-    def swim(candidates, conditions, cells, jobs, report):
+    def swim(candidates, conditions, cells, jobs, report, keep):
         assert conditions[0].fused
         report(3, 20)
         judged.extend(cells)
         laws.update({c.name: c.law for c in candidates})
-        return [row(c.name, 0.01, cell=cell) for c in candidates for cell in cells]
+        for c in candidates:
+            keep(0, [row(c.name, 0.01, cell=cell) for cell in cells])
 
     monkeypatch.setattr(close_loop, "_verb", verb)
     monkeypatch.setattr(gain_search, "run_study", try_gains)
-    monkeypatch.setattr(close_loop, "run_study", swim)
+    monkeypatch.setattr(kept_swims, "run_study", swim)
     monkeypatch.setattr(close_loop, "_plant_law", lambda _: own)
     plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path / "out", search=8)
     said = []
@@ -224,7 +227,7 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     assert "--robot" not in given["nominal"]
     assert str(tmp_path / "out" / "identify" / "robot.yaml") in given["refitted"]
     assert str(tmp_path / "out" / "diagnose" / "model.yaml") in given["corrected"]
-    assert laws["true"] == own and laws["corrected"].limits == ControlLimits()
+    assert laws["true"] == own and laws["corrected_1"].limits == ControlLimits()
     assert {c.seed for c in judged} == set(JUDGE_SEEDS)
     assert {(c.path, c.speed) for c in judged} == {(c.path, c.speed) for c in searched}
     assert {c.seed for c in searched}.isdisjoint(JUDGE_SEEDS)
@@ -236,6 +239,44 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     again = [(Path(v[v.index("--out") + 1]).name, v[v.index("--seed") + 1]) for v in verbs[done:]]
     assert sorted(again) == [("corrected", "4"), ("nominal", "2"), ("nominal", "4"), ("refitted", "4")]
     assert all("--resume" in v and "--overwrite" not in v for v in verbs[done:])
+
+
+def test_swims_that_are_kept_are_not_swum_again_and_those_of_other_gains_are(tmp_path, monkeypatch) -> None:
+    cells = [Cell("S", 0.1, seed) for seed in (1, 2, 3)]
+    swum = []
+
+    def swim(candidates, conditions, cells, jobs, report, keep):
+        for c in candidates:
+            if c.name == "b_1" and not swum[1:]:
+                keep(1, [row(c.name, 9.0, cell=cells[0])])  # half of its runs, then the loop is stopped
+                raise KeyboardInterrupt
+            swum.append(c.name)
+            keep(1, [row(c.name, len(swum) + 0.1, cell=cells[2])])
+            keep(0, [replace(row(c.name, np.nan, cell=cell), condition="pool") for cell in cells[:2]])
+
+    def gains(steering: float) -> Candidate:
+        policy = Policy.constant(HAND_TUNED._replace(steering_kp=steering))
+        return Candidate("model", PolicyGains(policy))
+
+    def each(given) -> list[Row]:
+        return kept_swims.swim_each(given, Condition(), cells, 2, tmp_path, lambda _: None)
+
+    monkeypatch.setattr(kept_swims, "run_study", swim)
+    runs = {"a_1": gains(1.0), "b_1": gains(2.0)}
+    with pytest.raises(KeyboardInterrupt):
+        each(runs)
+    assert [file.name for file in tmp_path.iterdir()] == ["a_1.json"]
+    swum.append("stopped")
+    first = each(runs)
+    assert swum == ["a_1", "stopped", "b_1"]
+    assert [r.cell for r in first] == cells * 2 and {r.candidate for r in first} == {"model"}
+    sizes = [r.metrics.whole.cross_track_rmse for r in first]
+    np.testing.assert_array_equal(sizes, [np.nan, np.nan, 1.1, np.nan, np.nan, 3.1])
+    assert [r.condition for r in first[:3]] == ["pool", "pool", "second plant"]
+    assert str(each(runs)) == str(first) and len(swum) == 3
+    each({**runs, "a_1": gains(1.5)})
+    each({**runs, "b_1": replace(gains(2.0), law=replace(Law(), limits=ControlLimits(curvature_gain=0.18)))})
+    assert swum[3:] == ["a_1", "a_1", "b_1"]
 
 
 @pytest.mark.parametrize(("concealed", "kept"), [("wind", set()), ("servo_filter", {"servo_filter"})])

@@ -40,6 +40,16 @@ def test_slopes_equal_differences(outlook: Outlook) -> None:
         np.testing.assert_allclose(J[:, k], numeric, atol=1e-4 * np.abs(numeric).max())
 
 
+def test_what_a_step_promises_is_about_what_the_fit_brings(outlook: Outlook) -> None:
+    start = outlook.coordinates.origin()
+    lowest = outlook.minimise(start)
+    least = outlook.cost(lowest)
+    for theta in (start, lowest + [-0.2, -0.2, 0.1]):
+        fall = outlook.cost(theta) - least
+        assert fall > 10.0 and outlook.promised(theta) == pytest.approx(least, abs=0.2 * fall)
+    assert outlook.promised(lowest) == pytest.approx(least, abs=1.0)
+
+
 def test_truth_comes_back(outlook: Outlook) -> None:
     start = evaluate(
         nominal_hypothesis(Robot(), FREE), outlook.coordinates.origin(), outlook.experiment, NOISE

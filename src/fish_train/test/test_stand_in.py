@@ -60,6 +60,41 @@ def test_what_helps_is_taken_and_unseen_trials_are_foretold(slipping: Experiment
     assert any("better with tip_slip" in text for text in said)
 
 
+def test_what_predictions_call_for_most_is_tried_without_being_told(monkeypatch) -> None:
+    """A current moves the fish by little in a sample and by much in seconds; nobody named it."""
+    monkeypatch.setattr(module, "CALLED", 1)
+    drifting = recorded(SLIPPING.with_effect("current", x=0.03, y=-0.02), 7)
+    told = ("camera_scale", "rudder_lag", "current")
+    found = stand_in(nominal(drifting), ("tip_slip",), drifting, lambda _: None, told)
+    assert {"current", "tip_slip"} <= set(found.hypothesis.names)
+    assert [found.values[f"current.{axis}"] for axis in "xy"] == pytest.approx([0.03, -0.02], abs=0.004)
+
+
+def test_what_promises_nothing_is_not_called_for(monkeypatch, slipping: Experiment) -> None:
+    promised = {"rotor_lag": 99.0, "current": 101.0, "tether": 96.0, "wave_drag": 97.5, "rudder_lag": 98.0}
+
+    class Promising:
+        def __init__(self, experiment, hypothesis, every) -> None:
+            self.name = hypothesis.names[-1]
+
+        def start_from(self, theta, noise) -> None:
+            assert noise is WATER
+
+        def promised(self, theta) -> float:
+            return promised[self.name]
+
+    monkeypatch.setattr(module, "Unpushed", Promising)
+    hypothesis = nominal_hypothesis(Robot(), FREE)
+    best = module._Tried(hypothesis, np.zeros(len(FREE)), 100.0)
+    asked = lambda *names: module._called_for(best, names, WATER, slipping)  # noqa: E731
+    # a fall of 4 by four parameters, of 2.5 by three, of 2 and of 1 by one each
+    assert asked(*promised) == ["rudder_lag", "rotor_lag"] and asked("tether", "wave_drag") == [
+        "tether",
+        "wave_drag",
+    ]
+    assert asked("current") == [] and asked() == []
+
+
 def test_a_model_that_lacks_nothing_gets_nothing_much(slipping: Experiment) -> None:
     """Parameters come back; an effect that is tried is near neutral if it is taken at all."""
     true = Robot().with_parameters(head_drag_surge=0.26, tail_stiffness=0.08)

@@ -86,7 +86,7 @@ def diagnose(
     if named(found) or not much_is_left(found):
         return found
     helpful = dict.fromkeys((*(a.name for a in accepted), *(n for n in STRUCTURAL if n in names)))
-    return replace(found, outlook=stand_in(nominal, tuple(helpful), training, progress))
+    return replace(found, outlook=stand_in(nominal, tuple(helpful), training, progress, names))
 
 
 def shares(

@@ -5,8 +5,9 @@ every structure is fitted by its predictions alone (`identify.outlook`), from th
 ones have many optima. The filter's states follow what was measured (FOLLOWING), and no unexplained force acts on the
 predictions: it would stand in for what the model lacks.
 
-The structure grows by one effect at a time, of those that the search found nearest and of those that change every stroke
-(STRUCTURAL), while its cost falls and trials left out are foretold better. It describes, for simulation and training; no effect
+The structure grows by one effect at a time, of those that the search found nearest, those that change every stroke
+(STRUCTURAL) and those that the predictions themselves call for (`_called_for`: a likelihood says little of what moves the
+fish slowly), while its cost falls and trials left out are foretold better. It describes, for simulation and training; no effect
 in it is a name of the answer. Where the nominal structure predicts better after all, that is taken.
 """
 
@@ -34,6 +35,8 @@ Array = NDArray[np.float64]
 # change every stroke; a bad base's linear scores say nothing of them
 STRUCTURAL = ("tip_slip", "quadratic_drag")
 MOST_EFFECTS = 3
+CALLED = 2  # effects for which the nominal structure's predictions call most
+FAINT = 0.1  # their strength, in typical ones, where that is asked: without any, where or how fast they act makes no difference
 STAGES = ((0.5, 1.0), (0.5, 1.0, 2.0), HORIZONS)  # s
 EVERY = 2.0  # s between start points
 # times usual water: unexplained forces in the filter that gives the states, and in that of the predictions
@@ -63,21 +66,27 @@ class Unpushed(Outlook):
 
 
 def stand_in(
-    nominal: Fit, names: Sequence[str], experiment: Experiment, report: Callable[[str], None]
+    nominal: Fit,
+    names: Sequence[str],
+    experiment: Experiment,
+    report: Callable[[str], None],
+    candidates: Sequence[str] = (),
 ) -> Fit:
     """The model that predicts best; nominal: the fit without effects; names: effects that may help.
 
-    The nominal fit itself where no trial is long enough to predict.
+    candidates: effects of which those are tried, too, that the predictions call for. The nominal fit itself where no trial is
+    long enough to predict.
     """
     plain = nominal_hypothesis(nominal.hypothesis.robot, nominal.hypothesis.free)
     if not Unpushed(experiment, plain, EVERY).targets:
         return nominal
-    names = [name for name in names if kind_of(name) != "sensor"]  # which predicts no motion
     noise = _water(nominal.noise, FOLLOWING)
     report("no name fits: fitting predictions over seconds")
     best = _fitted(plain, [Coordinates(plain).origin(), nominal.theta], noise, experiment)
+    called = _called_for(best, _moving(candidates), noise, experiment)
+    helpful = dict.fromkeys((*_moving(names), *called))
     for _ in range(MOST_EFFECTS):
-        left = [name for name in names if name not in best.hypothesis.names]
+        left = [name for name in helpful if name not in best.hypothesis.names]
         tried = on_all_cores(partial(_grown, best, noise, experiment), left)
         promising = min(tried, key=lambda one: one.cost, default=best)
         falls = best.cost - promising.cost >= SETTLED * best.cost
@@ -86,6 +95,25 @@ def stand_in(
         best = promising
         report(f"predictions are better with {', '.join(best.hypothesis.names)}")
     return _best_of(best, (nominal, fit_outlook(nominal, experiment, report)), experiment)
+
+
+def _moving(names: Sequence[str]) -> list[str]:
+    """Those that move the fish: a sensor's error predicts no motion."""
+    return [name for name in names if kind_of(name) != "sensor"]
+
+
+def _called_for(best: _Tried, names: Sequence[str], noise: Noise, experiment: Experiment) -> list[str]:
+    """The CALLED effects of whose parameters each promises the largest fall of the cost, in a Gauss-Newton step from best."""
+
+    def fall(name: str) -> float:
+        hypothesis = best.hypothesis.with_effect(name, FAINT)
+        theta = extend(best.theta, hypothesis, name, FAINT)
+        outlook = Unpushed(experiment, hypothesis, EVERY)
+        outlook.start_from(theta, noise)
+        return (best.cost - outlook.promised(theta)) / (len(theta) - len(best.theta))
+
+    falls = dict(zip(names, on_all_cores(fall, names), strict=True))
+    return sorted((name for name in names if falls[name] > 0.0), key=lambda name: -falls[name])[:CALLED]
 
 
 def _water(noise: Noise, times: float) -> Noise:

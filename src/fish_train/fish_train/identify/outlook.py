@@ -183,6 +183,12 @@ class Outlook:
         normal = J.T @ (_weight(e)[:, None] * J) + np.diag(1.0 / self.coordinates.prior**2)
         return np.where(self.moving, gradient, 0.0), normal
 
+    def promised(self, theta: Array) -> float:
+        """The cost to which a Gauss-Newton step from theta (K,) would lead, were errors linear: c - g' N^-1 g / 2."""
+        e, J = self.errors(theta)
+        gradient, normal = self._normal(e, J, theta)
+        return self._cost(e, theta) - 0.5 * float(gradient @ np.linalg.solve(normal, gradient))
+
     def normal(self, theta: Array) -> Array:
         """(K, K) whose inverse is the covariance, J' W J / s^2 + diag(1 / prior^2)."""
         e, J = self.errors(theta)

@@ -32,8 +32,9 @@ from fish_train.evaluation.cells import make_cells
 from fish_train.evaluation.feed_forward import law_of_plant
 from fish_train.evaluation.gains_source import PolicyGains
 from fish_train.evaluation.plant import Plant
-from fish_train.evaluation.study import Candidate, Condition, Row, run_study
+from fish_train.evaluation.study import Candidate, Condition, Row
 from fish_train.prove.gain_search import Say, search
+from fish_train.prove.kept_swims import swim_each
 from fish_train.prove.mujoco_effects import CONCEALED
 from fish_train.prove.mujoco_plant import MujocoError, MujocoPlant
 from fish_train.prove.world import World
@@ -109,18 +110,15 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
     Rows of all trainings of a model bear its name, one training after the other.
     """
     robots = {"nominal": plan.nominal, **_models(plan, say)}
-    candidates = _trained(plan, robots, jobs, say)
+    gains = _trained(plan, robots, jobs, say)
     condition = Condition(name="second plant", plant=SecondPlant(plan.world))
     say("searching gains on the plant itself")
     cells = make_cells(plan.paths, plan.speeds, SEARCH_SEEDS)
     law = _plant_law(plan.world)
     best = search(condition, cells, plan.search, jobs, plan.out / "search" / "tries.json", say, law)
-    candidates.append(Candidate("true", PolicyGains(Policy.constant(best)), law))
+    gains["true"] = Candidate("true", PolicyGains(Policy.constant(best)), law)
     judged = make_cells(plan.paths, plan.speeds, JUDGE_SEEDS)
-    say(f"swimming: {len(judged)} runs with each of {len(candidates)} gains")
-    return run_study(
-        candidates, [condition], judged, jobs, lambda done, batches: say(f"swum: {done} of {batches} batches")
-    )
+    return swim_each(gains, condition, judged, jobs, plan.out / "swims", say)
 
 
 def _plant_law(world: World) -> Law:
@@ -145,17 +143,17 @@ def _models(plan: Plan, say: Say) -> dict[str, Path]:
     return files
 
 
-def _trained(plan: Plan, robots: Mapping[str, Path | None], jobs: int, say: Say) -> list[Candidate]:
-    """The gains of all trainings on each model, `jobs` of them side by side."""
+def _trained(plan: Plan, robots: Mapping[str, Path | None], jobs: int, say: Say) -> dict[str, Candidate]:
+    """The gains of all trainings on each model, MODEL_SEED, `jobs` of them side by side."""
     say(f"training on the models {', '.join(robots)}, {plan.trainings} times on each")
-    runs = list(product(robots, range(1, plan.trainings + 1)))
-    candidates = []
+    runs = list(product(range(1, plan.trainings + 1), robots))
+    gains = {}
     with ThreadPoolExecutor(jobs) as pool:  # of threads that wait for processes
-        weights = pool.map(lambda run: _train(plan, run[0], robots[run[0]], run[1]), runs)
-        for (name, _), file in zip(runs, weights, strict=True):
-            candidates.append(read_policy(name, file))
-            say(f"trained: {len(candidates)} of {len(runs)}")
-    return candidates
+        weights = pool.map(lambda run: _train(plan, run[1], robots[run[1]], run[0]), runs)
+        for (seed, name), file in zip(runs, weights, strict=True):
+            gains[f"{name}_{seed}"] = read_policy(name, file)
+            say(f"trained: {len(gains)} of {len(runs)}")
+    return gains
 
 
 def _train(plan: Plan, name: str, robot: Path | None, seed: int) -> Path:
