@@ -14,8 +14,8 @@ VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check install --quiet --quiet $(PIP_ARGS) --constraint constraints.txt
 ACTIVATE := source $(VENV)/bin/activate
 WORKSPACE := $(ACTIVATE); source install/setup.bash
-FISH_TRAIN := $(WORKSPACE); exec install/fish_train/lib/fish_train/fish_train
-SOURCES := $(shell find src -not -path '*/test*' -not -path '*/__pycache__*' -not -name '* *')
+ROBOFISH := $(WORKSPACE); exec install/fish_report/lib/fish_report/robofish
+SOURCES := $(shell find src studies -not -path '*/test*' -not -path '*/__pycache__*' -not -name '* *')
 
 # The first interpreter that really is 3.11 or 3.12 (a pyenv shim may exist and still not run).
 PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
@@ -65,42 +65,43 @@ $(VENV)/.dev: requirements-dev.txt constraints.txt $(VENV)/.train
 setup: $(VENV)/.dev
 
 # --- build ----------------------------------------------------------------------------------------------------------------
-# The command fish_train in the environment's folder of commands runs colcon's executable, or says what to source.
+# The command robofish in the environment's folder of commands runs colcon's executable, or says what to source.
 install/.built: $(VENV)/.run colcon.meta $(SOURCES)
 	@$(ACTIVATE); colcon build
-	@ln -sfn ../../src/fish_train/bin/fish_train $(VENV)/bin/fish_train
+	@ln -sfn ../../src/fish_report/bin/robofish $(VENV)/bin/robofish
 	@touch $@
 
 build: install/.built
 
 # --- the robot and the tools ----------------------------------------------------------------------------------------------
 demo: build
-	@$(FISH_TRAIN) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
+	@$(ROBOFISH) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
 		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
 
 # A few small worlds; ARGS='--worlds 300 --oracle' is the study. The same OUT goes on where it was stopped.
 prove: build $(VENV)/.diagnose
-	@$(FISH_TRAIN) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--worlds 4 --groups single sensor outside null --trials 6 --duration 8)
+	@$(ROBOFISH) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--worlds 4 --groups single sensor outside null --trials 6 --duration 8)
 
 identify diagnose: build $(VENV)/.diagnose
-	@$(FISH_TRAIN) $@ $(DATASET) --out '$(or $(OUT),out/$@)' $(ARGS)
+	@$(ROBOFISH) $@ $(DATASET) --out '$(or $(OUT),out/$@)' $(ARGS)
 
 evaluate: build $(VENV)/.diagnose
 train paper: build $(VENV)/.train
 train evaluate paper:
-	@$(FISH_TRAIN) $@ --out '$(or $(OUT),out/$@)' $(ARGS)
+	@$(ROBOFISH) $@ --out '$(or $(OUT),out/$@)' $(ARGS)
 
 # --- tests ----------------------------------------------------------------------------------------------------------------
-# The longest tests, those of fish_train, run beside all the others and those across packages: both cores stay busy.
+# The longest tests, those of fish_sysid and fish_study, run beside all the others: both cores stay busy.
+LONGEST := fish_sysid fish_study
 test: setup build
 	@$(WORKSPACE); status=0; \
-		colcon --log-base log/fish_train test --packages-select fish_train --return-code-on-test-failure & \
-		colcon test --packages-skip fish_train --executor sequential --return-code-on-test-failure || status=1; \
+		colcon --log-base log/longest test --packages-select $(LONGEST) --executor sequential --return-code-on-test-failure & \
+		colcon test --packages-skip $(LONGEST) --executor sequential --return-code-on-test-failure || status=1; \
 		python -m pytest test || status=1; \
 		wait $$! || status=1; colcon test-result --all --verbose || status=1; exit $$status
 
 lint: setup
-	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_*
+	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_* studies/*/fish_*
 
 clean:
 	rm -rf build install log

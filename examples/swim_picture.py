@@ -12,13 +12,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from fish_bag import RecordingError, read_trial
+from fish_bag.trial import Trial
+from fish_bringup.score import score_trial
+from fish_report.errors import UserError
 from fish_sim.camera.config import CameraConfig
 from fish_sim.camera.fish import FishPose
 from fish_sim.camera.renderer import PoolRenderer
-from fish_train.errors import UserError
-from fish_train.recordings import RecordingError, read_trial
-from fish_train.recordings.trial import Trial
-from fish_train.score import score_trial
 
 MOMENTS = 6
 WANTED, SWUM = (70, 130, 240), (190, 110, 30)  # blue, green, red

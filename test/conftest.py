@@ -11,11 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from fish_train.bringup import CONTROL, RECORDER, SIMULATED, NodeSpec
-from fish_train.domain import choose_domain
-from fish_train.nodes.watch import WatchNode, watching
-from fish_train.processes import NodeProcesses
-from fish_train.swim import check_running
+from fish_bringup.node_table import (
+    CONTROL,
+    RECORDER,
+    SIMULATED,
+    NodeSpec,
+)
+from fish_bringup.nodes.watch import WatchNode, watching
+from fish_bringup.processes import NodeProcesses
+from fish_bringup.run_watch import check_running
+from fish_node.domain import choose_domain
 
 SIMULATOR, CAMERA = SIMULATED
 TRACKER, FUSION, PLANNER, CONTROLLER = CONTROL
@@ -24,7 +29,7 @@ PATIENCE = 120.0  # s of real time in which anything waited for must happen
 
 def pytest_configure() -> None:
     """Say at once what is missing instead of failing in every test."""
-    if "fish_train" not in os.environ.get("AMENT_PREFIX_PATH", ""):
+    if "fish_bringup" not in os.environ.get("AMENT_PREFIX_PATH", ""):
         raise pytest.UsageError("the workspace is not sourced: make test, or source install/setup.bash first")
 
 

@@ -11,13 +11,25 @@ from xml.etree import ElementTree
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("fish_node", "fish_sim", "fish_vision", "fish_control", "fish_hw", "fish_train")
+# every package and those of the project that it may import; data flows down only, and each may import fish_node
 MAY_IMPORT = {
-    "fish_train": {"fish_sim", "fish_control"}
-}  # the other four meet through topics; all may import fish_node
+    "fish_node": set(),
+    "fish_report": set(),
+    "fish_sim": {"fish_report"},
+    "fish_vision": set(),
+    "fish_control": {"fish_report"},
+    "fish_hw": set(),
+    "fish_bag": {"fish_report"},
+    "fish_sysid": {"fish_report", "fish_bag", "fish_sim", "fish_control"},
+    "fish_train": {"fish_report", "fish_sim", "fish_control"},
+    "fish_bringup": {"fish_report", "fish_bag", "fish_sim", "fish_control"},
+    "fish_study": {"fish_report", "fish_bag", "fish_sim", "fish_control", "fish_sysid", "fish_train"},
+}
+PACKAGES = tuple(MAY_IMPORT)
+FOLDERS = {name: ROOT / ("studies" if name == "fish_study" else "src") / name for name in PACKAGES}
 ROS = ("rclpy", "rcl_interfaces", "launch", "launch_ros", "rosgraph_msgs", "builtin_interfaces")
 GRAPH_FOLDERS = ("nodes", "launch", "test")
-SOURCES = [path for name in PACKAGES for path in sorted((ROOT / "src" / name).rglob("*.py"))]
+SOURCES = [(name, path) for name, folder in FOLDERS.items() for path in sorted(folder.rglob("*.py"))]
 
 
 def imported(path):
@@ -35,9 +47,9 @@ def is_ros(name):
 
 def may_import(package, path):
     """Packages of the project that a file may import; tests also what package.xml declares for them."""
-    allowed = {package, "fish_node"} | MAY_IMPORT.get(package, set())
-    if "test" in path.relative_to(ROOT / "src").parts:
-        manifest = ElementTree.parse(ROOT / "src" / package / "package.xml")
+    allowed = {package, "fish_node"} | MAY_IMPORT[package]
+    if "test" in path.relative_to(FOLDERS[package]).parts:
+        manifest = ElementTree.parse(FOLDERS[package] / "package.xml")
         allowed |= {entry.text for entry in manifest.iter("test_depend")}
     return allowed
 
@@ -46,8 +58,8 @@ def may_import(package, path):
 def test_packages_import_only_what_they_may(package):
     wrong = [
         f"{path.relative_to(ROOT)}:{line} imports {name}"
-        for path in SOURCES
-        if path.relative_to(ROOT / "src").parts[0] == package
+        for owner, path in SOURCES
+        if owner == package
         for line, name in imported(path)
         if name in PACKAGES and name not in may_import(package, path)
     ]
@@ -57,8 +69,8 @@ def test_packages_import_only_what_they_may(package):
 def test_only_nodes_know_ros():
     wrong = [
         f"{path.relative_to(ROOT)}:{line} imports {name}"
-        for path in SOURCES
-        if not set(GRAPH_FOLDERS) & set(path.relative_to(ROOT / "src").parts)
+        for package, path in SOURCES
+        if not set(GRAPH_FOLDERS) & set(path.relative_to(FOLDERS[package]).parts)
         for line, name in imported(path)
         if is_ros(name)
     ]
@@ -68,11 +80,12 @@ def test_only_nodes_know_ros():
 def test_only_training_needs_torch():
     """The wheel is large: identify, diagnose, prove and evaluate are installed without it."""
     code = """
-import importlib, pkgutil, sys, fish_train
-train = ("fish_train.training.", "fish_train.evaluation.paper_")  # `paper` trains nine seeds
-for module in pkgutil.walk_packages(fish_train.__path__, "fish_train."):
-    if not module.name.startswith((*train, "fish_train.nodes", "fish_train.commands.main")):
-        importlib.import_module(module.name)
+import importlib, pkgutil, sys, fish_bag, fish_study, fish_sysid, fish_train
+training = ("fish_train.training.", "fish_study.paper_")  # `paper` trains nine seeds
+for package in (fish_bag, fish_sysid, fish_train, fish_study):
+    for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+        if not module.name.startswith((*training, "fish_bag.nodes")):
+            importlib.import_module(module.name)
 assert not {"torch", "tensorboard"} & set(sys.modules)
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -87,10 +100,10 @@ def test_ruff(check):
     assert result.returncode == 0, "\n" + result.stdout + result.stderr
 
 
-@pytest.mark.parametrize("package", ["fish_sim", "fish_train"])
+@pytest.mark.parametrize("package", ["fish_sim", "fish_train", "fish_sysid", "fish_report"])
 def test_every_data_file_of_a_package_is_installed(package):
     """C texts and page templates are read at run time: a file that setup.py forgets is missing only when installed."""
-    source = ROOT / "src" / package / package
+    source = FOLDERS[package] / package
     wanted = {p.relative_to(source) for s in ("*.c", "*.h", "*.j2") for p in source.rglob(s)}
     installed = Path(importlib.util.find_spec(package).origin).parent
     assert wanted

@@ -13,9 +13,9 @@ from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from fish_train.bringup import REPLAYER, NodeSpec
-from fish_train.recordings import read_trial
-from fish_train.score import RunScore, score_trial
+from fish_bag import read_trial
+from fish_bringup.node_table import REPLAYER, NodeSpec
+from fish_bringup.score import RunScore, score_trial
 
 SHORT, SHORT_START = "{amplitude: 0.15, length: 1.2}", (-0.6, 0.0, math.atan(0.15 * math.pi / 0.6))
 LONG, LONG_START = "{amplitude: 0.25, length: 2.6}", (-1.3, 0.0, math.atan(0.25 * 2.0 * math.pi / 2.6))

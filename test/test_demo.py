@@ -11,13 +11,13 @@ import time
 import pytest
 from ament_index_python.packages import get_package_prefix
 
-from fish_train.domain import choose_domain, discovery_port, domain_in_use
+from fish_node.domain import choose_domain, discovery_port, domain_in_use
 
-PROGRAM = f"{get_package_prefix('fish_train')}/lib/fish_train/fish_train"
+PROGRAM = f"{get_package_prefix('fish_report')}/lib/fish_report/robofish"
 
 
 def demo(folder, *arguments, limit_s=90):
-    """Run `fish_train demo` in a folder."""
+    """Run `robofish demo` in a folder."""
     command = [PROGRAM, "demo", *map(str, arguments)]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=limit_s)
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from test_demo import PROGRAM, assert_one_line
 
-from fish_train.domain import choose_domain, domain_in_use
-from fish_train.identify.experiment import build_experiment
-from fish_train.recordings import read_dataset
+from fish_bag import read_dataset
+from fish_node.domain import choose_domain, domain_in_use
+from fish_sysid.dataset.experiment import build_experiment
 
 # slow enough for the guard never to stop it where the plan puts it
 ROWS = [
@@ -69,7 +69,7 @@ def test_the_fish_turns_left_from_rest(swum):
 
 def test_how_it_ended_is_said_and_nothing_is_left_running(swum):
     output, _, domain = swum
-    assert "trial_00: 4.0 to " in output and "fish_train diagnose" in output
+    assert "trial_00: 4.0 to " in output and "robofish diagnose" in output
     assert not domain_in_use(domain)
 
 

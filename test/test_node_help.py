@@ -12,7 +12,7 @@ NODES = {
     "fish_vision": ("tracker",),
     "fish_control": ("fusion", "planner", "controller", "exciter"),
     "fish_hw": ("rotor", "rudder", "imu", "camera"),
-    "fish_train": ("recorder", "replayer"),
+    "fish_bag": ("recorder", "replayer"),
 }
 
 

@@ -8,10 +8,10 @@ from contextlib import ExitStack
 import pytest
 from conftest import PATIENCE
 
-from fish_train.bringup import EXCITER, RECORDER, ROBOTS
-from fish_train.domain import domain_in_use
-from fish_train.nodes.watch import watching
-from fish_train.processes import NodeProcesses
+from fish_bringup.node_table import EXCITER, RECORDER, ROBOTS
+from fish_bringup.nodes.watch import watching
+from fish_bringup.processes import NodeProcesses
+from fish_node.domain import domain_in_use
 
 NODES = (*ROBOTS["sim"], EXCITER)
 SIGNALS = (signal.SIGINT, signal.SIGTERM)

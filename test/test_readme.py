@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from fish_control.excitation import LAST_ROW
-from fish_train.commands.verbs import VERBS
-from fish_train.diagnose.vocabulary import known
-from fish_train.prove.judge import judge_studies
-from fish_train.prove.score import score_world
-from fish_train.prove.study import Study
-from fish_train.prove.tables import ASKED, Share
-from fish_train.prove.truths import truths_of
+from fish_report.robofish import VERBS
+from fish_study.oracle_scores import judge_studies
+from fish_study.score import score_world
+from fish_study.study import Study
+from fish_study.tables import ASKED, Share
+from fish_study.truths import truths_of
+from fish_sysid.diagnosis.vocabulary import known
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

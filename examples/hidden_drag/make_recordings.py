@@ -7,10 +7,10 @@ import shutil
 import sys
 from pathlib import Path
 
-from fish_train.commands.output_folder import new_folder
-from fish_train.errors import UserError
-from fish_train.prove.build import make_world
-from fish_train.prove.world import World
+from fish_report.errors import UserError
+from fish_report.output_folder import new_folder
+from fish_study.build import make_world
+from fish_study.scenario import World
 
 WORLD = World(
     group="example",

@@ -13,13 +13,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fish_bag import read_dataset
 from fish_sim.robot import Robot
-from fish_train.diagnose.diagnosis import Diagnosis
-from fish_train.diagnose.procedure import diagnose
-from fish_train.identify.experiment import build_experiment
-from fish_train.recordings import read_dataset
-from fish_train.reports.diagnosis_figures import binned_means
-from fish_train.reports.identify_page_figures import whole_swims
+from fish_sysid.dataset.experiment import build_experiment
+from fish_sysid.diagnosis.pipeline import diagnose
+from fish_sysid.diagnosis.result import Diagnosis
+from fish_sysid.reports.diagnosis_figures import binned_means
+from fish_sysid.reports.identify_page_figures import whole_swims
 
 EFFECT = "quadratic_drag"  # concealed in these recordings
 SHOWN = 8  # names of the evidence

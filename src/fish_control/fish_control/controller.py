@@ -44,7 +44,7 @@ class Command(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Reference:
     """The planner's wishes."""
 
     course: float  # rad
@@ -77,7 +77,7 @@ class Controller:
         self._listened += dt
         return observe(state, motion, self._setpoint, dt, self._limits, self._guidance, np)
 
-    def decide(self, wanted: Wanted) -> Gains:
+    def decide(self, wanted: Reference) -> Gains:
         """One control period at a wanted speed above zero: errors, gains from the policy, new set-points.
 
         Before the first stroke the set-points stay at rest until the fish `has_listened`.

@@ -11,7 +11,7 @@ from fish_control.excitation import LIMITS, Excitation
 from fish_control.line_of_sight import Motion
 from fish_control.node_configs import ExciterConfig
 from fish_control.wall_guard import heads_for_a_wall, stopping_rudder
-from fish_control.watchdog import EstimateSigns, estimate_fault
+from fish_control.watchdog import EstimateHealth, estimate_fault
 
 AT_REST = Command(0.0, 0.0, 0.0)
 State = Literal["waiting", "resting", "swimming", "ended", "before a wall", "lost"]
@@ -22,7 +22,7 @@ class Sight:
     """The newest estimate and what speaks for it."""
 
     motion: Motion
-    signs: EstimateSigns
+    signs: EstimateHealth
 
 
 class Exciter:

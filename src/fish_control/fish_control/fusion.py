@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fish_control.imu_history import ImuHistory, InertialSample
+from fish_control.measurement_buffer import CameraPose, Moment, Timeline
 from fish_control.strapdown import SIZE, MotionNoise, StrapdownFilter, pose_residual
-from fish_control.timeline import CameraPose, Moment, Timeline
 
 Array = NDArray[np.float64]
 LOST_VARIANCE = 1e4  # published for a pose without camera or a twist without IMU: unusable, in any unit

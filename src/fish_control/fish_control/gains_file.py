@@ -10,8 +10,8 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from fish_control.contract import Contract, ContractError
 from fish_control.policy import Policy, tensor_shapes
+from fish_control.policy_spec import ContractError, PolicySpec
 
 
 class GainsFileError(ValueError):
@@ -57,7 +57,7 @@ def read_gains_file(file: str | Path) -> Policy:
             f"weights file {file}: no contract in its metadata; was it written by write_gains_file?"
         )
     try:
-        policy = Policy(Contract.from_json(json.loads(metadata["contract"])), tensors)
+        policy = Policy(PolicySpec.from_json(json.loads(metadata["contract"])), tensors)
     except (ContractError, json.JSONDecodeError) as error:
         raise GainsFileError(f"weights file {file}: {error}") from error
     _check_tensors(policy, file)

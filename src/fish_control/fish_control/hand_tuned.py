@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import sys
 
-from fish_control.contract import Contract
 from fish_control.control_law import Gains
 from fish_control.gains_file import write_gains_file
 from fish_control.policy import Policy
+from fish_control.policy_spec import PolicySpec
 
 HAND_TUNED = Gains(
     steering_kp=0.28, steering_ki=0.4, steering_kd=0.03, speed_kp=0.6, speed_ki=0.07, speed_kd=0.0
@@ -24,7 +24,7 @@ HAND_TUNED = Gains(
 
 def hand_tuned_policy() -> Policy:
     """The gains with the contract of this version's control law."""
-    return Policy.constant(HAND_TUNED, Contract(layers=(), note="constant gains, tuned by hand"))
+    return Policy.constant(HAND_TUNED, PolicySpec(layers=(), note="constant gains, tuned by hand"))
 
 
 if __name__ == "__main__":

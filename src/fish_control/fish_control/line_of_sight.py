@@ -25,8 +25,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from fish_control.control_law import ControlLimits, Setpoint
+from fish_control.current_observer import WaterState, bounded, see_across, see_ahead, swim
 from fish_control.stroke_mean import TURN_LAG, StrokeState, stroke_step
-from fish_control.water import WaterState, bounded, see_across, see_ahead, swim
 
 LEAST_HEADWAY = 0.3  # of the wanted speed, through the water: a stronger current ahead is not believed
 SLOW = 0.02  # m/s, a robot that is slower has no course of its own: its heading stands for it
@@ -95,7 +95,7 @@ GUIDANCE_NAMES = (*(f"stroke.{n}" for n in StrokeState._fields), *(f"water.{n}" 
 
 
 class TrackingErrors(NamedTuple):
-    """Wanted minus actual."""
+    """Reference minus actual."""
 
     cross_track: Any  # m, positive: robot left of the path
     heading: Any  # rad, of the way over ground (course), mean over a stroke, within +-pi

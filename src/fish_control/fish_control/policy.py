@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fish_control.contract import INPUTS, Contract, Input
 from fish_control.control_law import Gains
+from fish_control.policy_spec import INPUTS, Input, PolicySpec
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def policy_inputs(
     return [(value - i.offset) / i.scale for value, i in zip(values, inputs, strict=True)]
 
 
-def tensor_shapes(contract: Contract) -> dict[str, tuple[int, ...]]:
+def tensor_shapes(contract: PolicySpec) -> dict[str, tuple[int, ...]]:
     """Names and shapes of the arrays a file must hold: `layers.K.weight` (out, in), `layers.K.bias`, or
     `gains`.
     """
@@ -51,16 +51,16 @@ def tensor_shapes(contract: Contract) -> dict[str, tuple[int, ...]]:
 class Policy:
     """Weights and their contract; `gains` is all a controller needs."""
 
-    def __init__(self, contract: Contract, tensors: Mapping[str, ArrayLike]) -> None:
+    def __init__(self, contract: PolicySpec, tensors: Mapping[str, ArrayLike]) -> None:
         self.contract = contract
         self.tensors = {name: np.asarray(tensor, dtype=np.float64) for name, tensor in tensors.items()}
         self._low = np.array([o.low for o in contract.outputs])
         self._span = np.array([o.high - o.low for o in contract.outputs])
 
     @classmethod
-    def constant(cls, gains: Gains, contract: Contract | None = None) -> Policy:
+    def constant(cls, gains: Gains, contract: PolicySpec | None = None) -> Policy:
         """The same gains always."""
-        return cls(contract or Contract(layers=()), {"gains": np.array(gains)})
+        return cls(contract or PolicySpec(layers=()), {"gains": np.array(gains)})
 
     def gains(self, inputs: ArrayLike) -> Gains:
         """Gains for normalised inputs (..., 6); each of the six with the leading shape.

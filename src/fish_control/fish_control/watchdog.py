@@ -12,7 +12,7 @@ AHEAD = 0.1  # s, a stamp may be this far ahead of the clock: two machines' cloc
 
 
 @dataclass(frozen=True)
-class EstimateSigns:
+class EstimateHealth:
     """What speaks for an estimate of the motion."""
 
     age: float  # s since the stamp
@@ -22,10 +22,10 @@ class EstimateSigns:
 
 
 @dataclass(frozen=True)
-class Signs:
+class Health:
     """What the controller knows at one moment; None where nothing came yet."""
 
-    estimate: EstimateSigns | None
+    estimate: EstimateHealth | None
     target_age: float | None  # s since the stamp
 
 
@@ -43,7 +43,7 @@ class Watchdog:
         self.reason = "waiting for odometry"
         self.stops = 0
 
-    def check(self, now: float, signs: Signs) -> bool:
+    def check(self, now: float, signs: Health) -> bool:
         """Whether the fish may swim at `now` [s]; `reason` says why not."""
         fault = self._fault(signs)
         if fault is not None:
@@ -78,7 +78,7 @@ class Watchdog:
         self.reason = "all is well again; call resume"
         return False
 
-    def _fault(self, signs: Signs) -> str | None:
+    def _fault(self, signs: Health) -> str | None:
         config = self._config
         if signs.estimate is None:
             return "waiting for odometry"
@@ -90,7 +90,7 @@ class Watchdog:
         return _age_fault("target", signs.target_age, config.target_timeout)
 
 
-def estimate_fault(signs: EstimateSigns, timeout: float, largest_variance: float) -> str | None:
+def estimate_fault(signs: EstimateHealth, timeout: float, largest_variance: float) -> str | None:
     """What is wrong with an estimate, None if nothing is.
 
     timeout: s; largest_variance: m^2, rad^2 and their rates. Fusion marks what it has lost with a far larger one.
@@ -100,7 +100,7 @@ def estimate_fault(signs: EstimateSigns, timeout: float, largest_variance: float
     return _age_fault("odometry", signs.age, timeout) or loss(signs, largest_variance)
 
 
-def loss(signs: EstimateSigns, largest_variance: float) -> str | None:
+def loss(signs: EstimateHealth, largest_variance: float) -> str | None:
     """Which sensor an estimate of any age lacks, None if none; a variance that is no number is one too many."""
     if lost_pose := pose_loss(signs, largest_variance):
         return lost_pose
@@ -109,7 +109,7 @@ def loss(signs: EstimateSigns, largest_variance: float) -> str | None:
     return None
 
 
-def pose_loss(signs: EstimateSigns, largest_variance: float) -> str | None:
+def pose_loss(signs: EstimateHealth, largest_variance: float) -> str | None:
     """The same for who needs no velocity."""
     if not signs.pose_variance <= largest_variance:
         return "camera lost: fusion does not vouch for the pose"

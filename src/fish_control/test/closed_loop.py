@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fish_control.controller import Command, Controller, Wanted
+from fish_control.controller import Command, Controller, Reference
 from fish_control.fusion import Fusion, FusionConfig
 from fish_control.line_of_sight import GuidanceConfig, Motion
 from fish_control.path_batch import TrackerConfig
@@ -72,7 +72,7 @@ def swim(
             if planner.finished:
                 break
             errors = plan.errors
-            controller.decide(Wanted(errors.course, plan.speed, plan.yaw_rate, errors.cross_track))
+            controller.decide(Reference(errors.course, plan.speed, plan.yaw_rate, errors.cross_track))
         command: Command = controller.command(DT)
         simulation.command(command.rotor_speed, command.alpha)
         truth = reading.truth

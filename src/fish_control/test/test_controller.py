@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from fish_control.contract import Contract
 from fish_control.control_law import Gains
-from fish_control.controller import Controller, Wanted, continued
+from fish_control.controller import Controller, Reference, continued
 from fish_control.line_of_sight import GuidanceConfig, Motion, slip_lever
 from fish_control.policy import Policy
+from fish_control.policy_spec import PolicySpec
 from fish_control.stroke_mean import TURN_LAG
 
 GAINS = Gains(0.3, 0.4, 0.03, 0.6, 0.07, 0.0)
 LISTENS = Policy.constant(GAINS)
-POLICY = Policy.constant(GAINS, Contract(layers=(), guidance=GuidanceConfig(listen_time=0.0)))
-STRAIGHT = Wanted(0.0, 0.2, 0.0, 0.0)
+POLICY = Policy.constant(GAINS, PolicySpec(layers=(), guidance=GuidanceConfig(listen_time=0.0)))
+STRAIGHT = Reference(0.0, 0.2, 0.0, 0.0)
 
 
 def controller(heading=0.0, surge=0.2, policy=POLICY):
@@ -26,7 +26,7 @@ def controller(heading=0.0, surge=0.2, policy=POLICY):
 def test_it_steers_towards_the_wanted_course():
     for course in (0.3, -0.3):
         made = controller()
-        made.decide(Wanted(course, 0.2, 0.0, 0.0))
+        made.decide(Reference(course, 0.2, 0.0, 0.0))
         assert np.sign(made.command(0.01).alpha) == np.sign(course)
 
 
@@ -61,7 +61,7 @@ def test_a_fish_at_rest_listens_before_its_first_stroke_and_one_under_way_does_n
 def test_rest_stops_rotor_and_centres_rudder_within_half_a_second():
     made = controller()
     for _ in range(50):
-        made.decide(Wanted(1.0, 0.2, 0.0, 0.0))
+        made.decide(Reference(1.0, 0.2, 0.0, 0.0))
         made.command(0.02)
     made.rest()
     for _ in range(60):
@@ -112,7 +112,7 @@ def test_curvature_is_fed_forward():
     lever = slip_lever(0.2, POLICY.contract.guidance) - TURN_LAG * 0.2
     made = controller(heading=lever * 2.0)
     for _ in range(100):
-        made.decide(Wanted(0.0, 0.2, 0.4, 0.0))
+        made.decide(Reference(0.0, 0.2, 0.4, 0.0))
         command = made.command(0.02)
     # a speed that comes from nowhere is taken for a current of 4 mm/s, so that the water asks for a little more
     assert command.alpha == pytest.approx(POLICY.contract.limits.curvature_gain * 2.0, rel=0.08)

@@ -10,10 +10,10 @@ from fish_control.exciter import Exciter, Sight
 from fish_control.line_of_sight import Motion
 from fish_control.node_configs import ExciterConfig
 from fish_control.pool import HALF_LENGTH
-from fish_control.watchdog import EstimateSigns
+from fish_control.watchdog import EstimateHealth
 
 DT = 0.01  # s
-SURE = EstimateSigns(0.01, True, 1e-5, 1e-4)
+SURE = EstimateHealth(0.01, True, 1e-5, 1e-4)
 MIDDLE = Sight(Motion(0.0, 0.0, 0.0, 0.2, 0.0, 0.0), SURE)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
-from fish_control.contract import HIDDEN, INPUTS, Contract, ContractError
 from fish_control.control_law import Gains
 from fish_control.gains_file import GainsFileError, read_gains_file, require_fit, write_gains_file
 from fish_control.policy import Policy, policy_inputs, tensor_shapes
+from fish_control.policy_spec import HIDDEN, INPUTS, ContractError, PolicySpec
 
 CONSTANT = Gains(0.3, 0.4, 0.03, 0.6, 0.07, 0.0)
 
@@ -19,7 +19,7 @@ CONSTANT = Gains(0.3, 0.4, 0.03, 0.6, 0.07, 0.0)
 @pytest.fixture
 def network():
     rng = np.random.default_rng(0)
-    contract = Contract(training_seed=7, robot_hash="abc", note="test")
+    contract = PolicySpec(training_seed=7, robot_hash="abc", note="test")
     tensors = {name: rng.normal(0.0, 0.2, shape) for name, shape in tensor_shapes(contract).items()}
     return Policy(contract, tensors)
 
@@ -168,7 +168,7 @@ def test_a_written_file_is_for_those_whom_the_umask_leaves(tmp_path, umask, mode
 
 
 def test_arrays_that_numpy_does_not_know_are_refused(tmp_path):
-    contract = json.dumps(Contract(layers=()).to_json())
+    contract = json.dumps(PolicySpec(layers=()).to_json())
     gains = {"dtype": "BF16", "shape": [6], "data_offsets": [0, 12]}
     header = json.dumps({"__metadata__": {"contract": contract}, "gains": gains}).encode()
     file = tmp_path / "w.safetensors"
@@ -209,12 +209,12 @@ def test_every_difference_to_the_controller_is_listed(network):
 
 
 def test_other_inputs_are_refused():
-    contract = Contract(inputs=tuple(replace(i, name=i.name + "_x") for i in INPUTS))
+    contract = PolicySpec(inputs=tuple(replace(i, name=i.name + "_x") for i in INPUTS))
     assert "inputs are" in contract.differences(0.02, 0.4)[0]
 
 
 def test_contract_survives_json():
-    contract = Contract(training_seed=3, note="n")
-    assert Contract.from_json(json.loads(json.dumps(contract.to_json()))) == contract
+    contract = PolicySpec(training_seed=3, note="n")
+    assert PolicySpec.from_json(json.loads(json.dumps(contract.to_json()))) == contract
     with pytest.raises(ContractError, match="expected an object"):
-        Contract.from_json([1])
+        PolicySpec.from_json([1])

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from fish_control.control_law import ControlLimits, Setpoint, feedforward_throttle
+from fish_control.current_observer import LAG, WaterState
 from fish_control.line_of_sight import (
     GUIDANCE_NAMES,
     GuidanceConfig,
@@ -21,7 +22,6 @@ from fish_control.line_of_sight import (
 from fish_control.path_tracker import PathTracker
 from fish_control.paths import make_path
 from fish_control.stroke_mean import TURN_LAG, StrokeState
-from fish_control.water import LAG, WaterState
 
 CONFIG = GuidanceConfig()
 LIMITS = ControlLimits()

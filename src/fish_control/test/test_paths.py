@@ -1,4 +1,4 @@
-"""Contract of every path family, and what is special about each."""
+"""PolicySpec of every path family, and what is special about each."""
 
 import numpy as np
 import pytest

@@ -10,9 +10,9 @@ from fish_control.control_law import (
     actuator_step,
     feedforward_throttle,
 )
+from fish_control.current_observer import WaterState
+from fish_control.current_observer import swim as swim_in_water
 from fish_control.line_of_sight import GuidanceConfig, slip_lever
-from fish_control.water import WaterState
-from fish_control.water import swim as swim_in_water
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper

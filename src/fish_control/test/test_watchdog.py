@@ -6,10 +6,10 @@ from dataclasses import replace
 import pytest
 
 from fish_control.node_configs import ControllerConfig
-from fish_control.watchdog import EstimateSigns, Signs, Watchdog, loss, pose_loss
+from fish_control.watchdog import EstimateHealth, Health, Watchdog, loss, pose_loss
 
-SURE = EstimateSigns(0.01, True, 1e-5, 1e-4)
-GOOD = Signs(SURE, 0.02)
+SURE = EstimateHealth(0.01, True, 1e-5, 1e-4)
+GOOD = Health(SURE, 0.02)
 
 
 def but(**changes):
@@ -35,7 +35,7 @@ def swimming(**parameters):
 
 def test_it_waits_for_odometry_and_target_without_calling_it_a_stop():
     dog = Watchdog(ControllerConfig())
-    assert not dog.check(0.0, Signs(None, None))
+    assert not dog.check(0.0, Health(None, None))
     assert dog.reason == "waiting for odometry"
     assert not dog.check(0.1, replace(GOOD, target_age=None))
     assert (dog.state, dog.stops) == ("waiting", 0)

@@ -31,9 +31,9 @@ from fish_sim.model import DT  # noqa: E402
 from fish_sim.robot import Robot  # noqa: E402
 from fish_sim.scheme import Scheme  # noqa: E402
 from fish_sim.step import Stepper  # noqa: E402
+from fish_train.training.batch_state import Fleet  # noqa: E402
+from fish_train.training.closed_loop_equations import PHYSICS_STEPS, SIZES, Law, act, drive, motion, sense  # noqa: E402
 from fish_train.training.compiled_loop import CompiledLoop  # noqa: E402
-from fish_train.training.fleet import Fleet  # noqa: E402
-from fish_train.training.loop import PHYSICS_STEPS, SIZES, Law, act, drive, motion, sense  # noqa: E402
 from fish_train.training.network import initial_weights, split  # noqa: E402
 from fish_train.training.path_bank import PathBank  # noqa: E402
 

@@ -18,7 +18,7 @@ from fish_train.evaluation.feed_forward import (
     steady_swims,
 )
 from fish_train.evaluation.plant import FishSimPlant
-from fish_train.training.loop import Law
+from fish_train.training.closed_loop_equations import Law
 
 LIMITS = ControlLimits(
     curvature_gain=0.3, throttle_linear=0.7, throttle_quadratic=5.0, turn_linear=2.0, turn_quadratic=6.0

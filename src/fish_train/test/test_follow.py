@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from training_setup import COST, make_stepper
 
-from fish_control.contract import INPUTS, Contract
-from fish_control.controller import Controller, Wanted
+from fish_control.controller import Controller, Reference
 from fish_control.line_of_sight import GuidanceConfig, Motion
 from fish_control.paths import make_path
 from fish_control.planner import Planner
 from fish_control.policy import Policy
+from fish_control.policy_spec import INPUTS, PolicySpec
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_train.evaluation.follow import Follower
 from fish_train.evaluation.gains_source import PolicyGains
+from fish_train.training.batch_state import Fleet
+from fish_train.training.closed_loop_equations import Law
 from fish_train.training.compiled_loop import CompiledLoop
-from fish_train.training.fleet import Fleet
-from fish_train.training.loop import Law
 from fish_train.training.network import initial_weights, to_tensors
 from fish_train.training.path_bank import PathBank
 from fish_train.training.torch_loop import TorchLoop
@@ -49,7 +49,9 @@ def node_swim(policy: Policy, path, stepper) -> np.ndarray:
     for k in range(STEPS * 2):
         if k % 2 == 0:
             plan = planner.plan(motion_of(state, size))
-            controller.decide(Wanted(plan.errors.course, plan.speed, plan.yaw_rate, plan.errors.cross_track))
+            controller.decide(
+                Reference(plan.errors.course, plan.speed, plan.yaw_rate, plan.errors.cross_track)
+            )
         command = controller.command(DT)
         state = stepper.step(state, np.array([command.rotor_speed, command.alpha]), parameters)
         for observer in (controller, planner):
@@ -73,7 +75,7 @@ def setting():
     weights = initial_weights(rng, start)
     weights += 0.02 * rng.standard_normal(weights.shape)
     path, stepper = make_path("straight", length=3.0, x=1.5), make_stepper()
-    policies = {t: Policy(Contract(guidance=law_of(t).guidance), to_tensors(weights)) for t in (0.0, 0.5)}
+    policies = {t: Policy(PolicySpec(guidance=law_of(t).guidance), to_tensors(weights)) for t in (0.0, 0.5)}
     return weights, policies, path, stepper, {t: node_swim(p, path, stepper) for t, p in policies.items()}
 
 
@@ -125,7 +127,7 @@ def test_the_follower_asks_a_policy_in_its_own_scales(setting) -> None:
         for time in (-2.0 * DT, -DT, 0.0):
             observer.observe(time, start)
     plan = planner.plan(start)
-    wanted = Wanted(plan.errors.course, plan.speed, plan.yaw_rate, plan.errors.cross_track)
+    wanted = Reference(plan.errors.course, plan.speed, plan.yaw_rate, plan.errors.cross_track)
     seen, known = np.array([start]), np.ones(1, dtype=bool)
     for _ in range(2):
         follower.observe(seen, known)

@@ -6,7 +6,7 @@ import pytest
 from fish_control.path_batch import PathBatch, TrackerConfig
 from fish_control.paths import make_path
 from fish_sim.ops import NUMPY
-from fish_train.training.loop import path_ahead
+from fish_train.training.closed_loop_equations import path_ahead
 from fish_train.training.path_bank import PathTable
 from fish_train.training.path_search import locate
 

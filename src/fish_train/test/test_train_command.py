@@ -1,22 +1,17 @@
 """The verbs as a user types them."""
 
 import json
-from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 from fish_control.control_law import ControlLimits
 from fish_control.gains_file import read_gains_file
 from fish_control.line_of_sight import GuidanceConfig
+from fish_report.robofish import main
 from fish_sim.robot import Robot, save_robot
-from fish_train.commands.main import main
-from fish_train.commands.paper import trained
-from fish_train.commands.train import command_line
 from fish_train.evaluation.feed_forward import law_of_robot
-from fish_train.training.loop import Law
+from fish_train.verbs.train import command_line
 
 SETTINGS = [
     "batch=2", "unroll=2", "hold=5", "episode=1.0", "approach=0.2", "amplitudes=[1.0]", "cycles=[0.5]", "radii=[1.5]",
@@ -62,22 +57,6 @@ def test_gains_of_a_robot_carry_its_own_feed_forward(
     said = capsys.readouterr().out
     assert f"heavy.yaml: throttle {law.limits.throttle_linear:.3g} u" in said
     assert "the nominal fish's feed-forward is used" in said
-
-
-def test_the_papers_training_on_a_robot_has_that_robots_law(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    jobs = []
-    own = Law(limits=replace(Law().limits, curvature_gain=0.3))
-    monkeypatch.setattr("fish_train.evaluation.feed_forward.law_of_robot", lambda _: own)
-    monkeypatch.setattr("fish_train.training.seeds.run_all", lambda todo, *_: jobs.extend(todo))
-    monkeypatch.setattr("fish_train.training.run_log.read_curve", lambda _: [])
-    for file in (Path("models/heavy.yaml"), None):
-        trained(tmp_path, 1, Robot(), file, 1, Console(file=StringIO()))
-    assert [job.law for job in jobs] == [own, Law()]
-    assert [job.command for job in jobs] == [
-        "fish_train train --robot heavy.yaml --seed 1", "fish_train train --seed 1"
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -146,7 +125,7 @@ def test_bad_input_is_one_line(
     ],
 )
 def test_the_command_that_travels_with_the_weights_names_no_folder(typed: str, kept: str) -> None:
-    assert command_line(["fish_train", "train", *typed.split()]) == kept.split()
+    assert command_line(["robofish", "train", *typed.split()]) == kept.split()
 
 
 def test_what_resume_and_overwrite_contradict_about_is_left_alone(tmp_path: Path) -> None:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from fish_train.commands.train import parse_settings
-from fish_train.errors import UserError
+from fish_report.errors import UserError
 from fish_train.training.config import TrainConfig, load_config, make_config
+from fish_train.verbs.train import parse_settings
 
 RECIPE = Path(__file__).parents[1] / "config" / "train.yaml"
 

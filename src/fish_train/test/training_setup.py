@@ -5,8 +5,8 @@ import numpy as np
 from fish_control.paths import make_path
 from fish_sim.robot import Robot
 from fish_sim.step import Scheme, Stepper
-from fish_train.training.fleet import Fleet
-from fish_train.training.loop import Law
+from fish_train.training.batch_state import Fleet
+from fish_train.training.closed_loop_equations import Law
 from fish_train.training.network import FORMS, initial_weights
 from fish_train.training.path_bank import PathBank
 

@@ -21,7 +21,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from std_srvs.srv import Trigger
 
 from fish_control.control_law import Gains
-from fish_control.controller import LONGEST_PERIOD, Controller, Wanted
+from fish_control.controller import LONGEST_PERIOD, Controller, Reference
 from fish_control.gains_file import read_gains_file, require_fit
 from fish_control.latency import Latency
 from fish_control.node_configs import ControllerConfig
@@ -36,7 +36,7 @@ from fish_control.nodes.messages import (
     yaw_of,
 )
 from fish_control.nodes.reporter import Reporter
-from fish_control.watchdog import Signs, Watchdog, loss
+from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.start import read_parameters, run
 
 
@@ -55,7 +55,7 @@ class ControllerNode(Node):
         self._watchdog = Watchdog(config)
         self._odometry: Odometry | None = None
         self._odometry_time = self._target_time = math.nan
-        self._wanted = Wanted(0.0, 0.0, 0.0, 0.0)
+        self._wanted = Reference(0.0, 0.0, 0.0, 0.0)
         self._now = math.nan
         self._ticks = 0
         self._latency = Latency()
@@ -122,8 +122,8 @@ class ControllerNode(Node):
         if self._watchdog.state != self._said:
             self._report()
 
-    def _signs(self, now: float) -> Signs:
-        return Signs(
+    def _signs(self, now: float) -> Health:
+        return Health(
             None if self._odometry is None else estimate_signs(self._odometry, now),
             None if math.isnan(self._target_time) else now - self._target_time,
         )

@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from fish_control.controller import Command
 from fish_control.line_of_sight import Motion
 from fish_control.planner import motion_is_finite
-from fish_control.watchdog import EstimateSigns
+from fish_control.watchdog import EstimateHealth
 
 PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
 
@@ -64,10 +64,10 @@ def planar_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.reshape(covariance, (6, 6))[np.ix_(PLANAR, PLANAR)]
 
 
-def estimate_signs(message: Odometry, now: float) -> EstimateSigns:
+def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
     """What speaks for an estimate at `now` [s]."""
     pose, twist = planar_covariance(message.pose.covariance), planar_covariance(message.twist.covariance)
-    return EstimateSigns(
+    return EstimateHealth(
         age=now - seconds(message.header.stamp),
         finite=motion_is_finite(motion_of(message)),
         pose_variance=float(pose.diagonal().max()),

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_control.contract import OUTPUTS, Contract
 from fish_control.control_law import Gains
 from fish_control.gains_file import GainsFileError, read_gains_file, require_fit
 from fish_control.path_batch import TrackerConfig
 from fish_control.policy import Policy
-from fish_train.errors import UserError
+from fish_control.policy_spec import OUTPUTS, PolicySpec
+from fish_report.errors import UserError
 from fish_train.evaluation.gains_source import PolicyGains, ScheduledGains
 from fish_train.evaluation.study import Candidate
-from fish_train.training.loop import CONTROL_PERIOD, Law
+from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law
 from fish_train.training.network import FORMS, weight_count
 
 # of a schedule, with the names and checks of a weights file's contract
@@ -48,10 +48,10 @@ def read_schedule(name: str, path: Path) -> Candidate:
         weights = np.array(content["weights"], dtype=float)
         has_law = any(key in content for key in LAW_KEYS)
         given = {key: content[key] for key in LAW_KEYS} if has_law else {}
-        contract = Contract.from_json({**Contract(layers=()).to_json(), **given})
+        contract = PolicySpec.from_json({**PolicySpec(layers=()).to_json(), **given})
     except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
         raise UserError(
-            f"{path}: not a schedule written by fish_train train --form schedule ({error})"
+            f"{path}: not a schedule written by robofish train --form schedule ({error})"
         ) from error
     expected = weight_count(FORMS["schedule"].layers)
     if weights.shape != (expected,):
@@ -59,7 +59,7 @@ def read_schedule(name: str, path: Path) -> Candidate:
     return Candidate(name, ScheduledGains(weights), _law(contract, path))
 
 
-def _law(contract: Contract, path: Path) -> Law:
+def _law(contract: PolicySpec, path: Path) -> Law:
     """What a file says of the law its gains were made for."""
     try:
         tracker = TrackerConfig(lookahead=contract.lookahead)

@@ -11,7 +11,7 @@ import yaml
 from fish_control.paths import make_path
 from fish_control.planner import FASTEST, SLOWEST
 from fish_control.reference_path import PathError, ReferencePath
-from fish_train.errors import UserError
+from fish_report.errors import UserError
 
 RUN_UP = 0.15  # m, runs start this far before their path
 START_OFFSET = 0.01  # m, std of the start's distance from the path; seed 0 starts exactly

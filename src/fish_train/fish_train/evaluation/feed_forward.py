@@ -24,7 +24,7 @@ from fish_control.control_law import ControlLimits, amplitude_of_throttle
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_train.evaluation.plant import FishSimPlant, Plant
-from fish_train.training.loop import Law
+from fish_train.training.closed_loop_equations import Law
 
 Array = NDArray[np.float64]
 

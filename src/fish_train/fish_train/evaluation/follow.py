@@ -38,7 +38,7 @@ from fish_sim.model import DT
 from fish_train.evaluation.gains_source import GainsSource
 from fish_train.evaluation.plant import Plant
 from fish_train.evaluation.sensing import Sensing
-from fish_train.training.loop import CONTROL_PERIOD, PHYSICS_STEPS, Law
+from fish_train.training.closed_loop_equations import CONTROL_PERIOD, PHYSICS_STEPS, Law
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fish_control.control_law import Gains
 from fish_control.policy import Policy, policy_inputs
 from fish_sim.ops import NUMPY
-from fish_train.training.loop import gains_of, schedule_inputs
+from fish_train.training.closed_loop_equations import gains_of, schedule_inputs
 from fish_train.training.network import FORMS, split
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Errors of one run of a trace, with and without the approach, as `fish_train score` defines them for recordings."""
+"""Errors of one run of a trace, with and without the approach, as `robofish score` defines them for recordings."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_control.approach import first_settled, stroke_mean
 from fish_control.reference_path import ReferencePath
 from fish_train.evaluation.follow import Trace
-from fish_train.score import first_settled, stroke_mean
-from fish_train.training.loop import CONTROL_PERIOD
+from fish_train.training.closed_loop_equations import CONTROL_PERIOD
 
 Array = NDArray[np.float64]
 LOST = 0.3  # m, after the approach a run that gets this far from its path has failed

@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from fish_report.page import Block, write_page
 from fish_train.evaluation.cells import LAPS
 from fish_train.evaluation.study import Row
-from fish_train.evaluation.tables import cell_table, ratio_table, summary_table, unique
-from fish_train.reports.page import Block, write_page
+from fish_train.evaluation.tables import (
+    cell_table,
+    ratio_table,
+    summary_table,
+    unique,
+)
 
 
 def write_study_page(path: Path, rows: Sequence[Row], nominal: str | None = None) -> None:

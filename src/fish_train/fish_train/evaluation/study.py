@@ -11,17 +11,22 @@ from typing import Any
 
 import numpy as np
 
+from fish_report.worker_pool import worker_pool
 from fish_sim.robot import Robot
 from fish_sim.sensors.settings import SensorSettings
-from fish_train.evaluation.cells import Cell, longest, read_path, start_pose
+from fish_train.evaluation.cells import (
+    Cell,
+    longest,
+    read_path,
+    start_pose,
+)
 from fish_train.evaluation.follow import Trace, follow
 from fish_train.evaluation.gains_source import GainsSource
 from fish_train.evaluation.metrics import ErrorSizes, RunMetrics, measure
 from fish_train.evaluation.plant import FishSimPlant, Plant
 from fish_train.evaluation.sensing import FusedSensing, PerfectSensing, Sensing
+from fish_train.training.closed_loop_equations import Law
 from fish_train.training.episodes import CERTAIN
-from fish_train.training.loop import Law
-from fish_train.worker_pool import worker_pool
 
 LARGEST_BATCH = 16  # runs
 MakePlant = Callable[[Sequence[Robot], Sequence[int], float], Plant]

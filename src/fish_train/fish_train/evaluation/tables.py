@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from fish_report.page import Table
 from fish_train.evaluation.metrics import ErrorSizes
 from fish_train.evaluation.study import Row, mean_sizes
-from fish_train.reports.page import Table
 
 SUMMARY_COLUMNS = (
     ("cross-track RMSE", "cross_track_rmse", 1e3, "mm"),

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fish_train.errors import UserError
-from fish_train.training.loop import Law
+from fish_report.errors import UserError
+from fish_train.training.closed_loop_equations import Law
 from fish_train.training.network import FORMS, weight_count
 from fish_train.training.trainer import Trainer
 

@@ -12,9 +12,20 @@ from fish_control.path_batch import LOOKAHEAD_SEARCH
 from fish_sim.compiled import lanes, library
 from fish_sim.emit import emit
 from fish_sim.step import Stepper, kernel_source
+from fish_train.training.batch_state import (
+    HISTORY,
+    Fleet,
+    WindowResult,
+    check_hold,
+)
+from fish_train.training.closed_loop_equations import (
+    COST_NAMES,
+    INPUT_COUNTS,
+    PHYSICS_STEPS,
+    SIZES,
+    Law,
+)
 from fish_train.training.expressions import expressions
-from fish_train.training.fleet import HISTORY, Fleet, WindowResult, check_hold
-from fish_train.training.loop import COST_NAMES, INPUT_COUNTS, PHYSICS_STEPS, SIZES, Law
 from fish_train.training.network import LAYERS, split, weight_count
 from fish_train.training.path_bank import PathBank
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import yaml
 
-from fish_control.contract import OUTPUTS
+from fish_control.policy_spec import OUTPUTS
+from fish_report.errors import UserError
 from fish_sim.model import DT
-from fish_train.errors import UserError
-from fish_train.training.fleet import LONGEST_DELAY
-from fish_train.training.loop import COST_NAMES
+from fish_train.training.batch_state import LONGEST_DELAY
+from fish_train.training.closed_loop_equations import COST_NAMES
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from fish_control.path_batch import TrackerConfig
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
+from fish_train.training.batch_state import Fleet
+from fish_train.training.closed_loop_equations import CONTROL_PERIOD
 from fish_train.training.config import TrainConfig
-from fish_train.training.fleet import Fleet
-from fish_train.training.loop import CONTROL_PERIOD
 from fish_train.training.path_bank import PathBank
 
 Array = NDArray[np.float64]

@@ -8,7 +8,16 @@ from functools import lru_cache
 import casadi
 
 from fish_sim.ops import CASADI
-from fish_train.training.loop import COST_NAMES, PHYSICS_STEPS, SIZES, Law, act, drive, motion, sense
+from fish_train.training.closed_loop_equations import (
+    COST_NAMES,
+    PHYSICS_STEPS,
+    SIZES,
+    Law,
+    act,
+    drive,
+    motion,
+    sense,
+)
 
 SENSE_OUTPUTS = ("inputs", "errors", "guidance", "report", "cost")
 ACT_OUTPUTS = ("control", "last", "cost")

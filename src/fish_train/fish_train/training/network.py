@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.contract import HIDDEN, OUTPUTS
+from fish_control.policy_spec import HIDDEN, OUTPUTS
 
 Array = NDArray[np.float64]
 LAYERS = HIDDEN  # 6-128-128-64-6

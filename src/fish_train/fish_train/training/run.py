@@ -11,14 +11,19 @@ from typing import Literal
 
 import torch
 
-from fish_control.contract import INPUTS, OUTPUTS
 from fish_control.gains_file import GainsFileError, read_gains_file
+from fish_control.policy_spec import INPUTS, OUTPUTS
+from fish_report.errors import UserError
 from fish_sim.robot import Robot
-from fish_train.errors import UserError
 from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
+from fish_train.training.closed_loop_equations import Law
 from fish_train.training.config import TrainConfig
-from fish_train.training.loop import Law
-from fish_train.training.network import FORMS, LAYERS, Array, from_tensors
+from fish_train.training.network import (
+    FORMS,
+    LAYERS,
+    Array,
+    from_tensors,
+)
 from fish_train.training.run_log import RunLog
 from fish_train.training.search import search
 from fish_train.training.trainer import Progress, Trainer, TrainingDiverged
@@ -250,6 +255,6 @@ def warm_weights(job: Job) -> Array | None:
     if (policy.contract.inputs, policy.contract.outputs) != (INPUTS, OUTPUTS):
         raise UserError(
             f"{file}: inputs or gains have other scales than those trained here; its weights would mean other gains. "
-            "Start from a file that fish_train train wrote"
+            "Start from a file that robofish train wrote"
         )
     return from_tensors(policy.tensors)

@@ -11,8 +11,8 @@ from types import TracebackType
 
 from torch.utils.tensorboard import SummaryWriter
 
-from fish_control.contract import OUTPUTS
-from fish_train.errors import UserError
+from fish_control.policy_spec import OUTPUTS
+from fish_report.errors import UserError
 from fish_train.training.trainer import Progress
 
 CURVE = "curve.csv"
@@ -95,7 +95,7 @@ def read_curve(folder: Path) -> list[CurveRow]:
     """The curve of a run's folder."""
     path = folder / CURVE
     if not path.exists():
-        raise UserError(f"{path}: no training curve here; expected a folder written by fish_train train")
+        raise UserError(f"{path}: no training curve here; expected a folder written by robofish train")
     return [
         CurveRow(
             seconds=float(row["seconds"]),

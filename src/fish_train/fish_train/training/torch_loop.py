@@ -13,8 +13,21 @@ from torch import Tensor
 from fish_sim import torch_step
 from fish_sim.ops import torch_ops
 from fish_sim.step import Stepper
-from fish_train.training.fleet import HISTORY, Fleet, WindowResult, check_hold
-from fish_train.training.loop import PHYSICS_STEPS, SIZES, Law, act, drive, motion, sense
+from fish_train.training.batch_state import (
+    HISTORY,
+    Fleet,
+    WindowResult,
+    check_hold,
+)
+from fish_train.training.closed_loop_equations import (
+    PHYSICS_STEPS,
+    SIZES,
+    Law,
+    act,
+    drive,
+    motion,
+    sense,
+)
 from fish_train.training.network import LAYERS, split
 from fish_train.training.path_bank import PathBank
 from fish_train.training.path_search import locate

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.step import Stepper
+from fish_train.training.batch_state import Fleet, WindowResult
+from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law
 from fish_train.training.compiled_loop import CompiledLoop
 from fish_train.training.config import TrainConfig
 from fish_train.training.curriculum import SlidingCriterion, make_levels
 from fish_train.training.episodes import Episodes, SeenNoise
-from fish_train.training.fleet import Fleet, WindowResult
-from fish_train.training.loop import CONTROL_PERIOD, Law
 from fish_train.training.network import FORMS, Form, initial_weights
 from fish_train.training.path_bank import PathBank
 from fish_train.training.torch_loop import TorchLoop

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_control.contract import Contract
 from fish_control.gains_file import read_gains_file, write_gains_file
 from fish_control.policy import Policy
+from fish_control.policy_spec import PolicySpec
+from fish_report.json_file import write_json
 from fish_sim.ops import NUMPY
-from fish_train.json_file import write_json
-from fish_train.training.loop import CONTROL_PERIOD, Law, gains_of
+from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law, gains_of
 from fish_train.training.network import to_tensors
 from fish_train.training.trainer import Progress, Trainer
 
@@ -39,7 +39,7 @@ def make_policy(trainer: Trainer, note: str) -> Policy:
     """The trained network or constants with their contract."""
     law: Law = trainer.law
     constant = trainer.form.inputs == "none"
-    contract = Contract(
+    contract = PolicySpec(
         layers=() if constant else trainer.form.layers,
         control_period=CONTROL_PERIOD,
         lookahead=law.tracker.lookahead,
@@ -122,7 +122,7 @@ def model_card(trainer: Trainer, made: str, last: Progress | None, seconds: floa
         ]
     lines += [
         "",
-        "Not for: speeds or curves outside these ranges, other robots; `fish_train evaluate` tells.",
+        "Not for: speeds or curves outside these ranges, other robots; `robofish evaluate` tells.",
         "",
         "## Recipe",
         "",

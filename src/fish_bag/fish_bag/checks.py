@@ -1,0 +1,156 @@
+"""What is wrong with a trial: sample flags and problems. Nothing is changed or removed here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fish_bag.clock import ClockEstimate
+from fish_bag.decode import ROLES
+from fish_bag.jumps import find_jumps
+from fish_bag.problem import SEVERITIES, Problem
+from fish_bag.streams import Decoded
+from fish_bag.topic_map import TopicRule
+from fish_bag.trial import (
+    BAD_STAMP,
+    DUPLICATE,
+    JUMP,
+    NOT_FINITE,
+    TIME_BACK,
+    UNREADABLE,
+    WRONG_FRAME,
+    Camera,
+    Commands,
+    Encoder,
+    Stream,
+)
+
+GAP_PERIODS = 2.5  # a distance of more than so many periods is a gap
+LONG_GAP_S = 0.5  # from here on a warning
+CONSTANT = 1e-6  # a command that varies less is constant, rad/s or rad
+OF_USE = {"imu": "warning", "encoder": "info"}  # severity of the absence of topics that are not required
+
+FLAG_TEXTS = {
+    DUPLICATE: ("warning", "duplicate", "stamps repeat an earlier one"),
+    TIME_BACK: ("warning", "time_back", "stamps are older than the one before"),
+    NOT_FINITE: ("warning", "nan", "messages carry NaN, infinity or lack a value"),
+    JUMP: ("warning", "jump", "poses lie far from those before and after"),
+    BAD_STAMP: ("warning", "bad_stamp", "stamps are zero or far from the rest"),
+    UNREADABLE: ("error", "unreadable", "messages cannot be decoded"),
+}
+
+
+def flag_samples(
+    role: str, decoded: Decoded, rule: TopicRule, t: np.ndarray, plausible: np.ndarray, stamped: bool
+) -> np.ndarray:
+    """(N,) uint8 flags of one topic's samples (bits of trial.py)."""
+    flags = np.zeros(len(t), np.uint8)
+    flags[~plausible] |= BAD_STAMP
+    if stamped and decoded.stamp_ns is not None:
+        first = np.unique(decoded.stamp_ns, return_index=True)[1]
+        repeated = np.ones(len(t), bool)
+        repeated[first] = False
+        flags[repeated] |= DUPLICATE
+    known = np.where(plausible, t, -np.inf)
+    latest = np.concatenate([[-np.inf], np.maximum.accumulate(known)[:-1]])
+    flags[plausible & (t < latest)] |= TIME_BACK
+    for name, values in decoded.arrays.items():
+        if name not in ROLES[role].optional:
+            flags[~np.isfinite(values).reshape(len(t), -1).all(axis=1)] |= NOT_FINITE
+    if rule.frame and decoded.frames is not None:
+        flags[decoded.frames != rule.frame] |= WRONG_FRAME
+    if ROLES[role].stream is Camera:
+        flags[find_jumps(t, *(decoded.arrays[k] for k in ("x", "y", "psi")))] |= JUMP
+    flags[decoded.unreadable] = UNREADABLE
+    return flags
+
+
+def check_stream(stream: Stream, rule: TopicRule, frames: np.ndarray | None) -> Iterator[Problem]:
+    """Problems of one topic: flagged samples, frames (N,) of its messages if they have any, gaps."""
+    for bit, (severity, kind, text) in FLAG_TEXTS.items():
+        where = np.flatnonzero(stream.flags & bit)
+        if len(where):
+            what = f"{len(where)} of {len(stream)} {text}"
+            yield Problem(severity, kind, stream.topic, what, len(where), float(stream.t_arrival[where[0]]))
+    wrong = stream.flags & WRONG_FRAME > 0
+    if frames is not None and wrong.any():
+        other = ", ".join(map(repr, sorted(set(frames[wrong]))))
+        text = f"{wrong.sum()} of {len(stream)} messages in frame {other}, expected {rule.frame!r}"
+        yield Problem("error", "wrong_frame", stream.topic, text, int(wrong.sum()))
+    yield from _gaps(stream)
+
+
+def _gaps(stream: Stream) -> Iterator[Problem]:
+    """Missing pieces of a topic that otherwise comes regularly."""
+    t = np.sort(stream.t[stream.flags & (BAD_STAMP | DUPLICATE) == 0])
+    if len(t) < 10:
+        return
+    step = np.diff(t)
+    period = max(float(np.median(step)), float(step.mean()) / 3)  # the mean where messages come in bursts
+    gaps = np.flatnonzero(step > GAP_PERIODS * period)
+    if len(gaps):
+        longest = float(step.max())
+        lost = int(np.sum(np.round(step[gaps] / period) - 1))
+        what = f"{len(gaps)} gaps, longest {longest:.3f} s"
+        text = f"{what}, about {lost} messages at a period of {period * 1e3:.1f} ms"
+        severity = "warning" if longest > LONG_GAP_S else "info"
+        yield Problem(severity, "gap", stream.topic, text, len(gaps), float(t[gaps[0]]))
+
+
+def missing(role: str, topic: str, required: bool) -> Iterator[Problem]:
+    """A mapped topic that is not in the recording."""
+    severity = "error" if required else OF_USE.get(role)
+    if severity:
+        yield Problem(severity, "missing_topic", topic, f"not in the recording; nothing known of {role}")
+
+
+def check_excitation(commands: Commands | None) -> Iterator[Problem]:
+    """Commands that never change identify nothing."""
+    if commands is None:
+        return
+    good = commands.flags & (NOT_FINITE | UNREADABLE) == 0
+    for name, unit in (("rotor_speed", "rad/s"), ("rudder", "rad")):
+        values = getattr(commands, name)[good]
+        if len(values) and np.ptp(values) < CONSTANT:
+            what = f"{name} is {values[0]:g} {unit} throughout"
+            text = f"{what}: parameters that need it to vary cannot be determined"
+            yield Problem(
+                "warning" if name == "rotor_speed" else "info", "constant_command", commands.topic, text
+            )
+
+
+def check_rotor_sign(commands: Commands | None, encoder: Encoder | None) -> Iterator[Problem]:
+    """Encoder and command must turn the same way: a swapped sign means another robot or a wrong driver."""
+    if commands is None or encoder is None:
+        return
+    c, e = commands.clean(), encoder.clean()
+    if len(c) < 10 or len(e) < 10 or np.ptp(c.rotor_speed) < CONSTANT:
+        return
+    wanted = np.interp(e.t, c.t, c.rotor_speed)
+    if np.std(wanted) and np.std(e.speed) and np.corrcoef(wanted, e.speed)[0, 1] < -0.5:
+        yield Problem(
+            "error",
+            "rotor_sign",
+            encoder.topic,
+            "measured rotor speed runs against the command; expected the same sign",
+        )
+
+
+def check_clock(clock: ClockEstimate) -> Iterator[Problem]:
+    """Clocks that were moved, and drift."""
+    if clock.applied:
+        text = (
+            f"clock {clock.clock!r} stands {clock.offset_s:.6f} s (std {clock.offset_std_s:.1e}) and drifts "
+            f"{clock.drift_ppm:.1f} ppm (std {clock.drift_std_ppm:.1f}) from the recorder's; times were moved"
+        )
+        yield Problem("info", "clock", "", text)
+    elif clock.drift_is_significant and abs(clock.drift_ppm) > 20:
+        drift = f"{clock.drift_ppm:.1f} ppm (std {clock.drift_std_ppm:.1f})"
+        text = f"clock {clock.clock!r} drifts {drift}; not corrected"
+        yield Problem("info", "clock", "", text)
+
+
+def by_severity(problem: Problem) -> tuple[int, str]:
+    """Sort key: errors first."""
+    return -SEVERITIES.index(problem.severity), problem.topic

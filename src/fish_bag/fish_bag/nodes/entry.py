@@ -1,0 +1,8 @@
+"""Entry points of the installed executables."""
+
+from functools import partial
+
+from fish_node.entry import start
+
+recorder = partial(start, "fish_bag", "recorder")
+replayer = partial(start, "fish_bag", "replayer")

@@ -1,0 +1,136 @@
+"""Recorder: writes topics as they come, undecoded, to a rosbag2 recording (MCAP) that survives a kill.
+
+In: every topic that the parameter `topics` selects, with the quality of service its publishers offer. Out:
+the recording; /diagnostics. The bag's time is the moment of arrival on the recorder's wall clock, also
+under use_sim_time: simulation time stands in the stamps and on /clock, and the reader relates the two.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from datetime import datetime
+from functools import partial
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+from fish_bag.mcap_writer import McapRecording, Topic
+from fish_bag.nodes.raw_topics import from_profile, message_class, to_profile
+from fish_bag.qos import Qos
+from fish_bag.record_file import DiskFullError
+from fish_bag.recorder_config import RecorderConfig, common_qos, is_selected
+from fish_node.nodes.start import read_parameters, run
+from fish_report.errors import UserError
+
+
+class RecorderNode(Node):
+    """Finds topics, subscribes raw, hands bytes to a McapRecording."""
+
+    def __init__(self) -> None:
+        super().__init__("recorder", namespace="fish", automatically_declare_parameters_from_overrides=True)
+        self._config = read_parameters(self, RecorderConfig)
+        directory = self._config.directory(datetime.now())
+        custom = {"robot": self._config.robot} if self._config.robot else {}
+        self.recording = McapRecording(directory, custom, self._config.chunk_s)
+        self._subscriptions_of: dict[tuple[str, str], tuple[Subscription, Qos]] = {}
+        self._refused: set[tuple[str, str]] = set()
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(self._config.discovery_s, self._discover, clock=steady)
+        self.create_timer(self._config.chunk_s / 2, self._flush, clock=steady)
+        self.create_timer(1.0, self._report, clock=steady)
+        self._discover()
+        self.get_logger().info(f"recording to {directory}")
+
+    def _discover(self) -> None:
+        """Subscribe to selected topics that are new, or again where publishers offer something else."""
+        for topic, types in self.get_topic_names_and_types():
+            if is_selected(topic, self._config.topics, self.get_namespace()):
+                for msgtype in types:
+                    self._follow(topic, msgtype)
+
+    def _follow(self, topic: str, msgtype: str) -> None:
+        key = (topic, msgtype)
+        offered = [
+            from_profile(info.qos_profile)
+            for info in self.get_publishers_info_by_topic(topic)
+            if info.topic_type == msgtype
+        ]
+        if not offered or key in self._refused:
+            return
+        wanted = common_qos(offered)
+        current = self._subscriptions_of.get(key)
+        if current is not None and current[1] == wanted:
+            return
+        if current is not None:
+            self.destroy_subscription(current[0])
+        try:
+            message = message_class(msgtype)
+            entry = self.recording.add_topic(topic, msgtype, offered[0])
+        except DiskFullError:
+            raise
+        except UserError as error:
+            self._refused.add(key)
+            self.get_logger().error(f"{topic} is not recorded: {error}")
+            return
+        callback = partial(self._store, entry)
+        subscription = self.create_subscription(message, topic, callback, to_profile(wanted), raw=True)
+        self._subscriptions_of[key] = (subscription, wanted)
+        self.get_logger().info(f"recording {topic} ({msgtype})")
+
+    def _store(self, topic: Topic, data: bytes) -> None:
+        self.recording.write(topic, time.time_ns(), data)
+
+    def _flush(self) -> None:
+        self.recording.flush_old(time.time_ns())
+
+    def _report(self) -> None:
+        status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="recorder")
+        status.level, status.message = DiagnosticStatus.OK, "recording"
+        if self._refused:
+            status.level = DiagnosticStatus.WARN
+            status.message = f"not recorded: {', '.join(sorted(topic for topic, _ in self._refused))}"
+        elif not self.recording.message_count:
+            status.level, status.message = DiagnosticStatus.WARN, "nothing received yet"
+        values = {
+            "directory": self.recording.directory,
+            "topics": len(self.recording.topics),
+            "messages": self.recording.message_count,
+            "bytes": self.recording.size,
+        }
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def destroy_node(self) -> None:
+        """Close the recording, then the node."""
+        recording = self.recording
+        recording.close()
+        print(
+            f"recorder: {recording.message_count} messages of {len(recording.topics)} topics, "
+            f"{recording.size} bytes in {recording.directory}",
+            flush=True,
+        )
+        super().destroy_node()
+
+
+def main() -> int:
+    """Record until SIGINT or SIGTERM; 1 and one line if the recording cannot be made or the disk is full."""
+    # rclpy ends the spinning; a KeyboardInterrupt besides would tear a record that is being written
+    before = signal.signal(signal.SIGINT, lambda *_: None)
+    try:
+        return run(RecorderNode, "recorder")
+    except (UserError, OSError) as error:
+        print(f"recorder: {error}", file=sys.stderr)
+        return 1
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

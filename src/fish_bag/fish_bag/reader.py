@@ -1,0 +1,196 @@
+"""One recording in, one typed trial out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fish_bag import checks
+from fish_bag.bag import (
+    RawBag,
+    RawTopic,
+    is_pool_bag,
+    read_bag,
+)
+from fish_bag.decode import PATH_ROLE, PATH_TYPE, ROLES
+from fish_bag.namespace import find_namespace, full_name
+from fish_bag.problem import Problem, RecordingError
+from fish_bag.streams import (
+    Decoded,
+    decode_paths,
+    decode_topic,
+    stamps_of_prefixes,
+)
+from fish_bag.summary import summarise
+from fish_bag.time_axis import (
+    MASTER,
+    Stamps,
+    TimeAxis,
+    build_axis,
+)
+from fish_bag.topic_map import TopicMap, TopicRule
+from fish_bag.trial import (
+    ReferencePath,
+    Stream,
+    TopicSummary,
+    Trial,
+)
+
+
+def read_trial(path: Path | str, topics: TopicMap | None = None) -> Trial:
+    """Read one recording into a typed trial.
+
+    Args:
+        path: rosbag2 directory (MCAP or sqlite3), bare .mcap or .db3 file, or ROS 1 .bag file.
+        topics: which topic is what; None: the default names (config/topics.yaml).
+
+    Raises:
+        RecordingError: nothing can be read; everything less stands in Trial.problems.
+    """
+    topics, path = topics or TopicMap(), Path(path)
+    last_names = {rule.topic.rsplit("/", 1)[-1] for rule in topics.rules.values()}
+    bag = read_bag(path, lambda topic, _: topic.rsplit("/", 1)[-1] in last_names)
+    return _Assembly(bag, topics).trial()
+
+
+@dataclass(frozen=True)
+class _Mapped:
+    """One role's topic, decoded."""
+
+    rule: TopicRule
+    decoded: Decoded
+    stamps: Stamps | None  # None: measured at arrival
+
+
+class _Assembly:
+    """Builds the trial of one raw bag step by step; every step may add problems."""
+
+    def __init__(self, bag: RawBag, topics: TopicMap) -> None:
+        self.bag, self.topics = bag, topics
+        self.problems: list[Problem] = []
+        names = [raw.topic for raw in bag.topics]
+        try:
+            found = topics.namespace
+            self.namespace = find_namespace(names, topics) if found is None else found
+        except RecordingError as error:
+            raise RecordingError(f"{bag.path}: {error}") from error
+        truth = topics.rules.get("truth")  # where a simulator speaks, all stamps are of its clock
+        self.simulated = truth is not None and full_name(self.namespace, truth.topic) in names
+
+    def trial(self) -> Trial:
+        mapped = self.decode()
+        if not mapped and self.topic_of(PATH_ROLE) is None:
+            held = ", ".join(sorted(f"{raw.topic} ({raw.type})" for raw in self.bag.topics))
+            advice = "; 'robofish import_pool' converts it" if is_pool_bag(self.bag) else ""
+            raise RecordingError(
+                f"{self.bag.path}: none of the robot's topics can be read; it holds {held}{advice}"
+            )
+        arrivals = np.concatenate([raw.arrival_ns for raw in self.bag.topics])
+        stamps = [m.stamps for m in mapped.values() if m.stamps is not None]
+        axis = build_axis(stamps, int(arrivals.min()), self.topics.max_latency_s)
+        streams: dict[str, Any] = {role: self.stream(role, m, axis) for role, m in mapped.items()}
+        paths = self.paths(axis)
+        for clock in axis.clocks.values():
+            self.problems += checks.check_clock(clock)
+        self.problems += checks.check_excitation(streams.get("commands"))
+        self.problems += checks.check_rotor_sign(streams.get("commands"), streams.get("encoder"))
+        ends = axis.arrived(np.array([arrivals.min(), arrivals.max()]))
+        return Trial(
+            name=self.bag.path.stem if self.bag.path.is_file() else self.bag.path.name,
+            path=self.bag.path,
+            origin_ns=axis.origin_ns,
+            duration=float(ends[1] - ends[0]),
+            namespace=self.namespace,
+            axis=axis.clock,
+            reference_paths=paths,
+            clocks=tuple(axis.clocks.values()),
+            topics=tuple(self.summary(raw, axis) for raw in self.bag.topics if raw.raws),
+            problems=tuple(sorted(self.problems, key=checks.by_severity)),
+            metadata=self.bag.metadata,
+            **streams,
+        )
+
+    def topic_of(self, role: str) -> RawTopic | None:
+        """The recorded topic of a role, None if it is missing or of another type (both are said)."""
+        rule = self.topics.rules.get(role)
+        if rule is None:
+            return None
+        name = full_name(self.namespace, rule.topic)
+        expected = PATH_TYPE if role == PATH_ROLE else ROLES[role].type
+        there = [raw for raw in self.bag.topics if raw.topic == name and raw.raws]
+        for raw in there:
+            if raw.type != expected:
+                text = f"{len(raw.raws)} messages of type {raw.type}, expected {expected}"
+                self.problems.append(Problem("error", "wrong_type", name, text, len(raw.raws)))
+        if not there:
+            self.problems += checks.missing(role, name, rule.required)
+        return next((raw for raw in there if raw.type == expected), None)
+
+    def decode(self) -> dict[str, _Mapped]:
+        mapped = {}
+        for role, rule in self.topics.rules.items():
+            raw = None if role == PATH_ROLE else self.topic_of(role)
+            if raw is not None:
+                decoded = decode_topic(raw, ROLES[role], self.bag.types, self.bag.ros1)
+                if decoded.arrays:
+                    mapped[role] = _Mapped(rule, decoded, self.stamps(rule, decoded))
+                else:
+                    text = f"none of {len(raw.raws)} messages can be decoded as {raw.type}"
+                    self.problems.append(Problem("error", "unreadable", raw.topic, text, len(raw.raws)))
+        return mapped
+
+    def stamps(self, rule: TopicRule, decoded: Decoded) -> Stamps | None:
+        """Stamps to go by; None where the map says arrival, there is no header, or stamps were never set."""
+        if rule.time == "arrival" or decoded.stamp_ns is None:
+            return None
+        if len(decoded.stamp_ns) > 2 and not np.ptp(decoded.stamp_ns):
+            text = f"all {len(decoded.stamp_ns)} stamps are the same; times of arrival are used"
+            self.problems.append(Problem("warning", "no_stamps", decoded.topic, text))
+            return None
+        clock = MASTER if self.simulated else rule.clock
+        return Stamps(decoded.topic, clock, decoded.stamp_ns, decoded.arrival_ns)
+
+    def stream(self, role: str, mapped: _Mapped, axis: TimeAxis) -> Stream:
+        decoded, rule, stamps = mapped.decoded, mapped.rule, mapped.stamps
+        t_arrival = axis.arrived(decoded.arrival_ns)
+        t = t_arrival if stamps is None else axis.measured(stamps.clock, stamps.stamp_ns)
+        plausible = np.ones(len(t), bool) if stamps is None else stamps.plausible
+        flags = checks.flag_samples(role, decoded, rule, t, plausible, stamps is not None)
+        frame = "" if decoded.frames is None else str(decoded.frames[0])
+        values: dict[str, Any] = dict(decoded.arrays)
+        if ROLES[role].names:
+            values["names"] = decoded.names
+        values |= {"topic": decoded.topic, "frame_id": frame, "t": t, "t_arrival": t_arrival, "flags": flags}
+        stream = ROLES[role].stream(**values)
+        self.problems += checks.check_stream(stream, rule, decoded.frames)
+        return stream
+
+    def paths(self, axis: TimeAxis) -> tuple[ReferencePath, ...]:
+        raw = self.topic_of(PATH_ROLE)
+        if raw is None:
+            return ()
+        expected, times = self.topics.rules[PATH_ROLE].frame, axis.arrived(raw.arrival_ns)
+        paths = []
+        for t, path in zip(times.tolist(), decode_paths(raw, self.bag.types, self.bag.ros1), strict=True):
+            if path is None:
+                text = f"a path cannot be decoded as {raw.type}"
+                self.problems.append(Problem("error", "unreadable", raw.topic, text, t=t))
+                continue
+            points, frame = path
+            if expected and frame != expected:
+                text = f"path in frame {frame!r}, expected {expected!r}"
+                self.problems.append(Problem("error", "wrong_frame", raw.topic, text, t=t))
+            paths.append(ReferencePath(t, points, frame))
+        return tuple(paths)
+
+    def summary(self, raw: RawTopic, axis: TimeAxis) -> TopicSummary:
+        roles = {full_name(self.namespace, rule.topic): role for role, rule in self.topics.rules.items()}
+        role = roles.get(raw.topic, "")
+        clock = self.topics.rules[role].clock if role else "robot"
+        stamp_ns = stamps_of_prefixes(raw, self.bag.types, self.bag.ros1)
+        t_arrival = axis.arrived(raw.arrival_ns)
+        t = t_arrival if stamp_ns is None else axis.measured(clock, stamp_ns)
+        return summarise(raw, role, t, t_arrival, stamp_ns is not None)

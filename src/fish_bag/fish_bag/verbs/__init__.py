@@ -1,0 +1,1 @@
+"""Commands of this package for `robofish`, one module each."""

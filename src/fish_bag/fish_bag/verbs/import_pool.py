@@ -1,0 +1,36 @@
+"""Convert the real robot's ROS 1 bags (own message types) to recordings in the project's format."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("bags", type=Path, nargs="+", help=".bag files or folders of them")
+    parser.add_argument("--out", type=Path, required=True, help="folder in which every bag gets a recording")
+
+
+def run(args: argparse.Namespace) -> int:
+    from fish_bag.dataset import find_trials
+    from fish_bag.pool_import import import_bag
+
+    bags = [bag for path in args.bags for bag in find_trials(path)]
+    console = Console()
+    table = Table(
+        "recording", "messages", "robot's clock (s)", "camera's clock (s)", "rotor residual (rad/s)"
+    )
+    for bag in track(bags, "importing", console=console, transient=True):
+        report = import_bag(bag, args.out / bag.stem)
+        offsets = f"{report.robot_offset_s:.6f}", f"{report.camera_offset_s:.6f}"
+        table.add_row(bag.stem, str(report.messages), *offsets, f"{report.rotor_residual:.2f}")
+    console.print(table)
+    console.print(
+        "clock: recorder minus that clock; rotor residual: median of encoder minus rebuilt command",
+        highlight=False,
+    )
+    return 0

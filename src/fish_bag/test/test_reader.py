@@ -1,0 +1,191 @@
+"""read_trial: every storage format gives the values that were written, on one time axis."""
+
+import shutil
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+
+from fish_bag import RecordingError, TopicMap, read_trial
+from fish_bag import sample_recordings as samples
+from fish_bag.message_types import typestore
+from fish_bag.topic_map import DEFAULT_RULES, TopicRule
+
+
+def write_rosbag2(directory, messages, plugin, mode=CompressionMode.NONE):
+    writer = Writer2(directory, version=9, storage_plugin=plugin)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    connections = {}
+    with writer:
+        for arrival_ns, topic, message in messages:
+            kind = message.__msgtype__
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=typestore())
+            writer.write(connections[topic], arrival_ns, bytes(typestore().serialize_cdr(message, kind)))
+    return directory
+
+
+def write_rosbag1(path, messages):
+    store, connections = typestore(ros1=True), {}
+    with Writer1(path) as writer:
+        for arrival_ns, topic, message in messages:
+            kind = message.__msgtype__
+            if kind not in store.types:
+                continue
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], arrival_ns, bytes(store.serialize_ros1(to_ros1(message), kind)))
+    return path
+
+
+def to_ros1(message):
+    """The same message as ROS 1 has it: headers carry a sequence number."""
+    if isinstance(message, list):
+        return [to_ros1(item) for item in message]
+    if not hasattr(message, "__msgtype__"):
+        return message
+    store = typestore(ros1=True)
+    fields = {name: 0 for name, _ in store.fielddefs[message.__msgtype__][1] if name == "seq"}
+    fields |= {k: to_ros1(v) for k, v in vars(message).items() if not k.isupper()}
+    return store.types[message.__msgtype__](**fields)
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory):
+    """The same messages in every format."""
+    folder, messages = tmp_path_factory.mktemp("formats"), samples.robot_messages()
+    own = samples.write_mcap(folder / "own", messages, {"robot": "test fish"})
+    shutil.copy(own / "own.mcap", folder / "bare.mcap")
+    return {
+        "own": own,
+        "bare": folder / "bare.mcap",
+        "mcap": write_rosbag2(folder / "mcap", messages, StoragePlugin.MCAP),
+        "mcap zstd chunks": write_rosbag2(
+            folder / "z", messages, StoragePlugin.MCAP, CompressionMode.STORAGE
+        ),
+        "mcap zstd messages": write_rosbag2(
+            folder / "zm", messages, StoragePlugin.MCAP, CompressionMode.MESSAGE
+        ),
+        "mcap zstd file": write_rosbag2(folder / "zf", messages, StoragePlugin.MCAP, CompressionMode.FILE),
+        "sqlite3": write_rosbag2(folder / "sq", messages, StoragePlugin.SQLITE3),
+        "sqlite3 zstd": write_rosbag2(
+            folder / "sqz", messages, StoragePlugin.SQLITE3, CompressionMode.MESSAGE
+        ),
+        "ros1": write_rosbag1(folder / "ros1.bag", messages),
+    }
+
+
+FORMATS = (
+    "own", "bare", "mcap", "mcap zstd chunks", "mcap zstd messages", "mcap zstd file", "sqlite3",
+    "sqlite3 zstd", "ros1",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_values_and_times(sources, form):
+    trial = read_trial(sources[form])
+    assert [p for p in trial.problems if p.severity != "info"] == []
+    assert (trial.namespace, trial.axis, trial.origin_ns) == ("/fish", "recorder", samples.START_NS)
+    t = np.arange(0, 2, 0.01)
+    for stream, latency in ((trial.commands, 0.0), (trial.encoder, 0.001), (trial.imu, 0.002)):
+        np.testing.assert_allclose(stream.t, t, atol=2e-9)
+        np.testing.assert_allclose(stream.t_arrival - stream.t, latency, atol=2e-9)
+    np.testing.assert_array_equal(trial.commands.rotor_speed, samples.rotor_speed(t))
+    np.testing.assert_array_equal(trial.commands.rotor_phase, samples.phase(t))
+    np.testing.assert_array_equal(trial.commands.rudder, samples.rudder(t))
+    np.testing.assert_array_equal(trial.encoder.angle, 0.5 * t)
+    np.testing.assert_array_equal(trial.encoder.speed, samples.rotor_speed(t) - 0.5)
+    np.testing.assert_array_equal(trial.imu.gyro, np.column_stack([0.1 + 0 * t, 0.2 + 0 * t, t]))
+    np.testing.assert_array_equal(trial.imu.accel[:, 1], t)
+    np.testing.assert_array_equal(trial.imu.orientation[0], [0, 0, 0.6, 0.8])
+    tc = np.arange(0.005, 2, 1 / 30)
+    np.testing.assert_allclose(trial.camera.t, tc, atol=2e-9)
+    np.testing.assert_allclose(trial.camera.pose, samples.pose(tc), atol=1e-12)
+    np.testing.assert_array_equal(trial.camera.covariance[0], np.diag([4e-6, 4e-6, 1.44e-4]))
+    assert trial.tail.names == ("tail_1", "tail_2")
+    np.testing.assert_allclose(trial.tail.angle, np.column_stack([0.1 * tc, -0.2 * tc]))
+    np.testing.assert_allclose(trial.odometry.pose, samples.pose(t), atol=1e-12)
+    np.testing.assert_allclose(trial.odometry.v, 0.01 * t)
+    assert trial.gains.names == ("p", "i", "d", "p2", "i2", "d2")
+    np.testing.assert_allclose(trial.gains.values[:, 5], np.arange(0, 2, 0.02))
+    np.testing.assert_allclose(trial.target.course, 0.5)
+    np.testing.assert_array_equal(trial.tracking_error.heading, 0.02)
+    np.testing.assert_array_equal(trial.reference_path, [[0, 0], [1, 0.5], [1.5, 0.5]])
+    assert trial.reference_speed.speed.tolist() == [0.2]
+    np.testing.assert_allclose(trial.battery.voltage, [12.0, 11.9], atol=1e-6)
+
+
+def test_custom_data_and_counts(sources):
+    trial = read_trial(sources["own"])
+    assert trial.metadata == {"robot": "test fish"}
+    by_topic = {topic.topic: topic for topic in trial.topics}
+    imu = by_topic["/fish/imu/data"]
+    assert (imu.count, imu.role, imu.stamped) == (200, "imu", True)
+    assert imu.rate_hz == pytest.approx(100, rel=1e-6)
+    np.testing.assert_allclose(imu.latency_s, 0.002, atol=1e-8)
+    assert by_topic["/fish/control/gains"].stamped is False
+
+
+def test_arrival_times_by_map(sources):
+    rules = dict(DEFAULT_RULES) | {"imu": TopicRule("imu/data", time="arrival")}
+    trial = read_trial(sources["own"], TopicMap(rules))
+    np.testing.assert_allclose(trial.imu.t, np.arange(0, 2, 0.01) + 0.002, atol=2e-9)
+
+
+def test_other_names_by_map(tmp_path):
+    messages = samples.robot_messages(0.5, namespace="/robots/seven")
+    messages = [(t, topic.replace("imu/data", "sensors/imu"), m) for t, topic, m in messages]
+    rules = dict(DEFAULT_RULES) | {"imu": TopicRule("/robots/seven/sensors/imu", frame="imu_link")}
+    trial = read_trial(samples.write_mcap(tmp_path / "a", messages), TopicMap(rules))
+    assert trial.namespace == "/robots/seven"
+    assert len(trial.imu) == 50
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda p: p / "nothing", "does not exist"),
+        (lambda p: _file(p / "empty.mcap", b""), "empty"),
+        (lambda p: _file(p / "notes.txt", b"hello"), "not a recording"),
+        (lambda p: _file(p / "junk.mcap", b"hello world" * 50), "truncated or damaged"),
+        (lambda p: _file(p / "junk.bag", b"hello world" * 50), "not a complete ROS 1 bag"),
+        (lambda p: _file(p / "junk.db3", b"hello world" * 50), "truncated or damaged"),
+        (lambda p: samples.write_mcap(p / "none", []), "no messages"),
+        (lambda p: _truncated(p), "robofish recover"),
+        (lambda p: _file(p / "folder" / "metadata.yaml", b"a: ["), "truncated or damaged"),
+    ],
+)
+def test_unreadable_recordings_say_why(tmp_path, make, text):
+    path = make(tmp_path)
+    with pytest.raises(RecordingError, match=text) as error:
+        read_trial(path if path.suffix or path.is_dir() or not path.exists() else path)
+    assert "Traceback" not in str(error.value) and str(tmp_path) in str(error.value)
+
+
+def test_foreign_recording_lists_what_it_holds(tmp_path):
+    path = samples.write_mcap(tmp_path / "a", [(1, "/lidar/range", samples.build.number(1.0))])
+    with pytest.raises(RecordingError, match=r"/lidar/range \(std_msgs/msg/Float64\)"):
+        read_trial(path)
+
+
+def test_two_robots_in_one_recording(tmp_path):
+    both = samples.robot_messages(0.2, "/fish") + samples.robot_messages(0.2, "/carp")
+    path = samples.write_mcap(tmp_path / "a", sorted(both, key=lambda m: m[0]))
+    with pytest.raises(RecordingError, match="2 robots"):
+        read_trial(path)
+    assert len(read_trial(path, TopicMap(namespace="/carp")).commands) == 20
+
+
+def _file(path, data):
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(data)
+    return path if path.name != "metadata.yaml" else path.parent
+
+
+def _truncated(folder):
+    path = samples.robot_recording(folder / "cut")
+    file = path / "cut.mcap"
+    file.write_bytes(file.read_bytes()[:50_000])
+    return path

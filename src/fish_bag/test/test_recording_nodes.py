@@ -1,0 +1,265 @@
+"""Recorder and replayer as real processes on real topics."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from fish_bag import sample_recordings as samples
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+import rclpy  # noqa: E402
+from rclpy.context import Context  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from sensor_msgs.msg import Imu, JointState  # noqa: E402
+from std_msgs.msg import Float64  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
+
+from fish_bag import RecordingError, read_trial  # noqa: E402
+from fish_bag.bag import read_bag  # noqa: E402
+from fish_bag.recover import recover  # noqa: E402
+from fish_node.domain import choose_domain  # noqa: E402
+
+pytestmark = pytest.mark.ros
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LOSSY = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+ALL = QoSProfile(depth=1000)
+
+
+class Peer:
+    """A node of this process in a domain of its own, and processes started beside it."""
+
+    def __init__(self) -> None:
+        self.domain = choose_domain()
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=self.domain)
+        self.node = Node("peer", namespace="fish", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.processes: list[subprocess.Popen] = []
+
+    def start(self, executable: str, /, **parameters: object) -> subprocess.Popen:
+        given = [a for k, v in parameters.items() for a in ("-p", f"{k}:={v}")]
+        process = subprocess.Popen(
+            [sys.executable, "-m", f"fish_bag.nodes.{executable}", "--ros-args", *given],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env=os.environ | {"ROS_DOMAIN_ID": str(self.domain)},
+        )  # fmt: skip
+        self.processes.append(process)
+        return process
+
+    def spin_until(self, condition: Callable[[], object], limit: float = 60.0) -> bool:
+        end = time.monotonic() + limit
+        while not condition() and time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.02)
+        return bool(condition())
+
+    def close(self) -> None:
+        for process in self.processes:
+            process.kill()
+            process.communicate()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+
+@pytest.fixture
+def peer() -> Iterator[Peer]:
+    bench = Peer()
+    yield bench
+    bench.close()
+
+
+def publish_all(peer: Peer, count: int) -> tuple[list[bytes], list[int]]:
+    """Topics of every quality of service, once the recorder listens; the IMU's raw bytes and times [ns]."""
+    latched = peer.node.create_publisher(Float64, "reference/speed", LATCHED)
+    latched.publish(Float64(data=0.25))  # before anybody listens
+    imu = peer.node.create_publisher(Imu, "imu/data", LOSSY)
+    command = peer.node.create_publisher(JointState, "joint_command", 10)
+    assert peer.spin_until(lambda: imu.get_subscription_count() and command.get_subscription_count())
+    raws, times = [], []
+    store = samples.typestore()
+    for i in range(count):
+        message = samples.build.imu(samples.ns(0.01 * i), (0, 0, i), (0, 0, 9.81), (0, 0, 0, 1))
+        raws.append(bytes(store.serialize_cdr(message, "sensor_msgs/msg/Imu")))
+        times.append(time.time_ns())
+        imu.publish(raws[-1])
+        command.publish(JointState(name=["rotor", "rudder"], position=[float(i), 0.0], velocity=[1.0, 0.0]))
+        peer.spin_until(lambda: False, limit=0.01)
+    return raws, times
+
+
+def test_recorder_keeps_every_byte(peer, tmp_path):
+    recorder = peer.start("recorder", output=tmp_path, name="run", robot="trout")
+    raws, times_ns = publish_all(peer, 100)
+    peer.spin_until(lambda: False, limit=0.3)
+    recorder.send_signal(signal.SIGTERM)
+    out, _ = recorder.communicate(timeout=15)
+    assert recorder.returncode == 0, out
+    assert "messages of" in out
+    bag = read_bag(tmp_path / "run", lambda *_: True)
+    topics = {raw.topic: raw for raw in bag.topics}
+    assert topics["/fish/imu/data"].raws == raws
+    assert len(topics["/fish/joint_command"].raws) == 100
+    assert len(topics["/fish/reference/speed"].raws) == 1
+    assert "/diagnostics" in topics
+    assert bag.metadata == {"robot": "trout"}
+    latency_s = (topics["/fish/imu/data"].arrival_ns - np.array(times_ns)) * 1e-9
+    assert np.all(latency_s > 0) and np.median(latency_s) < 0.2
+
+
+def test_killed_recorder_loses_at_most_a_second(peer, tmp_path):
+    recorder = peer.start("recorder", output=tmp_path, name="run")
+    raws, _ = publish_all(peer, 200)
+    killed_ns = time.time_ns()
+    recorder.kill()
+    recorder.wait()
+    with pytest.raises(RecordingError, match="robofish recover"):
+        read_trial(tmp_path / "run")
+    result = recover(tmp_path / "run", tmp_path / "saved")
+    assert (killed_ns - result.last_ns) * 1e-9 < 1.0
+    saved = read_bag(tmp_path / "saved", lambda *_: True)
+    imu = next(raw for raw in saved.topics if raw.topic == "/fish/imu/data")
+    assert len(imu.raws) > 100 and imu.raws == raws[: len(imu.raws)]
+
+
+@pytest.mark.parametrize(
+    ("node", "parameters", "text"),
+    [
+        ("recorder", {"output": "/proc/none"}, "recorder: "),
+        ("replayer", {"recording": "/nowhere"}, "replayer: /nowhere: does not exist"),
+    ],
+)
+def test_bad_parameters_are_one_line(peer, node, parameters, text):
+    process = peer.start(node, **parameters)
+    out, _ = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert out.startswith(text) and "Traceback" not in out and len(out.splitlines()) == 1
+
+
+FULL_DISK = '''
+import errno, sys
+from fish_train.nodes import recorder
+from fish_bag.record_file import RecordFile
+
+class Full:
+    """A disk with room for 60 kB and for what the reserve gives back."""
+    def __init__(self, raw, reserve): self.raw, self.reserve, self.room = raw, reserve, 60_000
+    def __getattr__(self, name): return getattr(self.raw, name)
+    def write(self, data):
+        self.room -= len(data)
+        if self.room < 0 and self.reserve.exists(): raise OSError(errno.ENOSPC, "No space left on device")
+        return self.raw.write(data)
+
+start = RecordFile.__init__
+def limited(self, path):
+    start(self, path)
+    self._raw = Full(self._raw, self._reserve)
+RecordFile.__init__ = limited
+sys.exit(recorder.main())
+'''
+
+
+def test_full_disk_is_one_line_and_a_valid_recording(peer, tmp_path):
+    arguments = ["--ros-args", "-p", f"output:={tmp_path}", "-p", "name:=run", "--log-level", "warn"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", FULL_DISK, *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env=os.environ | {"ROS_DOMAIN_ID": str(peer.domain)},
+    )  # fmt: skip
+    peer.processes.append(process)
+    publish_all(peer, 250)
+    _, errors = process.communicate(timeout=15)
+    assert process.returncode == 1
+    assert errors.startswith("recorder: ") and "No space left on device" in errors
+    assert len(errors.splitlines()) == 1
+    assert len(read_trial(tmp_path / "run").imu) > 50
+
+
+def test_replay_sends_the_same_bytes_at_the_same_times(peer, tmp_path):
+    path = samples.robot_recording(tmp_path / "run", duration=2.0)
+    got: list[tuple[float, bytes]] = []
+    clock: list[int] = []
+    peer.node.create_subscription(
+        Imu, "imu/data", lambda raw: got.append((time.monotonic(), raw)), ALL, raw=True
+    )
+    other: list[bytes] = []
+    peer.node.create_subscription(JointState, "elsewhere", other.append, ALL, raw=True)
+    stamp = lambda m: clock.append(m.clock.sec * 10**9 + m.clock.nanosec)  # noqa: E731
+    peer.node.create_subscription(Clock, "/clock", stamp, ALL)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fish_bag.nodes.replayer", "--ros-args", "-p", f"recording:={path}",
+         "-p", "exclude:=['camera/*']", "-p", "start_delay_s:=8.0",  # a busy computer discovers slowly
+         "-r", "/fish/joint_command:=/fish/elsewhere"],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        env=os.environ | {"ROS_DOMAIN_ID": str(peer.domain)},
+    )  # fmt: skip
+    peer.processes.append(process)
+    assert peer.spin_until(lambda: process.poll() is not None)
+    peer.spin_until(lambda: False, limit=0.2)
+    out = process.stdout.read()
+    assert process.returncode == 0, out
+    sent = {raw.topic: raw.raws for raw in read_bag(path, lambda *_: True).topics}
+    assert [raw for _, raw in got] == sent["/fish/imu/data"]
+    assert other == sent["/fish/joint_command"]
+    times = np.array([t for t, _ in got])
+    lateness = times - times[0] - np.arange(200) * 0.01
+    assert np.all(lateness > -0.5)  # the first may have come late, none comes long before its time
+    assert np.median(np.abs(lateness - np.median(lateness))) < 0.05
+    assert np.all(np.diff(clock) > 0) and len(clock) > 20
+    assert clock[-1] - clock[0] == pytest.approx(2e9, abs=1e8)
+
+
+def test_pause_rate_and_loop(peer, tmp_path):
+    path = samples.robot_recording(tmp_path / "run", duration=1.0)
+    got: list[int] = []
+    peer.node.create_subscription(
+        Imu, "imu/data", lambda m: got.append(round(m.angular_velocity.z * 100)), ALL
+    )
+    pause = peer.node.create_client(SetBool, "replayer/pause")
+    process = peer.start(
+        "replayer", recording=path, paused=True, loop=True, rate=2.0, topics="['imu/data']", start_delay_s=0.0
+    )
+    assert pause.wait_for_service(20.0) and peer.spin_until(
+        lambda: peer.node.count_publishers("/fish/imu/data")
+    )
+    peer.spin_until(lambda: False, limit=0.5)
+    assert got == []
+    started = time.monotonic()
+    assert peer.spin_until(pause.call_async(SetBool.Request(data=False)).done)
+    assert peer.spin_until(lambda: len(got) >= 250)
+    assert time.monotonic() - started > 1.0  # 2.5 rounds of 1 s at rate 2 take 1.25 s
+    assert got[:250] == [*range(100), *range(100), *range(50)]
+    done = pause.call_async(SetBool.Request(data=True))
+    assert peer.spin_until(done.done) and done.result().message == "paused"
+    peer.spin_until(lambda: False, limit=0.3)
+    stopped = len(got)
+    peer.spin_until(lambda: False, limit=0.5)
+    assert len(got) == stopped
+    process.send_signal(signal.SIGINT)
+    assert process.wait(10) == 0
+
+
+def test_ctrl_c_does_not_tear_what_the_recorder_is_writing(monkeypatch):
+    """rclpy ends the spinning; a KeyboardInterrupt in the middle of a record would leave half of it in the file."""
+    from fish_bag.nodes import recorder
+
+    written = []
+
+    def run(make_node: object, name: str) -> int:
+        os.kill(os.getpid(), signal.SIGINT)
+        written.append(name)
+        return 0
+
+    monkeypatch.setattr(recorder, "run", run)
+    before = signal.getsignal(signal.SIGINT)
+    assert recorder.main() == 0 and written == ["recorder"]
+    assert signal.getsignal(signal.SIGINT) is before

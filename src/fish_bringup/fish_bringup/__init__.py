@@ -1,0 +1,1 @@
+"""Starts the robot: node table, process starter, launch files, demo, score, excite."""

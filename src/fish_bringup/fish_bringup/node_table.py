@@ -1,0 +1,126 @@
+"""The one table of the robot's nodes, and how each is started.
+
+The pip-only starter (`processes.py`, used by `robofish demo` and the tests) and launch/fish.launch.py
+read it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
+
+from fish_report.errors import UserError
+
+NAMESPACE = "/fish"
+FAST_DDS, PROFILE = "rmw_fastrtps_cpp", "FASTRTPS_DEFAULT_PROFILES_FILE"
+Parameters = Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """An installed executable and the parameter file it is started with.
+
+    Attributes:
+        parameter_file: in config/ of the package's share directory.
+    """
+
+    package: str
+    executable: str
+    parameter_file: str
+
+    @property
+    def name(self) -> str:
+        """For people and log files: package/executable."""
+        return f"{self.package}/{self.executable}"
+
+
+SIMULATED = (
+    NodeSpec("fish_sim", "simulator", "simulator.yaml"),
+    NodeSpec("fish_sim", "camera", "camera.yaml"),
+)
+REAL = (
+    NodeSpec("fish_hw", "rotor", "rotor.yaml"),
+    NodeSpec("fish_hw", "rudder", "rudder.yaml"),
+    NodeSpec("fish_hw", "imu", "imu.yaml"),
+    NodeSpec("fish_hw", "camera", "camera.yaml"),
+)
+CONTROL = (
+    NodeSpec("fish_vision", "tracker", "tracker.yaml"),
+    NodeSpec("fish_control", "fusion", "fusion.yaml"),
+    NodeSpec("fish_control", "planner", "planner.yaml"),
+    NodeSpec("fish_control", "controller", "controller.yaml"),
+)
+EXCITER = NodeSpec("fish_control", "exciter", "exciter.yaml")
+RECORDER = NodeSpec("fish_bag", "recorder", "recorder.yaml")
+REPLAYER = NodeSpec("fish_bag", "replayer", "replayer.yaml")
+
+ROBOTS = {"sim": (*SIMULATED, *CONTROL, RECORDER), "real": (*REAL, *CONTROL, RECORDER)}
+
+
+def open_loop(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
+    """A robot's nodes with the exciter in the place of planner and controller."""
+    return (*(spec for spec in robot if spec not in CONTROL[2:]), EXCITER)
+
+
+def executable_path(spec: NodeSpec) -> Path:
+    """install/<package>/lib/<package>/<executable>, what `ros2 run` starts.
+
+    Raises:
+        UserError: not built, or the workspace is not sourced.
+    """
+    try:
+        path = Path(get_package_prefix(spec.package)) / "lib" / spec.package / spec.executable
+    except (PackageNotFoundError, OSError):  # OSError: AMENT_PREFIX_PATH is empty
+        raise UserError(
+            f"package {spec.package} is not in this shell's workspace; "
+            "build it (make build) and source install/setup.bash"
+        ) from None
+    if not path.exists():
+        raise UserError(f"{path} does not exist; build the workspace again (make build)")
+    return path
+
+
+def parameter_path(spec: NodeSpec) -> Path:
+    """The installed parameter file."""
+    return Path(get_package_share_directory(spec.package)) / "config" / spec.parameter_file
+
+
+def command(spec: NodeSpec, parameters: Parameters | None = None, namespace: str = NAMESPACE) -> list[str]:
+    """Command line of a node: its parameter file, then single parameters that override it."""
+    line = [str(executable_path(spec)), "--ros-args", "-r", f"__ns:={namespace}"]
+    line += ["--params-file", str(parameter_path(spec))]
+    for name, value in (parameters or {}).items():
+        line += ["-p", f"{name}:={json.dumps(value)}"]  # JSON is YAML, and keeps "N" a string and 1.0 a float
+    return line
+
+
+def middleware() -> dict[str, str]:
+    """What keeps a robot's messages on this computer, and a node that was killed from making others deaf.
+
+    Fast DDS: config/loopback.xml, and the discovery range left to it (LOCALHOST would add shared memory again).
+    Another middleware, or a profile of the caller's own: the discovery range alone.
+    """
+    if os.environ.get("RMW_IMPLEMENTATION", FAST_DDS) == FAST_DDS:
+        profile = str(Path(get_package_share_directory("fish_bringup")) / "config" / "loopback.xml")
+        if os.environ.get(PROFILE, profile) == profile:
+            return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", PROFILE: profile}
+    return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+def environment(domain: int) -> dict[str, str]:
+    """The environment of every node: an own DDS domain on this machine only, one thread for small matrices.
+
+    The ROS wheels start Python again with LD_LIBRARY_PATH set and leave a guard variable behind; a child
+    gets both (inherited) or, where a caller dropped the path, neither.
+    """
+    env = dict(os.environ)
+    env.update(middleware(), ROS_DOMAIN_ID=str(domain), PYTHONUNBUFFERED="1")
+    env.setdefault("OMP_NUM_THREADS", "1")
+    if not env.get("LD_LIBRARY_PATH"):
+        env.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
+    return env

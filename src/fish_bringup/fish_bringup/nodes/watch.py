@@ -1,0 +1,91 @@
+"""Watches a run from outside, for progress lines and tests: where the robot is, what the nodes say.
+
+In: odometry/filtered, reference/path, /diagnostics. Out: nothing. Not a process of its own: it lives in
+the command that starts the robot.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import atan2
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry, Path
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from fish_bringup.node_table import NAMESPACE, middleware
+from fish_bringup.run_watch import Sight
+from fish_bringup.score import path_from_points
+from fish_control.path_tracker import PathTracker
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class WatchNode(Node):
+    """Keeps the latest of what it hears; progress and cross-track error from the path followed in order."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__("watch", namespace=NAMESPACE, context=context)
+        self.sight: Sight | None = None
+        self.diagnostics: dict[str, dict[str, str]] = {}
+        self.levels: dict[str, tuple[int, str]] = {}
+        self.tracker: PathTracker | None = None
+        self.create_subscription(Path, "reference/path", self._on_path, LATCHED)
+        self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 1)
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 50)
+
+    def sees(self, node: str) -> bool:
+        """Whether a node of this name is in the graph."""
+        return node in self.get_node_names()
+
+    def _on_path(self, msg: Path) -> None:
+        if self.tracker is None and len(msg.poses) > 1:
+            points = np.array([[pose.pose.position.x, pose.pose.position.y] for pose in msg.poses])
+            self.tracker = PathTracker(path_from_points(points))
+
+    def _on_odometry(self, msg: Odometry) -> None:
+        stamp = msg.header.stamp.sec + 1e-9 * msg.header.stamp.nanosec
+        position, q = msg.pose.pose.position, msg.pose.pose.orientation
+        heading = 2.0 * atan2(q.z, q.w)  # rotation about z only
+        self.sight = Sight(stamp, position.x, position.y, heading, msg.twist.twist.linear.x)
+
+    def _on_diagnostics(self, msg: DiagnosticArray) -> None:
+        for status in msg.status:
+            name = status.name.lstrip("/")
+            self.diagnostics[name] = {item.key: item.value for item in status.values}
+            self.levels[name] = (int.from_bytes(status.level), status.message)
+
+
+@contextmanager
+def watching(domain: int) -> Iterator[tuple[WatchNode, Callable[[float], None]]]:
+    """A WatchNode in an own context of the domain, and a function that listens for so many seconds.
+
+    Signals stay with the caller: ROS installs no handlers.
+    """
+    os.environ.update(middleware())
+    context = Context()
+    rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    node = WatchNode(context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+
+    def listen(seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            executor.spin_once(timeout_sec=left)
+
+    try:
+        yield node, listen
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        context.try_shutdown()

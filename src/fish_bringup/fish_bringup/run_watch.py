@@ -1,0 +1,150 @@
+"""One run of the started robot, watched until it ends: progress, end of path or time, nodes that fail or hang."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from rich.console import Console
+from rich.status import Status
+
+from fish_bringup.node_table import CONTROL, NodeSpec
+from fish_bringup.processes import NodeProcesses
+from fish_control.path_tracker import PathTracker
+from fish_report.errors import UserError
+from fish_report.interruption import Interruption
+
+FUSION = CONTROL[1]  # says odometry/filtered
+START_TIMEOUT = 30.0  # s in which each thing that is waited for must come
+STILL_TIMEOUT = 30.0  # s of real time without any new stamp of the estimate, however slow the computer
+LOOK_PERIOD = 0.1  # s between looks at the robot
+LAST_LOOK = 0.5  # s after the end of the path: the estimate may be there a little before the fish
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The robot's estimate of itself, last heard."""
+
+    stamp: float  # s, header stamp
+    x: float  # m
+    y: float  # m
+    heading: float  # rad
+    speed: float  # m/s, surge
+
+
+class Watch(Protocol):
+    """What the watching node has heard last."""
+
+    sight: Sight | None
+    tracker: PathTracker | None
+
+
+@dataclass(frozen=True)
+class SwimEnd:
+    """How a run ended, and what it cost.
+
+    Attributes:
+        seconds: wall time from the first odometry to the end.
+        cpu: share of one core each node used meanwhile.
+    """
+
+    reason: str
+    seconds: float
+    cpu: dict[NodeSpec, float]
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A started robot and the eyes on it."""
+
+    nodes: NodeProcesses
+    watch: Watch
+    listen: Callable[[float], None]  # for so many seconds
+    interruption: Interruption
+
+    def wait_for(self, there: Callable[[], bool], what: str) -> None:
+        """Listen until something is there.
+
+        Raises:
+            UserError: a node ended, or it did not come in time.
+            KeyboardInterrupt: the user does not want to wait.
+        """
+        deadline = time.monotonic() + START_TIMEOUT
+        while not there():
+            self._look()
+            if self.interruption.asked:
+                raise KeyboardInterrupt
+            if time.monotonic() > deadline:
+                raise UserError(f"no {what} within {START_TIMEOUT:.0f} s; see the logs of the nodes")
+
+    def swim(self, duration: float, console: Console) -> SwimEnd:
+        """Watch for at most `duration` seconds of the robot's own time, with a line of progress."""
+        begin, before = time.monotonic(), self.nodes.cpu_times()
+        with console.status("") as line:
+            reason = self._follow(duration, line)
+        seconds = time.monotonic() - begin
+        used = {spec: spent - before[spec] for spec, spent in self.nodes.cpu_times().items()}
+        return SwimEnd(reason, seconds, {spec: cpu_s / seconds for spec, cpu_s in used.items()})
+
+    def _follow(self, duration: float, line: Status) -> str:
+        """Until the end of the path, one lap of a closed one, the end of the time or Ctrl-C; the reason."""
+        sight, tracker = self._seen()
+        first, lap_start = sight.stamp, tracker.progress
+        patience = Patience(self.nodes)
+        while (t := sight.stamp - first) < duration and not self.interruption.asked:
+            self._look()
+            sight, tracker = self._seen()
+            patience.heed(sight)
+            on_path = tracker.update((sight.x, sight.y))
+            line.update(
+                f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
+                f"cross-track {1000 * on_path.cross_track_error:+4.0f} mm   speed {sight.speed:.2f} m/s   "
+                f"{on_path.progress:.2f} of {tracker.path.length:.2f} m"
+            )
+            if on_path.finished:
+                self.listen(LAST_LOOK)
+                return "at the end of the path"
+            if tracker.path.closed and on_path.progress - lap_start >= tracker.path.length:
+                return "after one lap"
+        return "as interrupted" if self.interruption.asked else f"after {duration:.0f} s"
+
+    def _seen(self) -> tuple[Sight, PathTracker]:
+        if self.watch.sight is None or self.watch.tracker is None:
+            raise RuntimeError("wait for odometry and path before swimming")
+        return self.watch.sight, self.watch.tracker
+
+    def _look(self) -> None:
+        self.listen(LOOK_PERIOD)
+        check_running(self.nodes)
+
+
+class Patience:
+    """Ends a run whose estimate stands still: its time is told by the robot's stamps, and would never be over."""
+
+    def __init__(self, nodes: NodeProcesses) -> None:
+        self._nodes = nodes
+        self._stamp, self._since = float("nan"), time.monotonic()
+
+    def heed(self, sight: Sight | None) -> None:
+        """Called with what was last seen, look after look.
+
+        Raises:
+            UserError: for a long time nothing new, though every node lives.
+        """
+        if sight is not None and sight.stamp != self._stamp:
+            self._stamp, self._since = sight.stamp, time.monotonic()
+        elif time.monotonic() - self._since > STILL_TIMEOUT:
+            raise UserError(
+                f"no new odometry/filtered for {STILL_TIMEOUT:g} s: {FUSION.name}, or a node that it hears (simulator, camera, "
+                f"tracker), hangs; see {self._nodes.running[FUSION].log} and the logs beside it; what was recorded is kept"
+            )
+
+
+def check_running(nodes: NodeProcesses) -> None:
+    """Raise UserError with a node's last words if one has ended."""
+    for process in nodes.ended():
+        raise UserError(
+            f"{process.spec.name} ended with status {process.status}: {process.last_words()} (log: {process.log})"
+        )

@@ -1,0 +1,145 @@
+"""The whole robot: start every node, let the fish swim a path, record, score and show it.
+
+Simulator, camera, tracker, fusion, planner, controller and recorder run as processes of their own, on
+their own ROS domain. The run ends at the end of the path (a closed one: after a lap), after --duration, or
+with Ctrl-C; what was recorded is then scored.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.console import Console
+
+from fish_bag import read_trial
+from fish_bringup.node_table import (
+    CONTROL,
+    RECORDER,
+    ROBOTS,
+    SIMULATED,
+    NodeSpec,
+    Parameters,
+)
+from fish_bringup.nodes.watch import watching
+from fish_bringup.processes import NodeProcesses
+from fish_bringup.run_page import write_run_page
+from fish_bringup.run_watch import Robot, SwimEnd
+from fish_bringup.score import score_trial
+from fish_bringup.score_table import error_table
+from fish_control.paths import make_path, read_arguments
+from fish_control.reference_path import PathError
+from fish_node.domain import choose_domain
+from fish_report.errors import UserError, user_errors
+from fish_report.interruption import Interruption
+from fish_report.output_folder import new_folder
+from fish_report.page import Table
+from fish_report.terminal import print_table
+
+LONGEST = 600.0  # s, a run that does not end by itself
+SIMULATOR = SIMULATED[0]
+PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("--letter", default="R", help="letter, or a path family such as circle (R)")
+    parser.add_argument(
+        "--path-args", default="", help="of the family, YAML: '{radius: 0.5}', '{file: my.svg}'"
+    )
+    parser.add_argument("--speed", type=float, default=0.2, help="surge speed, m/s (0.2)")
+    parser.add_argument(
+        "--duration", type=float, default=LONGEST, help="s, the longest run; a lap ends a closed path"
+    )
+    parser.add_argument("--weights", type=Path, help="weights file of the controller (the one it ships with)")
+    parser.add_argument("--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims")
+    parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
+    parser.add_argument("--out", type=Path, help="new folder for recording, page and logs (out/...)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Swim, record, score, show."""
+    if not args.duration > 0.0:
+        raise UserError(f"duration is {args.duration:g} s, expected a positive number")
+    with user_errors():
+        domain = choose_domain(args.domain)
+    start = start_pose(args.letter, args.path_args)
+    folder = new_folder(args.out, "demo_" + "".join(c if c.isalnum() else "_" for c in args.letter))
+    console = Console(highlight=False)
+    console.print(f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}")
+    end, latency = _swim(domain, node_parameters(args, start, folder), folder, args.duration, console)
+    console.print(f"ended {end.reason}, {end.seconds:.1f} s after the first odometry")
+    trial = read_trial(folder / "recording")
+    score = score_trial(trial)
+    tables = [error_table(score), latency, _cpu_table(end)]
+    for table in tables:
+        print_table(console, table)
+    page = folder / "report.html"
+    write_run_page(page, f"Path {args.letter} at {args.speed:g} m/s", trial, score, tables)
+    console.print(f"recording: {folder / 'recording'}\npage: {page}", soft_wrap=True)
+    return 0
+
+
+def node_parameters(
+    args: argparse.Namespace, start: Parameters, folder: Path
+) -> dict[NodeSpec, dict[str, object]]:
+    """What the command line changes in the nodes' parameter files."""
+    changed: dict[NodeSpec, dict[str, object]] = {
+        SIMULATOR: dict(start),
+        PLANNER: {"path": args.letter, "path_args": args.path_args, "speed": args.speed},
+        RECORDER: {"output": str(folder.resolve()), "name": "recording"},
+    }
+    if args.robot:
+        changed[SIMULATOR]["robot_file"] = str(args.robot.resolve())
+    if args.weights:
+        changed[CONTROLLER] = {"weights_file": str(args.weights.resolve())}
+    return changed
+
+
+def start_pose(name: str, path_args: str) -> Parameters:
+    """The fish waits at the beginning of the path, along it.
+
+    Raises:
+        UserError: no such path.
+    """
+    try:
+        path = make_path(name, **read_arguments(path_args, "path-args"))
+    except PathError as error:
+        raise UserError(str(error)) from error
+    (x, y), heading = path.point(0.0), float(path.heading_at(0.0))
+    return {"start_x": float(x), "start_y": float(y), "start_heading": heading}
+
+
+def _swim(
+    domain: int, changed: Mapping[NodeSpec, Parameters], folder: Path, duration: float, console: Console
+) -> tuple[SwimEnd, Table]:
+    """Start the nodes, watch the run, end them; the recorder comes before the fish moves and ends first."""
+    with Interruption() as interruption, NodeProcesses(domain, folder / "logs") as nodes:
+        with watching(domain) as (watch, listen):
+            robot = Robot(nodes, watch, listen, interruption)
+            for spec in ROBOTS["sim"]:
+                if spec != CONTROLLER:
+                    nodes.start(spec, changed.get(spec))
+            robot.wait_for(lambda: watch.sees(RECORDER.executable), "recorder")
+            nodes.start(CONTROLLER, changed.get(CONTROLLER))
+            robot.wait_for(lambda: watch.tracker is not None, "reference/path")
+            robot.wait_for(lambda: watch.sight is not None, "odometry/filtered")
+            end = robot.swim(duration, console)
+            nodes.stop([RECORDER])
+            return end, _latency_table(watch.diagnostics)
+
+
+def _latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:
+    """What the controller says of its own latency and period."""
+    said = next((values for name, values in diagnostics.items() if name.endswith("/controller")), {})
+    rows = [[key, value] for key, value in said.items() if "latency" in key or "period" in key]
+    return Table(
+        "Controller", ["value", "measured"], rows, "Latency: stamp of the measurement to the command."
+    )
+
+
+def _cpu_table(end: SwimEnd) -> Table:
+    rows = [[spec.name, f"{100 * share:.0f} %"] for spec, share in end.cpu.items()]
+    rows.append(["all nodes", f"{100 * sum(end.cpu.values()):.0f} %"])
+    return Table("CPU", ["node", "of one core"], rows, f"Mean over {end.seconds:.0f} s of swimming.")

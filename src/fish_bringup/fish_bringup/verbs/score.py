@@ -1,0 +1,37 @@
+"""Score a recorded run against its reference path: a table and a self-contained page."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+
+from fish_bag import read_trial
+from fish_bringup.run_page import write_run_page
+from fish_bringup.score import score_trial
+from fish_bringup.score_table import error_table
+from fish_report.named_path import named_path
+from fish_report.terminal import print_table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("recording", type=Path, help="a recording with reference/path and odometry")
+    parser.add_argument(
+        "--out", type=Path, help="page to write (default: score_<name>.html beside the recording)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the table of errors and write the page."""
+    recording = named_path(args.recording)
+    trial = read_trial(recording)
+    score = score_trial(trial)
+    table = error_table(score)
+    print_table(Console(), table)
+    # named after the recording: it replaces neither the page of the one beside it nor a demo's report.html
+    page = args.out or recording.parent / f"score_{trial.name}.html"
+    write_run_page(page, f"Run {trial.name}", trial, score, [table])
+    print(f"page: {page}")
+    return 0

@@ -1,0 +1,238 @@
+"""The node table: complete, startable, the same for the pip-only starter and the launch file."""
+
+import os
+import runpy
+import sys
+import types
+from pathlib import Path
+
+import ament_index_python.packages
+import pytest
+import yaml
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from fish_bringup import node_table  # noqa: E402
+from fish_bringup.node_table import NodeSpec  # noqa: E402
+from fish_report.errors import UserError  # noqa: E402
+
+SOURCE = Path(__file__).parents[2]
+EVERY_NODE = sorted(
+    {*node_table.ROBOTS["sim"], *node_table.ROBOTS["real"], node_table.REPLAYER, node_table.EXCITER},
+    key=lambda spec: spec.name,
+)
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """A stand-in for the install space with one executable."""
+    node = tmp_path / "lib" / "fish_sim" / "camera"
+    node.parent.mkdir(parents=True)
+    node.touch()
+    monkeypatch.setattr(node_table, "get_package_prefix", lambda _: str(tmp_path))
+    for module in (node_table, ament_index_python.packages):
+        monkeypatch.setattr(
+            module, "get_package_share_directory", lambda package: f"{tmp_path}/share/{package}"
+        )
+    return tmp_path
+
+
+@pytest.mark.parametrize("spec", EVERY_NODE, ids=lambda spec: spec.name)
+def test_every_node_has_an_entry_point_and_a_parameter_file(spec):
+    assert f'"{spec.executable} = {spec.package}.' in (SOURCE / spec.package / "setup.py").read_text()
+    parameters = yaml.safe_load((SOURCE / spec.package / "config" / spec.parameter_file).read_text())
+    for settings in parameters.values():
+        assert isinstance(settings["ros__parameters"], dict)
+
+
+def test_command_line_keeps_types_of_parameters(installed):
+    spec = NodeSpec("fish_sim", "camera", "camera.yaml")
+    line = node_table.command(spec, {"path": "N", "speed": 1.0, "loop": True})
+    given = [line[k + 1] for k, word in enumerate(line) if word == "-p"]
+    values = {name: yaml.safe_load(value) for name, value in (item.split(":=", 1) for item in given)}
+    assert values == {"path": "N", "speed": 1.0, "loop": True}
+    assert all(type(values[name]) is kind for name, kind in (("path", str), ("speed", float), ("loop", bool)))
+    assert line[0] == str(installed / "lib/fish_sim/camera")
+
+
+def test_an_executable_that_is_not_built_is_named(installed):
+    with pytest.raises(UserError, match="lib/fish_sim/absent does not exist; build"):
+        node_table.command(NodeSpec("fish_sim", "absent", "camera.yaml"))
+
+
+def test_a_workspace_that_is_not_sourced_is_said(monkeypatch):
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    with pytest.raises(UserError, match="source install/setup.bash"):
+        node_table.command(NodeSpec("fish_sim", "camera", "camera.yaml"))
+
+
+def test_children_inherit_the_wheels_guard_only_with_the_library_path(monkeypatch):
+    monkeypatch.setenv("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "1")
+    monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)
+    assert "_ROS_WHEELS_BOOTSTRAP_COMPLETE" not in node_table.environment(7)
+    monkeypatch.setenv("LD_LIBRARY_PATH", "somewhere")
+    child = node_table.environment(7)
+    assert child["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] == "1"
+    assert child["ROS_DOMAIN_ID"] == "7"
+
+
+def test_messages_stay_on_this_computer_with_any_middleware(monkeypatch):
+    for variable in ("RMW_IMPLEMENTATION", node_table.PROFILE):
+        monkeypatch.delenv(variable, raising=False)
+    ours = node_table.middleware()
+    assert "type>UDPv4" in Path(ours[node_table.PROFILE]).read_text()
+    assert ours["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
+    # as a process sees it that runs in this environment
+    monkeypatch.setenv(node_table.PROFILE, ours[node_table.PROFILE])
+    assert node_table.middleware() == ours
+    monkeypatch.setenv(node_table.PROFILE, "their.xml")
+    assert node_table.middleware() == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    monkeypatch.delenv(node_table.PROFILE)
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
+    assert node_table.middleware() == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+class Recorded(types.SimpleNamespace):
+    """Stands for a class of launch: keeps what it was made with."""
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(args=args, **kwargs)
+
+
+class Configuration(Recorded):
+    """Stands for LaunchConfiguration; the context is a dict of arguments."""
+
+    def perform(self, context):
+        return context[self.args[0]]
+
+
+@pytest.fixture
+def launch_names(installed, monkeypatch):
+    """The names of a package's launch file, with stand-ins for launch and launch_ros, which have no wheels."""
+    stand_ins = {
+        "launch": {"LaunchContext": dict, "LaunchDescription": Recorded},
+        "launch.actions": {"DeclareLaunchArgument": Recorded, "OpaqueFunction": Recorded},
+        "launch.conditions": {"IfCondition": Recorded},
+        "launch.substitutions": {"LaunchConfiguration": Configuration},
+        "launch_ros": {},
+        "launch_ros.actions": {"Node": Recorded},
+        "launch_ros.parameter_descriptions": {"ParameterValue": Recorded},
+    }
+    for name, members in stand_ins.items():
+        module = types.ModuleType(name)
+        vars(module).update(members)
+        monkeypatch.setitem(sys.modules, name, module)
+    return lambda package, file: runpy.run_path(str(SOURCE / package / "launch" / file))
+
+
+@pytest.fixture
+def launch_file(launch_names):
+    """The whole robot's."""
+    return launch_names("fish_bringup", "fish.launch.py")
+
+
+@pytest.fixture
+def launched(launch_file):
+    """launched(path="S", ...): the nodes that the launch file starts with these arguments, by executable, in order."""
+    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
+    defaults = {name: default for name, (default, _) in launch_file["ARGUMENTS"].items()}
+
+    def nodes(**given):
+        assert given.keys() <= defaults.keys()
+        return {node.executable: node for node in opaque.function({**defaults, **given})}
+
+    return nodes
+
+
+def parameters(node):
+    """Files and, for each parameter in a dict, the argument that it is taken from and its type."""
+    return [
+        given
+        if isinstance(given, str)
+        else {name: (value.args[0].args[0], value.value_type) for name, value in given.items()}
+        for given in node.parameters
+    ]
+
+
+@pytest.mark.parametrize("robot", node_table.ROBOTS)
+def test_the_launch_file_starts_the_table(launch_file, launched, robot):
+    started = [(n.package, n.executable, parameters(n)) for n in launched(robot=robot).values()]
+    assert started == [
+        (s.package, s.executable, [str(node_table.parameter_path(s))]) for s in node_table.ROBOTS[robot]
+    ]
+    [*arguments, _] = launch_file["generate_launch_description"]().args[0]
+    assert {argument.args[0] for argument in arguments} >= {"robot", "path", "speed", "use_sim_time"}
+
+
+@pytest.mark.parametrize("robot", node_table.ROBOTS)
+def test_with_a_program_the_exciter_takes_the_place_of_planner_and_controller(launched, robot):
+    nodes = launched(robot=robot, program="diagnosis.json", begin="2.5", end="34")
+    assert list(nodes) == [
+        *(s.executable for s in node_table.ROBOTS[robot] if s.executable not in ("planner", "controller")),
+        "exciter",
+    ]
+    given = {"program_file": ("program", str), "begin": ("begin", float), "end": ("end", float)}
+    assert parameters(nodes["exciter"]) == [str(node_table.parameter_path(node_table.EXCITER)), given]
+
+
+def test_the_launch_file_hands_the_planner_its_path_and_arguments_as_text(launched):
+    """Else launch would read {radius: 0.6} as a dict, and N as false."""
+    planner = launched(path="circle", path_args="{radius: 0.6}", speed="0.1")["planner"]
+    given = {"path": ("path", str), "path_args": ("path_args", str), "speed": ("speed", float)}
+    assert parameters(planner) == [str(node_table.parameter_path(node_table.CONTROL[2])), given]
+
+
+def test_the_launch_file_refuses_an_unknown_robot(launched):
+    with pytest.raises(RuntimeError, match="known: sim, real"):
+        launched(robot="whale")
+
+
+@pytest.mark.parametrize(
+    ("given", "overridden"),
+    [
+        ({}, {}),
+        ({"path": "S"}, {"path": ("path", str)}),
+        (
+            {"speed": "0.1", "use_sim_time": "true"},
+            {"use_sim_time": ("use_sim_time", bool), "speed": ("speed", float)},
+        ),
+    ],
+)
+def test_only_arguments_that_are_given_override_a_robots_own_values(launched, tmp_path, given, overridden):
+    """The arguments' defaults had overridden the robot's own planner.yaml."""
+    own = [tmp_path / "planner.yaml", tmp_path / "fusion.yaml"]
+    for file in own:
+        file.touch()
+    nodes = launched(robot="real", config=str(tmp_path), **given)
+    installed = [
+        str(node_table.parameter_path(spec)) for spec in (node_table.CONTROL[2], node_table.CONTROL[1])
+    ]
+    last = [overridden] if overridden else []
+    assert parameters(nodes["planner"]) == [installed[0], str(own[0]), *last]
+    everybody = [{"use_sim_time": overridden["use_sim_time"]}] if "use_sim_time" in overridden else []
+    assert parameters(nodes["fusion"]) == [installed[1], str(own[1]), *everybody]
+
+
+def test_a_robots_own_values_override_the_installed_ones(launched, tmp_path):
+    context = {"robot": "real", "config": str(tmp_path)}
+    with pytest.raises(RuntimeError, match=r"holds none of .*; expected some of rotor.yaml, rudder.yaml"):
+        launched(**context)
+    (tmp_path / "tracker.yaml").touch()
+    files = {name: parameters(node) for name, node in launched(**context).items()}
+    assert files["tracker"][1:] == [str(tmp_path / "tracker.yaml")]
+    assert all(len(given) == 1 for name, given in files.items() if name != "tracker")
+
+
+def test_the_drivers_alone_take_a_robots_own_values_in_the_same_way(launch_names, tmp_path):
+    [*arguments, opaque] = launch_names("fish_hw", "drivers.launch.py")["generate_launch_description"]().args[
+        0
+    ]
+    with pytest.raises(RuntimeError, match="holds none of .*; expected some of rotor.yaml, rudder.yaml"):
+        opaque.function({"config": str(tmp_path)})
+    (tmp_path / "rotor.yaml").touch()
+    drivers = [spec for spec in node_table.ROBOTS["real"] if spec.package == "fish_hw"]
+    installed = {spec.executable: [str(node_table.parameter_path(spec))] for spec in drivers}
+    for config, own in (("", []), (str(tmp_path), [str(tmp_path / "rotor.yaml")])):
+        files = {node.executable: node.parameters for node in opaque.function({"config": config})}
+        assert files == {**installed, "rotor": installed["rotor"] + own}
+    assert {argument.args[0] for argument in arguments} == {"config", "namespace", *installed}

@@ -1,0 +1,158 @@
+"""How a watched run ends, with a fish that moves along its path whenever somebody listens."""
+
+import os
+import signal
+import time
+from contextlib import contextmanager, nullcontext
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from fish_bringup.node_table import ROBOTS, NodeSpec
+from fish_bringup.run_watch import FUSION, Robot, Sight
+from fish_bringup.verbs import excite
+from fish_control.path_tracker import PathTracker
+from fish_control.paths import make_path
+from fish_report.errors import UserError
+from fish_report.interruption import Interruption
+
+NODE = NodeSpec("test", "node", "none.yaml")
+
+
+class Fish:
+    """Swims along a path at 0.2 m/s of its own time, which passes while somebody listens."""
+
+    def __init__(self, path):
+        self.path, self.tracker, self.time = path, PathTracker(path), 0.0
+        self.events = {}  # s of its time -> something that happens
+
+    @property
+    def sight(self):
+        x, y = self.path.point(0.2 * self.time)
+        return Sight(self.time, float(x), float(y), 0.0, 0.2)
+
+    def listen(self, seconds):
+        self.time += seconds
+        for when in [when for when in self.events if when <= self.time]:
+            self.events.pop(when)()
+
+
+@pytest.fixture
+def nodes():
+    """Nodes that run on."""
+    running = {FUSION: SimpleNamespace(log="logs/fusion.log")}
+    return SimpleNamespace(cpu_times=lambda: {NODE: 1.0}, ended=lambda: [], running=running)
+
+
+@pytest.fixture
+def interruption():
+    with Interruption() as interruption:
+        yield interruption
+
+
+def swim(fish, nodes, interruption, duration=600.0):
+    return Robot(nodes, fish, fish.listen, interruption).swim(duration, Console(quiet=True))
+
+
+def test_a_run_ends_at_the_end_of_an_open_path(nodes, interruption):
+    fish = Fish(make_path("straight", length=2.0))
+    assert swim(fish, nodes, interruption).reason == "at the end of the path"
+    assert fish.time == pytest.approx(2.0 / 0.2 + 0.5, abs=0.3)
+
+
+def test_a_run_on_a_closed_path_ends_after_a_lap(nodes, interruption):
+    fish = Fish(make_path("circle", radius=0.5))
+    assert swim(fish, nodes, interruption).reason == "after one lap"
+    assert fish.time == pytest.approx(fish.path.length / 0.2, abs=0.3)
+
+
+def test_a_run_ends_after_its_duration(nodes, interruption):
+    fish = Fish(make_path("circle"))
+    assert swim(fish, nodes, interruption, 3.0).reason == "after 3 s"
+    assert fish.time == pytest.approx(3.0, abs=0.2)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_run_in_order(number, nodes, interruption):
+    fish = Fish(make_path("circle"))
+    fish.events[1.0] = lambda: os.kill(os.getpid(), number)
+    assert swim(fish, nodes, interruption).reason == "as interrupted"
+    assert fish.time < 1.5
+
+
+def test_a_node_that_ends_is_said_with_its_last_words(nodes, interruption):
+    fish = Fish(make_path("circle"))
+    dead = SimpleNamespace(spec=NODE, status=3, last_words=lambda: "no such weights", log="node.log")
+    fish.events[1.0] = lambda: setattr(nodes, "ended", lambda: [dead])
+    with pytest.raises(UserError, match="test/node ended with status 3: no such weights"):
+        swim(fish, nodes, interruption)
+
+
+class Stuck(Fish):
+    """Nothing new is heard of it from the second second on; whoever listens waits."""
+
+    @property
+    def sight(self):
+        self.time = min(self.time, 2.0)
+        return super().sight
+
+    def listen(self, seconds):
+        time.sleep(0.01)
+        super().listen(seconds)
+
+
+def test_a_robot_of_which_nothing_new_is_heard_is_not_waited_for(nodes, interruption, monkeypatch):
+    monkeypatch.setattr("fish_bringup.run_watch.STILL_TIMEOUT", 0.3)
+    with pytest.raises(UserError, match="no new odometry/filtered for 0.3 s: .*hangs; see logs/fusion.log"):
+        swim(Stuck(make_path("circle")), nodes, interruption)
+
+
+def test_a_slow_robot_is_waited_for(nodes, interruption, monkeypatch):
+    """A stamp now and then is enough, its own time as slow as it will."""
+    monkeypatch.setattr("fish_bringup.run_watch.STILL_TIMEOUT", 0.3)
+
+    class Slow(Fish):
+        def listen(self, seconds):
+            time.sleep(0.1)
+            super().listen(0.1 * seconds)
+
+    fish = Slow(make_path("circle"))
+    assert swim(fish, nodes, interruption, 0.1).reason == "after 0 s"
+
+
+def test_an_experiment_ends_when_nothing_new_is_heard_of_the_robot(tmp_path, monkeypatch):
+    """Its nodes are ended like those of any other run that fails."""
+    monkeypatch.setattr("fish_bringup.run_watch.STILL_TIMEOUT", 0.3)
+    fish, ended = Stuck(make_path("circle")), []
+    fish.sees, fish.diagnostics = lambda _: True, {excite.EXCITER_NAME: {"over": "false", "time_s": "2"}}
+
+    @contextmanager
+    def started(domain, logs):
+        try:
+            yield SimpleNamespace(
+                start=lambda *_: None, ended=lambda: [], running={FUSION: SimpleNamespace(log="fusion.log")}
+            )
+        finally:
+            ended.append(domain)
+
+    monkeypatch.setattr(excite, "NodeProcesses", started)
+    monkeypatch.setattr(excite, "watching", lambda _: nullcontext((fish, fish.listen)))
+    changed = dict.fromkeys(excite.open_loop(ROBOTS["sim"]), {})
+    with pytest.raises(UserError, match="no new odometry/filtered for 0.3 s: .*see fusion.log"):
+        excite._swim(7, changed, tmp_path, SimpleNamespace(asked=False), Console(quiet=True))
+    assert ended == [7]
+
+
+def test_waiting_can_be_interrupted(nodes, interruption):
+    fish = Fish(make_path("circle"))
+    fish.events[1.0] = lambda: os.kill(os.getpid(), signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        Robot(nodes, fish, fish.listen, interruption).wait_for(lambda: False, "nothing")
+
+
+def test_handlers_are_put_back():
+    before = signal.getsignal(signal.SIGTERM)
+    with Interruption():
+        assert signal.getsignal(signal.SIGTERM) != before
+    assert signal.getsignal(signal.SIGTERM) == before

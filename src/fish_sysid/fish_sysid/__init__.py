@@ -1,0 +1,1 @@
+"""System identification and diagnosis: fits the robot's parameters and names the physics that its model lacks."""

@@ -1,0 +1,1 @@
+"""Recordings as an experiment: trials on one time grid."""

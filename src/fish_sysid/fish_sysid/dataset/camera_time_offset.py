@@ -1,0 +1,105 @@
+"""How much older than its stamp the camera's image is, from camera and gyro alone.
+
+The heading that the camera shows at t is the fish's at t - d, whose changes the gyro measures:
+
+    d = argmin of sum over windows | psi_camera(t) - integral of r up to (t - d), less a straight line |^2
+
+The straight line takes the gyro's bias and the unknown start away; no model of the fish is needed. The likelihood of a model
+has many optima in d, one per stroke, as soon as d is more than a quarter of one: this finds the right one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_sysid.dataset.experiment import Experiment, Frames
+
+Array = NDArray[np.float64]
+
+WINDOW = 4.0  # s, of poses that are compared
+LEAST_FRAMES = 12  # in a window
+LARGEST = 1.0  # s, delay that is looked for
+STEP = 0.01  # s
+DELAYS = np.arange(0.0, LARGEST + 0.5 * STEP, STEP)
+CLIP = 0.5  # rad; windows in which the markers were swapped count no more than this
+CLEAR = 0.7  # rms at the best delay over rms at none, below which a delay is stated
+SMALLEST = 0.03  # s, about a frame; below it the filter's own parameter finds it
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Camera and gyro laid over each other."""
+
+    delay: float  # s, how much older than its stamp an image is; 0 where the data do not clearly say so
+    rms: float  # rad, heading of the camera less that of the gyro at this delay
+    rms_undelayed: float  # rad, the same without a delay
+
+
+def align(experiment: Experiment) -> Alignment:
+    """The delay common to all trials; 0 with rms NaN where no trial has a gyro and enough poses."""
+    squares, count = misfits(experiment)
+    if not count.any():
+        return Alignment(0.0, np.nan, np.nan)
+    rms = np.sqrt(np.nansum(squares * count[:, None], axis=0) / count.sum())
+    best = int(rms.argmin())
+    clear = rms[best] < CLEAR * rms[0] and DELAYS[best] >= SMALLEST and best < len(DELAYS) - 1
+    best = best if clear else 0
+    return Alignment(float(DELAYS[best]), float(rms[best]), float(rms[0]))
+
+
+def misfits(experiment: Experiment) -> tuple[Array, NDArray[np.int64]]:
+    """Mean squares (M, D) [rad^2] at each of DELAYS, NaN without a gyro, and the number of windows (M,) behind them."""
+    squares = np.full((len(experiment.names), len(DELAYS)), np.nan)
+    count = np.zeros(len(squares), dtype=np.int64)
+    for m, frames in enumerate(experiment.frames):
+        turned = _turned(experiment, m)
+        picks = [] if turned is None else _windows(frames, experiment.steps[m] * DT)
+        if turned is None or not picks:
+            continue
+        rows = [_misfit(frames.t[pick], frames.pose[pick, 2], turned, DELAYS) for pick in picks]
+        squares[m], count[m] = np.mean(rows, axis=0), len(rows)
+    return squares, count
+
+
+def _turned(experiment: Experiment, m: int) -> Array | None:
+    """Integral of the gyro (steps,) [rad] up to half a step after each grid point of trial m; None without a gyro."""
+    gyro = experiment.gyro[: experiment.steps[m], m]
+    known = np.flatnonzero(np.isfinite(gyro))
+    if len(known) < 2:
+        return None
+    angle: Array = DT * np.cumsum(np.interp(np.arange(len(gyro)), known, gyro[known]))
+    return angle
+
+
+def _windows(frames: Frames, duration: float) -> list[NDArray[np.int64]]:
+    """Indices of the frames of each window that starts late enough for every delay."""
+    out = []
+    for start in np.arange(LARGEST, duration - WINDOW, WINDOW):
+        pick = np.flatnonzero((frames.t >= start) & (frames.t < start + WINDOW))
+        if len(pick) >= LEAST_FRAMES:
+            out.append(pick)
+    return out
+
+
+def _misfit(t: Array, heading: Array, turned: Array, delays: Array) -> Array:
+    """Mean squares [rad^2] of the differences less their straight lines, one per delay."""
+    taken = t[:, None] - delays
+    difference = heading[:, None] - np.interp(taken / DT, np.arange(len(turned)) + 0.5, turned)
+    line = np.column_stack([np.ones_like(t), t - t.mean()])
+    rest = difference - line @ np.linalg.lstsq(line, difference, rcond=None)[0]
+    return np.asarray(np.mean(np.minimum(rest**2, CLIP**2), axis=0))
+
+
+def moved_back(experiment: Experiment, delay: float) -> Experiment:
+    """The experiment with every image at the moment it was taken; those taken before the first command are left out."""
+    frames = tuple(_moved(f, delay) for f in experiment.frames)
+    return replace(experiment, frames=frames)
+
+
+def _moved(frames: Frames, delay: float) -> Frames:
+    keep = frames.t >= delay
+    return Frames(frames.t[keep] - delay, frames.pose[keep])

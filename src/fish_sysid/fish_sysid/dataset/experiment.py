@@ -1,0 +1,171 @@
+"""Trials on the filter's grid: every 10 ms a command, an IMU sample, an encoder sample and perhaps a camera pose.
+
+All trials of a data set stand side by side, padded to the longest; `steps` says where a trial ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_bag.trial import Commands, Trial
+from fish_sim.model import DT
+from fish_sysid.dataset.command_gaps import LostCommandsError, told_on_grid
+from fish_sysid.dataset.imu_leveling import level
+from fish_sysid.dataset.resample import apart, on_grid
+from fish_sysid.dataset.rest_detection import starts_at_rest
+from fish_sysid.dataset.rotor_coasting import driven
+
+Array = NDArray[np.float64]
+
+FEWEST_POSES = 3
+UNKNOWN = 1.0  # s from the first command on in which neither camera nor gyro say where the fish heads
+
+
+class ExperimentError(ValueError):
+    """The recordings do not allow what was asked; the message says what is missing."""
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Camera poses of one trial in order of stamps."""
+
+    t: Array  # (F,) s from the trial's grid start
+    pose: Array  # (F, 3) x, y [m], psi [rad] unwrapped, pool frame
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Trials on one grid of 10 ms; NaN where a sensor says nothing."""
+
+    names: tuple[str, ...]  # M trials
+    steps: NDArray[np.int64]  # (M,) grid points with data
+    commands: Array  # (T, M, 2) rotor speed [rad/s], rudder [rad]
+    gyro: Array  # (T, M) rad/s, about the vertical
+    accel: Array  # (T, M, 2) m/s^2, level forward and left
+    encoder: Array  # (T, M) rad/s
+    frames: tuple[Frames, ...]
+    start_at_rest: bool  # fish and rotor still, rudder centred, at the first grid point
+
+    def select(self, which: Sequence[int]) -> Experiment:
+        """Some of the trials."""
+        index = np.array(which, dtype=int)
+        longest = int(self.steps[index].max())
+        arrays = {k: getattr(self, k)[:longest, index] for k in ("commands", "gyro", "accel", "encoder")}
+        names, frames = tuple(self.names[i] for i in which), tuple(self.frames[i] for i in which)
+        return replace(self, names=names, frames=frames, steps=self.steps[index], **arrays)
+
+    def rest_of(self, trial: int, first: int) -> Experiment:
+        """One trial from a grid point on, with the fish in motion."""
+        one, start = self.select([trial]), first * DT
+        arrays = {k: getattr(one, k)[first:] for k in ("commands", "gyro", "accel", "encoder")}
+        seen = one.frames[0].t >= start
+        frames = (Frames(one.frames[0].t[seen] - start, one.frames[0].pose[seen]),)
+        return replace(one, steps=one.steps - first, frames=frames, start_at_rest=False, **arrays)
+
+    @property
+    def length(self) -> int:
+        return len(self.commands)
+
+    @property
+    def given_commands(self) -> Array:
+        """(N, 2) commands of all trials, one trial after the other, without what pads the shorter ones."""
+        return np.concatenate([self.commands[:steps, m] for m, steps in enumerate(self.steps)])
+
+
+def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None) -> Experiment:
+    """Put trials on the grid of their commands.
+
+    start_at_rest None: as `at_rest` finds, where all do.
+    What was measured before the first command or after the last one is left out: nobody knows what the rotor did then.
+    Raises ExperimentError when commands or camera poses are missing.
+    """
+    if not trials:
+        raise ExperimentError("no trial with data; expected at least one")
+    gridded = [_grid(trial.clean()) for trial in trials]
+    steps = np.array([len(g["commands"]) for g in gridded])
+    longest = int(steps.max())
+
+    def stack(key: str) -> Array:
+        filler = 0.0 if key == "commands" else np.nan
+        shape = (longest, len(gridded), *gridded[0][key].shape[1:])
+        out = np.full(shape, filler)
+        for i, g in enumerate(gridded):
+            out[: steps[i], i] = g[key]
+        return out
+
+    arrays = {key: stack(key) for key in ("commands", "gyro", "accel", "encoder")}
+    rest = start_at_rest
+    if rest is None:
+        sensors = [[g[key] for key in ("gyro", "accel", "encoder", "frame_t", "frame_pose")] for g in gridded]
+        rest = all(starts_at_rest(*own) for own in sensors)
+    frames = tuple(Frames(g["frame_t"], g["frame_pose"]) for g in gridded)
+    return Experiment(tuple(t.name for t in trials), steps, **arrays, frames=frames, start_at_rest=rest)
+
+
+def _grid(trial: Trial) -> dict[str, Array]:
+    if trial.commands is None:
+        raise ExperimentError(f"{trial.name}: no joint_command; the inputs of the fish are needed")
+    c, imu, encoder = trial.commands, trial.imu, trial.encoder
+    start, end = c.t[0], c.t[-1] + DT
+    count = int(np.floor((end - start) / DT + 1e-6)) + 1
+    t = start + DT * np.arange(count)
+    frames = _seen(trial, start, end)
+    nothing = np.full(count, np.nan)
+    gyro, accel = nothing, np.full((count, 2), np.nan)
+    if imu is not None:
+        gyro, accel = (on_grid(imu.t, felt, t, DT) for felt in level(imu))
+    _check_heading(trial.name, frames, gyro)
+    measured = nothing if encoder is None else on_grid(encoder.t, encoder.speed, t, DT)
+    commands, measured = _told(trial.name, c, t, measured)
+    commands[:, 0], measured = driven(commands[:, 0], measured)
+    return {
+        "commands": commands,
+        "gyro": gyro,
+        "accel": accel,
+        "encoder": measured,
+        "frame_t": frames.t,
+        "frame_pose": frames.pose,
+    }
+
+
+def _seen(trial: Trial, start: float, end: float) -> Frames:
+    """The camera's poses while commands came; of a camera that is faster than the grid those that each have a grid point."""
+    camera = trial.camera
+    if camera is None or len(camera) < FEWEST_POSES:
+        raise ExperimentError(f"{trial.name}: no camera/pose; at least three poses are needed")
+    seen = (camera.t >= start - 0.5 * DT) & (camera.t <= end)
+    if seen.sum() < FEWEST_POSES:
+        raise ExperimentError(
+            f"{trial.name}: {seen.sum()} camera poses between the first and the last command; at least three are needed"
+        )
+    kept = apart(camera.t[seen], DT)
+    pose = np.column_stack([camera.x, camera.y, np.unwrap(camera.psi)])
+    return Frames((camera.t[seen] - start)[kept], pose[seen][kept])
+
+
+def _check_heading(name: str, frames: Frames, gyro: Array) -> None:
+    """Refuse a trial in which the fish may have turned too far before anything tells where it heads."""
+    first = float(frames.t[0])
+    if DT * np.isnan(gyro[: max(round(first / DT), 0)]).sum() > UNKNOWN:
+        raise ExperimentError(
+            f"{name}: the first camera pose comes {first:.1f} s after the first command and no gyro tells how the fish turned "
+            f"until then; expected it within {UNKNOWN:g} s; start the camera before the commands"
+        )
+
+
+def _told(name: str, c: Commands, t: Array, encoder: Array) -> tuple[Array, Array]:
+    """`told_on_grid` of a trial's commands; raises ExperimentError where too many were lost."""
+    try:
+        return told_on_grid(c.t, np.column_stack([c.rotor_speed, c.rudder]), t, encoder)
+    except LostCommandsError as error:
+        raise ExperimentError(f"{name}: {error}") from error
+
+
+def shorten(experiment: Experiment, steps: int) -> Experiment:
+    """The first `steps` grid points of every trial."""
+    arrays = {k: getattr(experiment, k)[:steps] for k in ("commands", "gyro", "accel", "encoder")}
+    return replace(experiment, steps=np.minimum(experiment.steps, steps), **arrays)

@@ -1,0 +1,355 @@
+"""The filter's pass in NumPy, all trials at once: the readable form, and the one used without a C compiler.
+
+`filter_compiled` does the same per trial in C; a test holds them equal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_sysid.estimation.ekf_types import (
+    ENCODER_ROW,
+    ROWS,
+    WRENCH,
+    Array,
+    FilterResult,
+    History,
+    Noise,
+    Problem,
+    first_commands,
+    first_memory,
+    first_state,
+    place_frames,
+)
+from fish_sysid.estimation.encoder import encoder_terms
+
+SERIES = 8  # terms of the matrix exponential, as in c/filter.c
+
+
+class Filter:
+    """One pass over an experiment for given parameters."""
+
+    def __init__(self, problem: Problem, noise: Noise) -> None:
+        self.experiment, self.stepper, self.sensors = problem.experiment, problem.stepper, problem.sensors
+        self.p, self.dp, self.noise = problem.p, problem.dp, noise
+        layout = self.stepper.layout
+        self.trials, self.free = len(self.experiment.names), len(self.dp)
+        self.nq, self.nx, self.n = layout.links + 3, len(layout.motion), len(layout.motion) + 6
+        self.wrench_at = [layout.parameters.index(name) for name in WRENCH]
+        self.directions = self.nx + 3 + self.free
+        self.frames = place_frames(self.experiment, self.sensors)
+        self.memory, self.d_memory = self._follow_commands()
+
+    def run(self, keep: bool = False) -> FilterResult:
+        """Filter all trials; keep=True stores the history for the smoother.
+
+        A trial whose state is not finite any more is lost: it takes no further part, its log likelihood is -inf.
+        """
+        T, M, K, n = self.experiment.length, self.trials, self.free, self.n
+        start, start_P = first_state(self.experiment, self.stepper.layout, self.sensors, self.noise)
+        xi, P = start, start_P
+        D = np.zeros((M, n, K))  # of motion, wrench and biases; that of the memory is self.d_memory
+        sums, lost = _Sums(M, K, T), np.zeros(M, dtype=bool)
+        history = _empty_history(T, M, n, self.memory) if keep else None
+        decay = np.exp(-DT / self.noise.wrench_time)
+        Q = np.zeros((n, n))
+        wrench = slice(self.nx, self.nx + 3)
+        Q[wrench, wrench] = np.diag(np.square(self.noise.wrench) * (1.0 - decay**2))
+        Q[range(2 * self.nq), range(2 * self.nq)] = 1e-14  # keeps the covariance regular on the constraint
+        for k in range(T):
+            if history is not None:
+                history.predicted[k], history.predicted_P[k] = xi, P
+            active = (k < self.experiment.steps) & ~lost
+            xi, P, D = self._measure(k, xi, P, D, active, sums)
+            if history is not None:
+                history.filtered[k], history.filtered_P[k] = np.where(lost[:, None], np.nan, xi), P
+            if k == T - 1:
+                break
+            xi, F, D = self._predict(k, xi, D, decay)
+            P = F @ P @ F.transpose(0, 2, 1) + Q
+            P = 0.5 * (P + P.transpose(0, 2, 1))
+            gone = ~np.isfinite(xi).all(axis=1) | ~np.isfinite(P).all(axis=(1, 2))
+            lost |= gone & (k + 1 < self.experiment.steps)
+            # of such a trial nothing is used from here on, but numbers have to stand beside those of the others
+            xi[gone], P[gone], D[gone] = start[gone], start_P[gone], 0.0
+            if history is not None:
+                history.transition[k] = F
+        self._encoder(sums)
+        sums.log_likelihood[lost] = -np.inf
+        return FilterResult(
+            sums.log_likelihood, sums.samples, sums.gradient, sums.normal, sums.whitened, history
+        )
+
+    def _follow_commands(self) -> tuple[Array, Array]:
+        """Memory (T + 1, M, NM) and its derivatives (T + 1, M, NM, K): they need no motion."""
+        M, K, nm = self.trials, max(self.free, 1), len(self.stepper.layout.memory)
+        start, d_start = first_memory(first_commands(self.experiment), self.stepper, self.p, self.dp)
+        d_start = d_start.reshape(-1, nm) if self.free else np.zeros((M, nm))
+        commands = np.repeat(self.experiment.commands, K, axis=1)
+        dp = np.tile(self.dp, (M, 1)) if self.free else np.zeros((M, len(self.p)))
+        memory, tangents = self.stepper.memory_jvp(np.repeat(start, K, axis=0), commands, self.p, dp, d_start)
+        T = len(memory)
+        memory = memory.reshape(T, M, K, nm)[:, :, 0]
+        return memory, tangents.reshape(T, M, K, nm).transpose(0, 1, 3, 2)[..., : self.free]
+
+    def _directions(self, D: Array, moving: bool) -> tuple[Array, Array]:
+        """Tangent directions (M, directions, nx) of the motion and (M, directions, NP) of the parameters.
+
+        moving False: of the free parameters' directions only what they do to a given motion.
+        """
+        M, nx = self.trials, self.nx
+        ds = np.zeros((M, self.directions, nx))
+        ds[:, range(nx), range(nx)] = 1.0
+        if moving:
+            ds[:, nx + 3 :] = D[:, :nx].transpose(0, 2, 1)
+        dp = np.zeros((M, self.directions, len(self.p)))
+        dp[:, range(nx, nx + 3), self.wrench_at] = 1.0
+        dp[:, nx + 3 :] = self.dp
+        dp[:, nx + 3 :, self.wrench_at] = D[:, nx : nx + 3].transpose(0, 2, 1)
+        return ds, dp
+
+    def _parameters(self, xi: Array) -> Array:
+        p = np.tile(self.p, (self.trials, 1))
+        p[:, self.wrench_at] = xi[:, self.nx : self.nx + 3]
+        return p
+
+    def _predict(self, k: int, xi: Array, D: Array, decay: float) -> tuple[Array, Array, Array]:
+        """One step of 10 ms: (xi, F, D). The estimate takes the simulator's step.
+
+        Its tangents follow x' = A x + b, the Jacobian A taken in the middle of the step and the parameters' b in the middle
+        of each half: a few rates with tangents instead of one at every stage of the integrator.
+        """
+        M, nx, n, columns = self.trials, self.nx, self.n, self.nx + 3
+        start = np.concatenate([xi[:, :nx], self.memory[k]], axis=1)
+        end = self.stepper.rollout(start, self.experiment.commands[k][None], self._parameters(xi))[1]
+        ends = [self._rates(k, x[:, :nx], xi, D, c)[0] for x, c in ((start, 0.0), (end, 1.0))]
+
+        def own(fraction: float) -> Array:
+            motion = between(start[:, :nx], end[:, :nx], ends[0], ends[1], fraction)
+            tangent = self._rates(k, motion, xi, D, fraction, moving=False)[1]
+            return tangent.transpose(0, 2, 1)
+
+        A = own(0.5)
+        moving = np.zeros((M, nx, self.directions))
+        moving[:, range(nx), range(nx)] = 1.0
+        moving[:, :, columns:] = D[:, :nx]
+        for half in range(2):
+            b = own(0.25 + 0.5 * half)
+            b[:, :, :nx], b[:, :, nx:columns] = 0.0, A[:, :, nx:columns]
+            for _ in range(self.stepper.scheme.substeps):
+                moving = flow(A[:, :, :nx], b, 0.5 * DT / self.stepper.scheme.substeps, moving)
+        moved = xi.copy()
+        moved[:, :nx] = end[:, :nx]
+        moved[:, nx:columns] *= decay
+        F = np.tile(np.eye(n), (M, 1, 1))
+        F[:, :nx, :columns] = moving[:, :, :columns]
+        F[:, range(nx, columns), range(nx, columns)] = decay
+        D = D.copy()
+        D[:, :nx] = moving[:, :, columns:]
+        D[:, nx:columns] *= decay
+        return moved, F, D
+
+    def _measure(
+        self, k: int, xi: Array, P: Array, D: Array, active: NDArray[np.bool_], sums: _Sums
+    ) -> tuple[Array, Array, Array]:
+        """Take in IMU and camera of one grid point: (xi, P, D)."""
+        offset, pose = self.frames[0][k], self.frames[1][k]
+        z_imu = np.column_stack([self.experiment.gyro[k], self.experiment.accel[k]])
+        imu, camera = active & np.isfinite(z_imu).all(1), active & np.isfinite(offset)
+        if not imu.any() and not camera.any():
+            return xi, P, D
+        rate, tangent = self._rates(k, xi[:, : self.nx], xi, D, 0.0)
+        if imu.any():
+            h, H, dh = self._imu(xi, rate, tangent, D)
+            R = np.diag([self.noise.gyro**2, self.noise.accel**2, self.noise.accel**2])
+            xi, P, D = _update(
+                k, slice(0, 3), z_imu - h, H, dh, R, imu, self.noise.gate_imu, (xi, P, D), sums
+            )
+        if camera.any():
+            h, H, dh = self._camera(xi, np.nan_to_num(offset), rate, D)
+            position, heading = self.noise.camera_position, self.noise.camera_heading
+            R = np.diag([position**2, position**2, heading**2])
+            e = pose - h
+            e[:, 2] = (e[:, 2] + np.pi) % (2 * np.pi) - np.pi
+            xi, P, D = _update(k, slice(3, 6), e, H, dh, R, camera, self.noise.gate_camera, (xi, P, D), sums)
+        return xi, P, D
+
+    def _rates(
+        self, k: int, motion: Array, xi: Array, D: Array, fraction: float, moving: bool = True
+    ) -> tuple[Array, Array]:
+        """Rates (M, nx) of a motion at a fraction of the period after grid point k, and their tangents (M, directions, nx)."""
+        M, nx, R = self.trials, self.nx, self.directions
+        ds, dp = self._directions(D, moving)
+        drive = drive_at(self.memory[k, :, :2], self.memory[k + 1, :, :2], fraction)
+        d_drive = np.zeros((M, R, 4))
+        before, after = (d.transpose(0, 2, 1) for d in self.d_memory[k : k + 2, :, :2])
+        d_drive[:, nx + 3 :] = drive_at(before, after, fraction)
+        rate, tangent = self.stepper.rates_jvp(
+            np.repeat(motion, R, axis=0), np.repeat(drive, R, axis=0), np.repeat(self._parameters(xi), R, axis=0),
+            ds.reshape(M * R, nx), d_drive.reshape(M * R, 4), dp.reshape(M * R, -1),
+        )  # fmt: skip
+        return rate.reshape(M, R, nx)[:, 0], tangent.reshape(M, R, nx)
+
+    def _imu(self, xi: Array, rate: Array, tangent: Array, D: Array) -> tuple[Array, Array, Array]:
+        """Predicted gyro and accelerometer (M, 3), their Jacobian (M, 3, n) and derivatives (M, 3, K)."""
+        M, nq, nx, s = self.trials, self.nq, self.nx, self.sensors
+        axis = xi[:, 2] + s.imu_misalignment
+        cos, sin = np.cos(axis), np.sin(axis)
+        ax, ay = rate[:, nq], rate[:, nq + 1]
+        forward, left = ax * cos + ay * sin, ay * cos - ax * sin
+        h = np.stack([s.gyro_scale * xi[:, nq + 2], forward, left], axis=1) + xi[:, nx + 3 :]
+        t_x, t_y = tangent[:, :, nq], tangent[:, :, nq + 1]
+        turn = np.concatenate(
+            [np.zeros((M, nx + 3)), D[:, 2]], axis=1
+        )  # change of heading along each direction
+        turn[:, 2] = 1.0
+        spin = np.concatenate([np.zeros((M, nx + 3)), D[:, nq + 2]], axis=1)
+        spin[:, nq + 2] = 1.0
+        d = np.stack(
+            [
+                s.gyro_scale * spin,
+                t_x * cos[:, None] + t_y * sin[:, None] + left[:, None] * turn,
+                t_y * cos[:, None] - t_x * sin[:, None] - forward[:, None] * turn,
+            ],
+            axis=1,
+        )
+        H = np.concatenate([d[:, :, : nx + 3], np.tile(np.eye(3), (M, 1, 1))], axis=2)
+        dh = d[:, :, nx + 3 :] + D[:, nx + 3 :]
+        if "gyro_scale" in s.free:
+            dh[:, 0, s.free["gyro_scale"]] += s.slope.get("gyro_scale", 1.0) * xi[:, nq + 2]
+        if "imu_misalignment" in s.free:
+            dh[:, 1, s.free["imu_misalignment"]] += s.slope.get("imu_misalignment", 1.0) * left
+            dh[:, 2, s.free["imu_misalignment"]] -= s.slope.get("imu_misalignment", 1.0) * forward
+        return h, H, dh
+
+    def _camera(self, xi: Array, offset: Array, rate: Array, D: Array) -> tuple[Array, Array, Array]:
+        """Predicted camera pose at the grid point + offset, its Jacobian and derivatives."""
+        nq, s = self.nq, self.sensors
+        gain = np.array([s.camera_scale, s.camera_scale, 1.0])
+        velocity = xi[:, nq : nq + 3] + offset[:, None] * rate[:, nq : nq + 3]
+        here = (
+            xi[:, :3]
+            + offset[:, None] * xi[:, nq : nq + 3]
+            + 0.5 * offset[:, None] ** 2 * rate[:, nq : nq + 3]
+        )
+        h = here * gain + np.array([0.0, 0.0, s.camera_heading_offset])
+        H = np.zeros((self.trials, 3, self.n))
+        H[:, range(3), range(3)] = gain
+        H[:, range(3), range(nq, nq + 3)] = gain * offset[:, None]
+        dh = H @ D
+        if "camera_latency" in s.free:
+            dh[:, :, s.free["camera_latency"]] -= s.slope.get("camera_latency", 1.0) * gain * velocity
+        if "camera_scale" in s.free:
+            dh[:, :2, s.free["camera_scale"]] += s.slope.get("camera_scale", 1.0) * here[:, :2]
+        if "camera_heading_offset" in s.free:
+            dh[:, 2, s.free["camera_heading_offset"]] += s.slope.get("camera_heading_offset", 1.0)
+        return h, H, dh
+
+    def _encoder(self, sums: _Sums) -> None:
+        """The encoder reads the rotor's speed, which follows from the commands alone."""
+        T = self.experiment.length
+        terms = encoder_terms(self.experiment, self.noise, self.memory[:T, :, 1], self.d_memory[:T, :, 1])
+        sums.log_likelihood += terms.log_likelihood
+        sums.samples += terms.samples
+        sums.gradient += terms.gradient
+        sums.normal += terms.normal
+        sums.whitened[..., ENCODER_ROW] = terms.whitened
+
+
+def drive_at(start: Array, end: Array, fraction: float) -> Array:
+    """Rudder, its rate, rotor speed, its rate (..., 4) at a fraction of a period between two memories (..., 2)."""
+    rate = (end - start) / DT
+    now = start + fraction * (end - start)
+    return np.stack([now[..., 0], rate[..., 0], now[..., 1], rate[..., 1]], axis=-1)
+
+
+def between(x0: Array, x1: Array, rate0: Array, rate1: Array, c: float) -> Array:
+    """Motion at a fraction c of the period from x0 to x1 with these rates at its ends: Hermite's cubic."""
+    bend = (1.0 - c) * DT * rate0 - c * DT * rate1
+    blended: Array = x0 + (x1 - x0) * c * c * (3.0 - 2.0 * c) + c * (1.0 - c) * bend
+    return blended
+
+
+def flow(A: Array, b: Array, h: float, y: Array) -> Array:
+    """exp(A h) y + (integral of exp(A s) over 0 .. h) b by the series; A (M, nx, nx), b and y (M, nx, R)."""
+    total, term = y, y
+    for m in range(1, SERIES + 1):
+        term = h / m * (A @ term + (b if m == 1 else 0.0))
+        total = total + term
+    return total
+
+
+class _Sums:
+    """What a pass adds up."""
+
+    def __init__(self, trials: int, free: int, steps: int) -> None:
+        self.log_likelihood, self.samples = np.zeros(trials), np.zeros(trials)
+        self.gradient, self.normal = np.zeros((trials, free)), np.zeros((trials, free, free))
+        self.whitened = np.full((steps, trials, len(ROWS) + 1), np.nan)
+
+
+def _update(
+    k: int, rows: slice, e: Array, H: Array, dh: Array, R: Array, use: NDArray[np.bool_], gate: float,
+    state: tuple[Array, Array, Array], sums: _Sums,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Kalman update of the trials in `use`; innovations beyond `gate` (squared, normalised) are left out."""
+    xi, P, D = state
+    PHt = P @ H.transpose(0, 2, 1)
+    S, L, sound = _factored(H @ PHt + R)
+    use = use & sound
+    e = np.where(use[:, None], e, 0.0)
+    white = np.linalg.solve(L, e[..., None])[..., 0]
+    use = use & (np.sum(white**2, axis=1) < gate)
+    e = np.where(use[:, None], e, 0.0)
+    white = np.where(use[:, None], white, 0.0)
+    J = np.where(use[:, None, None], -np.linalg.solve(L, dh), 0.0)  # derivative of the whitened innovation
+    K = np.where(use[:, None, None], np.linalg.solve(S, PHt.transpose(0, 2, 1)).transpose(0, 2, 1), 0.0)
+    xi = xi + (K @ e[..., None])[..., 0]
+    D = D - K @ dh
+    P = P - K @ PHt.transpose(0, 2, 1)
+    log_det = 2.0 * np.sum(np.log(np.diagonal(L, axis1=1, axis2=2)), axis=1)
+    size = e.shape[1]
+    sums.log_likelihood -= 0.5 * np.where(
+        use, np.sum(white**2, axis=1) + log_det + size * np.log(2 * np.pi), 0.0
+    )
+    sums.samples += size * use
+    sums.gradient += np.einsum("mi,mik->mk", white, J)
+    sums.normal += J.transpose(0, 2, 1) @ J
+    sums.whitened[k, use, rows] = white[use]
+    return xi, P, D
+
+
+def _factored(S: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """(S, L, which): S (M, 3, 3) and its lower Cholesky factors; the unit matrix for both where S has none or no inverse.
+
+    Rounding leaves a filter neither that is about to be lost.
+    """
+    try:
+        return S, _factor(S), np.ones(len(S), dtype=bool)
+    except np.linalg.LinAlgError:
+        sound = np.array([_is_sound(own) for own in S], dtype=bool)
+        S = np.where(sound[:, None, None], S, np.eye(3))
+        return S, _factor(S), sound
+
+
+def _factor(S: Array) -> Array:
+    """The Cholesky factor. Raises LinAlgError where S has none, or no inverse."""
+    np.linalg.inv(S)
+    return np.asarray(np.linalg.cholesky(S), dtype=np.float64)
+
+
+def _is_sound(S: Array) -> bool:
+    try:
+        _factor(S)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _empty_history(T: int, M: int, n: int, memory: Array) -> History:
+    return History(
+        np.zeros((T, M, n)), np.zeros((T, M, n, n)), np.zeros((T, M, n)), np.zeros((T, M, n, n)),
+        np.zeros((T, M, n, n)), memory,
+    )  # fmt: skip

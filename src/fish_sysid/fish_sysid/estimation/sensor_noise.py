@@ -1,0 +1,60 @@
+"""Noise to start from: of usual water, and of the sensors as their signals' roughness tells it before anything is fitted.
+
+A fit that is told too small a sensor noise takes the rest for a rough force on the fish, and with it every parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import comb, sqrt
+
+import numpy as np
+
+from fish_sim.model import DT
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.estimation.ekf_types import Array, Noise
+from fish_sysid.estimation.encoder import (
+    NORMAL_MAD,
+    SMALLEST,
+    commanded_residual,
+    encoder_noise,
+)
+
+ORDER = 6  # of the differences: at 30 Hz they weaken a tail beat of 2 Hz 5000 times against white noise
+SLOWEST = 0.04  # s between samples; in the differences of slower ones the motion itself is left
+FEWEST = 50  # differences that an estimate needs
+
+
+def usual_noise(experiment: Experiment) -> Noise:
+    """`Noise()` with sensors as noisy as they are in these recordings; the encoder by its distance from the command."""
+    grid: Array = DT * np.arange(experiment.length, dtype=float)
+    frames = experiment.frames
+    signals: dict[str, list[tuple[Array, Array]]] = {
+        "gyro": [(grid, s) for s in experiment.gyro.T],
+        "accel": [(grid, s) for axis in (0, 1) for s in experiment.accel[..., axis].T],
+        "camera_position": [(f.t, f.pose[:, axis]) for f in frames for axis in (0, 1)],
+        "camera_heading": [(f.t, f.pose[:, 2]) for f in frames],
+    }
+    usual = Noise()
+    measured = {name: white_noise(own, getattr(usual, name)) for name, own in signals.items()}
+    measured["encoder"] = encoder_noise(commanded_residual(experiment), usual.encoder)
+    return replace(usual, **measured)  # type: ignore[arg-type]  # all numbers, no wrench among them
+
+
+def white_noise(signals: Sequence[tuple[Array, Array]], usual: float) -> float:
+    """Standard deviation of the noise of (times [s], values; NaN: no sample) by the median of their differences.
+
+    Hall, Kay and Titterington 1990; the median leaves out the signal's jumps. Never below half the usual value (a signal
+    that somebody has smoothed tells nothing); the usual one where there are too few samples or they come too slowly.
+    """
+    sizes = [np.zeros(0)]
+    for t, values in signals:
+        there = np.isfinite(values)
+        if there.sum() > ORDER and np.median(np.diff(t[there])) < SLOWEST:
+            sizes.append(np.abs(np.diff(values[there], ORDER)))
+    size = np.concatenate(sizes)
+    if len(size) < FEWEST:
+        return usual
+    found = float(np.median(size)) / NORMAL_MAD / sqrt(comb(2 * ORDER, ORDER))
+    return max(found, SMALLEST * usual)

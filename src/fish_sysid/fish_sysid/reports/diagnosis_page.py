@@ -1,0 +1,192 @@
+"""The page of a diagnosis: verdict first, then where, evidence, rivals, before and after, what to try next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fish_report.page import (
+    Figure,
+    Table,
+    Text,
+    write_page,
+)
+from fish_sysid.diagnosis.diagnosis_json import LAGS
+from fish_sysid.diagnosis.forward_selection import Round
+from fish_sysid.diagnosis.known_effects import own_effects, own_parameters
+from fish_sysid.diagnosis.result import Diagnosis
+from fish_sysid.diagnosis.screening import Ranked
+from fish_sysid.estimation.map_fit import Fit
+from fish_sysid.estimation.parametrization import specification
+from fish_sysid.reports.before_after import before_after
+from fish_sysid.reports.diagnosis_figures import (
+    force_against_covariates,
+    force_over_the_pool,
+    force_over_time,
+    moves_water,
+    program,
+    tells_when,
+    water_over_the_pool,
+    when_it_acts,
+)
+from fish_sysid.reports.verdict_sentence import sentence
+
+Content = dict[str, Any]
+
+DENSITY = "log_density_per_sample"
+NAT = "A nat is a unit of log-likelihood: by n nats more, what was measured is e^n times as probable."
+
+
+def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) -> None:
+    """Write report.html."""
+    blocks: list[Text | Table | Figure] = [
+        *(_found(entry) for entry in content["effects"]),
+        *_own_effects(d),
+        _fit_table(content, d.unseen_are),
+        before_after(d),
+        Figure(
+            "Missing force over the pool",
+            force_over_the_pool(d),
+            "darker: more force missing in the refitted nominal model",
+        ),
+        Figure(
+            "Missing force over time",
+            force_over_time(d),
+            "first training trial; grey: what remains with the effects found",
+        ),
+        Figure("Missing force against covariates", force_against_covariates(d)),
+        *(water_over_the_pool(entry, d) for entry in content["effects"] if moves_water(entry["name"])),
+        *(when_it_acts(entry) for entry in content["effects"] if _acts_in_a_range(entry, d)),
+        *_evidence(d),
+        _whiteness(content),
+        Text("Next experiment", content["next_experiment"]["why"]),
+        Figure("Its program", program(content)),
+        Text("Out of reach", _unreachable(d)),
+        *(Text("Left out", text) for text in content.get("left_out", ())),
+        Text("What remains", content["unexplained"]["description"]),
+    ]
+    write_page(path, f"Diagnosis of {name}", sentence(content), blocks)
+
+
+def _acts_in_a_range(effect: Content, d: Diagnosis) -> bool:
+    """Whether an effect pushes, and by a range of a covariate can be told when."""
+    push = d.pushes.get(effect["name"])
+    return push is not None and tells_when(effect["where"], push)
+
+
+def _found(effect: Content) -> Table:
+    """Equation, parameters, where it acts and what it could be mistaken for."""
+    rows = [[k, f"{p['value']:.4g}", f"{p['std']:.2g}", p["unit"]] for k, p in effect["parameters"].items()]
+    rivals = ", ".join(f"{r['name']} (probability {r['probability']:.2f})" for r in effect["rivals"])
+    note = (
+        f"{effect['equation']}. {_explains(effect['where']['dof'])} "
+        f"Could be mistaken for: {rivals or 'nothing else that was tried'}."
+    )
+    return Table(
+        f"What is missing: {effect['name']}", ["parameter", "value", "standard error", "unit"], rows, note
+    )
+
+
+def _own_effects(d: Diagnosis) -> list[Table]:
+    """What became of the effects and sensor errors that the robot was given with."""
+    given = {**d.robot.effects, **d.robot.sensors}
+    rows = [_own_row(name, given, d.final) for name in own_parameters(d.robot)]
+    header = ["parameter", "given", "refitted", "standard error", "unit"]
+    note = "Refitted together with the nominal parameters; these recordings say too little of the others to move them."
+    return [Table("The given robot's own effects", header, rows, note)] if rows else []
+
+
+def _own_row(name: str, given: Mapping[str, Mapping[str, float]], fit: Fit) -> list[str]:
+    effect, key = name.split(".")
+    value, unit = f"{given[effect][key]:.4g}", specification(effect)[key].unit
+    if name not in fit.hypothesis.free:
+        return [name, value, "", "", unit]
+    return [name, value, f"{fit.values[name]:.4g}", f"{fit.standard_errors[name]:.2g}", unit]
+
+
+def _explains(shares: Mapping[str, float]) -> str:
+    """How the force that was missing without an effect is shared among the degrees of freedom."""
+    if not any(shares.values()):
+        return "No force was missing without it."
+    parts = ", ".join(f"{share:.0%} in {dof}" for dof, share in shares.items())
+    return f"Of the force that was missing without it (variance over that of the water's) acts {parts}."
+
+
+def _fit_table(content: Content, trials: str) -> Table:
+    """Errors on `trials`; the gain with its interval, where more than one trial tells how far it spreads."""
+    fit, rows = content["fit"], []
+    for label in ("nominal", "refitted", "with_effects"):
+        entry = fit[label]
+        cells = [_errors(v) for v in entry["rms"].values()]
+        rows.append([label.replace("_", " "), *cells, f"{entry[DENSITY]:.3f}"])
+    if fit["model_yaml"]:
+        cells = [_errors(v) for v in fit["model_yaml"]["rms"].values()]
+        helped = ", ".join(fit["model_yaml"]["effects"]) or "no effects"
+        rows.append([f"model.yaml: fitted to predict over seconds, described with {helped}", *cells, ""])
+    header = ["model", *(f"{h}: m / rad / m/s" for h in fit["nominal"]["rms"]), "log density per sample"]
+    low, high = fit["improvement_ci95"]
+    gain = f"{fit['with_effects'][DENSITY] - fit['refitted'][DENSITY]:.3f} nats per sample"
+    spread = f", 95 % interval {low:.3f} to {high:.3f}" if np.isfinite(low) else ""
+    held = ", ".join(fit["held_out_trials"]) or "none"
+    note = f"Held out: {held}. {NAT} Gain of the effects over the refitted model: {gain}{spread}."
+    return Table(f"Prediction errors on {trials}, before and after", header, rows, note)
+
+
+def _errors(rms: Mapping[str, float]) -> str:
+    return f"{rms['position_m']:.3f} / {rms['heading_rad']:.3f} / {rms['speed_m_s']:.3f}"
+
+
+EVIDENCE_HEADER = ("name", "quick gain, nats", "refitted gain, nats", "parameters")
+EVIDENCE_NOTE = (
+    f"{NAT} Every candidate is fitted together with all nominal parameters and the noise; "
+    "gains are over the refitted model, so what its parameters absorb does not count. "
+    "Diverged: at the quick fit's values the model does not follow the recordings at all."
+)
+
+
+def _evidence(d: Diagnosis) -> list[Table]:
+    tables = []
+    for number, found in enumerate(d.rounds, 1):
+        given = own_effects(d.robot)
+        added = [name for name in found.base.hypothesis.names if name not in given]
+        base = " + ".join(added) or ("the given model" if given else "the nominal model")
+        rows = [_evidence_row(found, ranked) for ranked in found.ranking]
+        title = f"Evidence, round {number}: what {base} lacks"
+        tables.append(Table(title, EVIDENCE_HEADER, rows, EVIDENCE_NOTE))
+    return tables
+
+
+def _evidence_row(found: Round, ranked: Ranked) -> list[str]:
+    fit = found.refitted.get(ranked.name)
+    quick = f"{ranked.gain:.0f}" if np.isfinite(ranked.gain) else "diverged"
+    if fit is None:
+        return [ranked.name, quick, "", ""]
+    own = {k: v for k, v in fit.values.items() if k.startswith(ranked.name + ".")}
+    values = ", ".join(f"{k.split('.')[1]} {v:.4g} ± {fit.standard_errors[k]:.2g}" for k, v in own.items())
+    return [ranked.name, quick, f"{found.gain(ranked.name):.0f}", values]
+
+
+WHITENESS_NOTE = (
+    "p of the Ljung-Box test: how probable residuals are that repeat themselves as much as these over "
+    f"{LAGS} samples, were nothing but noise left in them; the worst trial's, times the number of trials (Bonferroni). "
+    "Below 0.05 something is left in a row; near 1 nothing is seen there. Before: refitted; after: with the effects."
+)
+
+
+def _whiteness(content: Content) -> Table:
+    p = content["fit"]["residual_whiteness_p"]
+    rows = [
+        [name, f"{p['before'][name]:.3g}", f"{p['after'].get(name, float('nan')):.3g}"]
+        for name in p["before"]
+    ]
+    return Table("Are the residuals white?", ["row", "p before", "p after"], rows, WHITENESS_NOTE)
+
+
+def _unreachable(d: Diagnosis) -> str:
+    return (
+        "; ".join(f"{name}: {why}" for name, why in d.unreachable.items())
+        or "All candidates could be judged."
+    )

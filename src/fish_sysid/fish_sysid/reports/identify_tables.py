@@ -1,0 +1,116 @@
+"""Tables of an identification: errors, parameters, biases."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fish_report.page import Table
+from fish_sim.robot import nominal_parameters
+from fish_sysid.identification import (
+    AHEAD,
+    PEEK,
+    Identification,
+    entangled,
+)
+from fish_sysid.prediction.prediction import ErrorSizes
+
+NAMES = {
+    "start": "physics, before fitting",
+    "identified": "physics, identified",
+    "constant": "constant speed and yaw rate",
+    "arx": "linear ARX",
+    "bilinear": "bilinear",
+}
+
+
+def error_table(errors: Mapping[str, ErrorSizes], title: str = "Prediction error") -> Table:
+    """Rms of position [mm], heading [mrad] and speed [mm/s] at each horizon."""
+    horizons = next(iter(errors.values())).horizons
+    header = ["predictor", *(f"{q} {h:g} s" for h in horizons for q in ("mm", "mrad", "mm/s")), "predictions"]
+    rows = [
+        [
+            _label(name),
+            *(_cell(1e3 * v) for v in e.rms.ravel()),
+            " / ".join(map(str, e.counts.sum(0))),
+        ]
+        for name, e in errors.items()
+    ]
+    return Table(title, header, rows, _error_note(errors, horizons))
+
+
+def _error_note(errors: Mapping[str, ErrorSizes], horizons: Sequence[float]) -> str:
+    """What the columns and rows that are there mean."""
+    *most, last = (f"{h:g}" for h in horizons)
+    after = f"{', '.join(most)} and {last}" if most else last
+    note = (
+        f"Rms errors of position, heading and surge speed after {after} s, averaged over strokes in measurement and "
+        "prediction alike; last how many predictions they are of, at each horizon. "
+    )
+    if not any(name.endswith(AHEAD) for name in errors):
+        return note + "Every prediction starts from what was measured before."
+    return note + (
+        f"All start from what was measured before; below the same with {PEEK:g} s of what comes: the "
+        "camera's stroke means at the start, which the baselines are usually given, and for the physics a smoothed state."
+    )
+
+
+def _label(name: str) -> str:
+    plain = name.removesuffix(AHEAD)
+    return NAMES.get(plain, plain) + (f", with {PEEK:g} s of what comes" if plain != name else "")
+
+
+def _cell(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.3g}"
+
+
+def parameter_table(result: Identification) -> Table:
+    """Value, standard error and ratio to the start of each free parameter."""
+    fit, units = result.fit, nominal_parameters(result.start.links)
+    unknown, rows = set(result.undetermined), []
+    for name, value in fit.values.items():
+        unit = units[name].unit if name in units else ""
+        before = result.start.parameters.get(name)
+        ratio = "" if before is None else f"{value / before:.3f}"
+        error = fit.standard_errors[name]
+        remark = "not determined by these data" if name in unknown else ""
+        relative = f"{100 * error / abs(value):.2g} %" if value else ""
+        rows.append([name, f"{value:.5g}", f"{error:.2g}", unit, ratio, relative, remark])
+    header = ["parameter", "value", "standard error", "unit", "over start", "relative error", ""]
+    return Table(
+        "Parameters", header, rows, "Standard errors from the likelihood's curvature, to first order."
+    )
+
+
+def entangled_table(result: Identification) -> Table:
+    """Pairs that the data hardly tell apart."""
+    rows = [[a, b, f"{value:+.3f}"] for a, b, value in entangled(result.fit)]
+    return Table("Strong correlations", ["parameter", "and", "correlation"], rows)
+
+
+def bias_table(result: Identification) -> Table:
+    """Sensor biases per trial."""
+    rows = [
+        [name, *(f"{b:+.4f} ± {s:.4f}" for b, s in zip(bias, std, strict=True))]
+        for name, bias, std in zip(
+            result.training.names, result.estimates.bias, result.estimates.bias_std, strict=True
+        )
+    ]
+    return Table("Sensor biases", ["trial", "gyro, rad/s", "accelerometer forward, m/s²", "left, m/s²"], rows)
+
+
+def noise_table(result: Identification) -> Table:
+    """Standard deviations that the fit ended with."""
+    n = result.fit.noise
+    rows = [
+        ["unexplained surge force", f"{n.wrench[0]:.3g}", "N"],
+        ["unexplained sway force", f"{n.wrench[1]:.3g}", "N"],
+        ["unexplained yaw moment", f"{n.wrench[2]:.3g}", "N m"],
+        ["its time constant", f"{n.wrench_time:.3g}", "s"],
+        ["gyro", f"{n.gyro:.3g}", "rad/s"],
+        ["accelerometer", f"{n.accel:.3g}", "m/s²"],
+        ["camera position", f"{n.camera_position:.3g}", "m"],
+        ["camera heading", f"{n.camera_heading:.3g}", "rad"],
+    ]
+    return Table("Noise", ["of", "standard deviation", "unit"], rows)

@@ -1,0 +1,60 @@
+"""The verdict in one sentence: on the terminal, at the head of the page and in model.yaml."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fish_sysid.diagnosis.vocabulary import candidates
+
+Content = dict[str, Any]
+
+MOST_NUMBERS = 4  # of an effect, told one by one
+
+
+def sentence(content: Content) -> str:
+    """The verdict in one sentence, and in further ones whether trials were held out and the tail needed more links."""
+    links, told = content["fit"]["tail_links"], [_verdict(content)]
+    if not content["fit"]["held_out_trials"]:
+        told.append(
+            "With fewer than three trials nothing could be held out: errors are of the trials that were fitted."
+        )
+    if links["given"] != links["used"]:
+        told.append(f"The tail is modelled with {links['used']} links instead of {links['given']}.")
+    return " ".join(told)
+
+
+def _verdict(content: Content) -> str:
+    found = content["effects"]
+    if found:
+        return f"{content['verdict']}: the model lacks {' and '.join(_effect(e) for e in found)}."
+    if content["verdict"] == "unexplained":
+        nearest = ", ".join(content["unexplained"]["nearest"])
+        aside = f" Without explaining the most of it, {nearest} would help." if nearest else ""
+        return f"unexplained: {content['unexplained']['description']}.{aside}"
+    return f"no_mismatch: {_nothing_found([entry['name'] for entry in content['ranking']])}"
+
+
+def _nothing_found(tried: list[str]) -> str:
+    """Only where every name competed may it be said that nothing is missing: one that did not may be what is needed."""
+    everything = len(set(tried) | set(candidates()))
+    if len(tried) == everything:
+        return "with refitted parameters the model explains these recordings; nothing is missing."
+    if len(tried) == 1:
+        needed = f"{tried[0]}, the one candidate tried (of {everything}), is not needed"
+    else:
+        needed = f"none of the {len(tried)} candidates tried (of {everything}) is needed"
+    return f"with refitted parameters {needed}; of the others nothing is known."
+
+
+def _effect(effect: Content) -> str:
+    rivals = "".join(f"; or {r['name']}, {r['probability']:.2f}" for r in effect["rivals"])
+    return f"{effect['name']} ({_parameters(effect)}; probability {effect['evidence']['probability']:.2f}{rivals})"
+
+
+def _parameters(effect: Content) -> str:
+    """All of them, or of many those that differ most surely from zero."""
+    rows = [(k, p["value"], p["std"], p["unit"]) for k, p in effect["parameters"].items()]
+    few = len(rows) <= MOST_NUMBERS
+    told = rows if few else sorted(rows, key=lambda row: -abs(row[1]) / row[2])[: MOST_NUMBERS - 1]
+    text = ", ".join(f"{k} {value:.4g} ± {std:.2g} {unit}" for k, value, std, unit in told)
+    return text if few else f"{len(rows)} numbers, surest {text}"

@@ -1,0 +1,85 @@
+"""Say where recordings and model differ, which physics is missing, and write the corrected robot."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+from rich.console import Console
+
+from fish_bag.topic_arguments import add_topic_arguments, topic_map
+from fish_report.errors import UserError, user_errors
+from fish_report.json_file import write_json
+from fish_report.named_path import named_path
+from fish_report.writable import writable_folder
+from fish_sim.robot import Robot, save_robot
+from fish_sim.robot_argument import read_model
+from fish_sysid.dataset.read import read_experiment
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument(
+        "dataset", type=Path, nargs="+", help="recordings or folders of recordings of one robot and day"
+    )
+    parser.add_argument("--robot", type=Path, help="robot.yaml (default: the nominal fish)")
+    parser.add_argument(
+        "--out", type=Path, required=True, help="folder for diagnosis.json, model.yaml, report.html"
+    )
+    parser.add_argument(
+        "--false-alarms", type=float, default=0.02, help="tolerated share of false alarms (default 0.02)"
+    )
+    parser.add_argument(
+        "--candidates", metavar="NAME,NAME", help="what competes (default: every name of the vocabulary)"
+    )
+    add_topic_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, write the three files, print the verdict."""
+    from fish_sysid.diagnosis.corrected_model import corrected
+    from fish_sysid.diagnosis.diagnosis_json import answer
+    from fish_sysid.diagnosis.pipeline import diagnose
+    from fish_sysid.diagnosis.significance import Level
+    from fish_sysid.diagnosis.vocabulary import NoCandidateError, known
+    from fish_sysid.reports.diagnosis_page import write_diagnosis_page
+    from fish_sysid.reports.verdict_sentence import sentence
+
+    console, start = Console(stderr=True), time.monotonic()
+    robot = read_model(args.robot)
+    with user_errors():
+        level = Level(args.false_alarms)
+        names = known(args.candidates.split(",")) if args.candidates else None
+    experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
+    writable_folder(args.out)
+    with console.status("diagnosing") as status:
+
+        def say(text: str) -> None:
+            status.update(f"{time.monotonic() - start:5.0f} s  {text}")
+            if not console.is_terminal:
+                console.print(f"{time.monotonic() - start:5.0f} s  {text}")
+
+        try:
+            result = diagnose(experiment, robot, level, say, names)
+        except NoCandidateError as error:
+            raise UserError(str(error)) from error
+        content = {**answer(result), "left_out": left_out}
+    write_json(args.out / "diagnosis.json", content)
+    fit = corrected(result)
+    save_robot(
+        without_wrench(fit.robot), args.out / "model.yaml", fit.standard_errors, notes=sentence(content)
+    )
+    write_diagnosis_page(args.out / "report.html", named_path(args.dataset[0]).name, content, result)
+    for text in left_out:
+        print(f"left out: {text}")
+    print(sentence(content))
+    print(f"{args.out}/diagnosis.json, model.yaml, report.html ({time.monotonic() - start:.0f} s)")
+    return 0
+
+
+def without_wrench(robot: Robot) -> Robot:
+    """The robot less the filter's latent wrench."""
+    from dataclasses import replace
+
+    return replace(robot, effects={k: v for k, v in robot.effects.items() if k != "disturbance"})

@@ -1,0 +1,190 @@
+"""From recordings to the filter's grid: every sample once, at its place, and nothing invented where nothing was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fish_bag import message_build as build
+from fish_bag import read_trial
+from fish_bag import sample_recordings as samples
+from fish_bag.trial import Trial
+from fish_sysid.dataset.experiment import (
+    Experiment,
+    ExperimentError,
+    build_experiment,
+    shorten,
+)
+
+
+def without(
+    topic: str, first: float = 0.0, last: float = np.inf, duration: float = 2.0
+) -> list[samples.Message]:
+    """A robot's messages less those of a topic with stamps in [first, last) [s]."""
+    messages = samples.robot_messages(duration)
+
+    def stamp(message: object) -> float:
+        return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec - 1e-9 * samples.START_NS
+
+    def stays(name: str, message: object) -> bool:
+        return name != f"/fish/{topic}" or not first - 1e-6 <= stamp(message) < last - 1e-6
+
+    return [(t, name, message) for t, name, message in messages if stays(name, message)]
+
+
+def read(folder: Path, messages: list[samples.Message]) -> Trial:
+    return read_trial(samples.write_mcap(folder, messages))
+
+
+def posed(
+    pose: Callable[[float], np.ndarray], duration: float = 2.0, rate: float = 30.0
+) -> list[samples.Message]:
+    """A robot's messages with these poses instead of its own."""
+    others = [m for m in samples.robot_messages(duration) if m[1] != "/fish/camera/pose"]
+    seen = [
+        (samples.ns(t + 0.025), "/fish/camera/pose", build.camera_pose(samples.ns(t), "pool", pose(t), (4e-6, 4e-6, 1.44e-4)))
+        for t in np.arange(0.005, duration, 1.0 / rate)
+    ]  # fmt: skip
+    return sorted([*others, *seen], key=lambda m: m[0])
+
+
+@pytest.fixture(scope="module")
+def swum(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    """Five seconds, in which the heading passes pi."""
+    folder = tmp_path_factory.mktemp("swum") / "trial"
+    return build_experiment([read(folder, samples.robot_messages(5.0))])
+
+
+def test_every_sensor_stands_at_its_own_grid_point(swum: Experiment) -> None:
+    t = 0.01 * np.arange(500)
+    assert swum.steps.tolist() == [501]  # the last command is followed for one more step
+    np.testing.assert_allclose(swum.commands[:500, 0, 0], samples.rotor_speed(t), atol=1e-9)
+    np.testing.assert_allclose(swum.commands[:500, 0, 1], samples.rudder(t), atol=1e-9)
+    np.testing.assert_array_equal(swum.commands[500], swum.commands[499])
+    np.testing.assert_allclose(swum.encoder[:500, 0], samples.rotor_speed(t) - 0.5, atol=1e-9)
+    np.testing.assert_allclose(swum.gyro[:500, 0], t, atol=1e-9)
+    np.testing.assert_allclose(swum.accel[:500, 0], np.column_stack([np.ones(500), t]), atol=1e-9)
+    assert np.isnan(swum.gyro[500]).all() and np.isnan(swum.encoder[500]).all()
+
+
+def test_images_keep_their_own_times_and_headings_do_not_wrap(swum: Experiment) -> None:
+    (frames,) = swum.frames
+    np.testing.assert_allclose(frames.t, np.arange(0.005, 5.0, 1 / 30), atol=1e-8)
+    pose = samples.pose(frames.t)
+    np.testing.assert_allclose(frames.pose[:, :2], pose[:, :2], atol=1e-9)
+    np.testing.assert_allclose(frames.pose[:, 2], np.unwrap(pose[:, 2]), atol=1e-9)
+    assert frames.pose[-1, 2] > np.pi > pose[-1, 2]
+
+
+def test_the_grid_begins_with_the_first_command(tmp_path: Path) -> None:
+    late = build_experiment([read(tmp_path / "late", without("joint_command", 0.0, 0.5))])
+    assert late.steps.tolist() == [151] and not late.start_at_rest  # it turned already
+    np.testing.assert_allclose(late.gyro[:150, 0], 0.5 + 0.01 * np.arange(150), atol=1e-9)
+    (frames,) = late.frames
+    assert -0.005 <= frames.t[0] < 1 / 30
+    np.testing.assert_allclose(frames.pose[:, :2], samples.pose(0.5 + frames.t)[:, :2], atol=1e-9)
+
+
+def test_of_lost_commands_the_encoder_tells_the_rotor_and_a_line_the_rudder(tmp_path: Path) -> None:
+    lost = build_experiment([read(tmp_path / "lost", without("joint_command", 1.0, 1.05))])
+    whole = build_experiment([read(tmp_path / "whole", samples.robot_messages())])
+    hole, t = slice(100, 105), 0.01 * np.arange(100, 105)
+    np.testing.assert_allclose(lost.commands[hole, 0, 0], whole.encoder[101:106, 0], atol=1e-9)
+    assert np.isnan(lost.encoder[101:106]).all()  # what was used is no measurement any more
+    line = np.interp(t, [0.99, 1.05], samples.rudder(np.array([0.99, 1.05])))
+    np.testing.assert_allclose(lost.commands[hole, 0, 1], line, atol=1e-9)
+    kept = np.r_[0:100, 105:201]
+    np.testing.assert_array_equal(lost.commands[kept], whole.commands[kept])
+    kept = np.r_[0:101, 106:201]
+    np.testing.assert_array_equal(lost.encoder[kept], whole.encoder[kept])
+
+
+def test_a_trial_in_which_too_many_commands_were_lost_is_refused(tmp_path: Path) -> None:
+    trial = read(tmp_path / "gap", without("joint_command", 1.0, 1.2))
+    words = r"gap: no joint_command from 0\.99 to 1\.20 s, where one comes every 10 ms; expected at most 0\.1 s without; cut"
+    with pytest.raises(ExperimentError, match=words):
+        build_experiment([trial])
+
+
+def test_trials_stand_side_by_side_padded_to_the_longest(tmp_path: Path) -> None:
+    short, long = (read(tmp_path / n, samples.robot_messages(s)) for n, s in (("short", 1.0), ("long", 2.0)))
+    both = build_experiment([short, long])
+    assert both.names == ("short", "long") and both.steps.tolist() == [101, 201] and both.length == 201
+    assert np.isnan(both.gyro[101:, 0]).all() and np.isfinite(both.gyro[:200, 1]).all()
+    assert not both.commands[101:, 0].any()
+    alone = both.select([0])
+    assert alone.names == ("short",) and alone.length == 101
+    np.testing.assert_array_equal(alone.commands, build_experiment([short]).commands)
+
+
+def test_the_rest_of_a_trial_begins_in_motion_with_its_own_clock(swum: Experiment) -> None:
+    rest = replace(swum, start_at_rest=True).rest_of(0, 300)
+    assert rest.steps.tolist() == [201] and not rest.start_at_rest
+    np.testing.assert_array_equal(rest.gyro, swum.gyro[300:])
+    (frames,) = rest.frames
+    assert 0.0 <= frames.t[0] < 1 / 30
+    np.testing.assert_allclose(frames.pose[:, :2], samples.pose(3.0 + frames.t)[:, :2], atol=1e-9)
+
+
+def test_a_shortened_experiment_has_its_first_steps(swum: Experiment) -> None:
+    begun = shorten(swum, 120)
+    assert begun.steps.tolist() == [120]
+    np.testing.assert_array_equal(begun.commands, swum.commands[:120])
+    assert shorten(swum, 1000).steps.tolist() == [501]
+
+
+def test_a_fish_that_swims_already_is_not_at_rest(swum: Experiment, tmp_path: Path) -> None:
+    """At 0.24 m/s from the first pose on, though it does not turn yet."""
+    assert swum.gyro[0, 0] == 0.0 and not swum.start_at_rest
+    begun = build_experiment([read(tmp_path / "begun", posed(lambda t: samples.pose(max(t - 0.4, 0.0))))])
+    assert begun.start_at_rest
+
+
+def test_a_fast_camera_is_thinned_and_one_that_keeps_to_the_grid_is_not(tmp_path: Path) -> None:
+    for rate, every in ((60.0, 1 / 60.0), (100.0, 0.01), (120.0, 2 / 120.0), (240.0, 3 / 240.0)):
+        (frames,) = build_experiment([read(tmp_path / f"{rate:g}", posed(samples.pose, rate=rate))]).frames
+        np.testing.assert_allclose(np.diff(frames.t), every, atol=1e-8)
+        np.testing.assert_allclose(frames.pose[:, :2], samples.pose(frames.t)[:, :2], atol=1e-9)
+
+
+def test_a_fish_that_is_neither_seen_nor_felt_turn_is_refused(tmp_path: Path) -> None:
+    late = without("camera/pose", 0.0, 1.5, duration=3.0)
+    assert build_experiment([read(tmp_path / "felt", late)]).frames[0].t[0] > 1.5
+    blind = read(tmp_path / "blind", [m for m in late if m[1] != "/fish/imu/data"])
+    with pytest.raises(
+        ExperimentError, match="blind: the first camera pose comes 1.5 s after .* no gyro .* within 1 s"
+    ):
+        build_experiment([blind])
+
+
+def test_who_knows_no_rate_does_not_start_at_rest_unless_told(tmp_path: Path) -> None:
+    still = posed(lambda t: np.zeros(3))  # noqa: ARG005
+    blind = read(tmp_path / "blind", [m for m in still if m[1] != "/fish/imu/data"])
+    assert build_experiment([read(tmp_path / "felt", still)]).start_at_rest
+    assert not build_experiment([blind]).start_at_rest
+    assert build_experiment([blind], start_at_rest=True).start_at_rest
+    assert np.isnan(build_experiment([blind]).accel).all()
+
+
+@pytest.mark.parametrize(
+    ("topic", "first", "text"),
+    [
+        ("joint_command", 0.0, "no joint_command; the inputs"),
+        ("camera/pose", 0.05, "no camera/pose; at least three poses"),
+        ("joint_command", 0.05, "2 camera poses between the first and the last command"),
+    ],
+)
+def test_recordings_without_inputs_or_poses_are_refused(
+    tmp_path: Path, topic: str, first: float, text: str
+) -> None:
+    with pytest.raises(ExperimentError, match=f"few: {text}"):
+        build_experiment([read(tmp_path / "few", without(topic, first))])
+
+
+def test_no_trial_is_refused() -> None:
+    with pytest.raises(ExperimentError, match="no trial with data"):
+        build_experiment([])

@@ -1,0 +1,52 @@
+"""Sensor noise from the signals' roughness: what the sensors were made with, whatever the fish does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_sim.robot import Robot
+from fish_sysid.dataset.synthetic import program, record
+from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.estimation.sensor_noise import (
+    FEWEST,
+    SMALLEST,
+    usual_noise,
+    white_noise,
+)
+
+SENSORS = ("gyro", "accel", "camera_position", "camera_heading", "encoder")
+
+
+@pytest.fixture(scope="module", params=[1.0, 3.0])
+def factor(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def swum(factor):
+    random, usual = np.random.default_rng(4), Noise()
+    noisy = replace(usual, **{name: factor * getattr(usual, name) for name in SENSORS})
+    commands = np.stack([program(kind, 10.0, random) for kind in ("sines", "random")], axis=1)
+    return record(Robot(), commands, noisy, random)[0]
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_noise_is_that_of_the_sensors(swum, factor, sensor):
+    found = getattr(usual_noise(swum), sensor) / getattr(Noise(), sensor)
+    assert found == pytest.approx(factor, rel=0.12)  # 600 poses
+
+
+def test_a_smooth_signal_and_a_short_one():
+    t = np.linspace(0.0, 5.0, 500)
+    swing = 2.0 * np.sin(2.0 * np.pi * 2.0 * t)
+    assert white_noise([(t, swing)], 0.006) == SMALLEST * 0.006
+    assert white_noise([(t[:FEWEST], swing[:FEWEST])], 0.006) == 0.006
+    assert white_noise([(t, np.full(500, np.nan))], 0.006) == 0.006
+
+
+@pytest.mark.parametrize(("every", "expected"), [(2, 0.02), (5, 0.006)])
+def test_a_slow_sensor_is_measured_as_long_as_it_follows_the_motion(every, expected):
+    t, signal = 0.01 * np.arange(3000), np.full(3000, np.nan)
+    signal[::every] = 0.02 * np.random.default_rng(5).standard_normal(3000 // every)
+    assert white_noise([(t, signal)], 0.006) == pytest.approx(expected, rel=0.15)

@@ -1,0 +1,136 @@
+"""The oracle: it knows which effect to look for and where the parameters are, and may do no more than fit them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from fish_report.json_file import number
+from fish_sim.robot import Robot
+from fish_study.scenario import World
+from fish_study.swim import Readings
+from fish_sysid.dataset.experiment import Experiment, Frames
+from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.estimation.map_fit import Fit, climb, evaluate
+from fish_sysid.estimation.noise_estimation import adapt_noise
+from fish_sysid.estimation.parametrization import Coordinates, Hypothesis, nominal_hypothesis
+from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.prediction.prediction import predict, prediction_errors
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 6
+HORIZONS = (1.0, 2.0, 5.0)  # s
+LEVEL = 0.02  # false alarms of the oracle's test
+
+
+@dataclass(frozen=True)
+class Looked:
+    """The oracle's fits and the trials they were made and judged on."""
+
+    nominal: Fit
+    true: Fit
+    training: Experiment
+    held_out: Experiment
+
+    @property
+    def sight(self) -> Sight:
+        """What is kept of it."""
+        extra = len(self.true.hypothesis.free) - len(self.nominal.hypothesis.free)
+        gain = self.true.objective - self.nominal.objective
+        return Sight(gain, extra, _rms(self.held_out, self.nominal), _rms(self.held_out, self.true))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What the oracle sees in one world."""
+
+    gain: float  # nats of the true structure over the nominal one, both fitted
+    parameters: int  # of the true structure beyond the nominal one
+    rms_nominal: list[
+        list[float]
+    ]  # (horizon, position m, heading rad, speed m/s), held out, refitted nominal structure
+    rms_true: list[list[float]]  # true structure fitted
+
+    @classmethod
+    def read(cls, content: Mapping[str, Any]) -> Sight:
+        """From JSON, in which what is not finite is null."""
+        tables = ([[number(v) for v in row] for row in content[key]] for key in ("rms_nominal", "rms_true"))
+        return cls(number(content["gain"], -np.inf), content["parameters"], *tables)
+
+
+def as_experiment(readings: Sequence[Readings], encoder: bool) -> Experiment:
+    """Readings on the filter's grid, trials named as in the recordings."""
+    commands, gyro, accel, speed = (
+        np.concatenate([getattr(r, key) for r in readings], axis=1)
+        for key in ("commands", "gyro", "accel", "encoder")
+    )
+    count = commands.shape[1]
+    stamps = [t for r in readings for t in r.stamps]
+    poses = [p for r in readings for p in r.poses]
+    frames = tuple(Frames(t, p) for t, p in zip(stamps, poses, strict=True))
+    names = tuple(f"trial_{m:02d}" for m in range(count))
+    rotor = speed if encoder else np.full_like(speed, np.nan)
+    return Experiment(names, np.full(count, len(commands)), commands, gyro, accel, rotor, frames, True)
+
+
+def look(
+    world: World, experiment: Experiment, held_out: Sequence[str], names: Sequence[str] | None = None
+) -> Looked:
+    """Fit the structure with `names` (default: what is hidden) and the nominal one, from the true values."""
+    looked_for = tuple(world.names if names is None else names)
+    held = [i for i, name in enumerate(experiment.names) if name in held_out]
+    training = [i for i in range(len(experiment.names)) if i not in held]
+    data, unseen = experiment.select(training), experiment.select(held or training)
+    noise = usual_noise(data)
+    surge, sway, yaw = (world.noise * w for w in noise.wrench)
+    noise = replace(noise, wrench=(surge, sway, yaw))
+    nominal = _fit(*with_truth(world, ()), data, noise)
+    true = _fit(*with_truth(world, looked_for), data, noise)
+    again = _from(nominal, true, data)
+    nominal = max(nominal, again, key=lambda f: f.objective)
+    return Looked(nominal, true, data, unseen)
+
+
+def detects(sight: Sight, nulls: Sequence[Sight]) -> bool:
+    """Likelihood-ratio test at LEVEL; where nulls show a heavier tail than chi square, theirs counts."""
+    threshold = 0.5 * float(chi2.isf(LEVEL, max(sight.parameters, 1)))
+    if len(nulls) >= 1.0 / LEVEL / 2.0:
+        threshold = max(threshold, float(np.quantile([s.gain for s in nulls], 1.0 - LEVEL)))
+    return sight.gain > threshold
+
+
+def with_truth(world: World, names: Sequence[str]) -> tuple[Hypothesis, Array]:
+    """The nominal robot with these effects free, and theta at the true values of all that is hidden."""
+    hypothesis = nominal_hypothesis(Robot())
+    for name in names:
+        hypothesis = hypothesis.with_effect(name, 1.0)
+        if name in world.effects:
+            robot = hypothesis.robot.with_effect(name, **world.effects[name])
+            hypothesis = replace(hypothesis, robot=robot)
+    theta = Coordinates(hypothesis).origin().copy()
+    for i, name in enumerate(hypothesis.free):
+        if name in world.parameters:
+            theta[i] = np.log(world.parameters[name])
+    return hypothesis, theta
+
+
+def _fit(hypothesis: Hypothesis, theta: Array, data: Experiment, noise: Noise) -> Fit:
+    fit = climb(evaluate(hypothesis, theta, data, noise), data, ITERATIONS)
+    return climb(evaluate(hypothesis, fit.theta, data, adapt_noise(fit, data)), data, ITERATIONS)
+
+
+def _from(base: Fit, rival: Fit, data: Experiment) -> Fit:
+    """The base's structure from the rival's nominal parameters."""
+    theta = rival.theta[: len(base.theta)]
+    return climb(evaluate(base.hypothesis, theta, data, base.noise), data, ITERATIONS)
+
+
+def _rms(unseen: Experiment, fit: Fit) -> list[list[float]]:
+    sizes = prediction_errors(predict(unseen, fit.robot, fit.noise, max(HORIZONS)), HORIZONS)
+    return [[float(v) for v in row] for row in sizes.rms]

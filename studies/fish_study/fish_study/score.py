@@ -1,0 +1,161 @@
+"""What an answer is worth once the label is open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fish_report.json_file import number
+from fish_sim.effects import EFFECTS
+from fish_sim.sensors import SENSOR_EFFECTS
+from fish_study.scenario import World
+
+CONFIDENT = (
+    0.9  # stated probability from which a wrong name counts as given with confidence; fixed before any run
+)
+NOTHING = "no_mismatch"
+FAILED = "failed"  # in place of a verdict
+
+
+@dataclass(frozen=True)
+class ParameterError:
+    """One parameter of an effect that was found."""
+
+    name: str  # effect.parameter
+    true: float
+    found: float
+    std: float
+
+    @property
+    def within(self) -> bool:
+        """Three standard errors or 20 %: what is asked."""
+        error = abs(self.found - self.true)
+        return error <= 3.0 * self.std or error <= 0.2 * abs(self.true)
+
+
+@dataclass(frozen=True)
+class Score:
+    """One world. Truth: names of the vocabulary that are hidden; unnamed: something without a name is hidden."""
+
+    world: World
+    truth: tuple[str, ...]
+    unnamed: bool
+    verdict: str  # of the tool; "failed" if it gave none
+    named: tuple[str, ...]  # effects, the first found first
+    answered: frozenset[str]  # effects and rivals
+    probability: float  # stated for the first name; NaN without one
+    kinds: tuple[str, ...]  # of the named
+    parameters: tuple[ParameterError, ...]
+    rms: Mapping[str, Any]  # model -> horizon -> errors, as in diagnosis.json
+    ranking: Mapping[str, float]  # name -> quick gain, nats
+    free: Mapping[str, int]  # name -> numbers it took in the ranking; empty in answers that do not tell
+    seconds: float
+    error: str = ""  # why there is no answer
+    # refitted name -> position error 2 s ahead on held-out trials [m]
+    held_out: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def has_answer(self) -> bool:
+        """The tool came to an end."""
+        return self.verdict != FAILED
+
+    @property
+    def top1(self) -> bool:
+        """The first name is a hidden one."""
+        return bool(self.named) and self.named[0] in self.truth
+
+    @property
+    def in_set(self) -> bool:
+        """Every hidden name is an effect or a rival in the answer."""
+        return bool(self.truth) and set(self.truth) <= self.answered
+
+    @property
+    def exact(self) -> bool:
+        """An answer with all hidden names and no other."""
+        return self.has_answer and set(self.named) == set(self.truth)
+
+    @property
+    def alarm(self) -> bool:
+        """The tool says that something is missing."""
+        return self.has_answer and self.verdict != NOTHING
+
+    @property
+    def false_names(self) -> tuple[str, ...]:
+        """Names given that are not hidden."""
+        return tuple(n for n in self.named if n not in self.truth)
+
+    @property
+    def confident_wrong(self) -> bool:
+        """The first name is wrong and was stated with confidence."""
+        return bool(self.named) and not self.top1 and self.probability >= CONFIDENT
+
+    @property
+    def called_physics(self) -> bool:
+        """A physics name was given."""
+        return "physics" in self.kinds
+
+
+def vocabulary() -> frozenset[str]:
+    """The names a label may have that the tool can answer."""
+    return frozenset({*EFFECTS, *SENSOR_EFFECTS} - {"disturbance"})
+
+
+def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] | None = None) -> Score:
+    """Score a result. truth: names that count as right, for a plant whose effects have other names (default: its own)."""
+    known = vocabulary()
+    names = tuple(n for n in world.names if n in known) if truth is None else truth
+    unnamed = bool(world.names) and not names
+    d = result.get("diagnosis")
+    if d is None:
+        return Score(
+            world=world,
+            truth=names,
+            unnamed=unnamed,
+            verdict=FAILED,
+            named=(),
+            answered=frozenset(),
+            probability=float("nan"),
+            kinds=(),
+            parameters=(),
+            rms={},
+            ranking={},
+            free={},
+            seconds=result["seconds"],
+            error=result["error"],
+        )
+    effects = d["effects"]
+    rivals = {rival["name"] for e in effects for rival in e["rivals"]}
+    fit = d["fit"]
+    return Score(
+        world=world,
+        truth=names,
+        unnamed=unnamed,
+        verdict=d["verdict"],
+        named=tuple(e["name"] for e in effects),
+        answered=frozenset({e["name"] for e in effects} | rivals),
+        probability=effects[0]["evidence"]["probability"] if effects else float("nan"),
+        kinds=tuple(e["kind"] for e in effects),
+        parameters=tuple(p for e in effects for p in _parameter_errors(world, e)),
+        rms={k: fit[k]["rms"] for k in ("nominal", "refitted", "with_effects") if k in fit},
+        ranking={r["name"]: number(r["gain"], -np.inf) for r in d.get("ranking", ())},
+        free={r["name"]: r["free_parameters"] for r in d.get("ranking", ()) if "free_parameters" in r},
+        seconds=result["seconds"],
+        held_out={r["name"]: _position(r["held_out_rms"]) for r in d.get("refitted", ())},
+    )
+
+
+def _position(rms: Mapping[str, Any]) -> float:
+    """Position error 2 s ahead [m]; infinite where no trial is that long."""
+    return number(rms.get("2 s", {}).get("position_m"), np.inf)
+
+
+def _parameter_errors(world: World, effect: Mapping[str, Any]) -> list[ParameterError]:
+    hidden = world.effects.get(effect["name"], {})
+    return [
+        ParameterError(f"{effect['name']}.{key}", hidden[key], number(p["value"]), number(p["std"]))
+        for key, p in effect["parameters"].items()
+        if key in hidden
+    ]

@@ -1,0 +1,100 @@
+"""Let a plant swim under a driver and write down what its instruments say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_study.sensor_models import TRANSPORT, Instruments
+from fish_study.trials import PERIOD, Pose
+
+Array = NDArray[np.float64]
+
+
+class Inertial(NamedTuple):
+    """True motion of the head at the start of a period, with the drive of that period: (M,) each."""
+
+    rate: Array  # rad/s
+    forward: Array  # m/s^2, acceleration along x of base_link
+    left: Array  # m/s^2
+
+
+class Plant(Protocol):
+    """M fish in the water."""
+
+    def reset(self, poses: Array) -> None:
+        """At rest at (M, 3) poses."""
+
+    def step(self, commands: Array) -> Inertial:
+        """Follow commands (M, 2) for one period; what an IMU feels at its start."""
+
+    @property
+    def pose(self) -> Array:
+        """(M, 3) x, y [m], heading [rad, not wrapped] of the head."""
+
+    @property
+    def rotor_speed(self) -> Array:
+        """(M,) rad/s."""
+
+
+class Driver(Protocol):
+    """Who commands."""
+
+    def command(self, k: int) -> tuple[Array, Array]:
+        """Commands (M, 2) and rotor phases (M,) at grid point k."""
+
+    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
+        """IMU samples of grid point k and camera poses (stamp, x, y, heading) that arrived in the period after it."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """M trials on T grid points of 10 ms."""
+
+    commands: Array  # (T, M, 2) rad/s, rad
+    phase: Array  # (T, M) rad
+    gyro: Array  # (T, M)
+    accel: Array  # (T, M, 2)
+    encoder: Array  # (T, M)
+    stamps: tuple[Array, ...]  # (F,) s, of the camera's frames
+    poses: tuple[Array, ...]  # (F, 3)
+    truth: Array  # (T, M, 3) poses
+
+
+def swim(plant: Plant, starts: Array, driver: Driver, instruments: Instruments, steps: int) -> Readings:
+    """`steps` grid points from rest at `starts` (M, 3)."""
+    plant.reset(starts)
+    count = len(starts)
+    commands, phase = np.empty((steps, count, 2)), np.empty((steps, count))
+    gyro, accel = np.empty((steps, count)), np.empty((steps, count, 2))
+    truth, speed, shown = np.empty((steps + 1, count, 3)), np.empty((steps, count)), [0] * count
+    truth[0] = plant.pose
+    for k in range(steps):
+        commands[k], phase[k] = driver.command(k)
+        speed[k] = plant.rotor_speed
+        gyro[k], accel[k] = instruments.imu(k, *plant.step(commands[k]))
+        truth[k + 1] = plant.pose
+        arrived = []
+        for m in range(count):
+            new = int(np.searchsorted(instruments.stamps[m], PERIOD * (k + 1) - TRANSPORT, side="right"))
+            frames = slice(shown[m], new)
+            poses = instruments.poses(m, frames, truth[: k + 2, m]) if new > shown[m] else ()
+            stamps = instruments.stamps[m][frames]
+            arrived.append([(float(t), x, y, psi) for t, (x, y, psi) in zip(stamps, poses, strict=True)])
+            shown[m] = new
+        driver.see(k, gyro[k], accel[k], arrived)
+    everything = tuple(instruments.poses(m, slice(None), truth[:steps, m]) for m in range(count))
+    return Readings(
+        commands,
+        phase,
+        gyro,
+        accel,
+        instruments.encoder(speed),
+        tuple(instruments.stamps),
+        everything,
+        truth[:steps],
+    )

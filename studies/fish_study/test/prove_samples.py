@@ -1,0 +1,43 @@
+"""Small worlds of the blind study, and answers to them as the tool would write them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fish_sim.scheme import default_scheme
+from fish_study import scenario_groups
+from fish_study.scenario import World
+
+
+def small(group: str, number: int = 0, **changes: Any) -> World:
+    """A world of a group with three trials of 4 s."""
+    world = scenario_groups.GROUPS[group](np.random.default_rng(5), number)
+    scheme = default_scheme(3)  # the kernel of other tests
+    changes = {"method": scheme.method, "substeps": scheme.substeps, **changes}
+    return replace(world, count=3, duration=4.0, **changes)
+
+
+def diagnosis(
+    *effects: tuple[str, str, float], verdict: str = "missing_physics", rivals: Sequence[str] = ()
+) -> dict[str, Any]:
+    """A result with these effects (name, kind, probability), each with the same rivals."""
+    rows = [
+        {
+            "name": name,
+            "kind": kind,
+            "evidence": {"probability": p},
+            "rivals": [{"name": n, "probability": 0.1} for n in rivals],
+            "parameters": {"x": {"value": 0.031, "std": 0.0001}},
+        }
+        for name, kind, p in effects
+    ]
+    ranking = [{"name": "current", "gain": 9.0}, {"name": "quadratic_drag", "gain": 10.0}]
+    fit = {"with_effects": {"rms": {}}, "refitted": {"rms": {"2 s": {"position_m": 0.010}}}}
+    errors = {"current": 0.012, "wall_effect": 0.009}
+    refitted = [{"name": n, "held_out_rms": {"2 s": {"position_m": e}}} for n, e in errors.items()]
+    content = {"verdict": verdict, "effects": rows, "fit": fit, "ranking": ranking, "refitted": refitted}
+    return {"seconds": 60.0, "diagnosis": content}
