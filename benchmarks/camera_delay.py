@@ -67,10 +67,18 @@ def drawing(experiment: Experiment, curves: np.ndarray) -> str:
             f'<polyline points="{points}" fill="none" stroke="#4c566a" opacity="0.6"><title>{name}</title></polyline>'
         )
     lines.append(
-        text((LEFT + inner_width / 2, HEIGHT - 8), "assumed age of the image (s)", 'text-anchor="middle"')
+        text(
+            (LEFT + inner_width / 2, HEIGHT - 8),
+            "assumed age of the image (s)",
+            'text-anchor="middle"',
+        )
     )
     lines.append(
-        text((14, HEIGHT / 2), "rms (rad)", f'text-anchor="middle" transform="rotate(-90 14 {HEIGHT / 2})"')
+        text(
+            (14, HEIGHT / 2),
+            "rms (rad)",
+            f'text-anchor="middle" transform="rotate(-90 14 {HEIGHT / 2})"',
+        )
     )
     return "\n".join([*lines, "</svg>\n"])
 

@@ -29,13 +29,17 @@ class Chain:
 
     def __init__(self) -> None:
         model = CAMERA.model()
-        lens = Lens.from_camera_info(*model.size, "plumb_bob", model.K.ravel().tolist(), model.D.tolist())
+        lens = Lens.from_camera_info(
+            *model.size, "plumb_bob", model.K.ravel().tolist(), model.D.tolist()
+        )
         self.calibration = Calibration(lens, TRACKER.mount())
         self.renderer = PoolRenderer(model, CAMERA.shape(), CAMERA.look())
         self.times: dict[str, list[float]] = defaultdict(list)
         self.lost: Counter[str] = Counter()
 
-    def frame(self, tracker: Tracker, poses: list[FishPose], time: float, stamp: float) -> Detection | None:
+    def frame(
+        self, tracker: Tracker, poses: list[FishPose], time: float, stamp: float
+    ) -> Detection | None:
         """One frame through all stages."""
         t_0 = thread_time()
         picture = self.renderer.render(poses, time)
@@ -71,7 +75,9 @@ def swim(chain: Chain, frames: int) -> int:
         poses = []
         for t in (k / 30.0 - 0.001, k / 30.0 + 0.001):
             heading = 0.25 * sin(4 * pi * t)
-            poses.append(FishPose(1.9 * sin(0.15 * t), 0.6 * sin(0.47 * t), heading, (0.2 * sin(9 * t),) * 3))
+            poses.append(
+                FishPose(1.9 * sin(0.15 * t), 0.6 * sin(0.47 * t), heading, (0.2 * sin(9 * t),) * 3)
+            )
         found += chain.frame(tracker, poses, k / 30.0, k / 30.0) is not None
     return found
 
@@ -85,7 +91,11 @@ def scatter(chain: Chain, frames: int) -> tuple[np.ndarray, np.ndarray]:
         found = chain.frame(Tracker(TRACKER, chain.calibration), [pose], 0.37 * k, 0.0)
         if found is not None:
             head.append(
-                [found.head.x - pose.x, found.head.y - pose.y, wrap(found.head.heading - pose.heading)]
+                [
+                    found.head.x - pose.x,
+                    found.head.y - pose.y,
+                    wrap(found.head.heading - pose.heading),
+                ]
             )
             if found.tail is not None:
                 tail.append(np.subtract(found.tail, pose.tail))
@@ -102,18 +112,24 @@ def main() -> None:
     cv2.setNumThreads(1)
     chain = Chain()
     seen = swim(chain, frames)
-    print(f"swimming through glare: seen in {seen} of {frames} frames ({100 * seen / frames:.2f} %)")
+    print(
+        f"swimming through glare: seen in {seen} of {frames} frames ({100 * seen / frames:.2f} %)"
+    )
     head, tail = scatter(chain, frames)
     print(
         f"anywhere in the pool:   seen in {len(head)} of {frames} frames ({100 * len(head) / frames:.2f} %)"
     )
     rms = np.sqrt(np.mean(head**2, axis=0))
     print(f"  position {1e3 * np.hypot(rms[0], rms[1]):.2f} mm rms, heading {rms[2]:.4f} rad rms")
-    print(f"  tail seen in {len(tail)}, angles {np.sqrt(np.mean(tail**2, axis=0)).round(3).tolist()} rad rms")
+    print(
+        f"  tail seen in {len(tail)}, angles {np.sqrt(np.mean(tail**2, axis=0)).round(3).tolist()} rad rms"
+    )
     print(f"lost: {dict(chain.lost)}")
     for name, times in chain.times.items():
         p50, p99 = np.percentile(np.array(times) * 1e3, [50, 99])
-        print(f"{name:20s} {p50:6.2f} ms median {p99:7.2f} ms 99th percentile ({len(times)} frames)")
+        print(
+            f"{name:20s} {p50:6.2f} ms median {p99:7.2f} ms 99th percentile ({len(times)} frames)"
+        )
 
 
 if __name__ == "__main__":

@@ -45,9 +45,13 @@ def pose_at(trial: Trial, moment: float) -> FishPose:
     """The head's true pose, with the tail as the tracker saw it."""
     truth, tail = trial.truth, trial.tail
     if truth is None or tail is None:
-        raise UserError(f"{trial.name}: expected sim/odometry and camera/tail, as a recorded demo has them")
+        raise UserError(
+            f"{trial.name}: expected sim/odometry and camera/tail, as a recorded demo has them"
+        )
     angles = tuple(float(np.interp(moment, tail.t, angle)) for angle in tail.angle.T)
-    x, y, psi = (float(np.interp(moment, truth.t, v)) for v in (truth.x, truth.y, np.unwrap(truth.psi)))
+    x, y, psi = (
+        float(np.interp(moment, truth.t, v)) for v in (truth.x, truth.y, np.unwrap(truth.psi))
+    )
     return FishPose(x, y, psi, angles)
 
 
@@ -55,7 +59,9 @@ def main() -> None:
     """Read, draw, write."""
     parser = argparse.ArgumentParser(description="draw a recorded swim of the simulator from above")
     parser.add_argument("recording", type=Path)
-    parser.add_argument("--out", type=Path, default=Path("swim.jpg"), help="picture to write (.jpg)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("swim.jpg"), help="picture to write (.jpg)"
+    )
     args = parser.parse_args()
     config = CameraConfig()
     # noise would differ everywhere, lamps would hide the lines

@@ -30,7 +30,9 @@ PATIENCE = 120.0  # s of real time in which anything waited for must happen
 def pytest_configure() -> None:
     """Say at once what is missing instead of failing in every test."""
     if "fish_bringup" not in os.environ.get("AMENT_PREFIX_PATH", ""):
-        raise pytest.UsageError("the workspace is not sourced: make test, or source install/setup.bash first")
+        raise pytest.UsageError(
+            "the workspace is not sourced: make test, or source install/setup.bash first"
+        )
 
 
 @dataclass
@@ -58,7 +60,9 @@ class Run:
 
     def seen(self) -> str:
         """What was last heard of robot and nodes, and what the nodes logged, for a message."""
-        logged = {process.spec.name: process.last_words() for process in self.nodes.running.values()}
+        logged = {
+            process.spec.name: process.last_words() for process in self.nodes.running.values()
+        }
         return f"{self.watch.sight}, {self.watch.levels}, {self.watch.diagnostics}, {logged}"
 
     def progress(self) -> float:
@@ -109,5 +113,7 @@ def running(
         run.until(lambda: watch.sees(RECORDER.executable), "the recorder")
         if swims:
             run.start(CONTROLLER)
-            run.until(lambda: watch.sight is not None and watch.tracker is not None, "odometry and path")
+            run.until(
+                lambda: watch.sight is not None and watch.tracker is not None, "odometry and path"
+            )
         yield run

@@ -23,13 +23,22 @@ MAY_IMPORT = {
     "fish_sysid": {"fish_report", "fish_bag", "fish_sim", "fish_control"},
     "fish_train": {"fish_report", "fish_sim", "fish_control"},
     "fish_bringup": {"fish_report", "fish_bag", "fish_sim", "fish_control"},
-    "fish_study": {"fish_report", "fish_bag", "fish_sim", "fish_control", "fish_sysid", "fish_train"},
+    "fish_study": {
+        "fish_report",
+        "fish_bag",
+        "fish_sim",
+        "fish_control",
+        "fish_sysid",
+        "fish_train",
+    },
 }
 PACKAGES = tuple(MAY_IMPORT)
 FOLDERS = {name: ROOT / ("studies" if name == "fish_study" else "src") / name for name in PACKAGES}
 ROS = ("rclpy", "rcl_interfaces", "launch", "launch_ros", "rosgraph_msgs", "builtin_interfaces")
 GRAPH_FOLDERS = ("nodes", "launch", "test")
-SOURCES = [(name, path) for name, folder in FOLDERS.items() for path in sorted(folder.rglob("*.py"))]
+SOURCES = [
+    (name, path) for name, folder in FOLDERS.items() for path in sorted(folder.rglob("*.py"))
+]
 
 
 def imported(path):
@@ -92,7 +101,9 @@ assert not {"torch", "tensorboard"} & set(sys.modules)
     assert result.returncode == 0, result.stderr
 
 
-@pytest.mark.parametrize("check", [["check"], ["format", "--check"]], ids=["ruff check", "ruff format"])
+@pytest.mark.parametrize(
+    "check", [["check"], ["format", "--check"]], ids=["ruff check", "ruff format"]
+)
 def test_ruff(check):
     program = shutil.which("ruff", path=str(Path(sys.executable).parent))
     command = [program, *check, "--output-format", "concise", "."]

@@ -26,7 +26,9 @@ def renderer() -> PoolRenderer:
 @pytest.fixture(scope="module")
 def calibration() -> Calibration:
     model = CAMERA.model()
-    lens = Lens.from_camera_info(*model.size, "plumb_bob", model.K.ravel().tolist(), model.D.tolist())
+    lens = Lens.from_camera_info(
+        *model.size, "plumb_bob", model.K.ravel().tolist(), model.D.tolist()
+    )
     return Calibration(lens, TRACKER.mount())
 
 
@@ -53,17 +55,24 @@ def anywhere(count: int, seed: int) -> list[FishPose]:
 def test_pose_errors_over_the_whole_pool(renderer: PoolRenderer, calibration: Calibration) -> None:
     pairs = []
     for k, pose in enumerate(poses := anywhere(150, seed=11)):
-        image = from_compressed(renderer.jpeg(renderer.render([pose], 0.37 * k)), CAMERA.model().size)
+        image = from_compressed(
+            renderer.jpeg(renderer.render([pose], 0.37 * k)), CAMERA.model().size
+        )
         found = Tracker(TRACKER, calibration).track(image, 0.0)
         if isinstance(found, Detection):
             pairs.append((found, pose))
     assert len(pairs) >= 0.99 * len(poses)
     error = np.array([errors(*pair) for pair in pairs])
     rms = np.sqrt(np.mean(error**2, axis=0))
-    assert np.hypot(rms[0], rms[1]) < 1e-3 and rms[2] < 0.008  # asked: 2e-3 m, 0.012 rad
+    assert np.hypot(rms[0], rms[1]) < 1e-3
+    assert rms[2] < 0.008
     bends = np.array([np.subtract(f.tail, p.tail) for f, p in pairs if f.tail is not None])
-    assert len(bends) > 0.9 * len(pairs) and np.sqrt(np.mean(bends**2, axis=0)).max() < 0.06
-    whitened = [e @ np.linalg.solve(f.head.covariance, e) / 3 for e, (f, _) in zip(error, pairs, strict=True)]
+    assert len(bends) > 0.9 * len(pairs)
+    assert np.sqrt(np.mean(bends**2, axis=0)).max() < 0.06
+    whitened = [
+        e @ np.linalg.solve(f.head.covariance, e) / 3
+        for e, (f, _) in zip(error, pairs, strict=True)
+    ]
     assert 0.2 < np.mean(whitened) < 2.0  # the stated covariance is about the true one
 
 
@@ -71,9 +80,13 @@ def test_a_swimming_fish_is_followed_through_the_glare(
     renderer: PoolRenderer, calibration: Calibration
 ) -> None:
     tracker, lost, error = Tracker(TRACKER, calibration), 0, []
-    for k in range(300):  # 10 s at 0.4 m/s along the lamps' mirror images, the head swinging at 2 Hz
+    for k in range(
+        300
+    ):  # 10 s at 0.4 m/s along the lamps' mirror images, the head swinging at 2 Hz
         t = k / 30.0
-        pose = FishPose(-2.0 + 0.4 * t, 0.55 + 0.08 * sin(t), 0.25 * sin(4 * pi * t), (0.2 * sin(9 * t),) * 3)
+        pose = FishPose(
+            -2.0 + 0.4 * t, 0.55 + 0.08 * sin(t), 0.25 * sin(4 * pi * t), (0.2 * sin(9 * t),) * 3
+        )
         image = from_compressed(renderer.jpeg(renderer.render([pose], t)), CAMERA.model().size)
         found = tracker.track(image, t)
         if isinstance(found, Lost):
@@ -82,7 +95,8 @@ def test_a_swimming_fish_is_followed_through_the_glare(
             error.append(errors(found, pose))
     assert lost <= 0.01 * 300
     rms = np.sqrt(np.mean(np.square(error), axis=0))
-    assert np.hypot(rms[0], rms[1]) < 2e-3 and rms[2] < 0.012
+    assert np.hypot(rms[0], rms[1]) < 2e-3
+    assert rms[2] < 0.012
 
 
 def test_default_files_of_camera_and_tracker_agree() -> None:
@@ -90,9 +104,11 @@ def test_default_files_of_camera_and_tracker_agree() -> None:
     np.testing.assert_allclose(lens.K, model.K)
     np.testing.assert_allclose(lens.D, model.D)
     assert lens.size == model.size
-    assert TRACKER.camera_position == CAMERA.camera_position and TRACKER.camera_tilt == CAMERA.camera_tilt
+    assert TRACKER.camera_position == CAMERA.camera_position
+    assert TRACKER.camera_tilt == CAMERA.camera_tilt
     shape = CAMERA.shape()
-    assert TRACKER.front_marker[0] == shape.front_marker and TRACKER.rear_marker[0] == shape.rear_marker
+    assert TRACKER.front_marker[0] == shape.front_marker
+    assert TRACKER.rear_marker[0] == shape.rear_marker
     assert (TRACKER.marker_diameter, TRACKER.tail_marker_diameter) == (
         shape.marker_diameter,
         shape.tail_marker_diameter,
@@ -103,12 +119,19 @@ def test_default_files_of_camera_and_tracker_agree() -> None:
 
 def test_a_tilted_camera_elsewhere_works_as_well() -> None:
     camera = replace(
-        CAMERA, camera_position=(-0.8, 0.5, 3.6), camera_tilt=(0.12, -0.2, 0.6), focal=(760.0, 765.0)
+        CAMERA,
+        camera_position=(-0.8, 0.5, 3.6),
+        camera_tilt=(0.12, -0.2, 0.6),
+        focal=(760.0, 765.0),
     )
-    tracker = replace(TRACKER, camera_position=camera.camera_position, camera_tilt=camera.camera_tilt)
+    tracker = replace(
+        TRACKER, camera_position=camera.camera_position, camera_tilt=camera.camera_tilt
+    )
     model = camera.model()
     renderer = PoolRenderer(model, camera.shape(), replace(camera.look(), glare=0.0))
-    lens = Lens.from_camera_info(*model.size, "plumb_bob", model.K.ravel().tolist(), model.D.tolist())
+    lens = Lens.from_camera_info(
+        *model.size, "plumb_bob", model.K.ravel().tolist(), model.D.tolist()
+    )
     calibration = Calibration(lens, tracker.mount())
     found = []
     for pose in (p for p in anywhere(60, seed=3) if abs(p.x) < 1.4):
@@ -116,4 +139,5 @@ def test_a_tilted_camera_elsewhere_works_as_well() -> None:
         assert isinstance(result, Detection)
         found.append(errors(result, pose))
     rms = np.sqrt(np.mean(np.square(found), axis=0))
-    assert np.hypot(rms[0], rms[1]) < 2e-3 and rms[2] < 0.012
+    assert np.hypot(rms[0], rms[1]) < 2e-3
+    assert rms[2] < 0.012

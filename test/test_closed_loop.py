@@ -18,21 +18,36 @@ from fish_bringup.node_table import REPLAYER, NodeSpec
 from fish_bringup.score import RunScore, score_trial
 
 SHORT, SHORT_START = "{amplitude: 0.15, length: 1.2}", (-0.6, 0.0, math.atan(0.15 * math.pi / 0.6))
-LONG, LONG_START = "{amplitude: 0.25, length: 2.6}", (-1.3, 0.0, math.atan(0.25 * 2.0 * math.pi / 2.6))
+LONG, LONG_START = (
+    "{amplitude: 0.25, length: 2.6}",
+    (-1.3, 0.0, math.atan(0.25 * 2.0 * math.pi / 2.6)),
+)
 LOCKSTEP = 5.0  # s of real time that the simulator waits for estimates and commands
-FACTOR = 0.5  # simulated seconds in a second: time enough on a computer that does other things as well
+FACTOR = (
+    0.5  # simulated seconds in a second: time enough on a computer that does other things as well
+)
 CROSS_TRACK_RMSE, SPEED_RMSE = 0.03, 0.04  # m, m/s; on a quiet computer 0.010 and 0.024
-SAME_POSITION, SAME_HEADING = 0.006, 0.03  # m, rad, in 95 % of them; the noise is 0.002 m and 0.012 rad
-STOP_WITHIN = 0.8  # s from the last estimate: 0.15 s until it is stale, 0.5 s in which the rotor runs down
+SAME_POSITION, SAME_HEADING = (
+    0.006,
+    0.03,
+)  # m, rad, in 95 % of them; the noise is 0.002 m and 0.012 rad
+STOP_WITHIN = (
+    0.8  # s from the last estimate: 0.15 s until it is stale, 0.5 s in which the rotor runs down
+)
 GLIDE = 1.0  # m at most without a node and until the planner speaks again
-BACK_WITHIN, BACK_FOR = 0.1, 0.2  # m off the path at most, over this much [m] of its end: all is as before
+BACK_WITHIN, BACK_FOR = (
+    0.1,
+    0.2,
+)  # m off the path at most, over this much [m] of its end: all is as before
 
 
 @pytest.fixture(scope="module")
 def swum(tmp_path_factory) -> Path:
     """A recording of the sinusoid from end to end."""
     folder = tmp_path_factory.mktemp("swum")
-    with running(folder, parameters(folder, "sinusoid", SHORT, SHORT_START, FACTOR, LOCKSTEP)) as run:
+    with running(
+        folder, parameters(folder, "sinusoid", SHORT, SHORT_START, FACTOR, LOCKSTEP)
+    ) as run:
         run.until(run.finished, "the end of the path")
         run.listen(0.5)  # the estimate may be there a little before the fish
         run.nodes.stop([RECORDER])
@@ -45,7 +60,8 @@ def score(swum) -> RunScore:
 
 
 def test_the_path_is_followed_to_its_end(score):
-    assert score.source == "truth" and score.finished
+    assert score.source == "truth"
+    assert score.finished
 
 
 def test_errors_are_as_small_as_stated(score):
@@ -57,10 +73,13 @@ def test_errors_are_as_small_as_stated(score):
 def test_the_estimate_is_close_to_the_truth(swum):
     t, estimate = odometry(swum, "/fish/odometry/filtered")
     t_true, truth = odometry(swum, "/fish/sim/odometry")
-    both = (t >= t_true[0]) & (t <= t_true[-1])  # the recorder discovers one topic a little before the other
+    both = (t >= t_true[0]) & (
+        t <= t_true[-1]
+    )  # the recorder discovers one topic a little before the other
     expected = np.column_stack([np.interp(t[both], t_true, column) for column in truth.T])
     rms = np.sqrt(np.mean((estimate[both] - expected) ** 2, axis=0))
-    assert rms[0] < 0.005 and rms[1] < 0.005  # m; the camera's noise is 0.002 m
+    assert rms[0] < 0.005
+    assert rms[1] < 0.005
     assert rms[2] < 0.03  # rad; 0.012 rad
 
 
@@ -73,7 +92,7 @@ def test_a_replay_through_fusion_gives_the_same_odometry(swum, tmp_path):
             "topics": ["camera/pose", "imu/data", "joint_states", "/clock"],
             "start_delay_s": 2.0,
         },
-    }  # fmt: skip
+    }
     with running(tmp_path, settings, swims=False) as run:
         assert run.nodes.running[REPLAYER].wait(60.0) == 0
         run.nodes.stop([RECORDER])
@@ -89,7 +108,9 @@ def test_a_replay_through_fusion_gives_the_same_odometry(swum, tmp_path):
     )
     # the same measurements, but on a busy computer a pose may come in just before or after an estimate is sent
     usual = np.quantile(np.abs(difference), 0.95, axis=0)
-    assert usual[0] < SAME_POSITION and usual[1] < SAME_POSITION and usual[2] < SAME_HEADING
+    assert usual[0] < SAME_POSITION
+    assert usual[1] < SAME_POSITION
+    assert usual[2] < SAME_HEADING
 
 
 @pytest.mark.parametrize("spec", [PLANNER, FUSION, CONTROLLER], ids=lambda spec: spec.executable)
@@ -102,7 +123,8 @@ def test_a_killed_node_resumes(spec, resumed):
 
 
 def test_no_node_uses_the_shared_memory_that_a_kill_can_spoil(resumed):
-    assert resumed.mapped and not [line for line in resumed.mapped if "/dev/shm/fastrtps" in line]
+    assert resumed.mapped
+    assert not [line for line in resumed.mapped if "/dev/shm/fastrtps" in line]
 
 
 def test_a_run_with_kills_is_back_on_the_path_at_its_end(resumed):
@@ -188,8 +210,12 @@ def swim_without_estimates(run: Run, duration: float) -> None:
     commands: list[JointState] = []
     subscription = run.watch.create_subscription(JointState, "joint_command", commands.append, 50)
     deadline = time.monotonic() + PATIENCE
-    while duration and not (commands and seconds(commands[-1].header) > run.watch.sight.stamp + duration):
-        assert time.monotonic() < deadline, f"no commands over {duration:g} s within {PATIENCE:.0f} s"
+    while duration and not (
+        commands and seconds(commands[-1].header) > run.watch.sight.stamp + duration
+    ):
+        assert time.monotonic() < deadline, (
+            f"no commands over {duration:g} s within {PATIENCE:.0f} s"
+        )
         run.listen(0.05)
     run.watch.destroy_subscription(subscription)
 
@@ -230,5 +256,7 @@ def odometry(recording: Path, topic: str) -> tuple[np.ndarray, np.ndarray]:
     """Stamps (N,) [s] and x, y, heading (N, 3), unwrapped."""
     t, found = messages(recording, topic)
     poses = [heard.message.pose.pose for heard in found]
-    heading = np.unwrap([2.0 * math.atan2(pose.orientation.z, pose.orientation.w) for pose in poses])
+    heading = np.unwrap(
+        [2.0 * math.atan2(pose.orientation.z, pose.orientation.w) for pose in poses]
+    )
     return t, np.column_stack([[(pose.position.x, pose.position.y) for pose in poses], heading])

@@ -19,7 +19,8 @@ def run(prefixes, *arguments):
 def test_without_a_workspace_it_is_one_line(prefixes):
     ended = run(prefixes, "inspect", "x")
     assert (ended.returncode, ended.stdout) == (1, "")
-    assert ended.stderr.startswith("robofish: ") and "source install/setup.bash first" in ended.stderr
+    assert ended.stderr.startswith("robofish: ")
+    assert "source install/setup.bash first" in ended.stderr
     assert ended.stderr.count("\n") == 1
 
 

@@ -28,7 +28,17 @@ def shown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
     domain = choose_domain()
     result = demo(
-        folder, "--letter", "S", "--speed", 0.2, "--duration", 10, "--domain", domain, "--out", "run"
+        folder,
+        "--letter",
+        "S",
+        "--speed",
+        0.2,
+        "--duration",
+        10,
+        "--domain",
+        domain,
+        "--out",
+        "run",
     )
     assert result.returncode == 0, result.stderr + result.stdout
     return result.stdout, folder / "run", domain
@@ -37,7 +47,9 @@ def shown(tmp_path_factory):
 def test_the_fish_swims_on_its_path(shown):
     output, *_ = shown
     rmse = float(re.search(r"cross-track, m +([\d.]+)", output)[1])
-    assert rmse < 0.1  # m, in real time; on a quiet computer below 0.015, with an idle rudder 0.3 and more
+    assert (
+        rmse < 0.1
+    )  # m, in real time; on a quiet computer below 0.015, with an idle rudder 0.3 and more
 
 
 def test_latency_and_cpu_of_every_node_are_shown(shown):
@@ -51,7 +63,8 @@ def test_recording_and_page_are_there(shown):
     _, folder, _ = shown
     assert (folder / "recording" / "metadata.yaml").exists()
     page = (folder / "report.html").read_text()
-    assert "Path in the pool" in page and not re.search(r"<(script|link|img)[^>]+(src|href)=", page)
+    assert "Path in the pool" in page
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", page)
 
 
 def test_nothing_is_left_running(shown):
@@ -63,8 +76,11 @@ def test_sigterm_ends_the_demo_and_its_nodes(tmp_path):
     domain = choose_domain()
     with subprocess.Popen(
         [PROGRAM, "demo", "--domain", str(domain), "--out", "run"],
-        cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
         deadline = time.monotonic() + 30.0
         while not (tmp_path / "run" / "logs" / "fish_control.controller.log").exists():
             assert time.monotonic() < deadline and process.poll() is None, "the demo did not start"

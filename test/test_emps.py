@@ -42,7 +42,8 @@ def test_dry_friction_is_named_and_the_rest_refitted(drive) -> None:
     answer = drive.diagnose(drive.record(*swing(DRY)))
     assert answer.final.terms[0] == "dry_friction" == max(answer.ranking, key=answer.ranking.get)
     assert answer.final.coefficients["dry_friction"] == pytest.approx(DRY, rel=0.1)
-    assert answer.final.viscous == pytest.approx(VISCOUS, rel=0.1) and answer.nominal.viscous > 1.3 * VISCOUS
+    assert answer.final.viscous == pytest.approx(VISCOUS, rel=0.1)
+    assert answer.nominal.viscous > 1.3 * VISCOUS
     assert answer.final.mass == pytest.approx(MASS, rel=0.02)
     assert answer.held_out["with"] < 0.5 * answer.held_out["without"]
 

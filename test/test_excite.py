@@ -25,7 +25,9 @@ def excite(folder, *arguments):
 
 def longest(folder):
     """The swim that a stalled computer cut least: the guard stops a fish of which it hears nothing for half a second."""
-    return max(read_dataset(folder / "recordings").trials, key=lambda trial: np.ptp(trial.commands.t))
+    return max(
+        read_dataset(folder / "recordings").trials, key=lambda trial: np.ptp(trial.commands.t)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +48,8 @@ def test_the_recording_holds_what_the_program_says(swum):
     rotor, rudder = trial.commands.rotor_speed, trial.commands.rudder
     assert np.abs(rotor).max() == pytest.approx(5.5 * 2.0 * np.pi * 2.5, rel=0.02)
     moves = np.abs(rotor) > 1.0
-    assert set(np.round(rudder[moves], 6)) <= {0.0, 0.5} and np.mean(rudder[moves] == 0.5) > 0.8
+    assert set(np.round(rudder[moves], 6)) <= {0.0, 0.5}
+    assert np.mean(rudder[moves] == 0.5) > 0.8
     zero_crossings = np.count_nonzero(np.diff(np.sign(rotor[moves])))
     seconds = np.ptp(trial.commands.t[moves])
     assert zero_crossings / (2.0 * seconds) == pytest.approx(2.5, rel=0.05)
@@ -57,7 +60,8 @@ def test_a_command_acts_from_its_stamp_on_however_busy_the_computer_is(swum):
     _, folder, _ = swum
     experiment = build_experiment([longest(folder)])
     behind = experiment.encoder[6:, 0] - experiment.commands[5:-1, 0, 0]
-    assert np.nanstd(behind) < 0.4 and np.nanmax(np.abs(behind)) < 2.0
+    assert np.nanstd(behind) < 0.4
+    assert np.nanmax(np.abs(behind)) < 2.0
 
 
 def test_the_fish_turns_left_from_rest(swum):
@@ -69,7 +73,8 @@ def test_the_fish_turns_left_from_rest(swum):
 
 def test_how_it_ended_is_said_and_nothing_is_left_running(swum):
     output, _, domain = swum
-    assert "trial_00: 4.0 to " in output and "robofish diagnose" in output
+    assert "trial_00: 4.0 to " in output
+    assert "robofish diagnose" in output
     assert not domain_in_use(domain)
 
 
@@ -90,5 +95,6 @@ def test_bad_input_is_one_line(tmp_path, content, arguments, said):
 def test_the_plan_lists_the_swims_without_swimming(tmp_path):
     (tmp_path / "program.json").write_text(json.dumps(ROWS))
     result = excite(tmp_path, "program.json", "--plan")
-    assert result.returncode == 0 and "heading, rad" in result.stdout
+    assert result.returncode == 0
+    assert "heading, rad" in result.stdout
     assert [file.name for file in tmp_path.iterdir()] == ["program.json"]

@@ -17,11 +17,15 @@ NODES = {
 
 
 @pytest.mark.parametrize("flag", ["-h", "--help"])
-@pytest.mark.parametrize(("package", "name"), [(p, name) for p, names in NODES.items() for name in names])
+@pytest.mark.parametrize(
+    ("package", "name"), [(p, name) for p, names in NODES.items() for name in names]
+)
 def test_help_says_what_a_node_is_and_starts_nothing(package, name, flag, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", [name, flag])
     monkeypatch.setattr(rclpy, "init", lambda *_, **__: pytest.fail("started"))
     assert getattr(importlib.import_module(f"{package}.nodes.entry"), name)() == 0
     usage, what, parameters = capsys.readouterr().out.splitlines()
-    assert usage.startswith(f"usage: {name} ") and what
-    assert Path(parameters.split(": ")[1]).name == f"{name}.yaml" and Path(parameters.split(": ")[1]).exists()
+    assert usage.startswith(f"usage: {name} ")
+    assert what
+    assert Path(parameters.split(": ")[1]).name == f"{name}.yaml"
+    assert Path(parameters.split(": ")[1]).exists()

@@ -21,7 +21,9 @@ END_WITHIN = 5.0  # s
 def settings(spec, folder):
     """What a node cannot do without."""
     if spec == EXCITER:
-        (folder / "program.json").write_text('[{"t": 0, "amplitude": 8, "frequency": 2, "rudder": 0}]')
+        (folder / "program.json").write_text(
+            '[{"t": 0, "amplitude": 8, "frequency": 2, "rudder": 0}]'
+        )
         return {"program_file": str(folder / "program.json")}
     return {"output": str(folder), "name": "recording"} if spec == RECORDER else {}
 
@@ -95,7 +97,9 @@ def test_the_simulator_keeps_its_pace_without_a_c_compiler(tmp_path):
         nodes.environment["FISH_SIM_NO_COMPILER"] = "1"
         process = nodes.start(simulator)
         deadline = time.monotonic() + PATIENCE
-        while float(watch.diagnostics.get("fish/simulator", {}).get("real_time_factor", 0.0)) < 0.95:
+        while (
+            float(watch.diagnostics.get("fish/simulator", {}).get("real_time_factor", 0.0)) < 0.95
+        ):
             assert process.status is None, process.last_words()
             assert time.monotonic() < deadline, watch.levels
             listen(0.1)

@@ -28,7 +28,9 @@ def section(title):
 
 def test_the_example_effect_is_the_one_that_a_test_executes():
     page = (ROOT / "src" / "fish_sim" / "docs" / "adding_an_effect.md").read_text()
-    examples = re.findall(r"```python\n(.*?)```", section("## Adding an effect, adding a path"), re.DOTALL)
+    examples = re.findall(
+        r"```python\n(.*?)```", section("## Adding an effect, adding a path"), re.DOTALL
+    )
     assert len(examples) == 2
     for example in examples:
         assert example in page
@@ -36,7 +38,9 @@ def test_the_example_effect_is_the_one_that_a_test_executes():
 
 def test_the_diagnosis_from_python_can_be_pasted():
     """Its imports, its recordings and its names; the call itself takes a minute."""
-    (example,) = re.findall(r"```python\n(.*?)```", section("## Which physics is missing"), re.DOTALL)
+    (example,) = re.findall(
+        r"```python\n(.*?)```", section("## Which physics is missing"), re.DOTALL
+    )
     imports, rest = example.split("\n\n", 1)
     names: dict[str, object] = {}
     exec(imports, names)
@@ -51,7 +55,9 @@ def test_the_readme_says_how_long_a_programs_last_row_lasts():
 
 
 def test_every_verb_is_listed():
-    listed = re.findall(r"^\| `(\w+)[^`]*` \|", section("### The `fish_train` command"), re.MULTILINE)
+    listed = re.findall(
+        r"^\| `(\w+)[^`]*` \|", section("### The `fish_train` command"), re.MULTILINE
+    )
     assert set(listed) == set(VERBS)
 
 
@@ -88,7 +94,9 @@ def dead_links(page):
         place = page.parent / file if file else page
         if re.match(r"[a-z]+:", target):  # not of the project
             continue
-        if not place.exists() or (anchor and place.suffix == ".md" and anchor not in anchors(place)):
+        if not place.exists() or (
+            anchor and place.suffix == ".md" and anchor not in anchors(place)
+        ):
             dead.append(target)
     return dead
 
@@ -153,7 +161,9 @@ def test_the_studys_table_is_what_the_committed_answers_give(parts, newest_study
         "right name first, single effects and sensors": asked["right name first, single effects"],
         "the truth in the answered set": asked["truth in the answered set, single effects"],
         "right name first, closed loop only": asked["right name first, closed loop only"],
-        "a wrong name first, in any world": Share.of(newest_study, lambda s: bool(s.named) and not s.top1),
+        "a wrong name first, in any world": Share.of(
+            newest_study, lambda s: bool(s.named) and not s.top1
+        ),
         "false alarms, nothing hidden": asked["false alarms, nothing hidden"],
         "both of two effects": asked["both of two effects"],
         "an effect without a name called unexplained": asked["no name exists: called unexplained"],

@@ -14,8 +14,19 @@ from fish_train.evaluation.study import Row
 
 GAINS = "0.3,0.3,0.03,0.6,0.05,0"
 EVALUATE = [
-    "evaluate", "--constant", GAINS, "--paths", "R", "I", "--speeds", "0.1", "0.2", "--robust", "--jobs", "1",
-]  # fmt: skip
+    "evaluate",
+    "--constant",
+    GAINS,
+    "--paths",
+    "R",
+    "I",
+    "--speeds",
+    "0.1",
+    "0.2",
+    "--robust",
+    "--jobs",
+    "1",
+]
 
 
 def never(*_: object, **__: object) -> None:
@@ -51,7 +62,8 @@ def test_an_output_that_cannot_be_written_is_said_before_the_work(
     capsys.readouterr()
     assert command.main([*words, "--out", str(place)]) == 1
     said = capsys.readouterr().err.splitlines()[-1]
-    assert f"robofish {verb}: --out " in said and "choose another" in said
+    assert f"robofish {verb}: --out " in said
+    assert "choose another" in said
     assert (tmp_path / "file").read_text() == "mine"
 
 
@@ -75,10 +87,13 @@ def test_repetitions_that_are_finished_outlive_ctrl_c(
     assert command.main(["coverage", "--study", "5", "--out", str(out)]) == 130
     assert "2 of 5 repetitions" in capsys.readouterr().out
     content = json.loads((out.parent / "coverage_partial.json").read_text())
-    assert content["inside95"] == 0.5 and set(content["scores"]) == {"0", "1"}
+    assert content["inside95"] == 0.5
+    assert set(content["scores"]) == {"0", "1"}
     assert not out.exists()
     # nothing finished, nothing written
-    assert command.main(["coverage", "--seed", "2", "--out", str(tmp_path / "none" / "c.json")]) == 130
+    assert (
+        command.main(["coverage", "--seed", "2", "--out", str(tmp_path / "none" / "c.json")]) == 130
+    )
     assert list((tmp_path / "none").iterdir()) == []
 
 
@@ -98,7 +113,9 @@ def test_runs_that_are_finished_outlive_ctrl_c(
     monkeypatch.setattr("fish_train.evaluation.study.evaluate", evaluate)
     (tmp_path / "runs.csv").write_text("of yesterday")
     assert command.main([*EVALUATE, "--seeds", "1", "--out", str(tmp_path)]) == 130
-    assert "8 of 16 runs; runs_partial.csv and evaluation_partial.html in" in capsys.readouterr().out
+    assert (
+        "8 of 16 runs; runs_partial.csv and evaluation_partial.html in" in capsys.readouterr().out
+    )
     assert len((tmp_path / "runs_partial.csv").read_text().splitlines()) == 1 + 8
     assert "Tracking" in (tmp_path / "evaluation_partial.html").read_text()
     assert (tmp_path / "runs.csv").read_text() == "of yesterday"
@@ -117,5 +134,8 @@ def test_batches_are_kept_as_they_come_and_returned_in_order() -> None:
 
     kept: list[tuple[int, int]] = []
     tasks = [(0,), (1,)]
-    assert _in_processes(late_or_interrupted, tasks, 2, keep=lambda *said: kept.append(said)) == [0, 1]
+    assert _in_processes(late_or_interrupted, tasks, 2, keep=lambda *said: kept.append(said)) == [
+        0,
+        1,
+    ]
     assert kept == [(1, 1), (0, 0)]

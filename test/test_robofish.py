@@ -20,13 +20,18 @@ def test_every_verb_is_a_module_with_help(verb):
     module = command.installed_verbs()[verb].load()
     parser = ArgumentParser()
     module.add_arguments(parser)
-    assert module.__doc__ and callable(module.run)
+    assert module.__doc__
+    assert callable(module.run)
     assert callable(getattr(command, verb))  # the entry point of its own executable
 
 
 def test_help_is_fast_because_no_verb_is_loaded():
-    code = "import sys; from fish_report.robofish import main; main(['--help']); print(*sys.modules)"
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    code = (
+        "import sys; from fish_report.robofish import main; main(['--help']); print(*sys.modules)"
+    )
+    out = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
     *table, modules = out.splitlines()
     assert all(any(line.split()[:1] == [verb] for line in table) for verb in BROUGHT_BY)
     assert not {"numpy", "rosbags", "torch", "rclpy"} & set(modules.split())
@@ -48,7 +53,11 @@ def test_a_package_that_is_not_installed_is_one_line(verb, package):
     code = f"import sys; sys.modules[{package!r}] = None; from fish_report.robofish import main; sys.exit(main([{verb!r}]))"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     said = f"robofish {verb}: the Python package {package} is not installed; `make setup`, or "
-    assert (ended.returncode, ended.stderr.startswith(said), ended.stderr.count("\n")) == (1, True, 1)
+    assert (ended.returncode, ended.stderr.startswith(said), ended.stderr.count("\n")) == (
+        1,
+        True,
+        1,
+    )
 
 
 @pytest.mark.parametrize("verb", ["inspect", "recover"])
@@ -64,7 +73,8 @@ def test_recover_prints_what_was_saved_and_lost(tmp_path, capsys):
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     assert command.main(["recover", str(path)]) == 0
     out = capsys.readouterr().out
-    assert "/fish/imu/data" in out and "lost: a.mcap: " in out
+    assert "/fish/imu/data" in out
+    assert "lost: a.mcap: " in out
     assert (tmp_path / "a_recovered" / "metadata.yaml").exists()
     assert command.main(["recover", str(path)]) == 1
     assert "never overwritten" in capsys.readouterr().err
@@ -90,10 +100,13 @@ def test_inspect_prints_and_plots(tmp_path, capsys):
     page = tmp_path / "out" / "page.html"
     assert command.main(["inspect", str(path), "--html", str(page)]) == 0
     out = capsys.readouterr().out
-    assert "/fish/camera/pose" in out and "1 gaps, longest 1.010 s, about 100 messages" in out
+    assert "/fish/camera/pose" in out
+    assert "1 gaps, longest 1.010 s, about 100 messages" in out
     html = page.read_text()
-    assert "a: path in the pool" in html and "1 gaps, longest 1.010 s" in html
-    assert "<script src=" not in html and "Plotly.newPlot" in html
+    assert "a: path in the pool" in html
+    assert "1 gaps, longest 1.010 s" in html
+    assert "<script src=" not in html
+    assert "Plotly.newPlot" in html
 
 
 def test_inspect_of_the_folder_one_is_in_is_called_after_it(tmp_path, monkeypatch):
@@ -112,7 +125,9 @@ def test_diagnose_of_the_folder_one_is_in_is_called_after_it(tmp_path, monkeypat
         "fish_sysid.diagnosis.diagnosis_json.answer": lambda _: {},
         "fish_sysid.diagnosis.corrected_model.corrected": lambda _: robot,
         "fish_sysid.reports.verdict_sentence.sentence": lambda _: "nothing",
-        "fish_sysid.reports.diagnosis_page.write_diagnosis_page": lambda _, title, *__: titles.append(title),
+        "fish_sysid.reports.diagnosis_page.write_diagnosis_page": lambda _, title, *__: (
+            titles.append(title)
+        ),
     }.items():
         monkeypatch.setattr(name, stand_in)
     (tmp_path / "set").mkdir()
@@ -142,7 +157,9 @@ def test_excite_says_how_long_the_last_row_lasts(tmp_path, capsys):
     program = tmp_path / "program.yaml"
     program.write_text("- {t: 7, amplitude: 5, frequency: 2, rudder: 0}")
     assert command.main(["excite", str(program), "--begin", "50"]) == 1
-    expected = "expected 0 to 12 s: the program lasts 15 s (8 s from its last row on), a swim at least 3 s"
+    expected = (
+        "expected 0 to 12 s: the program lasts 15 s (8 s from its last row on), a swim at least 3 s"
+    )
     assert expected in capsys.readouterr().err
 
 

@@ -110,7 +110,12 @@ def record(t: Array, force: Array, position: Array) -> Record:
     means = (_means(a) for a in (force, smooth, velocity, np.gradient(velocity, period)))
     force, smooth, velocity, acceleration = means
     return Record(
-        EVERY * period, force, position[: EVERY * len(force) : EVERY], smooth, velocity, acceleration
+        EVERY * period,
+        force,
+        position[: EVERY * len(force) : EVERY],
+        smooth,
+        velocity,
+        acceleration,
     )
 
 
@@ -129,7 +134,10 @@ def _low_pass(signal: Array, period: float, cutoff: float = CUTOFF) -> Array:
 
 def part(r: Record, first: int, last: int) -> Record:
     """A stretch of a record."""
-    cut = {k: getattr(r, k)[first:last] for k in ("force", "position", "smooth", "velocity", "acceleration")}
+    cut = {
+        k: getattr(r, k)[first:last]
+        for k in ("force", "position", "smooth", "velocity", "acceleration")
+    }
     return Record(r.period, **cut)
 
 
@@ -158,7 +166,9 @@ def whiten(r: Record, latent: float) -> Whitened:
         **{name: term(r) for name, (_, term) in CANDIDATES.items()},
     }
     inputs = np.column_stack(list(terms.values()))
-    x = np.zeros((3, 1 + inputs.shape[1]))  # the first column follows the position, each other one a term
+    x = np.zeros(
+        (3, 1 + inputs.shape[1])
+    )  # the first column follows the position, each other one a term
     x[0, 0] = r.position[0]
     out, measured = np.empty((len(r.position), x.shape[1])), np.zeros(x.shape[1])
     for k, (position, force) in enumerate(zip(r.position, inputs, strict=True)):
@@ -181,7 +191,9 @@ def fit(w: Whitened, terms: tuple[str, ...]) -> Fit:
     values = {name: float(c) * mass for name, c in zip(terms, theta[2:], strict=True)}
     errors = {name: float(d) for name, d in zip(terms, deviation[2:], strict=True)}
     density = -n * (0.5 * np.log(variance) + np.log(w.scale))
-    return Fit(terms, mass, float(theta[1]) * mass, values, errors, float(density), n, w.latent * mass)
+    return Fit(
+        terms, mass, float(theta[1]) * mass, values, errors, float(density), n, w.latent * mass
+    )
 
 
 def best_fit(filters: Sequence[Whitened], terms: tuple[str, ...]) -> Fit:
@@ -211,7 +223,9 @@ def diagnose(r: Record) -> Answer:
     nominal = base = best_fit(filters, ())
     ranking: dict[str, float] = {}
     while len(base.terms) < MOST:
-        rivals = [best_fit(filters, (*base.terms, name)) for name in CANDIDATES if name not in base.terms]
+        rivals = [
+            best_fit(filters, (*base.terms, name)) for name in CANDIDATES if name not in base.terms
+        ]
         if not base.terms:
             ranking = {f.terms[-1]: f.log_likelihood - base.log_likelihood for f in rivals}
         usable = [f for f in rivals if sound(f)]
@@ -227,7 +241,9 @@ def sound(f: Fit) -> bool:
     """Friction takes energy, masses are positive."""
     dissipative = ("dry_friction", "quadratic_drag", "cubic_drag")
     return (
-        f.mass > 0.0 and f.viscous > 0.0 and all(f.coefficients.get(name, 0.0) >= 0.0 for name in dissipative)
+        f.mass > 0.0
+        and f.viscous > 0.0
+        and all(f.coefficients.get(name, 0.0) >= 0.0 for name in dissipative)
     )
 
 
@@ -238,8 +254,10 @@ def show(answer: Answer) -> None:
         print(f"  {name:20} {gain:9.0f}")
     for label, f in (("without", answer.nominal), ("with", answer.final)):
         error = answer.held_out[label]
-        print(f"{label:8} mass {f.mass:6.1f} kg, viscous {f.viscous:6.1f} N s/m, latent force {f.latent:5.2f} N, "
-              f"held-out error of the force {100 * error:4.1f} %")  # fmt: skip
+        print(
+            f"{label:8} mass {f.mass:6.1f} kg, viscous {f.viscous:6.1f} N s/m, latent force {f.latent:5.2f} N, "
+            f"held-out error of the force {100 * error:4.1f} %"
+        )
     for name in answer.final.terms:
         unit = CANDIDATES[name][0]
         print(

@@ -46,7 +46,9 @@ def draw_missing_force(axes: Axes, found: Diagnosis) -> None:
         (found.force, "missing in the refitted model", BEFORE),
         (found.remaining, "missing with the effect", NEUTRAL),
     ):
-        rate, moment = binned_means(force.covariates["yaw_rate"].ravel(), force.wrench[..., 2].ravel())
+        rate, moment = binned_means(
+            force.covariates["yaw_rate"].ravel(), force.wrench[..., 2].ravel()
+        )
         axes.plot(rate, 1e3 * moment, ".-", label=label, color=colour)
     axes.set(title="where", xlabel="yaw rate, rad/s", ylabel="yaw moment, mN m")
     axes.legend(fontsize="small")
@@ -57,7 +59,10 @@ def draw_evidence(axes: Axes, found: Diagnosis) -> None:
     nearest = sorted(found.rounds[0].ranking, key=lambda ranked: -ranked.gain)[:SHOWN][::-1]
     best = nearest[-1].gain
     axes.plot(
-        [best - ranked.gain for ranked in nearest], [ranked.name for ranked in nearest], "o", color=BEFORE
+        [best - ranked.gain for ranked in nearest],
+        [ranked.name for ranked in nearest],
+        "o",
+        color=BEFORE,
     )
     axes.plot(0.0, nearest[-1].name, "o", color=AFTER)
     axes.set(title="which", xlabel="behind the best name, nats")
@@ -74,14 +79,18 @@ def draw_held_out_trials(axes: Axes, found: Diagnosis) -> None:
             away = np.linalg.norm(swim.simulated[:, :2] - swim.measured[:, :2], axis=1)
             axes.plot(swim.t, 1e3 * away, color=colour, label=label)
             label = None  # one entry of the legend for all trials
-    axes.set(title="how much: held-out trials", xlabel="simulated for, s", ylabel="position error, mm")
+    axes.set(
+        title="how much: held-out trials", xlabel="simulated for, s", ylabel="position error, mm"
+    )
     axes.legend(fontsize="small")
 
 
 def main() -> None:
     """Read, diagnose, draw."""
     parser = argparse.ArgumentParser(description="draw the diagnosis of this example")
-    parser.add_argument("--out", type=Path, default=Path("docs/hidden_drag.svg"), help="picture to write")
+    parser.add_argument(
+        "--out", type=Path, default=Path("docs/hidden_drag.svg"), help="picture to write"
+    )
     out = parser.parse_args().out
     trials = list(read_dataset(Path(__file__).parent / "recordings"))
     found = diagnose(build_experiment(trials), Robot(), progress=print)

@@ -23,7 +23,7 @@ from rosbags.typesys import Stores, get_typestore
 from fish_bag import find_trials, read_dataset
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "test"))
-from recording_samples import robot_messages, write_mcap  # noqa: E402
+from recording_samples import robot_messages, write_mcap
 
 TOPICS = ("joint_command", "joint_states", "imu/data", "camera/pose", "battery_state")
 
@@ -57,7 +57,9 @@ def measure(name: str, read: Callable[[], int], reference: float | None = None) 
     count = read()
     seconds, busy = perf_counter() - start, processor_time() - before
     ratio = "" if reference is None else f", {count / busy / reference:.2f} of raw"
-    print(f"{name}: {count / busy:9,.0f} messages per processor second{ratio}; {seconds:.2f} s on the clock")
+    print(
+        f"{name}: {count / busy:9,.0f} messages per processor second{ratio}; {seconds:.2f} s on the clock"
+    )
     return count / busy
 
 
@@ -71,7 +73,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--trials", type=int, default=100)
-    parser.add_argument("--recordings", type=Path, help="read this data set instead of made-up trials")
+    parser.add_argument(
+        "--recordings", type=Path, help="read this data set instead of made-up trials"
+    )
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = args.recordings or Path(temporary)

@@ -83,16 +83,21 @@ def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
 
     Raises:
         RecordingError: nothing there, empty, truncated or not a recording; the text says what to do.
+
     """
     source = storage(path)
     ros1 = source.suffix == ".bag"
     with damage_is_said(path), (rosbag1.Reader if ros1 else rosbag2.Reader)(source) as reader:
         topics = _collect(reader, wanted)
         types = _types(reader.connections, ros1)
-        metadata = {} if isinstance(reader, rosbag1.Reader) else reader.storage.metadata.custom or {}
+        metadata = (
+            {} if isinstance(reader, rosbag1.Reader) else reader.storage.metadata.custom or {}
+        )
     bag = RawBag(path, ros1, types, topics, {str(k): str(v) for k, v in metadata.items()})
     if not bag.count:
-        raise RecordingError(f"{path}: the recording holds no messages; was anything published while it ran?")
+        raise RecordingError(
+            f"{path}: the recording holds no messages; was anything published while it ran?"
+        )
     return bag
 
 
@@ -104,7 +109,9 @@ def damage_is_said(path: Path) -> Iterator[None]:
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
     except Exception as error:  # of every kind, as damaged bytes lead anywhere
-        raise RecordingError(f"{path}: {_advice(path, str(error) or type(error).__name__)}") from error
+        raise RecordingError(
+            f"{path}: {_advice(path, str(error) or type(error).__name__)}"
+        ) from error
 
 
 def storage(path: Path) -> Path:
@@ -133,7 +140,9 @@ def storage(path: Path) -> Path:
     )
 
 
-def _collect(reader: rosbag1.Reader | rosbag2.Reader, wanted: Callable[[str, str], bool]) -> list[RawTopic]:
+def _collect(
+    reader: rosbag1.Reader | rosbag2.Reader, wanted: Callable[[str, str], bool]
+) -> list[RawTopic]:
     """All messages by topic and type (a topic with two types gives two entries)."""
     keep: dict[int, bool] = {}
     raws: dict[tuple[str, str], list[bytes]] = {}
@@ -148,7 +157,9 @@ def _collect(reader: rosbag1.Reader | rosbag2.Reader, wanted: Callable[[str, str
         bucket.append(raw if keep[connection.id] else raw[:STAMP_PREFIX])
         stamps.append(arrival)
     return [
-        RawTopic(topic, msgtype, np.array(times[topic, msgtype], np.int64), raw, wanted(topic, msgtype))
+        RawTopic(
+            topic, msgtype, np.array(times[topic, msgtype], np.int64), raw, wanted(topic, msgtype)
+        )
         for (topic, msgtype), raw in raws.items()
     ]
 
@@ -158,7 +169,9 @@ def _types(connections: list[Connection], ros1: bool) -> Typesdict:
     types: Typesdict = dict(typestore(ros1).fielddefs)
     for connection in connections:
         if connection.msgdef.format != MessageDefinitionFormat.NONE:
-            types.update(_definition(connection.msgtype, connection.msgdef.format, connection.msgdef.data))
+            types.update(
+                _definition(connection.msgtype, connection.msgdef.format, connection.msgdef.data)
+            )
     return types
 
 
@@ -182,4 +195,6 @@ def _advice(path: Path, error: str) -> str:
         return "the file is empty"
     if path.suffix == ".bag":
         return f"not a complete ROS 1 bag ({error.rstrip('.')}); mend it with 'rosbag reindex'"
-    return f"truncated or damaged ({error.rstrip('.')}); 'robofish recover {path}' saves what is left"
+    return (
+        f"truncated or damaged ({error.rstrip('.')}); 'robofish recover {path}' saves what is left"
+    )

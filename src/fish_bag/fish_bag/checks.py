@@ -29,7 +29,10 @@ from fish_bag.trial import (
 GAP_PERIODS = 2.5  # a distance of more than so many periods is a gap
 LONG_GAP_S = 0.5  # from here on a warning
 CONSTANT = 1e-6  # a command that varies less is constant, rad/s or rad
-OF_USE = {"imu": "warning", "encoder": "info"}  # severity of the absence of topics that are not required
+OF_USE = {
+    "imu": "warning",
+    "encoder": "info",
+}  # severity of the absence of topics that are not required
 
 FLAG_TEXTS = {
     DUPLICATE: ("warning", "duplicate", "stamps repeat an earlier one"),
@@ -42,7 +45,12 @@ FLAG_TEXTS = {
 
 
 def flag_samples(
-    role: str, decoded: Decoded, rule: TopicRule, t: np.ndarray, plausible: np.ndarray, stamped: bool
+    role: str,
+    decoded: Decoded,
+    rule: TopicRule,
+    t: np.ndarray,
+    plausible: np.ndarray,
+    stamped: bool,
 ) -> np.ndarray:
     """(N,) uint8 flags of one topic's samples (bits of trial.py)."""
     flags = np.zeros(len(t), np.uint8)
@@ -72,7 +80,9 @@ def check_stream(stream: Stream, rule: TopicRule, frames: np.ndarray | None) -> 
         where = np.flatnonzero(stream.flags & bit)
         if len(where):
             what = f"{len(where)} of {len(stream)} {text}"
-            yield Problem(severity, kind, stream.topic, what, len(where), float(stream.t_arrival[where[0]]))
+            yield Problem(
+                severity, kind, stream.topic, what, len(where), float(stream.t_arrival[where[0]])
+            )
     wrong = stream.flags & WRONG_FRAME > 0
     if frames is not None and wrong.any():
         other = ", ".join(map(repr, sorted(set(frames[wrong]))))
@@ -87,7 +97,9 @@ def _gaps(stream: Stream) -> Iterator[Problem]:
     if len(t) < 10:
         return
     step = np.diff(t)
-    period = max(float(np.median(step)), float(step.mean()) / 3)  # the mean where messages come in bursts
+    period = max(
+        float(np.median(step)), float(step.mean()) / 3
+    )  # the mean where messages come in bursts
     gaps = np.flatnonzero(step > GAP_PERIODS * period)
     if len(gaps):
         longest = float(step.max())
@@ -102,7 +114,9 @@ def missing(role: str, topic: str, required: bool) -> Iterator[Problem]:
     """A mapped topic that is not in the recording."""
     severity = "error" if required else OF_USE.get(role)
     if severity:
-        yield Problem(severity, "missing_topic", topic, f"not in the recording; nothing known of {role}")
+        yield Problem(
+            severity, "missing_topic", topic, f"not in the recording; nothing known of {role}"
+        )
 
 
 def check_excitation(commands: Commands | None) -> Iterator[Problem]:
@@ -116,7 +130,10 @@ def check_excitation(commands: Commands | None) -> Iterator[Problem]:
             what = f"{name} is {values[0]:g} {unit} throughout"
             text = f"{what}: parameters that need it to vary cannot be determined"
             yield Problem(
-                "warning" if name == "rotor_speed" else "info", "constant_command", commands.topic, text
+                "warning" if name == "rotor_speed" else "info",
+                "constant_command",
+                commands.topic,
+                text,
             )
 
 

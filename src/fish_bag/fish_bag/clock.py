@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BLOCKS = 40  # the recording is cut into so many pieces of time; resampling them gives the uncertainty
+BLOCKS = (
+    40  # the recording is cut into so many pieces of time; resampling them gives the uncertainty
+)
 LOWEST = 3  # points kept of each piece: only the lowest can touch the envelope
 RESAMPLES = 50
 FEWEST = 10  # messages; below this nothing is said about drift and uncertainty
@@ -67,6 +69,7 @@ def estimate_clock(
 
     Args:
         stamp_ns, arrival_ns: (N,) int64, N >= 1, any order.
+
     """
     middle = int(np.mean([stamp_ns.min(), stamp_ns.max()], dtype=np.longdouble))
     delay_ns = arrival_ns - stamp_ns
@@ -80,14 +83,24 @@ def estimate_clock(
     offset, drift = _edge_at_middle(np.concatenate(pieces))
     spread = np.array([_edge_at_middle(sample) for sample in _resampled(pieces)])
     offset_std, drift_std = np.sqrt(np.mean((spread - [offset, drift]) ** 2, axis=0))
-    offset_std *= np.sqrt(2)  # the smallest of n latencies lies above its limit by as much as it scatters
-    grain = float(np.mean(d - offset - drift * x)) / len(x)  # of the envelope, for exponential latencies
+    offset_std *= np.sqrt(
+        2
+    )  # the smallest of n latencies lies above its limit by as much as it scatters
+    grain = float(np.mean(d - offset - drift * x)) / len(
+        x
+    )  # of the envelope, for exponential latencies
     offset_std, drift_std = (
         max(offset_std, grain),
         max(drift_std, 4 * grain / np.ptp(x)),
     )  # resampling misses it
     return ClockEstimate(
-        clock, topics, base * 1e-9 + offset, float(offset_std), drift * 1e6, float(drift_std) * 1e6, middle
+        clock,
+        topics,
+        base * 1e-9 + offset,
+        float(offset_std),
+        drift * 1e6,
+        float(drift_std) * 1e6,
+        middle,
     )
 
 
@@ -119,7 +132,9 @@ def _lowest_points(x: np.ndarray, d: np.ndarray) -> list[np.ndarray]:
     order = np.lexsort([above, piece])
     rank = np.arange(len(x)) - np.searchsorted(piece[order], piece[order])
     kept = order[rank < LOWEST]
-    return [np.column_stack([x[i], d[i]]) for p in np.unique(piece) for i in [kept[piece[kept] == p]]]
+    return [
+        np.column_stack([x[i], d[i]]) for p in np.unique(piece) for i in [kept[piece[kept] == p]]
+    ]
 
 
 def _resampled(pieces: list[np.ndarray]) -> list[np.ndarray]:

@@ -26,6 +26,7 @@ def find_trials(path: Path) -> list[Path]:
 
     Raises:
         RecordingError: there is none.
+
     """
     if not path.exists():
         raise RecordingError(f"{path}: does not exist")
@@ -40,7 +41,10 @@ def find_trials(path: Path) -> list[Path]:
 
 
 def read_dataset(
-    path: Path | str, topics: TopicMap | None = None, progress: bool = False, processes: int | None = None
+    path: Path | str,
+    topics: TopicMap | None = None,
+    progress: bool = False,
+    processes: int | None = None,
 ) -> DataSet:
     """Read one recording, or all recordings of a folder, into a data set.
 
@@ -51,6 +55,7 @@ def read_dataset(
 
     Raises:
         RecordingError: no trial can be read. Single unreadable trials stand in DataSet.problems.
+
     """
     path = Path(path)
     paths = find_trials(path)
@@ -60,7 +65,9 @@ def read_dataset(
         if isinstance(result, Trial):
             trials.append(result)
         else:
-            problems.append(Problem("error", "unreadable_trial", "", f"{source.name} left out: {result}"))
+            problems.append(
+                Problem("error", "unreadable_trial", "", f"{source.name} left out: {result}")
+            )
     if not trials:
         raise RecordingError("; ".join(problem.text for problem in problems))
     trials = told_apart(trials)
@@ -74,7 +81,9 @@ def _read_all(
     """Every path with its trial, or with what went wrong, in order."""
     jobs = [(path, topics) for path in paths]
     if processes is None:
-        processes = 1 if len(paths) < PARALLEL_FROM else min(len(os.sched_getaffinity(0)), len(paths))
+        processes = (
+            1 if len(paths) < PARALLEL_FROM else min(len(os.sched_getaffinity(0)), len(paths))
+        )
     if processes == 1:
         yield from zip(paths, _shown(map(_read_one, jobs), len(paths), progress), strict=True)
         return
@@ -87,7 +96,12 @@ def _read_all(
 
 def _shown(results: Iterable[Trial | str], total: int, progress: bool) -> Iterator[Trial | str]:
     """The results as they come, with a progress bar if asked for."""
-    columns = (TextColumn("reading trials"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn("reading trials"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, disable=not progress, transient=True) as bar:
         yield from bar.track(results, total=total)
 
@@ -104,6 +118,7 @@ def told_apart(trials: Sequence[Trial]) -> list[Trial]:
 
     Raises:
         RecordingError: a recording is there twice.
+
     """
     namesakes: dict[str, list[tuple[str, ...]]] = {}
     for trial in trials:
@@ -126,7 +141,9 @@ def check_set(trials: Sequence[Trial]) -> Iterator[Problem]:
         yield Problem("warning", "one_trial", "", text)
     for what, values in _identities(trials).items():
         if len(values) > 1:
-            text = "; ".join(f"{value}: {', '.join(names)}" for value, names in sorted(values.items()))
+            text = "; ".join(
+                f"{value}: {', '.join(names)}" for value, names in sorted(values.items())
+            )
             yield Problem(
                 "error",
                 "mixed_robots",

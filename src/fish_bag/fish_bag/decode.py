@@ -86,9 +86,13 @@ def odometry(block: Block) -> Arrays:
     position = vector(block, "pose.pose.position")
     speed = vector(block, "twist.twist.linear")
     return {
-        "x": position[:, 0], "y": position[:, 1], "psi": yaw(block, "pose.pose.orientation"),
-        "u": speed[:, 0], "v": speed[:, 1], "r": block.values["twist.twist.angular.z"],
-    }  # fmt: skip
+        "x": position[:, 0],
+        "y": position[:, 1],
+        "psi": yaw(block, "pose.pose.orientation"),
+        "u": speed[:, 0],
+        "v": speed[:, 1],
+        "r": block.values["twist.twist.angular.z"],
+    }
 
 
 def gains(block: Block) -> Arrays:

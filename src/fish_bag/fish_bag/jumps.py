@@ -21,6 +21,7 @@ def find_jumps(t: np.ndarray, x: np.ndarray, y: np.ndarray, psi: np.ndarray) -> 
 
     Args:
         t, x, y, psi: (N,) in order of arrival [s, m, m, rad], NaN allowed (never a jump).
+
     """
     finite = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(psi))
     jumps = np.zeros(len(t), bool)
@@ -34,7 +35,9 @@ def find_jumps(t: np.ndarray, x: np.ndarray, y: np.ndarray, psi: np.ndarray) -> 
     dt = _median(np.abs(t[j] - t[i]), outside)
     distance = np.hypot(_median(x[j] - x[i], outside), _median(y[j] - y[i], outside))
     turn = np.abs(_median(np.mod(psi[j] - psi[i] + np.pi, 2 * np.pi) - np.pi, outside))
-    jumps[finite] = (distance > POSITION_M + SPEED_M_S * dt) | (turn > HEADING_RAD + TURN_RAD_S * dt)
+    jumps[finite] = (distance > POSITION_M + SPEED_M_S * dt) | (
+        turn > HEADING_RAD + TURN_RAD_S * dt
+    )
     return jumps
 
 

@@ -18,10 +18,23 @@ from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import Typesdict
 
 DTYPES = {
-    "bool": "?", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
-}  # fmt: skip
-MAX_LAYOUTS = 200  # per topic; more means that lengths change with every message and columns make no sense
+    "bool": "?",
+    "byte": "u1",
+    "char": "u1",
+    "int8": "i1",
+    "uint8": "u1",
+    "int16": "i2",
+    "uint16": "u2",
+    "int32": "i4",
+    "uint32": "u4",
+    "int64": "i8",
+    "uint64": "u8",
+    "float32": "f4",
+    "float64": "f8",
+}
+MAX_LAYOUTS = (
+    200  # per topic; more means that lengths change with every message and columns make no sense
+)
 
 
 class LayoutError(Exception):
@@ -47,8 +60,12 @@ class Layout:
     """All columns and strings of one message."""
 
     columns: list[Column] = field(default_factory=list)
-    texts: dict[str, list[str]] = field(default_factory=dict)  # path -> strings (one for a plain string)
-    fixed: list[int] = field(default_factory=list)  # bytes that decide the layout: lengths and strings
+    texts: dict[str, list[str]] = field(
+        default_factory=dict
+    )  # path -> strings (one for a plain string)
+    fixed: list[int] = field(
+        default_factory=list
+    )  # bytes that decide the layout: lengths and strings
     size: int = 0
 
 
@@ -59,7 +76,9 @@ class _Walker:
         self.raw, self.types, self.ros1 = raw, types, ros1
         self.base = 0 if ros1 else 4  # CDR aligns relative to the end of the encapsulation header
         if not ros1 and (len(raw) < 4 or raw[0] != 0 or raw[1] > 1):
-            raise LayoutError(f"{len(raw)} bytes without a CDR header: {raw[:4].hex() or 'nothing'}")
+            raise LayoutError(
+                f"{len(raw)} bytes without a CDR header: {raw[:4].hex() or 'nothing'}"
+            )
         self.order = "<" if ros1 or raw[1] else ">"
         self.pos = self.base
         self.layout = Layout(fixed=list(range(self.base)))
@@ -154,6 +173,7 @@ def decode_blocks(
     Returns:
         blocks, and the positions of messages in no block: their bytes do not fit the type, or MAX_LAYOUTS
         others came before their layout.
+
     """
     sizes = np.fromiter(map(len, raws), int, len(raws))
     left = np.ones(len(raws), bool)
@@ -182,7 +202,9 @@ def _same_structure(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and bytes (n, size) of the messages that differ from raws[first] in numbers only."""
     index = np.concatenate([[first], alike])
-    rows = np.frombuffer(b"".join([raws[i] for i in index]), np.uint8).reshape(len(index), layout.size)
+    rows = np.frombuffer(b"".join([raws[i] for i in index]), np.uint8).reshape(
+        len(index), layout.size
+    )
     same = (rows[:, layout.fixed] == rows[0, layout.fixed]).all(axis=1)
     return (index, rows) if same.all() else (index[same], rows[same])
 

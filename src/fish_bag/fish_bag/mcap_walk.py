@@ -99,7 +99,9 @@ def walk_file(path: Path) -> Walk:
     _drop_undefined(walk)
     if summary is not None and not walk.lost and len(walk.messages) < (summary.messages or 0):
         missing = (summary.messages or 0) - len(walk.messages)
-        walk.lose(f"{missing} of the {summary.messages} messages that its statistics count are not in it")
+        walk.lose(
+            f"{missing} of the {summary.messages} messages that its statistics count are not in it"
+        )
     return walk
 
 
@@ -112,7 +114,10 @@ def read_summary(data: bytes) -> Summary | None:
     if ending.opcode != Opcode.FOOTER or ending.cut:
         return None
     footer = ending.read(Footer)
-    start, covered = footer.summary_start, footer_at + FOOTER_BYTES - 4  # the checksum itself is not covered
+    start, covered = (
+        footer.summary_start,
+        footer_at + FOOTER_BYTES - 4,
+    )  # the checksum itself is not covered
     if not 0 < start <= footer_at or (
         footer.summary_crc and zlib.crc32(data[start:covered]) != footer.summary_crc
     ):
@@ -154,7 +159,9 @@ def _walk_data(walk: Walk, data: bytes, summary: Summary | None) -> None:
             following = bisect_right(chunks, record.position)
             if record.cut and following < len(chunks):
                 start = chunks[following]
-                walk.lose(f"{start - record.position} bytes from byte {record.position} on make no sense")
+                walk.lose(
+                    f"{start - record.position} bytes from byte {record.position} on make no sense"
+                )
                 break
             _take(walk, record)
     if summary is None and not walk.lost:
@@ -170,7 +177,9 @@ def _records(data: bytes, start: int, end: int) -> Iterator[Record]:
             return
         opcode, length = RECORD_HEAD.unpack_from(data, position)
         body_at = position + RECORD_HEAD.size
-        yield Record(opcode, data[body_at : min(body_at + length, end)], position, cut=body_at + length > end)
+        yield Record(
+            opcode, data[body_at : min(body_at + length, end)], position, cut=body_at + length > end
+        )
         position = body_at + length
 
 
@@ -213,7 +222,9 @@ def _take_chunk(walk: Walk, chunk: Record) -> None:
     try:
         data, damaged = _decompress(chunk.body)
     except CHUNK_DAMAGE as error:
-        walk.lose(f"chunk at byte {chunk.position} cannot be read ({error or type(error).__name__})")
+        walk.lose(
+            f"chunk at byte {chunk.position} cannot be read ({error or type(error).__name__})"
+        )
         return
     if damaged and not chunk.cut:
         walk.lose(f"chunk at byte {chunk.position} is damaged (wrong checksum); skipped")
@@ -246,7 +257,9 @@ def _decompress(body: bytes) -> tuple[bytes, bool]:
 
 def _drop_undefined(walk: Walk) -> None:
     """Without the record that says what a channel carries its messages are only bytes."""
-    walk.channels = {k: channel for k, channel in walk.channels.items() if channel.schema_id in walk.schemas}
+    walk.channels = {
+        k: channel for k, channel in walk.channels.items() if channel.schema_id in walk.schemas
+    }
     gone = Counter(m.channel_id for m in walk.messages if m.channel_id not in walk.channels)
     for channel, count in sorted(gone.items()):
         walk.lose(f"{count} messages of channel {channel}, whose topic or type is lost")

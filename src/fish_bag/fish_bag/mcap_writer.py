@@ -45,9 +45,7 @@ from fish_bag.record_file import DiskFullError, RecordFile
 
 CHUNK_BYTES = 1 << 20
 LIBRARY = "fish_bag"
-CUSTOM_NAME = (
-    "fish_train"  # metadata record that keeps the custom data even if metadata.yaml is never written
-)
+CUSTOM_NAME = "fish_train"  # metadata record that keeps the custom data even if metadata.yaml is never written
 
 
 @dataclass
@@ -70,21 +68,28 @@ class _OpenChunk:
 
     records: RecordBuilder = field(default_factory=RecordBuilder)
     times: list[int] = field(default_factory=list)
-    index: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # channel -> (time, offset)
+    index: dict[int, list[tuple[int, int]]] = field(
+        default_factory=dict
+    )  # channel -> (time, offset)
 
 
 class McapRecording:
     """Writes one recording directory: `<directory>/<name>.mcap` and metadata.yaml."""
 
     def __init__(
-        self, directory: Path, custom: dict[str, str] | None = None, chunk_s: float = 0.5, compress: bool = False
-    ) -> None:  # fmt: skip
+        self,
+        directory: Path,
+        custom: dict[str, str] | None = None,
+        chunk_s: float = 0.5,
+        compress: bool = False,
+    ) -> None:
         """Create the directory, which must not exist yet.
 
         Args:
             custom: stored with the recording ("robot" names the robot).
             chunk_s: age at which an open chunk is written [s], by the times given to `write`.
             compress: chunks are packed with zstandard; costs time while recording.
+
         """
         if directory.exists():
             raise RecordingError(f"{directory}: exists already; recordings are never overwritten")
@@ -127,6 +132,7 @@ class McapRecording:
 
         Raises:
             RecordingError: the type is unknown.
+
         """
         kind = message_type(msgtype) if isinstance(msgtype, str) else msgtype
         known = self.topics.get((name, kind.name))
@@ -136,7 +142,9 @@ class McapRecording:
         new: list[McapRecord] = []
         if schema is None:
             data = kind.definition.encode()
-            schema = Schema(id=len(self._schemas) + 1, name=kind.name, encoding=kind.encoding, data=data)
+            schema = Schema(
+                id=len(self._schemas) + 1, name=kind.name, encoding=kind.encoding, data=data
+            )
             new.append(schema)
         qos = qos or Qos()
         channel = Channel(
@@ -156,6 +164,7 @@ class McapRecording:
 
         Raises:
             DiskFullError: the chunk could not be written; the recording has been closed.
+
         """
         chunk, channel = self._chunk, topic.channel.id
         chunk.index.setdefault(channel, []).append((time_ns, chunk.records.count))
@@ -179,24 +188,35 @@ class McapRecording:
         packed = zstandard.compress(data) if self._compression else data
         body = _records(
             Chunk(
-                compression=self._compression, data=packed, uncompressed_size=len(data), uncompressed_crc=zlib.crc32(data),
-                message_start_time=first, message_end_time=last,
+                compression=self._compression,
+                data=packed,
+                uncompressed_size=len(data),
+                uncompressed_crc=zlib.crc32(data),
+                message_start_time=first,
+                message_end_time=last,
             )
-        )  # fmt: skip
+        )
         offsets, index = {}, b""
         for channel, entries in chunk.index.items():
             offsets[channel] = self._file.size + len(body) + len(index)
             index += _records(MessageIndex(channel_id=channel, records=entries))
         entry = ChunkIndex(
-            chunk_start_offset=self._file.size, chunk_length=len(body), compression=self._compression,
-            compressed_size=len(packed), uncompressed_size=len(data),
-            message_index_offsets=offsets, message_index_length=len(index),
-            message_start_time=first, message_end_time=last,
-        )  # fmt: skip
+            chunk_start_offset=self._file.size,
+            chunk_length=len(body),
+            compression=self._compression,
+            compressed_size=len(packed),
+            uncompressed_size=len(data),
+            message_index_offsets=offsets,
+            message_index_length=len(index),
+            message_start_time=first,
+            message_end_time=last,
+        )
         self._append_or_close(body + index, lost=chunk)
         self._chunks.append(entry)
         self._range = (
-            (min(first, self._range[0]), max(last, self._range[1])) if self._range else (first, last)
+            (min(first, self._range[0]), max(last, self._range[1]))
+            if self._range
+            else (first, last)
         )
 
     def close(self) -> None:
@@ -226,13 +246,17 @@ class McapRecording:
             with suppress(DiskFullError):
                 self._file.append(ending)
                 break
-        with suppress(OSError):  # without metadata.yaml the file is still read, and mended by recover
+        with suppress(
+            OSError
+        ):  # without metadata.yaml the file is still read, and mended by recover
             self._finish()
 
     def _finish(self) -> None:
         self._closed = True
         self._file.close()
-        write_metadata(self.directory, self.path.name, list(self.topics.values()), self._range, self.custom)
+        write_metadata(
+            self.directory, self.path.name, list(self.topics.values()), self._range, self.custom
+        )
 
     def _ending(self) -> bytes:
         """DataEnd, summary section with its offsets, footer and magic."""
@@ -241,11 +265,18 @@ class McapRecording:
         channels = [topic.channel for topic in self.topics.values()]
         first, last = self._range or (0, 0)
         statistics = Statistics(
-            attachment_count=0, channel_count=len(channels), chunk_count=len(self._chunks), metadata_count=1,
-            channel_message_counts={topic.channel.id: topic.count for topic in self.topics.values()},
-            message_count=self.message_count, message_start_time=first, message_end_time=last,
+            attachment_count=0,
+            channel_count=len(channels),
+            chunk_count=len(self._chunks),
+            metadata_count=1,
+            channel_message_counts={
+                topic.channel.id: topic.count for topic in self.topics.values()
+            },
+            message_count=self.message_count,
+            message_start_time=first,
+            message_end_time=last,
             schema_count=len(self._schemas),
-        )  # fmt: skip
+        )
         groups: list[tuple[Opcode, list[McapRecord]]] = [
             (Opcode.SCHEMA, list(self._schemas.values())),
             (Opcode.CHANNEL, list(channels)),
@@ -258,11 +289,19 @@ class McapRecording:
             if group:
                 offsets += _records(
                     SummaryOffset(
-                        group_opcode=opcode, group_start=start + len(summary), group_length=len(group)
+                        group_opcode=opcode,
+                        group_start=start + len(summary),
+                        group_length=len(group),
                     )
                 )
             summary += group
-        return end + summary + offsets + _footer(start, start + len(summary), summary + offsets) + MCAP0_MAGIC
+        return (
+            end
+            + summary
+            + offsets
+            + _footer(start, start + len(summary), summary + offsets)
+            + MCAP0_MAGIC
+        )
 
 
 def _records(*records: McapRecord) -> bytes:

@@ -31,12 +31,16 @@ def pose(x: float, y: float, psi: float) -> Any:
     """A pose in the plane."""
     position = make("geometry_msgs/msg/Point", x=float(x), y=float(y), z=0.0)
     half = 0.5 * float(psi)
-    turn = make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=float(np.sin(half)), w=float(np.cos(half)))
+    turn = make(
+        "geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=float(np.sin(half)), w=float(np.cos(half))
+    )
     return make("geometry_msgs/msg/Pose", position=position, orientation=turn)
 
 
 def pose_stamped(stamp_ns: int, frame: str, x: float, y: float, psi: float) -> Any:
-    return make("geometry_msgs/msg/PoseStamped", header=header(stamp_ns, frame), pose=pose(x, y, psi))
+    return make(
+        "geometry_msgs/msg/PoseStamped", header=header(stamp_ns, frame), pose=pose(x, y, psi)
+    )
 
 
 def planar_covariance(variance: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -50,9 +54,13 @@ def camera_pose(
     stamp_ns: int, frame: str, xypsi: Sequence[float], variance: Sequence[float] | np.ndarray
 ) -> Any:
     body = make(
-        "geometry_msgs/msg/PoseWithCovariance", pose=pose(*xypsi), covariance=planar_covariance(variance)
+        "geometry_msgs/msg/PoseWithCovariance",
+        pose=pose(*xypsi),
+        covariance=planar_covariance(variance),
     )
-    return make("geometry_msgs/msg/PoseWithCovarianceStamped", header=header(stamp_ns, frame), pose=body)
+    return make(
+        "geometry_msgs/msg/PoseWithCovarianceStamped", header=header(stamp_ns, frame), pose=body
+    )
 
 
 def odometry(stamp_ns: int, xypsi: Sequence[float], uvr: Sequence[float]) -> Any:
@@ -62,10 +70,14 @@ def odometry(stamp_ns: int, xypsi: Sequence[float], uvr: Sequence[float]) -> Any
     twist = make("geometry_msgs/msg/Twist", linear=vector3(u, v, 0.0), angular=vector3(0.0, 0.0, r))
     speed = make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=np.zeros(36))
     head = header(stamp_ns, "pool")
-    return make("nav_msgs/msg/Odometry", header=head, child_frame_id="base_link", pose=where, twist=speed)
+    return make(
+        "nav_msgs/msg/Odometry", header=head, child_frame_id="base_link", pose=where, twist=speed
+    )
 
 
-def joints(stamp_ns: int, names: list[str], position: Sequence[float], velocity: Sequence[float] = ()) -> Any:
+def joints(
+    stamp_ns: int, names: list[str], position: Sequence[float], velocity: Sequence[float] = ()
+) -> Any:
     return make(
         "sensor_msgs/msg/JointState",
         header=header(stamp_ns),
@@ -76,7 +88,9 @@ def joints(stamp_ns: int, names: list[str], position: Sequence[float], velocity:
     )
 
 
-def imu(stamp_ns: int, gyro: Sequence[float], accel: Sequence[float], orientation: Sequence[float]) -> Any:
+def imu(
+    stamp_ns: int, gyro: Sequence[float], accel: Sequence[float], orientation: Sequence[float]
+) -> Any:
     """Angular velocity [rad/s], specific force [m/s^2], quaternion x, y, z, w; frame imu_link."""
     x, y, z, w = (float(q) for q in orientation)
     return make(
@@ -92,7 +106,9 @@ def imu(stamp_ns: int, gyro: Sequence[float], accel: Sequence[float], orientatio
 
 
 def vector_stamped(stamp_ns: int, frame: str, xyz: Sequence[float]) -> Any:
-    return make("geometry_msgs/msg/Vector3Stamped", header=header(stamp_ns, frame), vector=vector3(*xyz))
+    return make(
+        "geometry_msgs/msg/Vector3Stamped", header=header(stamp_ns, frame), vector=vector3(*xyz)
+    )
 
 
 def number(value: float) -> Any:
@@ -113,7 +129,9 @@ def path(stamp_ns: int, frame: str, points: np.ndarray) -> Any:
     return make("nav_msgs/msg/Path", header=header(stamp_ns, frame), poses=poses)
 
 
-def battery(stamp_ns: int, voltage: float, current: float = np.nan, temperature: float = np.nan) -> Any:
+def battery(
+    stamp_ns: int, voltage: float, current: float = np.nan, temperature: float = np.nan
+) -> Any:
     unknown = dict.fromkeys(("charge", "capacity", "design_capacity", "percentage"), np.nan)
     return make(
         "sensor_msgs/msg/BatteryState",

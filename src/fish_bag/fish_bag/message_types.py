@@ -23,7 +23,7 @@ class MessageType:
 
 @lru_cache(maxsize=2)
 def typestore(ros1: bool = False) -> Typestore:
-    """rosbags' types of ROS 2 Jazzy or ROS 1 Noetic."""
+    """Rosbags' types of ROS 2 Jazzy or ROS 1 Noetic."""
     return get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_JAZZY)
 
 
@@ -33,8 +33,11 @@ def message_type(name: str) -> MessageType:
 
     Raises:
         RecordingError: not one of the common interfaces.
+
     """
     if name not in typestore().fielddefs:
-        raise RecordingError(f"message type {name!r} is not one of the common interfaces of ROS 2 Jazzy")
+        raise RecordingError(
+            f"message type {name!r} is not one of the common interfaces of ROS 2 Jazzy"
+        )
     text, _ = typestore().generate_msgdef(name, ros_version=2)
     return MessageType(name, text, typestore().hash_rihs01(name))

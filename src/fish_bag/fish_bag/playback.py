@@ -23,10 +23,17 @@ class ReplayerConfig:
     rate: float = 1.0  # times as fast as recorded, 0.01 to 100
     loop: bool = False  # start again at the end
     paused: bool = False  # wait for the pause service to be called with false
-    topics: tuple[str, ...] = ("*", "/*")  # names or patterns, relative to the node's namespace or absolute
+    topics: tuple[str, ...] = (
+        "*",
+        "/*",
+    )  # names or patterns, relative to the node's namespace or absolute
     exclude: tuple[str, ...] = ("",)  # taken out of these
-    clock_hz: float = 100.0  # Hz of bag time on /clock unless the recording has a /clock of its own; 0: none
-    start_delay_s: float = 3.0  # s before the first message: subscribers need up to 2 s to find publishers
+    clock_hz: float = (
+        100.0  # Hz of bag time on /clock unless the recording has a /clock of its own; 0: none
+    )
+    start_delay_s: float = (
+        3.0  # s before the first message: subscribers need up to 2 s to find publishers
+    )
 
     def __post_init__(self) -> None:
         if not 0.01 <= self.rate <= 100.0:
@@ -49,7 +56,9 @@ class PlaybackClock:
     def bag_time(self, steady_ns: int) -> int:
         """Bag time now [ns]."""
         return (
-            self._bag_ns if self.paused else self._bag_ns + round((steady_ns - self._steady_ns) * self._rate)
+            self._bag_ns
+            if self.paused
+            else self._bag_ns + round((steady_ns - self._steady_ns) * self._rate)
         )
 
     def wait(self, bag_ns: int, steady_ns: int) -> int:
@@ -70,7 +79,9 @@ class Playback:
 
     def __init__(self, config: ReplayerConfig, namespace: str) -> None:
         if not config.recording:
-            raise RecordingError("parameter recording is empty: expected a rosbag2 folder or .mcap file")
+            raise RecordingError(
+                "parameter recording is empty: expected a rosbag2 folder or .mcap file"
+            )
         self._path = path = Path(config.recording).expanduser()
         source = storage(path)
         if source.suffix == ".bag":
@@ -97,6 +108,7 @@ class Playback:
 
         Raises:
             RecordingError: the file is damaged from here on.
+
         """
         with damage_is_said(self._path):
             yield from self._reader.messages(self.connections)
@@ -108,7 +120,11 @@ class Playback:
 
 def offered_qos(connection: Connection) -> Qos:
     """What the recorded publisher offered."""
-    profiles = connection.ext.offered_qos_profiles if isinstance(connection.ext, ConnectionExtRosbag2) else []
+    profiles = (
+        connection.ext.offered_qos_profiles
+        if isinstance(connection.ext, ConnectionExtRosbag2)
+        else []
+    )
     if not profiles:
         return Qos()
     return Qos(

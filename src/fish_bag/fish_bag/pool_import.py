@@ -26,11 +26,15 @@ from fish_bag.streams import NS_PER_S, decode_paths
 
 Message = tuple[int, str, Any]  # arrival [ns], topic, message
 
-CENTRE = np.array([1.9005, 0.8688])  # m, image centre in the tracker's frame, taken for the pool's centre
+CENTRE = np.array(
+    [1.9005, 0.8688]
+)  # m, image centre in the tracker's frame, taken for the pool's centre
 GRAVITY = 9.81  # m/s^2, what the sensor's gravity removal is undone with
 ENCODER_AGE_S = 0.042  # s, encoder samples are older than their stamp
 IMU_AGE_S = 0.014  # s, half of the polling and refresh time
-CAMERA_QUANTILE = 0.01  # of arrival minus stamp: the camera clock's offset (single frames come early)
+CAMERA_QUANTILE = (
+    0.01  # of arrival minus stamp: the camera clock's offset (single frames come early)
+)
 CAMERA_VARIANCE = np.array([9e-6, 9e-6, 9e-4])  # m^2, m^2, rad^2
 TAIL_NAMES = ["tail_1", "tail_2"]
 GAIN_FIELDS = ("yaw_Kp", "yaw_Ki", "yaw_Kd", "vel_Kp", "vel_Ki", "vel_Kd")
@@ -77,13 +81,16 @@ def import_bag(path: Path, out: Path) -> ImportReport:
 
     Raises:
         RecordingError: not one of these bags, or a topic is missing.
+
     """
     bag = read_bag(path, lambda topic, _: topic in (*SOURCES.values(), PATH_SOURCE))
     if not (bag.ros1 and is_pool_bag(bag)):
         held = ", ".join(sorted(raw.topic for raw in bag.topics))
         raise RecordingError(f"{path}: not a recording of the paper's robot; it holds {held}")
     sources = {role: _source(bag, role, topic) for role, topic in SOURCES.items()}
-    robot = min(int((s.arrival_ns - s.stamp_ns).min()) for role, s in sources.items() if role != "camera")
+    robot = min(
+        int((s.arrival_ns - s.stamp_ns).min()) for role, s in sources.items() if role != "camera"
+    )
     delay = sources["camera"].arrival_ns - sources["camera"].stamp_ns
     camera = int(delay.min()) + round(float(np.quantile(delay - delay.min(), CAMERA_QUANTILE)))
     shifted = {
@@ -107,12 +114,16 @@ def _source(bag: RawBag, role: str, topic: str) -> Source:
     """Decode one topic; stamps are still the robot's."""
     raw = next((raw for raw in bag.topics if raw.topic == topic and raw.raws), None)
     if raw is None:
-        raise RecordingError(f"{bag.path}: {topic} ({role}) is missing; nothing can be imported without it")
+        raise RecordingError(
+            f"{bag.path}: {topic} ({role}) is missing; nothing can be imported without it"
+        )
     blocks, unreadable = decode_blocks(raw.raws, raw.type, bag.types, ros1=True)
     if len(blocks) != 1 or len(unreadable):
         raise RecordingError(f"{bag.path}: {topic}: messages do not all fit {raw.type}")
     values = blocks[0].values
-    stamp_ns = values["header.stamp.sec"].astype(np.int64) * NS_PER_S + values["header.stamp.nanosec"]
+    stamp_ns = (
+        values["header.stamp.sec"].astype(np.int64) * NS_PER_S + values["header.stamp.nanosec"]
+    )
     return Source(values, stamp_ns, raw.arrival_ns)
 
 
@@ -144,7 +155,9 @@ def _rotor(sources: dict[str, Source], last_ns: int) -> tuple[RotorCommand, int]
 def _commands(control: Source, rotor: RotorCommand, start_ns: int) -> Iterator[Message]:
     """joint_command every 10 ms: the rebuilt rotor speed, and the rudder angle of the latest loop."""
     loop = np.searchsorted((control.stamp_ns - start_ns) * 1e-9, rotor.t, side="right") - 1
-    rudder = np.where(loop >= 0, -np.deg2rad(control["servo_angle"].astype(float)[np.maximum(loop, 0)]), 0.0)
+    rudder = np.where(
+        loop >= 0, -np.deg2rad(control["servo_angle"].astype(float)[np.maximum(loop, 0)]), 0.0
+    )
     for t, phase, speed, alpha in zip(rotor.t, rotor.phase, rotor.speed, rudder, strict=True):
         stamp_ns = start_ns + _ns(t)
         yield (
@@ -157,7 +170,9 @@ def _commands(control: Source, rotor: RotorCommand, start_ns: int) -> Iterator[M
 def _camera(sources: dict[str, Source]) -> Iterator[Message]:
     """Head pose and relative tail angles; the tracker's angles are absolute, in degrees."""
     camera = sources["camera"]
-    head, tail_1, tail_2 = (np.deg2rad(camera[k]) for k in ("head_angle", "tail_angle_1", "tail_angle_2"))
+    head, tail_1, tail_2 = (
+        np.deg2rad(camera[k]) for k in ("head_angle", "tail_angle_1", "tail_angle_2")
+    )
     x, y = camera["x_position"] - CENTRE[0], camera["y_position"] - CENTRE[1]
     bends = np.column_stack([_wrap(tail_1 - head), _wrap(tail_2 - tail_1)])
     for i, (stamp_ns, arrival_ns) in enumerate(_times(camera)):
@@ -199,7 +214,8 @@ def _imu(sources: dict[str, Source]) -> Iterator[Message]:
     """
     imu = sources["imu"]
     gyro, accel = (
-        np.column_stack([imu[f"{k}.{a}"] for a in "xyz"]) for k in ("angular_velocity", "linear_acceleration")
+        np.column_stack([imu[f"{k}.{a}"] for a in "xyz"])
+        for k in ("angular_velocity", "linear_acceleration")
     )
     q = np.column_stack([imu[f"orientation.{a}"] for a in "xyzw"])
     up = _vertical(q / np.linalg.norm(q, axis=1, keepdims=True))
@@ -207,7 +223,11 @@ def _imu(sources: dict[str, Source]) -> Iterator[Message]:
     for i, (stamp_ns, arrival_ns) in enumerate(_times(imu)):
         if new[i]:
             stamp_ns -= _ns(IMU_AGE_S)
-            yield arrival_ns, "imu/data", build.imu(stamp_ns, gyro[i], accel[i] + GRAVITY * up[i], q[i])
+            yield (
+                arrival_ns,
+                "imu/data",
+                build.imu(stamp_ns, gyro[i], accel[i] + GRAVITY * up[i], q[i]),
+            )
 
 
 def _vertical(q: np.ndarray) -> np.ndarray:
@@ -222,7 +242,11 @@ def _filter(sources: dict[str, Source]) -> Iterator[Message]:
     x, y = state["x"] - CENTRE[0], state["y"] - CENTRE[1]
     for i, (stamp_ns, arrival_ns) in enumerate(_times(state)):
         uvr = state["vb_x"][i], state["vb_y"][i], 0.0
-        yield arrival_ns, "odometry/filtered", build.odometry(stamp_ns, (x[i], y[i], state["yaw"][i]), uvr)
+        yield (
+            arrival_ns,
+            "odometry/filtered",
+            build.odometry(stamp_ns, (x[i], y[i], state["yaw"][i]), uvr),
+        )
 
 
 def _control(sources: dict[str, Source]) -> Iterator[Message]:
@@ -251,5 +275,7 @@ def _path(bag: RawBag) -> Iterator[Message]:
             paths = decode_paths(raw, bag.types, ros1=True)
             for arrival_ns, path in zip(raw.arrival_ns.tolist(), paths, strict=True):
                 if path is None:
-                    raise RecordingError(f"{bag.path}: {raw.topic}: messages do not all fit {raw.type}")
+                    raise RecordingError(
+                        f"{bag.path}: {raw.topic}: messages do not all fit {raw.type}"
+                    )
                 yield arrival_ns, "reference/path", build.path(arrival_ns, "pool", path[0] - CENTRE)

@@ -41,7 +41,9 @@ class RotorCommand:
 class _Loops:
     """The control loops of one run, on a fine grid of time."""
 
-    def __init__(self, t: np.ndarray, amplitude: np.ndarray, frequency_hz: np.ndarray, end: float) -> None:
+    def __init__(
+        self, t: np.ndarray, amplitude: np.ndarray, frequency_hz: np.ndarray, end: float
+    ) -> None:
         self.omega = 2 * np.pi * frequency_hz
         self.amplitude, self.start = amplitude, t[0]
         self.grid = np.arange(t[0], end + GRID_S, GRID_S)
@@ -50,7 +52,7 @@ class _Loops:
         self.knots = np.linspace(t[0], t[-1], max(2, round((t[-1] - t[0]) / KNOT_S) + 1))
 
     def phase(self, slip: np.ndarray) -> np.ndarray:
-        """theta + delta on the grid."""
+        """Theta + delta on the grid."""
         return np.asarray(self.theta[self.loop] + np.interp(self.grid, self.knots, slip))
 
     def speed(self, slip: np.ndarray, lag_s: float) -> np.ndarray:
@@ -75,16 +77,21 @@ def rebuild_rotor_command(
         t_loop, amplitude, frequency_hz: (L,) loops [s, rad, Hz].
         t_encoder, encoder_speed: (E,) samples [s, rad/s, REP 103 sign].
         end: until when commands are wanted [s]; after the last loop its speed is held.
+
     """
     loops = _Loops(t_loop, amplitude, frequency_hz, end)
     use = (t_encoder > t_loop[0] + 0.2) & (t_encoder < t_loop[-1])
     t_fit, measured = t_encoder[use], encoder_speed[use]
 
     def residuals(p: np.ndarray) -> np.ndarray:
-        return np.asarray(np.interp(t_fit, loops.grid, loops.speed(p[1:], p[0] * FIRST_LAG_S)) - measured)
+        return np.asarray(
+            np.interp(t_fit, loops.grid, loops.speed(p[1:], p[0] * FIRST_LAG_S)) - measured
+        )
 
     def cost(first_phase: float) -> float:
-        early = np.abs(residuals(np.concatenate([[1.0], np.full(len(loops.knots), first_phase)])))[:100]
+        early = np.abs(residuals(np.concatenate([[1.0], np.full(len(loops.knots), first_phase)])))[
+            :100
+        ]
         return float(np.mean(np.minimum(early, 30.0)))
 
     start = np.full(1 + len(loops.knots), min(FIRST_PHASES, key=cost))

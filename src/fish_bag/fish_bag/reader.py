@@ -49,6 +49,7 @@ def read_trial(path: Path | str, topics: TopicMap | None = None) -> Trial:
 
     Raises:
         RecordingError: nothing can be read; everything less stands in Trial.problems.
+
     """
     topics, path = topics or TopicMap(), Path(path)
     last_names = {rule.topic.rsplit("/", 1)[-1] for rule in topics.rules.values()}
@@ -139,7 +140,9 @@ class _Assembly:
                     mapped[role] = _Mapped(rule, decoded, self.stamps(rule, decoded))
                 else:
                     text = f"none of {len(raw.raws)} messages can be decoded as {raw.type}"
-                    self.problems.append(Problem("error", "unreadable", raw.topic, text, len(raw.raws)))
+                    self.problems.append(
+                        Problem("error", "unreadable", raw.topic, text, len(raw.raws))
+                    )
         return mapped
 
     def stamps(self, rule: TopicRule, decoded: Decoded) -> Stamps | None:
@@ -163,7 +166,13 @@ class _Assembly:
         values: dict[str, Any] = dict(decoded.arrays)
         if ROLES[role].names:
             values["names"] = decoded.names
-        values |= {"topic": decoded.topic, "frame_id": frame, "t": t, "t_arrival": t_arrival, "flags": flags}
+        values |= {
+            "topic": decoded.topic,
+            "frame_id": frame,
+            "t": t,
+            "t_arrival": t_arrival,
+            "flags": flags,
+        }
         stream = ROLES[role].stream(**values)
         self.problems += checks.check_stream(stream, rule, decoded.frames)
         return stream
@@ -174,7 +183,9 @@ class _Assembly:
             return ()
         expected, times = self.topics.rules[PATH_ROLE].frame, axis.arrived(raw.arrival_ns)
         paths = []
-        for t, path in zip(times.tolist(), decode_paths(raw, self.bag.types, self.bag.ros1), strict=True):
+        for t, path in zip(
+            times.tolist(), decode_paths(raw, self.bag.types, self.bag.ros1), strict=True
+        ):
             if path is None:
                 text = f"a path cannot be decoded as {raw.type}"
                 self.problems.append(Problem("error", "unreadable", raw.topic, text, t=t))
@@ -187,7 +198,9 @@ class _Assembly:
         return tuple(paths)
 
     def summary(self, raw: RawTopic, axis: TimeAxis) -> TopicSummary:
-        roles = {full_name(self.namespace, rule.topic): role for role, rule in self.topics.rules.items()}
+        roles = {
+            full_name(self.namespace, rule.topic): role for role, rule in self.topics.rules.items()
+        }
         role = roles.get(raw.topic, "")
         clock = self.topics.rules[role].clock if role else "robot"
         stamp_ns = stamps_of_prefixes(raw, self.bag.types, self.bag.ros1)

@@ -23,6 +23,7 @@ class RecordFile:
 
         Raises:
             DiskFullError: there is no room for either.
+
         """
         self.path, self.size = path, 0
         self._reserve = path.parent / RESERVE_NAME
@@ -38,6 +39,7 @@ class RecordFile:
 
         Raises:
             DiskFullError: it could not be written; the file is as it was before.
+
         """
         view = memoryview(data)
         try:

@@ -11,10 +11,24 @@ from pathlib import Path
 from fish_bag.qos import Qos
 
 DEFAULT_TOPICS = (
-    "joint_command", "joint_states", "imu/data", "camera/pose", "camera/tail", "camera/camera_info",
-    "odometry/filtered", "reference/*", "control/*", "tracking/error", "battery_state",
-    "sim/odometry", "sim/joint_states", "/diagnostics", "/tf", "/tf_static", "/clock",
-)  # fmt: skip
+    "joint_command",
+    "joint_states",
+    "imu/data",
+    "camera/pose",
+    "camera/tail",
+    "camera/camera_info",
+    "odometry/filtered",
+    "reference/*",
+    "control/*",
+    "tracking/error",
+    "battery_state",
+    "sim/odometry",
+    "sim/joint_states",
+    "/diagnostics",
+    "/tf",
+    "/tf_static",
+    "/clock",
+)
 
 
 @dataclass(frozen=True)

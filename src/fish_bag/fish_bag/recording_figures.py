@@ -18,7 +18,11 @@ Row = tuple[str, list[tuple[str, Stream, np.ndarray]]]  # axis title, lines: lab
 
 def figures(trial: Trial) -> list[Figure]:
     """All figures that the trial has data for."""
-    flagged = "Red crosses: flagged samples." if any(s.flags.any() for s in trial.streams.values()) else ""
+    flagged = (
+        "Red crosses: flagged samples."
+        if any(s.flags.any() for s in trial.streams.values())
+        else ""
+    )
     made = [
         Figure(f"{trial.name}: path in the pool", path_figure(trial), flagged),
         Figure(f"{trial.name}: measurements and commands", over_time(list(_rows(trial))), flagged),
@@ -30,7 +34,11 @@ def figures(trial: Trial) -> list[Figure]:
 def path_figure(trial: Trial) -> go.Figure:
     """The way through the pool, frame pool [m]."""
     figure = styled(go.Figure(), height=520)
-    for name, stream in (("camera", trial.camera), ("odometry", trial.odometry), ("truth", trial.truth)):
+    for name, stream in (
+        ("camera", trial.camera),
+        ("odometry", trial.odometry),
+        ("truth", trial.truth),
+    ):
         if stream is not None:
             keep = _thinned(stream)
             figure.add_scatter(x=stream.x[keep], y=stream.y[keep], name=name, mode="lines")
@@ -48,7 +56,9 @@ def _rows(trial: Trial) -> Iterator[Row]:
     """One row of the time plot for every quantity that was recorded."""
     camera, odometry, truth = trial.camera, trial.odometry, trial.truth
     poses = [
-        (k, s) for k, s in (("camera", camera), ("odometry", odometry), ("truth", truth)) if s is not None
+        (k, s)
+        for k, s in (("camera", camera), ("odometry", odometry), ("truth", truth))
+        if s is not None
     ]
     if poses:
         yield "heading (rad)", [(name, s, _unwrapped(s.psi)) for name, s in poses]
@@ -77,7 +87,10 @@ def _rows(trial: Trial) -> Iterator[Row]:
         )
     if trial.gains is not None:
         labels = trial.gains.names or tuple(str(i) for i in range(trial.gains.values.shape[1]))
-        yield "gains", [(name, trial.gains, trial.gains.values[:, i]) for i, name in enumerate(labels)]
+        yield (
+            "gains",
+            [(name, trial.gains, trial.gains.values[:, i]) for i, name in enumerate(labels)],
+        )
     if trial.tracking_error is not None:
         e = trial.tracking_error
         yield (
@@ -94,7 +107,9 @@ def over_time(rows: list[Row]) -> go.Figure:
     for i, (title, lines) in enumerate(rows, start=1):
         for name, stream, values in lines:
             keep = _thinned(stream)
-            figure.add_scatter(x=stream.t[keep], y=values[keep], name=name, mode="lines", row=i, col=1)
+            figure.add_scatter(
+                x=stream.t[keep], y=values[keep], name=name, mode="lines", row=i, col=1
+            )
             _mark(figure, stream, stream.t, values, row=i, col=1)
         figure.update_yaxes(title=title, row=i, col=1)
     figure.update_xaxes(title="time (s)", row=max(1, len(rows)), col=1)
@@ -113,7 +128,9 @@ def timing_figure(trial: Trial) -> go.Figure:
             )
         t = np.sort(stream.t)
         if len(t) > 1:
-            figure.add_scatter(x=t[1:], y=np.diff(t) * 1e3, name=f"{name} period", mode="lines", row=2, col=1)
+            figure.add_scatter(
+                x=t[1:], y=np.diff(t) * 1e3, name=f"{name} period", mode="lines", row=2, col=1
+            )
     figure.update_yaxes(title="latency (ms)", row=1, col=1)
     figure.update_yaxes(title="period (ms)", row=2, col=1)
     figure.update_xaxes(title="time (s)", row=2, col=1)
@@ -132,7 +149,9 @@ def _mark(figure: go.Figure, stream: Stream, x: np.ndarray, y: np.ndarray, **whe
     flagged = stream.flags != 0
     if flagged.any():
         name = f"{stream.topic} flagged"
-        figure.add_scatter(x=x[flagged], y=y[flagged], name=name, showlegend=False, **FLAGGED, **where)
+        figure.add_scatter(
+            x=x[flagged], y=y[flagged], name=name, showlegend=False, **FLAGGED, **where
+        )
 
 
 def _unwrapped(psi: np.ndarray) -> np.ndarray:

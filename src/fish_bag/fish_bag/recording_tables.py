@@ -13,7 +13,9 @@ def trials_table(data: DataSet) -> Table:
     """One row per trial."""
     rows = []
     for trial in data:
-        counts = {s: sum(p.severity == s for p in trial.problems) for s in ("error", "warning", "info")}
+        counts = {
+            s: sum(p.severity == s for p in trial.problems) for s in ("error", "warning", "info")
+        }
         rows.append(
             (
                 trial.name,
@@ -29,9 +31,19 @@ def trials_table(data: DataSet) -> Table:
 
 def topics_table(trial: Trial) -> Table:
     """One row per topic."""
-    head = ("topic", "type", "read as", "messages", "Hz", "longest gap (ms)", "latency 1/50/99 % (ms)")
+    head = (
+        "topic",
+        "type",
+        "read as",
+        "messages",
+        "Hz",
+        "longest gap (ms)",
+        "latency 1/50/99 % (ms)",
+    )
     rows = [_topic_row(topic) for topic in sorted(trial.topics, key=lambda t: t.topic)]
-    return Table(f"{trial.name}: {trial.duration:.3f} s, time axis of the {trial.axis}", head, tuple(rows))
+    return Table(
+        f"{trial.name}: {trial.duration:.3f} s, time axis of the {trial.axis}", head, tuple(rows)
+    )
 
 
 def _topic_row(topic: TopicSummary) -> tuple[str, ...]:
@@ -65,7 +77,9 @@ def clocks_table(trial: Trial) -> Table:
 
 def problems_table(title: str, problems: tuple[Problem, ...]) -> Table:
     """One row per problem."""
-    rows = [(p.severity, p.kind, p.topic, p.text, "" if p.t is None else f"{p.t:.3f}") for p in problems]
+    rows = [
+        (p.severity, p.kind, p.topic, p.text, "" if p.t is None else f"{p.t:.3f}") for p in problems
+    ]
     return Table(title, ("severity", "kind", "topic", "what", "first at (s)"), tuple(rows))
 
 

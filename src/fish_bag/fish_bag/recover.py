@@ -40,6 +40,7 @@ def recover(path: Path, out: Path) -> Recovery:
 
     Raises:
         RecordingError: not MCAP, files of several recordings, or not one message is left.
+
     """
     walks = [walk_file(file) for file in _files(path)]
     if not any(walk.messages for walk in walks):
@@ -86,7 +87,9 @@ def _kind(schema: Schema) -> MessageType:
     try:
         return message_type(schema.name)
     except RecordingError:
-        return MessageType(schema.name, schema.data.decode(errors="replace"), encoding=schema.encoding)
+        return MessageType(
+            schema.name, schema.data.decode(errors="replace"), encoding=schema.encoding
+        )
 
 
 def _qos(channel: Channel) -> Qos:

@@ -73,11 +73,17 @@ def robot_messages(duration: float = 2.0, namespace: str = "/fish") -> list[Mess
     for t in np.arange(0, duration, 1.0):
         add("battery_state", t, build.battery(ns(t), 12.0 - 0.1 * t))
     add("reference/speed", 0.1, build.number(0.2))
-    add("reference/path", 0.0, build.path(ns(0), "pool", np.array([[0.0, 0.0], [1.0, 0.5], [1.5, 0.5]])))
+    add(
+        "reference/path",
+        0.0,
+        build.path(ns(0), "pool", np.array([[0.0, 0.0], [1.0, 0.5], [1.5, 0.5]])),
+    )
     return sorted(out, key=lambda m: m[0])
 
 
-def write_mcap(directory: Path, messages: Iterable[Message], custom: dict[str, str] | None = None) -> Path:
+def write_mcap(
+    directory: Path, messages: Iterable[Message], custom: dict[str, str] | None = None
+) -> Path:
     """A recording directory of these messages, in this order."""
     with McapRecording(directory, custom) as recording:
         for arrival_ns, topic, message in messages:
@@ -92,7 +98,9 @@ def robot_recording(directory: Path, **options: Any) -> Path:
 
 
 def changed(
-    messages: Iterable[Message], topic: str, change: Callable[[int, int, Any], tuple[int, Any] | None]
+    messages: Iterable[Message],
+    topic: str,
+    change: Callable[[int, int, Any], tuple[int, Any] | None],
 ) -> list[Message]:
     """Messages with `change(i, arrival_ns, message)` applied to one topic (None drops the message)."""
     out, i = [], 0

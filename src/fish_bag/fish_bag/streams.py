@@ -56,7 +56,9 @@ def stamps_of_prefixes(raw: RawTopic, types: Typesdict, ros1: bool) -> np.ndarra
     return pairs[:, 0] * NS_PER_S + pairs[:, 1]
 
 
-def decode_paths(raw: RawTopic, types: Typesdict, ros1: bool) -> list[tuple[np.ndarray, str] | None]:
+def decode_paths(
+    raw: RawTopic, types: Typesdict, ros1: bool
+) -> list[tuple[np.ndarray, str] | None]:
     """Points (P, 2) and frame of every nav_msgs/Path, None where one cannot be decoded; one by one, as lengths vary."""
     paths: list[tuple[np.ndarray, str] | None] = []
     for message in raw.raws:
@@ -67,12 +69,16 @@ def decode_paths(raw: RawTopic, types: Typesdict, ros1: bool) -> list[tuple[np.n
 
 def _path(block: Block) -> tuple[np.ndarray, str]:
     xy = [
-        block.values[path] for path in block.values if path.endswith(("pose.position.x", "pose.position.y"))
+        block.values[path]
+        for path in block.values
+        if path.endswith(("pose.position.x", "pose.position.y"))
     ]
     return np.array(xy, float).reshape(-1, 2), block.texts["header.frame_id"][0]
 
 
-def _headers(blocks: list[Block], count: int, raw: RawTopic) -> tuple[np.ndarray | None, np.ndarray | None]:
+def _headers(
+    blocks: list[Block], count: int, raw: RawTopic
+) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Stamps and frames of messages with a header; unreadable messages get their arrival time."""
     if not any("header.stamp.sec" in block.values for block in blocks):
         return None, None
@@ -105,7 +111,9 @@ def _by_name(values: np.ndarray, names: list[str], wanted: tuple[str, ...]) -> n
     return columns
 
 
-def _put(arrays: dict[str, np.ndarray], name: str, values: np.ndarray, index: np.ndarray, count: int) -> None:
+def _put(
+    arrays: dict[str, np.ndarray], name: str, values: np.ndarray, index: np.ndarray, count: int
+) -> None:
     """Write one block's rows, widening the array when this block has more columns than those before."""
     have = arrays.setdefault(name, np.full((count, *values.shape[1:]), np.nan))
     if have.ndim == 2 and values.shape[1] > have.shape[1]:

@@ -8,7 +8,9 @@ from fish_bag.bag import RawTopic
 from fish_bag.trial import TopicSummary
 
 
-def summarise(raw: RawTopic, role: str, t: np.ndarray, t_arrival: np.ndarray, stamped: bool) -> TopicSummary:
+def summarise(
+    raw: RawTopic, role: str, t: np.ndarray, t_arrival: np.ndarray, stamped: bool
+) -> TopicSummary:
     """One topic; `t` is the moment of measurement, or the arrival where there is no usable stamp."""
     steps = np.diff(np.sort(t))
     span = float(np.sum(steps))

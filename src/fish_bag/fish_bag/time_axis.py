@@ -43,14 +43,20 @@ class TimeAxis:
     def measured(self, clock: str, stamp_ns: np.ndarray) -> np.ndarray:
         """(N,) stamps of `clock` in seconds on the axis."""
         estimate = self.clocks.get(clock)
-        if clock == self.clock or estimate is None or (self.clock == RECORDER and not estimate.applied):
+        if (
+            clock == self.clock
+            or estimate is None
+            or (self.clock == RECORDER and not estimate.applied)
+        ):
             return (stamp_ns - self.origin_ns) * 1e-9
         if self.clock == RECORDER:
             return estimate.to_recorder(stamp_ns, self.origin_ns)
         if not estimate.applied:
             return self.arrived(stamp_ns)
         start_ns = estimate.middle_ns + round(estimate.offset_s * 1e9)
-        recorder_ns = start_ns + np.round(estimate.to_recorder(stamp_ns, start_ns) * 1e9).astype(np.int64)
+        recorder_ns = start_ns + np.round(estimate.to_recorder(stamp_ns, start_ns) * 1e9).astype(
+            np.int64
+        )
         return self.arrived(recorder_ns)
 
     def arrived(self, arrival_ns: np.ndarray) -> np.ndarray:

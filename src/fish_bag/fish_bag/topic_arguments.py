@@ -12,7 +12,9 @@ from fish_report.errors import user_errors
 
 def add_topic_arguments(parser: argparse.ArgumentParser) -> None:
     """Add --topics and --namespace."""
-    parser.add_argument("--topics", type=Path, help="YAML topic map (default: the names of the format)")
+    parser.add_argument(
+        "--topics", type=Path, help="YAML topic map (default: the names of the format)"
+    )
     parser.add_argument("--namespace", help="robot's namespace (default: found from the topics)")
 
 
@@ -21,6 +23,7 @@ def topic_map(args: argparse.Namespace) -> TopicMap:
 
     Raises:
         UserError: the file is no topic map.
+
     """
     with user_errors():
         topics = load_topic_map(args.topics) if args.topics else TopicMap()

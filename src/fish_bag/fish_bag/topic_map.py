@@ -15,7 +15,13 @@ from fish_bag.problem import RecordingError
 TIMES = ("stamp", "arrival")
 KNOWN_ROLES = (*ROLES, PATH_ROLE)
 KEYS = {"namespace": str, "max_latency_s": (int, float), "topics": dict}  # of the YAML file
-RULE_KEYS = {"topic": str, "time": str, "clock": str, "frame": str, "required": bool}  # of one role in it
+RULE_KEYS = {
+    "topic": str,
+    "time": str,
+    "clock": str,
+    "frame": str,
+    "required": bool,
+}  # of one role in it
 KIND_NAMES = {str: "text", (int, float): "a number", dict: "a mapping", bool: "true or false"}
 
 
@@ -24,7 +30,9 @@ class TopicRule:
     """How one topic is read."""
 
     topic: str  # relative to the robot's namespace, or absolute with a leading /
-    time: str = "stamp"  # "stamp": header stamp is the moment of measurement; "arrival": the bag's own time
+    time: str = (
+        "stamp"  # "stamp": header stamp is the moment of measurement; "arrival": the bag's own time
+    )
     clock: str = "robot"  # machine whose clock made the stamps
     frame: str = ""  # expected frame_id, "" for any
     required: bool = False  # a trial without it is of no use for identification
@@ -61,12 +69,16 @@ class TopicMap:
 
     rules: dict[str, TopicRule] = field(default_factory=lambda: dict(DEFAULT_RULES))
     namespace: str | None = None  # robot's namespace; None: found from the topics
-    max_latency_s: float = 0.5  # stamps older than this at arrival, or in the future, are another clock's
+    max_latency_s: float = (
+        0.5  # stamps older than this at arrival, or in the future, are another clock's
+    )
 
     def __post_init__(self) -> None:
         for role in self.rules:
             if role not in KNOWN_ROLES:
-                raise RecordingError(f"topic map: unknown role {role!r}; known: {', '.join(KNOWN_ROLES)}")
+                raise RecordingError(
+                    f"topic map: unknown role {role!r}; known: {', '.join(KNOWN_ROLES)}"
+                )
         if not self.max_latency_s > 0:
             raise RecordingError(f"topic map: max_latency_s {self.max_latency_s}; expected > 0")
 
@@ -76,12 +88,18 @@ def load_topic_map(path: Path) -> TopicMap:
 
     Raises:
         RecordingError: the file or a rule is not as expected.
+
     """
     try:
         data = yaml.safe_load(path.read_text())
     except OSError as error:
-        raise RecordingError(f"{path}: topic map cannot be read: {error.strerror or error}") from error
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
+        raise RecordingError(
+            f"{path}: topic map cannot be read: {error.strerror or error}"
+        ) from error
+    except (
+        yaml.YAMLError,
+        ValueError,
+    ) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
         raise RecordingError(f"{path}: topic map is not YAML: {error}") from error
     data = _checked(f"{path}: topic map", {} if data is None else data, KEYS)
     rules = dict(DEFAULT_RULES)
@@ -100,7 +118,9 @@ def load_topic_map(path: Path) -> TopicMap:
 def _checked(where: str, given: object, kinds: Mapping[str, Any]) -> dict[str, Any]:
     """The mapping without what is null, if it has these keys with values of these kinds only."""
     if not isinstance(given, dict) or not set(given) <= set(kinds):
-        raise RecordingError(f"{where}: got {given!r}; expected a mapping with keys {', '.join(kinds)}")
+        raise RecordingError(
+            f"{where}: got {given!r}; expected a mapping with keys {', '.join(kinds)}"
+        )
     values = {key: value for key, value in given.items() if value is not None}
     for key, value in values.items():
         if not isinstance(value, kinds[key]):

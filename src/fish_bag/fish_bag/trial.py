@@ -52,7 +52,8 @@ class Stream:
         n = len(self)
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         return replace(
-            self, **{k: v[index] for k, v in arrays.items() if isinstance(v, np.ndarray) and len(v) == n}
+            self,
+            **{k: v[index] for k, v in arrays.items() if isinstance(v, np.ndarray) and len(v) == n},
         )
 
     def clean(self) -> Self:
@@ -84,7 +85,9 @@ class Imu(Stream):
 
     gyro: np.ndarray  # (N, 3) angular velocity [rad/s]
     accel: np.ndarray  # (N, 3) specific force, gravity included [m/s^2]
-    orientation: np.ndarray  # (N, 4) quaternion x, y, z, w, no absolute heading; NaN where not given
+    orientation: (
+        np.ndarray
+    )  # (N, 4) quaternion x, y, z, w, no absolute heading; NaN where not given
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +189,9 @@ class TopicSummary:
     rate_hz: float  # (count - 1) / time between first and last, nan below two messages
     period_s: float  # median distance of stamps
     longest_gap_s: float
-    latency_s: tuple[float, float, float]  # arrival minus stamp: 1 %, 50 %, 99 % quantile; nan without header
+    latency_s: tuple[
+        float, float, float
+    ]  # arrival minus stamp: 1 %, 50 %, 99 % quantile; nan without header
     role: str  # key in the topic map, "" if the reader has no use for it
     stamped: bool  # has a header
 
@@ -217,7 +222,9 @@ class Trial:
     clocks: tuple[ClockEstimate, ...] = ()
     topics: tuple[TopicSummary, ...] = ()
     problems: tuple[Problem, ...] = ()
-    metadata: dict[str, str] = field(default_factory=dict)  # custom data of the recording, "robot" among them
+    metadata: dict[str, str] = field(
+        default_factory=dict
+    )  # custom data of the recording, "robot" among them
 
     @property
     def streams(self) -> dict[str, Stream]:
@@ -233,7 +240,9 @@ class Trial:
     def clean(self) -> Trial:
         """The same trial without flagged samples, streams in order of time; empty streams become None."""
         cleaned = {name: stream.clean() for name, stream in self.streams.items()}
-        kept: dict[str, Any] = {name: stream if len(stream) else None for name, stream in cleaned.items()}
+        kept: dict[str, Any] = {
+            name: stream if len(stream) else None for name, stream in cleaned.items()
+        }
         return replace(self, **kept)
 
 
@@ -256,7 +265,9 @@ class DataSet:
         for trial in self.trials:
             if trial.name == name:
                 return trial
-        raise KeyError(f"no trial {name!r} in {self.name}; known: {', '.join(t.name for t in self.trials)}")
+        raise KeyError(
+            f"no trial {name!r} in {self.name}; known: {', '.join(t.name for t in self.trials)}"
+        )
 
     def clean(self) -> DataSet:
         """The same set with every trial cleaned."""

@@ -27,7 +27,9 @@ def test_faultless_recording_has_no_problem(tmp_path):
 
 def test_gap(tmp_path):
     messages = samples.changed(
-        samples.robot_messages(), "/fish/imu/data", lambda i, t, m: None if 50 <= i < 120 else (t, m)
+        samples.robot_messages(),
+        "/fish/imu/data",
+        lambda i, t, m: None if 50 <= i < 120 else (t, m),
     )
     result = read(tmp_path, messages)
     gap = problem(result, "gap", "imu/data")
@@ -40,13 +42,16 @@ def test_gap(tmp_path):
 def test_duplicates_are_kept_and_flagged(tmp_path):
     messages = samples.robot_messages()
     repeated = [m for m in messages if m[1] == "/fish/imu/data"][10:15]
-    messages = sorted(messages + [(t + 1000, topic, m) for t, topic, m in repeated], key=lambda m: m[0])
+    messages = sorted(
+        messages + [(t + 1000, topic, m) for t, topic, m in repeated], key=lambda m: m[0]
+    )
     result = read(tmp_path, messages)
     assert problem(result, "duplicate", "imu/data").count == 5
     assert len(result.imu) == 205
     assert np.count_nonzero(result.imu.flags == trial.DUPLICATE) == 5
     clean = result.clean().imu
-    assert len(clean) == 200 and np.all(np.diff(clean.t) > 0)
+    assert len(clean) == 200
+    assert np.all(np.diff(clean.t) > 0)
 
 
 def test_time_going_back(tmp_path):
@@ -62,7 +67,10 @@ def test_time_going_back(tmp_path):
 def test_arrivals_out_of_order_in_the_file(tmp_path):
     messages = samples.robot_messages()
     rng = np.random.default_rng(1)
-    shuffled = [messages[i] for i in np.argsort(np.arange(len(messages)) + rng.uniform(0, 30, len(messages)))]
+    shuffled = [
+        messages[i]
+        for i in np.argsort(np.arange(len(messages)) + rng.uniform(0, 30, len(messages)))
+    ]
     result = read(tmp_path, shuffled)
     np.testing.assert_allclose(result.imu.t, np.arange(0, 2, 0.01), atol=2e-9)
     assert result.problems == ()
@@ -83,15 +91,23 @@ def test_joint_missing_from_some_messages(tmp_path):
     def without_rudder(i, t, m):
         return t, build.joints(samples.ns(i * 0.01), ["rotor"], [1.0], [2.0]) if i < 7 else m
 
-    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/joint_command", without_rudder))
+    result = read(
+        tmp_path, samples.changed(samples.robot_messages(), "/fish/joint_command", without_rudder)
+    )
     assert problem(result, "nan", "joint_command").count == 7
-    assert np.isnan(result.commands.rudder[:7]).all() and np.isfinite(result.commands.rudder[7:]).all()
+    assert np.isnan(result.commands.rudder[:7]).all()
+    assert np.isfinite(result.commands.rudder[7:]).all()
     assert result.commands.rotor_speed[0] == 2.0
 
 
 @pytest.mark.parametrize(
     ("topic", "severity"),
-    [("joint_command", "error"), ("camera/pose", "error"), ("imu/data", "warning"), ("joint_states", "info")],
+    [
+        ("joint_command", "error"),
+        ("camera/pose", "error"),
+        ("imu/data", "warning"),
+        ("joint_states", "info"),
+    ],
 )
 def test_missing_topic(tmp_path, topic, severity):
     messages = [m for m in samples.robot_messages() if m[1] != f"/fish/{topic}"]
@@ -105,7 +121,8 @@ def test_wrong_type(tmp_path):
     result = read(tmp_path, messages)
     assert result.imu is None
     assert (
-        "std_msgs/msg/Float64, expected sensor_msgs/msg/Imu" in problem(result, "wrong_type", "imu/data").text
+        "std_msgs/msg/Float64, expected sensor_msgs/msg/Imu"
+        in problem(result, "wrong_type", "imu/data").text
     )
 
 
@@ -153,8 +170,10 @@ def test_unreadable_messages(tmp_path):
             recording.write(entry, arrival_ns, raw[:40] if cut else raw)
     result = read_trial(tmp_path / "trial")
     bad = problem(result, "unreadable", "imu/data")
-    assert bad.severity == "error" and bad.count == np.count_nonzero(result.imu.flags == trial.UNREADABLE) > 5
-    assert len(result.imu) == 200 and np.isnan(result.imu.gyro[-1]).all()
+    assert bad.severity == "error"
+    assert bad.count == np.count_nonzero(result.imu.flags == trial.UNREADABLE) > 5
+    assert len(result.imu) == 200
+    assert np.isnan(result.imu.gyro[-1]).all()
 
 
 @pytest.mark.parametrize(
@@ -169,11 +188,16 @@ def test_a_topic_that_cannot_be_decoded_at_all_costs_itself_only(tmp_path, topic
     result = read_trial(tmp_path / "trial")
     bad = problem(result, "unreadable", topic)
     counted = next(summary for summary in result.topics if summary.topic == f"/fish/{topic}")
-    assert bad.severity == "error" and bad.count == counted.count
+    assert bad.severity == "error"
+    assert bad.count == counted.count
     whole = read_trial(samples.robot_recording(tmp_path / "whole"))
     roles = {rule.topic: role for role, rule in TopicMap().rules.items()}
     assert set(result.streams) == set(whole.streams) - {roles[topic]}
-    assert result.reference_paths == () if topic == "reference/path" else len(result.reference_paths) == 1
+    assert (
+        result.reference_paths == ()
+        if topic == "reference/path"
+        else len(result.reference_paths) == 1
+    )
 
 
 def test_constant_commands(tmp_path):
@@ -188,9 +212,13 @@ def test_constant_commands(tmp_path):
 
 def test_rotor_that_turns_against_its_command(tmp_path):
     def mirrored(i, t, m):
-        return t, build.joints(samples.ns(i * 0.01), ["rotor"], [0.0], [-samples.rotor_speed(i * 0.01)])
+        return t, build.joints(
+            samples.ns(i * 0.01), ["rotor"], [0.0], [-samples.rotor_speed(i * 0.01)]
+        )
 
-    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/joint_states", mirrored))
+    result = read(
+        tmp_path, samples.changed(samples.robot_messages(), "/fish/joint_states", mirrored)
+    )
     assert problem(result, "rotor_sign").severity == "error"
 
 
@@ -208,5 +236,7 @@ def test_swapped_markers_are_jumps(tmp_path):
 def test_a_fast_wriggling_fish_does_not_jump():
     t = np.arange(0, 10, 1 / 11)
     x, y = 0.5 * t, 0.05 * np.sin(12 * t)
-    psi = 0.35 * np.sin(2 * np.pi * 2.5 * t) + 0.6 * t  # stroke and turn of the real robot, sampled at 11 Hz
+    psi = (
+        0.35 * np.sin(2 * np.pi * 2.5 * t) + 0.6 * t
+    )  # stroke and turn of the real robot, sampled at 11 Hz
     assert not find_jumps(t, x, y, np.mod(psi, 2 * np.pi)).any()

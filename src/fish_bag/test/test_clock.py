@@ -15,9 +15,9 @@ def observe(seed, offset, drift_ppm, duration=20.0, n=2000, scale=2e-3, shortest
     latency = shortest + rng.exponential(scale, n)
     stamp = EPOCH + np.round(t * 1e9).astype(np.int64)
     error = offset + drift_ppm * 1e-6 * (t - duration / 2)
-    return stamp, stamp + round(offset) * 10**9 + np.round((error - round(offset) + latency) * 1e9).astype(
-        np.int64
-    )
+    return stamp, stamp + round(offset) * 10**9 + np.round(
+        (error - round(offset) + latency) * 1e9
+    ).astype(np.int64)
 
 
 def test_offset_and_drift_within_their_standard_errors():
@@ -53,7 +53,8 @@ def test_few_messages_give_no_uncertainty():
     stamp, arrival = observe(3, offset=1.0, drift_ppm=0.0, n=4)
     clock = estimate_clock("c", ("a",), stamp, arrival)
     assert clock.offset_s == pytest.approx(np.min(arrival - stamp) * 1e-9)
-    assert np.isnan(clock.offset_std_s) and not clock.drift_is_significant
+    assert np.isnan(clock.offset_std_s)
+    assert not clock.drift_is_significant
 
 
 @pytest.mark.parametrize("drift_ppm", [0.0, 80.0, -5e5])
@@ -61,4 +62,6 @@ def test_there_and_back(drift_ppm):
     stamp, arrival = observe(4, offset=12.5, drift_ppm=drift_ppm)
     clock = estimate_clock("c", ("a",), stamp, arrival)
     recorder = EPOCH + np.round(clock.to_recorder(stamp, EPOCH) * 1e9).astype(np.int64)
-    np.testing.assert_allclose(clock.from_recorder(recorder, EPOCH), (stamp - EPOCH) * 1e-9, atol=1e-8)
+    np.testing.assert_allclose(
+        clock.from_recorder(recorder, EPOCH), (stamp - EPOCH) * 1e-9, atol=1e-8
+    )

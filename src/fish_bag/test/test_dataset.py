@@ -43,13 +43,14 @@ def test_unreadable_trial_is_left_out_and_said(tmp_path):
     data = read_dataset(tmp_path)
     assert [trial.name for trial in data] == ["a", "c"]
     assert kinds(data) == ["unreadable_trial"]
-    assert "b left out" in data.problems[0].text and "recover" in data.problems[0].text
+    assert "b left out" in data.problems[0].text
+    assert "recover" in data.problems[0].text
 
 
 @pytest.mark.parametrize("folder", ["empty", "missing"])
 def test_nothing_to_read(tmp_path, folder):
     (tmp_path / "empty").mkdir()
-    with pytest.raises(RecordingError, match="no recording|does not exist"):
+    with pytest.raises(RecordingError, match=r"no recording|does not exist"):
         read_dataset(tmp_path / folder)
 
 
@@ -59,9 +60,9 @@ def test_a_folder_of_bare_files_is_a_folder_of_trials(tmp_path):
         (made / f"{name}.mcap").rename(tmp_path / f"{name}.mcap")
         shutil.rmtree(made)
     assert [trial.name for trial in read_dataset(tmp_path)] == ["trial_0", "trial_1"]
-    with pytest.raises(RecordingError, match="2 storage files.*give one of the recordings in it"):
+    with pytest.raises(RecordingError, match=r"2 storage files.*give one of the recordings in it"):
         read_trial(tmp_path)
-    with pytest.raises(RecordingError, match="2 recordings.*recover one of them at a time"):
+    with pytest.raises(RecordingError, match=r"2 recordings.*recover one of them at a time"):
         recover(tmp_path, tmp_path / "mended")
 
 
@@ -71,7 +72,7 @@ def test_parts_of_a_split_recording_are_one_that_can_be_mended(tmp_path):
     for k, half in enumerate((messages[: len(messages) // 2], messages[len(messages) // 2 :])):
         made = samples.write_mcap(tmp_path / f"half_{k}", half)
         (made / f"half_{k}.mcap").rename(folder / f"swim_{k}.mcap")
-    with pytest.raises(RecordingError, match="2 storage files.*robofish recover .*swim"):
+    with pytest.raises(RecordingError, match=r"2 storage files.*robofish recover .*swim"):
         read_dataset(folder)
     assert recover(folder, tmp_path / "mended").count == len(messages)
 
@@ -114,7 +115,8 @@ def kin(name: str, **changes) -> SimpleNamespace:
 )
 def test_trials_of_robots_that_are_built_differently_are_no_set(changes, text):
     (problem,) = check_set([kin("a"), kin("b", **changes)])
-    assert problem.kind == "mixed_robots" and re.search(text, problem.text)
+    assert problem.kind == "mixed_robots"
+    assert re.search(text, problem.text)
 
 
 def test_a_set_whose_trials_know_less_of_the_robot_is_one():
@@ -141,4 +143,5 @@ def test_several_processes_read_the_same(tmp_path):
     for a, b in zip(one, two, strict=True):
         assert a.name == b.name
         np.testing.assert_array_equal(a.imu.gyro, b.imu.gyro)
-        assert a.problems == b.problems and repr(a.topics) == repr(b.topics)
+        assert a.problems == b.problems
+        assert repr(a.topics) == repr(b.topics)

@@ -15,7 +15,10 @@ from fish_bag.message_types import typestore
 
 TYPES = {
     "sensor_msgs/msg/JointState": lambda r, n: build.joints(
-        r.integers(1, 2**60), ["rotor", "rudder", "x"][: n % 4], r.normal(size=n % 4), r.normal(size=n % 3)
+        r.integers(1, 2**60),
+        ["rotor", "rudder", "x"][: n % 4],
+        r.normal(size=n % 4),
+        r.normal(size=n % 3),
     ),
     "sensor_msgs/msg/Imu": lambda r, _n: build.imu(
         r.integers(1, 2**60), r.normal(size=3), r.normal(size=3), r.normal(size=4)
@@ -26,11 +29,15 @@ TYPES = {
     "nav_msgs/msg/Odometry": lambda r, _n: build.odometry(
         r.integers(1, 2**60), r.normal(size=3), r.normal(size=3)
     ),
-    "sensor_msgs/msg/BatteryState": lambda r, _n: build.battery(r.integers(1, 2**60), r.uniform(9, 12)),
+    "sensor_msgs/msg/BatteryState": lambda r, _n: build.battery(
+        r.integers(1, 2**60), r.uniform(9, 12)
+    ),
     "std_msgs/msg/Float64MultiArray": lambda r, n: build.labelled_numbers(
         "a" * (n % 6), r.normal(size=n % 7)
     ),
-    "nav_msgs/msg/Path": lambda r, n: build.path(r.integers(1, 2**60), "pool", r.normal(size=(n % 5, 2))),
+    "nav_msgs/msg/Path": lambda r, n: build.path(
+        r.integers(1, 2**60), "pool", r.normal(size=(n % 5, 2))
+    ),
     "std_msgs/msg/Float64": lambda r, _n: build.number(r.normal()),
 }
 
@@ -76,17 +83,24 @@ def test_padding_bytes_do_not_split_layouts():
     )
     other = bytearray(raw)
     other[4 + 13] = 0xAB  # behind the empty frame_id, before the next length
-    blocks, bad = decode_blocks([bytes(raw), bytes(other)], "sensor_msgs/msg/JointState", store.fielddefs)
-    assert len(blocks) == 1 and not len(bad)
+    blocks, bad = decode_blocks(
+        [bytes(raw), bytes(other)], "sensor_msgs/msg/JointState", store.fielddefs
+    )
+    assert len(blocks) == 1
+    assert not len(bad)
 
 
 @pytest.mark.parametrize("cut", [0, 3, 10, 50, 90])
 def test_short_messages_are_named_not_read(cut):
     store = typestore()
-    raw = bytes(store.serialize_cdr(build.joints(5, ["rotor"], [1.0], [2.0]), "sensor_msgs/msg/JointState"))
+    raw = bytes(
+        store.serialize_cdr(build.joints(5, ["rotor"], [1.0], [2.0]), "sensor_msgs/msg/JointState")
+    )
     if cut >= len(raw):
         pytest.skip("cut beyond the message")
-    blocks, bad = decode_blocks([raw, raw[:cut], raw], "sensor_msgs/msg/JointState", store.fielddefs)
+    blocks, bad = decode_blocks(
+        [raw, raw[:cut], raw], "sensor_msgs/msg/JointState", store.fielddefs
+    )
     assert bad.tolist() == [1]
     assert blocks[0].index.tolist() == [0, 2]
 
@@ -98,7 +112,8 @@ def test_layouts_beyond_the_limit_are_left_out():
         for n in range(MAX_LAYOUTS + 3)
     ]
     blocks, bad = decode_blocks([*raws, raws[0]], msgtype, store.fielddefs)
-    assert len(blocks) == MAX_LAYOUTS and blocks[0].index.tolist() == [0, MAX_LAYOUTS + 3]
+    assert len(blocks) == MAX_LAYOUTS
+    assert blocks[0].index.tolist() == [0, MAX_LAYOUTS + 3]
     assert bad.tolist() == [MAX_LAYOUTS, MAX_LAYOUTS + 1, MAX_LAYOUTS + 2]
 
 
@@ -118,10 +133,16 @@ def test_ros1_layout_has_no_alignment():
     time = types["builtin_interfaces/msg/Time"](sec=7, nanosec=8)
     header = types["std_msgs/msg/Header"](seq=3, stamp=time, frame_id="abc")
     joint = types["sensor_msgs/msg/JointState"](
-        header=header, name=["rotor"], position=np.array([1.5]), velocity=np.array([2.5]), effort=np.zeros(0)
+        header=header,
+        name=["rotor"],
+        position=np.array([1.5]),
+        velocity=np.array([2.5]),
+        effort=np.zeros(0),
     )
     raw = bytes(store.serialize_ros1(joint, "sensor_msgs/msg/JointState"))
-    blocks, bad = decode_blocks([raw, raw], "sensor_msgs/msg/JointState", store.fielddefs, ros1=True)
+    blocks, bad = decode_blocks(
+        [raw, raw], "sensor_msgs/msg/JointState", store.fielddefs, ros1=True
+    )
     assert not len(bad)
     assert blocks[0].values["position"].tolist() == [[1.5], [1.5]]
     assert blocks[0].values["header.stamp.sec"].tolist() == [7, 7]

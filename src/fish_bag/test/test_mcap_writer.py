@@ -20,7 +20,9 @@ from fish_bag.recover import recover
 
 IMU = "sensor_msgs/msg/Imu"
 PAYLOAD = bytes(
-    samples.typestore().serialize_cdr(samples.build.imu(1, (0, 0, 0), (0, 0, 9.81), (0, 0, 0, 1)), IMU)
+    samples.typestore().serialize_cdr(
+        samples.build.imu(1, (0, 0, 0), (0, 0, 9.81), (0, 0, 0, 1)), IMU
+    )
 )
 
 
@@ -33,10 +35,11 @@ def test_mcap_library_finds_index_and_checksums_right(tmp_path):
         assert len(summary.chunk_indexes) == 6  # 3 s in chunks of 0.5 s
         imu = [m.log_time for _, _, m in reader.iter_messages(topics=["/fish/imu/data"])]
         assert imu == [samples.ns(0.01 * i + 0.002) for i in range(300)]
-        window = list(reader.iter_messages(starting_at=samples.ns(1.0), ending_before=samples.ns(1.5)))
-        assert (
-            all(samples.ns(1.0) <= m.log_time < samples.ns(1.5) for _, _, m in window) and len(window) > 200
+        window = list(
+            reader.iter_messages(starting_at=samples.ns(1.0), ending_before=samples.ns(1.5))
         )
+        assert all(samples.ns(1.0) <= m.log_time < samples.ns(1.5) for _, _, m in window)
+        assert len(window) > 200
 
 
 def test_rosbag2_metadata(tmp_path):
@@ -49,7 +52,8 @@ def test_rosbag2_metadata(tmp_path):
         assert (reader.message_count, reader.start_time, reader.end_time) == (2, 5_000, 7_001)
         qos = {c.topic: c.ext.offered_qos_profiles[0] for c in reader.connections}
         assert reader.storage.metadata.custom == {"robot": "x"}
-    assert qos["/path"].durability == QosDurability.TRANSIENT_LOCAL and qos["/path"].depth == 1
+    assert qos["/path"].durability == QosDurability.TRANSIENT_LOCAL
+    assert qos["/path"].depth == 1
     assert qos["/lossy"].reliability == QosReliability.BEST_EFFORT
     assert not (tmp_path / "a" / RESERVE_NAME).exists()
 
@@ -61,7 +65,10 @@ def test_never_overwrites(tmp_path):
 
 
 def test_unknown_type_is_refused(tmp_path):
-    with McapRecording(tmp_path / "a") as recording, pytest.raises(RecordingError, match="my_msgs/msg/Own"):
+    with (
+        McapRecording(tmp_path / "a") as recording,
+        pytest.raises(RecordingError, match="my_msgs/msg/Own"),
+    ):
         recording.add_topic("/x", "my_msgs/msg/Own")
 
 
@@ -81,7 +88,9 @@ WRITE_AND_STALL = """
 
 def test_kill_loses_less_than_a_second(tmp_path):
     code = textwrap.dedent(WRITE_AND_STALL)
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([os.path.dirname(__file__), *sys.path])}
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([os.path.dirname(__file__), *sys.path])
+    }
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path / "a")], stdout=subprocess.PIPE, env=environment
     )
@@ -113,7 +122,9 @@ FILL = """
 
 def test_full_disk_closes_a_valid_recording(tmp_path):
     """A limit on the file's size stands in for the disk: the kernel refuses to write more."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([os.path.dirname(__file__), *sys.path])}
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([os.path.dirname(__file__), *sys.path])
+    }
     run = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(FILL), str(tmp_path / "a")],
         capture_output=True,
@@ -121,7 +132,8 @@ def test_full_disk_closes_a_valid_recording(tmp_path):
         env=environment,
     )
     assert run.returncode == 1
-    assert "DiskFullError" in run.stderr and "writing failed" in run.stderr
+    assert "DiskFullError" in run.stderr
+    assert "writing failed" in run.stderr
     trial = read_trial(tmp_path / "a")
     assert 500 < len(trial.imu) < 900
     assert len(trial.imu) % 51 == 0  # whole chunks of 0.5 s

@@ -41,13 +41,16 @@ def test_starts_paused():
 
 def test_messages_come_in_order_and_filtered(tmp_path):
     path = samples.robot_recording(tmp_path / "a", duration=0.5)
-    config = ReplayerConfig(str(path), topics=("imu/data", "/fish/camera/*"), exclude=("camera/tail",))
+    config = ReplayerConfig(
+        str(path), topics=("imu/data", "/fish/camera/*"), exclude=("camera/tail",)
+    )
     playback = Playback(config, "/fish")
     for _ in range(2):  # every call starts anew
         sent = list(playback.messages())
         assert {c.topic for c, _, _ in sent} == {"/fish/imu/data", "/fish/camera/pose"}
         times = [t for _, t, _ in sent]
-        assert times == sorted(times) and len(times) == 50 + 15
+        assert times == sorted(times)
+        assert len(times) == 50 + 15
     playback.close()
 
 
@@ -60,7 +63,7 @@ def test_no_topic_left(tmp_path, topics):
 
 @pytest.mark.parametrize("path", ["", "/nowhere/at/all"])
 def test_no_recording(path):
-    with pytest.raises(RecordingError, match="expected a rosbag2 folder|does not exist"):
+    with pytest.raises(RecordingError, match=r"expected a rosbag2 folder|does not exist"):
         Playback(ReplayerConfig(path), "/fish")
 
 
@@ -76,7 +79,7 @@ def test_messages_before_the_damage_are_replayed(tmp_path):
     data[data.index(b"imu_link", len(data) // 2)] ^= 0xFF
     (path / "a.mcap").write_bytes(bytes(data))
     playback, sent = Playback(ReplayerConfig(str(path)), "/fish"), []
-    with pytest.raises(RecordingError, match="'robofish recover .*/a' saves what is left"):
+    with pytest.raises(RecordingError, match=r"'robofish recover .*/a' saves what is left"):
         for message in playback.messages():
             sent.append(message)
     assert 0.2 * len(samples.robot_messages()) < len(sent) < len(samples.robot_messages())
@@ -116,7 +119,9 @@ def test_common_qos_reaches_every_publisher():
     assert common_qos([Qos(transient_local=True)]).transient_local
 
 
-@pytest.mark.parametrize(("name", "config"), [("recorder", RecorderConfig()), ("replayer", ReplayerConfig())])
+@pytest.mark.parametrize(
+    ("name", "config"), [("recorder", RecorderConfig()), ("replayer", ReplayerConfig())]
+)
 def test_parameter_files_name_every_field(name, config):
     given = yaml.safe_load((CONFIG / f"{name}.yaml").read_text())["/**"]["ros__parameters"]
     assert given == {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(config).items()}

@@ -18,7 +18,8 @@ CAMERA = -0.25  # s, camera's clock minus recorder's
 DURATION = 8.0
 FIELDS = {
     "cam_tracking_data": (
-        "float64", "x_position y_position body_velocity z_angular_velocity tail_angle_1 head_angle tail_angle_2 Vx Vy",
+        "float64",
+        "x_position y_position body_velocity z_angular_velocity tail_angle_1 head_angle tail_angle_2 Vx Vy",
     ),
     "motor_estimates": (
         "float64",
@@ -30,7 +31,7 @@ FIELDS = {
         "goal_x goal_y Ld error_yaw e_fa yaw_Kp yaw_Ki yaw_Kd curvature_des vel_Kp vel_Ki vel_Kd error_vel "
         "velocity_x_des throttle A omega servo_angle theta_p",
     ),
-}  # fmt: skip
+}
 
 
 class Robot:
@@ -73,7 +74,9 @@ class Bag:
 
     def header(self, stamp: float, frame: str = "") -> object:
         total = round(stamp * 1e9)
-        time = self.types.types["builtin_interfaces/msg/Time"](sec=total // 10**9, nanosec=total % 10**9)
+        time = self.types.types["builtin_interfaces/msg/Time"](
+            sec=total // 10**9, nanosec=total % 10**9
+        )
         return self.types.types["std_msgs/msg/Header"](seq=0, stamp=time, frame_id=frame)
 
     def add(self, topic: str, kind: str, stamp: float, arrival: float, **values: float) -> None:
@@ -98,17 +101,39 @@ def robot_bag(path: Path) -> Path:
     robot_stamp, late = START + ROBOT, lambda: 0.001 + rng.exponential(0.002)
     for t in np.arange(0.5, DURATION, 1 / 17):
         bag.add(
-            "/encoder_estimates", "motor_estimates", robot_stamp + t, t + late(),
-            encoder_vel=-robot.speed(np.array([t - 0.042]))[0], encoder_pos=-0.1 * t, voltage=24.0 - t,
-            current=0.5, temperature=40.0,
-        )  # fmt: skip
+            "/encoder_estimates",
+            "motor_estimates",
+            robot_stamp + t,
+            t + late(),
+            encoder_vel=-robot.speed(np.array([t - 0.042]))[0],
+            encoder_pos=-0.1 * t,
+            voltage=24.0 - t,
+            current=0.5,
+            temperature=40.0,
+        )
     for i, t in enumerate(robot.t_loop):
         bag.add(
-            "/purepursuit_target", "purepursuit_control", robot_stamp + t, t + late(), A=robot.A[i], omega=robot.f[i],
-            servo_angle=robot.servo_deg[i], goal_x=2.0, goal_y=1.0, theta_p=0.25, e_fa=0.125, error_yaw=-0.5,
-            error_vel=0.0625, velocity_x_des=0.25, yaw_Kp=1.0, yaw_Ki=2.0, yaw_Kd=3.0, vel_Kp=4.0, vel_Ki=5.0,
+            "/purepursuit_target",
+            "purepursuit_control",
+            robot_stamp + t,
+            t + late(),
+            A=robot.A[i],
+            omega=robot.f[i],
+            servo_angle=robot.servo_deg[i],
+            goal_x=2.0,
+            goal_y=1.0,
+            theta_p=0.25,
+            e_fa=0.125,
+            error_yaw=-0.5,
+            error_vel=0.0625,
+            velocity_x_des=0.25,
+            yaw_Kp=1.0,
+            yaw_Ki=2.0,
+            yaw_Kd=3.0,
+            vel_Kp=4.0,
+            vel_Ki=5.0,
             vel_Kd=6.0,
-        )  # fmt: skip
+        )
         bag.add(
             "/KF_state_estimate",
             "KFstate",
@@ -123,9 +148,16 @@ def robot_bag(path: Path) -> Path:
     for i, t in enumerate(np.arange(0, DURATION, 1 / 11)):
         broken = np.nan if i == 30 else 1.0
         bag.add(
-            "/runcam_tracking", "cam_tracking_data", START + CAMERA + t, t + 0.1 + late(), x_position=broken * t / 4,
-            y_position=0.9, head_angle=170.0, tail_angle_1=-175.0, tail_angle_2=-170.0,
-        )  # fmt: skip
+            "/runcam_tracking",
+            "cam_tracking_data",
+            START + CAMERA + t,
+            t + 0.1 + late(),
+            x_position=broken * t / 4,
+            y_position=0.9,
+            head_angle=170.0,
+            tail_angle_1=-175.0,
+            tail_angle_2=-170.0,
+        )
     add_imu(bag, robot_stamp, late)
     add_path(bag)
     return bag.write(path)
@@ -137,13 +169,19 @@ def add_imu(bag: Bag, robot_stamp: float, late) -> None:
     half = np.radians(15)
     for i, t in enumerate(np.arange(1.0, DURATION, 1 / 60)):
         sample = i // 3
-        turn = types["geometry_msgs/msg/Quaternion"](x=0.0, y=np.sin(half), z=1e-6 * sample, w=np.cos(half))
+        turn = types["geometry_msgs/msg/Quaternion"](
+            x=0.0, y=np.sin(half), z=1e-6 * sample, w=np.cos(half)
+        )
         vector = types["geometry_msgs/msg/Vector3"]
         message = types["sensor_msgs/msg/Imu"](
-            header=bag.header(robot_stamp + t), orientation=turn, orientation_covariance=np.zeros(9),
-            angular_velocity=vector(x=0.0, y=0.0, z=float(sample)), angular_velocity_covariance=np.zeros(9),
-            linear_acceleration=vector(x=1.0, y=0.0, z=0.0), linear_acceleration_covariance=np.zeros(9),
-        )  # fmt: skip
+            header=bag.header(robot_stamp + t),
+            orientation=turn,
+            orientation_covariance=np.zeros(9),
+            angular_velocity=vector(x=0.0, y=0.0, z=float(sample)),
+            angular_velocity_covariance=np.zeros(9),
+            linear_acceleration=vector(x=1.0, y=0.0, z=0.0),
+            linear_acceleration_covariance=np.zeros(9),
+        )
         bag.messages.append((t + late(), "/IMU_bno08x/raw", message))
 
 
@@ -230,7 +268,10 @@ def test_rotor_command_is_rebuilt(imported):
     loop = np.searchsorted(robot.t_loop, t[during] - 1e-6, side="right") - 1
     alpha = -np.radians(robot.servo_deg)
     nearest = np.minimum.reduce(
-        [np.abs(trial.commands.rudder[during] - alpha[np.clip(loop + k, 0, None)]) for k in (-1, 0, 1)]
+        [
+            np.abs(trial.commands.rudder[during] - alpha[np.clip(loop + k, 0, None)])
+            for k in (-1, 0, 1)
+        ]
     )
     assert nearest.max() < 1e-6
     np.testing.assert_allclose(np.diff(trial.commands.t), 0.01, atol=1e-6)

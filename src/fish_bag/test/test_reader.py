@@ -23,7 +23,9 @@ def write_rosbag2(directory, messages, plugin, mode=CompressionMode.NONE):
             kind = message.__msgtype__
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=typestore())
-            writer.write(connections[topic], arrival_ns, bytes(typestore().serialize_cdr(message, kind)))
+            writer.write(
+                connections[topic], arrival_ns, bytes(typestore().serialize_cdr(message, kind))
+            )
     return directory
 
 
@@ -36,7 +38,9 @@ def write_rosbag1(path, messages):
                 continue
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connections[topic], arrival_ns, bytes(store.serialize_ros1(to_ros1(message), kind)))
+            writer.write(
+                connections[topic], arrival_ns, bytes(store.serialize_ros1(to_ros1(message), kind))
+            )
     return path
 
 
@@ -68,7 +72,9 @@ def sources(tmp_path_factory):
         "mcap zstd messages": write_rosbag2(
             folder / "zm", messages, StoragePlugin.MCAP, CompressionMode.MESSAGE
         ),
-        "mcap zstd file": write_rosbag2(folder / "zf", messages, StoragePlugin.MCAP, CompressionMode.FILE),
+        "mcap zstd file": write_rosbag2(
+            folder / "zf", messages, StoragePlugin.MCAP, CompressionMode.FILE
+        ),
         "sqlite3": write_rosbag2(folder / "sq", messages, StoragePlugin.SQLITE3),
         "sqlite3 zstd": write_rosbag2(
             folder / "sqz", messages, StoragePlugin.SQLITE3, CompressionMode.MESSAGE
@@ -78,9 +84,16 @@ def sources(tmp_path_factory):
 
 
 FORMATS = (
-    "own", "bare", "mcap", "mcap zstd chunks", "mcap zstd messages", "mcap zstd file", "sqlite3",
-    "sqlite3 zstd", "ros1",
-)  # fmt: skip
+    "own",
+    "bare",
+    "mcap",
+    "mcap zstd chunks",
+    "mcap zstd messages",
+    "mcap zstd file",
+    "sqlite3",
+    "sqlite3 zstd",
+    "ros1",
+)
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -160,8 +173,9 @@ def test_other_names_by_map(tmp_path):
 def test_unreadable_recordings_say_why(tmp_path, make, text):
     path = make(tmp_path)
     with pytest.raises(RecordingError, match=text) as error:
-        read_trial(path if path.suffix or path.is_dir() or not path.exists() else path)
-    assert "Traceback" not in str(error.value) and str(tmp_path) in str(error.value)
+        read_trial(path)
+    assert "Traceback" not in str(error.value)
+    assert str(tmp_path) in str(error.value)
 
 
 def test_foreign_recording_lists_what_it_holds(tmp_path):

@@ -14,20 +14,20 @@ from fish_bag import sample_recordings as samples
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-import rclpy  # noqa: E402
-from rclpy.context import Context  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.node import Node  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
-from rosgraph_msgs.msg import Clock  # noqa: E402
-from sensor_msgs.msg import Imu, JointState  # noqa: E402
-from std_msgs.msg import Float64  # noqa: E402
-from std_srvs.srv import SetBool  # noqa: E402
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool
 
-from fish_bag import RecordingError, read_trial  # noqa: E402
-from fish_bag.bag import read_bag  # noqa: E402
-from fish_bag.recover import recover  # noqa: E402
-from fish_node.domain import choose_domain  # noqa: E402
+from fish_bag import RecordingError, read_trial
+from fish_bag.bag import read_bag
+from fish_bag.recover import recover
+from fish_node.domain import choose_domain
 
 pytestmark = pytest.mark.ros
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -51,9 +51,11 @@ class Peer:
         given = [a for k, v in parameters.items() for a in ("-p", f"{k}:={v}")]
         process = subprocess.Popen(
             [sys.executable, "-m", f"fish_bag.nodes.{executable}", "--ros-args", *given],
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
             env=os.environ | {"ROS_DOMAIN_ID": str(self.domain)},
-        )  # fmt: skip
+        )
         self.processes.append(process)
         return process
 
@@ -84,7 +86,9 @@ def publish_all(peer: Peer, count: int) -> tuple[list[bytes], list[int]]:
     latched.publish(Float64(data=0.25))  # before anybody listens
     imu = peer.node.create_publisher(Imu, "imu/data", LOSSY)
     command = peer.node.create_publisher(JointState, "joint_command", 10)
-    assert peer.spin_until(lambda: imu.get_subscription_count() and command.get_subscription_count())
+    assert peer.spin_until(
+        lambda: imu.get_subscription_count() and command.get_subscription_count()
+    )
     raws, times = [], []
     store = samples.typestore()
     for i in range(count):
@@ -92,7 +96,9 @@ def publish_all(peer: Peer, count: int) -> tuple[list[bytes], list[int]]:
         raws.append(bytes(store.serialize_cdr(message, "sensor_msgs/msg/Imu")))
         times.append(time.time_ns())
         imu.publish(raws[-1])
-        command.publish(JointState(name=["rotor", "rudder"], position=[float(i), 0.0], velocity=[1.0, 0.0]))
+        command.publish(
+            JointState(name=["rotor", "rudder"], position=[float(i), 0.0], velocity=[1.0, 0.0])
+        )
         peer.spin_until(lambda: False, limit=0.01)
     return raws, times
 
@@ -113,7 +119,8 @@ def test_recorder_keeps_every_byte(peer, tmp_path):
     assert "/diagnostics" in topics
     assert bag.metadata == {"robot": "trout"}
     latency_s = (topics["/fish/imu/data"].arrival_ns - np.array(times_ns)) * 1e-9
-    assert np.all(latency_s > 0) and np.median(latency_s) < 0.2
+    assert np.all(latency_s > 0)
+    assert np.median(latency_s) < 0.2
 
 
 def test_killed_recorder_loses_at_most_a_second(peer, tmp_path):
@@ -128,7 +135,8 @@ def test_killed_recorder_loses_at_most_a_second(peer, tmp_path):
     assert (killed_ns - result.last_ns) * 1e-9 < 1.0
     saved = read_bag(tmp_path / "saved", lambda *_: True)
     imu = next(raw for raw in saved.topics if raw.topic == "/fish/imu/data")
-    assert len(imu.raws) > 100 and imu.raws == raws[: len(imu.raws)]
+    assert len(imu.raws) > 100
+    assert imu.raws == raws[: len(imu.raws)]
 
 
 @pytest.mark.parametrize(
@@ -142,7 +150,9 @@ def test_bad_parameters_are_one_line(peer, node, parameters, text):
     process = peer.start(node, **parameters)
     out, _ = process.communicate(timeout=20)
     assert process.returncode == 1
-    assert out.startswith(text) and "Traceback" not in out and len(out.splitlines()) == 1
+    assert out.startswith(text)
+    assert "Traceback" not in out
+    assert len(out.splitlines()) == 1
 
 
 FULL_DISK = '''
@@ -169,17 +179,28 @@ sys.exit(recorder.main())
 
 
 def test_full_disk_is_one_line_and_a_valid_recording(peer, tmp_path):
-    arguments = ["--ros-args", "-p", f"output:={tmp_path}", "-p", "name:=run", "--log-level", "warn"]
+    arguments = [
+        "--ros-args",
+        "-p",
+        f"output:={tmp_path}",
+        "-p",
+        "name:=run",
+        "--log-level",
+        "warn",
+    ]
     process = subprocess.Popen(
         [sys.executable, "-c", FULL_DISK, *arguments],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         env=os.environ | {"ROS_DOMAIN_ID": str(peer.domain)},
-    )  # fmt: skip
+    )
     peer.processes.append(process)
     publish_all(peer, 250)
     _, errors = process.communicate(timeout=15)
     assert process.returncode == 1
-    assert errors.startswith("recorder: ") and "No space left on device" in errors
+    assert errors.startswith("recorder: ")
+    assert "No space left on device" in errors
     assert len(errors.splitlines()) == 1
     assert len(read_trial(tmp_path / "run").imu) > 50
 
@@ -196,12 +217,25 @@ def test_replay_sends_the_same_bytes_at_the_same_times(peer, tmp_path):
     stamp = lambda m: clock.append(m.clock.sec * 10**9 + m.clock.nanosec)  # noqa: E731
     peer.node.create_subscription(Clock, "/clock", stamp, ALL)
     process = subprocess.Popen(
-        [sys.executable, "-m", "fish_bag.nodes.replayer", "--ros-args", "-p", f"recording:={path}",
-         "-p", "exclude:=['camera/*']", "-p", "start_delay_s:=8.0",  # a busy computer discovers slowly
-         "-r", "/fish/joint_command:=/fish/elsewhere"],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        [
+            sys.executable,
+            "-m",
+            "fish_bag.nodes.replayer",
+            "--ros-args",
+            "-p",
+            f"recording:={path}",
+            "-p",
+            "exclude:=['camera/*']",
+            "-p",
+            "start_delay_s:=8.0",  # a busy computer discovers slowly
+            "-r",
+            "/fish/joint_command:=/fish/elsewhere",
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
         env=os.environ | {"ROS_DOMAIN_ID": str(peer.domain)},
-    )  # fmt: skip
+    )
     peer.processes.append(process)
     assert peer.spin_until(lambda: process.poll() is not None)
     peer.spin_until(lambda: False, limit=0.2)
@@ -214,7 +248,8 @@ def test_replay_sends_the_same_bytes_at_the_same_times(peer, tmp_path):
     lateness = times - times[0] - np.arange(200) * 0.01
     assert np.all(lateness > -0.5)  # the first may have come late, none comes long before its time
     assert np.median(np.abs(lateness - np.median(lateness))) < 0.05
-    assert np.all(np.diff(clock) > 0) and len(clock) > 20
+    assert np.all(np.diff(clock) > 0)
+    assert len(clock) > 20
     assert clock[-1] - clock[0] == pytest.approx(2e9, abs=1e8)
 
 
@@ -226,11 +261,16 @@ def test_pause_rate_and_loop(peer, tmp_path):
     )
     pause = peer.node.create_client(SetBool, "replayer/pause")
     process = peer.start(
-        "replayer", recording=path, paused=True, loop=True, rate=2.0, topics="['imu/data']", start_delay_s=0.0
+        "replayer",
+        recording=path,
+        paused=True,
+        loop=True,
+        rate=2.0,
+        topics="['imu/data']",
+        start_delay_s=0.0,
     )
-    assert pause.wait_for_service(20.0) and peer.spin_until(
-        lambda: peer.node.count_publishers("/fish/imu/data")
-    )
+    assert pause.wait_for_service(20.0)
+    assert peer.spin_until(lambda: peer.node.count_publishers("/fish/imu/data"))
     peer.spin_until(lambda: False, limit=0.5)
     assert got == []
     started = time.monotonic()
@@ -239,7 +279,8 @@ def test_pause_rate_and_loop(peer, tmp_path):
     assert time.monotonic() - started > 1.0  # 2.5 rounds of 1 s at rate 2 take 1.25 s
     assert got[:250] == [*range(100), *range(100), *range(50)]
     done = pause.call_async(SetBool.Request(data=True))
-    assert peer.spin_until(done.done) and done.result().message == "paused"
+    assert peer.spin_until(done.done)
+    assert done.result().message == "paused"
     peer.spin_until(lambda: False, limit=0.3)
     stopped = len(got)
     peer.spin_until(lambda: False, limit=0.5)
@@ -249,7 +290,7 @@ def test_pause_rate_and_loop(peer, tmp_path):
 
 
 def test_ctrl_c_does_not_tear_what_the_recorder_is_writing(monkeypatch):
-    """rclpy ends the spinning; a KeyboardInterrupt in the middle of a record would leave half of it in the file."""
+    """Rclpy ends the spinning; a KeyboardInterrupt in the middle of a record would leave half of it in the file."""
     from fish_bag.nodes import recorder
 
     written = []
@@ -261,5 +302,6 @@ def test_ctrl_c_does_not_tear_what_the_recorder_is_writing(monkeypatch):
 
     monkeypatch.setattr(recorder, "run", run)
     before = signal.getsignal(signal.SIGINT)
-    assert recorder.main() == 0 and written == ["recorder"]
+    assert recorder.main() == 0
+    assert written == ["recorder"]
     assert signal.getsignal(signal.SIGINT) is before

@@ -24,7 +24,8 @@ def damaged(path, change):
 def test_complete_recording_loses_nothing(tmp_path):
     path = samples.robot_recording(tmp_path / "a")
     result = recover(path, tmp_path / "b")
-    assert result.lost == () and result.count == len(samples.robot_messages())
+    assert result.lost == ()
+    assert result.count == len(samples.robot_messages())
     before, after = read_trial(path), read_trial(tmp_path / "b")
     for name, stream in before.streams.items():
         np.testing.assert_array_equal(stream.t, after.streams[name].t)
@@ -88,7 +89,8 @@ def test_a_damaged_head_of_a_chunk_costs_that_chunk(tmp_path, place):
     damaged(path, flipped(chunks[1] + place))
     result = recover(path, tmp_path / "b")
     lost = len(samples.robot_messages()) - result.count
-    assert 0.15 * result.count < lost < 0.35 * result.count and result.lost
+    assert 0.15 * result.count < lost < 0.35 * result.count
+    assert result.lost
     assert result.last_ns == samples.robot_messages()[-1][0]
     assert len(read_trial(tmp_path / "b").camera) < 60
 
@@ -125,14 +127,22 @@ def test_messages_whose_channel_is_lost_are_counted(tmp_path):
     result = recover(path, tmp_path / "b")
     gone = [topic for _, topic, _ in samples.robot_messages()].count("/fish/joint_command")
     assert result.count == len(samples.robot_messages()) - gone
-    assert any(f"{gone} messages of channel 1, whose topic or type is lost" in loss for loss in result.lost)
+    assert any(
+        f"{gone} messages of channel 1, whose topic or type is lost" in loss for loss in result.lost
+    )
 
 
 def test_any_damaged_byte_is_survived(tmp_path):
     """A trial or a RecordingError, and a recovery that can be read; half of the bytes where the file's structure lies."""
-    whole, count = samples.robot_recording(tmp_path / "whole", duration=1.0), len(samples.robot_messages(1.0))
+    whole, count = (
+        samples.robot_recording(tmp_path / "whole", duration=1.0),
+        len(samples.robot_messages(1.0)),
+    )
     data, rng = next(whole.glob("*.mcap")).read_bytes(), np.random.default_rng(5)
-    structure = [*range(8, first(whole, Opcode.CHUNK)), *range(first(whole, Opcode.DATA_END), len(data))]
+    structure = [
+        *range(8, first(whole, Opcode.CHUNK)),
+        *range(first(whole, Opcode.DATA_END), len(data)),
+    ]
     for i in range(24):
         at = int(rng.choice(structure) if i % 2 else rng.integers(8, len(data)))
         broken = bytearray(data)
@@ -160,7 +170,9 @@ def test_compressed_chunk_that_is_cut(tmp_path):
     path = damaged(tmp_path / "a", lambda d: d[: int(len(d) * 0.6)])
     result = recover(path, tmp_path / "b")
     assert 0.3 * count < result.count < 0.8 * count
-    np.testing.assert_allclose(read_trial(tmp_path / "b").imu.gyro[:, 2], 0.01 * np.arange(result.count))
+    np.testing.assert_allclose(
+        read_trial(tmp_path / "b").imu.gyro[:, 2], 0.01 * np.arange(result.count)
+    )
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"not mcap at all" * 100])

@@ -7,9 +7,14 @@ from fish_bag import read_trial
 from fish_bag import sample_recordings as samples
 
 ROBOT_TOPICS = (
-    "joint_command", "joint_states", "imu/data", "odometry/filtered", "control/target", "tracking/error",
+    "joint_command",
+    "joint_states",
+    "imu/data",
+    "odometry/filtered",
+    "control/target",
+    "tracking/error",
     "battery_state",
-)  # fmt: skip
+)
 
 
 def moved(messages, topics, offset_s, drift=0.0):
@@ -27,7 +32,8 @@ def moved(messages, topics, offset_s, drift=0.0):
 def test_same_clock_is_left_alone(tmp_path):
     trial = read_trial(samples.robot_recording(tmp_path / "a"))
     clocks = {clock.clock: clock for clock in trial.clocks}
-    assert not clocks["robot"].applied and not clocks["camera"].applied
+    assert not clocks["robot"].applied
+    assert not clocks["camera"].applied
     assert clocks["robot"].offset_s == pytest.approx(0.0, abs=1e-6)
     assert clocks["camera"].offset_s == pytest.approx(0.025, abs=1e-6)
 
@@ -40,7 +46,8 @@ def test_robot_with_another_clock(tmp_path, offset, drift):
     assert trial.axis == "robot"
     assert [p.kind for p in trial.problems if p.kind == "clock"] == ["clock"]
     robot = trial.clocks[0]
-    assert robot.applied and robot.drift_ppm == pytest.approx(-drift * 1e6 / (1 + drift), abs=1)
+    assert robot.applied
+    assert robot.drift_ppm == pytest.approx(-drift * 1e6 / (1 + drift), abs=1)
     t = np.arange(0, 10, 0.01)
     np.testing.assert_allclose(trial.commands.t - trial.commands.t[0], t * (1 + drift), atol=1e-6)
     camera = np.arange(0.005, 10, 1 / 30) * (1 + drift)
@@ -72,11 +79,23 @@ def test_a_simulation_has_one_clock_however_unsteady(tmp_path):
         t = (arrival_ns - samples.START_NS) * 1e-9
         wall = t + 0.2 * t**1.5 + rng.exponential(0.0005)
         messages.append((samples.START_NS + round(1e9 * wall), topic, message))
-    truth = [(a, "/fish/sim/odometry", samples.build.odometry(samples.ns(0.01 * i), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-             for i, a in enumerate(np.linspace(messages[0][0], messages[-1][0], 1000).astype(int).tolist())]  # fmt: skip
-    trial = read_trial(samples.write_mcap(tmp_path / "a", sorted(messages + truth, key=lambda m: m[0])))
+    truth = [
+        (
+            a,
+            "/fish/sim/odometry",
+            samples.build.odometry(samples.ns(0.01 * i), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        )
+        for i, a in enumerate(
+            np.linspace(messages[0][0], messages[-1][0], 1000).astype(int).tolist()
+        )
+    ]
+    trial = read_trial(
+        samples.write_mcap(tmp_path / "a", sorted(messages + truth, key=lambda m: m[0]))
+    )
     assert [clock.clock for clock in trial.clocks] == ["robot"]
-    np.testing.assert_allclose(trial.camera.t - trial.imu.t[0], np.arange(0.005, 10, 1 / 30), atol=1e-6)
+    np.testing.assert_allclose(
+        trial.camera.t - trial.imu.t[0], np.arange(0.005, 10, 1 / 30), atol=1e-6
+    )
 
 
 @pytest.mark.parametrize("factor", [0.5, 3.0])

@@ -24,9 +24,11 @@ def test_partial_file(tmp_path):
     )
     topics = load_topic_map(tmp_path / "t.yaml")
     assert topics.namespace == "/x"
-    assert topics.rules["imu"].topic == "/imu/raw" and topics.rules["imu"].frame == "imu_link"
+    assert topics.rules["imu"].topic == "/imu/raw"
+    assert topics.rules["imu"].frame == "imu_link"
     assert "tail" not in topics.rules
-    assert topics.rules["camera"].frame == "map" and topics.rules["camera"].required
+    assert topics.rules["camera"].frame == "map"
+    assert topics.rules["camera"].required
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
+from ament_index_python.packages import (
+    PackageNotFoundError,
+    get_package_prefix,
+    get_package_share_directory,
+)
 
 from fish_report.errors import UserError
 
@@ -27,6 +31,7 @@ class NodeSpec:
 
     Attributes:
         parameter_file: in config/ of the package's share directory.
+
     """
 
     package: str
@@ -72,6 +77,7 @@ def executable_path(spec: NodeSpec) -> Path:
 
     Raises:
         UserError: not built, or the workspace is not sourced.
+
     """
     try:
         path = Path(get_package_prefix(spec.package)) / "lib" / spec.package / spec.executable
@@ -90,12 +96,17 @@ def parameter_path(spec: NodeSpec) -> Path:
     return Path(get_package_share_directory(spec.package)) / "config" / spec.parameter_file
 
 
-def command(spec: NodeSpec, parameters: Parameters | None = None, namespace: str = NAMESPACE) -> list[str]:
+def command(
+    spec: NodeSpec, parameters: Parameters | None = None, namespace: str = NAMESPACE
+) -> list[str]:
     """Command line of a node: its parameter file, then single parameters that override it."""
     line = [str(executable_path(spec)), "--ros-args", "-r", f"__ns:={namespace}"]
     line += ["--params-file", str(parameter_path(spec))]
     for name, value in (parameters or {}).items():
-        line += ["-p", f"{name}:={json.dumps(value)}"]  # JSON is YAML, and keeps "N" a string and 1.0 a float
+        line += [
+            "-p",
+            f"{name}:={json.dumps(value)}",
+        ]  # JSON is YAML, and keeps "N" a string and 1.0 a float
     return line
 
 

@@ -78,7 +78,11 @@ class NodeProcess:
 
     def last_words(self) -> str:
         """Last line of its log that says something."""
-        lines = [line.strip() for line in self.log.read_text(errors="replace").splitlines() if line.strip()]
+        lines = [
+            line.strip()
+            for line in self.log.read_text(errors="replace").splitlines()
+            if line.strip()
+        ]
         return lines[-1] if lines else "(it said nothing)"
 
 
@@ -112,7 +116,10 @@ class NodeProcesses:
             for process in chosen:
                 process.signal(number)
             deadline = time.monotonic() + grace_s
-            if all([process.wait(max(deadline - time.monotonic(), 0.0)) is not None for process in chosen]):
+            if all(
+                process.wait(max(deadline - time.monotonic(), 0.0)) is not None
+                for process in chosen
+            ):
                 break
         return {process.spec: process.status for process in chosen}
 
@@ -120,7 +127,10 @@ class NodeProcesses:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.stop()
 

@@ -21,11 +21,16 @@ from fish_report.page import (
 )
 
 BLUE, ORANGE, GREY, GREEN = "#1f6fb2", "#e07b39", "#9aa7b2", "#3a9a5b"
-SOURCES = {"truth": "the simulator's true pose", "estimate": "the robot's own estimate (odometry/filtered)"}
+SOURCES = {
+    "truth": "the simulator's true pose",
+    "estimate": "the robot's own estimate (odometry/filtered)",
+}
 GAIN_NAMES = ("steering Kp", "steering Ki", "steering Kd", "speed Kp", "speed Ki", "speed Kd")
 
 
-def write_run_page(path: Path, title: str, trial: Trial, score: RunScore, tables: list[Table]) -> None:
+def write_run_page(
+    path: Path, title: str, trial: Trial, score: RunScore, tables: list[Table]
+) -> None:
     """Write report.html: path, errors, speed, gains and commands of a recorded run, and the tables given."""
     trial = trial.clean()
     blocks: list[Block] = [Figure("Path in the pool", _pool(score), _pool_note(score))]
@@ -35,7 +40,9 @@ def write_run_page(path: Path, title: str, trial: Trial, score: RunScore, tables
         blocks.append(Figure("Gains", _gains(trial.gains), "As published by the controller."))
     if trial.commands is not None:
         blocks.append(
-            Figure("Commands", _commands(trial.commands), "Rotor speed and rudder angle as commanded.")
+            Figure(
+                "Commands", _commands(trial.commands), "Rotor speed and rudder angle as commanded."
+            )
         )
     write_page(path, title, _lead(score), [*blocks, *tables[1:]])
 
@@ -62,13 +69,21 @@ def _pool_note(score: RunScore) -> str:
 def _pool(score: RunScore) -> go.Figure:
     """Top view: walls, reference, swum path with the approach phase apart."""
     reference = (
-        score.path.points if not score.path.closed else np.vstack([score.path.points, score.path.points[:1]])
+        score.path.points
+        if not score.path.closed
+        else np.vstack([score.path.points, score.path.points[:1]])
     )
     figure = go.Figure()
     figure.add_shape(
-        type="rect", x0=-HALF_LENGTH, x1=HALF_LENGTH, y0=-HALF_WIDTH, y1=HALF_WIDTH,
-        line={"color": GREY, "width": 2}, fillcolor="#eef5fa", layer="below",
-    )  # fmt: skip
+        type="rect",
+        x0=-HALF_LENGTH,
+        x1=HALF_LENGTH,
+        y0=-HALF_WIDTH,
+        y1=HALF_WIDTH,
+        line={"color": GREY, "width": 2},
+        fillcolor="#eef5fa",
+        layer="below",
+    )
     figure.add_scatter(
         x=reference[:, 0],
         y=reference[:, 1],
@@ -86,7 +101,9 @@ def _pool(score: RunScore) -> go.Figure:
     figure.add_scatter(
         x=start[:1], y=start[1:], name="start", mode="markers", marker={"color": GREEN, "size": 10}
     )
-    figure.update_xaxes(title="x [m]", range=[-HALF_LENGTH - 0.1, HALF_LENGTH + 0.1], constrain="domain")
+    figure.update_xaxes(
+        title="x [m]", range=[-HALF_LENGTH - 0.1, HALF_LENGTH + 0.1], constrain="domain"
+    )
     figure.update_yaxes(title="y [m]", scaleanchor="x", scaleratio=1.0)
     return styled(figure, 560)
 
@@ -101,7 +118,9 @@ def _errors(score: RunScore) -> go.Figure:
         (3, "speed [m/s]", score.speed_error, BLUE, 1),
     )
     for row, name, value, colour, width in lines:
-        figure.add_scatter(x=t, y=value, name=name, line={"color": colour, "width": width}, row=row, col=1)
+        figure.add_scatter(
+            x=t, y=value, name=name, line={"color": colour, "width": width}, row=row, col=1
+        )
     for row, name in ((1, "cross-track [m]"), (2, "heading [rad]"), (3, "speed [m/s]")):
         figure.update_yaxes(title=name, row=row, col=1)
     figure.update_xaxes(title="time [s]", row=3, col=1)
@@ -112,7 +131,9 @@ def _speed(score: RunScore) -> go.Figure:
     t = score.t - score.t[0]
     figure = go.Figure()
     figure.add_scatter(x=t, y=score.speed, name="surge speed", line={"color": GREY, "width": 1})
-    figure.add_scatter(x=t, y=stroke_mean(score.t, score.speed), name="stroke mean", line={"color": BLUE})
+    figure.add_scatter(
+        x=t, y=stroke_mean(score.t, score.speed), name="stroke mean", line={"color": BLUE}
+    )
     commanded = {"color": ORANGE, "dash": "dash", "shape": "hv"}
     figure.add_scatter(x=t, y=score.reference_speed, name="commanded", line=commanded, mode="lines")
     figure.update_xaxes(title="time [s]")

@@ -18,7 +18,9 @@ from fish_report.interruption import Interruption
 
 FUSION = CONTROL[1]  # says odometry/filtered
 START_TIMEOUT = 30.0  # s in which each thing that is waited for must come
-STILL_TIMEOUT = 30.0  # s of real time without any new stamp of the estimate, however slow the computer
+STILL_TIMEOUT = (
+    30.0  # s of real time without any new stamp of the estimate, however slow the computer
+)
 LOOK_PERIOD = 0.1  # s between looks at the robot
 LAST_LOOK = 0.5  # s after the end of the path: the estimate may be there a little before the fish
 
@@ -48,6 +50,7 @@ class SwimEnd:
     Attributes:
         seconds: wall time from the first odometry to the end.
         cpu: share of one core each node used meanwhile.
+
     """
 
     reason: str
@@ -70,6 +73,7 @@ class Robot:
         Raises:
             UserError: a node ended, or it did not come in time.
             KeyboardInterrupt: the user does not want to wait.
+
         """
         deadline = time.monotonic() + START_TIMEOUT
         while not there():
@@ -77,7 +81,9 @@ class Robot:
             if self.interruption.asked:
                 raise KeyboardInterrupt
             if time.monotonic() > deadline:
-                raise UserError(f"no {what} within {START_TIMEOUT:.0f} s; see the logs of the nodes")
+                raise UserError(
+                    f"no {what} within {START_TIMEOUT:.0f} s; see the logs of the nodes"
+                )
 
     def swim(self, duration: float, console: Console) -> SwimEnd:
         """Watch for at most `duration` seconds of the robot's own time, with a line of progress."""
@@ -132,6 +138,7 @@ class Patience:
 
         Raises:
             UserError: for a long time nothing new, though every node lives.
+
         """
         if sight is not None and sight.stamp != self._stamp:
             self._stamp, self._since = sight.stamp, time.monotonic()

@@ -43,7 +43,9 @@ class Summary:
         if not len(error):
             return cls(float("nan"), float("nan"), float("nan"))
         size = np.abs(error)
-        return cls(float(np.sqrt(np.mean(error**2))), float(np.percentile(size, 95)), float(size.max()))
+        return cls(
+            float(np.sqrt(np.mean(error**2))), float(np.percentile(size, 95)), float(size.max())
+        )
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class RunScore:
         head_angle: heading error of the head as it swings [rad]. heading: of its mean over a stroke [rad].
         settled: first sample after the approach phase, N if the run never got there.
         finished: whether the end of an open path was reached, or the planner said that it was.
+
     """
 
     source: str
@@ -75,7 +78,9 @@ class RunScore:
     @property
     def approach_s(self) -> float:
         """Length of the approach phase [s]; nan if it never ended."""
-        return float(self.t[self.settled] - self.t[0]) if self.settled < len(self.t) else float("nan")
+        return (
+            float(self.t[self.settled] - self.t[0]) if self.settled < len(self.t) else float("nan")
+        )
 
     def summaries(self, *, with_approach: bool) -> dict[str, Summary]:
         """Error name -> size, over the whole run or what follows the approach phase."""
@@ -94,9 +99,12 @@ def score_trial(trial: Trial) -> RunScore:
 
     Raises:
         UserError: path, speed or odometry is missing.
+
     """
     trial = trial.clean()
-    motion, source = (trial.truth, "truth") if trial.truth is not None else (trial.odometry, "estimate")
+    motion, source = (
+        (trial.truth, "truth") if trial.truth is not None else (trial.odometry, "estimate")
+    )
     if motion is None:
         raise UserError(
             f"{trial.name}: neither sim/odometry nor odometry/filtered was recorded; nothing to score"
@@ -116,8 +124,12 @@ def score_trial(trial: Trial) -> RunScore:
     try:
         path = path_from_points(given.points)
     except PathError as error:
-        raise UserError(f"{trial.name}: reference/path cannot be scored against: {error}") from error
-    return score_motion(motion, path, commanded_speed(trial.reference_speed, motion.t), given.t, source, end)
+        raise UserError(
+            f"{trial.name}: reference/path cannot be scored against: {error}"
+        ) from error
+    return score_motion(
+        motion, path, commanded_speed(trial.reference_speed, motion.t), given.t, source, end
+    )
 
 
 def commanded_speed(said: ReferenceSpeed, t: Array) -> Array:
@@ -146,6 +158,7 @@ def path_from_points(points: Array) -> ReferencePath:
 
     Raises:
         PathError: fewer than two points, or values that are not finite.
+
     """
     if len(points) < 2:
         raise PathError(f"got {len(points)} points; expected at least two")

@@ -14,9 +14,7 @@ def error_table(score: RunScore) -> Table:
     rows = [[name, *_cells(settled[name]), *_cells(whole[name])] for name in whole]
     header = ["error", "RMSE", "95 %", "max", "RMSE *", "95 % *", "max *"]
     approach = "never ended" if np.isnan(score.approach_s) else f"took {score.approach_s:.1f} s"
-    note = (
-        f"Without the approach phase, which {approach}; * with it. Heading: mean over a stroke of the tail."
-    )
+    note = f"Without the approach phase, which {approach}; * with it. Heading: mean over a stroke of the tail."
     return Table("Tracking errors", header, rows, note)
 
 

@@ -14,7 +14,15 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from fish_bringup.node_table import CONTROL, EXCITER, NAMESPACE, ROBOTS, NodeSpec, open_loop, parameter_path
+from fish_bringup.node_table import (
+    CONTROL,
+    EXCITER,
+    NAMESPACE,
+    ROBOTS,
+    NodeSpec,
+    open_loop,
+    parameter_path,
+)
 
 PLANNER = CONTROL[2]
 IN_FILE = "; without it what planner.yaml says"
@@ -24,7 +32,10 @@ ARGUMENTS = {
     "config": ("", "folder of parameter files that override the installed ones of the same name"),
     "namespace": (NAMESPACE, "namespace of all nodes"),
     "path": ("", f"letter or path family{IN_FILE}"),
-    "path_args": ("", f"YAML, arguments of the path family: '{{radius: 0.6}}', '{{}}' for none{IN_FILE}"),
+    "path_args": (
+        "",
+        f"YAML, arguments of the path family: '{{radius: 0.6}}', '{{}}' for none{IN_FILE}",
+    ),
     "speed": ("", f"surge speed, m/s{IN_FILE}"),
     "program": ("", "program of stroke and rudder to swim open loop, instead of path and speed"),
     "begin": ("", f"s of the program's time{IN_PROGRAM}"),

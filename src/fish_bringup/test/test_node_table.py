@@ -12,13 +12,18 @@ import yaml
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from fish_bringup import node_table  # noqa: E402
-from fish_bringup.node_table import NodeSpec  # noqa: E402
-from fish_report.errors import UserError  # noqa: E402
+from fish_bringup import node_table
+from fish_bringup.node_table import NodeSpec
+from fish_report.errors import UserError
 
 SOURCE = Path(__file__).parents[2]
 EVERY_NODE = sorted(
-    {*node_table.ROBOTS["sim"], *node_table.ROBOTS["real"], node_table.REPLAYER, node_table.EXCITER},
+    {
+        *node_table.ROBOTS["sim"],
+        *node_table.ROBOTS["real"],
+        node_table.REPLAYER,
+        node_table.EXCITER,
+    },
     key=lambda spec: spec.name,
 )
 
@@ -39,8 +44,12 @@ def installed(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("spec", EVERY_NODE, ids=lambda spec: spec.name)
 def test_every_node_has_an_entry_point_and_a_parameter_file(spec):
-    assert f'"{spec.executable} = {spec.package}.' in (SOURCE / spec.package / "setup.py").read_text()
-    parameters = yaml.safe_load((SOURCE / spec.package / "config" / spec.parameter_file).read_text())
+    assert (
+        f'"{spec.executable} = {spec.package}.' in (SOURCE / spec.package / "setup.py").read_text()
+    )
+    parameters = yaml.safe_load(
+        (SOURCE / spec.package / "config" / spec.parameter_file).read_text()
+    )
     for settings in parameters.values():
         assert isinstance(settings["ros__parameters"], dict)
 
@@ -49,9 +58,14 @@ def test_command_line_keeps_types_of_parameters(installed):
     spec = NodeSpec("fish_sim", "camera", "camera.yaml")
     line = node_table.command(spec, {"path": "N", "speed": 1.0, "loop": True})
     given = [line[k + 1] for k, word in enumerate(line) if word == "-p"]
-    values = {name: yaml.safe_load(value) for name, value in (item.split(":=", 1) for item in given)}
+    values = {
+        name: yaml.safe_load(value) for name, value in (item.split(":=", 1) for item in given)
+    }
     assert values == {"path": "N", "speed": 1.0, "loop": True}
-    assert all(type(values[name]) is kind for name, kind in (("path", str), ("speed", float), ("loop", bool)))
+    assert all(
+        type(values[name]) is kind
+        for name, kind in (("path", str), ("speed", float), ("loop", bool))
+    )
     assert line[0] == str(installed / "lib/fish_sim/camera")
 
 
@@ -62,7 +76,7 @@ def test_an_executable_that_is_not_built_is_named(installed):
 
 def test_a_workspace_that_is_not_sourced_is_said(monkeypatch):
     monkeypatch.setenv("AMENT_PREFIX_PATH", "")
-    with pytest.raises(UserError, match="source install/setup.bash"):
+    with pytest.raises(UserError, match=r"source install/setup.bash"):
         node_table.command(NodeSpec("fish_sim", "camera", "camera.yaml"))
 
 
@@ -158,21 +172,34 @@ def parameters(node):
 def test_the_launch_file_starts_the_table(launch_file, launched, robot):
     started = [(n.package, n.executable, parameters(n)) for n in launched(robot=robot).values()]
     assert started == [
-        (s.package, s.executable, [str(node_table.parameter_path(s))]) for s in node_table.ROBOTS[robot]
+        (s.package, s.executable, [str(node_table.parameter_path(s))])
+        for s in node_table.ROBOTS[robot]
     ]
     [*arguments, _] = launch_file["generate_launch_description"]().args[0]
-    assert {argument.args[0] for argument in arguments} >= {"robot", "path", "speed", "use_sim_time"}
+    assert {argument.args[0] for argument in arguments} >= {
+        "robot",
+        "path",
+        "speed",
+        "use_sim_time",
+    }
 
 
 @pytest.mark.parametrize("robot", node_table.ROBOTS)
 def test_with_a_program_the_exciter_takes_the_place_of_planner_and_controller(launched, robot):
     nodes = launched(robot=robot, program="diagnosis.json", begin="2.5", end="34")
     assert list(nodes) == [
-        *(s.executable for s in node_table.ROBOTS[robot] if s.executable not in ("planner", "controller")),
+        *(
+            s.executable
+            for s in node_table.ROBOTS[robot]
+            if s.executable not in ("planner", "controller")
+        ),
         "exciter",
     ]
     given = {"program_file": ("program", str), "begin": ("begin", float), "end": ("end", float)}
-    assert parameters(nodes["exciter"]) == [str(node_table.parameter_path(node_table.EXCITER)), given]
+    assert parameters(nodes["exciter"]) == [
+        str(node_table.parameter_path(node_table.EXCITER)),
+        given,
+    ]
 
 
 def test_the_launch_file_hands_the_planner_its_path_and_arguments_as_text(launched):
@@ -198,24 +225,31 @@ def test_the_launch_file_refuses_an_unknown_robot(launched):
         ),
     ],
 )
-def test_only_arguments_that_are_given_override_a_robots_own_values(launched, tmp_path, given, overridden):
+def test_only_arguments_that_are_given_override_a_robots_own_values(
+    launched, tmp_path, given, overridden
+):
     """The arguments' defaults had overridden the robot's own planner.yaml."""
     own = [tmp_path / "planner.yaml", tmp_path / "fusion.yaml"]
     for file in own:
         file.touch()
     nodes = launched(robot="real", config=str(tmp_path), **given)
     installed = [
-        str(node_table.parameter_path(spec)) for spec in (node_table.CONTROL[2], node_table.CONTROL[1])
+        str(node_table.parameter_path(spec))
+        for spec in (node_table.CONTROL[2], node_table.CONTROL[1])
     ]
     last = [overridden] if overridden else []
     assert parameters(nodes["planner"]) == [installed[0], str(own[0]), *last]
-    everybody = [{"use_sim_time": overridden["use_sim_time"]}] if "use_sim_time" in overridden else []
+    everybody = (
+        [{"use_sim_time": overridden["use_sim_time"]}] if "use_sim_time" in overridden else []
+    )
     assert parameters(nodes["fusion"]) == [installed[1], str(own[1]), *everybody]
 
 
 def test_a_robots_own_values_override_the_installed_ones(launched, tmp_path):
     context = {"robot": "real", "config": str(tmp_path)}
-    with pytest.raises(RuntimeError, match=r"holds none of .*; expected some of rotor.yaml, rudder.yaml"):
+    with pytest.raises(
+        RuntimeError, match=r"holds none of .*; expected some of rotor.yaml, rudder.yaml"
+    ):
         launched(**context)
     (tmp_path / "tracker.yaml").touch()
     files = {name: parameters(node) for name, node in launched(**context).items()}
@@ -224,10 +258,12 @@ def test_a_robots_own_values_override_the_installed_ones(launched, tmp_path):
 
 
 def test_the_drivers_alone_take_a_robots_own_values_in_the_same_way(launch_names, tmp_path):
-    [*arguments, opaque] = launch_names("fish_hw", "drivers.launch.py")["generate_launch_description"]().args[
-        0
-    ]
-    with pytest.raises(RuntimeError, match="holds none of .*; expected some of rotor.yaml, rudder.yaml"):
+    [*arguments, opaque] = launch_names("fish_hw", "drivers.launch.py")[
+        "generate_launch_description"
+    ]().args[0]
+    with pytest.raises(
+        RuntimeError, match=r"holds none of .*; expected some of rotor.yaml, rudder.yaml"
+    ):
         opaque.function({"config": str(tmp_path)})
     (tmp_path / "rotor.yaml").touch()
     drivers = [spec for spec in node_table.ROBOTS["real"] if spec.package == "fish_hw"]

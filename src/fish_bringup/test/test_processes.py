@@ -74,7 +74,8 @@ def test_a_process_can_be_started_again_after_kill(nodes):
     first.signal(signal.SIGKILL)
     assert first.wait(5.0) == -signal.SIGKILL
     second = nodes.start(first.spec)
-    assert second.pid != first.pid and nodes.ended() == []
+    assert second.pid != first.pid
+    assert nodes.ended() == []
 
 
 def test_cpu_time_is_that_of_the_process(nodes):
@@ -82,12 +83,14 @@ def test_cpu_time_is_that_of_the_process(nodes):
     before, began = busy.cpu_time(), time.monotonic()
     while time.monotonic() - began < 0.5:
         time.sleep(0.05)
-    assert 0.02 < busy.cpu_time() - before <= time.monotonic() - began + 0.02  # it may share its core
+    assert (
+        0.02 < busy.cpu_time() - before <= time.monotonic() - began + 0.02
+    )  # it may share its core
     assert idle.cpu_time() < 2.0
 
 
 def test_nothing_survives_the_starter(tmp_path):
-    """kill -9 of the starter ends the node: the kernel sends it SIGTERM."""
+    """Kill -9 of the starter ends the node: the kernel sends it SIGTERM."""
     starter = f"""
 import sys, time
 from pathlib import Path
@@ -98,7 +101,9 @@ nodes = processes.NodeProcesses(0, Path({str(tmp_path)!r}))
 print(nodes.start(NodeSpec("test", "polite", "none.yaml")).pid, flush=True)
 time.sleep(60)
 """
-    with subprocess.Popen([sys.executable, "-c", starter], stdout=subprocess.PIPE, text=True) as parent:
+    with subprocess.Popen(
+        [sys.executable, "-c", starter], stdout=subprocess.PIPE, text=True
+    ) as parent:
         child = int(parent.stdout.readline())
         parent.kill()
         parent.wait()

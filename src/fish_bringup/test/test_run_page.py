@@ -29,7 +29,11 @@ from fish_report.page import (
 def page(tmp_path):
     path = tmp_path / "report.html"
     figure = Figure("Curve", styled(go.Figure(go.Scatter(x=[0, 1], y=[2, 3]))))
-    blocks = [Text("Words", "a <b> & c"), Table("Numbers", ["name", "m"], [["<x>", "1.5"]], "a note"), figure]
+    blocks = [
+        Text("Words", "a <b> & c"),
+        Table("Numbers", ["name", "m"], [["<x>", "1.5"]], "a note"),
+        figure,
+    ]
     write_page(path, "Title", "Lead.", blocks)
     return path.read_text()
 
@@ -40,7 +44,8 @@ def test_a_page_loads_nothing(page):
 
 
 def test_text_is_escaped(page):
-    assert "a &lt;b&gt; &amp; c" in page and "<td>&lt;x&gt;</td>" in page
+    assert "a &lt;b&gt; &amp; c" in page
+    assert "<td>&lt;x&gt;</td>" in page
 
 
 def test_blocks_stand_in_order_and_the_library_once(page):
@@ -53,16 +58,35 @@ def test_the_page_of_a_run_shows_path_errors_gains_and_commands(tmp_path):
     path = make_path("letter", letter="S")
     s = np.linspace(0.0, path.length, 500)
     t, zero = s / 0.2, np.zeros(500)
-    stream = {"topic": "x", "frame_id": "pool", "t": t, "t_arrival": t, "flags": zero.astype(np.uint8)}
+    stream = {
+        "topic": "x",
+        "frame_id": "pool",
+        "t": t,
+        "t_arrival": t,
+        "flags": zero.astype(np.uint8),
+    }
     x, y = path.point(s).T
     truth = Odometry(**stream, x=x, y=y, psi=path.heading_at(s), u=zero + 0.2, v=zero, r=zero)
     trial = Trial(
-        name="run", path=tmp_path, origin_ns=0, duration=t[-1], namespace="/fish", axis="robot", truth=truth,
+        name="run",
+        path=tmp_path,
+        origin_ns=0,
+        duration=t[-1],
+        namespace="/fish",
+        axis="robot",
+        truth=truth,
         commands=Commands(**stream, rotor_phase=zero, rotor_speed=zero, rudder=zero),
         gains=Gains(**stream, names=(), values=np.ones((500, 6))),
-    )  # fmt: skip
+    )
     score = score_motion(truth, path, 0.2, 0.0, "truth")
     write_run_page(tmp_path / "report.html", "Run", trial, score, [error_table(score)])
     html = (tmp_path / "report.html").read_text()
-    for title in ("Path in the pool", "Tracking errors", "Errors", "Surge speed", "Gains", "Commands"):
+    for title in (
+        "Path in the pool",
+        "Tracking errors",
+        "Errors",
+        "Surge speed",
+        "Gains",
+        "Commands",
+    ):
         assert f"<h2>{title}</h2>" in html

@@ -83,7 +83,9 @@ def test_a_signal_ends_a_run_in_order(number, nodes, interruption):
 
 def test_a_node_that_ends_is_said_with_its_last_words(nodes, interruption):
     fish = Fish(make_path("circle"))
-    dead = SimpleNamespace(spec=NODE, status=3, last_words=lambda: "no such weights", log="node.log")
+    dead = SimpleNamespace(
+        spec=NODE, status=3, last_words=lambda: "no such weights", log="node.log"
+    )
     fish.events[1.0] = lambda: setattr(nodes, "ended", lambda: [dead])
     with pytest.raises(UserError, match="test/node ended with status 3: no such weights"):
         swim(fish, nodes, interruption)
@@ -104,7 +106,9 @@ class Stuck(Fish):
 
 def test_a_robot_of_which_nothing_new_is_heard_is_not_waited_for(nodes, interruption, monkeypatch):
     monkeypatch.setattr("fish_bringup.run_watch.STILL_TIMEOUT", 0.3)
-    with pytest.raises(UserError, match="no new odometry/filtered for 0.3 s: .*hangs; see logs/fusion.log"):
+    with pytest.raises(
+        UserError, match=r"no new odometry/filtered for 0.3 s: .*hangs; see logs/fusion.log"
+    ):
         swim(Stuck(make_path("circle")), nodes, interruption)
 
 
@@ -125,21 +129,26 @@ def test_an_experiment_ends_when_nothing_new_is_heard_of_the_robot(tmp_path, mon
     """Its nodes are ended like those of any other run that fails."""
     monkeypatch.setattr("fish_bringup.run_watch.STILL_TIMEOUT", 0.3)
     fish, ended = Stuck(make_path("circle")), []
-    fish.sees, fish.diagnostics = lambda _: True, {excite.EXCITER_NAME: {"over": "false", "time_s": "2"}}
+    fish.sees, fish.diagnostics = (
+        lambda _: True,
+        {excite.EXCITER_NAME: {"over": "false", "time_s": "2"}},
+    )
 
     @contextmanager
     def started(domain, logs):
         try:
             yield SimpleNamespace(
-                start=lambda *_: None, ended=lambda: [], running={FUSION: SimpleNamespace(log="fusion.log")}
+                start=lambda *_: None,
+                ended=lambda: [],
+                running={FUSION: SimpleNamespace(log="fusion.log")},
             )
         finally:
             ended.append(domain)
 
     monkeypatch.setattr(excite, "NodeProcesses", started)
     monkeypatch.setattr(excite, "watching", lambda _: nullcontext((fish, fish.listen)))
-    changed = dict.fromkeys(excite.open_loop(ROBOTS["sim"]), {})
-    with pytest.raises(UserError, match="no new odometry/filtered for 0.3 s: .*see fusion.log"):
+    changed = {spec: {} for spec in excite.open_loop(ROBOTS["sim"])}
+    with pytest.raises(UserError, match=r"no new odometry/filtered for 0.3 s: .*see fusion.log"):
         excite._swim(7, changed, tmp_path, SimpleNamespace(asked=False), Console(quiet=True))
     assert ended == [7]
 

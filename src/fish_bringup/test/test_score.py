@@ -24,12 +24,23 @@ STRAIGHT = ReferencePath.from_points([[-1.0, 0.0], [1.0, 0.0]], name="straight")
 
 
 def motion(t, x, y, psi, u):
-    t, x, y, psi, u = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in (t, x, y, psi, u)))
+    t, x, y, psi, u = np.broadcast_arrays(
+        *(np.asarray(value, dtype=float) for value in (t, x, y, psi, u))
+    )
     zero = np.zeros(len(t))
     return Odometry(
-        topic="/fish/sim/odometry", frame_id="pool", t=t, t_arrival=t, flags=np.zeros(len(t), np.uint8),
-        x=x, y=y, psi=psi, u=u, v=zero, r=zero,
-    )  # fmt: skip
+        topic="/fish/sim/odometry",
+        frame_id="pool",
+        t=t,
+        t_arrival=t,
+        flags=np.zeros(len(t), np.uint8),
+        x=x,
+        y=y,
+        psi=psi,
+        u=u,
+        v=zero,
+        r=zero,
+    )
 
 
 def test_summary_of_a_sine_has_the_sine_s_rms_and_percentile():
@@ -68,10 +79,14 @@ def test_approach_ends_when_path_heading_and_speed_are_all_near(last, side):
     psi = -np.maximum(0.3 + 0.1 * (near["heading"] - t), 0.0)
     u = 0.2 - np.maximum(0.04 + 0.02 * (near["speed"] - t), 0.0)
     u = 0.2 + side * (u - 0.2)
-    score = score_motion(motion(t, -1.0 + 0.2 * t, side * y, side * psi, u), STRAIGHT, 0.2, 0.0, "truth")
+    score = score_motion(
+        motion(t, -1.0 + 0.2 * t, side * y, side * psi, u), STRAIGHT, 0.2, 0.0, "truth"
+    )
     assert score.approach_s == pytest.approx(4.0, abs=0.03)
     settled, whole = score.summaries(with_approach=False), score.summaries(with_approach=True)
-    assert settled["cross-track, m"].maximum == pytest.approx(0.05 if last == "path" else 0.0, abs=1e-3)
+    assert settled["cross-track, m"].maximum == pytest.approx(
+        0.05 if last == "path" else 0.0, abs=1e-3
+    )
     assert whole["cross-track, m"].maximum == pytest.approx(0.05 + 0.05 * near["path"])
 
 
@@ -119,7 +134,9 @@ def test_stroke_mean_of_a_parabola_is_its_integral_also_at_the_ends():
     """(b^3 - a^3) / 3 (b - a) between a and b, a quarter of a second to both sides where there is as much."""
     t = np.r_[np.arange(0.0, 2.0, 0.01), np.arange(2.0, 5.0, 0.02)]
     a, b = np.maximum(t - 0.25, t[0]), np.minimum(t + 0.25, t[-1])
-    assert stroke_mean(t, t**2) == pytest.approx((b**3 - a**3) / (3.0 * (b - a)), rel=2e-4, abs=2e-4)
+    assert stroke_mean(t, t**2) == pytest.approx(
+        (b**3 - a**3) / (3.0 * (b - a)), rel=2e-4, abs=2e-4
+    )
 
 
 def test_the_mean_over_a_single_sample_is_that_sample():
@@ -159,14 +176,17 @@ def test_a_run_without_a_wanted_speed_or_a_pose_on_its_path_is_refused(tmp_path)
 
 def test_truth_is_scored_where_there_is_one_and_else_the_estimate(tmp_path):
     t = np.arange(0.0, 3.0, 0.01)
-    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]), end=9.0)
+    trial = recorded_run(
+        tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]), end=9.0
+    )
     beside = motion(t, 0.2 * t - 1.0, 0.03, 0.0, 0.2)
     for odometry, truth, source, offset in (
         (beside, trial.truth, "truth", 0.0),
         (beside, None, "estimate", 0.03),
     ):
         score = score_trial(replace(trial, odometry=odometry, truth=truth))
-        assert score.source == source and score.cross_track == pytest.approx(offset, abs=1e-9)
+        assert score.source == source
+        assert score.cross_track == pytest.approx(offset, abs=1e-9)
 
 
 def test_the_last_commanded_speed_is_the_one_of_the_last_path(tmp_path):
@@ -176,14 +196,18 @@ def test_the_last_commanded_speed_is_the_one_of_the_last_path(tmp_path):
     stamps = np.array([0.0, 1.0, 3.0, 6.0])
     speeds = replace(
         trial.reference_speed,
-        t=stamps, t_arrival=stamps, flags=np.zeros(4, np.uint8), speed=np.array([0.2, 0.0, 0.25, 0.0]),
-    )  # fmt: skip
+        t=stamps,
+        t_arrival=stamps,
+        flags=np.zeros(4, np.uint8),
+        speed=np.array([0.2, 0.0, 0.25, 0.0]),
+    )
     paths = (
         replace(trial.reference_paths[0], points=STRAIGHT.points + 0.5),
         replace(trial.reference_paths[0], t=2.0),
     )
     score = score_trial(replace(trial, reference_speed=speeds, reference_paths=paths))
-    assert set(score.reference_speed) == {0.25} and score.finished
+    assert set(score.reference_speed) == {0.25}
+    assert score.finished
     assert (score.t[0], score.t[-1]) == pytest.approx((2.0, 6.0))
 
 
@@ -195,9 +219,14 @@ def changing_speed(tmp_path):
     stamps = np.array([0.5, 5.0, 12.4])
     said = replace(
         trial.reference_speed,
-        t=stamps, t_arrival=stamps, flags=np.zeros(3, np.uint8), speed=np.array([0.1, 0.2, 0.0]),
-    )  # fmt: skip
-    return replace(trial, truth=motion(t, x, 0.0, 0.0, np.where(t < 5.0, 0.1, 0.2)), reference_speed=said)
+        t=stamps,
+        t_arrival=stamps,
+        flags=np.zeros(3, np.uint8),
+        speed=np.array([0.1, 0.2, 0.0]),
+    )
+    return replace(
+        trial, truth=motion(t, x, 0.0, 0.0, np.where(t < 5.0, 0.1, 0.2)), reference_speed=said
+    )
 
 
 def test_a_speed_that_changes_on_the_way_is_wanted_from_then_on(tmp_path):
@@ -225,9 +254,12 @@ def test_a_single_speed_is_wanted_throughout_whatever_zeros_are_said(tmp_path):
         ([0.0, 2.0, 4.0], [0.2, 0.0, 0.2]),
     ):
         said = replace(
-            trial.reference_speed, t=np.array(stamps), speed=np.array(speeds),
-            t_arrival=np.array(stamps), flags=np.zeros(len(stamps), np.uint8),
-        )  # fmt: skip
+            trial.reference_speed,
+            t=np.array(stamps),
+            speed=np.array(speeds),
+            t_arrival=np.array(stamps),
+            flags=np.zeros(len(stamps), np.uint8),
+        )
         assert set(commanded_speed(said, t)) == {0.2}
 
 
@@ -235,7 +267,8 @@ def test_a_speed_of_0_that_was_said_before_the_path_does_not_end_it(tmp_path):
     t = np.arange(0.0, 5.0, 0.01)
     trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]))
     score = score_trial(replace(trial, reference_paths=(replace(trial.reference_paths[0], t=2.0),)))
-    assert score.t[-1] == pytest.approx(4.99) and not score.finished
+    assert score.t[-1] == pytest.approx(4.99)
+    assert not score.finished
 
 
 def test_a_closed_path_is_followed_from_where_the_fish_is():
@@ -244,11 +277,14 @@ def test_a_closed_path_is_followed_from_where_the_fish_is():
     x, y = (path.point(s) * 0.96).T  # within the circle: left of a path that goes round to the left
     score = score_motion(motion(s / 0.2, x, y, path.heading_at(s), 0.2), path, 0.2, 0.0, "truth")
     assert score.progress == pytest.approx(s, abs=5e-3)
-    assert score.cross_track == pytest.approx(0.04 * 0.5, abs=1e-4) and not score.finished
+    assert score.cross_track == pytest.approx(0.04 * 0.5, abs=1e-4)
+    assert not score.finished
 
 
 def test_a_path_without_enough_points_is_an_error_the_user_can_read(tmp_path):
-    with pytest.raises(UserError, match="reference/path cannot be scored against: got 0 points; expected"):
+    with pytest.raises(
+        UserError, match="reference/path cannot be scored against: got 0 points; expected"
+    ):
         score_trial(recorded_run(tmp_path, np.zeros((0, 2)), np.arange(3.0), np.zeros((3, 2))))
 
 
@@ -257,10 +293,15 @@ def test_an_open_path_that_ends_where_it_begins_is_over_when_the_planner_says_so
     t = np.arange(0.0, path.length / 0.2 + 20.0, 0.02)  # 20 s of rest at the end
     score = score_trial(
         recorded_run(
-            tmp_path, path.points, t, path.point(np.minimum(0.2 * t, path.length)), path.length / 0.2
+            tmp_path,
+            path.points,
+            t,
+            path.point(np.minimum(0.2 * t, path.length)),
+            path.length / 0.2,
         )
     )
-    assert score.finished and score.t[-1] == pytest.approx(path.length / 0.2, abs=0.03)
+    assert score.finished
+    assert score.t[-1] == pytest.approx(path.length / 0.2, abs=0.03)
     assert score.summaries(with_approach=True)["speed, m/s"].rmse < 1e-9
 
 
@@ -268,10 +309,21 @@ def recorded_run(folder, points, t, position, end=1.0):
     """A trial that moves through positions (N, 2) at 0.2 m/s until the planner says 0 at `end` [s]."""
     stamps = np.array([0.0, end])
     speed = ReferenceSpeed(
-        topic="s", frame_id="", t=stamps, t_arrival=stamps, flags=np.zeros(2, np.uint8), speed=np.array([0.2, 0.0])
-    )  # fmt: skip
+        topic="s",
+        frame_id="",
+        t=stamps,
+        t_arrival=stamps,
+        flags=np.zeros(2, np.uint8),
+        speed=np.array([0.2, 0.0]),
+    )
     truth = motion(t, *np.transpose(position), 0.0, np.where(t <= end, 0.2, 0.0))
-    common = dict(path=folder, origin_ns=0, duration=float(t[-1]), namespace="/fish", axis="robot")
+    common = {
+        "path": folder,
+        "origin_ns": 0,
+        "duration": float(t[-1]),
+        "namespace": "/fish",
+        "axis": "robot",
+    }
     return Trial(
         name="a",
         truth=truth,
@@ -285,7 +337,13 @@ def test_a_path_that_is_said_again_does_not_start_the_run_anew(tmp_path):
     t = np.arange(0.0, 11.0, 0.01)
     line = RecordedPath(0.0, STRAIGHT.points, "pool")
     other = RecordedPath(0.0, STRAIGHT.points + 0.5, "pool")
-    common = dict(path=tmp_path, origin_ns=0, duration=11.0, namespace="/fish", axis="robot")
+    common = {
+        "path": tmp_path,
+        "origin_ns": 0,
+        "duration": 11.0,
+        "namespace": "/fish",
+        "axis": "robot",
+    }
     truth = motion(t, -1.0 + 0.2 * t, 0.01, 0.0, 0.2)
     speed = ReferenceSpeed(
         topic="s",
@@ -296,7 +354,10 @@ def test_a_path_that_is_said_again_does_not_start_the_run_anew(tmp_path):
         speed=np.array([0.2, 0.0]),
     )
     paths = (other, replace(line, t=0.5), replace(line, t=5.0))
-    score = score_trial(Trial(name="a", truth=truth, reference_speed=speed, reference_paths=paths, **common))
-    assert score.t[0] == pytest.approx(0.5) and score.finished
+    score = score_trial(
+        Trial(name="a", truth=truth, reference_speed=speed, reference_paths=paths, **common)
+    )
+    assert score.t[0] == pytest.approx(0.5)
+    assert score.finished
     assert score.approach_s == pytest.approx(0.01)  # it is swum along from its second sample on
     assert set(score.reference_speed) == {0.2}

@@ -14,7 +14,12 @@ NEAR_SPEED = 0.2  # share of the commanded speed
 
 
 def first_settled(
-    t: Array, progress: Array, cross_track: Array, heading: Array, speed_error: Array, wanted: float | Array
+    t: Array,
+    progress: Array,
+    cross_track: Array,
+    heading: Array,
+    speed_error: Array,
+    wanted: float | Array,
 ) -> int:
     """The first sample after the approach phase, N if the run never got there; wanted: speed [m/s]."""
     near = (

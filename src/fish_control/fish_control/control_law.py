@@ -24,8 +24,12 @@ class ControlLimits:
     steering_scale: float = 2.0  # rad of rudder for a steering PID output of 1
     throttle_scale: float = 4.0  # throttle for a speed PID output of 1
     curvature_gain: float = 0.21  # m, rudder for a path curvature: alpha = gain kappa; steady turns
-    curvature_lag: float = 0.062  # m, lag of that curvature along the path: a rudder step yaws at once
-    throttle_linear: float = 1.333  # s/m, throttle for a speed u: linear u + quadratic u^2; straight
+    curvature_lag: float = (
+        0.062  # m, lag of that curvature along the path: a rudder step yaws at once
+    )
+    throttle_linear: float = (
+        1.333  # s/m, throttle for a speed u: linear u + quadratic u^2; straight
+    )
     throttle_quadratic: float = 2.13  # s^2/m^2
     turn_linear: float = 1.2  # s/(m rad^2), and in turns: alpha^2 (linear u + quadratic u^2)
     turn_quadratic: float = 10.0  # s^2/(m^2 rad^2)
@@ -123,7 +127,8 @@ def control_step(
         xp,
     )
     throttle, speed_integral = _pid(
-        feedforward_throttle(errors.speed_wanted, alpha, limits) / xp.fmax(1.0 + errors.thrust, LEAST_THRUST),
+        feedforward_throttle(errors.speed_wanted, alpha, limits)
+        / xp.fmax(1.0 + errors.thrust, LEAST_THRUST),
         (errors.speed, state.speed_integral, speed_rate),
         (gains.speed_kp, gains.speed_ki, gains.speed_kd),
         limits.throttle_scale,
@@ -189,16 +194,24 @@ def _towards(value: Any, goal: Any, step: Any, xp: Any) -> Any:
     return value + xp.fmin(xp.fmax(goal - value, -step), step)
 
 
-def _filtered_rate(rate: Any, before: Any, now: Any, primed: Any, dt: Any, limits: ControlLimits) -> Any:
+def _filtered_rate(
+    rate: Any, before: Any, now: Any, primed: Any, dt: Any, limits: ControlLimits
+) -> Any:
     """Rate of an error through a first-order filter; of an angle the caller avoids jumps by 2 pi."""
     raw = primed * (now - before) / dt
     return rate + (raw - rate) * dt / (limits.derivative_time + dt)
 
 
 def _pid(
-    feedforward: Any, terms: tuple[Any, Any, Any], gains: tuple[Any, Any, Any], scale: float,
-    span: tuple[float, float], dt: Any, limits: ControlLimits, xp: Any,
-) -> tuple[Any, Any]:  # fmt: skip
+    feedforward: Any,
+    terms: tuple[Any, Any, Any],
+    gains: tuple[Any, Any, Any],
+    scale: float,
+    span: tuple[float, float],
+    dt: Any,
+    limits: ControlLimits,
+    xp: Any,
+) -> tuple[Any, Any]:
     """Saturated output and new integral (in output units, so that a change of gain does not jolt)."""
     error, integral, rate = terms
     kp, ki, kd = gains

@@ -88,7 +88,8 @@ class Controller:
         state, curvature = self._observer.state, wanted.yaw_rate / wanted.speed
         water = through_water(state, wanted.course, curvature, wanted.speed, np)
         e_psi = continued(
-            self._control.heading_error, float(heading_error(state, motion, water, self._guidance, np))
+            self._control.heading_error,
+            float(heading_error(state, motion, water, self._guidance, np)),
         )
         e_u = wanted.speed - motion.surge
         inputs = policy_inputs(
@@ -120,7 +121,9 @@ class Controller:
         the PID would flap the rudder and so go on swimming; a rudder let go at once would push off again.
         """
         self._control = ControlState()
-        self._glides = self._glides and self._motion is not None and self._motion.surge > STANDING_SPEED
+        self._glides = (
+            self._glides and self._motion is not None and self._motion.surge > STANDING_SPEED
+        )
         if self._glides:
             alpha = math.copysign(self._limits.rudder_range, yaw_rate) if yaw_rate != 0.0 else 0.0
         else:
@@ -134,9 +137,13 @@ class Controller:
 
     def command(self, dt: float) -> Command:
         """Advance the actuators by dt [s]."""
-        self._actuators, rotor_speed = actuator_step(self._actuators, self._setpoint, dt, self._limits, np)
+        self._actuators, rotor_speed = actuator_step(
+            self._actuators, self._setpoint, dt, self._limits, np
+        )
         return Command(
-            math.fmod(self._actuators.phase, 2.0 * math.pi), float(rotor_speed), float(self._actuators.alpha)
+            math.fmod(self._actuators.phase, 2.0 * math.pi),
+            float(rotor_speed),
+            float(self._actuators.alpha),
         )
 
 

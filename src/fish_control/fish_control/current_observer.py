@@ -28,31 +28,34 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from fish_control.control_law import ControlLimits, Setpoint, feedforward_slope, feedforward_throttle
+from fish_control.control_law import (
+    ControlLimits,
+    Setpoint,
+    feedforward_slope,
+    feedforward_throttle,
+)
 
 LAG = 3.7  # s^2/m, M: a step of the throttle is answered within M / ff'(w), 2 s at 0.1 m/s
-MOVE_TIME = 0.3  # s, for which a move of the rudder counts; also in which the rotor follows the throttle
+MOVE_TIME = (
+    0.3  # s, for which a move of the rudder counts; also in which the rotor follows the throttle
+)
 # spreads at the start
 SPEED_SPREAD = 0.2  # m/s, of w
 CURRENT_SPREAD = 0.03  # m/s, of each component
-THRUST_SPREAD = (
-    1.0  # of e: wide, as a robot that is not the nominal one must not swim against a current that is none
-)
+THRUST_SPREAD = 1.0  # of e: wide, as a robot that is not the nominal one must not swim against a current that is none
 # drifts, per root s
-CURRENT_DRIFT = 0.003  # m/s, of each component; a faster one takes the start of a strong robot for a current
+CURRENT_DRIFT = (
+    0.003  # m/s, of each component; a faster one takes the start of a strong robot for a current
+)
 THRUST_DRIFT = 0.005  # of e
 SPEED_DRIFT = 0.05  # m/s for each throttle, of w
 TURN_DRIFT = 0.1  # m/s for each rad of rudder, of w
 MOVE_DRIFT = 1.0  # m/s for each rad that the rudder has just moved, of w
 # noises, times root s
 SURGE_NOISE = 0.002  # m/s, of u: ripple of the stroke
-SWAY_NOISE = (
-    0.004  # m/s, of v: with CURRENT_DRIFT, a current across that changes is learned in a second and a half
-)
+SWAY_NOISE = 0.004  # m/s, of v: with CURRENT_DRIFT, a current across that changes is learned in a second and a half
 MOVE_NOISE = 0.1  # m/s for each rad that the rudder has just moved, of v
-EARLY_NOISE = (
-    0.1  # m/s, times root s, of u and v at first: fusion starts with errors of 5 cm/s that last half a second
-)
+EARLY_NOISE = 0.1  # m/s, times root s, of u and v at first: fusion starts with errors of 5 cm/s that last half a second
 EARLY_TIME = 0.3  # s, in which it fades
 THRUST_LIMIT = 2.0  # e stays within
 SIZE, LAGGED = 4, 3  # numbers of the estimate; and those beside it and its covariance
@@ -87,7 +90,9 @@ def swim(state: WaterState, setpoint: Setpoint, dt: Any, limits: ControlLimits) 
     rudder = state.rudder + share * (setpoint.alpha - state.rudder)
     slope = feedforward_slope(state.speed, setpoint.alpha, limits)
     gain = dt / (LAG + dt * slope)
-    push = (1.0 + state.thrust) * throttle - feedforward_throttle(state.speed, setpoint.alpha, limits)
+    push = (1.0 + state.thrust) * throttle - feedforward_throttle(
+        state.speed, setpoint.alpha, limits
+    )
     F_w, F_e = 1.0 - gain * slope, gain * throttle  # of the new speed by the old speed and by e
     P = _matrix(state)
     row = [F_w * P[0][k] + F_e * P[3][k] for k in range(SIZE)]
@@ -95,7 +100,11 @@ def swim(state: WaterState, setpoint: Setpoint, dt: Any, limits: ControlLimits) 
     for k in range(SIZE):
         P[0][k] = P[k][0] = row[k]
     moved = setpoint.alpha - state.rudder
-    drift = (SPEED_DRIFT * throttle) ** 2 + (TURN_DRIFT * setpoint.alpha) ** 2 + (MOVE_DRIFT * moved) ** 2
+    drift = (
+        (SPEED_DRIFT * throttle) ** 2
+        + (TURN_DRIFT * setpoint.alpha) ** 2
+        + (MOVE_DRIFT * moved) ** 2
+    )
     for k, variance in enumerate((drift, CURRENT_DRIFT**2, CURRENT_DRIFT**2, THRUST_DRIFT**2)):
         P[k][k] = P[k][k] + dt * variance
     early = state.early * (1.0 - dt / (EARLY_TIME + dt))

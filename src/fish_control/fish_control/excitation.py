@@ -7,6 +7,7 @@ alpha   = rudder                                       as a step: what the servo
 from __future__ import annotations
 
 import bisect
+import itertools
 import json
 import math
 from dataclasses import dataclass
@@ -21,7 +22,9 @@ from fish_control.stroke_mean import STROKE_FREQUENCY
 
 LAST_ROW = 8.0  # s that the last row lasts
 FASTEST_STROKE = 4.0  # Hz
-FASTEST_ROTOR = AMPLITUDE_AT_FULL_THROTTLE * 2.0 * math.pi * STROKE_FREQUENCY  # rad/s, at full throttle
+FASTEST_ROTOR = (
+    AMPLITUDE_AT_FULL_THROTTLE * 2.0 * math.pi * STROKE_FREQUENCY
+)  # rad/s, at full throttle
 FREQUENCY_RATE = 4.0  # Hz/s; the rotor's speed must not jump
 STOPPING = 3.0  # s that a stopped fish holds its rudder, until it stands
 LIMITS = ControlLimits()
@@ -53,7 +56,7 @@ class Program:
         for number, row in enumerate(self.rows):
             _check(number, row)
         times = [row.t for row in self.rows]
-        for number, (before, t) in enumerate(zip(times, times[1:], strict=False), 1):
+        for number, (before, t) in enumerate(itertools.pairwise(times), 1):
             if t <= before:
                 raise ProgramError(
                     f"row {number}: t is {t:g} s, expected more than the {before:g} s of the row before"
@@ -75,6 +78,7 @@ def read_program(path: Path) -> Program:
     Raises:
         ProgramError: says what came and what was expected.
         OSError: the file cannot be read.
+
     """
     text = path.read_text(encoding="utf-8", errors="replace")
     try:
@@ -107,7 +111,9 @@ class Excitation:
         self._amplitude, self._phase = 0.0, 0.0
         self._frequency = program.at(begin).frequency
         self._held = 0.0  # rad, rudder of a stopped fish
-        self._left: float | None = None  # s for which it is still held; None while it was not stopped
+        self._left: float | None = (
+            None  # s for which it is still held; None while it was not stopped
+        )
 
     @property
     def over(self) -> bool:
@@ -153,7 +159,11 @@ def _row(number: int, entry: Any) -> Row:
     if not isinstance(entry, dict) or set(entry) != set(Row._fields):
         raise ProgramError(f"row {number} is {entry!r}; expected {{{', '.join(Row._fields)}}}")
     for key, value in entry.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not math.isfinite(value)
+        ):
             raise ProgramError(f"row {number}: {key} is {value!r}, expected a finite number")
     return Row(**{key: float(value) for key, value in entry.items()})
 

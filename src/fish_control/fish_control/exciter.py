@@ -65,7 +65,8 @@ class Exciter:
             elif heads_for_a_wall(motion, config.horizon, config.margin):
                 excitation.stop(stopping_rudder(motion, LIMITS.rudder_range))
                 self._become(
-                    "before a wall", f"stopped at {at} before a wall, at ({motion.x:.2f}, {motion.y:.2f}) m"
+                    "before a wall",
+                    f"stopped at {at} before a wall, at ({motion.x:.2f}, {motion.y:.2f}) m",
                 )
 
     def _become(self, state: State, reason: str) -> None:

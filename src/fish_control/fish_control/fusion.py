@@ -14,7 +14,9 @@ from fish_control.measurement_buffer import CameraPose, Moment, Timeline
 from fish_control.strapdown import SIZE, MotionNoise, StrapdownFilter, pose_residual
 
 Array = NDArray[np.float64]
-LOST_VARIANCE = 1e4  # published for a pose without camera or a twist without IMU: unusable, in any unit
+LOST_VARIANCE = (
+    1e4  # published for a pose without camera or a twist without IMU: unusable, in any unit
+)
 START_STD = (
     0.02,
     0.02,
@@ -27,10 +29,10 @@ START_STD = (
 )  # m, rad, m/s, rad/s, m/s^2; of the state when it starts
 FASTEST_SWIM = 0.6  # m/s, poses of one fish are no farther apart
 FASTEST_TURN = 4.0  # rad/s
-SILENT_POSES = 3  # that arrive without an IMU sample in between say that the IMU is dead; stamps alone cannot
-OLD_POSES = (
-    3  # in a row, from before the history, say that the clock was set back when no IMU is there to say it
+SILENT_POSES = (
+    3  # that arrive without an IMU sample in between say that the IMU is dead; stamps alone cannot
 )
+OLD_POSES = 3  # in a row, from before the history, say that the clock was set back when no IMU is there to say it
 
 
 @dataclass(frozen=True)
@@ -42,11 +44,19 @@ class FusionConfig(MotionNoise):
     gate: float = 16.27  # squared Mahalanobis distance, chi^2 of 3 at 99.9 %
     history: float = 1.0  # s, how late a camera pose may come
     camera_timeout: float = 0.6  # s without an accepted pose: camera lost
-    imu_timeout: float = 0.1  # s without a sample: IMU lost; s that a pose may be ahead of the newest sample
-    reacquire_time: float = 1.0  # s of poses that agree, but not with the estimate: start anew from them
+    imu_timeout: float = (
+        0.1  # s without a sample: IMU lost; s that a pose may be ahead of the newest sample
+    )
+    reacquire_time: float = (
+        1.0  # s of poses that agree, but not with the estimate: start anew from them
+    )
     start_frames: int = 3  # poses that must agree before the first estimate
-    camera_offset: float = 0.0  # s, added to camera stamps (negative if images are older than their stamps)
-    largest_accel: float = 20.0  # m/s^2 in the plane; a sample above it is wrong (trials reach 1.84)
+    camera_offset: float = (
+        0.0  # s, added to camera stamps (negative if images are older than their stamps)
+    )
+    largest_accel: float = (
+        20.0  # m/s^2 in the plane; a sample above it is wrong (trials reach 1.84)
+    )
     largest_yaw_rate: float = 12.0  # rad/s; a sample above it is wrong (trials reach 5.3)
 
     def __post_init__(self) -> None:
@@ -83,7 +93,9 @@ class Fusion:
     def _clear(self) -> None:
         self._imu = ImuHistory(self.config.imu_timeout)
         self._timeline: Timeline | None = None
-        self._candidates: list[tuple[float, Array]] = []  # poses in a row that agree with each other
+        self._candidates: list[
+            tuple[float, Array]
+        ] = []  # poses in a row that agree with each other
         self._last_pose_time = self._last_imu_time = -math.inf
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
         self._old_poses = 0  # in a row, from before the history
@@ -103,7 +115,9 @@ class Fusion:
         largest = self.config.largest_accel, self.config.largest_yaw_rate
         if math.hypot(forward, left) > largest[0] or abs(yaw_rate) > largest[1]:
             return self._refuse("imu_implausible")
-        if time < self._last_imu_time - self.config.history:  # the clock was set back: a restarted simulation
+        if (
+            time < self._last_imu_time - self.config.history
+        ):  # the clock was set back: a restarted simulation
             self._restart()
         if time <= self._last_imu_time:
             return self._refuse("imu_out_of_order")
@@ -122,7 +136,11 @@ class Fusion:
         """A camera pose (x, y, psi) [m, m, rad] stamped `time` [s]; False if it was not used."""
         camera = CameraPose(np.array(pose, dtype=float), self._noise(covariance))
         time += self.config.camera_offset
-        if not (math.isfinite(time) and np.all(np.isfinite(camera.pose)) and np.all(np.isfinite(camera.R))):
+        if not (
+            math.isfinite(time)
+            and np.all(np.isfinite(camera.pose))
+            and np.all(np.isfinite(camera.R))
+        ):
             return self._refuse("pose_not_finite")
         imu_lives = self._poses_in_a_row < SILENT_POSES
         self._poses_in_a_row += 1
@@ -169,7 +187,10 @@ class Fusion:
 
     def _noise(self, covariance: Array | None) -> Array:
         """R of a camera pose: what its message says, but not below the floor."""
-        floor = np.array([self.config.camera_position_noise] * 2 + [self.config.camera_heading_noise]) ** 2
+        floor = (
+            np.array([self.config.camera_position_noise] * 2 + [self.config.camera_heading_noise])
+            ** 2
+        )
         return np.diag(floor if covariance is None else np.maximum(np.diag(covariance), floor))
 
     def _start(self, time: float, pose: Array) -> bool:
@@ -177,7 +198,9 @@ class Fusion:
         if self._agreeing(time, pose) < self.config.start_frames:
             return False
         self.counts["started"] += 1
-        return self._begin(Moment(time, x=np.r_[pose, np.zeros(SIZE - 3)], P=np.diag(START_STD) ** 2))
+        return self._begin(
+            Moment(time, x=np.r_[pose, np.zeros(SIZE - 3)], P=np.diag(START_STD) ** 2)
+        )
 
     def _reacquire(self, time: float, pose: Array) -> bool:
         """Believe poses that contradict the estimate once they have agreed for long enough."""
@@ -213,7 +236,9 @@ class Fusion:
         return len(self._candidates)
 
 
-def _to_estimate(moment: Moment, imu: InertialSample | None, camera_lost: bool, imu_lost: bool) -> Estimate:
+def _to_estimate(
+    moment: Moment, imu: InertialSample | None, camera_lost: bool, imu_lost: bool
+) -> Estimate:
     x, P = moment.x, moment.P
     c, s = math.cos(x[2]), math.sin(x[2])
     R = np.array([[c, s], [-s, c]])  # pool to body

@@ -23,10 +23,13 @@ def write_gains_file(file: str | Path, policy: Policy) -> None:
 
     Raises:
         GainsFileError: the arrays do not fit the contract.
+
     """
     _check_tensors(policy, Path(file))
     metadata = {"contract": json.dumps(policy.contract.to_json(), allow_nan=False)}
-    data = save({name: np.ascontiguousarray(t) for name, t in policy.tensors.items()}, metadata=metadata)
+    data = save(
+        {name: np.ascontiguousarray(t) for name, t in policy.tensors.items()}, metadata=metadata
+    )
     file = Path(file)
     new = file.with_name(f"{file.name}.{os.getpid()}.new")  # a tempfile would be for its owner only
     new.write_bytes(data)
@@ -38,14 +41,17 @@ def read_gains_file(file: str | Path) -> Policy:
 
     Raises:
         GainsFileError: missing, not safetensors, contract not understood, arrays that do not fit it.
+
     """
     file = Path(file)
     try:
         with safe_open(file, framework="numpy") as stream:
             metadata = stream.metadata() or {}
-            tensors = {name: stream.get_tensor(name) for name in stream.keys()}  # noqa: SIM118 (not a dict)
+            tensors = {name: stream.get_tensor(name) for name in stream.keys()}
     except OSError as error:
-        raise GainsFileError(f"weights file {file}: cannot be read: {error.strerror or error}") from error
+        raise GainsFileError(
+            f"weights file {file}: cannot be read: {error.strerror or error}"
+        ) from error
     except SafetensorError as error:
         raise GainsFileError(f"weights file {file}: not a safetensors file ({error})") from error
     except TypeError as error:
@@ -71,6 +77,7 @@ def require_fit(
 
     Raises:
         GainsFileError: lists every difference.
+
     """
     differences = policy.contract.differences(control_period, lookahead, robot_hash)
     if differences:

@@ -45,7 +45,9 @@ class ImuHistory:
 
     def times(self, start: float, end: float) -> list[float]:
         """Stamps [s] of the samples between `start` and `end`, without those two."""
-        return self._times[bisect.bisect_right(self._times, start) : bisect.bisect_left(self._times, end)]
+        return self._times[
+            bisect.bisect_right(self._times, start) : bisect.bisect_left(self._times, end)
+        ]
 
     def forget(self, before: float) -> None:
         """Drop samples older than `before` [s]."""

@@ -28,7 +28,9 @@ from fish_control.control_law import ControlLimits, Setpoint
 from fish_control.current_observer import WaterState, bounded, see_across, see_ahead, swim
 from fish_control.stroke_mean import TURN_LAG, StrokeState, stroke_step
 
-LEAST_HEADWAY = 0.3  # of the wanted speed, through the water: a stronger current ahead is not believed
+LEAST_HEADWAY = (
+    0.3  # of the wanted speed, through the water: a stronger current ahead is not believed
+)
 SLOW = 0.02  # m/s, a robot that is slower has no course of its own: its heading stands for it
 
 
@@ -91,7 +93,10 @@ class GuidanceState(NamedTuple):
         return [*self.stroke, *self.water]
 
 
-GUIDANCE_NAMES = (*(f"stroke.{n}" for n in StrokeState._fields), *(f"water.{n}" for n in WaterState._fields))
+GUIDANCE_NAMES = (
+    *(f"stroke.{n}" for n in StrokeState._fields),
+    *(f"water.{n}" for n in WaterState._fields),
+)
 
 
 class TrackingErrors(NamedTuple):
@@ -153,7 +158,12 @@ def slip_lever(speed: Any, config: GuidanceConfig) -> Any:
 
 
 def tracking_errors(
-    stroke: StrokeState, motion: Motion, path: PathAhead, speed: Any, config: GuidanceConfig, xp: Any
+    stroke: StrokeState,
+    motion: Motion,
+    path: PathAhead,
+    speed: Any,
+    config: GuidanceConfig,
+    xp: Any,
 ) -> TrackingErrors:
     """Errors of a robot against the path and the wanted surge speed [m/s]; what the water does is not asked."""
     wanted = xp.arctan2(path.target_y - motion.y, path.target_x - motion.x)
@@ -166,13 +176,19 @@ def tracking_errors(
     return TrackingErrors(e_y, wrap(wanted - course, xp), speed - motion.surge, wrap(wanted, xp))
 
 
-def through_water(state: GuidanceState, course: Any, curvature: Any, speed: Any, xp: Any) -> WaterTrack:
+def through_water(
+    state: GuidanceState, course: Any, curvature: Any, speed: Any, xp: Any
+) -> WaterTrack:
     """What a wanted course [rad], curvature [1/m] and speed [m/s] over ground are in the water that flows."""
     cos, sin = xp.cos(course), xp.sin(course)
-    ahead = xp.fmax(speed - cos * state.water.current_x - sin * state.water.current_y, LEAST_HEADWAY * speed)
+    ahead = xp.fmax(
+        speed - cos * state.water.current_x - sin * state.water.current_y, LEAST_HEADWAY * speed
+    )
     left = sin * state.water.current_x - cos * state.water.current_y
     through = xp.sqrt(ahead**2 + left**2)
-    return WaterTrack(course + xp.arctan2(left, ahead), curvature * speed**2 * ahead / through**3, through)
+    return WaterTrack(
+        course + xp.arctan2(left, ahead), curvature * speed**2 * ahead / through**3, through
+    )
 
 
 def heading_error(

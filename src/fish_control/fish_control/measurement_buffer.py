@@ -114,5 +114,7 @@ class Timeline:
             return
         for time in (*self._imu.times(start, end), end):
             known = time - start <= self._imu.reach
-            self._filter.advance(time - start, *(self._imu.at(t) if known else None for t in (start, time)))
+            self._filter.advance(
+                time - start, *(self._imu.at(t) if known else None for t in (start, time))
+            )
             start = time

@@ -8,7 +8,9 @@ from typing import Generic, TypeVar
 
 from fish_control.line_of_sight import Motion
 
-LONGEST_STEP = 0.1  # s, a longer gap between odometry messages, or a longer step back, restarts the filters
+LONGEST_STEP = (
+    0.1  # s, a longer gap between odometry messages, or a longer step back, restarts the filters
+)
 State = TypeVar("State")
 
 

@@ -31,7 +31,9 @@ def require_one_of(name: str, value: str, known: tuple[str, ...]) -> None:
 class PlannerConfig:
     """What to swim and how the path is followed."""
 
-    path: str = "R"  # a letter, a family (circle, ...), a .csv or .svg file, or topic: reference/path
+    path: str = (
+        "R"  # a letter, a family (circle, ...), a .csv or .svg file, or topic: reference/path
+    )
     path_args: str = ""  # YAML, arguments of the family: "{radius: 0.6, x: 0.2}"
     speed: float = 0.2  # m/s, surge
     end: str = ""  # stop or loop; empty: a closed path loops, an open one stops
@@ -43,11 +45,11 @@ class PlannerConfig:
     search_window: float = TrackerConfig.search_window  # m
     capture_distance: float = TrackerConfig.capture_distance  # m
     compensate_curvature: bool = GuidanceConfig.compensate_curvature  # False: the paper's law
-    state_file: str = (
-        ""  # progress for a restart after a crash; empty: in the system's folder for temporary files
-    )
+    state_file: str = ""  # progress for a restart after a crash; empty: in the system's folder for temporary files
     resume_timeout: float = 10.0  # s, older progress is not resumed; 0 never resumes
-    largest_variance: float = LARGEST_VARIANCE  # of a pose; nothing is planned from one that is lost
+    largest_variance: float = (
+        LARGEST_VARIANCE  # of a pose; nothing is planned from one that is lost
+    )
 
     def __post_init__(self) -> None:
         require_range("speed", self.speed, SLOWEST, FASTEST, "m/s")
@@ -65,7 +67,9 @@ class PlannerConfig:
 
     def tracker(self) -> TrackerConfig:
         """The part for the path tracker."""
-        return TrackerConfig(self.lookahead, self.lookahead_mode, self.search_window, self.capture_distance)  # type: ignore[arg-type]
+        return TrackerConfig(
+            self.lookahead, self.lookahead_mode, self.search_window, self.capture_distance
+        )  # type: ignore[arg-type]
 
     def guidance(self) -> GuidanceConfig:
         """The part for the line of sight."""
@@ -84,14 +88,21 @@ class ControllerConfig:
     odometry_timeout: float = 0.15  # s
     target_timeout: float = 0.25  # s
     largest_variance: float = LARGEST_VARIANCE  # of an estimate that is not lost
-    resume: str = "auto"  # after a stop: auto when all is well; manual when service resume is called
+    resume: str = (
+        "auto"  # after a stop: auto when all is well; manual when service resume is called
+    )
     resume_delay: float = 0.5  # s, how long all must be well before auto resumes
 
     def __post_init__(self) -> None:
         require_range("rate_hz", self.rate_hz, 10.0, 200.0, "Hz")
         require_range("command_rate_hz", self.command_rate_hz, self.rate_hz, 400.0, "Hz")
-        if abs(self.command_rate_hz / self.rate_hz - round(self.command_rate_hz / self.rate_hz)) > 1e-9:
-            rates = f"{self.command_rate_hz!r} Hz, expected a multiple of rate_hz {self.rate_hz!r} Hz"
+        if (
+            abs(self.command_rate_hz / self.rate_hz - round(self.command_rate_hz / self.rate_hz))
+            > 1e-9
+        ):
+            rates = (
+                f"{self.command_rate_hz!r} Hz, expected a multiple of rate_hz {self.rate_hz!r} Hz"
+            )
             raise ValueError(f"command_rate_hz is {rates}")
         require_range("lookahead", self.lookahead, 0.05, 2.0, "m")
         require_range("odometry_timeout", self.odometry_timeout, 0.02, 5.0, "s")
@@ -112,7 +123,9 @@ class ExciterConfig:
     end: float = 0.0  # s of the program's time; 0: its end, LAST_ROW after its last row begins
     rest: float = 1.0  # s at rest before the first stroke
     command_rate_hz: float = 100.0  # Hz, joint commands
-    guard: bool = True  # stop before walls and when the estimate is lost; false: swim without looking
+    guard: bool = (
+        True  # stop before walls and when the estimate is lost; false: swim without looking
+    )
     horizon: float = 1.0  # s, how far ahead the guard looks
     margin: float = 0.15  # m, nearer to a wall the fish must not be then
     odometry_timeout: float = 0.5  # s

@@ -25,15 +25,21 @@ class TrackerConfig:
     """How progress is kept and the target chosen."""
 
     lookahead: float = 0.4  # m, the paper's distance from the robot to the target point
-    lookahead_mode: LookaheadMode = "distance"  # from the robot (as in the paper), or along the path
+    lookahead_mode: LookaheadMode = (
+        "distance"  # from the robot (as in the paper), or along the path
+    )
     search_window: float = 0.3  # m ahead of the progress in which the nearest point is searched
-    capture_distance: float = 0.25  # m, progress starts when the robot first comes this close to the path
+    capture_distance: float = (
+        0.25  # m, progress starts when the robot first comes this close to the path
+    )
 
     def __post_init__(self) -> None:
         for name in ("lookahead", "search_window", "capture_distance"):
             value = getattr(self, name)
             if not (np.isfinite(value) and SAMPLE_SPACING < value <= 2.0):
-                raise ValueError(f"{name} is {value!r} m, expected {SAMPLE_SPACING} < {name} <= 2.0")
+                raise ValueError(
+                    f"{name} is {value!r} m, expected {SAMPLE_SPACING} < {name} <= 2.0"
+                )
         if self.lookahead_mode not in get_args(LookaheadMode):
             raise ValueError(
                 f"lookahead_mode is {self.lookahead_mode!r}; known: {', '.join(get_args(LookaheadMode))}"
@@ -54,6 +60,7 @@ class PathState:
         chord: (B,) direction of the lookahead point of a robot that is exactly on the path, relative to
             `heading` [rad]: what the path's own curvature contributes to the direction of `target`.
         finished: (B,) whether the end of a path that stops has been passed.
+
     """
 
     progress: Array
@@ -190,8 +197,10 @@ def leave_circle(ahead: Array, centre: Array, radius: float) -> Array:
 
     Args:
         ahead: (B, K, 2) points along each path [m]; centre: (B, 2) [m]; radius [m].
+
     Returns:
         (B, 2) [m]; the first point where the polyline starts outside.
+
     """
     distance = np.linalg.norm(ahead - centre[:, None, :], axis=-1)
     leaves = distance >= radius

@@ -24,7 +24,9 @@ from fish_control.reference_path import ReferencePath
 from fish_control.stroke_mean import StrokeState, stroke_step
 
 SLOWEST, FASTEST = 0.05, 0.5  # m/s, the range of speeds of the robot
-GLIDING_YAW_RATE = 0.5  # rad/s, wanted after the end; the rudder is hard over, so only its sign counts
+GLIDING_YAW_RATE = (
+    0.5  # rad/s, wanted after the end; the rudder is hard over, so only its sign counts
+)
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Planner:
         self.finished = False
         self._guidance = guidance or GuidanceConfig()
         self._observer = MotionObserver(
-            StrokeState(), lambda stroke, motion, dt: stroke_step(stroke, motion.yaw_rate, motion.sway, dt)
+            StrokeState(),
+            lambda stroke, motion, dt: stroke_step(stroke, motion.yaw_rate, motion.sway, dt),
         )
         self._side = 0.0  # +1 left, -1 right, chosen when the end is passed
 
@@ -88,9 +91,14 @@ class Planner:
         at = self.tracker.update([motion.x, motion.y])
         self.finished = self.finished or at.finished
         speed = 0.0 if self.finished else self.speed
-        ahead = PathAhead(at.x, at.y, at.heading, at.curvature, at.target[0], at.target[1], at.chord)
+        ahead = PathAhead(
+            at.x, at.y, at.heading, at.curvature, at.target[0], at.target[1], at.chord
+        )
         errors = TrackingErrors(
-            *map(float, tracking_errors(self._observer.state, motion, ahead, speed, self._guidance, np))
+            *map(
+                float,
+                tracking_errors(self._observer.state, motion, ahead, speed, self._guidance, np),
+            )
         )
         if self.finished:
             return Plan(at, errors, 0.0, self._stopping_yaw_rate(motion))

@@ -29,6 +29,7 @@ def policy_inputs(
     Args:
         head_angle: mean heading over the stroke [rad], any number of turns. Speeds [m/s], errors [rad, m/s,
             m].
+
     """
     wrapped = xp.arctan2(xp.sin(head_angle), xp.cos(head_angle))
     values = (wrapped, surge_speed, desired_speed, heading_error, speed_error, cross_track_error)
@@ -42,7 +43,9 @@ def tensor_shapes(contract: PolicySpec) -> dict[str, tuple[int, ...]]:
     if not contract.layers:
         return {"gains": (len(contract.outputs),)}
     shapes: dict[str, tuple[int, ...]] = {}
-    for k, (size_in, size_out) in enumerate(zip(contract.layers[:-1], contract.layers[1:], strict=True)):
+    for k, (size_in, size_out) in enumerate(
+        zip(contract.layers[:-1], contract.layers[1:], strict=True)
+    ):
         shapes[f"layers.{k}.weight"] = (size_out, size_in)
         shapes[f"layers.{k}.bias"] = (size_out,)
     return shapes
@@ -53,7 +56,9 @@ class Policy:
 
     def __init__(self, contract: PolicySpec, tensors: Mapping[str, ArrayLike]) -> None:
         self.contract = contract
-        self.tensors = {name: np.asarray(tensor, dtype=np.float64) for name, tensor in tensors.items()}
+        self.tensors = {
+            name: np.asarray(tensor, dtype=np.float64) for name, tensor in tensors.items()
+        }
         self._low = np.array([o.low for o in contract.outputs])
         self._span = np.array([o.high - o.low for o in contract.outputs])
 

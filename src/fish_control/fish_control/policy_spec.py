@@ -13,7 +13,9 @@ from fish_control.line_of_sight import GuidanceConfig
 FORMAT = "fish_control/gains"
 FORMAT_VERSION = 3
 HIDDEN = (6, 128, 128, 64, 6)  # the paper's policy; () in a contract means constant gains
-_KINDS: dict[str, tuple[tuple[type, ...], str]] = {  # what may stand in JSON for a field, by its annotation
+_KINDS: dict[
+    str, tuple[tuple[type, ...], str]
+] = {  # what may stand in JSON for a field, by its annotation
     "float": ((int, float), "a number"),
     "bool": ((bool,), "true or false"),
     "str": ((str,), "a text"),
@@ -110,7 +112,9 @@ class PolicySpec:
             if not (math.isfinite(value) and value > 0.0):
                 raise ContractError(f"{name} is {value!r}, expected a positive number")
 
-    def differences(self, control_period: float, lookahead: float, robot_hash: str = "") -> list[str]:
+    def differences(
+        self, control_period: float, lookahead: float, robot_hash: str = ""
+    ) -> list[str]:
         """What does not fit a controller of this period [s], lookahead [m] and robot (empty: any)."""
         found = []
         names, given = [i.name for i in self.inputs], [i.name for i in INPUTS]

@@ -9,7 +9,9 @@ from fish_control.reference_path import ReferencePath
 
 HALF_LENGTH = 2.135  # m, wall at x = +-2.135 (MODEL: pool of 4.27 x 2.13 m, origin at its centre)
 HALF_WIDTH = 1.065  # m, wall at y = +-1.065
-STOPPING_RADIUS = 0.27  # m, of the turn in which a fish stops with its rudder hard over; it turns in 0.257 m
+STOPPING_RADIUS = (
+    0.27  # m, of the turn in which a fish stops with its rudder hard over; it turns in 0.257 m
+)
 STOPPING_TURN = 1.9  # rad, how far it comes round from 0.3 m/s (1.5 rad from 0.2 m/s)
 
 
@@ -22,6 +24,7 @@ def check_inside_pool(path: ReferencePath, margin: float) -> None:
 
     Raises:
         PathOutsidePoolError: says where the path leaves, by how much, and what to change.
+
     """
     _check(path.points, "reaches", path, margin)
     if path.end == "stop":

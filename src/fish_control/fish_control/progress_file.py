@@ -21,7 +21,9 @@ SAVE_PERIOD = 0.2  # s between writes
 
 def path_digest(path: ReferencePath) -> str:
     """Same for the same points, to a millimetre, and the same end."""
-    content = (path.points * 1000.0).round().astype("int64").tobytes() + f"{path.closed} {path.end}".encode()
+    content = (path.points * 1000.0).round().astype(
+        "int64"
+    ).tobytes() + f"{path.closed} {path.end}".encode()
     return hashlib.sha256(content).hexdigest()[:16]
 
 
@@ -57,7 +59,9 @@ class ProgressFile:
 
     def keep(self, digest: str, time: float, progress: float) -> None:
         """Have it written, at most every SAVE_PERIOD of `time` [s] and not while the disk still writes the last."""
-        if self._next_save - 10.0 * SAVE_PERIOD < time < self._next_save:  # a clock set back writes at once
+        if (
+            self._next_save - 10.0 * SAVE_PERIOD < time < self._next_save
+        ):  # a clock set back writes at once
             return
         if self._writing is not None and not self._writing.done():
             return

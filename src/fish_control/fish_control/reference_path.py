@@ -8,7 +8,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-SAMPLE_SPACING = 0.005  # m, nominal; a tenth of the smallest error that matters (cross-track of a few cm)
+SAMPLE_SPACING = (
+    0.005  # m, nominal; a tenth of the smallest error that matters (cross-track of a few cm)
+)
 LONGEST = 200.0  # m; the tables with which so long a path is followed take 1 GB
 
 End = Literal["stop", "loop"]
@@ -36,6 +38,7 @@ class ReferencePath:
         closed: whether the last point joins the first.
         end: at the end of the path stop, or loop to its beginning (a closed path goes round, an open one
             starts anew).
+
     """
 
     name: str
@@ -65,7 +68,9 @@ class ReferencePath:
         samples, step = _resample(vertices, closed, spacing)
         heading = _tangent_heading(samples, closed)
         curvature = _curvature(heading, step, closed)
-        return cls(name, samples, heading, curvature, step, closed, end or ("loop" if closed else "stop"))
+        return cls(
+            name, samples, heading, curvature, step, closed, end or ("loop" if closed else "stop")
+        )
 
     @property
     def length(self) -> float:
@@ -76,9 +81,9 @@ class ReferencePath:
         """Position p(s): (...,) arc length [m] -> (..., 2) [m]."""
         k, delta, beyond = self._locate(s)
         chi = self.heading[k]
-        parabola = delta[..., None] * _unit(chi) + (0.5 * self.curvature[k] * delta**2)[..., None] * _unit(
-            chi + 0.5 * np.pi
-        )
+        parabola = delta[..., None] * _unit(chi) + (0.5 * self.curvature[k] * delta**2)[
+            ..., None
+        ] * _unit(chi + 0.5 * np.pi)
         return self.points[k] + parabola + beyond[..., None] * self.tangent(s)
 
     def heading_at(self, s: ArrayLike) -> Array:
@@ -115,7 +120,9 @@ def _checked_vertices(points: ArrayLike, name: str, closed: bool) -> Array:
     if vertices.ndim != 2 or vertices.shape[1] != 2:
         raise PathError(f"path '{name}': points have shape {vertices.shape}, expected (M, 2)")
     if not np.all(np.isfinite(vertices)):
-        raise PathError(f"path '{name}': point {np.argwhere(~np.isfinite(vertices))[0][0]} is not finite")
+        raise PathError(
+            f"path '{name}': point {np.argwhere(~np.isfinite(vertices))[0][0]} is not finite"
+        )
     length = _steps(np.vstack([vertices, vertices[:1]]) if closed else vertices).sum()
     if not length <= LONGEST:
         raise PathError(f"path '{name}': {length:g} m long, expected at most {LONGEST:g} m")
@@ -123,7 +130,9 @@ def _checked_vertices(points: ArrayLike, name: str, closed: bool) -> Array:
         vertices = vertices[:-1]
     vertices = vertices[np.r_[True, _steps(vertices) > 1e-9]]
     if len(vertices) < (3 if closed else 2):
-        raise PathError(f"path '{name}': {len(vertices)} distinct points; {3 if closed else 2} are needed")
+        raise PathError(
+            f"path '{name}': {len(vertices)} distinct points; {3 if closed else 2} are needed"
+        )
     return vertices
 
 
@@ -139,9 +148,11 @@ def _resample(vertices: Array, closed: bool, spacing: float) -> tuple[Array, flo
     if closed:
         vertices = np.vstack([vertices, vertices[:1]])
     s = np.r_[0.0, np.cumsum(_steps(vertices))]
-    intervals = max(int(round(s[-1] / spacing)), 3)
+    intervals = max(round(s[-1] / spacing), 3)
     s_even = np.linspace(0.0, s[-1], intervals + 1)
-    samples = np.column_stack([np.interp(s_even, s, vertices[:, 0]), np.interp(s_even, s, vertices[:, 1])])
+    samples = np.column_stack(
+        [np.interp(s_even, s, vertices[:, 0]), np.interp(s_even, s, vertices[:, 1])]
+    )
     return (samples[:-1] if closed else samples), s[-1] / intervals
 
 
@@ -155,7 +166,7 @@ def _tangent_heading(samples: Array, closed: bool) -> Array:
 
 
 def _curvature(heading: Array, spacing: float, closed: bool) -> Array:
-    """d chi / d s by central differences."""
+    """D chi / d s by central differences."""
     if not closed:
         return np.gradient(heading, spacing)
     ahead, behind = np.roll(heading, -1), np.roll(heading, 1)

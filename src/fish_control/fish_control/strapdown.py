@@ -35,10 +35,14 @@ class MotionNoise:
     """Standard deviations of the motion model; per sample means per sample at 100 Hz."""
 
     gyro_noise: float = 0.02  # rad/s per sample; the sensor's 0.006 and the swing between samples
-    accel_noise: float = 0.15  # m/s^2 per sample; the sensor's 0.05, tilt, and the swing between samples
+    accel_noise: float = (
+        0.15  # m/s^2 per sample; the sensor's 0.05, tilt, and the swing between samples
+    )
     gyro_drift: float = 1e-4  # rad/s per sqrt(s), of the bias
     accel_drift: float = 1e-3  # m/s^2 per sqrt(s), of the biases
-    coasting_yaw_rate: float = 2.0  # rad/s, unknown yaw rate without IMU (the head swings at up to 4 rad/s)
+    coasting_yaw_rate: float = (
+        2.0  # rad/s, unknown yaw rate without IMU (the head swings at up to 4 rad/s)
+    )
     coasting_accel: float = 1.0  # m/s^2, unknown acceleration without IMU
 
 
@@ -65,7 +69,9 @@ class StrapdownFilter:
         """Continue from this state; the arrays are copied."""
         self._filter.x, self._filter.P = x.copy(), P.copy()
 
-    def advance(self, dt: float, before: InertialSample | None, after: InertialSample | None) -> None:
+    def advance(
+        self, dt: float, before: InertialSample | None, after: InertialSample | None
+    ) -> None:
         """Predict over dt [s] with the mean of the measurements at its ends; None: unknown."""
         known = before is not None and after is not None
         w = forward = left = 0.0
@@ -91,7 +97,7 @@ class StrapdownFilter:
         self._filter.P = P
 
     def innovation(self, pose: Array, R: Array) -> tuple[Array, Array]:
-        """z - h(x) of a camera pose (x, y, psi) and its covariance S."""
+        """Z - h(x) of a camera pose (x, y, psi) and its covariance S."""
         return pose_residual(pose, self.x[POSE]), self.P[POSE, POSE] + R
 
     def correct(self, pose: Array, R: Array) -> None:
@@ -102,7 +108,9 @@ class StrapdownFilter:
     def _process_noise(self, dt: float, known: bool) -> tuple[float, ...]:
         """Diagonal of Q."""
         n = self._noise
-        rate, accel = (n.gyro_noise, n.accel_noise) if known else (n.coasting_yaw_rate, n.coasting_accel)
+        rate, accel = (
+            (n.gyro_noise, n.accel_noise) if known else (n.coasting_yaw_rate, n.coasting_accel)
+        )
         correlation = dt * SAMPLE_PERIOD * (1.0 if known else COASTING_SAMPLES)
         speed = accel**2 * correlation
         place, bias = speed * dt * dt / 3.0, n.accel_drift**2 * dt
@@ -110,14 +118,19 @@ class StrapdownFilter:
 
 
 def _fill_jacobian(F: Array, dt: float, c: float, s: float, ax: float, ay: float) -> None:
-    """d x(t + dt) / d x(t) into an identity; (c, s): direction of the head, (ax, ay): acceleration in the pool.
+    """D x(t + dt) / d x(t) into an identity; (c, s): direction of the head, (ax, ay): acceleration in the pool.
 
     Element by element: this runs for every IMU sample of a replay.
     """
     half = 0.5 * dt * dt
     F[0, 3] = F[1, 4] = dt
     F[2, 5] = -dt
-    F[0, 2], F[1, 2], F[3, 2], F[4, 2] = -half * ay, half * ax, -dt * ay, dt * ax  # d acceleration / d psi
+    F[0, 2], F[1, 2], F[3, 2], F[4, 2] = (
+        -half * ay,
+        half * ax,
+        -dt * ay,
+        dt * ax,
+    )  # d acceleration / d psi
     F[0, 6], F[0, 7], F[1, 6], F[1, 7] = -half * c, half * s, -half * s, -half * c
     F[3, 6], F[3, 7], F[4, 6], F[4, 7] = -dt * c, dt * s, -dt * s, -dt * c
 

@@ -22,8 +22,12 @@ import math
 from typing import Any, NamedTuple
 
 STROKE_FREQUENCY = 2.0  # Hz, fixed by the throttle map of MODEL (A carries the throttle)
-DAMPING = 0.3  # zeta, half the notch's width: wider delays turns, narrower learns a new swing slowly
-TURN_LAG = 2.0 * DAMPING / (2.0 * math.pi * STROKE_FREQUENCY)  # s, by which psi_mean is late in a steady turn
+DAMPING = (
+    0.3  # zeta, half the notch's width: wider delays turns, narrower learns a new swing slowly
+)
+TURN_LAG = (
+    2.0 * DAMPING / (2.0 * math.pi * STROKE_FREQUENCY)
+)  # s, by which psi_mean is late in a steady turn
 
 
 class StrokeState(NamedTuple):

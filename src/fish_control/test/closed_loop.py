@@ -72,13 +72,22 @@ def swim(
             if planner.finished:
                 break
             errors = plan.errors
-            controller.decide(Reference(errors.course, plan.speed, plan.yaw_rate, errors.cross_track))
+            controller.decide(
+                Reference(errors.course, plan.speed, plan.yaw_rate, errors.cross_track)
+            )
         command: Command = controller.command(DT)
         simulation.command(command.rotor_speed, command.alpha)
         truth = reading.truth
         at = judge.update(truth.pose[:2])
         off = np.hypot(*(np.array(truth.pose[:2]) - estimate.pose[:2]))
-        row = (at.progress, at.cross_track_error, speed - truth.velocity[0], command.alpha, off, reading.time)
+        row = (
+            at.progress,
+            at.cross_track_error,
+            speed - truth.velocity[0],
+            command.alpha,
+            off,
+            reading.time,
+        )
         rows.append(row)
         if record is not None:
             record.append((*row, *truth.pose, command.rotor_speed, errors.heading))

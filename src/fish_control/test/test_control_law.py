@@ -39,7 +39,9 @@ def test_casadi_expression_is_the_numpy_function():
     rng = np.random.default_rng(0)
     for _ in range(20):
         values = [rng.normal(size=n) for n in sizes]
-        here = control_step(ControlState(*values[0]), Errors(*values[1]), Gains(*values[2]), 0.02, LIMITS, np)
+        here = control_step(
+            ControlState(*values[0]), Errors(*values[1]), Gains(*values[2]), 0.02, LIMITS, np
+        )
         np.testing.assert_allclose(
             function(*values).full().ravel(), [*here[0], *here[1]], rtol=1e-12, atol=1e-14
         )
@@ -59,7 +61,9 @@ def test_a_batch_gives_what_singles_give():
     rng = np.random.default_rng(1)
     state, errors = rng.normal(size=(8, 10)), rng.normal(size=(5, 10))
     batch = control_step(ControlState(*state), Errors(*errors), GAINS, 0.02, LIMITS, np)[1]
-    single = control_step(ControlState(*state[:, 3]), Errors(*errors[:, 3]), GAINS, 0.02, LIMITS, np)[1]
+    single = control_step(
+        ControlState(*state[:, 3]), Errors(*errors[:, 3]), GAINS, 0.02, LIMITS, np
+    )[1]
     assert (batch.alpha[3], batch.throttle[3]) == pytest.approx(single)
 
 
@@ -94,7 +98,9 @@ def test_a_change_of_integral_gain_does_not_jolt():
         state, before = control_step(
             state, Errors(0.1, 0, 0, 0.2), Gains(0, 0.5, 0, 0, 0, 0), 0.02, LIMITS, np
         )
-    _, after = control_step(state, Errors(0.1, 0, 0, 0.2), Gains(0, 0.1, 0, 0, 0, 0), 0.02, LIMITS, np)
+    _, after = control_step(
+        state, Errors(0.1, 0, 0, 0.2), Gains(0, 0.1, 0, 0, 0, 0), 0.02, LIMITS, np
+    )
     assert after.alpha == pytest.approx(before.alpha, abs=0.01)
 
 
@@ -117,7 +123,11 @@ def test_anti_windup_leaves_saturation_soon_after_the_error_changes_sign():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_saturated_integral_settles_where_the_error_and_the_excess_balance(sign):
     """I' = Ki e + k_w (sat - unsat) / c = 0; to a period; the integral's own limit is not reached."""
-    gains, heading, speed = Gains(0.3, 0.04, 0, 0.6, 0.02, 0), 1.5 * sign, 0.5 if sign > 0.0 else -0.1
+    gains, heading, speed = (
+        Gains(0.3, 0.04, 0, 0.6, 0.02, 0),
+        1.5 * sign,
+        0.5 if sign > 0.0 else -0.1,
+    )
     state = ControlState()
     for _ in range(1000):
         state, out = control_step(state, Errors(heading, speed, 0.0, 0.0), gains, 0.02, LIMITS, np)
@@ -140,7 +150,9 @@ def test_throttle_stays_between_nothing_and_all_there_is(speed, throttle):
 
 def test_feedforward_of_water_that_overtakes_the_fish_is_the_opposite():
     for alpha in (0.0, 0.4):
-        assert feedforward_throttle(-0.2, alpha, LIMITS) == -feedforward_throttle(0.2, alpha, LIMITS)
+        assert feedforward_throttle(-0.2, alpha, LIMITS) == -feedforward_throttle(
+            0.2, alpha, LIMITS
+        )
 
 
 @pytest.mark.parametrize("speed", [0.15, -0.15])
@@ -152,7 +164,7 @@ def test_slope_of_the_feedforward_is_its_difference_quotient(speed, alpha):
 
 def test_filters_do_not_overshoot_however_long_a_period_is():
     gains, before = Gains(0, 0, 0.5, 0, 0, 0), ControlState(primed=1.0)
-    state, out = control_step(before, Errors(0.1, 0.0, 2.0, 0.2), gains, 1.0, LIMITS, np)
+    state, _out = control_step(before, Errors(0.1, 0.0, 2.0, 0.2), gains, 1.0, LIMITS, np)
     assert 0.0 < state.heading_error_rate < 0.1 / 1.0
     assert 0.0 < state.curvature < 2.0
 
@@ -190,7 +202,9 @@ def test_throttle_map_is_the_models(frequency):
 
 
 def test_a_rotor_without_frequency_stands_still():
-    state, speed = actuator_step(ActuatorState(), Setpoint(0.0, 1.0), 0.01, ControlLimits(frequency=0.0), np)
+    state, speed = actuator_step(
+        ActuatorState(), Setpoint(0.0, 1.0), 0.01, ControlLimits(frequency=0.0), np
+    )
     assert (state.amplitude, speed) == (0.0, 0.0)
 
 
@@ -229,7 +243,8 @@ def test_full_stop_within_half_a_second():
     state = ActuatorState(amplitude=12.0)
     for _ in range(51):
         state, speed = actuator_step(state, Setpoint(0.0, 0.0), 0.01, LIMITS, np)
-    assert state.amplitude == pytest.approx(0.0, abs=1e-12) and speed == pytest.approx(0.0, abs=1e-9)
+    assert state.amplitude == pytest.approx(0.0, abs=1e-12)
+    assert speed == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

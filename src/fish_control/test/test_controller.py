@@ -52,7 +52,8 @@ def test_a_fish_at_rest_listens_before_its_first_stroke_and_one_under_way_does_n
         assert made.decide(STRAIGHT) == pytest.approx(GAINS)
         moved.append(made.command(0.01).rotor_speed != 0.0)
     listened = LISTENS.contract.guidance.listen_time
-    assert 0.01 * moved.index(True) == pytest.approx(listened, abs=0.05) and listened > 1.0
+    assert 0.01 * moved.index(True) == pytest.approx(listened, abs=0.05)
+    assert listened > 1.0
     made = controller(surge=0.2, policy=LISTENS)
     made.decide(STRAIGHT)
     assert made.command(0.01).rotor_speed != 0.0
@@ -66,7 +67,8 @@ def test_rest_stops_rotor_and_centres_rudder_within_half_a_second():
     made.rest()
     for _ in range(60):
         command = made.command(0.01)
-    assert command.rotor_speed == pytest.approx(0.0, abs=1e-9) and command.alpha == 0.0
+    assert command.rotor_speed == pytest.approx(0.0, abs=1e-9)
+    assert command.alpha == 0.0
 
 
 def test_a_fish_that_swims_does_not_stop_to_listen_again():
@@ -86,7 +88,8 @@ def test_gliding_holds_the_rudder_without_drive_until_the_fish_has_stopped(side)
     for _ in range(60):
         made.glide(0.5 * side, 0.01)
         command = made.command(0.01)
-    assert command.rotor_speed == pytest.approx(0.0, abs=1e-9) and command.alpha == 0.8 * side
+    assert command.rotor_speed == pytest.approx(0.0, abs=1e-9)
+    assert command.alpha == 0.8 * side
     angles = []
     for k in range(500):  # noise about standing still does not start it again
         made.observe(1.0 + 0.01 * k, Motion(0.0, 0.0, 0.0, 0.015 + 0.03 * (k % 2), 0.0, 0.0))
@@ -128,7 +131,8 @@ def test_phase_is_published_within_one_turn():
     phases = [made.command(0.01).phase for _ in range(200)]
     t = 0.01 * np.arange(1, 201)
     np.testing.assert_allclose(np.exp(1j * np.array(phases)), np.exp(4j * np.pi * t), atol=1e-9)
-    assert 0.0 <= min(phases) and max(phases) < 2.0 * np.pi
+    assert 0.0 <= min(phases)
+    assert max(phases) < 2.0 * np.pi
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -31,7 +31,9 @@ def test_prediction_is_that_of_an_extended_kalman_filter(seed):
     (x, P), eps = matrices(state), 1e-6
 
     def moved(values):
-        return np.array(swim(state._replace(speed=values[0], thrust=values[3]), setpoint, dt, LIMITS)[:SIZE])
+        return np.array(
+            swim(state._replace(speed=values[0], thrust=values[3]), setpoint, dt, LIMITS)[:SIZE]
+        )
 
     F = np.eye(SIZE)
     for k in (0, 3):
@@ -77,7 +79,8 @@ def swum(current, headings, strength=1.0, seconds=6.0, u=0.15):
 
 def test_a_current_ahead_of_a_fish_that_has_not_listened_is_shared_with_its_thrust_until_it_turns():
     state = swum([0.03, 0.0], [0.0], u=0.1)
-    assert 0.0 < state.current_x < 0.031 and state.thrust > 0.0
+    assert 0.0 < state.current_x < 0.031
+    assert state.thrust > 0.0
     assert state.current_y == pytest.approx(0.0, abs=1e-6)
 
 

@@ -52,17 +52,22 @@ def test_the_rotor_s_speed_does_not_jump_between_rows():
 
 
 @pytest.mark.parametrize(
-    ("slow", "fast"), [((24.0, 1.0), (6.0, 4.0)), ((120.0, 0.2), (6.0, 4.0)), ((48.0, 0.5), (12.0, 2.0))]
+    ("slow", "fast"),
+    [((24.0, 1.0), (6.0, 4.0)), ((120.0, 0.2), (6.0, 4.0)), ((48.0, 0.5), (12.0, 2.0))],
 )
 @pytest.mark.parametrize("accelerates", [True, False])
-def test_between_two_rows_the_rotor_is_not_asked_for_more_than_a_row_may_ask(slow, fast, accelerates):
+def test_between_two_rows_the_rotor_is_not_asked_for_more_than_a_row_may_ask(
+    slow, fast, accelerates
+):
     """Amplitude and frequency move at their own rates: the amplitude of one row meets the frequency of the other."""
     first, second = (slow, fast) if accelerates else (fast, slow)
     program = Program((Row(0.0, *first, 0.0), Row(12.0, *second, 0.0)))
     rows = commands(Excitation(program), program.duration + 1.0)
     assert 0.99 * FASTEST_ROTOR < np.abs(rows[:, 1]).max() <= FASTEST_ROTOR + 1e-9
     w = 2.0 * math.pi * fast[1]
-    largest = FASTEST_ROTOR * w + 24.0 * w + slow[0] * 2.0 * math.pi * 4.0  # rad/s^2; and it does not jump
+    largest = (
+        FASTEST_ROTOR * w + 24.0 * w + slow[0] * 2.0 * math.pi * 4.0
+    )  # rad/s^2; and it does not jump
     assert np.abs(np.diff(rows[:, 1])).max() < largest * DT
 
 
@@ -70,7 +75,8 @@ def test_a_program_begins_in_the_middle_and_ends_at_rest():
     program = Program((Row(0.0, 8.0, 2.0, 0.2), Row(5.0, 8.0, 2.0, -0.2)))
     excitation = Excitation(program, begin=4.0, end=6.0)
     rows = commands(excitation, 4.0)
-    assert excitation.over and excitation.time == pytest.approx(6.0, abs=1.01 * DT)
+    assert excitation.over
+    assert excitation.time == pytest.approx(6.0, abs=1.01 * DT)
     np.testing.assert_allclose(rows[[50, 150], 2], [0.2, -0.2])
     np.testing.assert_allclose(rows[-100:, 1:], 0.0)
     assert program.duration == 5.0 + LAST_ROW
@@ -81,14 +87,21 @@ def test_a_stopped_program_holds_its_rudder_until_the_fish_stands():
     commands(excitation, 2.0)
     excitation.stop(0.8)
     rows = commands(excitation, STOPPING + 1.0)
-    assert excitation.over and excitation.time == pytest.approx(2.0, abs=1.01 * DT)
+    assert excitation.over
+    assert excitation.time == pytest.approx(2.0, abs=1.01 * DT)
     np.testing.assert_allclose(rows[: round(STOPPING / DT) - 1, 2], 0.8)
     np.testing.assert_allclose(rows[-90:, 1:], 0.0)
     assert np.abs(rows[60:, 1]).max() == 0.0  # the rotor is at rest within 0.6 s
 
 
-@pytest.mark.parametrize("wrap", [lambda rows: rows, lambda rows: {"program": rows},
-                                  lambda rows: {"verdict": "x", "next_experiment": {"why": "y", "program": rows}}])  # fmt: skip
+@pytest.mark.parametrize(
+    "wrap",
+    [
+        lambda rows: rows,
+        lambda rows: {"program": rows},
+        lambda rows: {"verdict": "x", "next_experiment": {"why": "y", "program": rows}},
+    ],
+)
 @pytest.mark.parametrize("suffix", [".json", ".yaml"])
 def test_a_program_is_read_alone_and_out_of_a_diagnosis(tmp_path, wrap, suffix):
     file = tmp_path / f"program{suffix}"
@@ -105,7 +118,10 @@ def test_a_program_is_read_alone_and_out_of_a_diagnosis(tmp_path, wrap, suffix):
         ("[]", "no rows"),
         ("[7]", "row 0 is 7; expected {t, amplitude, frequency, rudder}"),
         (json.dumps([{"t": 0, "amplitude": 1}]), "expected {t, amplitude, frequency, rudder}"),
-        (json.dumps([{**ROW, "rudder": "left"}]), "row 0: rudder is 'left', expected a finite number"),
+        (
+            json.dumps([{**ROW, "rudder": "left"}]),
+            "row 0: rudder is 'left', expected a finite number",
+        ),
         (
             json.dumps([{**ROW, "amplitude": float("nan")}]),
             "row 0: amplitude is nan, expected a finite number",
@@ -124,10 +140,13 @@ def test_what_is_no_program_is_named(tmp_path, content, said):
     file.write_text(content)
     with pytest.raises(ProgramError) as refusal:
         read_program(file)
-    assert said in str(refusal.value) and "program.json" in str(refusal.value)
+    assert said in str(refusal.value)
+    assert "program.json" in str(refusal.value)
 
 
-@pytest.mark.parametrize(("begin", "end"), [(-1.0, 5.0), (5.0, 5.0), (20.0, math.inf), (math.nan, 5.0)])
+@pytest.mark.parametrize(
+    ("begin", "end"), [(-1.0, 5.0), (5.0, 5.0), (20.0, math.inf), (math.nan, 5.0)]
+)
 def test_an_empty_part_of_a_program_is_refused(begin, end):
     with pytest.raises(ProgramError, match="begin is"):
         Excitation(Program((Row(0.0, 8.0, 2.0, 0.0),)), begin, end)

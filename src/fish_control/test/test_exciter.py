@@ -34,14 +34,17 @@ def swim(running, seconds, sight, begin=0.0):
 
 def test_it_rests_swims_its_part_and_ends_at_rest():
     running = exciter()
-    assert not swim(running, 1.0, None)[:, 1:].any() and running.state == "waiting"
-    assert not swim(running, 0.49, MIDDLE, begin=1.0)[:, 1:].any() and running.reason == "at rest"
+    assert not swim(running, 1.0, None)[:, 1:].any()
+    assert running.state == "waiting"
+    assert not swim(running, 0.49, MIDDLE, begin=1.0)[:, 1:].any()
+    assert running.reason == "at rest"
     strokes = swim(running, 1.99, MIDDLE, begin=1.5)
-    assert (
-        running.reason == "swimming" and strokes[-1, 2] == 0.3 and np.abs(strokes[:, 1]).max() > 60.0
-    )  # rad/s
+    assert running.reason == "swimming"
+    assert strokes[-1, 2] == 0.3
+    assert np.abs(strokes[:, 1]).max() > 60.0
     end = swim(running, 2.0, MIDDLE, begin=3.5)
-    assert running.state == "ended" and running.reason == "ended at 2.0 s, as programmed"
+    assert running.state == "ended"
+    assert running.reason == "ended at 2.0 s, as programmed"
     assert not end[-10:, 1:].any()
 
 
@@ -66,7 +69,9 @@ def test_a_reason_stops_it_for_good(sight, state, said):
     held = swim(running, 0.02, sight, begin=1.5)[:, 2]
     assert abs(held[-1]) == (pytest.approx(0.8) if state == "before a wall" else 0.0)  # rad
     after = swim(running, 4.0, MIDDLE, begin=1.52)
-    assert running.state == state and running.reason.startswith("stopped at 1.0 s") and said in running.reason
+    assert running.state == state
+    assert running.reason.startswith("stopped at 1.0 s")
+    assert said in running.reason
     assert not after[-10:, 1:].any()
 
 

@@ -30,7 +30,10 @@ def measurements(seconds, seed=0, latency=0.08, gyro_bias=0.02, noisy=True):
     events = []
     for t in np.arange(0.0, seconds, DT):
         _, rate, force = truth(t)
-        imu = [rate + gyro_bias + noise * rng.normal(0, 0.006), *(force + noise * rng.normal(0, 0.05, 2))]
+        imu = [
+            rate + gyro_bias + noise * rng.normal(0, 0.006),
+            *(force + noise * rng.normal(0, 0.05, 2)),
+        ]
         events.append((t, "imu", t, imu))
     for t in np.arange(0.003, seconds, 1.0 / 30.0):
         pose = truth(t)[0] + noise * rng.normal(0, [0.002, 0.002, 0.012])
@@ -66,7 +69,9 @@ def test_pose_and_velocity_of_a_swinging_head_in_spite_of_latency(latency):
             poses.append(pose_error(estimate))
             twists.append(estimate.twist - [SPEED * np.cos(swing), -SPEED * np.sin(swing), rate])
     rmse = np.sqrt(np.mean(np.square(poses), axis=0))
-    assert rmse[0] < 0.004 and rmse[1] < 0.004 and rmse[2] < 0.01
+    assert rmse[0] < 0.004
+    assert rmse[1] < 0.004
+    assert rmse[2] < 0.01
     assert np.all(np.sqrt(np.mean(np.square(twists), axis=0)) < [0.012, 0.012, 0.02])
 
 
@@ -86,7 +91,9 @@ def test_errors_are_as_large_as_the_covariance_says():
         estimate = fusion.estimate()
         error = pose_error(estimate)
         squares.append(error @ np.linalg.solve(estimate.pose_covariance, error))
-    assert 0.5 < np.mean(squares) < 6.0  # chi^2 of 3 has mean 3; the model's noise is on the safe side
+    assert (
+        0.5 < np.mean(squares) < 6.0
+    )  # chi^2 of 3 has mean 3; the model's noise is on the safe side
 
 
 def test_order_of_arrival_makes_no_difference():
@@ -129,7 +136,8 @@ def test_a_reflection_that_is_seen_now_and_then_is_never_believed():
     for k, event in enumerate(measurements(6.0)):
         reflected = event[1] == "camera" and event[2] > 1.0 and k % 3 == 0
         feed(fusion, [(*event[:3], event[3] + [0.8, -0.5, 0.0]) if reflected else event])
-    assert fusion.counts["pose_outlier"] > 30 and fusion.counts["reacquired"] == 0
+    assert fusion.counts["pose_outlier"] > 30
+    assert fusion.counts["reacquired"] == 0
     assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.01
 
 
@@ -149,7 +157,9 @@ def heading_errors(fusion, events):
         feed(fusion, [event])
         estimate = fusion.estimate()
         if event[1] == "imu" and estimate is not None and not estimate.camera_lost:
-            rows.append((event[0], pose_error(estimate)[2], np.sqrt(estimate.pose_covariance[2, 2])))
+            rows.append(
+                (event[0], pose_error(estimate)[2], np.sqrt(estimate.pose_covariance[2, 2]))
+            )
     return np.array(rows)
 
 
@@ -157,9 +167,13 @@ def heading_errors(fusion, events):
 def test_late_poses_begin_where_the_imu_has_been_since(begin):
     fusion = Fusion()
     events = measurements(3.0, seed=7, latency=0.3, gyro_bias=0.0)
-    _, error, spread = heading_errors(fusion, [e for e in events if e[1] == "imu" or e[2] > begin]).T
-    assert fusion.counts["started"] == 1 and fusion.counts["pose_outlier"] == 0
-    assert np.abs(error).max() < 0.05 and spread.max() < 0.12  # rad, of the pose that began it and no more
+    _, error, spread = heading_errors(
+        fusion, [e for e in events if e[1] == "imu" or e[2] > begin]
+    ).T
+    assert fusion.counts["started"] == 1
+    assert fusion.counts["pose_outlier"] == 0
+    assert np.abs(error).max() < 0.05
+    assert spread.max() < 0.12
 
 
 def test_late_poses_find_a_carried_fish_where_the_imu_has_been_since():
@@ -168,7 +182,8 @@ def test_late_poses_find_a_carried_fish_where_the_imu_has_been_since():
     carried = [(*e[:3], e[3] + moved) if e[1] == "camera" and e[2] > 3.0 else e for e in events]
     time, error, spread = heading_errors(fusion, carried).T
     assert fusion.counts["reacquired"] == 1
-    assert np.abs(error[time > 4.0]).max() < 0.05 and spread[time > 4.0].max() < 0.12
+    assert np.abs(error[time > 4.0]).max() < 0.05
+    assert spread[time > 4.0].max() < 0.12
 
 
 @pytest.mark.parametrize("gap", [0.15, 0.3, 0.5, 1.0, 60.0])
@@ -176,7 +191,8 @@ def test_when_both_sensors_were_silent_nobody_knows_what_happened_meanwhile(gap)
     """The IMU's last sample before and its first after say nothing about half a stroke or more in between."""
     fusion, events = Fusion(), measurements(5.0 + gap, seed=8, latency=0.0)
     _, error, spread = heading_errors(fusion, [e for e in events if not 3.0 < e[2] < 3.0 + gap]).T
-    assert np.all(np.abs(error) < 5.0 * spread + 0.02) and fusion.counts["pose_outlier"] == 0
+    assert np.all(np.abs(error) < 5.0 * spread + 0.02)
+    assert fusion.counts["pose_outlier"] == 0
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
 
 
@@ -204,7 +220,8 @@ def test_a_fish_that_was_carried_away_is_found_again():
             bias, spread = found.gyro_bias, np.sqrt(found.twist_covariance[2, 2])
     assert fusion.counts["reacquired"] == 1
     np.testing.assert_allclose(pose_error(fusion.estimate())[:2], moved[:2], atol=0.01)
-    assert bias == pytest.approx(0.03, abs=0.01) and spread < 0.01  # the sensor is the same as before
+    assert bias == pytest.approx(0.03, abs=0.01)
+    assert spread < 0.01
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -217,11 +234,14 @@ def test_values_that_are_not_finite_are_counted_and_dropped(bad):
     assert not fusion.add_pose(2.0, [0.0, 0.0, 0.0], np.full((3, 3), bad))
     assert not fusion.add_imu(bad, 0.0, 0.0, 0.0)
     assert not fusion.add_pose(bad, truth(2.0)[0])
-    assert fusion.counts["imu_not_finite"] == 2 and fusion.counts["pose_not_finite"] == 3
+    assert fusion.counts["imu_not_finite"] == 2
+    assert fusion.counts["pose_not_finite"] == 3
     np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
 
 
-@pytest.mark.parametrize("wrong", [(60.5, 0, 0), (-12.5, 0, 0), (0, 136, 0), (0, 15, -15), (0, 3e38, 3e38)])
+@pytest.mark.parametrize(
+    "wrong", [(60.5, 0, 0), (-12.5, 0, 0), (0, 136, 0), (0, 15, -15), (0, 3e38, 3e38)]
+)
 def test_one_damaged_imu_sample_neither_moves_the_pose_nor_locks_the_camera_out(wrong):
     """Such values pass the driver; one had moved the pose by up to 1.5 m, and the camera was an outlier for a second."""
     fusion, errors = Fusion(), []
@@ -233,7 +253,8 @@ def test_one_damaged_imu_sample_neither_moves_the_pose_nor_locks_the_camera_out(
         if event[0] > 1.0:
             errors.append(np.abs(pose_error(fusion.estimate())))
     assert fusion.counts["imu_implausible"] == 1
-    assert fusion.counts["pose_outlier"] == 0 and fusion.counts["reacquired"] == 0
+    assert fusion.counts["pose_outlier"] == 0
+    assert fusion.counts["reacquired"] == 0
     assert np.all(np.max(errors, axis=0) < [0.015, 0.015, 0.05])
     assert not fusion.estimate().imu_lost
 
@@ -242,7 +263,8 @@ def test_what_a_fish_does_is_no_damage_and_the_bounds_are_parameters():
     """The fastest of the real trials, with room."""
     assert Fusion().add_imu(1.0, 6.0, 2.0, -2.0)
     fusion = Fusion(FusionConfig(largest_accel=1.0, largest_yaw_rate=30.0))
-    assert fusion.add_imu(1.0, 25.0, 0.0, 0.0) and not fusion.add_imu(1.01, 0.0, 0.8, 0.8)
+    assert fusion.add_imu(1.0, 25.0, 0.0, 0.0)
+    assert not fusion.add_imu(1.01, 0.0, 0.8, 0.8)
 
 
 def test_an_imu_that_only_says_what_cannot_be_is_lost():
@@ -250,7 +272,8 @@ def test_an_imu_that_only_says_what_cannot_be_is_lost():
     for event in measurements(4.0):
         damaged = event[1] == "imu" and event[2] > 2.0
         feed(fusion, [(*event[:3], [100.0, 0.0, 0.0]) if damaged else event])
-    assert fusion.estimate().imu_lost and not fusion.estimate().camera_lost
+    assert fusion.estimate().imu_lost
+    assert not fusion.estimate().camera_lost
     assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.05
 
 
@@ -259,7 +282,8 @@ def test_too_late_and_repeated_measurements_are_dropped():
     feed(fusion, measurements(3.0))
     assert not fusion.add_pose(0.5, truth(0.5)[0])
     assert not fusion.add_imu(1.0 + 1.9, 0.0, 0.0, 0.0)
-    assert fusion.counts["pose_too_late"] == 1 and fusion.counts["imu_out_of_order"] == 1
+    assert fusion.counts["pose_too_late"] == 1
+    assert fusion.counts["imu_out_of_order"] == 1
     assert fusion.add_imu(3.0, 0.0, 0.0, 0.0)
     assert fusion.counts["imu"] == 301
 
@@ -281,9 +305,12 @@ def test_lost_camera_is_said_in_the_covariance_and_passes():
         feed(fusion, [event])
         estimate = fusion.estimate()
         if event[1] == "imu" and estimate is not None:
-            lost.append((event[0], estimate.camera_lost, estimate.pose_covariance[0, 0] == LOST_VARIANCE))
+            lost.append(
+                (event[0], estimate.camera_lost, estimate.pose_covariance[0, 0] == LOST_VARIANCE)
+            )
     times = [t for t, gone, said in lost if gone and said]
-    assert min(times) == pytest.approx(2.6, abs=0.06) and max(times) == pytest.approx(4.1, abs=0.1)
+    assert min(times) == pytest.approx(2.6, abs=0.06)
+    assert max(times) == pytest.approx(4.1, abs=0.1)
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
 
 
@@ -291,15 +318,19 @@ def test_lost_imu_is_said_and_the_camera_goes_on():
     fusion = Fusion()
     feed(fusion, [e for e in measurements(4.0) if e[1] == "camera" or e[2] < 2.0])
     estimate = fusion.estimate()
-    assert estimate.imu_lost and not estimate.camera_lost
+    assert estimate.imu_lost
+    assert not estimate.camera_lost
     assert estimate.twist_covariance[2, 2] == LOST_VARIANCE
     assert np.hypot(*pose_error(estimate)[:2]) < 0.05
 
 
 @pytest.mark.parametrize(
-    ("silence", "camera_lost", "imu_lost"), [(0.02, False, False), (0.3, False, True), (0.8, True, True)]
+    ("silence", "camera_lost", "imu_lost"),
+    [(0.02, False, False), (0.3, False, True), (0.8, True, True)],
 )
-def test_sensors_that_fall_silent_together_are_lost_after_their_times(silence, camera_lost, imu_lost):
+def test_sensors_that_fall_silent_together_are_lost_after_their_times(
+    silence, camera_lost, imu_lost
+):
     fusion = Fusion()
     feed(fusion, measurements(3.0, latency=0.0))
     estimate = fusion.estimate(silence)
@@ -316,17 +347,23 @@ def test_a_pose_from_the_future_is_refused_and_holds_nothing_up(begun):
         if event[0] >= at:
             feed(fusion, [event])
             if begun and event[1] == "imu":
-                assert fusion.estimate().time == event[2] and not fusion.estimate().imu_lost
-    assert fusion.counts["pose_from_future"] == 1 and fusion.counts["pose_too_late"] == 0
+                assert fusion.estimate().time == event[2]
+                assert not fusion.estimate().imu_lost
+    assert fusion.counts["pose_from_future"] == 1
+    assert fusion.counts["pose_too_late"] == 0
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
 
 
 def test_a_camera_far_ahead_of_the_imu_is_lost():
     fusion, events = Fusion(), measurements(4.0)
-    feed(fusion, [(a, k, s + (5.0 if k == "camera" and s > 2.0 else 0.0), v) for a, k, s, v in events])
+    feed(
+        fusion,
+        [(a, k, s + (5.0 if k == "camera" and s > 2.0 else 0.0), v) for a, k, s, v in events],
+    )
     assert fusion.counts["pose_from_future"] == pytest.approx(59, abs=3)  # of 2 s at 30 Hz
     estimate = fusion.estimate()
-    assert estimate.camera_lost and not estimate.imu_lost
+    assert estimate.camera_lost
+    assert not estimate.imu_lost
 
 
 @pytest.mark.parametrize("ahead", [0.02, 0.05])
@@ -339,7 +376,8 @@ def test_a_camera_a_little_ahead_of_the_imu_does_not_repeat_stamps(ahead):
         if kind == "imu" and fusion.estimate() is not None:
             times.append((stamp, fusion.estimate().time))
     stamps, estimated = np.transpose(times)
-    assert len(stamps) > 350 and fusion.counts["pose"] > 100
+    assert len(stamps) > 350
+    assert fusion.counts["pose"] > 100
     np.testing.assert_array_equal(estimated, stamps)
 
 
@@ -364,7 +402,8 @@ def test_a_clock_set_back_starts_anew_without_an_imu_too():
     fusion, poses = Fusion(), [e for e in measurements(2.0) if e[1] == "camera"]
     feed(fusion, [(a + 100, k, s + 100, v) for a, k, s, v in poses])
     feed(fusion, poses)
-    assert fusion.counts["restarted"] == 1 and fusion.counts["started"] == 2
+    assert fusion.counts["restarted"] == 1
+    assert fusion.counts["started"] == 2
     assert fusion.counts["pose_too_late"] == 2  # a straggler says nothing about the clock, three do
     assert fusion.estimate().time < 3.0
     assert np.hypot(*pose_error(fusion.estimate())[:2]) < 0.05
@@ -378,14 +417,16 @@ def test_single_poses_from_long_ago_do_not_set_the_clock_back(imu):
         feed(fusion, [event])
         old = event[0] > 3.0 and (k % 2 == 0 or (imu and event[1] == "camera"))
         assert not (old and fusion.add_pose(event[2] - 2.5, truth(event[2] - 2.5)[0]))
-    assert fusion.counts["pose_too_late"] > 40 and fusion.counts["restarted"] == 0
+    assert fusion.counts["pose_too_late"] > 40
+    assert fusion.counts["restarted"] == 0
 
 
 def test_a_negative_silence_takes_back_no_loss():
     """The node's clock may be set back while the sensors' is not."""
     fusion = Fusion()
     feed(fusion, [e for e in measurements(4.0) if e[1] == "camera" or e[2] < 2.0])
-    assert fusion.estimate().imu_lost and fusion.estimate(-90.0).imu_lost
+    assert fusion.estimate().imu_lost
+    assert fusion.estimate(-90.0).imu_lost
 
 
 def test_nothing_is_estimated_before_poses_agree():
@@ -395,7 +436,11 @@ def test_nothing_is_estimated_before_poses_agree():
         assert not fusion.add_pose(0.01 + k / 30.0, [float(k % 2), 0.0, 0.0])
     assert fusion.estimate() is None
     fusion.add_imu(0.7, 0.0, 0.0, 0.0)
-    assert [fusion.add_pose(0.7 + k / 30.0, [0.0, 0.0, 0.0]) for k in range(3)] == [False, False, True]
+    assert [fusion.add_pose(0.7 + k / 30.0, [0.0, 0.0, 0.0]) for k in range(3)] == [
+        False,
+        False,
+        True,
+    ]
     assert fusion.counts["started"] == 1
 
 

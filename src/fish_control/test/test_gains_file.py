@@ -58,7 +58,9 @@ def test_network_is_relu_then_tanh_scaled_to_the_ranges(network):
     h = x
     for k in range(3):
         w, b = network.tensors[f"layers.{k}.weight"], network.tensors[f"layers.{k}.bias"]
-        h = np.array([max(sum(w[i, j] * h[j] for j in range(len(h))) + b[i], 0.0) for i in range(len(b))])
+        h = np.array(
+            [max(sum(w[i, j] * h[j] for j in range(len(h))) + b[i], 0.0) for i in range(len(b))]
+        )
     raw = network.tensors["layers.3.weight"] @ h + network.tensors["layers.3.bias"]
     high = np.array([1.0, 1.0, 1.0, 2.5, 0.1, 0.1])
     np.testing.assert_allclose(network.gains(x), high / (1.0 + np.exp(-2.0 * raw)), rtol=1e-12)
@@ -68,7 +70,8 @@ def test_gains_stay_in_their_ranges_for_any_input(network):
     gains = np.array(network.gains(np.random.default_rng(3).normal(0.0, 100.0, (1000, 6))))
     low = np.array([o.low for o in network.contract.outputs])
     high = np.array([o.high for o in network.contract.outputs])
-    assert np.all(gains.T >= low) and np.all(gains.T <= high)
+    assert np.all(gains.T >= low)
+    assert np.all(gains.T <= high)
 
 
 def test_network_has_the_papers_layers(network):
@@ -87,7 +90,7 @@ def test_inputs_are_normalised_in_the_papers_order():
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(GainsFileError, match="nowhere.safetensors: cannot be read"):
+    with pytest.raises(GainsFileError, match=r"nowhere.safetensors: cannot be read"):
         read_gains_file(tmp_path / "nowhere.safetensors")
 
 
@@ -115,7 +118,10 @@ def test_file_without_contract(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda c: c.update(format_version=1), "version 1, expected 'fish_control/gains' version 3"),
+        (
+            lambda c: c.update(format_version=1),
+            "version 1, expected 'fish_control/gains' version 3",
+        ),
         (lambda c: c.pop("lookahead"), "contract lacks lookahead"),
         (lambda c: c.update(colour="red"), "contract has unknown colour"),
         (lambda c: c["limits"].pop("rudder_range"), "limits lacks rudder_range"),
@@ -126,8 +132,14 @@ def test_file_without_contract(tmp_path):
         (lambda c: c.update(activation="tanh"), "activation is 'tanh', expected 'relu'"),
         (lambda c: c["inputs"][1].update(scale=0.0), "input surge_speed has scale 0.0"),
         (lambda c: c.update(layers=None), "layers is None, expected a list"),
-        (lambda c: c.update(layers=[6]), r"layers are \[6\], expected 6 inputs first and 6 gains last"),
-        (lambda c: c.update(layers=[6, 8.0, 6]), r"layers are \[6, 8.0, 6\], expected whole numbers > 0"),
+        (
+            lambda c: c.update(layers=[6]),
+            r"layers are \[6\], expected 6 inputs first and 6 gains last",
+        ),
+        (
+            lambda c: c.update(layers=[6, 8.0, 6]),
+            r"layers are \[6, 8.0, 6\], expected whole numbers > 0",
+        ),
         (lambda c: c.update(inputs=3), "inputs is 3, expected a list"),
         (lambda c: c.update(inputs=[3]), "input is 3, expected an object"),
         (lambda c: c.update(outputs="all"), "outputs is 'all', expected a list"),
@@ -136,8 +148,14 @@ def test_file_without_contract(tmp_path):
             lambda c: c["limits"].update(rudder_range="wide"),
             "limits: rudder_range is 'wide', expected a number",
         ),
-        (lambda c: c["guidance"].update(slip_arm=None), "guidance: slip_arm is None, expected a number"),
-        (lambda c: c["guidance"].update(learn_current=1), "learn_current is 1, expected true or false"),
+        (
+            lambda c: c["guidance"].update(slip_arm=None),
+            "guidance: slip_arm is None, expected a number",
+        ),
+        (
+            lambda c: c["guidance"].update(learn_current=1),
+            "learn_current is 1, expected true or false",
+        ),
         (lambda c: c["inputs"][1].update(scale="1"), "input: scale is '1', expected a number"),
         (lambda c: c.update(lookahead=True), "lookahead is True, expected a number"),
         (lambda c: c.update(robot_hash=5), "robot_hash is 5, expected a text"),
@@ -173,7 +191,7 @@ def test_arrays_that_numpy_does_not_know_are_refused(tmp_path):
     header = json.dumps({"__metadata__": {"contract": contract}, "gains": gains}).encode()
     file = tmp_path / "w.safetensors"
     file.write_bytes(len(header).to_bytes(8, "little") + header + bytes(12))
-    with pytest.raises(GainsFileError, match="bfloat16.*expected float64"):
+    with pytest.raises(GainsFileError, match=r"bfloat16.*expected float64"):
         read_gains_file(file)
 
 
@@ -196,7 +214,9 @@ def test_arrays_that_differ_say_which(network, tmp_path, change, said):
 
 def test_constant_gain_out_of_range_is_refused(tmp_path):
     with pytest.raises(GainsFileError, match="speed_kp is 9, expected within"):
-        write_gains_file(tmp_path / "c.safetensors", Policy.constant(CONSTANT._replace(speed_kp=9.0)))
+        write_gains_file(
+            tmp_path / "c.safetensors", Policy.constant(CONSTANT._replace(speed_kp=9.0))
+        )
 
 
 def test_every_difference_to_the_controller_is_listed(network):

@@ -67,7 +67,9 @@ def test_the_papers_law_points_inside_the_circle_by_the_chord():
     path = make_path("circle", radius=0.5)
     motion = Motion(*path.point(1.0), float(path.heading_at(1.0)), 0.2, 0.0, 0.0)
     config = GuidanceConfig(compensate_curvature=False)
-    errors = tracking_errors(StrokeState(), motion, ahead(path, path.point(1.0), 1.0), 0.2, config, np)
+    errors = tracking_errors(
+        StrokeState(), motion, ahead(path, path.point(1.0), 1.0), 0.2, config, np
+    )
     assert errors.heading == pytest.approx(np.arcsin(0.4 / (2 * 0.5)), abs=2e-3)
 
 
@@ -90,7 +92,10 @@ def test_heading_error_is_the_short_way_round():
 def learned(current, heading, seconds=5.0, state=None, u=0.2):
     """Memory after swimming straight ahead in a current (2,) [m/s]."""
     state = state or GuidanceState()
-    n, t = np.array([-np.sin(heading), np.cos(heading)]), np.array([np.cos(heading), np.sin(heading)])
+    n, t = (
+        np.array([-np.sin(heading), np.cos(heading)]),
+        np.array([np.cos(heading), np.sin(heading)]),
+    )
     motion = Motion(0.0, 0.0, heading, u + t @ current, n @ current, 0.0)
     setpoint = Setpoint(0.0, feedforward_throttle(u, 0.0, LIMITS))
     for _ in range(int(100 * seconds)):
@@ -102,7 +107,9 @@ def test_a_current_is_learned_and_kept_through_a_turn():
     current = np.array([-0.02, 0.03])
     state = learned(current, 0.0)
     assert state.water.current_y == pytest.approx(0.03, abs=1e-3)
-    assert abs(state.water.current_x) < 0.025  # ahead or a weak robot? nothing tells before the turn
+    assert (
+        abs(state.water.current_x) < 0.025
+    )  # ahead or a weak robot? nothing tells before the turn
     state = learned(current, np.pi / 2, state=state)
     assert (state.water.current_x, state.water.current_y) == pytest.approx(tuple(current), abs=3e-3)
 
@@ -110,7 +117,10 @@ def test_a_current_is_learned_and_kept_through_a_turn():
 def drifted(current, heading, seconds):
     """Memory after a fish that floats was let go in a current (2,) [m/s]: drag takes it along."""
     state, velocity = GuidanceState(), np.zeros(2)
-    n, t = np.array([-np.sin(heading), np.cos(heading)]), np.array([np.cos(heading), np.sin(heading)])
+    n, t = (
+        np.array([-np.sin(heading), np.cos(heading)]),
+        np.array([np.cos(heading), np.sin(heading)]),
+    )
     for _ in range(round(100 * seconds)):
         ahead = t @ (current - velocity)
         velocity = velocity + 0.01 * feedforward_throttle(ahead, 0.0, LIMITS) / LAG * t
@@ -128,7 +138,8 @@ def test_a_fish_that_listens_knows_the_current_ahead_before_it_swims(current):
 
 def test_a_fish_listens_at_rest_and_does_not_when_it_is_under_way():
     still, moving = Motion(0, 0, 0, 0.01, 0.0, 0), Motion(0, 0, 0, 0.15, 0.0, 0)
-    assert not has_listened(1.0, still, CONFIG, np) and has_listened(CONFIG.listen_time, still, CONFIG, np)
+    assert not has_listened(1.0, still, CONFIG, np)
+    assert has_listened(CONFIG.listen_time, still, CONFIG, np)
     assert has_listened(0.0, moving, CONFIG, np)
     assert has_listened(0.0, still, GuidanceConfig(learn_current=False), np)
 
@@ -137,7 +148,8 @@ def test_a_current_is_believed_up_to_its_limit_and_not_at_all_when_switched_off(
     assert learned(np.array([0.0, 0.5]), 0.0).water.current_y == CONFIG.current_limit
     off, motion = GuidanceConfig(learn_current=False), Motion(0, 0, 0, 0.2, 0.03, 0)
     state = observe(GuidanceState(), motion, Setpoint(0.0, 0.3), 0.01, LIMITS, off, np)
-    assert state.water == WaterState() and state.stroke.sway > 0.0
+    assert state.water == WaterState()
+    assert state.stroke.sway > 0.0
 
 
 def test_through_the_water_a_robot_keeps_its_course_and_curvature_over_ground():
@@ -168,7 +180,9 @@ def test_casadi_and_numpy_give_the_same():
     def evaluate(v, xp):
         memory, moved, ahead = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
         start = GuidanceState().flat
-        state = GuidanceState.of([value + 0.001 * v[int(i)] for value, i in zip(start, memory, strict=True)])
+        state = GuidanceState.of(
+            [value + 0.001 * v[int(i)] for value, i in zip(start, memory, strict=True)]
+        )
         motion, path = Motion(*(v[int(i)] for i in moved)), PathAhead(*(v[int(i)] for i in ahead))
         state = observe(state, motion, Setpoint(0.3, 0.4), 0.02, LIMITS, CONFIG, xp)
         errors = tracking_errors(state.stroke, motion, path, 0.2, CONFIG, xp)
@@ -187,5 +201,5 @@ def test_casadi_and_numpy_give_the_same():
 
 
 def test_config_names_field_and_value():
-    with pytest.raises(ValueError, match="slip_arm is -0.1"):
+    with pytest.raises(ValueError, match=r"slip_arm is -0.1"):
         GuidanceConfig(slip_arm=-0.1)

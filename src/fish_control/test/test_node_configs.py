@@ -30,7 +30,9 @@ def test_yaml_holds_the_dataclass(name, kind):
 
 
 def test_the_exciters_comment_says_how_long_the_last_row_lasts():
-    (end,) = [line for line in (CONFIG / "exciter.yaml").read_text().splitlines() if " end:" in line]
+    (end,) = [
+        line for line in (CONFIG / "exciter.yaml").read_text().splitlines() if " end:" in line
+    ]
     assert end.endswith(f"its end, {LAST_ROW:g} s after its last row begins")
 
 
@@ -58,6 +60,6 @@ def test_shipped_weights_fit_the_shipped_controller():
 def test_a_value_out_of_range_is_named(kind, field, value, expected):
     with pytest.raises(ValueError) as refusal:
         kind(**{field: value})
-    assert (
-        field in str(refusal.value) and repr(value) in str(refusal.value) and expected in str(refusal.value)
-    )
+    assert field in str(refusal.value)
+    assert repr(value) in str(refusal.value)
+    assert expected in str(refusal.value)

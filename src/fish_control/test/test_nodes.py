@@ -54,7 +54,9 @@ class Bench:
 
     def say(self, topic, message, qos=10):
         if topic not in self._publishers:
-            publisher = self._publishers[topic] = self.other.create_publisher(type(message), topic, qos)
+            publisher = self._publishers[topic] = self.other.create_publisher(
+                type(message), topic, qos
+            )
             self.until(lambda: publisher.get_subscription_count() > 0)
         self._publishers[topic].publish(message)
 
@@ -77,7 +79,9 @@ class Bench:
     def said(self, level, text):
         """Whether the newest status of the node's diagnostics is this."""
         own = self.node.get_fully_qualified_name().lstrip("/")
-        statuses = [s for array in self.heard["/diagnostics"] for s in array.status if s.name == own]
+        statuses = [
+            s for array in self.heard["/diagnostics"] for s in array.status if s.name == own
+        ]
         return bool(statuses) and statuses[-1].level == level and text in statuses[-1].message
 
     def values(self):
@@ -161,7 +165,8 @@ def test_fusion_publishes_odometry_in_the_pool_at_the_imu_s_stamps(bench):
     assert last.pose.pose.position.x == pytest.approx(0.2 * t, abs=0.02)
     assert yaw_of(last.pose.pose.orientation) == pytest.approx(0.0, abs=0.05)
     assert last.twist.twist.linear.x == pytest.approx(0.2, abs=0.05)
-    assert 0.0 < last.pose.covariance[0] < 1e-3 and 0.0 < last.twist.covariance[35] < 1e-2
+    assert 0.0 < last.pose.covariance[0] < 1e-3
+    assert 0.0 < last.twist.covariance[35] < 1e-2
 
 
 def test_fusion_says_at_once_that_the_camera_is_lost(bench):
@@ -224,7 +229,8 @@ def test_fusion_is_not_stopped_by_one_pose_from_the_future(bench):
     b.until(lambda: seconds(b.heard["odometry/filtered"][-1].header.stamp) > start + 1.4)
     assert all(m.twist.covariance[35] < 1.0 for m in b.heard["odometry/filtered"])
     stamps = [seconds(m.header.stamp) for m in b.heard["odometry/filtered"]]
-    assert max(stamps) < start + 2.0 and np.all(np.diff(stamps) > 0.0)
+    assert max(stamps) < start + 2.0
+    assert np.all(np.diff(stamps) > 0.0)
     assert b.node._fusion.counts["pose_from_future"] == 1
 
 
@@ -257,18 +263,26 @@ def test_planner_publishes_path_target_twist_error_and_speed(bench):
     t = b.now()
     b.say("odometry/filtered", odometry(t, x=-1.4, y=0.05, u=0.1))
     b.until(lambda: all(b.heard[k] for k in b.heard if k != "/diagnostics"))
-    target, twist, error = (b.heard[k][0] for k in ("control/target", "control/twist", "tracking/error"))
-    assert target.header.frame_id == "pool" and seconds(target.header.stamp) == pytest.approx(t, abs=1e-6)
-    assert math.dist((target.pose.position.x, target.pose.position.y), (-1.4, 0.05)) == pytest.approx(
-        0.4, abs=1e-3
+    target, twist, error = (
+        b.heard[k][0] for k in ("control/target", "control/twist", "tracking/error")
     )
+    assert target.header.frame_id == "pool"
+    assert seconds(target.header.stamp) == pytest.approx(t, abs=1e-6)
+    assert math.dist(
+        (target.pose.position.x, target.pose.position.y), (-1.4, 0.05)
+    ) == pytest.approx(0.4, abs=1e-3)
     assert yaw_of(target.pose.orientation) == pytest.approx(-math.asin(0.05 / 0.4), abs=2e-3)
-    assert (twist.header.frame_id, twist.twist.linear.x, twist.twist.angular.z) == ("base_link", 0.15, 0.0)
+    assert (twist.header.frame_id, twist.twist.linear.x, twist.twist.angular.z) == (
+        "base_link",
+        0.15,
+        0.0,
+    )
     assert error.vector.x == pytest.approx(0.05, abs=1e-6)
     assert error.vector.y == pytest.approx(-math.asin(0.05 / 0.4), abs=2e-3)
     assert error.vector.z == pytest.approx(0.05)
     path = b.heard["reference/path"][0]
-    assert path.header.frame_id == "pool" and path.poses[0].pose.position.x == pytest.approx(-1.5)
+    assert path.header.frame_id == "pool"
+    assert path.poses[0].pose.position.x == pytest.approx(-1.5)
     assert path.poses[-1].pose.position.x == pytest.approx(1.5)
     assert b.heard["reference/speed"][0].data == 0.15
 
@@ -291,9 +305,8 @@ def test_planner_does_not_follow_an_estimate_that_fusion_has_lost(bench, tmp_pat
     said = []
     node._target.publish = said.append
     node._on_odometry(odometry(t, y=0.6, yaw=1.57, variance=LOST_VARIANCE))
-    assert (
-        node._plan is None and not said
-    )  # it has not begun either: nearest to a place where the fish is not
+    assert node._plan is None
+    assert not said
     for k in range(10):
         node._on_odometry(odometry(t + 0.1 + 0.02 * k, y=-0.5, yaw=1.57))
     node._progress.settle()
@@ -302,10 +315,17 @@ def test_planner_does_not_follow_an_estimate_that_fusion_has_lost(bench, tmp_pat
         len(said),
         (tmp_path / "progress.json").read_text(),
     )
-    assert progress == pytest.approx(0.35, abs=0.01) and count == 10
+    assert progress == pytest.approx(0.35, abs=0.01)
+    assert count == 10
     for k in range(400):  # drifts past the end
-        node._on_odometry(odometry(t + 0.3 + 0.01 * k, y=-0.5 + 0.005 * k, yaw=1.57, variance=LOST_VARIANCE))
-    assert (node._planner.tracker.progress, len(said), node._planner.finished) == (progress, count, False)
+        node._on_odometry(
+            odometry(t + 0.3 + 0.01 * k, y=-0.5 + 0.005 * k, yaw=1.57, variance=LOST_VARIANCE)
+        )
+    assert (node._planner.tracker.progress, len(said), node._planner.finished) == (
+        progress,
+        count,
+        False,
+    )
     node._progress.settle()
     assert (tmp_path / "progress.json").read_text() == kept
     lost = odometry(t + 4.3, y=1.5, yaw=1.57, variance=LOST_VARIANCE)
@@ -313,7 +333,8 @@ def test_planner_does_not_follow_an_estimate_that_fusion_has_lost(bench, tmp_pat
     b.until(lambda: node._on_odometry(lost) or b.said(b"\x01", words))
     found = odometry(t + 4.4, y=-0.4, yaw=1.57)
     node._on_odometry(found)
-    assert node._planner.tracker.progress == pytest.approx(0.45, abs=0.01) and len(said) == count + 1
+    assert node._planner.tracker.progress == pytest.approx(0.45, abs=0.01)
+    assert len(said) == count + 1
     b.until(lambda: node._on_odometry(found) or b.said(b"\x00", "following letter I"))
 
 
@@ -371,23 +392,30 @@ def path_message(half_length=1.0, frame="pool", pose_frame=""):
     return message
 
 
-@pytest.mark.parametrize(("frame", "pose_frame"), [("pool", ""), ("", ""), ("", "pool"), ("pool", "pool")])
+@pytest.mark.parametrize(
+    ("frame", "pose_frame"), [("pool", ""), ("", ""), ("", "pool"), ("pool", "pool")]
+)
 def test_planner_takes_a_path_in_the_pool_or_in_no_frame(bench, frame, pose_frame):
     node = bench(PlannerNode, path="topic").node
     node._on_path(path_message(1.0, frame, pose_frame))
-    assert node._planner is not None and not node._problem
+    assert node._planner is not None
+    assert not node._problem
 
 
 @pytest.mark.parametrize(
     ("frame", "pose_frame"), [("base_link", ""), ("pool", "base_link"), ("", "base_link")]
 )
-def test_planner_refuses_a_path_in_another_frame_and_follows_the_one_before(bench, frame, pose_frame):
+def test_planner_refuses_a_path_in_another_frame_and_follows_the_one_before(
+    bench, frame, pose_frame
+):
     b = bench(PlannerNode, path="topic")
     b.node._on_path(path_message(1.0))
     before = b.node._planner
     b.node._on_path(path_message(0.5, frame, pose_frame))
     assert b.node._planner is before
-    b.until(lambda: b.said(b"\x02", "path refused: frame_id is 'base_link', expected 'pool' or none"))
+    b.until(
+        lambda: b.said(b"\x02", "path refused: frame_id is 'base_link', expected 'pool' or none")
+    )
 
 
 def swim(node, start, begin, end):
@@ -409,7 +437,8 @@ def test_a_path_sent_again_after_its_end_is_swum_again_and_in_mid_swim_is_harmle
     assert node._planner.finished
     node._on_path(path_message())
     time = swim(node, time, 0.9, 1.0)  # where it was left, far from the beginning
-    assert not node._planner.finished and node._planner.tracker.progress < 0.3
+    assert not node._planner.finished
+    assert node._planner.tracker.progress < 0.3
     time = swim(node, time, -1.0, -0.5)  # carried to the beginning
     assert node._planner.tracker.progress == pytest.approx(0.5, abs=0.02)
 
@@ -420,14 +449,17 @@ def test_a_planner_that_is_killed_after_the_end_does_not_begin_again_by_itself(b
     time = swim(first, 100.0, -1.0, 1.02)
     again._on_path(path_message())  # latched: its publisher lives
     swim(again, time, 1.0, 1.1)
-    assert first._planner.finished and again._planner.finished
+    assert first._planner.finished
+    assert again._planner.finished
 
 
 def test_planner_says_that_there_is_no_odometry_any_more(bench):
     b = bench(PlannerNode, path="I")
     b.until(lambda: b.said(b"\x00", "waiting for odometry"))
     b.say("odometry/filtered", odometry(b.now(), y=-0.85, yaw=1.57))
-    b.until(lambda: b.said(b"\x01", "no odometry for ") and b.said(b"\x01", " s; nothing is planned"))
+    b.until(
+        lambda: b.said(b"\x01", "no odometry for ") and b.said(b"\x01", " s; nothing is planned")
+    )
     assert b.node._silence() > 0.5
     there = odometry(b.now(), y=-0.85, yaw=1.57)
     b.until(lambda: b.say("odometry/filtered", there) or b.said(b"\x00", "following letter I"))
@@ -439,7 +471,8 @@ def test_planner_says_that_odometry_is_not_finite(bench):
     b.node._on_odometry(odometry(b.now(), y=-0.85, yaw=1.57))
     bad, words = odometry(b.now(), y=math.nan), "odometry is not finite; nothing is planned"
     b.until(lambda: b.node._on_odometry(bad) or b.said(b"\x01", words))
-    assert b.node._bad_odometry > 0 and b.node._loss == "odometry is not finite"
+    assert b.node._bad_odometry > 0
+    assert b.node._loss == "odometry is not finite"
 
 
 @pytest.mark.parametrize(
@@ -462,7 +495,9 @@ def test_a_silence_is_one_on_both_clocks(bench, elapsed, silence):
 
 
 @pytest.mark.parametrize("crash", [True, False])
-def test_a_planner_that_crashes_leaves_its_progress_and_one_that_ends_does_not(tmp_path, monkeypatch, crash):
+def test_a_planner_that_crashes_leaves_its_progress_and_one_that_ends_does_not(
+    tmp_path, monkeypatch, crash
+):
     file = tmp_path / "progress.json"
 
     def spin(node):
@@ -472,7 +507,9 @@ def test_a_planner_that_crashes_leaves_its_progress_and_one_that_ends_does_not(t
 
     monkeypatch.setattr(rclpy, "spin", spin)
     arguments = ["path:=straight", 'path_args:="{length: 2.0}"', f"state_file:={file}"]
-    monkeypatch.setattr(sys, "argv", ["node", "--ros-args", *(w for a in arguments for w in ("-p", a))])
+    monkeypatch.setattr(
+        sys, "argv", ["node", "--ros-args", *(w for a in arguments for w in ("-p", a))]
+    )
     if crash:
         with pytest.raises(ValueError, match="a mistake"):
             planner.main()
@@ -487,7 +524,8 @@ def test_planner_survives_a_path_to_a_far_point(bench, x):
     message.poses = [PoseStamped(), PoseStamped(), PoseStamped()]
     message.poses[1].pose.position.x, message.poses[2].pose.position.x = x, -x
     node._on_path(message)
-    assert "m long, expected at most 200 m" in node._problem and node._planner is None
+    assert "m long, expected at most 200 m" in node._problem
+    assert node._planner is None
 
 
 def drive(b, seconds, **changes):
@@ -529,7 +567,8 @@ def test_controller_streams_named_commands_and_labelled_gains(bench):
     message = b.heard["joint_command"][-1]
     assert list(message.name) == ["rotor", "rudder"]
     moved = commands(b, 60)
-    assert np.abs(moved[:, 1]).max() > 20.0 and moved[-1, 2] > 0.0  # rad/s; a left turn
+    assert np.abs(moved[:, 1]).max() > 20.0
+    assert moved[-1, 2] > 0.0
     gains = b.heard["control/gains"][-1]
     assert [d.label for d in gains.layout.dim] == ["steering,speed", "Kp,Ki,Kd"]
     assert len(gains.data) == 6
@@ -589,10 +628,14 @@ def test_controller_learns_nothing_of_the_water_from_an_estimate_that_fusion_has
     learned = node._controller._observer.state
     for k in range(20, 400):  # of a drifting accelerometer
         node._on_odometry(odometry(10.0 + 0.01 * k, u=0.01 * k, **{lost: LOST_VARIANCE}))
-    assert node._controller._observer.state == learned and node._controller._motion.surge == 0.0
-    assert node._odometry_time == pytest.approx(13.99)  # the watchdog sees that it comes, and why not to swim
+    assert node._controller._observer.state == learned
+    assert node._controller._motion.surge == 0.0
+    assert node._odometry_time == pytest.approx(
+        13.99
+    )  # the watchdog sees that it comes, and why not to swim
     signs = node._signs(14.0)
-    assert not node._watchdog.check(14.0, signs) and "lost" in node._watchdog.reason
+    assert not node._watchdog.check(14.0, signs)
+    assert "lost" in node._watchdog.reason
 
 
 def test_controller_glides_when_no_speed_is_wanted(bench):
@@ -639,7 +682,8 @@ def test_exciter_waits_for_the_estimate_swims_its_part_and_ends_at_rest(bench, t
     show(b, 2.5)
     assert b.said(b"\x00", "ended at 2.8 s, as programmed")
     moved = commands(b, 1000)
-    assert np.abs(moved[:, 1]).max() > 60.0 and moved[:, 2].max() == pytest.approx(0.3)  # rad/s, rad
+    assert np.abs(moved[:, 1]).max() > 60.0
+    assert moved[:, 2].max() == pytest.approx(0.3)
     np.testing.assert_allclose(moved[-5:, 1:], 0.0)
 
 
@@ -658,7 +702,8 @@ def test_exciter_stops_for_good_where_the_guard_finds_a_reason(bench, tmp_path, 
     assert np.abs(commands(b, 60)[:, 1]).max() > 40.0
     b.spin(1.2) if fault is None else show(b, 1.2, **fault)
     show(b, 0.5)
-    assert b.said(level, said) and b.said(level, "stopped at ")
+    assert b.said(level, said)
+    assert b.said(level, "stopped at ")
     np.testing.assert_allclose(commands(b, 5)[:, 1], 0.0)
 
 
@@ -685,7 +730,8 @@ def test_a_second_node_of_the_same_kind_is_warned_of_on_diagnostics_and_console(
     b.other.create_publisher(output, topic, 10)
     b.until(lambda: b.said(DiagnosticStatus.WARN, f"another publisher of /fish/{topic}"))
     said = [line for line in capfd.readouterr().err.splitlines() if "another publisher" in line]
-    assert len(said) == 1 and "[WARN]" in said[0]
+    assert len(said) == 1
+    assert "[WARN]" in said[0]
 
 
 @pytest.mark.parametrize(
@@ -705,9 +751,17 @@ def test_a_second_node_of_the_same_kind_is_warned_of_on_diagnostics_and_console(
         (controller.main, "lokahead:=0.4", "unknown parameter lokahead (did you mean lookahead?)"),
         (fusion.main, "foo:=1", "unknown parameter foo; known: "),
         (exciter.main, "use_sim_tme:=true", "unknown parameter use_sim_tme; known: begin, "),
-        (controller.main, "weights_file:=nowhere.safetensors", "nowhere.safetensors: cannot be read"),
+        (
+            controller.main,
+            "weights_file:=nowhere.safetensors",
+            "nowhere.safetensors: cannot be read",
+        ),
         (controller.main, f"weights_file:={__file__}", "not a safetensors file"),
-        (controller.main, "lookahead:=0.5", "does not fit: lookahead is 0.4, this controller runs at 0.5"),
+        (
+            controller.main,
+            "lookahead:=0.5",
+            "does not fit: lookahead is 0.4, this controller runs at 0.5",
+        ),
         (fusion.main, "gate:=-1.0", "gate is -1.0"),
         (exciter.main, "begin:=1.0", "program_file is empty, expected a file with a program"),
         (exciter.main, "program_file:=nowhere.json", "No such file or directory: 'nowhere.json'"),
@@ -718,7 +772,8 @@ def test_what_cannot_start_says_why_in_one_line(main, parameter, said, monkeypat
     monkeypatch.setattr(sys, "argv", ["node", "--ros-args", "-p", parameter])
     assert main() == 1
     end = capsys.readouterr().err
-    assert said in end and end.count("\n") == 1
+    assert said in end
+    assert end.count("\n") == 1
 
 
 @pytest.mark.parametrize("key", ["Y", "N", "O"])
@@ -740,7 +795,9 @@ def test_parameters_of_ros_itself_are_no_mistakes(graph):
         "qos_overrides./parameter_events.publisher.depth",
     )
     values = [f"{name}:={value}" for name, value in zip(names, ("true", "false", "3"), strict=True)]
-    node = FusionNode(cli_args=["--ros-args", *(word for value in values for word in ("-p", value))])
+    node = FusionNode(
+        cli_args=["--ros-args", *(word for value in values for word in ("-p", value))]
+    )
     follows_clock = node.get_parameter("use_sim_time").value
     node.destroy_node()
     rclpy.try_shutdown()
@@ -756,4 +813,5 @@ def test_a_program_that_cannot_start_exits_with_1(tmp_path):
         timeout=30,
     )
     assert ended.returncode == 1
-    assert ended.stderr.startswith("planner: unknown path") and ended.stderr.count("\n") == 1
+    assert ended.stderr.startswith("planner: unknown path")
+    assert ended.stderr.count("\n") == 1

@@ -91,7 +91,8 @@ def test_open_path_that_stops_finishes_at_its_end_only():
     tracker = PathTracker(path)
     states = [tracker.update([x, 0.02]) for x in np.arange(-0.5, 0.7, 0.01)]
     assert not any(p.finished for p in states if p.progress < 0.99)
-    assert states[-1].finished and states[-1].progress == pytest.approx(1.0)
+    assert states[-1].finished
+    assert states[-1].progress == pytest.approx(1.0)
 
 
 def test_open_path_that_loops_starts_again():
@@ -100,7 +101,8 @@ def test_open_path_that_loops_starts_again():
     for x in np.arange(-0.5, 0.55, 0.01):
         tracker.update([x, 0.0])
     seen = tracker.update([0.55, 0.0])
-    assert seen.progress == 0.0 and not seen.finished
+    assert seen.progress == 0.0
+    assert not seen.finished
     np.testing.assert_allclose(seen.target, [-0.5, 0.0], atol=1e-9)
 
 
@@ -108,10 +110,12 @@ def test_closed_path_keeps_counting_or_stops_after_a_lap():
     rng = np.random.default_rng(3)
     going = PathTracker(make_path("circle"))
     _, _, seen = swim_along(going.path, going, rng, laps=2.5)
-    assert seen[-1].progress == pytest.approx(2.5 * going.path.length, abs=0.03) and not seen[-1].finished
+    assert seen[-1].progress == pytest.approx(2.5 * going.path.length, abs=0.03)
+    assert not seen[-1].finished
     once = PathTracker(make_path("circle", end="stop"))
     _, _, seen = swim_along(once.path, once, rng, laps=1.05)
-    assert seen[-1].finished and not seen[-60].finished
+    assert seen[-1].finished
+    assert not seen[-60].finished
 
 
 def test_reset_and_nearest_start_in_the_middle():

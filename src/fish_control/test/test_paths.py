@@ -22,8 +22,10 @@ def drawing(tmp_path):
 def test_every_family_gives_an_even_finite_path_inside_the_pool(name, drawing):
     path = make_path(name, **({"file": str(drawing)} if name == "polyline" else {}))
     gaps = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
-    assert np.all(np.isfinite(path.points)) and np.all(np.isfinite(path.curvature))
-    assert gaps.max() <= path.spacing * (1.0 + 1e-9) and gaps.min() > 0.95 * path.spacing
+    assert np.all(np.isfinite(path.points))
+    assert np.all(np.isfinite(path.curvature))
+    assert gaps.max() <= path.spacing * (1.0 + 1e-9)
+    assert gaps.min() > 0.95 * path.spacing
     assert path.end == ("loop" if path.closed else "stop")
     check_inside_pool(path, 0.1)
 
@@ -54,7 +56,8 @@ def test_a_letter_by_its_name_or_its_family():
 
 def test_a_letter_of_given_height_is_in_the_middle():
     path = make_path("I", height=1.2, y=0.1)
-    assert path.points[:, 1].min() == pytest.approx(-0.5) and path.points[:, 1].max() == pytest.approx(0.7)
+    assert path.points[:, 1].min() == pytest.approx(-0.5)
+    assert path.points[:, 1].max() == pytest.approx(0.7)
 
 
 def test_letters_do_not_share_their_shape():
@@ -64,7 +67,9 @@ def test_letters_do_not_share_their_shape():
 
 def test_figure_eight_crosses_itself_at_its_centre():
     path = make_path("figure_eight")
-    np.testing.assert_allclose(path.point([0.0, 0.5 * path.length]), [[0.0, 0.0], [0.0, 0.0]], atol=1e-4)
+    np.testing.assert_allclose(
+        path.point([0.0, 0.5 * path.length]), [[0.0, 0.0], [0.0, 0.0]], atol=1e-4
+    )
     assert np.abs(np.linalg.det(path.tangent([0.0, 0.5 * path.length]))) > 0.5
 
 

@@ -25,7 +25,9 @@ def test_yaw_rate_is_speed_times_curvature():
     assert planner.plan(at(planner.path, 0.0)).yaw_rate == pytest.approx(0.4, rel=1e-3)
 
 
-@pytest.mark.parametrize(("compensates", "error"), [(True, 0.0), (False, np.arcsin(0.4 / (2.0 * 0.5)))])
+@pytest.mark.parametrize(
+    ("compensates", "error"), [(True, 0.0), (False, np.arcsin(0.4 / (2.0 * 0.5)))]
+)
 def test_the_law_that_is_asked_for_is_followed(compensates, error):
     """The paper's points inside a circle of 0.5 m by the direction of its chord of 0.4 m."""
     guidance = GuidanceConfig(compensate_curvature=compensates)
@@ -40,7 +42,8 @@ def test_speed_is_wanted_until_the_end_and_zero_for_good_after_it():
     assert follow(planner, length - 0.01, length + 0.05).speed == 0.0
     assert planner.finished
     after = planner.plan(at(planner.path, 1.0, speed=0.12))
-    assert after.speed == 0.0 and after.errors.speed == pytest.approx(-0.12)
+    assert after.speed == 0.0
+    assert after.errors.speed == pytest.approx(-0.12)
 
 
 @pytest.mark.parametrize(("x", "side"), [(-1.9, -1.0), (1.9, 1.0)])
@@ -49,13 +52,15 @@ def test_after_the_end_it_turns_to_the_side_with_more_room_and_stays_with_it(x, 
     follow(planner, 0.0, 1.01)
     for heading in (1.6, 0.0, 3.1, -2.0):
         plan = planner.plan(Motion(x, 0.55, heading, 0.1, 0.0, 0.0))
-        assert plan.speed == 0.0 and np.sign(plan.yaw_rate) == side
+        assert plan.speed == 0.0
+        assert np.sign(plan.yaw_rate) == side
 
 
 def test_closed_path_goes_on():
     planner = Planner(make_path("O"), 0.2)
     plan = follow(planner, 0.0, 1.5 * planner.path.length)
-    assert plan.speed == 0.2 and not planner.finished
+    assert plan.speed == 0.2
+    assert not planner.finished
 
 
 def test_errors_are_seen_from_the_mean_heading():
@@ -78,7 +83,9 @@ def test_a_gap_in_the_odometry_restarts_the_filters():
         planner.observe(0.01 * k, Motion(0, 0, 0, 0.2, 0.05, 3.0))
     planner.observe(5.0, Motion(0, 0, 0.1, 0.2, 0.0, 0.0))
     planner.tracker.reset(1.5)
-    assert planner.plan(Motion(0, 0, 0.1, 0.2, 0, 0)).errors.heading == pytest.approx(-0.1, abs=1e-9)
+    assert planner.plan(Motion(0, 0, 0.1, 0.2, 0, 0)).errors.heading == pytest.approx(
+        -0.1, abs=1e-9
+    )
 
 
 def test_start_nearest():

@@ -32,7 +32,8 @@ def test_csv_that_returns_to_its_start_is_closed(tmp_path):
     file = tmp_path / "square.csv"
     file.write_text("0,0\n1,0\n1,1\n0,1\n0,0\n")
     path = make_path("polyline", file=str(file), radius=0.0)
-    assert path.closed and path.length == pytest.approx(4.0, abs=1e-6)
+    assert path.closed
+    assert path.length == pytest.approx(4.0, abs=1e-6)
 
 
 def test_bad_line_is_named(tmp_path):
@@ -46,7 +47,7 @@ def test_bad_line_is_named(tmp_path):
 def test_a_csv_that_is_no_text_with_lines_is_refused(tmp_path, content):
     file = tmp_path / "bad.csv"
     file.write_bytes(content)
-    with pytest.raises(PathError, match="bad.csv' is not UTF-8 text with lines x,y"):
+    with pytest.raises(PathError, match=r"bad.csv' is not UTF-8 text with lines x,y"):
         make_path(str(file))
 
 
@@ -75,7 +76,9 @@ def test_svg_commands_absolute_and_relative_draw_the_same(tmp_path):
     absolute, _ = read_svg(
         svg(tmp_path, '<path d="M1 2 L4 2 H6 V5 C7 6 8 6 9 5 S11 4 12 5 Q13 7 14 5 T16 5"/>')
     )
-    relative, _ = read_svg(svg(tmp_path, '<path d="m1,2 3,0 h2 v3 c1 1 2 1 3 0 s2-1 3 0 q1 2 2 0 t2 0"/>'))
+    relative, _ = read_svg(
+        svg(tmp_path, '<path d="m1,2 3,0 h2 v3 c1 1 2 1 3 0 s2-1 3 0 q1 2 2 0 t2 0"/>')
+    )
     np.testing.assert_allclose(absolute, relative, atol=1e-12)
 
 

@@ -27,14 +27,18 @@ def test_the_refusal_says_where_how_far_and_what_to_do():
 def test_a_path_that_ends_towards_a_wall_needs_room_to_stop():
     """It ends at (-0.508, 0.855) m on course 2 rad; the turn's highest point is (1 + cos 2) 0.27 m above."""
     to_the_wall = {"length": 1.0, "course": 2.0, "x": -0.3, "y": 0.4}
-    with pytest.raises(PathOutsidePoolError, match=r"ends so that .* fish comes to \(-0.7[3-7], 1.01\)"):
+    with pytest.raises(
+        PathOutsidePoolError, match=r"ends so that .* fish comes to \(-0.7[3-7], 1.01\)"
+    ):
         check_inside_pool(make_path("straight", **to_the_wall), 0.1)
     check_inside_pool(make_path("straight", **to_the_wall, end="loop"), 0.1)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_path_that_ends_beside_a_wall_is_passed_as_the_fish_stops_on_the_other_side(side):
-    check_inside_pool(make_path("straight", length=1.0, course=np.pi / 2, x=side * 1.8, y=-0.2), 0.3)
+    check_inside_pool(
+        make_path("straight", length=1.0, course=np.pi / 2, x=side * 1.8, y=-0.2), 0.3
+    )
 
 
 def test_a_fish_stops_to_the_side_with_more_room():

@@ -83,7 +83,9 @@ def test_forgotten_progress_is_gone(file):
 def test_what_is_being_written_is_forgotten_too(file, monkeypatch):
     stalled, goes_on = threading.Event(), threading.Event()
     rename = os.replace
-    monkeypatch.setattr(os, "replace", lambda *args: stalled.set() or goes_on.wait(10.0) and rename(*args))
+    monkeypatch.setattr(
+        os, "replace", lambda *args: stalled.set() or (goes_on.wait(10.0) and rename(*args))
+    )
     keeper = ProgressFile(file)
     keeper.keep("a", 1.0, 0.5)
     assert stalled.wait(10.0)
@@ -122,6 +124,8 @@ def test_a_disk_that_stalls_does_not_hold_up_the_planner(file, monkeypatch):
 
 
 def test_digest_tells_paths_apart():
-    digests = {path_digest(make_path(name)) for name in "IROS"} | {path_digest(make_path("O", end="stop"))}
+    digests = {path_digest(make_path(name)) for name in "IROS"} | {
+        path_digest(make_path("O", end="stop"))
+    }
     assert len(digests) == 5
     assert path_digest(make_path("R")) == path_digest(make_path("letter", letter="R"))

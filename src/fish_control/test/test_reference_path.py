@@ -13,14 +13,20 @@ def test_circle_has_length_heading_and_curvature_of_a_circle():
     angle = -0.5 * np.pi + s / 0.6
     assert path.length == pytest.approx(2.0 * np.pi * 0.6, abs=1e-6)
     np.testing.assert_allclose(
-        path.point(s), np.column_stack([0.3 + 0.6 * np.cos(angle), -0.1 + 0.6 * np.sin(angle)]), atol=2e-6
+        path.point(s),
+        np.column_stack([0.3 + 0.6 * np.cos(angle), -0.1 + 0.6 * np.sin(angle)]),
+        atol=2e-6,
     )
-    np.testing.assert_allclose(path.tangent(s), np.column_stack([-np.sin(angle), np.cos(angle)]), atol=1e-4)
+    np.testing.assert_allclose(
+        path.tangent(s), np.column_stack([-np.sin(angle), np.cos(angle)]), atol=1e-4
+    )
     np.testing.assert_allclose(path.curvature_at(s), 1.0 / 0.6, rtol=1e-3)
 
 
 def test_clockwise_circle_curves_to_the_right():
-    assert make_path("circle", radius=0.5, direction=-1).curvature_at(1.0) == pytest.approx(-2.0, rel=1e-3)
+    assert make_path("circle", radius=0.5, direction=-1).curvature_at(1.0) == pytest.approx(
+        -2.0, rel=1e-3
+    )
 
 
 def test_closed_path_is_periodic():

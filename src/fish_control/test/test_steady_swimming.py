@@ -57,7 +57,9 @@ def test_feedforward_is_the_throttle_that_holds_the_speed(throttle, rudder, stea
 def test_rudder_and_slip_of_a_curve_are_those_of_the_fish(throttle, rudder, steady):
     surge, sway, curvature = steady[throttle, rudder]
     assert LIMITS.curvature_gain * curvature == pytest.approx(rudder, rel=0.1)
-    assert slip_lever(surge, GuidanceConfig()) * curvature == pytest.approx(-sway / surge, abs=0.012)
+    assert slip_lever(surge, GuidanceConfig()) * curvature == pytest.approx(
+        -sway / surge, abs=0.012
+    )
 
 
 def test_the_water_filter_foretells_how_a_change_of_throttle_is_answered():

@@ -45,7 +45,9 @@ def test_mean_of_sway_is_kept_and_its_swing_removed():
 
 def test_casadi_and_numpy_give_the_same():
     symbols = casadi.SX.sym("z", 7)
-    out = stroke_step(StrokeState(*(symbols[i] for i in range(4))), symbols[4], symbols[5], symbols[6])
+    out = stroke_step(
+        StrokeState(*(symbols[i] for i in range(4))), symbols[4], symbols[5], symbols[6]
+    )
     function = casadi.Function("stroke", [symbols], list(out))
     values = np.random.default_rng(0).normal(size=7) * 0.1 + [0, 0, 0, 0, 0, 0, 0.3]
     here = stroke_step(StrokeState(*values[:4]), values[4], values[5], values[6])

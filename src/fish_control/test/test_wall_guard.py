@@ -15,17 +15,41 @@ from fish_control.wall_guard import heads_for_a_wall, stopping_rudder
         (HALF_LENGTH - 0.34, 0.0, 0.0, 0.2, 0.0, True),  # 0.14 m from the wall a second later
         (HALF_LENGTH - 0.36, 0.0, 0.0, 0.2, 0.0, False),
         (HALF_LENGTH - 0.34, 0.0, math.pi, 0.2, 0.0, False),  # away from it
-        (HALF_LENGTH - 0.05, 0.0, math.pi, 0.05, 0.0, False),  # put down near the wall, swimming away
+        (
+            HALF_LENGTH - 0.05,
+            0.0,
+            math.pi,
+            0.05,
+            0.0,
+            False,
+        ),  # put down near the wall, swimming away
         (HALF_LENGTH - 0.34, 0.0, math.pi / 2, 0.0, -0.2, True),  # sideways
         (0.0, HALF_WIDTH - 0.34, 0.0, 0.0, 0.2, True),
         (0.0, HALF_WIDTH - 0.34, 0.0, 0.0, -0.2, False),
-        (0.0, HALF_WIDTH - 0.34, math.pi / 6, 0.3, 0.0, False),  # 0.15 m of the 0.3 m are towards the wall
-        (0.0, HALF_WIDTH - 0.34, math.pi / 6, 0.3, 0.2 / math.sqrt(3.0), True),  # and 0.1 m more sideways
+        (
+            0.0,
+            HALF_WIDTH - 0.34,
+            math.pi / 6,
+            0.3,
+            0.0,
+            False,
+        ),  # 0.15 m of the 0.3 m are towards the wall
+        (
+            0.0,
+            HALF_WIDTH - 0.34,
+            math.pi / 6,
+            0.3,
+            0.2 / math.sqrt(3.0),
+            True,
+        ),  # and 0.1 m more sideways
         (0.0, 0.0, 0.0, 0.3, 0.0, False),
     ],
 )
 def test_a_fish_that_heads_for_a_wall_is_seen(x, y, heading, surge, sway, stopped):
-    assert heads_for_a_wall(Motion(x, y, heading, surge, sway, 0.0), horizon=1.0, margin=0.15) is stopped
+    assert (
+        heads_for_a_wall(Motion(x, y, heading, surge, sway, 0.0), horizon=1.0, margin=0.15)
+        is stopped
+    )
 
 
 def test_the_rudder_goes_to_the_side_with_more_room():

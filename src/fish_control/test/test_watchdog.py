@@ -39,14 +39,17 @@ def test_it_waits_for_odometry_and_target_without_calling_it_a_stop():
     assert dog.reason == "waiting for odometry"
     assert not dog.check(0.1, replace(GOOD, target_age=None))
     assert (dog.state, dog.stops) == ("waiting", 0)
-    assert dog.check(0.2, GOOD) and dog.state == "swimming"
+    assert dog.check(0.2, GOOD)
+    assert dog.state == "swimming"
 
 
 @pytest.mark.parametrize("said", FAULTS)
 def test_every_fault_stops_at_once_and_is_said(said):
     dog = swimming()
     assert not dog.check(0.01, FAULTS[said])
-    assert dog.state == "stopped" and dog.reason.startswith(said) and dog.stops == 1
+    assert dog.state == "stopped"
+    assert dog.reason.startswith(said)
+    assert dog.stops == 1
 
 
 def test_clocks_that_differ_by_little_are_no_fault():
@@ -63,7 +66,11 @@ def test_what_is_lost_is_lost_at_any_age(variance):
     no_pose, no_twist = (
         replace(SURE, age=99.0, **{k: variance}) for k in ("pose_variance", "twist_variance")
     )
-    assert pose_loss(no_pose, 1.0) == loss(no_pose, 1.0) == "camera lost: fusion does not vouch for the pose"
+    assert (
+        pose_loss(no_pose, 1.0)
+        == loss(no_pose, 1.0)
+        == "camera lost: fusion does not vouch for the pose"
+    )
     assert pose_loss(no_twist, 1.0) is None
     assert loss(no_twist, 1.0) == "IMU lost: fusion does not vouch for the velocity"
     assert loss(replace(SURE, age=99.0), 1.0) is None
@@ -90,7 +97,8 @@ def test_the_delay_starts_again_with_every_fault():
 def test_manual_resumes_only_when_told_and_all_is_well():
     dog = swimming(resume="manual")
     dog.check(0.1, FAULTS["camera lost"])
-    assert dog.release() is not None and "camera lost" in dog.release()
+    assert dog.release() is not None
+    assert "camera lost" in dog.release()
     assert not dog.check(100.0, GOOD)
     assert dog.reason == "all is well again; call resume"
     assert dog.release() is None

@@ -45,9 +45,16 @@ def generate_launch_description() -> LaunchDescription:
     """Arguments, then one node per driver."""
     arguments = [
         DeclareLaunchArgument(
-            "config", default_value="", description="folder of parameter files that override the installed"
+            "config",
+            default_value="",
+            description="folder of parameter files that override the installed",
         ),
-        DeclareLaunchArgument("namespace", default_value="fish", description="namespace of all nodes"),
-        *(DeclareLaunchArgument(name, default_value="true", description=f"start {name}") for name in DRIVERS),
+        DeclareLaunchArgument(
+            "namespace", default_value="fish", description="namespace of all nodes"
+        ),
+        *(
+            DeclareLaunchArgument(name, default_value="true", description=f"start {name}")
+            for name in DRIVERS
+        ),
     ]
     return LaunchDescription([*arguments, OpaqueFunction(function=_nodes)])

@@ -9,7 +9,7 @@ import pytest
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 sys.path.insert(0, str(Path(__file__).parent))
 
-from fish_hw.emulators.vertiq import VertiqEmulator  # noqa: E402
+from fish_hw.emulators.vertiq import VertiqEmulator
 
 
 @pytest.fixture

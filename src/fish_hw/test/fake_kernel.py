@@ -22,7 +22,9 @@ class FakeKernel:
 
     def ioctl(self, descriptor, request, argument=0, *_rest):
         if descriptor is None:
-            raise TypeError("argument must be an int, or have a fileno() method.")  # as fcntl.ioctl says
+            raise TypeError(
+                "argument must be an int, or have a fileno() method."
+            )  # as fcntl.ioctl says
         code = self.fault()
         if code is not None:
             raise OSError(code, os.strerror(code))
@@ -52,7 +54,9 @@ def refuse_as_sysfs_does(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def write_text(path: Path, text: str) -> int:
         if path.name in ("period", "duty_cycle", "enable") and path.exists():
-            state = {name: int((path.parent / name).read_text()) for name in ("period", "duty_cycle")}
+            state = {
+                name: int((path.parent / name).read_text()) for name in ("period", "duty_cycle")
+            }
             state[path.name] = int(text)
             if state["period"] == 0 or state["duty_cycle"] > state["period"]:
                 raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))

@@ -60,7 +60,8 @@ def test_request_asks_for_one_input_with_falling_edges(kernel):
     line = InterruptLine(str(kernel.chip), 17)
     assert len(kernel.request) == 592
     offset, flags, lines = (
-        struct.unpack_from(f, kernel.request, at)[0] for f, at in (("<I", 0), ("<Q", 288), ("<I", 560))
+        struct.unpack_from(f, kernel.request, at)[0]
+        for f, at in (("<I", 0), ("<Q", 288), ("<I", 560))
     )
     assert (offset, lines) == (17, 1)
     assert flags == 0x4 | 0x20 | 0x100  # input, falling edge, pull-up

@@ -25,7 +25,15 @@ ROS = {
     "builtin_interfaces",
     "rcl_interfaces",
 }
-OTHERS = {"fish_sim", "fish_vision", "fish_control", "fish_train", "fish_bag", "fish_sysid", "fish_bringup"}
+OTHERS = {
+    "fish_sim",
+    "fish_vision",
+    "fish_control",
+    "fish_train",
+    "fish_bag",
+    "fish_sysid",
+    "fish_bringup",
+}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 

@@ -115,7 +115,13 @@ def age_s(graph: Graph, stamp) -> float:
 
 
 def test_rotor_topics(graph, vertiq_emulator):
-    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.2, module_timeout_s=1.0)
+    g = graph(
+        RotorNode,
+        port=vertiq_emulator.port,
+        resume="auto",
+        reply_timeout_s=0.2,
+        module_timeout_s=1.0,
+    )
     states = g.listen(JointState, "joint_states")
     battery = g.listen(BatteryState, "battery_state")
     diagnostics = g.listen(DiagnosticArray, "/diagnostics")
@@ -135,10 +141,17 @@ def test_rotor_topics(graph, vertiq_emulator):
 
 
 def test_rotor_coasts_when_commands_end(graph, vertiq_emulator):
-    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.2, module_timeout_s=1.0)
+    g = graph(
+        RotorNode,
+        port=vertiq_emulator.port,
+        resume="auto",
+        reply_timeout_s=0.2,
+        module_timeout_s=1.0,
+    )
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     assert g.spin(
-        lambda: vertiq_emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0))
+        lambda: vertiq_emulator.mode == VELOCITY_MODE,
+        lambda: publisher.publish(command(rotor=50.0)),
     )
     assert g.spin(lambda: vertiq_emulator.mode == reg.COAST)
     assert vertiq_emulator.timeouts == 0  # told to, not left to its own watchdog
@@ -156,17 +169,30 @@ def test_rotor_coasts_when_commands_end(graph, vertiq_emulator):
     ids=["empty", "other joint", "no value", "nan", "inf"],
 )
 def test_rotor_survives_bad_commands(graph, vertiq_emulator, bad):
-    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.2, module_timeout_s=1.0)
+    g = graph(
+        RotorNode,
+        port=vertiq_emulator.port,
+        resume="auto",
+        reply_timeout_s=0.2,
+        module_timeout_s=1.0,
+    )
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     assert g.spin(lambda: g.node._driver.guard.rejected > 3, lambda: publisher.publish(bad))
     assert vertiq_emulator.mode == reg.COAST
     assert g.spin(
-        lambda: vertiq_emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0))
+        lambda: vertiq_emulator.mode == VELOCITY_MODE,
+        lambda: publisher.publish(command(rotor=50.0)),
     )
 
 
 def test_rotor_services(graph, vertiq_emulator):
-    g = graph(RotorNode, port=vertiq_emulator.port, resume="auto", reply_timeout_s=0.2, module_timeout_s=1.0)
+    g = graph(
+        RotorNode,
+        port=vertiq_emulator.port,
+        resume="auto",
+        reply_timeout_s=0.2,
+        module_timeout_s=1.0,
+    )
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
 
     def drive() -> None:
@@ -216,7 +242,9 @@ def test_imu_topics(graph):
 def test_imu_message_keeps_every_axis(graph):
     """The emulated sensor turns about one axis only."""
     g = graph(ImuNode, bus="emulator", orientation_stddev=0.1, gyro_stddev=0.2, accel_stddev=0.3)
-    message = g.node._message(ImuSample(1.0, (0.1, 0.2, 0.3, 0.9), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 3))
+    message = g.node._message(
+        ImuSample(1.0, (0.1, 0.2, 0.3, 0.9), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 3)
+    )
     q, w, a = message.orientation, message.angular_velocity, message.linear_acceleration
     assert (q.x, q.y, q.z, q.w) == (0.1, 0.2, 0.3, 0.9)
     assert (w.x, w.y, w.z, a.x, a.y, a.z) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -230,7 +258,9 @@ def test_imu_message_keeps_every_axis(graph):
 
 def test_a_stamp_is_the_ros_time_of_the_moment(graph):
     g = graph(RudderNode, backend="emulator")
-    assert 4.99 < age_s(g, g.node.stamp(time.monotonic() - 5.0)) < 15.0  # a busy computer looks later
+    assert (
+        4.99 < age_s(g, g.node.stamp(time.monotonic() - 5.0)) < 15.0
+    )  # a busy computer looks later
 
 
 def test_camera_topics(graph):
@@ -242,7 +272,8 @@ def test_camera_topics(graph):
     assert compressed[-1].header.frame_id == "overhead_optical"
     assert jpeg_size(bytes(compressed[-1].data)) == (160, 120)
     stamps = [
-        {(m.header.stamp.sec, m.header.stamp.nanosec) for m in topic} for topic in (compressed, info, raw)
+        {(m.header.stamp.sec, m.header.stamp.nanosec) for m in topic}
+        for topic in (compressed, info, raw)
     ]
     assert len(stamps[0] & stamps[1] & stamps[2]) > 3
     assert (raw[-1].encoding, raw[-1].step, len(raw[-1].data)) == ("bgr8", 480, 160 * 120 * 3)
@@ -305,7 +336,9 @@ def test_losses_are_logged_as_errors_and_doubts_as_warnings(graph, monkeypatch):
 
 @pytest.mark.parametrize("node_class", [RotorNode, RudderNode, ImuNode, CameraNode])
 def test_a_misspelt_parameter_is_refused_before_the_device_is_opened(graph, node_class):
-    with pytest.raises(ValueError, match=r"unknown parameter rate_zh \(did you mean rate_hz\?\); known: "):
+    with pytest.raises(
+        ValueError, match=r"unknown parameter rate_zh \(did you mean rate_hz\?\); known: "
+    ):
         graph(node_class, rate_zh=50.0, use_sim_time="true")
 
 
@@ -317,9 +350,17 @@ def test_absent_port_is_refused(graph):
 def test_port_that_appears_later(graph, tmp_path, capfd):
     g = graph(RudderNode, chip=str(tmp_path / "pwmchip0"), startup_timeout_s=60)
     diagnostics = g.listen(DiagnosticArray, "/diagnostics")
-    assert g.spin(lambda: bool(diagnostics) and diagnostics[-1].status[0].level == DiagnosticStatus.ERROR)
-    said = [line for line in capfd.readouterr().err.splitlines() if diagnostics[-1].status[0].message in line]
-    assert any("trying for" not in line for line in said)  # the status itself, beside the first try's error
+    assert g.spin(
+        lambda: bool(diagnostics) and diagnostics[-1].status[0].level == DiagnosticStatus.ERROR
+    )
+    said = [
+        line
+        for line in capfd.readouterr().err.splitlines()
+        if diagnostics[-1].status[0].message in line
+    ]
+    assert any(
+        "trying for" not in line for line in said
+    )  # the status itself, beside the first try's error
     chip = PwmChipEmulator(tmp_path / "pwmchip0")
     assert g.spin(lambda: chip.channel.joinpath("enable").read_text() == "1\n")
 
@@ -408,7 +449,9 @@ def signalled(number: signal.Signals, after: Callable) -> Callable:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("moment", ["node made", "output opened", "pulses on", "connected", "worker made"])
+@pytest.mark.parametrize(
+    "moment", ["node made", "output opened", "pulses on", "connected", "worker made"]
+)
 def test_a_signal_at_any_moment_of_the_start_leaves_the_device_safe(
     own_process, tmp_path, monkeypatch, capfd, number, moment
 ):
@@ -427,7 +470,8 @@ def test_a_signal_at_any_moment_of_the_start_leaves_the_device_safe(
     run(make_node, "rudder")
     assert chip.read("enable") == 0
     assert moment in ("node made", "output opened") or chip.read("duty_cycle") == 1_500_000
-    assert "Traceback" not in capfd.readouterr().err and not rclpy.ok()
+    assert "Traceback" not in capfd.readouterr().err
+    assert not rclpy.ok()
 
 
 def driven_rotor(emulator: VertiqEmulator, graph: Callable) -> tuple[subprocess.Popen, Graph]:
@@ -438,7 +482,9 @@ def driven_rotor(emulator: VertiqEmulator, graph: Callable) -> tuple[subprocess.
     first_words(process, "device ready")
     g = graph(RudderNode, backend="emulator")  # any node: this side needs an executor only
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
-    assert g.spin(lambda: emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0)))
+    assert g.spin(
+        lambda: emulator.mode == VELOCITY_MODE, lambda: publisher.publish(command(rotor=50.0))
+    )
     return process, g
 
 
@@ -447,7 +493,8 @@ def test_sigterm_coasts_a_spinning_rotor(graph, vertiq_emulator):
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0
-    assert vertiq_emulator.mode == reg.COAST and vertiq_emulator.timeouts == 0
+    assert vertiq_emulator.mode == reg.COAST
+    assert vertiq_emulator.timeouts == 0
 
 
 def test_sigkill_leaves_it_to_the_modules_own_watchdog(graph, vertiq_emulator):
@@ -455,12 +502,15 @@ def test_sigkill_leaves_it_to_the_modules_own_watchdog(graph, vertiq_emulator):
     process.kill()
     process.communicate(timeout=TIMEOUT_S)
     assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
-    assert vertiq_emulator.timeouts >= 1 and vertiq_emulator.timeout_s == 0.25
+    assert vertiq_emulator.timeouts >= 1
+    assert vertiq_emulator.timeout_s == 0.25
 
 
 def test_missing_port_is_one_line_and_an_exit_code():
     process = start("rotor", "-p", "port:=/dev/ttyX9")
     output, _ = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 1
-    assert output.startswith("rotor: cannot open serial port /dev/ttyX9: there is no such port; available: ")
+    assert output.startswith(
+        "rotor: cannot open serial port /dev/ttyX9: there is no such port; available: "
+    )
     assert output.count("\n") == 1

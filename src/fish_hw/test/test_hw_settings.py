@@ -11,7 +11,12 @@ from fish_hw.settings.imu import ImuSettings
 from fish_hw.settings.rotor import RotorSettings
 from fish_hw.settings.rudder import RudderSettings
 
-SETTINGS = {"rotor": RotorSettings, "rudder": RudderSettings, "imu": ImuSettings, "camera": CameraSettings}
+SETTINGS = {
+    "rotor": RotorSettings,
+    "rudder": RudderSettings,
+    "imu": ImuSettings,
+    "camera": CameraSettings,
+}
 CONFIG = Path(__file__).parents[1] / "config"
 
 
@@ -25,7 +30,12 @@ def test_yaml_has_every_parameter_with_its_default(name):
     ("settings", "field", "value", "expected"),
     [
         (RotorSettings, "sign", 0, "sign is 0, expected one of 1, -1"),
-        (RotorSettings, "resume", "soon", "resume is 'soon', expected one of 'zero', 'auto', 'manual'"),
+        (
+            RotorSettings,
+            "resume",
+            "soon",
+            "resume is 'soon', expected one of 'zero', 'auto', 'manual'",
+        ),
         (RotorSettings, "stale_s", 5.0, "stale_s is 5.0, expected 0.03 to 1.0"),
         (RotorSettings, "cell_warn_v", 3.0, "cell_warn_v is 3.0, expected 3.3 to 5.0"),
         (RotorSettings, "max_velocity", float("nan"), "max_velocity is nan"),

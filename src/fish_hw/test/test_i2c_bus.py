@@ -28,7 +28,8 @@ def test_real_driver_reads_samples_through_smbus2(kernel):
     bno = Bno085(bus, 0x4A, 1000, sleep=lambda _: None)
     assert str(bno.start()) == "part 10003608 version 3.2.7 build 370"
     samples = [s for _ in range(50) for s in bno.poll()]
-    assert samples and samples[0].acceleration[2] == pytest.approx(9.8, abs=0.5)
+    assert samples
+    assert samples[0].acceleration[2] == pytest.approx(9.8, abs=0.5)
     assert set(kernel.messages_per_transfer) == {1}  # never a repeated start
 
 
@@ -38,7 +39,9 @@ def test_long_reads_are_not_cut(kernel):
     assert bus.read(0x4A, 504)[4:] == bytes(range(250)) * 2
 
 
-@pytest.mark.parametrize("code", [errno.EREMOTEIO, errno.ETIMEDOUT, errno.EIO, errno.EAGAIN, errno.ENXIO])
+@pytest.mark.parametrize(
+    "code", [errno.EREMOTEIO, errno.ETIMEDOUT, errno.EIO, errno.EAGAIN, errno.ENXIO]
+)
 def test_bus_errors(kernel, code):
     bus = KernelI2c(str(kernel.path))
     kernel.fault = lambda: code
@@ -60,11 +63,13 @@ def test_closed_bus(kernel):
 
 
 def test_missing_bus_names_it():
-    with pytest.raises(PortUnavailable, match="cannot open I2C bus /dev/i2c-77: there is no such bus"):
+    with pytest.raises(
+        PortUnavailable, match="cannot open I2C bus /dev/i2c-77: there is no such bus"
+    ):
         KernelI2c("/dev/i2c-77")
 
 
 def test_missing_library_names_the_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "smbus2", None)
-    with pytest.raises(PortUnavailable, match="pip install smbus2.*apt install python3-smbus2"):
+    with pytest.raises(PortUnavailable, match=r"pip install smbus2.*apt install python3-smbus2"):
         KernelI2c("/dev/i2c-1")

@@ -1,5 +1,7 @@
 """When a lost device is tried again."""
 
+import itertools
+
 import pytest
 
 from fish_hw.devices.reconnect import Link, Loss
@@ -17,7 +19,7 @@ def failed_attempts(link: Link, start: float, duration_s: float) -> list[float]:
 
 
 def waits(times: list[float]) -> list[float]:
-    return [b - a for a, b in zip(times, times[1:], strict=False)]
+    return [b - a for a, b in itertools.pairwise(times)]
 
 
 def test_waits_double_up_to_the_longest_and_start_again_after_data() -> None:
@@ -34,7 +36,8 @@ def test_a_reason_is_said_when_it_is_new_and_the_return_once() -> None:
     link = Link("device")
     assert link.works() == []  # it was never away
     events = [*link.lose("gone", 0.0), *link.lose("gone", 1.0), *link.lose("busy", 2.0)]
-    assert events == ["gone", "busy"] and all(isinstance(event, Loss) for event in events)
+    assert events == ["gone", "busy"]
+    assert all(isinstance(event, Loss) for event in events)
     assert link.trouble == "busy"
     assert [*link.works(), *link.works()] == ["device connected again"]
     assert link.lose("busy", 3.0) == ["busy"]  # a second loss is news though its reason is not

@@ -56,7 +56,9 @@ def test_mounting_turns_everything_into_base_axes():
     R_level_sensor = matrix(*level_base) @ R_base_sensor
     w, a = np.array([0.1, 0.2, 0.3]), np.array([1.0, -2.0, 9.0])
     # quaternion of the sensor by its columns, made with an independent formula
-    x, y, z, s = (1.015 * c for c in _quaternion(R_level_sensor))  # as far from 1 as a reading may be
+    x, y, z, s = (
+        1.015 * c for c in _quaternion(R_level_sensor)
+    )  # as far from 1 as a reading may be
     sample = Mounting(settings).to_base(ImuSample(1.0, (x, y, z, s), tuple(w), tuple(a), 3))
     assert norm(sample.orientation) == pytest.approx(1.0)
     assert sample.angular_velocity == pytest.approx(R_base_sensor @ w)

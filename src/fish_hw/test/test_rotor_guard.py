@@ -1,5 +1,6 @@
 """The rotor's watchdog, limits and latch, on simulated time."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -50,7 +51,7 @@ def test_speed_and_acceleration_are_limited(direction):
     bench = Bench(replace(SETTINGS, max_velocity=50.0, max_acceleration=500.0))
     sent = [direction * a.velocity for a in bench.run(0.5, lambda _: direction * 200.0)]
     assert max(sent) == 50.0
-    assert max(b - a for a, b in zip(sent, sent[1:], strict=False)) <= 500.0 * DT + 1e-9
+    assert max(b - a for a, b in itertools.pairwise(sent)) <= 500.0 * DT + 1e-9
     assert bench.guard.clamped == 50
 
 
@@ -69,13 +70,16 @@ def test_stale_command_ramps_down_then_coasts_then_is_silent(direction):
     held = [v for v in speeds if v == 100.0]
     assert len(held) * DT == pytest.approx(SETTINGS.stale_s, abs=2 * DT)
     ramp = speeds[len(held) :]
-    assert all(b < a for a, b in zip(ramp, ramp[1:], strict=False))
+    assert all(b < a for a, b in itertools.pairwise(ramp))
     assert len(ramp) * DT == pytest.approx(SETTINGS.ramp_s, abs=2 * DT)
     coast = next(i for i, a in enumerate(after) if a.coast)
     quiet = [a for a in after[coast + 1 :] if not (a.ask or a.coast or a.velocity is not None)]
     assert len(quiet) * DT > SETTINGS.module_timeout_s  # the module's own watchdog can fire
-    assert not any(a.ask for a in after[len(held) : coast])  # no polling from the moment it is stale
-    assert after[-1].ask and after[-1].velocity is None
+    assert not any(
+        a.ask for a in after[len(held) : coast]
+    )  # no polling from the moment it is stale
+    assert after[-1].ask
+    assert after[-1].velocity is None
     assert bench.guard.phase is Phase.RESTING
     assert "no command for 0.15 s" in bench.guard.reason
 
@@ -86,7 +90,7 @@ def test_ramp_respects_the_acceleration_limit(direction):
     bench.run(1.0, lambda _: direction * 100.0)
     speeds = [direction * a.velocity for a in bench.run(0.6) if a.velocity is not None]
     assert len(speeds) > 30  # 0.15 s until it is stale, 0.2 s for the ramp
-    assert max(a - b for a, b in zip(speeds, speeds[1:], strict=False)) <= 500.0 * DT + 1e-9
+    assert max(a - b for a, b in itertools.pairwise(speeds)) <= 500.0 * DT + 1e-9
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
@@ -162,7 +166,8 @@ def test_operator_stop_holds_whatever_the_setting(resume):
     bench.run(0.5, lambda _: 0.0)
     bench.guard.stop("stopped by the operator", hold=True)
     bench.run(2.0, lambda _: 0.0)
-    assert bench.guard.latched and bench.guard.reason == "stopped by the operator"
+    assert bench.guard.latched
+    assert bench.guard.reason == "stopped by the operator"
     bench.guard.enable()
     assert bench.run(0.1, oscillation)[-1].velocity is not None
 
@@ -175,7 +180,9 @@ def test_resume_auto_goes_on_after_the_stop_is_complete():
     assert any(a.coast for a in actions)
     assert actions[-1].velocity == 100.0
     first = next(
-        a.velocity for a in actions[actions.index(next(a for a in actions if a.coast)) :] if a.velocity
+        a.velocity
+        for a in actions[actions.index(next(a for a in actions if a.coast)) :]
+        if a.velocity
     )
     assert first <= SETTINGS.max_acceleration * DT + 1e-9  # from rest again, no jump
 

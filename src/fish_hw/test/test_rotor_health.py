@@ -46,7 +46,10 @@ def test_missing_answers_leave_the_judgement_as_it_was():
     stopped = health.judge(replace(WELL, volts=4 * 3.2, coil_c=90.0), 0.0).stops
     assert len(stopped) == 2
     assert health.judge(RotorTelemetry(), 1.0).stops == stopped
-    assert health.judge(RotorTelemetry(faults=0b10), 2.0).stops == (*stopped, "module faults: input voltage")
+    assert health.judge(RotorTelemetry(faults=0b10), 2.0).stops == (
+        *stopped,
+        "module faults: input voltage",
+    )
     assert RotorHealth(SETTINGS).judge(RotorTelemetry(faults=0), 0.0).stops == ()
 
 
@@ -63,5 +66,7 @@ def test_missing_answers_leave_the_judgement_as_it_was():
 )
 def test_limits(change, warning, stop):
     health = RotorHealth(SETTINGS).judge(replace(WELL, **change), 0.0)
-    assert warning in "".join(health.warnings) and bool(warning) == bool(health.warnings)
-    assert stop in "".join(health.stops) and bool(stop) == bool(health.stops)
+    assert warning in "".join(health.warnings)
+    assert bool(warning) == bool(health.warnings)
+    assert stop in "".join(health.stops)
+    assert bool(stop) == bool(health.stops)

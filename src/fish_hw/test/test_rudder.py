@@ -1,6 +1,7 @@
 """Rudder: pulses, limits, watchdog, both PWM outputs, and the driver around them."""
 
 import errno
+import itertools
 import math
 import os
 import threading
@@ -28,7 +29,17 @@ from fish_hw.transport.sysfs_pwm import SysfsPwm
 SETTINGS = RudderSettings()
 DT = 0.01
 BOTH_WAYS = pytest.mark.parametrize("direction", [1.0, -1.0], ids=["left", "right"])
-PCA_COUNTS = {500: 102, 900: 184, 1000: 205, 1250: 256, 1500: 307, 1750: 359, 2000: 410, 2100: 430, 2500: 512}
+PCA_COUNTS = {
+    500: 102,
+    900: 184,
+    1000: 205,
+    1250: 256,
+    1500: 307,
+    1750: 359,
+    2000: 410,
+    2100: 430,
+    2500: 512,
+}
 
 
 @pytest.mark.parametrize(
@@ -72,7 +83,8 @@ def test_slew_and_range(direction):
     bench = ServoBench()
     angles = [direction * a for a in bench.run(1.0, direction * 2.0)]
     steps = [b - a for a, b in zip([0.0, *angles], angles, strict=False)]
-    assert steps[0] == 0.0 and max(steps) == pytest.approx(SETTINGS.max_rate * DT)
+    assert steps[0] == 0.0
+    assert max(steps) == pytest.approx(SETTINGS.max_rate * DT)
     assert angles[-1] == SETTINGS.max_angle
     assert bench.servo.counters.clamped == 100
 
@@ -85,7 +97,7 @@ def test_stale_command_centres_at_the_slew_rate(direction):
     angles = [direction * a for a in bench.run(1.0)]
     held = sum(a == pytest.approx(0.6) for a in angles)
     assert held * DT == pytest.approx(SETTINGS.stale_s, abs=2 * DT)
-    assert max(a - b for a, b in zip(angles, angles[1:], strict=False)) == pytest.approx(
+    assert max(a - b for a, b in itertools.pairwise(angles)) == pytest.approx(
         SETTINGS.max_rate * DT
     )
     assert angles[-1] == 0.0
@@ -111,16 +123,31 @@ def test_bad_numbers_do_not_feed_the_watchdog(bad):
 def test_pca9685_start_sequence_and_counts():
     board, slept = Pca9685Emulator(), []
     pwm = Pca9685Pwm(
-        I2cBusEmulator({0x40: board}), 0x40, 0, 25e6, 50.0, sleep=lambda s: slept.append((len(board.log), s))
+        I2cBusEmulator({0x40: board}),
+        0x40,
+        0,
+        25e6,
+        50.0,
+        sleep=lambda s: slept.append((len(board.log), s)),
     )
     pwm.start(1_500_000)
-    assert [w.hex(" ") for w in board.log] == ["00 00", "00 10", "fe 79", "00 00", "00 a0", "06 00 00 33 01"]
+    assert [w.hex(" ") for w in board.log] == [
+        "00 00",
+        "00 10",
+        "fe 79",
+        "00 00",
+        "00 a0",
+        "06 00 00 33 01",
+    ]
     [(written, waited_s)] = slept
-    assert written == 4 and waited_s >= 500e-6  # the oscillator runs before the restart
+    assert written == 4
+    assert waited_s >= 500e-6
     for us, count in PCA_COUNTS.items():
         pwm.set_pulse_ns(1000 * us)
         assert board.log[-1] == bytes([0x06, 0, 0]) + count.to_bytes(2, "little")
-    pwm.set_pulse_ns(30_000_000)  # longer than the period: bit 12 of the counter would be "full off"
+    pwm.set_pulse_ns(
+        30_000_000
+    )  # longer than the period: bit 12 of the counter would be "full off"
     assert board.pulse_counts(0) == (0, 4095)
     pwm.stop()
     assert board.log[-1].hex(" ") == "06 00 00 00 10"
@@ -169,7 +196,11 @@ def test_sysfs_pulse(chip, us):
     pwm = SysfsPwm(str(chip.chip), 0, 20_000_000)
     pwm.start(1_500_000)
     pwm.set_pulse_ns(1000 * us)
-    assert (chip.read("period"), chip.read("duty_cycle"), chip.read("enable")) == (20_000_000, 1000 * us, 1)
+    assert (chip.read("period"), chip.read("duty_cycle"), chip.read("enable")) == (
+        20_000_000,
+        1000 * us,
+        1,
+    )
     assert pwm.is_running()
     pwm.stop()
     assert not pwm.is_running()
@@ -182,7 +213,11 @@ def test_sysfs_starts_whatever_the_channel_was_left_at(chip, left):
         (chip.channel / "period").write_text("40000000\n")
         (chip.channel / "duty_cycle").write_text(f"{left}\n")
     SysfsPwm(str(chip.chip), 0, 20_000_000).start(1_500_000)
-    assert (chip.read("period"), chip.read("duty_cycle"), chip.read("enable")) == (20_000_000, 1_500_000, 1)
+    assert (chip.read("period"), chip.read("duty_cycle"), chip.read("enable")) == (
+        20_000_000,
+        1_500_000,
+        1,
+    )
 
 
 def test_sysfs_export_waits_for_the_files(tmp_path):
@@ -237,7 +272,7 @@ def test_sysfs_files_that_never_become_writable(tmp_path):
     folder = tmp_path / "pwmchip0"
     folder.mkdir()
     (folder / "export").write_text("")
-    with pytest.raises(PortUnavailable, match="did not become writable.*udev rule"):
+    with pytest.raises(PortUnavailable, match=r"did not become writable.*udev rule"):
         SysfsPwm(str(folder), 0, 20_000_000, sleep=lambda _: None)
 
 
@@ -257,7 +292,12 @@ def test_the_output_of_the_settings_on_a_board(monkeypatch):
     bus = I2cBusEmulator({0x41: board})
     monkeypatch.setattr(rudder_output, "KernelI2c", lambda path: opened.append(path) or bus)
     settings = RudderSettings(
-        backend="pca9685", bus="/dev/i2c-7", address=0x41, channel=5, pca_clock_hz=26e6, pwm_hz=100.0
+        backend="pca9685",
+        bus="/dev/i2c-7",
+        address=0x41,
+        channel=5,
+        pca_clock_hz=26e6,
+        pwm_hz=100.0,
     )
     open_output(settings).start(1_500_000)
     assert opened == ["/dev/i2c-7"]
@@ -360,7 +400,8 @@ def test_output_that_does_not_stay_on_is_lost_once(chip):
         bench.run(1.0, 0.6)
         (chip.channel / "enable").write_text("0\n")
     lost = [event for event in bench.events if isinstance(event, Loss)]
-    assert len(lost) == 1 and "connected again" not in " ".join(bench.events)
+    assert len(lost) == 1
+    assert "connected again" not in " ".join(bench.events)
     bench.run(8.0, 0.6)
     assert bench.events[-1] == "rudder output connected again"
     (chip.channel / "enable").write_text("0\n")
@@ -394,15 +435,18 @@ def test_bus_error_loses_the_board_and_finds_it_again():
     bus.closed = False
     run(4.0)
     assert bus.closed  # also by attempts that fail half-way: descriptors are few
-    assert driver.status().level == ERROR and not driver.connected
+    assert driver.status().level == ERROR
+    assert not driver.connected
     assert len(events) == 2  # follows, lost: not one line per attempt
     bus.fault = lambda: None
     board.power_cycle()
     run(6.0)
-    assert driver.connected and board.registers[0xFE] == 121
+    assert driver.connected
+    assert board.registers[0xFE] == 121
     bus.closed, bus.fault = False, lambda: errno.EREMOTEIO
     driver.close()
-    assert bus.closed and "not centred" in driver.status().message
+    assert bus.closed
+    assert "not centred" in driver.status().message
 
 
 def test_absent_output_is_raised_at_start(tmp_path):

@@ -31,7 +31,9 @@ TEXT = b"%Hillcrest Labs 10003608\r\n%SW Ver 3.2.7\r\n%(c) 2017 Hillcrest Labora
 def test_frames(data, index, degrees, acceleration):
     (message,) = RvcParser().feed(data)
     assert message.index == index
-    assert [math.degrees(a) for a in (message.yaw, message.pitch, message.roll)] == pytest.approx(degrees)
+    assert [math.degrees(a) for a in (message.yaw, message.pitch, message.roll)] == pytest.approx(
+        degrees
+    )
     assert message.acceleration == pytest.approx(acceleration, abs=1e-3)
     assert encode(message) == data
 

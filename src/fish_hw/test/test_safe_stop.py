@@ -39,7 +39,9 @@ def test_both_are_stopped(tmp_path, vertiq_emulator):
 
 def test_the_module_of_the_file_is_stopped(tmp_path):
     emulator = VertiqEmulator(module=5)
-    emulator.written[reg.TIMEOUT.type, reg.TIMEOUT.param] = struct.pack("<f", 60.0)  # not by its own watchdog
+    emulator.written[reg.TIMEOUT.type, reg.TIMEOUT.param] = struct.pack(
+        "<f", 60.0
+    )  # not by its own watchdog
     emulator.mode, emulator.commanded = VELOCITY_MODE, 50.0
     try:
         rotor = parameter_file(tmp_path / "rotor.yaml", port=emulator.port, module_id=5)
@@ -61,7 +63,9 @@ def test_the_device_is_stopped_that_the_node_drives(tmp_path, capsys):
         (1_900_000, 1),
         (1_500_000, 0),
     ]
-    rudder.write_text(yaml.safe_dump({"/red/fish/rudder": values[0], "/blue/fish/rudder": values[1]}))
+    rudder.write_text(
+        yaml.safe_dump({"/red/fish/rudder": values[0], "/blue/fish/rudder": values[1]})
+    )
     assert main(["--rudder", str(rudder)]) == 1
     assert chips[0].read("enable") == 1
     assert "does not read /blue/fish/rudder, /red/fish/rudder" in capsys.readouterr().err
@@ -104,7 +108,8 @@ def test_a_mistake_in_the_rotors_file_does_not_leave_the_rudder(tmp_path, capsys
     assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 1
     assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
     error = capsys.readouterr().err
-    assert f"{next(iter(wrong))} is" in error and error.count("\n") == 1
+    assert f"{next(iter(wrong))} is" in error
+    assert error.count("\n") == 1
 
 
 def test_what_nobody_expects_does_not_leave_the_rudder(tmp_path, capsys, monkeypatch):
@@ -146,7 +151,9 @@ def test_unknown_parameters_are_said_but_the_robot_is_stopped(tmp_path, capsys, 
     vertiq_emulator.mode, vertiq_emulator.commanded = VELOCITY_MODE, 50.0
     chip = rudder_at_the_side(tmp_path)
     rotor = parameter_file(tmp_path / "rotor.yaml", port=vertiq_emulator.port, use_sim_time=True)
-    rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip), chanel=1, **{"qos_overrides.x": 1})
+    rudder = parameter_file(
+        tmp_path / "rudder.yaml", chip=str(chip.chip), chanel=1, **{"qos_overrides.x": 1}
+    )
     assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 0
     assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
     assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
@@ -161,7 +168,8 @@ def test_names_that_are_no_words_are_left_out(tmp_path):
     path, said = tmp_path / "rudder.yaml", []
     path.write_text("/**: {ros__parameters: {1: 1, false: 2, channel: 3}}")
     assert read_settings(path, "/fish/rudder", RudderSettings, said.append).channel == 3
-    assert len(said) == 1 and "unknown parameter 1, False; known: " in said[0]
+    assert len(said) == 1
+    assert "unknown parameter 1, False; known: " in said[0]
 
 
 @pytest.mark.parametrize(
@@ -170,7 +178,10 @@ def test_names_that_are_no_words_are_left_out(tmp_path):
         ("{bad: [", "while parsing"),
         ("[]", "expected a node name with ros__parameters"),
         ("/fish/rotor: {ros__parameters: {module_id: 3}}", "nothing for the node /fish/rudder"),
-        ("/red/fish/rudder: {ros__parameters: {}}\n/fish/rudder: {ros__parameters: {}}", "of one robot only"),
+        (
+            "/red/fish/rudder: {ros__parameters: {}}\n/fish/rudder: {ros__parameters: {}}",
+            "of one robot only",
+        ),
         ("/**: {ros__parameters: {pwm_hz: 3}}", "pwm_hz is 3.0, expected 40.0 to 333.0"),
         ("/**: {ros__parameters: {pwm_hz: fast}}", "pwm_hz is 'fast', expected float such as 50.0"),
         ("/**: {ros__parameters: {channel: 0.0}}", "channel is 0.0, expected int such as 0"),

@@ -56,7 +56,8 @@ def test_port_is_exclusive(terminal):
 
 def test_absent_port_lists_the_others():
     with pytest.raises(
-        PortUnavailable, match="cannot open serial port /dev/ttyX9: there is no such port; available: "
+        PortUnavailable,
+        match="cannot open serial port /dev/ttyX9: there is no such port; available: ",
     ):
         SerialPort("/dev/ttyX9", 115200)
 
@@ -89,5 +90,5 @@ def test_closed_port(terminal):
 
 def test_missing_library_names_the_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "serial", None)
-    with pytest.raises(PortUnavailable, match="pip install pyserial.*apt install python3-serial"):
+    with pytest.raises(PortUnavailable, match=r"pip install pyserial.*apt install python3-serial"):
         SerialPort("/dev/ttyX9", 115200)

@@ -39,8 +39,12 @@ def test_feature_requests_with_counted_sequence():
 
 
 def test_reset_and_product_id_request():
-    assert shtp.Writer().frame(shtp.EXECUTABLE, sh2.RESET_COMMAND) == bytes.fromhex("05 00 01 00 01")
-    assert shtp.Writer().frame(shtp.CONTROL, sh2.product_id_request()) == bytes.fromhex("06 00 02 00 f9 00")
+    assert shtp.Writer().frame(shtp.EXECUTABLE, sh2.RESET_COMMAND) == bytes.fromhex(
+        "05 00 01 00 01"
+    )
+    assert shtp.Writer().frame(shtp.CONTROL, sh2.product_id_request()) == bytes.fromhex(
+        "06 00 02 00 f9 00"
+    )
 
 
 def test_sequence_wraps_and_is_kept_per_channel():
@@ -74,9 +78,7 @@ def test_reports(packet, report_id, values, accuracy):
 
 
 def test_batch_with_base_and_delay():
-    packet = (
-        "21 00 03 06 fb 78 00 00 00 05 09 03 00 00 00 00 00 7e 18 21 3b cd 00 02 0a 03 19 00 01 80 ff 00 03"
-    )
+    packet = "21 00 03 06 fb 78 00 00 00 05 09 03 00 00 00 00 00 7e 18 21 3b cd 00 02 0a 03 19 00 01 80 ff 00 03"
     rotation, gyro = parse(packet)
     assert rotation.time_s == pytest.approx(T - 12.0e-3)
     assert gyro.time_s == pytest.approx(T - 12.0e-3 + 2.5e-3)
@@ -166,12 +168,21 @@ def test_headers_that_no_hub_sends(data, reason):
 def test_empty_and_continued_headers():
     assert shtp.parse_header(bytes(4)).empty
     header = shtp.parse_header(bytes.fromhex("13 80 03 07"))
-    assert (header.length, header.channel, header.sequence, header.continuation) == (0x13, 3, 7, True)
+    assert (header.length, header.channel, header.sequence, header.continuation) == (
+        0x13,
+        3,
+        7,
+        True,
+    )
     assert not shtp.parse_header(bytes.fromhex("13 00 03 07")).continuation
 
 
-@pytest.mark.parametrize(("data", "length", "channel"), [("04 00 05 00", 4, 5), ("fe 7f 00 00", 32766, 0)])
-def test_the_shortest_and_the_longest_cargo_and_the_last_channel_are_accepted(data, length, channel):
+@pytest.mark.parametrize(
+    ("data", "length", "channel"), [("04 00 05 00", 4, 5), ("fe 7f 00 00", 32766, 0)]
+)
+def test_the_shortest_and_the_longest_cargo_and_the_last_channel_are_accepted(
+    data, length, channel
+):
     header = shtp.parse_header(bytes.fromhex(data))
     assert (header.length, header.channel) == (length, channel)
 

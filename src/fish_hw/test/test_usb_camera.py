@@ -80,7 +80,9 @@ def test_jpeg_of_the_camera_is_passed_through(bench):
 
 def test_exposure_delay_is_taken_off():
     camera = UsbCamera(
-        CameraSettings(device="emulator", width=64, height=48, exposure_delay_s=0.02), lambda: source, Clock()
+        CameraSettings(device="emulator", width=64, height=48, exposure_delay_s=0.02),
+        lambda: source,
+        Clock(),
     )
     source = Source(Clock())
     source.frames = [Frame(9.5, image=picture())]
@@ -121,7 +123,9 @@ def test_camera_that_stops_is_opened_again(bench):
     camera, source, clock = bench
     events = [e for _ in range(40) for e in camera.step().events]
     assert events == ["camera emulator: no frames for 1.0 s"]
-    assert source.closed and not camera.connected and camera.status().level == ERROR
+    assert source.closed
+    assert not camera.connected
+    assert camera.status().level == ERROR
     assert camera.missed == 31
     assert isinstance(events[0], Loss)
     camera.close()  # of nothing
@@ -129,7 +133,8 @@ def test_camera_that_stops_is_opened_again(bench):
     camera.step()  # opens it
     source.frames = [Frame(clock.now, image=picture())]
     cycle = camera.step()
-    assert cycle.picture is not None and cycle.events == ["camera connected again"]
+    assert cycle.picture is not None
+    assert cycle.events == ["camera connected again"]
     assert camera.connected
 
 
@@ -201,7 +206,9 @@ def test_a_device_is_configured_through_the_real_opencv(video, monkeypatch, chos
     monkeypatch.setattr(cv2, "VideoCapture", capture)
     camera = VideoCapture(CameraSettings(device="/dev/video0", **chosen))
     camera.close()
-    assert opened == [("/dev/video0", cv2.CAP_V4L2, "1")]  # s that a silent camera may block, not 10
+    assert opened == [
+        ("/dev/video0", cv2.CAP_V4L2, "1")
+    ]  # s that a silent camera may block, not 10
 
 
 class Device:
@@ -211,7 +218,7 @@ class Device:
         self.frame = frame
         self.values: dict[int, float] = {}
 
-    def isOpened(self) -> bool:  # noqa: N802 (OpenCV's name)
+    def isOpened(self) -> bool:
         return True
 
     def set(self, key: int, value: float) -> None:
@@ -242,10 +249,13 @@ FORMAT = {
 }
 AUTOMATIC = {cv2.CAP_PROP_AUTO_EXPOSURE: 3, cv2.CAP_PROP_AUTOFOCUS: 1, cv2.CAP_PROP_AUTO_WB: 1}
 BY_HAND = {  # automatic exposure is 3 in V4L2, exposure by hand 1
-    cv2.CAP_PROP_AUTO_EXPOSURE: 1, cv2.CAP_PROP_EXPOSURE: 100,
-    cv2.CAP_PROP_AUTOFOCUS: 0, cv2.CAP_PROP_FOCUS: 0,
-    cv2.CAP_PROP_AUTO_WB: 0, cv2.CAP_PROP_WB_TEMPERATURE: 4000,
-}  # fmt: skip
+    cv2.CAP_PROP_AUTO_EXPOSURE: 1,
+    cv2.CAP_PROP_EXPOSURE: 100,
+    cv2.CAP_PROP_AUTOFOCUS: 0,
+    cv2.CAP_PROP_FOCUS: 0,
+    cv2.CAP_PROP_AUTO_WB: 0,
+    cv2.CAP_PROP_WB_TEMPERATURE: 4000,
+}
 
 
 @pytest.mark.parametrize(
@@ -269,19 +279,25 @@ def test_a_frame_has_the_drivers_stamp_if_it_is_believable(monkeypatch, stamp_s,
     capture = opened(monkeypatch, device)
     device.values[cv2.CAP_PROP_POS_MSEC] = 1000 * stamp_s
     frame = capture.read()
-    assert frame.time_s == pytest.approx(time_s) and frame.image is device.frame
+    assert frame.time_s == pytest.approx(time_s)
+    assert frame.image is device.frame
 
 
 def test_the_jpeg_of_a_device_is_not_decoded(monkeypatch):
     jpeg = encode_jpeg(picture(), 90)
     frame = opened(monkeypatch, Device(np.frombuffer(jpeg, np.uint8)[None])).read()
-    assert frame.jpeg == jpeg and frame.image is None
+    assert frame.jpeg == jpeg
+    assert frame.image is None
 
 
 def test_a_damaged_frame_of_a_device_is_none(monkeypatch):
     device = Device(picture())
     capture = opened(monkeypatch, device)
-    for damaged in (lambda: (False, device.frame), lambda: (True, None), lambda: cv2.cvtColor(None, 0)):
+    for damaged in (
+        lambda: (False, device.frame),
+        lambda: (True, None),
+        lambda: cv2.cvtColor(None, 0),
+    ):
         device.retrieve = damaged
         assert capture.read() is None
 
@@ -363,7 +379,11 @@ CALIBRATION = {
     "distortion_model": "plumb_bob",
     "distortion_coefficients": {"rows": 1, "cols": 5, "data": [-0.2, 0.05, 0, 0, 0]},
     "rectification_matrix": {"rows": 3, "cols": 3, "data": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
-    "projection_matrix": {"rows": 3, "cols": 4, "data": [900, 0, 640, 0, 0, 900, 360, 0, 0, 0, 1, 0]},
+    "projection_matrix": {
+        "rows": 3,
+        "cols": 4,
+        "data": [900, 0, 640, 0, 0, 900, 360, 0, 0, 0, 1, 0],
+    },
 }
 
 
@@ -385,7 +405,10 @@ def test_calibration(tmp_path):
     ("change", "expected"),
     [
         ({"image_width": "wide"}, "image_width is 'wide', expected a number of pixels"),
-        ({"camera_matrix": {"data": [1, 2]}}, r"camera_matrix.data is \[1, 2\], expected 9 numbers"),
+        (
+            {"camera_matrix": {"data": [1, 2]}},
+            r"camera_matrix.data is \[1, 2\], expected 9 numbers",
+        ),
         ({"camera_matrix": 3}, "camera_matrix.data is None, expected 9 numbers"),
         ({"distortion_model": "fancy"}, "distortion_model is 'fancy', expected one of plumb_bob"),
     ],
@@ -397,7 +420,7 @@ def test_calibration_errors_name_the_field(tmp_path, change, expected):
 
 @pytest.mark.parametrize("text", ["", "[1, 2]", "{bad: [", "a: b: c"])
 def test_files_that_are_no_calibration(tmp_path, text):
-    with pytest.raises(CalibrationError, match="camera.yaml"):
+    with pytest.raises(CalibrationError, match=r"camera.yaml"):
         read_calibration(written(tmp_path, text))
 
 

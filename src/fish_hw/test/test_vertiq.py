@@ -45,7 +45,9 @@ def test_drive_sends_command_and_questions_and_reads_both():
     vertiq, stream = recorded(b"", VELOCITY_REPLY[:4], VELOCITY_REPLY[4:] + ANGLE_REPLY)
     sample = vertiq.drive(10.0)
     assert stream.written == [
-        bytes.fromhex("55 06 34 05 01 00 00 20 41 ed 9e  55 02 32 0d 00 31 b4  55 02 32 0c 00 00 87")
+        bytes.fromhex(
+            "55 06 34 05 01 00 00 20 41 ed 9e  55 02 32 0d 00 31 b4  55 02 32 0c 00 00 87"
+        )
     ]
     assert (sample.velocity, sample.angle) == (9.5, 1.25)
 
@@ -65,7 +67,9 @@ def test_coast_is_said_three_times():
     assert stream.written == [bytes.fromhex("55 02 34 02 01 8e 06") * 3]
 
 
-@pytest.mark.parametrize("reply", [b"", VELOCITY_REPLY, ANGLE_REPLY], ids=["nothing", "no angle", "no speed"])
+@pytest.mark.parametrize(
+    "reply", [b"", VELOCITY_REPLY, ANGLE_REPLY], ids=["nothing", "no angle", "no speed"]
+)
 def test_silence_is_no_sample(reply):
     vertiq, _ = recorded(b"", reply)
     assert vertiq.measure() is None
@@ -97,7 +101,9 @@ class TimedStream(RecordedStream):
         return got
 
 
-@pytest.mark.parametrize("ask", [lambda v: v.drive(10.0), lambda v: v.measure()], ids=["drive", "measure"])
+@pytest.mark.parametrize(
+    "ask", [lambda v: v.drive(10.0), lambda v: v.measure()], ids=["drive", "measure"]
+)
 def test_a_sample_behind_an_unanswered_question_is_stamped_between_its_own_question_and_answer(ask):
     clock = SteppedClock()
     stream = TimedStream(clock)
@@ -139,10 +145,12 @@ def test_answers_behind_a_false_start_are_found_when_the_line_falls_silent():
 def test_a_command_waits_for_nothing():
     vertiq, stream = recorded()
     read, waits = stream.read, []
-    stream.read = lambda timeout_s: waits.append((len(stream.written), timeout_s)) or read(timeout_s)
+    stream.read = lambda timeout_s: (
+        waits.append((len(stream.written), timeout_s)) or read(timeout_s)
+    )
     for written in (0, 1):  # at first, and after a question without an answer
         vertiq.drive(10.0)
-        assert [t for n, t in waits if n == written][0] == 0.0
+        assert next(t for n, t in waits if n == written) == 0.0
         assert stream.written[written].startswith(bytes.fromhex("55 06 34 05 01"))
         waits.clear()
 
@@ -166,7 +174,9 @@ def test_messages_that_are_no_answer_are_counted(wrong):
 @pytest.mark.parametrize("register", [reg.OBS_VELOCITY, reg.OBS_ANGLE], ids=["speed", "angle"])
 def test_value_that_is_no_number_is_no_sample(register):
     nan = encode(Message(register.type, register.param, REPLY, 0, struct.pack("<f", math.nan)))
-    vertiq, _ = recorded(b"", nan + (ANGLE_REPLY if register is reg.OBS_VELOCITY else VELOCITY_REPLY))
+    vertiq, _ = recorded(
+        b"", nan + (ANGLE_REPLY if register is reg.OBS_VELOCITY else VELOCITY_REPLY)
+    )
     assert vertiq.measure() is None
     assert vertiq.counters.unexpected == 1
 
@@ -179,13 +189,17 @@ def test_angle_is_continuous_through_many_turns():
         angle = speed * i * period
         wrapped = math.remainder(angle, math.tau)
         velocity = encode(Message(50, 13, REPLY, 0, struct.pack("<f", speed)))
-        stream.chunks.extend([b"", velocity + encode(Message(50, 12, REPLY, 0, struct.pack("<f", wrapped)))])
+        stream.chunks.extend(
+            [b"", velocity + encode(Message(50, 12, REPLY, 0, struct.pack("<f", wrapped)))]
+        )
         assert vertiq.measure().angle == pytest.approx(angle, abs=1e-4)
 
 
 def test_configure_writes_and_reads_back(module):
     vertiq, emulator = module
-    coast_quietly = [(r.type, r.param) for r in (reg.TIMEOUT_BEHAVIOR, reg.TIMEOUT_MEANING, reg.TIMEOUT_SONG)]
+    coast_quietly = [
+        (r.type, r.param) for r in (reg.TIMEOUT_BEHAVIOR, reg.TIMEOUT_MEANING, reg.TIMEOUT_SONG)
+    ]
     emulator.written |= dict.fromkeys(coast_quietly, b"\1")
     assert vertiq.configure(0.25) == []
     assert emulator.timeout_s == 0.25
@@ -196,7 +210,7 @@ def test_a_module_that_refuses_its_watchdog_is_not_used(module):
     vertiq, emulator = module
     kept = encode(Message(reg.TIMEOUT.type, reg.TIMEOUT.param, REPLY, 0, struct.pack("<f", 1.0)))
     emulator.mangle = lambda reply: kept if reply[2:4] == kept[2:4] else reply
-    with pytest.raises(DeviceError, match="refuses a timeout of 0.25 s"):
+    with pytest.raises(DeviceError, match=r"refuses a timeout of 0.25 s"):
         vertiq.configure(0.25)
 
 
@@ -220,7 +234,7 @@ def test_configure_names_settings_that_the_firmware_lacks(module):
 
 def test_configure_without_module_says_what_to_check():
     vertiq, _ = recorded(b"", b"noise")
-    with pytest.raises(DeviceError, match="no Vertiq module 0 answers.*baud rate and module_id"):
+    with pytest.raises(DeviceError, match=r"no Vertiq module 0 answers.*baud rate and module_id"):
         vertiq.configure(0.25)
 
 
@@ -248,7 +262,11 @@ def test_telemetry_keeps_the_answers_that_came(module):
     emulator.faults = 0b10
     emulator.mangle = dropping(reg.DERATE)
     telemetry = vertiq.telemetry()
-    assert (telemetry.volts, telemetry.faults, telemetry.derate) == (pytest.approx(14.8), 0b10, None)
+    assert (telemetry.volts, telemetry.faults, telemetry.derate) == (
+        pytest.approx(14.8),
+        0b10,
+        None,
+    )
     emulator.mangle = dropping(reg.TELEMETRY)
     telemetry = vertiq.telemetry()
     assert (telemetry.volts, telemetry.faults, telemetry.derate) == (None, 0b10, 1.0)
@@ -263,7 +281,9 @@ def test_fault_memory_that_could_not_be_read_is_not_erased(module):
     emulator.mangle = dropping(reg.FAULT_EVER)
     assert vertiq.clear_faults() is None
     emulator.mangle = lambda reply: reply
-    assert vertiq.read(reg.FAULT_EVER) == [(0b10,)]  # by now the module would have taken an order to erase
+    assert vertiq.read(reg.FAULT_EVER) == [
+        (0b10,)
+    ]  # by now the module would have taken an order to erase
 
 
 def test_fault_memory_is_told_before_it_is_cleared(module):

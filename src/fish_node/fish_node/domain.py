@@ -27,7 +27,9 @@ def discovery_port(domain: int, participant: int) -> int:
 
 def domain_in_use(domain: int) -> bool:
     """Whether some process of this machine takes part in the domain."""
-    return any(_port_taken(discovery_port(domain, participant)) for participant in range(PARTICIPANTS))
+    return any(
+        _port_taken(discovery_port(domain, participant)) for participant in range(PARTICIPANTS)
+    )
 
 
 def choose_domain(asked: int | None = None) -> int:
@@ -35,6 +37,7 @@ def choose_domain(asked: int | None = None) -> int:
 
     Raises:
         DomainError: the domain is out of range, in use, or all are.
+
     """
     if asked is None:
         for domain in random.sample(FREE_RANGE, len(FREE_RANGE)):
@@ -46,7 +49,9 @@ def choose_domain(asked: int | None = None) -> int:
     if not 0 <= asked <= LAST_DOMAIN:
         raise DomainError(f"ROS domain {asked} is out of range; expected 0 to {LAST_DOMAIN}")
     if domain_in_use(asked):
-        raise DomainError(f"ROS domain {asked} is in use on this machine; choose another or leave it out")
+        raise DomainError(
+            f"ROS domain {asked} is in use on this machine; choose another or leave it out"
+        )
     return asked
 
 
@@ -59,5 +64,7 @@ def _port_taken(port: int) -> bool:
         except OSError as error:
             if error.errno == errno.EADDRINUSE:
                 return True
-            raise DomainError(f"cannot open UDP port {port}: {error.strerror}; ROS 2 needs it") from error
+            raise DomainError(
+                f"cannot open UDP port {port}: {error.strerror}; ROS 2 needs it"
+            ) from error
     return False

@@ -19,7 +19,9 @@ WILDCARDS = ("*", "**")
 Entry = tuple[str, yaml.Node]
 
 
-def read_settings(path: Path, node: str, kind: type[Settings], say: Callable[[str], None]) -> Settings:
+def read_settings(
+    path: Path, node: str, kind: type[Settings], say: Callable[[str], None]
+) -> Settings:
     """A dataclass of settings from what a file has for a node; what it does not have keeps its default.
 
     Args:
@@ -27,15 +29,19 @@ def read_settings(path: Path, node: str, kind: type[Settings], say: Callable[[st
         node: full name, such as /fish/rudder; see read_node_parameters.
         kind: the dataclass.
         say: is told of unknown parameters, which are left out; it may raise.
+
     Raises:
         ValueError: as read_node_parameters, or a value of the wrong type or out of range; names the file.
+
     """
     parameters, defaults = read_node_parameters(path, node), asdict(kind())  # type: ignore[call-overload]
     if unknown := unknown_names(parameters, defaults):
         say(f"{path}: {unknown}")
     known = {name: value for name, value in parameters.items() if name in defaults}
     try:
-        return kind(**{name: in_type_of(name, value, defaults[name]) for name, value in known.items()})
+        return kind(
+            **{name: in_type_of(name, value, defaults[name]) for name, value in known.items()}
+        )
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
 
@@ -49,17 +55,23 @@ def read_node_parameters(path: Path, node: str) -> dict[str, Any]:
     Args:
         path: YAML.
         node: full name, such as /fish/rudder.
+
     Raises:
         ValueError: unreadable, no parameter file, nothing for the node, or for several; names the file.
+
     """
     name = node.rpartition("/")[2]
     try:
         root = yaml.compose(path.read_text(encoding="utf-8"), yaml.SafeLoader)
         entries = [] if root is None else list(_entries(root))
         known = ", ".join(dict.fromkeys(pattern for pattern, _ in entries)) or "none"
-        possible = [(p, below) for p, below in entries if p.rpartition("/")[2] in (name, *WILDCARDS)]
+        possible = [
+            (p, below) for p, below in entries if p.rpartition("/")[2] in (name, *WILDCARDS)
+        ]
         full = _meant([p for p, _ in possible], node)
-        own = [_parameters(pattern, below) for pattern, below in possible if _matches(pattern, full)]
+        own = [
+            _parameters(pattern, below) for pattern, below in possible if _matches(pattern, full)
+        ]
     except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
         raise ValueError(f"{path}: {' '.join(str(error).split())}") from error
     others = [pattern for pattern, _ in possible if not _matches(pattern, full)]

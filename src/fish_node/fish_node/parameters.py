@@ -6,16 +6,24 @@ from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from typing import Any
 
-ROS_NAMES = ("use_sim_time", "start_type_description_service")  # and qos_overrides: ROS's own parameters
+ROS_NAMES = (
+    "use_sim_time",
+    "start_type_description_service",
+)  # and qos_overrides: ROS's own parameters
 
 
 def in_type_of(name: str, given: Any, like: Any) -> Any:
-    """given in the type of like: whole numbers may stand for floats, lists for tuples, YAML 1.1's truth values for Y and N.
+    """Given in the type of like: whole numbers may stand for floats, lists for tuples, YAML 1.1's truth values for Y and N.
 
     Raises:
         ValueError: another type; names the parameter, what came and what was expected.
+
     """
-    if isinstance(like, tuple) and not isinstance(given, str | bytes) and hasattr(given, "__iter__"):
+    if (
+        isinstance(like, tuple)
+        and not isinstance(given, str | bytes)
+        and hasattr(given, "__iter__")
+    ):
         return tuple(in_type_of(name, item, like[0]) for item in given)
     if isinstance(like, float) and isinstance(given, int) and not isinstance(given, bool):
         return float(given)

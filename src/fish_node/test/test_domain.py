@@ -9,7 +9,11 @@ from fish_node import domain
 
 def test_ports_are_those_of_the_standard():
     # OMG DDSI-RTPS: domain 0, participants 0 and 1 listen on 7410 and 7412; domain 1 starts 250 higher
-    assert [domain.discovery_port(0, 0), domain.discovery_port(0, 1), domain.discovery_port(1, 0)] == [
+    assert [
+        domain.discovery_port(0, 0),
+        domain.discovery_port(0, 1),
+        domain.discovery_port(1, 0),
+    ] == [
         7410,
         7412,
         7660,

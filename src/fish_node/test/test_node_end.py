@@ -28,9 +28,15 @@ def run(monkeypatch, error, alive):
 
 @pytest.mark.parametrize(
     "error",
-    [RCLError("Failed to publish: publisher's context is invalid"), RuntimeError("not ok"), ValueError("x")],
+    [
+        RCLError("Failed to publish: publisher's context is invalid"),
+        RuntimeError("not ok"),
+        ValueError("x"),
+    ],
 )
-def test_what_a_signal_that_has_shut_the_context_down_brings_about_is_no_failure(monkeypatch, error):
+def test_what_a_signal_that_has_shut_the_context_down_brings_about_is_no_failure(
+    monkeypatch, error
+):
     ended = run(monkeypatch, error, alive=False)
     assert ended == ["destroyed", "shut down"]
 
@@ -52,7 +58,7 @@ def test_what_cannot_start_says_why(monkeypatch, capsys):
 
 
 def test_a_signal_that_shuts_the_context_down_at_the_same_moment_is_no_failure(monkeypatch):
-    """rclpy looks whether it is still there, and then shuts it down."""
+    """Rclpy looks whether it is still there, and then shuts it down."""
     tries = []
 
     def try_shutdown():

@@ -50,7 +50,9 @@ def file(tmp_path: Path) -> Path:
 
 @pytest.mark.ros
 @pytest.mark.parametrize("text", READ)
-def test_it_reads_what_the_node_reads(file: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_reads_what_the_node_reads(
+    file: Path, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     file.write_text(text)
     rclpy.init(args=["--ros-args", "--params-file", str(file)], domain_id=143)
@@ -74,18 +76,25 @@ def test_a_node_that_the_file_alone_names_in_another_namespace_is_meant(file: Pa
     ("text", "unread"),
     [
         (f"/fish/rudder: {ONE}\n/red/fish/rudder: {TWO}", "/red/fish/rudder"),
-        (f"/red/fish/rudder: {ONE}\n/blue/fish/rudder: {TWO}", "/red/fish/rudder, /blue/fish/rudder"),
+        (
+            f"/red/fish/rudder: {ONE}\n/blue/fish/rudder: {TWO}",
+            "/red/fish/rudder, /blue/fish/rudder",
+        ),
         (f"/**: {ONE}\n/red/**: {TWO}", "/red/**"),
         (f"/**: {ONE}\nrudder: {TWO}", "/rudder"),  # of a node without a namespace
         (f"'*': {ONE}", "/*"),
     ],
 )
-def test_entries_that_could_be_meant_but_are_not_read_are_refused(file: Path, text: str, unread: str) -> None:
+def test_entries_that_could_be_meant_but_are_not_read_are_refused(
+    file: Path, text: str, unread: str
+) -> None:
     file.write_text(text)
     with pytest.raises(ValueError, match=r"params\.yaml: /fish/rudder does not read ") as caught:
         read_node_parameters(file, NODE)
     assert f"read {unread}, which could be meant for it" in str(caught.value)
-    assert str(caught.value).endswith("Expected entries of one robot only: /**, /**/rudder or /fish/rudder")
+    assert str(caught.value).endswith(
+        "Expected entries of one robot only: /**, /**/rudder or /fish/rudder"
+    )
 
 
 @pytest.mark.parametrize(

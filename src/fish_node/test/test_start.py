@@ -87,7 +87,8 @@ def read(*overrides: str) -> Config:
 def test_parameters_come_from_the_dataclass_and_the_command_line() -> None:
     assert read() == Config()
     given = read("rate:=3", "count:=5", "on:=true", "name:=b", "place:=[1, 2]")
-    assert given == Config(3.0, 5, True, "b", (1.0, 2.0)) and isinstance(given.rate, float)
+    assert given == Config(3.0, 5, True, "b", (1.0, 2.0))
+    assert isinstance(given.rate, float)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +102,8 @@ def test_a_value_of_the_wrong_type_is_refused_with_its_name(override: str) -> No
 def test_an_unknown_name_is_refused_and_the_nearest_suggested() -> None:
     assert read("use_sim_time:=false", "qos_overrides./h.publisher.depth:=3", "count:=5").count == 5
     with pytest.raises(
-        ValueError, match=r"^unknown parameter cuont, x \(did you mean count\?\); known: count, name"
+        ValueError,
+        match=r"^unknown parameter cuont, x \(did you mean count\?\); known: count, name",
     ):
         read("cuont:=5", "x:=1", "rate:=2.0")
 
@@ -113,7 +115,11 @@ def test_a_change_at_run_time_is_refused_and_changes_nothing(given: list[str]) -
     node = Node("reader", automatically_declare_parameters_from_overrides=True)
     try:
         before = read_parameters(node, Config)
-        changes = [Parameter("rate", value=-7.0), Parameter("name", value=4), Parameter("place", value=[2.0])]
+        changes = [
+            Parameter("rate", value=-7.0),
+            Parameter("name", value=4),
+            Parameter("place", value=[2.0]),
+        ]
         results = node.set_parameters(changes)
         assert [result.successful for result in results] == [False] * 3
         assert all("read-only" in result.reason for result in results)
@@ -125,13 +131,16 @@ def test_a_change_at_run_time_is_refused_and_changes_nothing(given: list[str]) -
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(
-    "error", [None, ValueError("half made"), RuntimeError("half made"), OSError("half made")], ids=repr
+    "error",
+    [None, ValueError("half made"), RuntimeError("half made"), OSError("half made")],
+    ids=repr,
 )
 def test_a_signal_while_the_node_is_made_is_a_clean_end(
     number: signal.Signals, error: Exception | None, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert run(lambda: Signalled(number, error), "signalled") == 0
-    assert "half made" not in capfd.readouterr().err and not rclpy.ok()
+    assert "half made" not in capfd.readouterr().err
+    assert not rclpy.ok()
 
 
 @pytest.mark.parametrize("kind", [Stopped, Mistaken])
@@ -165,7 +174,9 @@ def test_an_argument_that_ros_refuses_gives_one_line_and_1(
     monkeypatch.setattr(sys, "argv", ["node", "--ros-args", "-p", "foo"])
     assert run(Stopped, "node") == 1
     error = capsys.readouterr().err
-    assert error.startswith("node: ") and "'-p foo'" in error and error.count("\n") == 1
+    assert error.startswith("node: ")
+    assert "'-p foo'" in error
+    assert error.count("\n") == 1
 
 
 def test_refused_parameters_give_one_line_and_1(capsys: pytest.CaptureFixture[str]) -> None:

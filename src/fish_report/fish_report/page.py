@@ -47,7 +47,9 @@ class Figure:
     def html(self) -> str:
         """The figure as a <div>; the library itself stands once in the page."""
         html = self.figure.to_html(
-            full_html=False, include_plotlyjs=False, config={"displaylogo": False, "responsive": True}
+            full_html=False,
+            include_plotlyjs=False,
+            config={"displaylogo": False, "responsive": True},
         )
         return str(html)
 
@@ -60,7 +62,9 @@ def write_page(path: Path, title: str, lead: str, blocks: Sequence[Block]) -> No
     template = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(
         files(__package__).joinpath("page.html.j2").read_text(encoding="utf-8")
     )
-    page = template.render(title=title, lead=lead, blocks=blocks, plotlyjs=get_plotlyjs(), font=FONT)
+    page = template.render(
+        title=title, lead=lead, blocks=blocks, plotlyjs=get_plotlyjs(), font=FONT
+    )
     path.write_text(page, encoding="utf-8")
 
 
@@ -71,6 +75,11 @@ def styled(figure: go.Figure, height: int = 320, titled: bool = False) -> go.Fig
         height=height,
         font={"family": FONT, "size": 13},
         margin={"l": 60, "r": 20, "t": 70 if titled else 20, "b": 45},
-        legend={"orientation": "h", "y": 1.0 + (30 if titled else 5) / height, "yanchor": "bottom", "x": 0},
+        legend={
+            "orientation": "h",
+            "y": 1.0 + (30 if titled else 5) / height,
+            "yanchor": "bottom",
+            "x": 0,
+        },
     )
     return figure

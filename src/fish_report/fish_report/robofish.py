@@ -36,9 +36,7 @@ BROUGHT_BY = {
     "prove": "fish_study",
     "paper": "fish_study",
 }
-BRINGS_PACKAGES = (
-    "`make setup`, or `pip install -r requirements-diagnose.txt -r requirements-train.txt`, brings it"
-)
+BRINGS_PACKAGES = "`make setup`, or `pip install -r requirements-diagnose.txt -r requirements-train.txt`, brings it"
 
 
 class OneLineParser(argparse.ArgumentParser):

@@ -29,7 +29,9 @@ def worker_pool(
     except BaseException:
         own = set(multiprocessing.active_children()) - others
         pool.shutdown(wait=False, cancel_futures=True)
-        for worker in own:  # waiting for them could take hours, or for ever where nobody reads what they say
+        for (
+            worker
+        ) in own:  # waiting for them could take hours, or for ever where nobody reads what they say
             worker.terminate()
         raise
     pool.shutdown()

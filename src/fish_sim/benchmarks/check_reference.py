@@ -53,7 +53,7 @@ def robot_of(comment: str) -> Robot:
 
 
 def simulate(comment: str, table: dict[str, np.ndarray], scheme: Scheme) -> np.ndarray:
-    """q and q' under the file's inputs, one row for every row of the file."""
+    """Q and q' under the file's inputs, one row for every row of the file."""
     robot = robot_of(comment)
     stepper = Stepper(robot.structure, scheme)
     start = stepper.rest(rudder=table["alpha"][0])
@@ -67,7 +67,7 @@ def simulate(comment: str, table: dict[str, np.ndarray], scheme: Scheme) -> np.n
 
 
 def motion(table: dict[str, np.ndarray], links: int) -> np.ndarray:
-    """q and q' of the file, (rows, 2 n + 6)."""
+    """Q and q' of the file, (rows, 2 n + 6)."""
     names = Layout((links, ())).motion
     return np.stack([table[name] for name in names], axis=-1)
 
@@ -102,7 +102,9 @@ def compare(path: Path) -> bool:
     good = distance(same, reference) < SAME_METHOD_LIMIT and distance(ours, halved) < LIMIT
     if "energy is constant" in comment:
         changes = [energy_change(comment, table, states) for states in (ours, reference)]
-        print(f"{'':20} energy in the worst second: ours {changes[0]:.1e}, the file's {changes[1]:.1e}")
+        print(
+            f"{'':20} energy in the worst second: ours {changes[0]:.1e}, the file's {changes[1]:.1e}"
+        )
         good = good and changes[0] < ENERGY_LIMIT
     return good and distance(ours, reference) < LIMIT + own
 
@@ -115,7 +117,8 @@ def main() -> int:
     files = sorted(folder.glob("*.csv"))
     if not files:
         print(
-            f"check_reference: no reference trajectories in {folder}; nothing was compared", file=sys.stderr
+            f"check_reference: no reference trajectories in {folder}; nothing was compared",
+            file=sys.stderr,
         )
         return 2
     reproduced = [compare(path) for path in files]

@@ -19,11 +19,11 @@ from collections.abc import Callable
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import numpy as np  # noqa: E402
+import numpy as np
 
-from fish_sim.robot import Robot  # noqa: E402
-from fish_sim.scheme import Scheme, default_scheme  # noqa: E402
-from fish_sim.step import Stepper  # noqa: E402
+from fish_sim.robot import Robot
+from fish_sim.scheme import Scheme, default_scheme
+from fish_sim.step import Stepper
 
 ROUNDS = 5
 STEPS = 100_000  # of one fish in a measurement; long enough that the states lie in large pages
@@ -68,7 +68,9 @@ def peer(integrator: str, kind: str) -> Callable[[], float]:
 
     options = PEERS[kind]
     tail = "".join(LINK.format(x=x, **options) for x in (-0.075, -0.0233, -0.0233)) + "</body>" * 3
-    model = mujoco.MjModel.from_xml_string(MODEL.format(integrator=integrator, tail=tail, **options))
+    model = mujoco.MjModel.from_xml_string(
+        MODEL.format(integrator=integrator, tail=tail, **options)
+    )
     data = mujoco.MjData(model)
     if model.nv != 6:
         raise RuntimeError(f"the peer has {model.nv} degrees of freedom, the fish has 6")
@@ -80,7 +82,9 @@ def peer(integrator: str, kind: str) -> Callable[[], float]:
         mujoco.mj_step(model, data, STEPS)
         seconds = time.thread_time() - start
         if data.warning.number.any() or not np.isfinite(data.qpos).all():
-            raise RuntimeError(f"the peer ({kind}, {integrator}) became unstable; its speed means nothing")
+            raise RuntimeError(
+                f"the peer ({kind}, {integrator}) became unstable; its speed means nothing"
+            )
         return STEPS / seconds
 
     return run
@@ -122,7 +126,9 @@ def main() -> int:
     try:
         peers = {(i, kind): peer(i, kind) for kind in PEERS for i in ("Euler", "RK4")}
     except ImportError:
-        print("forward_speed: mujoco is not installed (pip install mujoco): no ratio", file=sys.stderr)
+        print(
+            "forward_speed: mujoco is not installed (pip install mujoco): no ratio", file=sys.stderr
+        )
         return 2
     schemes = {"rk4": Scheme("rk4"), "default": default_scheme(3)}
     cases = {(n, b): ours(scheme, b) for n, scheme in schemes.items() for b in BATCHES}

@@ -94,7 +94,9 @@ def picture(sweeps: list[Sweep], cycle: Array, stroke: int) -> Figure:
 
 
 def print_sweep(s: Sweep) -> None:
-    shown = "  ".join(f"{t:.2f}: {v:.3f}" for t, v in zip(THROTTLES[::4], s.speed[::4], strict=True))
+    shown = "  ".join(
+        f"{t:.2f}: {v:.3f}" for t, v in zip(THROTTLES[::4], s.speed[::4], strict=True)
+    )
     slope, intercept, r2 = straight_line([s])
     print(f"{s.frequency:4.3g} Hz, speed [m/s] at throttle  {shown}")
     print(
@@ -105,7 +107,9 @@ def print_sweep(s: Sweep) -> None:
 def repetition(cycle: Array, stroke: int) -> float:
     """Largest difference of the rates of two strokes, relative to their largest value."""
     rates = cycle[:, 0, 6:12]
-    return float(np.abs(rates[-1 - stroke :] - rates[-1 - 2 * stroke : -stroke]).max() / np.abs(rates).max())
+    return float(
+        np.abs(rates[-1 - stroke :] - rates[-1 - 2 * stroke : -stroke]).max() / np.abs(rates).max()
+    )
 
 
 def main() -> int:
@@ -120,9 +124,13 @@ def main() -> int:
     slope, intercept, r2 = straight_line(sweeps)
     print(f"all together: {intercept:.3f} + {slope:.3f} throttle, R^2 {r2:.4f}")
     cycle, stroke = swim(2.0, np.array([0.5 * S_MAX])), round(0.5 / DT)
-    print(f"2 Hz, throttle 0.5: the stroke repeats to {repetition(cycle, stroke):.1e} of its largest rate")
+    print(
+        f"2 Hz, throttle 0.5: the stroke repeats to {repetition(cycle, stroke):.1e} of its largest rate"
+    )
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "swimming"}):
-        picture(sweeps, cycle, stroke).savefig(out, metadata={"Date": None} if out.suffix == ".svg" else None)
+        picture(sweeps, cycle, stroke).savefig(
+            out, metadata={"Date": None} if out.suffix == ".svg" else None
+        )
     print(f"wrote {out}")
     return 0
 

@@ -63,7 +63,7 @@ def lanes() -> int:
 
 @functools.cache
 def has_libmvec() -> bool:
-    """glibc's vector mathematics can be linked (x86-64 with glibc)."""
+    """Glibc's vector mathematics can be linked (x86-64 with glibc)."""
     try:
         ctypes.CDLL("libmvec.so.1")
     except OSError:
@@ -85,7 +85,11 @@ def library(source: str) -> ctypes.CDLL | None:
             _compile(cc, source, path)
         return ctypes.CDLL(str(path))
     except (OSError, subprocess.CalledProcessError) as error:
-        detail = error.stderr.decode()[:400] if isinstance(error, subprocess.CalledProcessError) else error
+        detail = (
+            error.stderr.decode()[:400]
+            if isinstance(error, subprocess.CalledProcessError)
+            else error
+        )
         log.warning("no compiled kernel (%s); the slower interpreted form is used", detail)
         return None
 

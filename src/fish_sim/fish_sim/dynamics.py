@@ -99,7 +99,7 @@ def inner(a: Pair, b: Pair) -> Scalar:
 
 
 def plus(a: Pair, b: Pair, factor: Scalar = 1.0) -> Pair:
-    """a + factor b."""
+    """A + factor b."""
     return a[0] + factor * b[0], a[1] + factor * b[1]
 
 
@@ -155,23 +155,50 @@ def build_chain(
 
 def build_bodies(n: int, r: SimpleNamespace, effects: Sequence[EnabledEffect]) -> list[Body]:
     """Head, links, fin, then what the effects fix to the head."""
-    link_inertia = r.link_inertia_factor * (r.link_mass + r.link_added_mass_sway) * r.link_length**2 / 12
+    link_inertia = (
+        r.link_inertia_factor * (r.link_mass + r.link_added_mass_sway) * r.link_length**2 / 12
+    )
     fin_inertia = r.fin_inertia_factor * (r.fin_mass + r.fin_added_mass_sway) * r.fin_length**2 / 12
     head = Body(
-        "head", 0, 0.0, 0.0, r.head_mass, r.head_added_mass_surge, r.head_added_mass_sway,
-        r.head_inertia, r.head_drag_surge, r.head_drag_sway, r.head_drag_yaw,
-    )  # fmt: skip
+        "head",
+        0,
+        0.0,
+        0.0,
+        r.head_mass,
+        r.head_added_mass_surge,
+        r.head_added_mass_sway,
+        r.head_inertia,
+        r.head_drag_surge,
+        r.head_drag_sway,
+        r.head_drag_yaw,
+    )
     links = [
         Body(
-            f"link_{i}", i, -r.link_length / 2, 0.0, r.link_mass, 0.0, r.link_added_mass_sway,
-            link_inertia, r.link_drag_surge, r.link_drag_sway,
+            f"link_{i}",
+            i,
+            -r.link_length / 2,
+            0.0,
+            r.link_mass,
+            0.0,
+            r.link_added_mass_sway,
+            link_inertia,
+            r.link_drag_surge,
+            r.link_drag_sway,
         )
         for i in range(1, n + 1)
-    ]  # fmt: skip
+    ]
     fin = Body(
-        "fin", n + 1, -r.fin_length / 2, 0.0, r.fin_mass, 0.0, r.fin_added_mass_sway,
-        fin_inertia, r.fin_drag_surge, r.fin_drag_sway,
-    )  # fmt: skip
+        "fin",
+        n + 1,
+        -r.fin_length / 2,
+        0.0,
+        r.fin_mass,
+        0.0,
+        r.fin_added_mass_sway,
+        fin_inertia,
+        r.fin_drag_surge,
+        r.fin_drag_sway,
+    )
     points = [
         Body(e.effect.name, 0, forward, left, mass, 0.0, 0.0, 0.0)
         for e in effects
@@ -213,11 +240,18 @@ class Inertia:
 def body_inertia(body: Body, cos: Scalar, sin: Scalar) -> Inertia:
     """Rigid and added mass of a body that points along (cos, sin)."""
     across, anisotropy = body.mass + body.added_sway, body.added_surge - body.added_sway
-    return Inertia(across + anisotropy * cos**2, anisotropy * (cos * sin), across + anisotropy * sin**2)
+    return Inertia(
+        across + anisotropy * cos**2, anisotropy * (cos * sin), across + anisotropy * sin**2
+    )
 
 
 def body_bias(
-    body: Body, inertia: Inertia, chain: Chain, drive: Drive, effects: Sequence[EnabledEffect], xp: Any
+    body: Body,
+    inertia: Inertia,
+    chain: Chain,
+    drive: Drive,
+    effects: Sequence[EnabledEffect],
+    xp: Any,
 ) -> tuple[Pair, Scalar]:
     """Force (pool frame) and moment about its centre of mass that a body's motion with q'' = 0 asks for, [N, N m].
 
@@ -240,8 +274,17 @@ def body_bias(
     Y = anisotropy * w * u + body.drag_sway * v
     N = -anisotropy * u * v + body.drag_yaw * w
     motion = BodyMotion(
-        body.name, *place.position, cos, sin, u, v, w, body.drag_surge, body.drag_sway, body.drag_yaw
-    )  # fmt: skip
+        body.name,
+        *place.position,
+        cos,
+        sin,
+        u,
+        v,
+        w,
+        body.drag_surge,
+        body.drag_sway,
+        body.drag_yaw,
+    )
     for e in effects:
         extra = e.effect.wrench(e.p, motion, e.z, drive, xp)
         if extra is not None:
@@ -296,9 +339,14 @@ def turn_fin_with_last_link(
 
 
 def add_springs(
-    h: list[Scalar], q: Sequence[Scalar], chain: Chain, drive: Drive, r: SimpleNamespace,
-    effects: Sequence[EnabledEffect], xp: Any,
-) -> None:  # fmt: skip
+    h: list[Scalar],
+    q: Sequence[Scalar],
+    chain: Chain,
+    drive: Drive,
+    r: SimpleNamespace,
+    effects: Sequence[EnabledEffect],
+    xp: Any,
+) -> None:
     """Tail springs k phi_i and what effects add at the joints; the servo moves the rest of joint 1 to -alpha."""
     root = 1.0 - sum((e.effect.tip_share(e.p) for e in effects), 0.0)
     for i in range(1, chain.links + 1):
@@ -329,9 +377,14 @@ def tip_force(slip: Scalar, A: Scalar, b: Scalar, grip: Grip | None, xp: Any) ->
 
 
 def solve(
-    q: Sequence[Scalar], qd: Sequence[Scalar], drive: Drive, r: SimpleNamespace,
-    effects: Sequence[EnabledEffect], xp: Any, constrained: bool = True,
-) -> Solution:  # fmt: skip
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    drive: Drive,
+    r: SimpleNamespace,
+    effects: Sequence[EnabledEffect],
+    xp: Any,
+    constrained: bool = True,
+) -> Solution:
     """Accelerations, tip force and effect state rates at one instant.
 
     q, qd: n + 3 scalars [m, rad], [m/s, rad/s]; r: nominal parameters by name; constrained=False frees the tip.
@@ -355,7 +408,11 @@ def solve(
     response = reduce(L, tip_normal(chain))
     weighted = [value * d for value, d in zip(response, inverse, strict=True)]
     A = dot(weighted, response)
-    b = dot(weighted, free) + inner(acceleration, turned(ahead)) - chain.rate[-1] * inner(velocity, ahead)
+    b = (
+        dot(weighted, free)
+        + inner(acceleration, turned(ahead))
+        - chain.rate[-1] * inner(velocity, ahead)
+    )
     grips = [g for e in effects if (g := e.effect.grip(e.p, e.z, xp)) is not None]
     force = tip_force(slip, A, b, combine(grips), xp)
     held = [f + force * m for f, m in zip(free, response, strict=True)]
@@ -373,10 +430,14 @@ def combine(grips: Sequence[Grip]) -> Grip | None:
     """Several finite grips in one: mobilities add, as in series, and so do shares, then of the whole slip, and what is late."""
     if not grips:
         return None
-    return Grip(*(sum((getattr(g, part) for g in grips), 0.0) for part in ("mobility", "share", "late")))
+    return Grip(
+        *(sum((getattr(g, part) for g in grips), 0.0) for part in ("mobility", "share", "late"))
+    )
 
 
-def energy(q: Sequence[Scalar], qd: Sequence[Scalar], alpha: Scalar, r: SimpleNamespace, xp: Any) -> Scalar:
+def energy(
+    q: Sequence[Scalar], qd: Sequence[Scalar], alpha: Scalar, r: SimpleNamespace, xp: Any
+) -> Scalar:
     """T + V of the nominal fish in still water [J]; T includes the added mass."""
     zero = Drive(alpha, 0.0, 0.0, 0.0)
     chain = build_chain(q, qd, zero, r, (), xp)
@@ -385,7 +446,9 @@ def energy(q: Sequence[Scalar], qd: Sequence[Scalar], alpha: Scalar, r: SimpleNa
         cos, sin = chain.cos[body.angle], chain.sin[body.angle]
         vx, vy = chain.place(body).velocity
         u, v = vx * cos + vy * sin, vy * cos - vx * sin
-        total = total + 0.5 * ((body.mass + body.added_surge) * u**2 + (body.mass + body.added_sway) * v**2)
+        total = total + 0.5 * (
+            (body.mass + body.added_surge) * u**2 + (body.mass + body.added_sway) * v**2
+        )
         total = total + 0.5 * body.inertia * chain.rate[body.angle] ** 2
     for i in range(1, chain.links + 1):
         angle = q[2 + i] - q[1 + i] + (alpha if i == 1 else 0.0)

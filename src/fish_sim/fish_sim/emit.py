@@ -46,7 +46,10 @@ CALL = {
 def emit(function: casadi.Function) -> str:
     """C text of `static void name(const V *i0, .., V *o0, ..)` for a CasADi SX function with dense arguments."""
     inputs, outputs = range(function.n_in()), range(function.n_out())
-    arguments = [*(f"const V *restrict i{k}" for k in inputs), *(f"V *restrict o{k}" for k in outputs)]
+    arguments = [
+        *(f"const V *restrict i{k}" for k in inputs),
+        *(f"V *restrict o{k}" for k in outputs),
+    ]
     registers = [f"  V w{k};" for k in range(function.sz_w())]
     body = [f"  {_instruction(function, k)}" for k in range(function.n_instructions())]
     head = f"static void {function.name()}({', '.join(arguments)})"
@@ -59,7 +62,9 @@ def _zero_outputs(function: casadi.Function) -> list[str]:
     for k in range(function.n_out()):
         sparsity = function.sparsity_out(k)
         if sparsity.nnz() != sparsity.numel():
-            lines.append(f"  for (int j = 0; j < {sparsity.numel()}; ++j) o{k}[j] = v_constant(0.0);")
+            lines.append(
+                f"  for (int j = 0; j < {sparsity.numel()}; ++j) o{k}[j] = v_constant(0.0);"
+            )
     return lines
 
 

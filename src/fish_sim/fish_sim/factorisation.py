@@ -31,7 +31,9 @@ def reduce(L: list[list[Scalar]], b: Sequence[Scalar]) -> list[Scalar]:
     return x
 
 
-def back_substitute(L: list[list[Scalar]], inverse: Sequence[Scalar], b: Sequence[Scalar]) -> list[Scalar]:
+def back_substitute(
+    L: list[list[Scalar]], inverse: Sequence[Scalar], b: Sequence[Scalar]
+) -> list[Scalar]:
     """(D L^T)^-1 b."""
     x = [value * d for value, d in zip(b, inverse, strict=True)]
     for i in reversed(range(len(x))):

@@ -47,9 +47,15 @@ class InterpretedKernel:
             states[t + 1], tangents[t + 1] = s.T, ds.T
 
     def rollout_vjp(
-        self, states: Array, commands: Array, parameters: Array, g_states: Array,
-        g_start: Array, g_commands: Array, g_parameters: Array,
-    ) -> None:  # fmt: skip
+        self,
+        states: Array,
+        commands: Array,
+        parameters: Array,
+        g_states: Array,
+        g_start: Array,
+        g_commands: Array,
+        g_parameters: Array,
+    ) -> None:
         """Fill g_start, g_commands and g_parameters."""
         batch = states.shape[1]
         p, g = _columns(parameters, batch), g_states[-1].T.copy()
@@ -73,10 +79,17 @@ class InterpretedKernel:
     ) -> None:
         """Fill out and d_out (batch, NX) with rates of motion and their tangents."""
         p, dp = _columns(parameters, len(x)), _columns(d_parameters, len(x))
-        out[:], d_out[:] = (v.full().T for v in self._functions.rate_jvp(x.T, w.T, p, dx.T, dw.T, dp))
+        out[:], d_out[:] = (
+            v.full().T for v in self._functions.rate_jvp(x.T, w.T, p, dx.T, dw.T, dp)
+        )
 
     def memory_jvp(
-        self, memory: Array, tangents: Array, commands: Array, parameters: Array, d_parameters: Array
+        self,
+        memory: Array,
+        tangents: Array,
+        commands: Array,
+        parameters: Array,
+        d_parameters: Array,
     ) -> None:
         """Fill memory[1:] and tangents[1:] (T + 1, batch, NM)."""
         batch = memory.shape[1]
@@ -99,7 +112,9 @@ class InterpretedKernel:
             x = x + h * _combine(self._method.B, K, x)
         return np.vstack([x, m1]), stages
 
-    def _step_jvp(self, s: Array, ds: Array, c: Array, dc: Array, p: Array, dp: Array) -> tuple[Array, Array]:
+    def _step_jvp(
+        self, s: Array, ds: Array, c: Array, dc: Array, p: Array, dp: Array
+    ) -> tuple[Array, Array]:
         x, dx, m0, dm0 = s[: self._nx], ds[: self._nx], s[self._nx :], ds[self._nx :]
         m1, dm1 = (v.full() for v in self._functions.follow_jvp(m0, c, p, dm0, dc, dp))
         h = DT / self._substeps

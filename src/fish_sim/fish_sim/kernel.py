@@ -18,7 +18,9 @@ class CompiledKernel:
 
     def rollout(self, states: Array, commands: Array, parameters: Array) -> None:
         """Fill states[1:] from states[0]."""
-        self._library.rollout(*_sizes(states), _at(states), *_shared(commands, 1), *_shared(parameters, 0))
+        self._library.rollout(
+            *_sizes(states), _at(states), *_shared(commands, 1), *_shared(parameters, 0)
+        )
 
     def rollout_jvp(
         self,
@@ -31,19 +33,33 @@ class CompiledKernel:
     ) -> None:
         """Fill states[1:] and tangents[1:]."""
         self._library.rollout_jvp(
-            *_sizes(states), _at(states), _at(tangents), *_shared(commands, 1), *_shared(d_commands, 1),
-            *_shared(parameters, 0), *_shared(d_parameters, 0),
-        )  # fmt: skip
+            *_sizes(states),
+            _at(states),
+            _at(tangents),
+            *_shared(commands, 1),
+            *_shared(d_commands, 1),
+            *_shared(parameters, 0),
+            *_shared(d_parameters, 0),
+        )
 
     def rollout_vjp(
-        self, states: Array, commands: Array, parameters: Array, g_states: Array,
-        g_start: Array, g_commands: Array, g_parameters: Array,
-    ) -> None:  # fmt: skip
+        self,
+        states: Array,
+        commands: Array,
+        parameters: Array,
+        g_states: Array,
+        g_start: Array,
+        g_commands: Array,
+        g_parameters: Array,
+    ) -> None:
         """Fill g_start, g_commands and g_parameters."""
         self._library.rollout_vjp(
-            *_sizes(states), _at(states), *_shared(commands, 1), *_shared(parameters, 0),
+            *_sizes(states),
+            _at(states),
+            *_shared(commands, 1),
+            *_shared(parameters, 0),
             *(_at(a) for a in (g_states, g_start, g_commands, g_parameters)),
-        )  # fmt: skip
+        )
 
     def rates_jvp(
         self,
@@ -58,18 +74,31 @@ class CompiledKernel:
     ) -> None:
         """Fill out and d_out (batch, NX) with rates of motion and their tangents."""
         self._library.rates_jvp(
-            ctypes.c_long(len(x)), *(_at(a) for a in (x, dx, w, dw)),
-            *_shared(parameters, 0), *_shared(d_parameters, 0), _at(out), _at(d_out),
-        )  # fmt: skip
+            ctypes.c_long(len(x)),
+            *(_at(a) for a in (x, dx, w, dw)),
+            *_shared(parameters, 0),
+            *_shared(d_parameters, 0),
+            _at(out),
+            _at(d_out),
+        )
 
     def memory_jvp(
-        self, memory: Array, tangents: Array, commands: Array, parameters: Array, d_parameters: Array
+        self,
+        memory: Array,
+        tangents: Array,
+        commands: Array,
+        parameters: Array,
+        d_parameters: Array,
     ) -> None:
         """Fill memory[1:] and tangents[1:] (T + 1, batch, NM)."""
         self._library.memory_jvp(
-            *_sizes(memory), _at(memory), _at(tangents), *_shared(commands, 1),
-            *_shared(parameters, 0), *_shared(d_parameters, 0),
-        )  # fmt: skip
+            *_sizes(memory),
+            _at(memory),
+            _at(tangents),
+            *_shared(commands, 1),
+            *_shared(parameters, 0),
+            *_shared(d_parameters, 0),
+        )
 
 
 def _at(array: Array) -> ctypes.c_void_p:

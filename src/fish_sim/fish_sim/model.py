@@ -73,7 +73,9 @@ class Layout:
         return parameter_names(self.structure)
 
     def _own(self, kind: str) -> tuple[str, ...]:
-        return tuple(f"{name}.{key}" for name in self.effects for key in getattr(EFFECTS[name], kind))
+        return tuple(
+            f"{name}.{key}" for name in self.effects for key in getattr(EFFECTS[name], kind)
+        )
 
 
 def unpack_effects(
@@ -121,7 +123,12 @@ def solution_rate(layout: Layout, x: Sequence[Scalar], solution: Solution) -> li
 
 
 def follow_command(
-    layout: Layout, m: Sequence[Scalar], command: Sequence[Scalar], p: Sequence[Scalar], dt: float, xp: Any
+    layout: Layout,
+    m: Sequence[Scalar],
+    command: Sequence[Scalar],
+    p: Sequence[Scalar],
+    dt: float,
+    xp: Any,
 ) -> list[Scalar]:
     """Memory at the end of a command's period: what servo, motor and the actuator effects make of it."""
     own = 3 if layout.has_linkage else 2
@@ -142,7 +149,9 @@ def follow_command(
     for e, values in zip(effects, kept, strict=True):
         alpha, linked = e.effect.linkage(e.p, e.z, alpha, dt, xp)
         values.update(linked)
-    memory = [values[key] for e, values in zip(effects, kept, strict=True) for key in e.effect.memory]
+    memory = [
+        values[key] for e, values in zip(effects, kept, strict=True) for key in e.effect.memory
+    ]
     return [alpha, rotor, *([servo] if layout.has_linkage else []), *memory]
 
 
@@ -201,7 +210,7 @@ class Expression:
     value: Any  # casadi.SX, one column
 
     def function(self) -> casadi.Function:
-        """inputs -> value."""
+        """Inputs -> value."""
         return casadi.Function(self.name, self.inputs, casadi.cse([self.value]))
 
     def jvp(self) -> casadi.Function:

@@ -74,7 +74,13 @@ def torch_ops() -> SimpleNamespace:
     two = {k: pairwise(getattr(torch, names.get(k, k))) for k in ("fmin", "fmax", "arctan2")}
 
     def where(condition: torch.Tensor, a: Scalar, b: Scalar) -> torch.Tensor:
-        like = a if isinstance(a, torch.Tensor) else b if isinstance(b, torch.Tensor) else torch.zeros(())
+        like = (
+            a
+            if isinstance(a, torch.Tensor)
+            else b
+            if isinstance(b, torch.Tensor)
+            else torch.zeros(())
+        )
         return torch.where(condition, tensor(a, like), tensor(b, like))
 
     return SimpleNamespace(**one, **two, where=where)

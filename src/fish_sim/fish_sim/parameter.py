@@ -14,6 +14,8 @@ class Parameter:
     lowest: float
     highest: float
     source: str = ""
-    typical: float | None = None  # a plausible non-zero strength: where searches start and tests probe
+    typical: float | None = (
+        None  # a plausible non-zero strength: where searches start and tests probe
+    )
     # values that a search starts from, where it cannot walk from one to the next: a frequency, a place, a limit
     tries: tuple[float, ...] = ()

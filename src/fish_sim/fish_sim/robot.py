@@ -46,7 +46,9 @@ def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
     strip = "slender-body strip, rho pi/4 h^2 per length, h = 0.075 m"
     rod = "1 is a uniform rod: inertia = factor (mass + added mass) length^2 / 12; a real tail's is spread unevenly"
 
-    def p(value: float, unit: str, source: str, lowest: float = 0.0, highest: float = math.inf) -> Parameter:
+    def p(
+        value: float, unit: str, source: str, lowest: float = 0.0, highest: float = math.inf
+    ) -> Parameter:
         return Parameter(value=value, unit=unit, lowest=lowest, highest=highest, source=source)
 
     return {
@@ -87,11 +89,15 @@ class Robot:
     """A fish: number of tail links, parameter values and enabled effects with their parameter values."""
 
     links: int = 3
-    parameters: Mapping[str, float] = field(default_factory=dict)  # missing names take the nominal value
+    parameters: Mapping[str, float] = field(
+        default_factory=dict
+    )  # missing names take the nominal value
     effects: Mapping[str, Mapping[str, float]] = field(
         default_factory=dict
     )  # EFFECTS name -> parameter -> value
-    sensors: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # SENSOR_EFFECTS name -> ...
+    sensors: Mapping[str, Mapping[str, float]] = field(
+        default_factory=dict
+    )  # SENSOR_EFFECTS name -> ...
     name: str = "fish"
 
     def __post_init__(self) -> None:
@@ -109,7 +115,10 @@ class Robot:
     def vector(self) -> list[float]:
         """All parameter values in the order of `parameter_names(self.structure)`."""
         names = self.structure[1]
-        return [*self.parameters.values(), *(v for name in names for v in self.effects[name].values())]
+        return [
+            *self.parameters.values(),
+            *(v for name in names for v in self.effects[name].values()),
+        ]
 
     def with_parameters(self, **values: float) -> Robot:
         """The same robot with some parameters changed."""
@@ -123,7 +132,11 @@ class Robot:
 
     def digest(self) -> str:
         """Hash of everything that changes its motion; weights files carry it."""
-        content = {"links": self.links, "parameters": dict(self.parameters), "effects": self.effects}
+        content = {
+            "links": self.links,
+            "parameters": dict(self.parameters),
+            "effects": self.effects,
+        }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -157,7 +170,9 @@ def _check_value(where: str, parameter: Parameter, value: Any) -> float:
     try:
         number = float(value)
     except OverflowError:  # YAML's whole numbers have no end; nobody wants to read this one
-        raise RobotError(f"{where}: got a whole number beyond every float; expected {expected}") from None
+        raise RobotError(
+            f"{where}: got a whole number beyond every float; expected {expected}"
+        ) from None
     if not math.isfinite(number) or not parameter.lowest <= number <= parameter.highest:
         raise RobotError(f"{where}: got {value!r} {parameter.unit}; expected {expected}")
     return number
@@ -183,7 +198,10 @@ def load_robot(path: str | Path) -> Robot:
         content = yaml.safe_load(path.read_text())
     except OSError as error:
         raise RobotError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
+    except (
+        yaml.YAMLError,
+        ValueError,
+    ) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
         raise RobotError(f"{path}: cannot be read as YAML: {error}") from error
     try:
         return _from_content(content)
@@ -193,7 +211,9 @@ def load_robot(path: str | Path) -> Robot:
 
 def _from_content(content: Any) -> Robot:
     if not isinstance(content, dict):
-        raise RobotError(f"got {type(content).__name__}; expected a table with format, links, parameters")
+        raise RobotError(
+            f"got {type(content).__name__}; expected a table with format, links, parameters"
+        )
     known = {"format", "name", "links", "parameters", "effects", "sensors", "notes"}
     if unknown := sorted(map(str, set(content) - known)):
         raise RobotError(f"{unknown[0]}: unknown field; known: {', '.join(sorted(known))}")
@@ -203,7 +223,9 @@ def _from_content(content: Any) -> Robot:
     _check_links(links)
     return Robot(
         links=links,
-        parameters=_values("parameters", content.get("parameters") or {}, nominal_parameters(links)),
+        parameters=_values(
+            "parameters", content.get("parameters") or {}, nominal_parameters(links)
+        ),
         effects=_effect_values("effects", content.get("effects") or {}, EFFECTS),
         sensors=_effect_values("sensors", content.get("sensors") or {}, SENSOR_EFFECTS),
         name=str(content.get("name", "fish")),
@@ -215,7 +237,9 @@ def _effect_values(where: str, given: Any, table: Mapping[str, Any]) -> dict[str
     if not isinstance(given, dict):
         raise RobotError(f"{where}: got {given!r}; expected a table of effect: parameters")
     return {
-        name: _values(f"{where}.{name}", values or {}, table[name].parameters if name in table else None)
+        name: _values(
+            f"{where}.{name}", values or {}, table[name].parameters if name in table else None
+        )
         for name, values in given.items()
     }
 
@@ -228,9 +252,13 @@ def _values(where: str, table: Any, units: Mapping[str, Parameter] | None = None
     for name, entry in table.items():
         if isinstance(entry, dict):
             if "value" not in entry:
-                raise RobotError(f"{where}.{name}: got {entry!r}; expected a number or a table with 'value'")
+                raise RobotError(
+                    f"{where}.{name}: got {entry!r}; expected a number or a table with 'value'"
+                )
             if units and name in units and entry.get("unit", units[name].unit) != units[name].unit:
-                raise RobotError(f"{where}.{name}.unit: got {entry['unit']!r}; expected {units[name].unit!r}")
+                raise RobotError(
+                    f"{where}.{name}.unit: got {entry['unit']!r}; expected {units[name].unit!r}"
+                )
             entry = entry["value"]
         result[name] = entry
     return result
@@ -251,7 +279,9 @@ def save_robot(
             row: dict[str, Any] = {"value": float(value), "unit": parameter.unit}
             if prefix + name in std:
                 row["std"] = float(std[prefix + name])
-            row["source"] = parameter.source if value == parameter.value else "identified or set by the user"
+            row["source"] = (
+                parameter.source if value == parameter.value else "identified or set by the user"
+            )
             table[name] = row
         return table
 
@@ -259,7 +289,9 @@ def save_robot(
     content["parameters"] = rows(robot.parameters, nominal_parameters(robot.links))
     for key, table in (("effects", EFFECTS), ("sensors", SENSOR_EFFECTS)):
         enabled = getattr(robot, key)
-        content[key] = {name: rows(v, table[name].parameters, f"{name}.") for name, v in enabled.items()}
+        content[key] = {
+            name: rows(v, table[name].parameters, f"{name}.") for name, v in enabled.items()
+        }
     if notes:
         content["notes"] = notes
     Path(path).write_text(yaml.safe_dump(content, sort_keys=False, width=110))

@@ -94,7 +94,9 @@ class Simulation:
     def command(self, rotor_speed: float, rudder: float) -> None:
         """Follow this from the next period on [rad/s, rad]. Raises ValueError for what no motor can do."""
         if not (math.isfinite(rotor_speed) and abs(rotor_speed) <= MAX_ROTOR_SPEED):
-            raise ValueError(f"rotor velocity = {rotor_speed}: expected at most {MAX_ROTOR_SPEED} rad/s")
+            raise ValueError(
+                f"rotor velocity = {rotor_speed}: expected at most {MAX_ROTOR_SPEED} rad/s"
+            )
         if not (math.isfinite(rudder) and abs(rudder) <= math.pi):
             raise ValueError(f"rudder position = {rudder}: expected at most pi rad")
         self._command, self._command_time = (rotor_speed, rudder), self.time
@@ -125,7 +127,9 @@ class Simulation:
         level = self._config.disturbance
         kept = math.exp(-DT / DISTURBANCE_TIME)
         size = level * np.array([1.0, 1.0, DISTURBANCE_ARM])
-        self._push = kept * self._push + math.sqrt(1 - kept**2) * size * self._random.standard_normal(3)
+        self._push = kept * self._push + math.sqrt(
+            1 - kept**2
+        ) * size * self._random.standard_normal(3)
         self._parameters[self._pushed] = self._constant_push + self._push
 
     def _acceleration(self, before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
@@ -135,7 +139,10 @@ class Simulation:
         rudder move as in the period that ends; what they do next nobody knows yet.
         """
         size, motion = 3 + self._stepper.layout.links, len(self._stepper.layout.motion)
-        (alpha, speed), (alpha_before, speed_before) = after[motion : motion + 2], before[motion : motion + 2]
+        (alpha, speed), (alpha_before, speed_before) = (
+            after[motion : motion + 2],
+            before[motion : motion + 2],
+        )
         drive = np.array([[alpha, (alpha - alpha_before) / DT, speed, (speed - speed_before) / DT]])
         now = after[None, :motion]
         still = (np.zeros_like(now), np.zeros_like(drive), np.zeros_like(self._parameters))

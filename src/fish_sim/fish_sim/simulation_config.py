@@ -45,9 +45,13 @@ class SimulatorConfig(SimulationConfig):
     """ROS parameters of the simulator node."""
 
     real_time_factor: float = 1.0  # simulated per real second; 0 = as fast as possible
-    camera: str = "image"  # image: the camera node renders; pose: publish camera/pose from the sensor model
+    camera: str = (
+        "image"  # image: the camera node renders; pose: publish camera/pose from the sensor model
+    )
     paused: bool = False  # start paused
-    lockstep: float = 0.0  # s of real time to wait for estimates and commands that lag; 0 = do not wait
+    lockstep: float = (
+        0.0  # s of real time to wait for estimates and commands that lag; 0 = do not wait
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -19,7 +19,9 @@ def modes_at_rest(structure: Structure, parameters: NDArray[np.float64]) -> Mode
     size = len(Layout(structure).motion)
     rest, still = np.zeros((size, size)), np.zeros((4, size))
     p = np.tile(np.reshape(parameters, (-1, 1)), size)
-    _, jacobian = functions(structure).rate_jvp(rest, still, p, np.eye(size), still, np.zeros_like(p))
+    _, jacobian = functions(structure).rate_jvp(
+        rest, still, p, np.eye(size), still, np.zeros_like(p)
+    )
     return np.linalg.eigvals(jacobian.full()).astype(complex)
 
 

@@ -37,7 +37,10 @@ PARTS: dict[Part, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("rate", "rate_vjp", "follow", "follow_vjp"),
         ("step.c", "adjoint.c", "rows.c", "rollout_vjp.c"),
     ),
-    "memory": (("follow_jvp",), ("rows.c", "memory_jvp.c")),  # built in a tenth of the time of the tangents
+    "memory": (
+        ("follow_jvp",),
+        ("rows.c", "memory_jvp.c"),
+    ),  # built in a tenth of the time of the tangents
 }
 
 SETTLED = 300  # periods of 10 ms after which servo and motor have followed a constant command
@@ -46,7 +49,9 @@ SETTLED = 300  # periods of 10 ms after which servo and motor have followed a co
 class Stepper:
     """The motion of one structure of robot (links, effects) under one integration scheme."""
 
-    def __init__(self, structure: Structure, scheme: Scheme | None = None, compiled: bool = True) -> None:
+    def __init__(
+        self, structure: Structure, scheme: Scheme | None = None, compiled: bool = True
+    ) -> None:
         self.layout = Layout(structure)
         self.scheme = scheme or default_scheme(structure[0])
         self._compiled = compiled and compiler() is not None
@@ -57,6 +62,7 @@ class Stepper:
 
         Raises:
             ValueError: the scheme's steps are too coarse for this robot.
+
         """
         if scheme is not None:
             check_scheme(scheme, robot)
@@ -85,7 +91,9 @@ class Stepper:
         state[2 : 3 + self.layout.links] = pose[2]
         state[len(self.layout.motion)] = rudder
         if parameters is not None:
-            state[len(self.layout.motion) :] = self.settled_memory(np.zeros((1, 2)), parameters)[0][0]
+            state[len(self.layout.motion) :] = self.settled_memory(np.zeros((1, 2)), parameters)[0][
+                0
+            ]
         return state
 
     def settled_memory(
@@ -109,6 +117,7 @@ class Stepper:
         Raises:
             ValueError: a wrong shape; a command, a parameter or the one start state is not finite. Of a batch of start
                 states the bad ones stay bad (`checks.diverged`) and leave the others alone.
+
         """
         start, commands, parameters, shape = self._arrange(start, commands, parameters)
         check_finite("command", commands, COMMAND_NAMES)
@@ -144,7 +153,9 @@ class Stepper:
         )
         states, tangents = (np.empty((len(commands) + 1, *start.shape)) for _ in range(2))
         states[0], tangents[0] = start, ds
-        self._kernel(len(start), "tangents").rollout_jvp(states, tangents, commands, dc, parameters, dp)
+        self._kernel(len(start), "tangents").rollout_jvp(
+            states, tangents, commands, dc, parameters, dp
+        )
         return tuple(a.reshape(len(a), *shape, a.shape[-1]) for a in (states, tangents))  # type: ignore[return-value]
 
     def rollout_vjp(
@@ -152,9 +163,15 @@ class Stepper:
     ) -> tuple[Array, Array, Array]:
         """Adjoints of (start, commands, parameters), per batch element, from adjoints of all states of a rollout."""
         start, commands, parameters, shape = self._arrange(states[0], commands, parameters)
-        flat = [np.ascontiguousarray(a, float).reshape(len(states), *start.shape) for a in (states, g_states)]
+        flat = [
+            np.ascontiguousarray(a, float).reshape(len(states), *start.shape)
+            for a in (states, g_states)
+        ]
         batch = len(start)
-        g_start, g_commands = np.empty_like(start), np.empty((len(commands), batch, commands.shape[-1]))
+        g_start, g_commands = (
+            np.empty_like(start),
+            np.empty((len(commands), batch, commands.shape[-1])),
+        )
         g_parameters = np.empty((batch, parameters.shape[-1]))
         self._kernel(batch, "adjoints").rollout_vjp(
             flat[0], commands, parameters, flat[1], g_start, g_commands, g_parameters
@@ -178,8 +195,12 @@ class Stepper:
 
         motion (B, NX), drive (B, 4) as DRIVE_NAMES, parameters (NP,) or (B, NP); tangents likewise.
         """
-        x, dx, w, dw = (np.ascontiguousarray(a, dtype=float) for a in (motion, d_motion, drive, d_drive))
-        p, dp = (np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters))
+        x, dx, w, dw = (
+            np.ascontiguousarray(a, dtype=float) for a in (motion, d_motion, drive, d_drive)
+        )
+        p, dp = (
+            np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters)
+        )
         self._check_width("motion", x, len(self.layout.motion))
         self._check_width("drive", w, len(DRIVE_NAMES))
         self._check_width("parameters", p, len(self.layout.parameters))
@@ -203,7 +224,9 @@ class Stepper:
         memory = np.empty((len(commands) + 1, *start.shape))
         tangents = np.empty_like(memory)
         memory[0], tangents[0] = start, d_start
-        p, dp = (np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters))
+        p, dp = (
+            np.ascontiguousarray(np.atleast_2d(a), dtype=float) for a in (parameters, d_parameters)
+        )
         self._check_width("memory", start, len(self.layout.memory))
         commands = np.ascontiguousarray(commands, dtype=float)
         self._kernel(start.shape[0], "memory").memory_jvp(memory, tangents, commands, p, dp)
@@ -234,13 +257,17 @@ class Stepper:
         self, start: Array, commands: Array, parameters: Array
     ) -> tuple[Array, Array, Array, tuple[int, ...]]:
         """Flatten batch axes: (B, NS), (T, B or 1, 2), (B or 1, NP), and the batch shape."""
-        start, commands, parameters = (np.asarray(a, dtype=float) for a in (start, commands, parameters))
+        start, commands, parameters = (
+            np.asarray(a, dtype=float) for a in (start, commands, parameters)
+        )
         self._check_width("state", start, len(self.layout.state))
         self._check_width("commands", commands, len(COMMAND_NAMES))
         self._check_width("parameters", parameters, len(self.layout.parameters))
         shape = np.broadcast_shapes(start.shape[:-1], commands.shape[1:-1], parameters.shape[:-1])
         batch = int(np.prod(shape, dtype=int))
-        flat_start = np.broadcast_to(start, (*shape, start.shape[-1])).reshape(batch, start.shape[-1])
+        flat_start = np.broadcast_to(start, (*shape, start.shape[-1])).reshape(
+            batch, start.shape[-1]
+        )
         if commands.ndim == 2:
             flat_commands = commands[:, None]
         else:
@@ -302,12 +329,14 @@ def _source(
     texts: tuple[str, ...],
 ) -> str:
     folder, table = files("fish_sim") / "c", functions(structure)
-    return "\n".join([
-        *_definitions(Layout(structure), METHODS[method], substeps, width),
-        (folder / "vector.h").read_text(),
-        *(emit(getattr(table, name)) for name in names),
-        *((folder / text).read_text() for text in texts),
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            *_definitions(Layout(structure), METHODS[method], substeps, width),
+            (folder / "vector.h").read_text(),
+            *(emit(getattr(table, name)) for name in names),
+            *((folder / text).read_text() for text in texts),
+        ]
+    )
 
 
 def _definitions(layout: Layout, method: Method, substeps: str, width: int) -> list[str]:

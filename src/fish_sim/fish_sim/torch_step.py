@@ -24,7 +24,9 @@ class _Rollout(torch.autograd.Function):
     """states = rollout(start, commands, parameters) with the hand-written adjoint of the kernel."""
 
     @staticmethod
-    def forward(ctx: Any, start: Tensor, commands: Tensor, parameters: Tensor, stepper: Stepper) -> Tensor:
+    def forward(
+        ctx: Any, start: Tensor, commands: Tensor, parameters: Tensor, stepper: Stepper
+    ) -> Tensor:
         values = [t.detach().numpy() for t in (start, commands, parameters)]
         states = torch.from_numpy(stepper.rollout(*values))
         ctx.stepper = stepper
@@ -35,7 +37,9 @@ class _Rollout(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
         states, commands, parameters, start = ctx.saved_tensors
-        values = [np.ascontiguousarray(t.detach().numpy()) for t in (states, commands, parameters, grad)]
+        values = [
+            np.ascontiguousarray(t.detach().numpy()) for t in (states, commands, parameters, grad)
+        ]
         gradients = [torch.from_numpy(g) for g in ctx.stepper.rollout_vjp(*values)]
         shapes = (start.shape, commands.shape, parameters.shape)
         return (*(g.sum_to_size(s) for g, s in zip(gradients, shapes, strict=True)), None)
@@ -84,13 +88,17 @@ def _generic_step(state: Tensor, command: Tensor, parameters: Tensor, stepper: S
         for i, c in enumerate(method.C):
             fraction = (sub + c) / scheme.substeps
             drive = [
-                v for a, b in zip(m0[:2], m1[:2], strict=True) for v in (a + (b - a) * fraction, (b - a) / DT)
+                v
+                for a, b in zip(m0[:2], m1[:2], strict=True)
+                for v in (a + (b - a) * fraction, (b - a) / DT)
             ]
             K.append(motion_rate(layout, _advance(x, K, method.A[i], h), drive, p, XP))
         x = _advance(x, K, method.B, h)
     return torch.stack(torch.broadcast_tensors(*x, *m1), dim=-1)
 
 
-def _advance(x: list[Tensor], K: list[list[Tensor]], weights: tuple[float, ...], h: float) -> list[Tensor]:
+def _advance(
+    x: list[Tensor], K: list[list[Tensor]], weights: tuple[float, ...], h: float
+) -> list[Tensor]:
     used = [(h * a, k) for a, k in zip(weights, K, strict=False) if a != 0.0]
     return [value + sum(a * k[j] for a, k in used) for j, value in enumerate(x)]

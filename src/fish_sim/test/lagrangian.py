@@ -37,9 +37,13 @@ def table(r, n):
     link = r["link_mass"] + r["link_added_mass_sway"]
     fin = r["fin_mass"] + r["fin_added_mass_sway"]
     head = [
-        r["head_mass"] + r["head_added_mass_surge"], r["head_mass"] + r["head_added_mass_sway"],
-        r["head_inertia"], r["head_drag_surge"], r["head_drag_sway"], r["head_drag_yaw"],
-    ]  # fmt: skip
+        r["head_mass"] + r["head_added_mass_surge"],
+        r["head_mass"] + r["head_added_mass_sway"],
+        r["head_inertia"],
+        r["head_drag_surge"],
+        r["head_drag_sway"],
+        r["head_drag_yaw"],
+    ]
     links = [
         [
             r["link_mass"],
@@ -88,7 +92,12 @@ def accelerations(q, qd, alpha, alpha_dot, rotor_acceleration, r, share=0.0, sli
 
     M = hessian(T, 1)(q, qd, alpha)
     _, drift = jvp(lambda q, a: grad(T, 1)(q, qd, a), (q, alpha), (qd, alpha_dot))
-    force = grad(T)(q, qd, alpha) - drift - grad(lambda q: spring_energy(q, alpha, r, share))(q) - grad(R)(qd)
+    force = (
+        grad(T)(q, qd, alpha)
+        - drift
+        - grad(lambda q: spring_energy(q, alpha, r, share))(q)
+        - grad(R)(qd)
+    )
     force[2] -= r["rotor_inertia"] * rotor_acceleration
     N = jacrev(slip, 1)(q, qd, alpha)
     _, bias = jvp(lambda q, a: slip(q, qd, a), (q, alpha), (qd, alpha_dot))

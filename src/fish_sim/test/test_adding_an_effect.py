@@ -31,7 +31,8 @@ def test_the_example_works_and_says_what_it_does(table, capsys, tmp_path):
     exec(table_line, names)
     exec(use, names)
     headings = re.findall(r"heading (-?[\d.]+) rad", capsys.readouterr().out)
-    assert len(headings) == 2 and headings[0] != headings[1]
+    assert len(headings) == 2
+    assert headings[0] != headings[1]
     robot = tmp_path / "robot.yaml"
     robot.write_text(yaml.safe_dump({"format": 1, **yaml.safe_load(blocks("yaml")[0])}))
     assert load_robot(robot) == Robot().with_effect("drag_arm", arm=0.02)

@@ -13,7 +13,9 @@ FILE = Path(__file__).parents[1] / "config" / "camera.yaml"
 
 def test_file_has_exactly_the_parameters_and_their_defaults() -> None:
     values = yaml.safe_load(FILE.read_text())["/**"]["ros__parameters"]
-    defaults = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(CameraConfig()).items()}
+    defaults = {
+        k: list(v) if isinstance(v, tuple) else v for k, v in asdict(CameraConfig()).items()
+    }
     assert values.keys() == defaults.keys()
     for key, value in values.items():
         assert value == pytest.approx(defaults[key]), key

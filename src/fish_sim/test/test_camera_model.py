@@ -9,11 +9,15 @@ from fish_sim.camera.model import undistort
 
 
 def straight_down(distortion: tuple[float, ...] = (0.0,) * 5) -> CameraModel:
-    return CameraModel((1280, 720), (900.0, 905.0), (640.0, 360.0), distortion, (0.3, -0.2, 3.0), (0.0,) * 3)
+    return CameraModel(
+        (1280, 720), (900.0, 905.0), (640.0, 360.0), distortion, (0.3, -0.2, 3.0), (0.0,) * 3
+    )
 
 
 def test_untilted_pinhole_is_a_similar_triangle() -> None:
-    pixels = straight_down().project([[0.3, -0.2, 0.0], [1.3, -0.2, 0.0], [0.3, 0.8, 0.0], [0.3, 0.8, 0.5]])
+    pixels = straight_down().project(
+        [[0.3, -0.2, 0.0], [1.3, -0.2, 0.0], [0.3, 0.8, 0.0], [0.3, 0.8, 0.5]]
+    )
     expected = [[640, 360], [640 + 300, 360], [640, 360 - 905 / 3], [640, 360 - 905 / 2.5]]
     np.testing.assert_allclose(pixels, expected, atol=1e-9)
 
@@ -50,4 +54,6 @@ def test_unproject_inverts_project(height: float) -> None:
 def test_default_camera_sees_the_whole_pool_with_a_margin() -> None:
     corners = [[x, y, 0.0] for x in (-2.135, 2.135) for y in (-1.065, 1.065)]
     pixels = CameraConfig().model().project(corners)
-    assert pixels.min() > 20 and pixels[:, 0].max() < 1260 and pixels[:, 1].max() < 700
+    assert pixels.min() > 20
+    assert pixels[:, 0].max() < 1260
+    assert pixels[:, 1].max() < 700

@@ -10,17 +10,17 @@ import pytest
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-import rclpy  # noqa: E402
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
-from nav_msgs.msg import Odometry  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.node import Node  # noqa: E402
-from rclpy.time import Time  # noqa: E402
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image  # noqa: E402
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from fish_sim.camera import FishPose, FishShape  # noqa: E402
-from fish_sim.camera.fish import markers  # noqa: E402
-from fish_sim.nodes.camera import CameraNode  # noqa: E402
+from fish_sim.camera import FishPose, FishShape
+from fish_sim.camera.fish import markers
+from fish_sim.nodes.camera import CameraNode
 
 pytestmark = pytest.mark.ros
 DOMAIN = 141
@@ -34,7 +34,13 @@ class Bench:
         arguments = ["--ros-args"] + [a for k, v in parameters.items() for a in ("-p", f"{k}:={v}")]
         rclpy.init(args=arguments, domain_id=DOMAIN)
         self.camera, self.peer = CameraNode(), Node("peer", namespace="fish")
-        self.got: dict[str, list] = {"info": [], "jpeg": [], "raw": [], "diagnostics": [], "arrival": []}
+        self.got: dict[str, list] = {
+            "info": [],
+            "jpeg": [],
+            "raw": [],
+            "diagnostics": [],
+            "arrival": [],
+        }
         self.odometry = self.peer.create_publisher(Odometry, "sim/odometry", 10)
         for name, kind, topic in (
             ("info", CameraInfo, "camera/camera_info"),
@@ -98,22 +104,26 @@ def seconds(msg: CameraInfo | CompressedImage | Image) -> float:
 @pytest.mark.parametrize("bench", [{"latency_s": 0.08, "publish_raw": True}], indirect=True)
 def test_frames_show_the_fish_and_come_late_with_the_exposure_as_stamp(bench: Bench) -> None:
     pose = FishPose(0.5, 0.2, 1.0)
-    assert bench.spin_until(lambda: min(len(bench.got[k]) for k in ("info", "jpeg", "raw")) >= 3, pose=pose)
+    assert bench.spin_until(
+        lambda: min(len(bench.got[k]) for k in ("info", "jpeg", "raw")) >= 3, pose=pose
+    )
     info, jpeg, raw = (bench.got[k][2] for k in ("info", "jpeg", "raw"))
-    assert info.header == jpeg.header == raw.header and info.header.frame_id == "overhead_optical"
+    assert info.header == jpeg.header == raw.header
+    assert info.header.frame_id == "overhead_optical"
     assert seconds(jpeg) * 30.0 == pytest.approx(round(seconds(jpeg) * 30.0), abs=1e-3)
     assert bench.got["arrival"][2] - seconds(jpeg) >= 0.08
     picture = cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR)
     sent = np.frombuffer(raw.data, np.uint8).reshape(raw.height, raw.width, 3)
-    assert raw.encoding == "bgr8" and cv2.PSNR(picture, sent) > 30.0
+    assert raw.encoding == "bgr8"
+    assert cv2.PSNR(picture, sent) > 30.0
     K, D = np.array(info.k).reshape(3, 3), np.array(info.d)
     assert (info.width, info.height, info.distortion_model) == (1280, 720, "plumb_bob")
     (front, _, colour), *_ = markers(pose, FishShape())
     camera = bench.camera._renderer.camera
     rotation = cv2.Rodrigues(camera.R)[0]
-    u, v = np.round(cv2.projectPoints(np.array([[*front, 0.0]]), rotation, camera.t, K, D)[0].ravel()).astype(
-        int
-    )
+    u, v = np.round(
+        cv2.projectPoints(np.array([[*front, 0.0]]), rotation, camera.t, K, D)[0].ravel()
+    ).astype(int)
     assert np.abs(sent[v, u].astype(int) - colour).max() < 40
 
 
@@ -129,8 +139,10 @@ def test_diagnostics_say_what_is_missing_and_nan_is_ignored(
     bench.send(FishPose(float("nan"), 0.0, 0.0), bench.now())
     assert bench.spin_until(lambda: bool(bench.got["diagnostics"]))
     status = bench.got["diagnostics"][0].status[0]
-    assert status.name == "/fish/camera" and status.level == DiagnosticStatus.WARN
-    assert "sim/odometry" in status.message and not bench.got["jpeg"]
+    assert status.name == "/fish/camera"
+    assert status.level == DiagnosticStatus.WARN
+    assert "sim/odometry" in status.message
+    assert not bench.got["jpeg"]
     assert status.message in capfd.readouterr().err
 
 

@@ -40,7 +40,8 @@ def test_every_marker_shows_its_colour(clean: PoolRenderer) -> None:
     for centre, _, colour in markers(POSE, CONFIG.shape()):
         u, v = np.round(clean.camera.project([[*centre, 0.0]])[0]).astype(int)
         seen = picture[v, u]
-        assert np.argmax(seen) == np.argmax(colour) and np.abs(seen - colour).max() < 40
+        assert np.argmax(seen) == np.argmax(colour)
+        assert np.abs(seen - colour).max() < 40
 
 
 def test_a_moving_fish_is_drawn_at_the_mean_of_its_poses(clean: PoolRenderer) -> None:
@@ -51,9 +52,12 @@ def test_a_moving_fish_is_drawn_at_the_mean_of_its_poses(clean: PoolRenderer) ->
 
 
 @pytest.mark.parametrize("place", [(30.0, 0.0), (2.135, 1.065), (2.3, 0.0)])
-def test_a_fish_at_or_beyond_the_edge_is_drawn_without_complaint(clean: PoolRenderer, place: tuple) -> None:
+def test_a_fish_at_or_beyond_the_edge_is_drawn_without_complaint(
+    clean: PoolRenderer, place: tuple
+) -> None:
     picture = clean.render([FishPose(*place, 0.3)], 0.0)
-    assert picture.shape == (720, 1280, 3) and picture.dtype == np.uint8
+    assert picture.shape == (720, 1280, 3)
+    assert picture.dtype == np.uint8
 
 
 def test_without_a_fish_the_pool_is_empty(clean: PoolRenderer) -> None:
@@ -65,11 +69,14 @@ def test_without_a_fish_the_pool_is_empty(clean: PoolRenderer) -> None:
 def test_noise_has_the_asked_standard_deviation(clean: PoolRenderer) -> None:
     noisy = PoolRenderer(CONFIG.model(), CONFIG.shape(), Look(noise_std=4.0, glare=0.0))
     noise = noisy.render([POSE], 0.0).astype(float) - clean.render([POSE], 0.0)
-    assert noise.std() == pytest.approx(4.0, rel=0.03) and abs(noise.mean()) < 0.1
+    assert noise.std() == pytest.approx(4.0, rel=0.03)
+    assert abs(noise.mean()) < 0.1
 
 
 def test_glare_saturates_only_when_asked(clean: PoolRenderer) -> None:
-    glaring = PoolRenderer(CONFIG.model(), CONFIG.shape(), Look(noise_std=0.0, glare=1.0)).render([], 0.5)
+    glaring = PoolRenderer(CONFIG.model(), CONFIG.shape(), Look(noise_std=0.0, glare=1.0)).render(
+        [], 0.5
+    )
     assert (glaring.min(axis=2) > 240).mean() > 1e-3
     assert not np.any(clean.render([], 0.5).min(axis=2) > 240)
 

@@ -40,12 +40,15 @@ def test_without_a_compiler_the_same_numbers_come(fresh, monkeypatch, strokes):
 def test_a_broken_compiler_is_said_and_done_without(fresh, monkeypatch, caplog, strokes):
     monkeypatch.setenv("CC", "false")
     expected = np.asarray(swim(strokes))
-    assert "no compiled kernel" in caplog.text and not list(fresh.glob("*.so"))
+    assert "no compiled kernel" in caplog.text
+    assert not list(fresh.glob("*.so"))
     assert isinstance(Stepper((1, ()), SCHEME)._kernel(1), InterpretedKernel)
     assert np.isfinite(expected).all()
 
 
-def test_a_folder_that_cannot_be_written_is_said_and_done_without(fresh, monkeypatch, caplog, strokes):
+def test_a_folder_that_cannot_be_written_is_said_and_done_without(
+    fresh, monkeypatch, caplog, strokes
+):
     (fresh / "file").write_text("not a folder")
     monkeypatch.setenv("FISH_SIM_CACHE", str(fresh / "file"))
     assert np.isfinite(swim(strokes)).all()

@@ -56,9 +56,11 @@ def servo(name, commands, **values):
 
 
 def test_quadratic_drag_stops_a_gliding_head_like_the_closed_form():
-    """m u' = -k u^2 from u_0: u = u_0 / (1 + k u_0 t / m), all bodies together, tail straight behind."""
+    """M u' = -k u^2 from u_0: u = u_0 / (1 + k u_0 t / m), all bodies together, tail straight behind."""
     zero = [k for k in Robot().parameters if "_drag_" in k]
-    robot = Robot().with_parameters(**dict.fromkeys(zero, 0.0)).with_effect("quadratic_drag", surge=0.6)
+    robot = (
+        Robot().with_parameters(**dict.fromkeys(zero, 0.0)).with_effect("quadratic_drag", surge=0.6)
+    )
     stepper = Stepper(robot.structure, compiled=False)
     start = stepper.rest()
     start[6] = 0.4
@@ -81,13 +83,16 @@ def test_wall_effect_is_drag_times_1_plus_k_exp_of_distance():
     expected = -grown * np.array([0.2 * 0.2, 1.5 * -0.1, 3e-3 * 0.5])
     np.testing.assert_allclose(wrench("wall_effect", body, k=2.5, length=0.2), expected, rtol=1e-12)
     nearer = head(x=1.0, y=-pool.WIDTH / 2 + d, u=0.2, v=-0.1, w=0.5)
-    np.testing.assert_allclose(wrench("wall_effect", nearer, k=2.5, length=0.2), expected, rtol=1e-12)
+    np.testing.assert_allclose(
+        wrench("wall_effect", nearer, k=2.5, length=0.2), expected, rtol=1e-12
+    )
 
 
 def test_dry_friction_has_one_size_in_every_direction():
     for u, v in ((0.1, 0.0), (0.0, -0.3), (-0.2, 0.2)):
         X, Y, N = wrench("dry_friction", head(u=u, v=v), force=0.02, moment=0.001)
-        assert np.hypot(X, Y) == pytest.approx(0.02, rel=1e-6) and N == 0.0
+        assert np.hypot(X, Y) == pytest.approx(0.02, rel=1e-6)
+        assert N == 0.0
         assert X * u + Y * v == pytest.approx(-0.02 * np.hypot(u, v), rel=1e-6)
     for w in (0.5, -3.0):
         assert wrench("dry_friction", head(w=w), moment=0.001) == pytest.approx(
@@ -102,10 +107,14 @@ def test_wave_drag_is_largest_at_the_hump_and_brakes_both_ways():
     speeds = np.linspace(0.02, 0.5, 200)
     force = np.array([wrench("wave_drag", head(u=u), speed=0.22)[0] for u in speeds])
     assert speeds[force.argmin()] == pytest.approx(0.22, abs=0.003)
-    assert wrench("wave_drag", head(u=-0.22), speed=0.22)[0] == pytest.approx(-force.min(), rel=1e-4)
+    assert wrench("wave_drag", head(u=-0.22), speed=0.22)[0] == pytest.approx(
+        -force.min(), rel=1e-4
+    )
     hump = {"amplitude": 0.02, "speed": 0.22, "width": 0.04}
     for u, share in ((0.22, 1.0), (0.26, np.exp(-0.5)), (0.14, np.exp(-2.0))):
-        assert wrench("wave_drag", head(u=u), **hump) == pytest.approx([-0.02 * share, 0.0, 0.0], rel=1e-6)
+        assert wrench("wave_drag", head(u=u), **hump) == pytest.approx(
+            [-0.02 * share, 0.0, 0.0], rel=1e-6
+        )
     slow = wrench("wave_drag", head(u=0.01), amplitude=0.02, speed=0.02, width=0.5)[0]
     assert slow == pytest.approx(-0.02 * np.tanh(1.0), rel=1e-3)
 
@@ -123,7 +132,9 @@ def test_sloshing_pushes_along_the_pool_whatever_the_heading():
     for heading in (0.0, 1.0, 2.5):
         X, Y, N = wrench("sloshing", head(x=0.5, heading=heading), z, sine=0.02, cosine=0.01)
         cos, sin = np.cos(heading), np.sin(heading)
-        np.testing.assert_allclose([X * cos - Y * sin, X * sin + Y * cos, N], [expected, 0, 0], atol=1e-15)
+        np.testing.assert_allclose(
+            [X * cos - Y * sin, X * sin + Y * cos, N], [expected, 0, 0], atol=1e-15
+        )
     end = head(x=pool.LENGTH / 2)
     np.testing.assert_allclose(wrench("sloshing", end, z, sine=0.02, cosine=0.01), 0, atol=1e-15)
 
@@ -134,7 +145,9 @@ def test_tether_is_slack_inside_its_length_and_pulls_to_the_anchor_outside():
     np.testing.assert_allclose(wrench("tether", head(x=0.0), **line), [2.0 * 0.5, 0, 0], rtol=1e-9)
     aside = wrench("tether", head(x=1.0, y=0.8), **line)
     np.testing.assert_allclose(aside, [0, -2.0 * 0.3, 0], atol=1e-9)
-    half_taut = wrench("tether", head(x=0.5), **line)  # w / 4 = 2.5 mm of stretch at its very length
+    half_taut = wrench(
+        "tether", head(x=0.5), **line
+    )  # w / 4 = 2.5 mm of stretch at its very length
     np.testing.assert_allclose(half_taut, [2.0 * 2.5e-3, 0, 0], rtol=1e-6)
     np.testing.assert_allclose(
         wrench("tether", head(x=0.0, heading=np.pi / 2), **line), [0, -1.0, 0], atol=1e-9
@@ -194,14 +207,21 @@ def test_nonuniform_current_is_a_linear_part_and_the_eddies_of_its_stream_functi
     def psi(x, y):
         a, b = x / L + 0.5, y / W + 0.5
         return sum(
-            W / (n * np.pi) * getattr(p, f"gyre_{m}{n}") * np.sin(m * np.pi * a) * np.sin(n * np.pi * b)
+            W
+            / (n * np.pi)
+            * getattr(p, f"gyre_{m}{n}")
+            * np.sin(m * np.pi * a)
+            * np.sin(n * np.pi * b)
             for m in range(1, 9)
             for n in range(1, 5)
         )
 
     for x, y in random.uniform(-1, 1, (10, 2)):
         V, _ = EFFECTS["nonuniform_current"].water(p, x, y, SimpleNamespace(), NUMPY)
-        eddies = (psi(x, y + h) - psi(x, y - h)) / (2 * h), -(psi(x + h, y) - psi(x - h, y)) / (2 * h)
+        eddies = (
+            (psi(x, y + h) - psi(x, y - h)) / (2 * h),
+            -(psi(x + h, y) - psi(x - h, y)) / (2 * h),
+        )
         linear = p.mean_x + p.strain * x + p.shear_x * y, p.mean_y + p.shear_y * x - p.strain * y
         np.testing.assert_allclose(V, np.add(linear, eddies), atol=1e-9)
 
@@ -214,12 +234,16 @@ def test_nonuniform_current_resolves_an_eddy_wherever_it_is(core, most):
     """
     effect, rest = EFFECTS["nonuniform_current"], SimpleNamespace()
     x, y = np.meshgrid(
-        np.linspace(-0.45, 0.45, 40) * pool.LENGTH, np.linspace(-0.4, 0.4, 20) * pool.WIDTH, indexing="ij"
+        np.linspace(-0.45, 0.45, 40) * pool.LENGTH,
+        np.linspace(-0.4, 0.4, 20) * pool.WIDTH,
+        indexing="ij",
     )
 
     def part(key):
         p = SimpleNamespace(**{other: float(other == key) for other in effect.parameters})
-        return np.ravel([velocity + np.zeros_like(x) for velocity in effect.water(p, x, y, rest, np)[0]])
+        return np.ravel(
+            [velocity + np.zeros_like(x) for velocity in effect.water(p, x, y, rest, np)[0]]
+        )
 
     parts = np.stack([part(key) for key in effect.parameters], axis=1)
     for at_x, at_y in ((-0.28, 0.24), (0.6, 0.4), (0.0, 0.0)):
@@ -236,7 +260,9 @@ def test_a_firm_grip_is_the_no_slip_constraint_and_a_loose_one_slips(strokes):
     commands = strokes(50)
     nominal = swim(Robot(), commands)
     gaps = [
-        np.abs(swim(Robot().with_effect("tip_slip", mobility=m), commands)[:, :6] - nominal[:, :6]).max()
+        np.abs(
+            swim(Robot().with_effect("tip_slip", mobility=m), commands)[:, :6] - nominal[:, :6]
+        ).max()
         for m in (1e-6, 1e-3, 1.0 / 6.0)
     ]
     assert gaps[0] < 1e-5 < gaps[1] < gaps[2]
@@ -250,7 +276,10 @@ def test_tip_force_of_a_finite_grip_is_minus_grip_times_slip():
     state[6:12] = (0.1, 0.05, 0.3, 0.2, -0.4, 0.6)
     out = stepper.outputs(state, np.zeros(2), stepper.parameters(robot))
     assert out["tip_force"] == pytest.approx(-out["slip"] / 1.0, rel=1e-6)
-    assert EFFECTS["tip_slip"].derived(namespace("tip_slip"))["grip"] == (pytest.approx(6.0), "N s/m")
+    assert EFFECTS["tip_slip"].derived(namespace("tip_slip"))["grip"] == (
+        pytest.approx(6.0),
+        "N s/m",
+    )
 
 
 def test_wake_memory_without_share_is_tip_slip(strokes):
@@ -271,7 +300,9 @@ def test_tip_force_with_a_memory_is_that_of_the_slip_now_and_of_the_slip_as_it_w
     for wake in (-2.0 * slip, 0.0, slip):
         state[stepper.layout.state.index("wake_memory.wake")] = wake
         out = stepper.outputs(state, np.zeros(2), stepper.parameters(robot))
-        assert out["tip_force"] == pytest.approx(-((1.0 - share) * slip + share * wake) / 1.0, rel=1e-6)
+        assert out["tip_force"] == pytest.approx(
+            -((1.0 - share) * slip + share * wake) / 1.0, rel=1e-6
+        )
     assert out["tip_force"] == pytest.approx(-slip, rel=1e-6)
 
 
@@ -297,9 +328,13 @@ def test_states_of_effects_follow_their_equations(strokes):
 
 def test_tail_hardening_and_damping_are_torques_of_the_joint():
     hardening = EFFECTS["tail_hardening"].joint_torque
-    assert hardening(namespace("tail_hardening", k3=0.3), 1, -0.5, 9.0, NUMPY) == pytest.approx(-0.0375)
+    assert hardening(namespace("tail_hardening", k3=0.3), 1, -0.5, 9.0, NUMPY) == pytest.approx(
+        -0.0375
+    )
     damping = EFFECTS["tail_joint_damping"].joint_torque
-    assert damping(namespace("tail_joint_damping", c=1e-3), 2, 9.0, -2.0, NUMPY) == pytest.approx(-2e-3)
+    assert damping(namespace("tail_joint_damping", c=1e-3), 2, 9.0, -2.0, NUMPY) == pytest.approx(
+        -2e-3
+    )
 
 
 # mass and rotor
@@ -308,12 +343,14 @@ def test_tail_hardening_and_damping_are_torques_of_the_joint():
 def test_a_payload_at_the_centre_is_a_heavier_head(strokes):
     commands = strokes(60)
     loaded = swim(Robot().with_effect("payload", mass=0.1, forward=0.0, left=0.0), commands)
-    np.testing.assert_allclose(loaded, swim(Robot().with_parameters(head_mass=0.565), commands), atol=1e-10)
+    np.testing.assert_allclose(
+        loaded, swim(Robot().with_parameters(head_mass=0.565), commands), atol=1e-10
+    )
 
 
-@pytest.mark.parametrize("X, Y", [(0.0, 0.0), (0.3, 0.0), (0.0, 0.3)])
+@pytest.mark.parametrize(("X", "Y"), [(0.0, 0.0), (0.3, 0.0), (0.0, 0.3)])
 def test_a_payload_off_centre_makes_one_rigid_body_with_the_head(X, Y):
-    """A free head of 0.465 kg, without added mass, pushed at its own centre of mass c and braked by its rotor:
+    """A free head of 0.465 kg, without added mass, pushed at its own centre of mass c and braked by its rotor.
 
     a = F / m + r' (y_c, -x_c),   r' = (M + y_c X - x_c Y) / I,   (x_c, y_c): centre of both, seen from c
     """
@@ -350,16 +387,20 @@ def test_rotor_lag_is_the_exact_answer_to_a_speed_that_is_linear_between_command
     time = 0.01 * np.arange(200)
     commands = 100 * np.sin(4 * np.pi * time)
     _, expected, _ = lsim(([1.0], [0.03, 1.0]), commands, time, interp=True)
-    np.testing.assert_allclose(servo("rotor_lag", commands, time_constant=0.03), expected, atol=1e-9)
+    np.testing.assert_allclose(
+        servo("rotor_lag", commands, time_constant=0.03), expected, atol=1e-9
+    )
 
 
 def test_rotor_saturation_clips():
-    np.testing.assert_array_equal(servo("rotor_saturation", [50, 90, -90], limit=70.0), [50, 70, -70])
+    np.testing.assert_array_equal(
+        servo("rotor_saturation", [50, 90, -90], limit=70.0), [50, 70, -70]
+    )
 
 
 @pytest.mark.parametrize("command", [70.0, -70.0])
 def test_battery_sag_slows_the_rotor_as_its_load_builds_up(command):
-    """load = (70 / 100)^2 (1 - exp(-t / T)) from rest; a load that takes all leaves the rotor standing."""
+    """Load = (70 / 100)^2 (1 - exp(-t / T)) from rest; a load that takes all leaves the rotor standing."""
     speeds = servo("battery_sag", np.full(300, command), sag=0.4, time_constant=0.5)
     load = 0.7**2 * (1 - np.exp(-0.01 * np.arange(1, 301) / 0.5))
     np.testing.assert_allclose(speeds, command * (1 - 0.4 * load), rtol=1e-12)
@@ -380,7 +421,8 @@ def test_rudder_lag_answers_a_step_exponentially_or_at_the_rate_limit():
     reach = 0.01 / (1 - np.exp(-0.01 / 0.12))
     limited = slow < 0.4 - reach
     np.testing.assert_allclose(slow[limited], time[limited], atol=1e-12)
-    assert 25 < limited.sum() < 35 and slow[-1] < 0.4
+    assert 25 < limited.sum() < 35
+    assert slow[-1] < 0.4
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.01, 0.085, 0.3])
@@ -414,7 +456,9 @@ def test_rudder_effects_act_in_the_order_of_their_table():
 
 
 def test_a_linkage_sits_behind_the_servo_and_its_range():
-    robot = Robot().with_effect("rudder_offset", offset=0.1).with_effect("rudder_backlash", play=0.05)
+    robot = (
+        Robot().with_effect("rudder_offset", offset=0.1).with_effect("rudder_backlash", play=0.05)
+    )
     states = swim(robot, np.tile([0.0, 2.0], (40, 1)))
     assert states[-1, 14] == pytest.approx(0.8)  # the command's range
     assert states[-1, 12] == pytest.approx(0.8 + 0.1 - 0.05)
@@ -427,6 +471,8 @@ def test_left_rudder_turns_left_and_so_does_a_positive_offset(strokes):
     commands = strokes(200) * [1.0, 0.0]
     straight = swim(Robot(), commands, scheme=Scheme("rk4"))[-1, 2]
     left = swim(Robot(), commands + [0.0, 0.3], scheme=Scheme("rk4"))[-1, 2]
-    offset = swim(Robot().with_effect("rudder_offset", offset=0.3), commands, scheme=Scheme("rk4"))[-1, 2]
+    offset = swim(Robot().with_effect("rudder_offset", offset=0.3), commands, scheme=Scheme("rk4"))[
+        -1, 2
+    ]
     assert left > straight + 0.2
     assert offset == pytest.approx(left, abs=5e-3)  # but for the servo's way there, 0.05 s

@@ -25,7 +25,8 @@ ACTUATORS = (
 
 def typical(name):
     return {
-        key: p.typical if p.typical is not None else p.value for key, p in EFFECTS[name].parameters.items()
+        key: p.typical if p.typical is not None else p.value
+        for key, p in EFFECTS[name].parameters.items()
     }
 
 
@@ -33,7 +34,8 @@ def strongest(name):
     """Every parameter at the upper end of its range, where it has one."""
     effect = EFFECTS[name]
     return {
-        k: p.highest if np.isfinite(p.highest) else typical(name)[k] for k, p in effect.parameters.items()
+        k: p.highest if np.isfinite(p.highest) else typical(name)[k]
+        for k, p in effect.parameters.items()
     }
 
 
@@ -41,7 +43,11 @@ def swim(effects, commands, poses=NEAR_WALL, links=1):
     """States of a fish with effects {name: parameters}, without a compiler; (T + 1, ..., NS)."""
     robot = Robot(links=links, effects=effects)
     stepper = Stepper(robot.structure, compiled=False)
-    start = np.stack([stepper.rest(pose) for pose in poses]) if np.ndim(poses) == 2 else stepper.rest(poses)
+    start = (
+        np.stack([stepper.rest(pose) for pose in poses])
+        if np.ndim(poses) == 2
+        else stepper.rest(poses)
+    )
     return stepper.rollout(start, commands, stepper.parameters(robot))
 
 
@@ -53,12 +59,18 @@ def test_every_physics_and_actuator_name_of_the_vocabulary_exists():
 @pytest.mark.parametrize("name", EFFECTS)
 def test_description_is_complete(name):
     effect = EFFECTS[name]
-    assert effect.name == name and effect.equation and effect.source and effect.__doc__
-    assert effect.strength and set(effect.strength) <= set(effect.parameters)
+    assert effect.name == name
+    assert effect.equation
+    assert effect.source
+    assert effect.__doc__
+    assert effect.strength
+    assert set(effect.strength) <= set(effect.parameters)
     for key, p in effect.parameters.items():
         assert p.lowest <= p.value <= p.highest and p.unit and p.source, key
         assert (p.typical is not None) == (key in effect.strength), key
-        assert p.typical is None or (p.lowest <= p.typical <= p.highest and p.typical != p.value), key
+        assert p.typical is None or (p.lowest <= p.typical <= p.highest and p.typical != p.value), (
+            key
+        )
         assert all(p.lowest <= tried <= p.highest for tried in p.tries), key
 
 
@@ -87,7 +99,8 @@ def test_all_effects_together_stay_finite(strokes):
 
 
 @pytest.mark.parametrize(
-    ("name", "links"), [*((name, 1) for name in EFFECTS), ("tail_hardening", 3), ("tail_joint_damping", 3)]
+    ("name", "links"),
+    [*((name, 1) for name in EFFECTS), ("tail_hardening", 3), ("tail_joint_damping", 3)],
 )
 def test_the_upper_end_of_the_ranges_stays_finite(name, links, strokes):
     commands = strokes(100) * [12 / 9, 1.6]  # full throttle, rudder from end to end
@@ -100,7 +113,9 @@ def test_a_batch_equals_its_elements(name, strokes):
     commands = strokes(15)
     batch = swim({name: typical(name)}, commands, poses)
     for i, pose in enumerate(poses):
-        np.testing.assert_allclose(batch[:, i], swim({name: typical(name)}, commands, pose), atol=1e-12)
+        np.testing.assert_allclose(
+            batch[:, i], swim({name: typical(name)}, commands, pose), atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -123,7 +138,9 @@ def test_dissipative_effects_never_give_energy_to_the_fish(name):
     for x, y, u, v, w, heading in random.uniform(-1, 1, (200, 6)):
         body = BodyMotion("head", x, y, np.cos(heading), np.sin(heading), u, v, w, 0.2, 1.5, 3e-3)
         force = effect.wrench(p, body, z, drive, NUMPY) or (0.0, 0.0, 0.0)
-        power = force[0] * u + force[1] * v + force[2] * w - effect.joint_torque(p, 1, x, w, NUMPY) * w
+        power = (
+            force[0] * u + force[1] * v + force[2] * w - effect.joint_torque(p, 1, x, w, NUMPY) * w
+        )
         assert power <= 0.0
         lost -= power
     assert lost > 0.0

@@ -16,7 +16,8 @@ MOVING = (0.3, 0.85, 0.1)
 
 def typical(name):
     return {
-        key: p.typical if p.typical is not None else p.value for key, p in EFFECTS[name].parameters.items()
+        key: p.typical if p.typical is not None else p.value
+        for key, p in EFFECTS[name].parameters.items()
     }
 
 
@@ -26,7 +27,9 @@ def finite_difference(stepper, start, commands, p, k):
     shifted = np.tile(p, (4, 1))
     shifted[:, k] += h * np.array([-2, -1, 1, 2])
     last = stepper.rollout(start, commands, shifted)[-1]
-    return (last[0] - 8 * last[1] + 8 * last[2] - last[3]) / (12 * h), 1e-13 / h  # and its round-off
+    return (last[0] - 8 * last[1] + 8 * last[2] - last[3]) / (
+        12 * h
+    ), 1e-13 / h  # and its round-off
 
 
 def tangents(stepper, start, commands, p, indices):
@@ -79,16 +82,24 @@ def test_tangents_equal_finite_differences_and_adjoints_equal_tangents(name, str
 @pytest.mark.parametrize(
     ("name", "inwards", "ramp"), [("rudder_delay", 1e-5, 0.1), ("rudder_backlash", 1e-6, 0.0)]
 )
-def test_at_the_end_of_its_range_a_parameter_has_the_slope_towards_the_inside(name, inwards, ramp, strokes):
+def test_at_the_end_of_its_range_a_parameter_has_the_slope_towards_the_inside(
+    name, inwards, ramp, strokes
+):
     """Searches stand there: half of the slope, as of a kink in mid-range, would lead them and all others astray."""
     stepper, start, p = case({name: {}}, links=1)
-    (k,) = (i for i, n in enumerate(parameter_names(stepper.layout.structure)) if n.startswith(name + "."))
+    (k,) = (
+        i
+        for i, n in enumerate(parameter_names(stepper.layout.structure))
+        if n.startswith(name + ".")
+    )
     t = 0.01 * np.arange(PERIODS)
     commands = np.column_stack([strokes(PERIODS)[:, 0], 0.1 + ramp * t])
     (tangent,) = tangents(stepper, start, commands, p, [k])
     q = p.copy()
     q[k] += inwards
-    difference = (stepper.rollout(start, commands, q)[-1] - stepper.rollout(start, commands, p)[-1]) / inwards
+    difference = (
+        stepper.rollout(start, commands, q)[-1] - stepper.rollout(start, commands, p)[-1]
+    ) / inwards
     assert np.abs(tangent - difference).max() < 1e-3 * np.abs(difference).max()
 
 
@@ -106,10 +117,14 @@ def test_tangents_along_start_and_commands_equal_finite_differences(strokes):
 
 
 def test_torch_gradients_are_those_of_the_adjoint(strokes):
-    stepper, start, p = case({"wall_effect": typical("wall_effect"), "rudder_delay": typical("rudder_delay")})
+    stepper, start, p = case(
+        {"wall_effect": typical("wall_effect"), "rudder_delay": typical("rudder_delay")}
+    )
     values = [torch.tensor(v, requires_grad=True) for v in (start, strokes(10), p)]
     states = torch_step.rollout(*values, stepper)
-    weights = torch.randn(states.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(3))
+    weights = torch.randn(
+        states.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(3)
+    )
     (states * weights).sum().backward()
     expected = stepper.rollout_vjp(states.detach().numpy(), strokes(10), p, weights.numpy())
     for value, gradient in zip(values, expected, strict=True):
@@ -142,7 +157,11 @@ def test_gradcheck_of_a_short_rollout(strokes):
     stepper, start, p = case({"quadratic_drag": typical("quadratic_drag")})
     values = [torch.tensor(v, requires_grad=True) for v in (start, strokes(2), p)]
     assert torch.autograd.gradcheck(
-        lambda s, c, q: torch_step.rollout(s, c, q, stepper)[-1], values, eps=1e-6, atol=1e-5, rtol=1e-5
+        lambda s, c, q: torch_step.rollout(s, c, q, stepper)[-1],
+        values,
+        eps=1e-6,
+        atol=1e-5,
+        rtol=1e-5,
     )
 
 
@@ -150,7 +169,9 @@ def test_one_row_of_command_tangents_stands_for_all():
     stepper = Stepper.of(Robot())
     p, start, commands = stepper.parameters(Robot()), stepper.rest(), np.full((7, 2), 0.3)
     one, all_ = (
-        stepper.rollout_jvp(start, commands, p, np.zeros_like(start), np.ones((rows, 2)), np.zeros_like(p))[1]
+        stepper.rollout_jvp(
+            start, commands, p, np.zeros_like(start), np.ones((rows, 2)), np.zeros_like(p)
+        )[1]
         for rows in (1, 7)
     )
     np.testing.assert_array_equal(one, all_)

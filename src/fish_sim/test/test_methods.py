@@ -26,7 +26,9 @@ def integrate(method, steps, end=2.0):
 
 @pytest.mark.parametrize("name", METHODS)
 def test_error_falls_with_the_order_of_the_method(name):
-    exact = solve_ivp(pendulum, (0.0, 2.0), [1.0, 0.3], method="DOP853", rtol=3e-14, atol=1e-15).y[:, -1]
+    exact = solve_ivp(pendulum, (0.0, 2.0), [1.0, 0.3], method="DOP853", rtol=3e-14, atol=1e-15).y[
+        :, -1
+    ]
     errors = [np.abs(integrate(METHODS[name], steps) - exact).max() for steps in (4, 8)]
     assert np.log2(errors[0] / errors[1]) > ORDERS[name] - 0.5
     np.testing.assert_allclose(np.sum(METHODS[name].A, axis=1), METHODS[name].C, atol=1e-12)
@@ -45,5 +47,7 @@ def test_growth_is_the_stability_polynomial_also_far_from_stable(mode):
     z = mode * 0.01
     modes = np.array([mode], dtype=complex)
     assert growth(METHODS["euler"], modes, 1) == pytest.approx(abs(1 + z))
-    assert growth(METHODS["rk4"], modes, 1) == pytest.approx(abs(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24))
+    assert growth(METHODS["rk4"], modes, 1) == pytest.approx(
+        abs(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24)
+    )
     assert np.isfinite(growth(METHODS["dop853"], modes, 1))

@@ -7,7 +7,14 @@ import pytest
 import yaml
 
 from fish_sim.effects import EFFECTS
-from fish_sim.robot import Robot, RobotError, load_robot, nominal_parameters, parameter_names, save_robot
+from fish_sim.robot import (
+    Robot,
+    RobotError,
+    load_robot,
+    nominal_parameters,
+    parameter_names,
+    save_robot,
+)
 from fish_sim.sensors import SENSOR_EFFECTS
 
 
@@ -29,14 +36,20 @@ def test_tail_keeps_length_mass_and_total_stiffness_whatever_the_number_of_links
 def test_a_file_gives_back_the_robot_with_effects_and_sensors(tmp_path):
     robot = Robot(links=2, name="blue").with_parameters(head_drag_surge=0.25)
     robot = robot.with_effect("tip_slip", mobility=0.2).with_effect("camera_latency", delay=0.05)
-    save_robot(robot, tmp_path / "model.yaml", std={"head_drag_surge": 0.01, "tip_slip.mobility": 0.02})
+    save_robot(
+        robot, tmp_path / "model.yaml", std={"head_drag_surge": 0.01, "tip_slip.mobility": 0.02}
+    )
     again = load_robot(tmp_path / "model.yaml")
-    assert again == robot and again.digest() == robot.digest()
+    assert again == robot
+    assert again.digest() == robot.digest()
     content = yaml.safe_load((tmp_path / "model.yaml").read_text())
     assert content["parameters"]["head_drag_surge"]["std"] == 0.01
     assert content["effects"]["tip_slip"]["mobility"] == {
-        "value": 0.2, "unit": "m/(N s)", "std": 0.02, "source": "identified or set by the user",
-    }  # fmt: skip
+        "value": 0.2,
+        "unit": "m/(N s)",
+        "std": 0.02,
+        "source": "identified or set by the user",
+    }
     assert all(row["unit"] and row["source"] for row in content["parameters"].values())
 
 
@@ -48,10 +61,15 @@ def test_digest_tells_robots_apart_by_motion_and_not_by_name():
 
 
 def test_vector_follows_the_parameter_names():
-    robot = Robot().with_effect("rudder_lag", time_constant=0.1).with_effect("tip_slip", mobility=0.2)
+    robot = (
+        Robot().with_effect("rudder_lag", time_constant=0.1).with_effect("tip_slip", mobility=0.2)
+    )
     names = parameter_names(robot.structure)
     assert dict(zip(names, robot.vector(), strict=True))["tip_slip.mobility"] == 0.2
-    assert robot.structure == (3, ("tip_slip", "rudder_lag"))  # table order, not the order of adding
+    assert robot.structure == (
+        3,
+        ("tip_slip", "rudder_lag"),
+    )  # table order, not the order of adding
 
 
 @pytest.mark.parametrize(
@@ -62,7 +80,10 @@ def test_vector_follows_the_parameter_names():
         (lambda: Robot(parameters={"head_mass": -1.0}), ["parameters.head_mass", "-1.0", "kg"]),
         (lambda: Robot(parameters={"head_mass": math.nan}), ["parameters.head_mass", "nan"]),
         (lambda: Robot(parameters={"head_mass": True}), ["parameters.head_mass", "True"]),
-        (lambda: Robot(parameters={"head_mas": 1.0}), ["parameters.head_mas", "unknown", "head_mass"]),
+        (
+            lambda: Robot(parameters={"head_mas": 1.0}),
+            ["parameters.head_mas", "unknown", "head_mass"],
+        ),
         (lambda: Robot(effects={"darg": {}}), ["darg", "known", "quadratic_drag"]),
         (lambda: Robot(effects={"current": {"z": 1.0}}), ["effects.current.z", "known: x, y"]),
         (lambda: Robot(effects={"current": {"x": math.inf}}), ["effects.current.x", "inf"]),
@@ -97,7 +118,10 @@ def test_impossible_robots_are_refused_with_name_and_value(make, words):
             ["gyro_scale.factor", "[0.5, 2] 1"],
         ),
         ("format: 1\nparameters: {head_mass: {unit: kg}}", ["parameters.head_mass", "value"]),
-        ("format: 1\nparameters: {head_mass: {value: 465, unit: g}}", ["head_mass.unit", "'g'", "'kg'"]),
+        (
+            "format: 1\nparameters: {head_mass: {value: 465, unit: g}}",
+            ["head_mass.unit", "'g'", "'kg'"],
+        ),
         ("format: 1\neffects: [current]", ["effects", "current", "table"]),
         ("format: 1\neffects: {darg: {}}", ["darg", "known"]),
         (
@@ -115,7 +139,7 @@ def test_broken_files_name_file_field_and_expectation(tmp_path, text, words):
 
 
 def test_a_missing_file_and_a_picture_are_refused_in_one_line(tmp_path):
-    with pytest.raises(RobotError, match="nowhere.yaml"):
+    with pytest.raises(RobotError, match=r"nowhere.yaml"):
         load_robot(tmp_path / "nowhere.yaml")
     (tmp_path / "robot.yaml").write_bytes(b"\xff\xd8\xff\xe0 jpeg")
     with pytest.raises(RobotError, match="cannot be read"):

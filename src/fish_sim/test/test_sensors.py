@@ -16,7 +16,13 @@ from fish_sim.sensors.overhead_camera import OverheadCamera
 from fish_sim.sensors.settings import SensorSettings
 from fish_sim.simulation_config import SimulatorConfig
 
-VOCABULARY = ("camera_latency", "camera_heading_offset", "camera_scale", "gyro_scale", "imu_misalignment")
+VOCABULARY = (
+    "camera_latency",
+    "camera_heading_offset",
+    "camera_scale",
+    "gyro_scale",
+    "imu_misalignment",
+)
 NONE = SensorDistortion({})
 
 
@@ -41,8 +47,13 @@ def test_the_table_holds_the_vocabulary():
 @pytest.mark.parametrize("name", VOCABULARY)
 def test_description_is_complete_and_zero_strength_is_the_truth(name):
     effect = SENSOR_EFFECTS[name]
-    assert effect.name == name and effect.kind == "sensor" and effect.equation and effect.source
-    assert set(effect.strength) == {k for k, p in effect.parameters.items() if p.typical is not None}
+    assert effect.name == name
+    assert effect.kind == "sensor"
+    assert effect.equation
+    assert effect.source
+    assert set(effect.strength) == {
+        k for k, p in effect.parameters.items() if p.typical is not None
+    }
     p = SimpleNamespace(**{k: q.value for k, q in effect.parameters.items()})
     assert effect.pose_delay(p) == 0.0
     assert effect.pose(p, 0.4, -0.2, 1.0, NUMPY) == (0.4, -0.2, 1.0)
@@ -80,7 +91,8 @@ def test_camera_frames_jitter_are_lost_arrive_late_and_are_noisy():
     assert len(samples) == pytest.approx(0.99 * 200 * 30, rel=0.01)
     gaps = np.diff(stamps)
     single = gaps[gaps < 0.05]
-    assert single.mean() == pytest.approx(1 / 30, rel=1e-3) and single.std() == pytest.approx(0.0008, rel=0.1)
+    assert single.mean() == pytest.approx(1 / 30, rel=1e-3)
+    assert single.std() == pytest.approx(0.0008, rel=0.1)
     assert (gaps > 0.05).mean() == pytest.approx(0.01, abs=0.004)
     assert all(s.arrival == pytest.approx(s.stamp + settings.camera_latency) for s in samples)
     truth = np.column_stack([0.2 * stamps, np.full(len(stamps), -0.3), 0.5 * stamps])
@@ -100,7 +112,9 @@ def test_camera_samples_are_handed_out_only_after_they_arrived():
 def test_camera_latency_shows_the_past():
     quiet = SensorSettings(camera_position_noise=0.0, camera_heading_noise=0.0, camera_loss=0.0)
     late = film(quiet, 5.0, {"camera_latency": {"delay": 0.05}})[5:]
-    np.testing.assert_allclose([s.x for s in late], [0.2 * (s.stamp - 0.05) for s in late], atol=1e-9)
+    np.testing.assert_allclose(
+        [s.x for s in late], [0.2 * (s.stamp - 0.05) for s in late], atol=1e-9
+    )
 
 
 def test_imu_has_white_noise_and_constant_bias():
@@ -119,7 +133,8 @@ def test_yaw_turns_with_the_head_and_drifts_as_a_random_walk():
     imu = Imu(SensorSettings(orientation_noise=0.0, orientation_drift=0.001), random())
     yaw = np.array([imu.measure((0.0, 0.0), 0.0, 0.05 * k, 0.25).yaw for k in range(4000)])
     steps = np.diff(yaw) - 0.05
-    assert steps.std() == pytest.approx(0.001 * 0.5, rel=0.05) and abs(steps.mean()) < 5e-5  # sqrt(0.25 s)
+    assert steps.std() == pytest.approx(0.001 * 0.5, rel=0.05)
+    assert abs(steps.mean()) < 5e-5
     still = Imu(SensorSettings(orientation_noise=0.003, orientation_drift=0.0), random())
     yaw = np.array([still.measure((0.0, 0.0), 0.0, 0.0, 0.01).yaw for _ in range(4000)])
     assert yaw.std() == pytest.approx(0.003, rel=0.05)
@@ -128,7 +143,9 @@ def test_yaw_turns_with_the_head_and_drifts_as_a_random_walk():
 def test_yaw_starts_at_an_unknown_angle_and_biases_differ_between_robots():
     robots = [Imu(SensorSettings(), np.random.default_rng(seed)) for seed in range(400)]
     yaw = np.array([imu.measure((0.0, 0.0), 0.0, 0.0, 0.01).yaw for imu in robots])
-    assert np.histogram(yaw, bins=4, range=(-math.pi, math.pi))[0].min() > 60  # a quarter of 400 each
+    assert (
+        np.histogram(yaw, bins=4, range=(-math.pi, math.pi))[0].min() > 60
+    )  # a quarter of 400 each
     for biases, std in (
         ([i.gyro_bias for i in robots], 0.01),
         ([i.accelerometer_bias for i in robots], 0.05),

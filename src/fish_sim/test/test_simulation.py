@@ -10,9 +10,14 @@ from fish_sim.simulation import Simulation
 from fish_sim.simulation_config import SimulationConfig, SimulatorConfig
 
 QUIET = {
-    "gyro_noise": 0.0, "gyro_bias": 0.0, "accelerometer_noise": 0.0, "accelerometer_bias": 0.0,
-    "encoder_angle_noise": 0.0, "encoder_speed_noise": 0.0, "disturbance": 0.0,
-}  # fmt: skip
+    "gyro_noise": 0.0,
+    "gyro_bias": 0.0,
+    "accelerometer_noise": 0.0,
+    "accelerometer_bias": 0.0,
+    "encoder_angle_noise": 0.0,
+    "encoder_speed_noise": 0.0,
+    "disturbance": 0.0,
+}
 
 
 def swim(simulation, periods, rudder=0.0, amplitude=9.0):
@@ -52,12 +57,16 @@ def test_the_accelerometer_tells_the_acceleration_at_its_stamp():
     off, size = (np.sqrt(np.mean(a[swimming] ** 2, axis=0)) for a in (felt - change, change))
     assert (off < 0.03 * size).all()
     # and what it adds up to is the way from the first velocity to the last
-    assert 0.005 * np.sum(felt[1:] + felt[:-1], axis=0) == pytest.approx(velocity[-3] - velocity[2], abs=2e-3)
+    assert 0.005 * np.sum(felt[1:] + felt[:-1], axis=0) == pytest.approx(
+        velocity[-3] - velocity[2], abs=2e-3
+    )
 
 
 def test_tail_angles_bend_left_when_negative():
     readings = swim(Simulation(Robot(), SimulationConfig(**QUIET)), 200, rudder=0.4)
-    assert np.mean([r.truth.tail[0] for r in readings[100:]]) < -0.2  # alpha > 0 bends it to the left
+    assert (
+        np.mean([r.truth.tail[0] for r in readings[100:]]) < -0.2
+    )  # alpha > 0 bends it to the left
     assert readings[-1].truth.pose[2] > 0.2  # and steers left
 
 
@@ -72,11 +81,14 @@ def test_stale_commands_stop_the_rotor_and_centre_the_rudder():
         if age <= 0.25:
             assert (rotor, rudder) == (100.0, 0.4)
         else:
-            assert rudder == 0.0 and rotor == pytest.approx(100 * max(0.0, 1 - (age - 0.25) / 0.5), abs=1e-9)
+            assert rudder == 0.0
+            assert rotor == pytest.approx(100 * max(0.0, 1 - (age - 0.25) / 0.5), abs=1e-9)
 
 
 def test_without_any_command_the_fish_rests():
-    simulation = Simulation(Robot(), SimulationConfig(disturbance=0.0, start_x=1.0, start_heading=0.5))
+    simulation = Simulation(
+        Robot(), SimulationConfig(disturbance=0.0, start_x=1.0, start_heading=0.5)
+    )
     readings = [simulation.advance() for _ in range(50)]
     np.testing.assert_allclose(readings[-1].truth.pose, (1.0, 0.0, 0.5), atol=1e-12)
 
@@ -95,11 +107,13 @@ def test_a_seed_gives_one_run_and_a_reset_gives_it_again():
     first, other = (Simulation(Robot(), SimulationConfig(seed=s)) for s in (3, 4))
     again = Simulation(Robot(), SimulationConfig(seed=3))
     a, b, c = (swim(s, 60)[-1] for s in (first, again, other))
-    assert a.truth == b.truth and a.rotor == b.rotor
+    assert a.truth == b.truth
+    assert a.rotor == b.rotor
     assert a.truth != c.truth
     before = first.time
     first.reset()
-    assert first.time == before and first.command_age == math.inf
+    assert first.time == before
+    assert first.command_age == math.inf
     rerun = first.advance(), again.reset() or again.advance()
     assert rerun[0].truth == rerun[1].truth
 

@@ -23,7 +23,9 @@ def heading(orientation) -> float:
     return 2.0 * math.atan2(orientation.z, orientation.w)
 
 
-@pytest.mark.parametrize("names", [["rotor", "rudder"], ["rudder", "rotor"], ["other", "rudder", "rotor"]])
+@pytest.mark.parametrize(
+    "names", [["rotor", "rudder"], ["rudder", "rotor"], ["other", "rudder", "rotor"]]
+)
 def test_a_command_is_read_by_name(names: list[str]) -> None:
     positions, speeds = {"rudder": 0.4}, {"rotor": 90.0}
     msg = JointState(name=names)
@@ -35,7 +37,9 @@ def test_a_command_is_read_by_name(names: list[str]) -> None:
 def test_odometry_is_the_truth() -> None:
     msg = messages.odometry(HEADER, TRUTH)
     p, twist = msg.pose.pose.position, msg.twist.twist
-    assert (p.x, p.y, p.z, heading(msg.pose.pose.orientation)) == pytest.approx((1.0, 2.0, 0.0, 2.5))
+    assert (p.x, p.y, p.z, heading(msg.pose.pose.orientation)) == pytest.approx(
+        (1.0, 2.0, 0.0, 2.5)
+    )
     assert (twist.linear.x, twist.linear.y, twist.angular.z) == (0.3, -0.2, 1.5)
 
 

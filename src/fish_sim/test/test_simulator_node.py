@@ -1,5 +1,6 @@
 """The simulator node in this process: topics, clock, services, bad commands, parameters."""
 
+import itertools
 import math
 from collections import defaultdict
 from collections.abc import Iterator
@@ -28,9 +29,14 @@ pytestmark = pytest.mark.ros
 DOMAIN = 143
 FAST = {"real_time_factor": 0.0, "disturbance": 0.0}
 TOPICS = {
-    "joint_states": JointState, "imu/data": Imu, "sim/odometry": Odometry, "sim/joint_states": JointState,
-    "battery_state": BatteryState, "camera/pose": PoseWithCovarianceStamped, "/diagnostics": DiagnosticArray,
-}  # fmt: skip
+    "joint_states": JointState,
+    "imu/data": Imu,
+    "sim/odometry": Odometry,
+    "sim/joint_states": JointState,
+    "battery_state": BatteryState,
+    "camera/pose": PoseWithCovarianceStamped,
+    "/diagnostics": DiagnosticArray,
+}
 
 
 def seconds(stamp) -> float:
@@ -47,7 +53,9 @@ class Bench:
         self.got: dict[str, list] = defaultdict(list)
         for topic, kind in TOPICS.items():
             self.peer.create_subscription(kind, topic, self.got[topic].append, 1000)
-        self.peer.create_subscription(Clock, "/clock", self.got["/clock"].append, qos_profile_sensor_data)
+        self.peer.create_subscription(
+            Clock, "/clock", self.got["/clock"].append, qos_profile_sensor_data
+        )
         self.commands = self.peer.create_publisher(JointState, "joint_command", 10)
         self.executor = SingleThreadedExecutor()
         for node in (self.simulator, self.peer):
@@ -75,7 +83,9 @@ class Bench:
         return future.result()
 
     def command(self, rotor: float, rudder: float, stamp: Time | None = None) -> None:
-        command = JointState(name=["rotor", "rudder"], position=[0.0, rudder], velocity=[rotor, 0.0])
+        command = JointState(
+            name=["rotor", "rudder"], position=[0.0, rudder], velocity=[rotor, 0.0]
+        )
         command.header.stamp = stamp or Time()
         self.commands.publish(command)
 
@@ -99,18 +109,19 @@ def test_every_topic_has_its_type_frame_and_rate(bench):
     bench.collect("sim/odometry", 120)
     odometry, imu = bench.got["sim/odometry"], bench.got["imu/data"]
     stamps = [seconds(m.header.stamp) for m in odometry]
-    assert all(b - a == pytest.approx(0.01, abs=1e-5) for a, b in zip(stamps, stamps[1:], strict=False))
-    assert odometry[0].header.frame_id == "pool" and odometry[0].child_frame_id == "base_link"
+    assert all(b - a == pytest.approx(0.01, abs=1e-5) for a, b in itertools.pairwise(stamps))
+    assert odometry[0].header.frame_id == "pool"
+    assert odometry[0].child_frame_id == "base_link"
     assert odometry[0].pose.pose.position.x == pytest.approx(0.5)
-    assert imu[0].header.frame_id == "imu_link" and imu[0].linear_acceleration.z == pytest.approx(
-        9.81, abs=0.5
-    )
+    assert imu[0].header.frame_id == "imu_link"
+    assert imu[0].linear_acceleration.z == pytest.approx(9.81, abs=0.5)
     assert imu[0].angular_velocity_covariance[8] == pytest.approx(0.006**2)
     assert bench.got["joint_states"][0].name == ["rotor"]
     assert bench.got["sim/joint_states"][0].name == ["tail_1", "tail_2", "tail_3"]
     assert 11.0 < bench.got["battery_state"][0].voltage < 13.0
     pose = bench.got["camera/pose"]
-    assert pose[0].header.frame_id == "pool" and pose[0].pose.covariance[0] == pytest.approx(0.002**2)
+    assert pose[0].header.frame_id == "pool"
+    assert pose[0].pose.covariance[0] == pytest.approx(0.002**2)
     gap = seconds(pose[-1].header.stamp) - seconds(pose[0].header.stamp)
     assert gap / (len(pose) - 1) == pytest.approx(1 / 30, rel=0.1)
     assert seconds(bench.got["/clock"][-1].clock) >= stamps[-2]
@@ -143,7 +154,8 @@ def test_pause_stops_time_and_reset_brings_the_fish_back_without_turning_time_ba
     assert bench.call(SetBool, "pause", SetBool.Request(data=False)).message == "running"
     message = bench.collect("sim/odometry", 3)[-1]
     assert seconds(message.header.stamp) > stopped
-    assert abs(message.pose.pose.position.x) < 1e-6 and abs(message.twist.twist.angular.z) < 1e-6
+    assert abs(message.pose.pose.position.x) < 1e-6
+    assert abs(message.twist.twist.angular.z) < 1e-6
 
 
 @pytest.mark.parametrize("bench", [{"lockstep": 60.0}], indirect=True)
@@ -168,9 +180,12 @@ def test_bad_commands_are_refused_and_said_in_the_diagnostics(bench):
         JointState(name=["rotor", "rudder"], position=[0.0, 0.0], velocity=[1e9, 0.0]),
     ):
         bench.commands.publish(message)
-    bench.until(lambda: any(dict_of(m)["commands_refused"] == "4" for m in bench.got["/diagnostics"]))
+    bench.until(
+        lambda: any(dict_of(m)["commands_refused"] == "4" for m in bench.got["/diagnostics"])
+    )
     status = bench.got["/diagnostics"][-1].status[0]
-    assert status.level == DiagnosticStatus.WARN and "joint_command refused" in status.message
+    assert status.level == DiagnosticStatus.WARN
+    assert "joint_command refused" in status.message
     assert status.name == "/fish/simulator"
 
 
@@ -208,7 +223,9 @@ def test_a_robot_file_is_used_and_a_broken_one_refused(tmp_path):
     finally:
         bench.close()
     (tmp_path / "robot.yaml").write_text("format: 1\nlinks: 0")
-    rclpy.init(args=["--ros-args", "-p", f"robot_file:={tmp_path / 'robot.yaml'}"], domain_id=DOMAIN)
+    rclpy.init(
+        args=["--ros-args", "-p", f"robot_file:={tmp_path / 'robot.yaml'}"], domain_id=DOMAIN
+    )
     try:
         with pytest.raises(RobotError, match="links: got 0"):
             SimulatorNode()
@@ -220,10 +237,13 @@ def test_a_second_simulator_is_warned_of_on_diagnostics_and_console(bench, monke
     monkeypatch.setattr(rivals, "PATIENCE_S", 0.0)
     bench.peer.create_publisher(Odometry, "sim/odometry", 10)
     warning = "another publisher of /fish/sim/odometry"
-    bench.until(lambda: any(warning in array.status[0].message for array in bench.got["/diagnostics"]))
+    bench.until(
+        lambda: any(warning in array.status[0].message for array in bench.got["/diagnostics"])
+    )
     assert bench.got["/diagnostics"][-1].status[0].level == DiagnosticStatus.WARN
     said = [line for line in capfd.readouterr().err.splitlines() if warning in line]
-    assert len(said) == 1 and "[WARN]" in said[0]
+    assert len(said) == 1
+    assert "[WARN]" in said[0]
 
 
 def test_a_misspelt_parameter_is_refused():

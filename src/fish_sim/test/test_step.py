@@ -21,9 +21,7 @@ from fish_sim.stability import modes_at_rest
 from fish_sim.step import Stepper
 
 # together they use states, memory, grip, water, joint torques and every elementary function
-COLOURFUL = (
-    "nonuniform_current wall_effect wake_memory wave_drag tether rotor_imbalance rudder_delay rotor_lag"
-)
+COLOURFUL = "nonuniform_current wall_effect wake_memory wave_drag tether rotor_imbalance rudder_delay rotor_lag"
 
 
 def colourful():
@@ -57,7 +55,8 @@ def test_motion_is_that_of_scipy_with_tight_tolerance(links, strokes):
         x = solve_ivp(rate, (0.0, 0.01), x, method="DOP853", rtol=1e-9, atol=1e-11).y[:, -1]
         alpha, speed = alpha + alpha_dot * 0.01, rotor
     np.testing.assert_allclose(states[-1, :size], x, rtol=1e-5, atol=1e-6)
-    assert states[-1, size] == pytest.approx(alpha) and states[-1, size + 1] == speed
+    assert states[-1, size] == pytest.approx(alpha)
+    assert states[-1, size + 1] == speed
 
 
 def test_compiled_interpreted_and_torch_forms_agree(strokes):
@@ -73,7 +72,8 @@ def test_compiled_interpreted_and_torch_forms_agree(strokes):
     np.testing.assert_allclose(generic.numpy(), values[0][:4], rtol=1e-8, atol=1e-10)
     adjoint = np.random.default_rng(0).normal(size=values[0].shape)
     for a, b in zip(
-        *(s.rollout_vjp(values[0], commands, p, adjoint) for s in (compiled, interpreted)), strict=True
+        *(s.rollout_vjp(values[0], commands, p, adjoint) for s in (compiled, interpreted)),
+        strict=True,
     ):
         np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-8 * np.abs(b).max())
 
@@ -84,11 +84,14 @@ def test_the_generic_form_stays_on_its_device_and_in_its_precision(strokes, devi
     robot = Robot(links=1, effects={name: {} for name in EFFECTS})
     stepper = Stepper(robot.structure, Scheme("euler"), compiled=False)
     values = (np.tile(stepper.rest((0.3, 0.8, 0.2)), (4, 1)), strokes(1), stepper.parameters(robot))
-    start, commands, p = (torch.tensor(v, device=device, dtype=dtype, requires_grad=True) for v in values)
+    start, commands, p = (
+        torch.tensor(v, device=device, dtype=dtype, requires_grad=True) for v in values
+    )
     states = torch_step.rollout(start, commands, p, stepper)
     states[-1].sum().backward()
     assert all(
-        t.device.type == device and t.dtype == dtype for t in (states, start.grad, commands.grad, p.grad)
+        t.device.type == device and t.dtype == dtype
+        for t in (states, start.grad, commands.grad, p.grad)
     )
     if device == "cpu":
         np.testing.assert_allclose(states.detach().numpy(), stepper.rollout(*values), atol=1e-4)
@@ -106,13 +109,17 @@ def test_states_commands_and_parameters_may_each_carry_the_batch(strokes):
     ):
         batch = stepper.rollout(start, c, q)
         assert batch.shape == (6, 2, 3, 14)
-        np.testing.assert_allclose(batch, np.broadcast_to(single[:, None, None], batch.shape), atol=1e-13)
+        np.testing.assert_allclose(
+            batch, np.broadcast_to(single[:, None, None], batch.shape), atol=1e-13
+        )
 
 
 def test_the_servo_moves_at_its_rate_limit_and_stops_at_its_range():
     robot = Robot()
     stepper = Stepper(robot.structure, compiled=False)
-    states = stepper.rollout(stepper.rest(), np.tile([0.0, 2.0], (20, 1)), stepper.parameters(robot))
+    states = stepper.rollout(
+        stepper.rest(), np.tile([0.0, 2.0], (20, 1)), stepper.parameters(robot)
+    )
     expected = np.minimum(0.06 * np.arange(21), 0.8)
     np.testing.assert_allclose(states[:, 12], expected, atol=1e-12)
 
@@ -127,7 +134,9 @@ def test_a_diverging_batch_element_is_flagged_and_leaves_the_others_alone(stroke
     states = stepper.rollout(start, commands, p)
     np.testing.assert_array_equal(diverged(states), [False, True, False, False, True, False])
     alone = stepper.rollout(stepper.rest(), commands, p)
-    np.testing.assert_allclose(states[:, [0, 2, 3, 5]], np.tile(alone[:, None], (1, 4, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        states[:, [0, 2, 3, 5]], np.tile(alone[:, None], (1, 4, 1)), atol=1e-12
+    )
 
 
 def test_a_batch_of_none_is_no_error(strokes):
@@ -164,13 +173,13 @@ def test_numbers_that_are_not_finite_are_named():
     bad_state, bad_parameters = rest.copy(), p.copy()
     bad_state[3], bad_parameters[0] = np.nan, np.inf
     stepper.step(rest, command, p)
-    with pytest.raises(ValueError, match="state theta_1.*: got nan; expected a finite number"):
+    with pytest.raises(ValueError, match=r"state theta_1.*: got nan; expected a finite number"):
         stepper.step(bad_state, command, p)
-    with pytest.raises(ValueError, match="command rudder.*: got inf"):
+    with pytest.raises(ValueError, match=r"command rudder.*: got inf"):
         stepper.step(rest, np.array([0.0, np.inf]), p)
-    with pytest.raises(ValueError, match="parameter head_mass.*: got inf"):
+    with pytest.raises(ValueError, match=r"parameter head_mass.*: got inf"):
         stepper.step(rest, command, bad_parameters)
-    with pytest.raises(ValueError, match="parameter head_mass.*: got inf"):
+    with pytest.raises(ValueError, match=r"parameter head_mass.*: got inf"):
         torch_step.step(*map(torch.from_numpy, (rest, command, bad_parameters)), stepper)
     with pytest.raises(ValueError, match=r"state theta_1 of batch element \(1,\): got nan"):
         check_finite("state", np.stack([rest, bad_state]), stepper.layout.state)
@@ -187,7 +196,8 @@ def test_a_step_too_coarse_for_the_tail_is_refused_with_the_number_that_works():
     start = fine.rest()
     start[7] = 0.01
     p = fine.parameters(robot)
-    assert diverged(coarse.rollout(start, commands, p)) and not diverged(fine.rollout(start, commands, p))
+    assert diverged(coarse.rollout(start, commands, p))
+    assert not diverged(fine.rollout(start, commands, p))
 
 
 def test_fastest_mode_of_the_nominal_tail_is_about_150_per_second():
@@ -223,4 +233,6 @@ def test_a_tail_too_stiff_for_any_step_is_refused():
 def test_the_comparison_with_the_reference_says_when_there_is_none(tmp_path):
     script = Path(__file__).parent.parent / "benchmarks" / "check_reference.py"
     run = subprocess.run([sys.executable, script, tmp_path], capture_output=True, text=True)
-    assert run.returncode == 2 and "no reference trajectories" in run.stderr and str(tmp_path) in run.stderr
+    assert run.returncode == 2
+    assert "no reference trajectories" in run.stderr
+    assert str(tmp_path) in run.stderr

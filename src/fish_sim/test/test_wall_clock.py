@@ -56,15 +56,18 @@ def test_the_simulator_follows_a_wall_clock_that_is_set(simulated, monkeypatch, 
     clocks = Clocks()
     monkeypatch.setattr(simulator, "time", clocks)
     node = simulated()
-    assert abs(clocks.run(node, 1.0)) < 0.02 and node._simulation.time == pytest.approx(1.0, abs=0.02)
+    assert abs(clocks.run(node, 1.0)) < 0.02
+    assert node._simulation.time == pytest.approx(1.0, abs=0.02)
     clocks.wall += step
     assert abs(clocks.run(node, 1.0)) < 0.03
-    assert node._simulation.time == pytest.approx(2.0, abs=0.05) and node._pacer.lost == 0.0
+    assert node._simulation.time == pytest.approx(2.0, abs=0.05)
+    assert node._pacer.lost == 0.0
     assert capfd.readouterr().err.count("the wall clock was set") == 1
 
 
 @pytest.mark.parametrize(
-    ("parameters", "step"), [({}, 0.1), ({"use_sim_time": "true"}, 60.0), ({"real_time_factor": 2.0}, 60.0)]
+    ("parameters", "step"),
+    [({}, 0.1), ({"use_sim_time": "true"}, 60.0), ({"real_time_factor": 2.0}, 60.0)],
 )
 def test_the_simulators_time_stays_even_where_the_wall_clock_hardly_moved_or_is_not_followed(
     simulated, monkeypatch, parameters, step

@@ -60,7 +60,10 @@ def draw_truth(random: np.random.Generator) -> Robot:
     nominal = Robot()
     factors = {name: min(SPREAD, LOG_PRIOR.get(name, SPREAD)) for name in NOMINAL_FREE}
     return nominal.with_parameters(
-        **{name: nominal.parameters[name] * (1.0 + random.uniform(-f, f)) for name, f in factors.items()}
+        **{
+            name: nominal.parameters[name] * (1.0 + random.uniform(-f, f))
+            for name, f in factors.items()
+        }
     )
 
 
@@ -68,7 +71,9 @@ def repeat(seed: int, trials: int, duration: float) -> Repetition:
     """Draw a robot, record it, identify it from the nominal values."""
     random = np.random.default_rng(seed)
     truth = draw_truth(random)
-    commands = np.stack([program(KINDS[m % len(KINDS)], duration, random) for m in range(trials)], axis=1)
+    commands = np.stack(
+        [program(KINDS[m % len(KINDS)], duration, random) for m in range(trials)], axis=1
+    )
     experiment, _ = record(truth, commands, Noise(wrench=WRENCH), random)
     hypothesis = nominal_hypothesis(Robot())
     # as `identify` does
@@ -92,9 +97,13 @@ def summarise(repetitions: list[Repetition]) -> Coverage:
     z = np.array([r.score for r in repetitions])
     error = np.array([r.relative_error for r in repetitions])
     return Coverage(
-        repetitions[0].names, (np.abs(z) < 1.96).mean(0), (np.abs(z) < 3.0).mean(0), np.sqrt((z**2).mean(0)),
-        np.median(np.abs(error), axis=0), len(z),
-    )  # fmt: skip
+        repetitions[0].names,
+        (np.abs(z) < 1.96).mean(0),
+        (np.abs(z) < 3.0).mean(0),
+        np.sqrt((z**2).mean(0)),
+        np.median(np.abs(error), axis=0),
+        len(z),
+    )
 
 
 def study(

@@ -44,8 +44,12 @@ Array = NDArray[np.float64]
 
 UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data say little
 ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
-WORSE = 1.1  # times the error of the robot it began with: more than two robots as good differ by chance
-STILL = 0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
+WORSE = (
+    1.1  # times the error of the robot it began with: more than two robots as good differ by chance
+)
+STILL = (
+    0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
+)
 BASELINES = ("constant", "arx", "bilinear")
 AHEAD, PEEK = "_ahead", HALF_WINDOW  # suffix of predictors that know so many s of what comes
 EFFECT_START = 0.3  # typical strengths, at which the fit of an effect starts
@@ -74,16 +78,24 @@ class Identification:
     judged: Predictions  # of the held-out trials, or of the only trial
     estimates: Estimates  # of the training trials
     errors: dict[str, ErrorSizes]  # "start", "identified", then the baselines that could be fitted
-    statements: tuple[str, ...]  # what is wrong with the data or the result, and what can still be said
+    statements: tuple[
+        str, ...
+    ]  # what is wrong with the data or the result, and what can still be said
     seconds: float
     camera_delay: float = 0.0  # s, taken out of all trials above
 
     @property
     def robot(self) -> Robot:
         """The identified robot, with the delay that its camera has in the recordings as they are."""
-        effects = {name: values for name, values in self.fit.robot.effects.items() if name != "disturbance"}
+        effects = {
+            name: values for name, values in self.fit.robot.effects.items() if name != "disturbance"
+        }
         plain = replace(self.fit.robot, effects=effects)
-        return plain.with_effect("camera_latency", delay=self.camera_delay) if self.camera_delay else plain
+        return (
+            plain.with_effect("camera_latency", delay=self.camera_delay)
+            if self.camera_delay
+            else plain
+        )
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -99,10 +111,15 @@ class Identification:
 
 
 def identify(
-    experiment: Experiment, robot: Robot, noise: Noise | None = None, hold_out: int = 4,
-    free: tuple[str, ...] = NOMINAL_FREE, report: Report = lambda _: None, effects: tuple[str, ...] = (),
+    experiment: Experiment,
+    robot: Robot,
+    noise: Noise | None = None,
+    hold_out: int = 4,
+    free: tuple[str, ...] = NOMINAL_FREE,
+    report: Report = lambda _: None,
+    effects: tuple[str, ...] = (),
     choose_from: tuple[str, ...] = (),
-) -> Identification:  # fmt: skip
+) -> Identification:
     """Fit the nominal parameters (and those of the robot's effects in `free`) and judge them on trials left out.
 
     hold_out: every so-manieth trial takes no part in fitting; 0: none. Raises ValueError when it is negative or 1.
@@ -118,7 +135,9 @@ def identify(
         lag = align(experiment.select(train))
         experiment = moved_back(experiment, lag.delay)
     training, held_out = experiment.select(train), experiment.select(held) if held else None
-    noise = noise or usual_noise(training)  # what trials left out say of the sensors takes no part either
+    noise = noise or usual_noise(
+        training
+    )  # what trials left out say of the sensors takes no part either
     hypothesis = nominal_hypothesis(robot, free)
     for name in effects:
         hypothesis = hypothesis.with_effect(name, EFFECT_START)
@@ -133,7 +152,11 @@ def identify(
     report("predicting trials left out")
     judged, errors, lacking = judge(training, held_out, robot, fit)
     estimates = estimate(training, fit.robot, fit.noise)
-    statements = [*data_statements(experiment, held_out), *lag_statements(lag), *fit_statements(fit)]
+    statements = [
+        *data_statements(experiment, held_out),
+        *lag_statements(lag),
+        *fit_statements(fit),
+    ]
     statements += lost_statements(training, fit)
     statements += [
         *([FITTED_FOR_OUTLOOK] if wrong else []),
@@ -145,7 +168,16 @@ def identify(
     ]
     seconds = time.monotonic() - began
     return Identification(
-        fit, robot, training, held_out, judged, estimates, errors, tuple(statements), seconds, lag.delay
+        fit,
+        robot,
+        training,
+        held_out,
+        judged,
+        estimates,
+        errors,
+        tuple(statements),
+        seconds,
+        lag.delay,
     )
 
 
@@ -155,7 +187,9 @@ def is_wrong(fit: Fit, noise: Noise) -> bool:
         (getattr(fit.noise, key), getattr(noise, key))
         for key in ("gyro", "camera_position", "camera_heading")
     ]
-    return any(needed > STRANGE * said for needed, said in told) or bool(excess(fit).max() > TOO_STRONG)
+    return any(needed > STRANGE * said for needed, said in told) or bool(
+        excess(fit).max() > TOO_STRONG
+    )
 
 
 def step_statement(step: Step) -> str:
@@ -176,7 +210,9 @@ def lag_statements(lag: Alignment) -> list[str]:
 def split(trials: int, hold_out: int) -> tuple[list[int], list[int]]:
     """Indices of training and held-out trials: every `hold_out`-th, the last one of a small set, none of a single one."""
     if hold_out < 0 or hold_out == 1:
-        raise ValueError(f"hold-out {hold_out}: expected 0 (none) or at least 2 (every second trial)")
+        raise ValueError(
+            f"hold-out {hold_out}: expected 0 (none) or at least 2 (every second trial)"
+        )
     if hold_out == 0 or trials == 1:
         return list(range(trials)), []
     held = list(range(hold_out - 1, trials, hold_out)) or [trials - 1]
@@ -191,7 +227,9 @@ def judge(
     longest = max(HORIZONS)
     judged = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP)
     peeking = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP, PEEK)
-    before = predict(unseen, start, suitable_noise(unseen, start, fit.noise), longest, EVERY, WARM_UP)
+    before = predict(
+        unseen, start, suitable_noise(unseen, start, fit.noise), longest, EVERY, WARM_UP
+    )
     errors = {"start": prediction_errors(before), "identified": prediction_errors(judged)}
     try:
         baselines = fit_baselines(training)
@@ -209,7 +247,9 @@ def undetermined(fit: Fit) -> tuple[str, ...]:
     """Free parameters whose posterior standard deviation is above UNDETERMINED times the prior's."""
     deviation, prior = np.sqrt(np.diag(fit.covariance)), Coordinates(fit.hypothesis).prior
     return tuple(
-        n for n, d, p in zip(fit.hypothesis.free, deviation, prior, strict=True) if d > UNDETERMINED * p
+        n
+        for n, d, p in zip(fit.hypothesis.free, deviation, prior, strict=True)
+        if d > UNDETERMINED * p
     )
 
 
@@ -218,7 +258,9 @@ def entangled(fit: Fit) -> list[tuple[str, str, float]]:
     deviation = np.sqrt(np.diag(fit.covariance))
     correlation = fit.covariance / np.outer(deviation, deviation)
     names = fit.hypothesis.free
-    pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > ENTANGLED]
+    pairs = [
+        (i, j) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > ENTANGLED
+    ]
     return [(names[j], names[i], float(correlation[i, j])) for i, j in pairs]
 
 
@@ -229,8 +271,13 @@ def data_statements(experiment: Experiment, held_out: Experiment | None) -> list
         out.append(
             "no trial was held out: errors below are of trials that took part in the fit, unseen ones are worse"
         )
-    for what, rows, cost in (("IMU", experiment.gyro, NO_IMU), ("encoder", experiment.encoder, NO_ENCODER)):
-        missing = [name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()]
+    for what, rows, cost in (
+        ("IMU", experiment.gyro, NO_IMU),
+        ("encoder", experiment.encoder, NO_ENCODER),
+    ):
+        missing = [
+            name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()
+        ]
         if missing:
             out.append(f"no {what} in {', '.join(missing)}: {cost}")
     rotor, rudder = experiment.given_commands.T
@@ -258,7 +305,9 @@ def fit_statements(fit: Fit) -> list[str]:
     """What the data do not determine."""
     out = []
     if names := undetermined(fit):
-        out.append(f"the data do not determine {', '.join(names)}: values and errors rest on the prior")
+        out.append(
+            f"the data do not determine {', '.join(names)}: values and errors rest on the prior"
+        )
     if names := zeros(fit.robot):
         out.append(
             f"{', '.join(names)}: 0 in the robot that the fit began with, so 0 in the one that came out"
@@ -275,10 +324,16 @@ def fit_statements(fit: Fit) -> list[str]:
 
 def lost_statements(training: Experiment, fit: Fit) -> list[str]:
     """Trials on which the filter diverged with the fitted model."""
-    lost = [n for n, value in zip(training.names, fit.log_likelihood, strict=True) if not np.isfinite(value)]
+    lost = [
+        n
+        for n, value in zip(training.names, fit.log_likelihood, strict=True)
+        if not np.isfinite(value)
+    ]
     if not lost:
         return []
-    return [f"the filter loses the fish in {', '.join(lost)} with these values and begins anew there"]
+    return [
+        f"the filter loses the fish in {', '.join(lost)} with these values and begins anew there"
+    ]
 
 
 def start_statements(errors: dict[str, ErrorSizes]) -> list[str]:
@@ -286,7 +341,9 @@ def start_statements(errors: dict[str, ErrorSizes]) -> list[str]:
     start, fitted = errors["start"], errors["identified"]
     pairs = zip(fitted.horizons, start.rms[:, 0], fitted.rms[:, 0], strict=True)
     worse = [
-        f"{h:g} s ({mine:.3g} m against {before:.3g})" for h, before, mine in pairs if mine > WORSE * before
+        f"{h:g} s ({mine:.3g} m against {before:.3g})"
+        for h, before, mine in pairs
+        if mine > WORSE * before
     ]
     if not worse:
         return []
@@ -311,19 +368,26 @@ def _against(errors: dict[str, ErrorSizes], suffix: str) -> str:
     names = [name + suffix for name in BASELINES if name + suffix in errors]
     mine = errors["identified" + suffix]
     terms = f" where all know {PEEK:g} s of what comes" if suffix else ""
-    ended, expected = mine.counts.sum(0), np.max([errors[name].counts.sum(0) for name in names], axis=0)
+    ended, expected = (
+        mine.counts.sum(0),
+        np.max([errors[name].counts.sum(0) for name in names], axis=0),
+    )
     compared = [(i, h) for i, h in enumerate(mine.horizons) if expected[i]]
     if not compared:
         return f"no trial is long enough to compare the physics model with the baselines{terms}"
     lost = []
     for i, h in compared:
         if ended[i] < expected[i]:
-            lost.append(f"{expected[i] - ended[i]} of {expected[i]} predictions at {h:g} s, which diverge")
+            lost.append(
+                f"{expected[i] - ended[i]} of {expected[i]} predictions at {h:g} s, which diverge"
+            )
         for j, quantity in enumerate(("position", "heading", "speed")):
             best = min(names, key=lambda name: np.nan_to_num(errors[name].rms[i, j], nan=np.inf))
             if mine.rms[i, j] >= (theirs := errors[best].rms[i, j]):
                 by = best.removesuffix(suffix)
-                lost.append(f"{quantity} at {h:g} s ({mine.rms[i, j]:.3g} against {theirs:.3g}, {by})")
+                lost.append(
+                    f"{quantity} at {h:g} s ({mine.rms[i, j]:.3g} against {theirs:.3g}, {by})"
+                )
     if lost:
         return f"the physics model does NOT beat the baselines{terms} in {', '.join(lost)}"
     at = " s, ".join(f"{h:g}" for _, h in compared)

@@ -29,7 +29,10 @@ def as_record(result: Identification, left_out: Sequence[str]) -> dict[str, Any]
         for name, value in fit.values.items()
     }
     biases = {
-        name: {"value": result.estimates.bias[m].tolist(), "std": result.estimates.bias_std[m].tolist()}
+        name: {
+            "value": result.estimates.bias[m].tolist(),
+            "std": result.estimates.bias_std[m].tolist(),
+        }
         for m, name in enumerate(result.training.names)
     }
     return {

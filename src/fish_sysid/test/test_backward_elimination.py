@@ -23,7 +23,9 @@ from fish_sysid.estimation.parametrization import nominal_hypothesis
 def fit_of(objective: float, *names: str) -> SimpleNamespace:
     """As much of a fit as pruning asks for; its evidence is its objective."""
     result = SimpleNamespace(samples=np.array([1000.0]))
-    return SimpleNamespace(objective=objective, result=result, hypothesis=SimpleNamespace(names=names))
+    return SimpleNamespace(
+        objective=objective, result=result, hypothesis=SimpleNamespace(names=names)
+    )
 
 
 @pytest.fixture
@@ -58,13 +60,18 @@ def pruned(first: str, **rivals: float) -> list[Accepted]:
 
 
 @pytest.mark.parametrize(
-    ("instead", "name"), [(995.0, "current"), (400.0, "nonuniform_current")], ids=["as good", "far worse"]
+    ("instead", "name"),
+    [(995.0, "current"), (400.0, "nonuniform_current")],
+    ids=["as good", "far worse"],
 )
-def test_a_richer_name_gives_way_to_a_simpler_look_alike_that_does_as_well_in_the_end(refits, instead, name):
+def test_a_richer_name_gives_way_to_a_simpler_look_alike_that_does_as_well_in_the_end(
+    refits, instead, name
+):
     """While a sliding tip was missing a flow with seventeen numbers had gained more than one with two."""
     refits(without=100.0, instead=instead)
     first, slip = pruned("nonuniform_current", current=700.0, wall_effect=100.0)
-    assert first.name == name and slip.name == "tip_slip"
+    assert first.name == name
+    assert slip.name == "tip_slip"
 
 
 @pytest.mark.parametrize(
@@ -86,7 +93,9 @@ def test_a_name_is_as_probable_as_beside_what_was_found_after_it(refits):
     asked = refits(without=100.0, instead=200.0)
     first, slip = pruned("current", wake_memory=1500.0, payload=100.0, wall_effect=895.0)
     assert asked == ["wake_memory"]  # the others had nothing to say in their own round
-    assert competition(first, [first, slip]) == pytest.approx({"current": 1.0, "wake_memory": 0.0}, abs=1e-6)
+    assert competition(first, [first, slip]) == pytest.approx(
+        {"current": 1.0, "wake_memory": 0.0}, abs=1e-6
+    )
 
 
 def test_what_the_others_have_made_superfluous_is_taken_out(refits):
@@ -106,4 +115,5 @@ def test_an_exchanged_effect_is_fitted_in_the_place_of_the_other():
     assert after.hypothesis.names == ("gyro_scale",)
     assert after.objective > before.objective
     scale, std = after.values["gyro_scale.factor"], after.standard_errors["gyro_scale.factor"]
-    assert scale == pytest.approx(1.05, abs=4.0 * std) and std < 0.01
+    assert scale == pytest.approx(1.05, abs=4.0 * std)
+    assert std < 0.01

@@ -24,7 +24,14 @@ def commanded(rotor: Array, rudder: Array) -> Experiment:
     frames = (Frames(np.zeros(0), np.zeros((0, 3))),)
     commands = np.stack([rotor, rudder], axis=-1)[:, None]
     return Experiment(
-        ("a",), np.array([steps]), commands, nothing, np.full((steps, 1, 2), np.nan), nothing, frames, True
+        ("a",),
+        np.array([steps]),
+        commands,
+        nothing,
+        np.full((steps, 1, 2), np.nan),
+        nothing,
+        frames,
+        True,
     )
 
 
@@ -42,7 +49,8 @@ def test_inputs_are_averaged_over_as_much_as_the_stroke_means() -> None:
     """A step of the rudder passes through a half in its middle and is over half a second to both sides."""
     rudder = np.where(np.arange(401) < 200, 0.0, 0.4)
     w = inputs(commanded(np.zeros(401), rudder))[:, 0, 1]
-    assert w[150] == pytest.approx(0.0, abs=1e-12) and w[250] == pytest.approx(0.4)
+    assert w[150] == pytest.approx(0.0, abs=1e-12)
+    assert w[250] == pytest.approx(0.4)
     assert 0.5 * (w[199] + w[200]) == pytest.approx(0.2, abs=1e-9)
     assert np.all(np.diff(w) >= -1e-12)
 

@@ -25,7 +25,9 @@ def swum() -> tuple[Fit, Experiment]:
     commands = np.stack([program(kind, 0.01 * LENGTH, random) for kind in kinds], axis=1)
     fish = record(Robot().with_effect("current", x=0.03), commands, Noise(), random)[0]
     seen = [frames.t < 0.01 * steps for frames, steps in zip(fish.frames, STEPS, strict=True)]
-    frames = tuple(replace(f, t=f.t[s], pose=f.pose[s]) for f, s in zip(fish.frames, seen, strict=True))
+    frames = tuple(
+        replace(f, t=f.t[s], pose=f.pose[s]) for f, s in zip(fish.frames, seen, strict=True)
+    )
     fish = replace(fish, steps=np.array(STEPS), frames=frames)
     nominal = nominal_hypothesis(Robot())
     return evaluate(nominal, np.zeros(len(nominal.free)), fish, Noise()), fish
@@ -44,7 +46,9 @@ def test_a_portion_has_so_many_steps_and_one_trial_at_least(monkeypatch, swum, a
     assert batches.portions(swum[1]) == expected
 
 
-def test_a_law_and_the_missing_force_are_the_same_in_portions_of_which_none_is_large(monkeypatch, swum):
+def test_a_law_and_the_missing_force_are_the_same_in_portions_of_which_none_is_large(
+    monkeypatch, swum
+):
     fit, fish = swum
     whole, force = residual_regression.describe(fit, fish), latent_force.missing_force(fit, fish)
     passed = []
@@ -56,9 +60,13 @@ def test_a_law_and_the_missing_force_are_the_same_in_portions_of_which_none_is_l
     monkeypatch.setattr(batches, "STEPS_AT_ONCE", 2 * LENGTH)
     for module in (residual_regression, latent_force):
         monkeypatch.setattr(module, "evaluate", watched)
-    again, in_portions = residual_regression.describe(fit, fish), latent_force.missing_force(fit, fish)
+    again, in_portions = (
+        residual_regression.describe(fit, fish),
+        latent_force.missing_force(fit, fish),
+    )
     assert passed == [2, 2, 1] * 2
-    assert again.terms.keys() == whole.terms.keys() and again.gain == pytest.approx(whole.gain, rel=1e-9)
+    assert again.terms.keys() == whole.terms.keys()
+    assert again.gain == pytest.approx(whole.gain, rel=1e-9)
     np.testing.assert_allclose(in_portions.wrench, force.wrench, rtol=1e-9, atol=1e-12)
     for name, values in force.covariates.items():
         np.testing.assert_allclose(in_portions.covariates[name], values, rtol=1e-9, atol=1e-12)

@@ -51,20 +51,30 @@ def test_images_move_back_and_those_before_the_start_go() -> None:
     late = experiment_with_delay(0.3)
     back = moved_back(late, 0.5)
     assert back.frames[0].t[0] >= 0.0
-    assert len(late.frames[0].t) - len(back.frames[0].t) == pytest.approx(6, abs=1)  # 0.2 s at 30 Hz
+    assert len(late.frames[0].t) - len(back.frames[0].t) == pytest.approx(
+        6, abs=1
+    )  # 0.2 s at 30 Hz
 
 
 def test_gravity_of_a_rolling_imu_is_taken_out() -> None:
     roll, yaw = 0.1 * np.sin(np.linspace(0.0, 6.0, 50)), 0.7
     half_roll, half_yaw = 0.5 * roll, 0.5 * yaw
-    quaternion = np.column_stack([  # yaw, then roll about the new x axis
-        np.cos(half_yaw) * np.sin(half_roll), np.sin(half_yaw) * np.sin(half_roll),
-        np.sin(half_yaw) * np.cos(half_roll), np.cos(half_yaw) * np.cos(half_roll),
-    ])  # fmt: skip
+    quaternion = np.column_stack(
+        [  # yaw, then roll about the new x axis
+            np.cos(half_yaw) * np.sin(half_roll),
+            np.sin(half_yaw) * np.sin(half_roll),
+            np.sin(half_yaw) * np.cos(half_roll),
+            np.cos(half_yaw) * np.cos(half_roll),
+        ]
+    )
     left, up, r = 0.4, 9.81, 1.5
-    accel = np.column_stack([
-        np.full(50, 0.2), left * np.cos(roll) + up * np.sin(roll), up * np.cos(roll) - left * np.sin(roll),
-    ])  # fmt: skip
+    accel = np.column_stack(
+        [
+            np.full(50, 0.2),
+            left * np.cos(roll) + up * np.sin(roll),
+            up * np.cos(roll) - left * np.sin(roll),
+        ]
+    )
     gyro = np.column_stack([np.zeros(50), r * np.sin(roll), r * np.cos(roll)])
     rate, force = level(SimpleNamespace(gyro=gyro, accel=accel, orientation=quaternion))  # type: ignore[arg-type]
     np.testing.assert_allclose(rate, r, atol=1e-12)
@@ -85,7 +95,9 @@ def test_encoder_replaces_a_command_that_stands_while_the_rotor_runs_down() -> N
 
 
 @pytest.mark.parametrize(("apart", "replaced"), [(4.0, False), (6.0, True), (-6.0, True)])
-def test_a_constant_command_stays_as_long_as_the_rotor_follows_it(apart: float, replaced: bool) -> None:
+def test_a_constant_command_stays_as_long_as_the_rotor_follows_it(
+    apart: float, replaced: bool
+) -> None:
     command = np.full(200, 40.0)
     speed, left = driven(command, command + apart)
     np.testing.assert_array_equal(speed, command + apart if replaced else command)
@@ -95,7 +107,8 @@ def test_a_constant_command_stays_as_long_as_the_rotor_follows_it(apart: float, 
 def test_a_rotor_that_is_told_to_stand_runs_down_in_the_model() -> None:
     command, encoder = np.zeros(300), 40.0 * np.exp(-0.01 * np.arange(300))
     speed, left = driven(command, encoder)
-    assert not speed.any() and np.array_equal(left, encoder)
+    assert not speed.any()
+    assert np.array_equal(left, encoder)
 
 
 def test_half_a_second_of_the_same_command_is_no_forgotten_one() -> None:

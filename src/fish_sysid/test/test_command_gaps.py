@@ -46,7 +46,9 @@ def losing(swum: Experiment, first: int, count: int, measured: bool) -> Experime
 @pytest.mark.parametrize("measured", [True, False])
 @pytest.mark.parametrize("count", [1, 5])
 @pytest.mark.parametrize("first", [200, 238])
-def test_lost_commands_cost_next_to_nothing(swum: Experiment, first: int, count: int, measured: bool) -> None:
+def test_lost_commands_cost_next_to_nothing(
+    swum: Experiment, first: int, count: int, measured: bool
+) -> None:
     """At the truth; held they cost 5 lost messages thousands of nats."""
     hypothesis = nominal_hypothesis(Robot(), ())
     lost = losing(swum, first, count, measured)
@@ -56,7 +58,9 @@ def test_lost_commands_cost_next_to_nothing(swum: Experiment, first: int, count:
     assert abs(full - found) < 8.0
     held = whole.commands.copy()
     held[first : first + count, 0] = held[first - 1, 0]
-    cost = full - evaluate(hypothesis, np.zeros(0), replace(whole, commands=held), Noise()).objective
+    cost = (
+        full - evaluate(hypothesis, np.zeros(0), replace(whole, commands=held), Noise()).objective
+    )
     assert count == 1 or cost > 200.0
 
 
@@ -79,7 +83,8 @@ def test_the_encoder_counts_where_it_measured_and_a_rudder_that_jumped_gets_a_li
     assert found[[100, 101, 103, 104, 105], 0].tolist() == [7.0] * 5
     assert found[102, 0] == pytest.approx(TOLD[102, 0], abs=0.5)
     np.testing.assert_allclose(np.diff(found[99:107, 1]), (0.9 - told[99, 1]) / 7, atol=1e-12)
-    assert np.isnan(left[101:107]).all() and (left[[100, 107]] == 7.0).all()
+    assert np.isnan(left[101:107]).all()
+    assert (left[[100, 107]] == 7.0).all()
 
 
 def test_a_hole_at_either_end_has_fewer_commands_to_run_through() -> None:
@@ -93,7 +98,8 @@ def test_a_hole_that_is_too_long_is_said() -> None:
     told_on_grid(GRID[(kept := without(200, 9))], TOLD[kept], GRID, SILENT)
     kept = without(200, 10)
     with pytest.raises(
-        LostCommandsError, match=r"from 1\.99 to 2\.10 s, where one comes every 10 ms; .* cut .* or record"
+        LostCommandsError,
+        match=r"from 1\.99 to 2\.10 s, where one comes every 10 ms; .* cut .* or record",
     ):
         told_on_grid(GRID[kept], TOLD[kept], GRID, SILENT)
 
@@ -108,7 +114,9 @@ def random_stamps(spread: float) -> np.ndarray:
         np.cumsum(np.random.default_rng(1).exponential(0.03, 500)),  # on events
         random_stamps(0.004),  # late and early
         np.concatenate([GRID, 4.0 + 0.5 * np.arange(200)]),  # when something changes
-        np.sort(np.concatenate([GRID[:200], GRID[200:] + 0.007])),  # one that came late, and all after it
+        np.sort(
+            np.concatenate([GRID[:200], GRID[200:] + 0.007])
+        ),  # one that came late, and all after it
         GRID[:5],
     ],
 )

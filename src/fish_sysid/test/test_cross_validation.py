@@ -33,14 +33,18 @@ def linear(monkeypatch):
     real = cross_validation.Coordinates
     prior = SimpleNamespace(prior=PRIOR)
     monkeypatch.setattr(
-        cross_validation, "Coordinates", lambda hypothesis: real(hypothesis) if hypothesis else prior
+        cross_validation,
+        "Coordinates",
+        lambda hypothesis: real(hypothesis) if hypothesis else prior,
     )
 
 
 def regression(x, y, used=(0, 1)):
     """The fit of y = x theta + unit noise at its optimum; a parameter that is not used stays 0. x: (trials, samples, 2)."""
     x = x * np.isin((0, 1), used)
-    theta = np.linalg.solve(np.einsum("tsi,tsj->ij", x, x) + np.diag(PRIOR**-2), np.einsum("tsi,ts->i", x, y))
+    theta = np.linalg.solve(
+        np.einsum("tsi,tsj->ij", x, x) + np.diag(PRIOR**-2), np.einsum("tsi,ts->i", x, y)
+    )
     left = y - x @ theta
     return SimpleNamespace(
         hypothesis=None,
@@ -55,7 +59,7 @@ def regression(x, y, used=(0, 1)):
 
 
 def exact(x, y, held):
-    """log p(y of the trials held | y of the others) of jointly Gaussian measurements."""
+    """Log p(y of the trials held | y of the others) of jointly Gaussian measurements."""
     others = [i for i in range(len(x)) if i not in held]
 
     def log_p(trials):
@@ -97,13 +101,21 @@ def swum(robot: Robot, kinds: tuple[str, ...]):
 def test_a_check_too_calm_to_tell_passes_the_question_on_to_every_trial_in_turn(there):
     """The rudder lags; straight trials say nothing of that."""
     lagging = Robot().with_effect("rudder_lag", time_constant=0.005)
-    training = swum(lagging if there else Robot(), ("sines", "steps", "random", "straight", "straight"))
-    searched, trials = training.select([0, 1, 2]), Trials(training, training.select([0, 1, 2]), (3, 4))
+    training = swum(
+        lagging if there else Robot(), ("sines", "steps", "random", "straight", "straight")
+    )
+    searched, trials = (
+        training.select([0, 1, 2]),
+        Trials(training, training.select([0, 1, 2]), (3, 4)),
+    )
     nominal = nominal_hypothesis(Robot())
     hypothesis = nominal.with_effect("rudder_lag", 0.3)
     start = Coordinates(hypothesis).origin()
     refitted = settle(evaluate(nominal, start[: len(nominal.free)], searched, Noise()), searched)
-    base, fit = on_all(refitted, training), settle(evaluate(hypothesis, start, searched, Noise()), searched)
+    base, fit = (
+        on_all(refitted, training),
+        settle(evaluate(hypothesis, start, searched, Noise()), searched),
+    )
     gain, expected = gain_unseen(base, on_all(fit, training), trials.check)
     assert max(gain, expected) < SMALLEST_CHECK
     assert (gain_left_out(base, on_all(fit, training))[0] > 30.0) is there
@@ -112,7 +124,9 @@ def test_a_check_too_calm_to_tell_passes_the_question_on_to_every_trial_in_turn(
 
 def test_a_fit_reaches_the_optimum_of_all_trials_however_far_it_is(monkeypatch):
     """A base short of it promises a flow gains that nobody could keep: two vortices were refused so."""
-    flowing = Robot().with_effect("nonuniform_current", shear_x=0.2, gyre_11=0.1, gyre_21=-0.08, gyre_22=0.06)
+    flowing = Robot().with_effect(
+        "nonuniform_current", shear_x=0.2, gyre_11=0.1, gyre_21=-0.08, gyre_22=0.06
+    )
     training = swum(flowing, ("sines", "turn"))
     hypothesis = nominal_hypothesis(Robot()).with_effect("nonuniform_current", 0.3)
     far = evaluate(hypothesis, Coordinates(hypothesis).origin(), training.select([0]), Noise())
@@ -124,10 +138,15 @@ def test_a_fit_reaches_the_optimum_of_all_trials_however_far_it_is(monkeypatch):
 
 def test_every_measurement_of_unseen_trials_counts(monkeypatch):
     """Behind gates a fit that has lost the fish would foretell it well."""
-    monkeypatch.setattr(cross_validation, "evaluate", lambda hypothesis, theta, trials, noise: noise)
+    monkeypatch.setattr(
+        cross_validation, "evaluate", lambda hypothesis, theta, trials, noise: noise
+    )
     monkeypatch.setattr(cross_validation, "climb", lambda fit, *_: fit)
-    noise = on_all(SimpleNamespace(hypothesis=None, theta=None, noise=Noise(wrench=(1.0, 2.0, 3.0))), None)
-    assert noise.gate_imu == noise.gate_camera == OPEN and noise.wrench == (1.0, 2.0, 3.0)
+    noise = on_all(
+        SimpleNamespace(hypothesis=None, theta=None, noise=Noise(wrench=(1.0, 2.0, 3.0))), None
+    )
+    assert noise.gate_imu == noise.gate_camera == OPEN
+    assert noise.wrench == (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize(
@@ -166,14 +185,19 @@ def test_a_name_gives_way_to_the_look_alike_that_leads_everywhere_though_it_keep
 ):
     """As a current does to a vortex, whose form the nonuniform current has only nearly."""
     fits = {
-        name: SimpleNamespace(name=name, objective=e) for name, e in zip(names, log_evidence, strict=True)
+        name: SimpleNamespace(name=name, objective=e)
+        for name, e in zip(names, log_evidence, strict=True)
     }
     gains = dict(zip(names, foretold, strict=True))
     monkeypatch.setattr(prediction_growth, "significant", lambda *_: list(names))
     monkeypatch.setattr(prediction_growth, "on_all", lambda fit, _: fit)
     monkeypatch.setattr(prediction_growth, "evidence", lambda fit: fit.objective)
-    monkeypatch.setattr(prediction_growth, "holds_elsewhere", lambda base, fit, *_: fit.name == names[0])
-    monkeypatch.setattr(prediction_growth, "gain_unseen", lambda base, fit, _: (gains[fit.name], 1000.0))
+    monkeypatch.setattr(
+        prediction_growth, "holds_elsewhere", lambda base, fit, *_: fit.name == names[0]
+    )
+    monkeypatch.setattr(
+        prediction_growth, "gain_unseen", lambda base, fit, _: (gains[fit.name], 1000.0)
+    )
     base = SimpleNamespace(result=SimpleNamespace(samples=np.array([1e4])))
     found = SimpleNamespace(base=base, refitted=fits)
     assert prediction_growth.choose(found, Trials(None, None, (0,)), 30, Level()) == chosen

@@ -24,7 +24,9 @@ from fish_sysid.reports.verdict_sentence import sentence
 def effect(name: str, parameters: dict[str, tuple[float, float]], rivals=()) -> dict:
     return {
         "name": name,
-        "parameters": {k: {"value": v, "std": s, "unit": "m/s"} for k, (v, s) in parameters.items()},
+        "parameters": {
+            k: {"value": v, "std": s, "unit": "m/s"} for k, (v, s) in parameters.items()
+        },
         "evidence": {"probability": 0.84},
         "rivals": [{"name": n, "probability": p} for n, p in rivals],
     }
@@ -39,7 +41,9 @@ def content(*effects: dict, links: int = 3, held=("trial_02",)) -> dict:
 
 
 def test_the_sentence_tells_rivals_beside_the_name():
-    told = sentence(content(effect("tip_slip", {"mobility": (0.1656, 0.00057)}, [("wake_memory", 0.159)])))
+    told = sentence(
+        content(effect("tip_slip", {"mobility": (0.1656, 0.00057)}, [("wake_memory", 0.159)]))
+    )
     assert told == (
         "missing_physics: the model lacks tip_slip "
         "(mobility 0.1656 ± 0.00057 m/s; probability 0.84; or wake_memory, 0.16)."
@@ -55,7 +59,10 @@ def test_of_many_numbers_the_sentence_tells_the_surest():
         "d": (0.0, 0.001),
     }
     told = sentence(content(effect("nonuniform_current", gyres), links=4))
-    assert "(5 numbers, surest b -0.03 ± 0.001 m/s, a 0.02 ± 0.001 m/s, c 0.5 ± 0.1 m/s; probability" in told
+    assert (
+        "(5 numbers, surest b -0.03 ± 0.001 m/s, a 0.02 ± 0.001 m/s, c 0.5 ± 0.1 m/s; probability"
+        in told
+    )
     assert told.endswith("The tail is modelled with 4 links instead of 3.")
 
 
@@ -83,7 +90,10 @@ def test_that_nothing_is_missing_is_said_only_where_every_name_was_tried():
     told = "no_mismatch: with refitted parameters "
     everything = candidates()
     many = len(everything)
-    assert nothing_found(everything) == told + "the model explains these recordings; nothing is missing."
+    assert (
+        nothing_found(everything)
+        == told + "the model explains these recordings; nothing is missing."
+    )
     assert nothing_found(everything[:3]) == (
         f"{told}none of the 3 candidates tried (of {many}) is needed; of the others nothing is known."
     )
@@ -134,28 +144,34 @@ def test_when_an_effect_acts_is_shown_where_a_range_tells_it(acts_s, f1, shown):
     wrench[:1000] = 0.1  # 10 s, what follows is beyond the trial's end
     diagnosis = SimpleNamespace(pushes={"drag": MissingForce(("a",), wrench, wrench, {})})
     assert _acts_in_a_range({"name": "drag", "where": where}, diagnosis) is shown
-    assert not _acts_in_a_range({"name": "camera_latency", "where": where}, diagnosis)  # does not push
+    assert not _acts_in_a_range(
+        {"name": "camera_latency", "where": where}, diagnosis
+    )  # does not push
 
 
 def test_nats_and_p_values_are_explained():
     p = {"before": {"gyro": 0.001}, "after": {"gyro": 0.4}}
     table = _whiteness({"fit": {"residual_whiteness_p": p}})
-    assert list(table.header) == ["row", "p before", "p after"] and table.rows == [["gyro", "0.001", "0.4"]]
+    assert list(table.header) == ["row", "p before", "p after"]
+    assert table.rows == [["gyro", "0.001", "0.4"]]
     assert "Below 0.05 something is left" in table.note
-    assert NAT in EVIDENCE_NOTE and "unit of log-likelihood" in NAT
+    assert NAT in EVIDENCE_NOTE
+    assert "unit of log-likelihood" in NAT
 
 
 def test_a_quick_fit_that_diverged_says_so():
     found = SimpleNamespace(refitted={})
     rows = [_evidence_row(found, SimpleNamespace(name="tip_slip", gain=g)) for g in (12.4, -np.inf)]
-    assert [row[1] for row in rows] == ["12", "diverged"] and "Diverged: " in EVIDENCE_NOTE
+    assert [row[1] for row in rows] == ["12", "diverged"]
+    assert "Diverged: " in EVIDENCE_NOTE
 
 
 def test_bins_of_a_rudder_that_stays_at_its_stop_hold_means_and_no_zeros():
     random = np.random.default_rng(0)
     rudder = np.clip(random.normal(0.0, 1.0, 2000), -0.5, 0.5)
     middle, mean = binned_means(rudder, 3.0 + rudder)
-    assert len(middle) < 15 and (np.diff(middle) > 0).all()
+    assert len(middle) < 15
+    assert (np.diff(middle) > 0).all()
     # bins at a stop hold the stop itself and what is near it
     np.testing.assert_allclose(mean, 3.0 + middle, atol=0.06)
 
@@ -167,7 +183,12 @@ def test_a_covariate_that_never_changes_or_was_never_measured_has_no_curve():
 
 @pytest.mark.parametrize(
     ("name", "moves"),
-    [("current", True), ("nonuniform_current", True), ("quadratic_drag", False), ("camera_latency", False)],
+    [
+        ("current", True),
+        ("nonuniform_current", True),
+        ("quadratic_drag", False),
+        ("camera_latency", False),
+    ],
 )
 def test_a_picture_of_the_water_is_for_effects_that_move_it(name, moves):
     assert moves_water(name) is moves
@@ -176,16 +197,25 @@ def test_a_picture_of_the_water_is_for_effects_that_move_it(name, moves):
 @pytest.mark.parametrize(
     ("held", "interval", "title", "gain"),
     [
-        (["c", "f"], [0.1, 0.4], "held-out trials", "0.250 nats per sample, 95 % interval 0.100 to 0.400."),
+        (
+            ["c", "f"],
+            [0.1, 0.4],
+            "held-out trials",
+            "0.250 nats per sample, 95 % interval 0.100 to 0.400.",
+        ),
         (["c"], [np.nan, np.nan], "held-out trials", "0.250 nats per sample."),
         ([], [np.nan, np.nan], "too few to hold any out", "0.250 nats per sample."),
     ],
 )
 def test_errors_are_said_to_be_of_held_out_trials_only_where_some_were(held, interval, title, gain):
     density = {"nominal": 1.0, "refitted": 2.0, "with_effects": 2.25}
-    entries = {name: {"rms": {}, "log_density_per_sample": value} for name, value in density.items()}
+    entries = {
+        name: {"rms": {}, "log_density_per_sample": value} for name, value in density.items()
+    }
     fit = {**entries, "model_yaml": None, "held_out_trials": held, "improvement_ci95": interval}
     split = SimpleNamespace(held_out=held)
     table = _fit_table({"fit": fit}, Diagnosis.unseen_are.fget(SimpleNamespace(split=split)))
-    assert title in table.title and ("held-out" in table.title) is bool(held)
-    assert table.note.endswith(gain) and NAT in table.note
+    assert title in table.title
+    assert ("held-out" in table.title) is bool(held)
+    assert table.note.endswith(gain)
+    assert NAT in table.note

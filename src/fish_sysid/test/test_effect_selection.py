@@ -31,7 +31,9 @@ def test_the_hidden_effect_is_added_and_no_other() -> None:
     assert found.hypothesis.names == ("rudder_gain",)
     assert found.values["rudder_gain.factor"] == pytest.approx(0.7, abs=0.05)
     assert [s.name for s in steps if s.added] == ["rudder_gain"]
-    assert next(s for s in steps if s.added).gain > 3.0 * next(s for s in steps if s.added).deviation
+    assert (
+        next(s for s in steps if s.added).gain > 3.0 * next(s for s in steps if s.added).deviation
+    )
 
 
 def test_nothing_is_added_where_nothing_is_missing_or_too_few_trials_are_there() -> None:

@@ -27,7 +27,13 @@ from fish_sysid.estimation.map_fit import evaluate
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Coordinates, nominal_hypothesis
 from fish_sysid.estimation.smoother import smooth
 
-SENSORS = ("camera_latency", "camera_heading_offset", "camera_scale", "gyro_scale", "imu_misalignment")
+SENSORS = (
+    "camera_latency",
+    "camera_heading_offset",
+    "camera_scale",
+    "gyro_scale",
+    "imu_misalignment",
+)
 
 
 def experiment(robot: Robot, duration: float, kinds: tuple[str, ...], seed: int = 0):
@@ -62,7 +68,9 @@ def test_compiled_and_numpy_passes_agree(stiffness, width, monkeypatch):
     for key in ("log_likelihood", "gradient", "normal", "whitened"):
         a, b = getattr(slow, key), getattr(fast, key)
         np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-8 * np.nanmax(np.abs(a)))
-    np.testing.assert_allclose(slow.history.filtered_P, fast.history.filtered_P, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(
+        slow.history.filtered_P, fast.history.filtered_P, rtol=1e-6, atol=1e-12
+    )
 
 
 def test_the_memory_of_all_trials_is_never_held_at_once():
@@ -77,7 +85,9 @@ def test_the_memory_of_all_trials_is_never_held_at_once():
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     rows = data.length * len(data.names) * len(problem.dp)
-    both = 16.0 * rows * len(coordinates.stepper.layout.memory)  # bytes of all memories and their derivatives
+    both = (
+        16.0 * rows * len(coordinates.stepper.layout.memory)
+    )  # bytes of all memories and their derivatives
     assert peak < 0.5 * both
 
 
@@ -86,7 +96,9 @@ def test_innovations_are_white_with_unit_variance_at_the_truth():
     coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
     result = run_filter(data, coordinates.stepper, *coordinates.filter_inputs(np.zeros(0)), Noise())
     w = result.whitened[:, :, :3]
-    np.testing.assert_allclose(np.nanmean(w**2, axis=(0, 1)), 1.0, atol=0.08)  # 3000 samples: sd 0.026
+    np.testing.assert_allclose(
+        np.nanmean(w**2, axis=(0, 1)), 1.0, atol=0.08
+    )  # 3000 samples: sd 0.026
     lagged = np.nanmean(w[1:] * w[:-1], axis=(0, 1))
     np.testing.assert_allclose(lagged, 0.0, atol=0.07)
 
@@ -101,12 +113,18 @@ def test_the_transition_is_the_derivative_of_the_simulators_step():
     for k in (100, 150, 250):
         for m in range(2):
             state = np.concatenate([history.filtered[k, m, :nx], history.memory[k, m]])
-            wrench = dict(zip(("surge", "sway", "yaw"), history.filtered[k, m, nx : nx + 3], strict=True))
+            wrench = dict(
+                zip(("surge", "sway", "yaw"), history.filtered[k, m, nx : nx + 3], strict=True)
+            )
             here = coordinates.hypothesis.robot.with_effect("disturbance", **wrench)
             exact = stepper.rollout_jvp(
-                state, data.commands[k, m][None], stepper.parameters(here),
-                np.eye(len(state))[:nx], np.zeros((1, 2)), np.zeros(len(p)),
-            )[1][1]  # fmt: skip
+                state,
+                data.commands[k, m][None],
+                stepper.parameters(here),
+                np.eye(len(state))[:nx],
+                np.zeros((1, 2)),
+                np.zeros(len(p)),
+            )[1][1]
             scale = np.abs(exact[:, :nx]).max(axis=0)
             np.testing.assert_allclose(
                 history.transition[k, m, :nx, :nx].T / scale, exact[:, :nx] / scale, atol=5e-3
@@ -119,7 +137,9 @@ def test_gradient_is_zero_in_the_mean_and_as_large_as_the_normal_matrix_says_at_
     free = ("head_drag_surge", "head_drag_sway", "head_drag_yaw", "head_inertia", "tail_stiffness")
 
     def score(robot: Robot):
-        result = evaluate(nominal_hypothesis(robot, free), np.zeros(len(free)), data, Noise()).result
+        result = evaluate(
+            nominal_hypothesis(robot, free), np.zeros(len(free)), data, Noise()
+        ).result
         return result.gradient.sum(0) / np.sqrt(np.diagonal(result.normal.sum(0)))
 
     right = score(Robot())
@@ -131,7 +151,9 @@ def test_gradient_is_zero_in_the_mean_and_as_large_as_the_normal_matrix_says_at_
 
 def test_a_missing_sensor_costs_nothing_but_its_samples():
     data, _ = experiment(Robot(), 6.0, ("sines",))
-    blind = replace(data, accel=np.full_like(data.accel, np.nan), gyro=np.full_like(data.gyro, np.nan))
+    blind = replace(
+        data, accel=np.full_like(data.accel, np.nan), gyro=np.full_like(data.gyro, np.nan)
+    )
     fit = evaluate(nominal_hypothesis(Robot()), np.zeros(len(NOMINAL_FREE)), blind, Noise())
     assert np.isfinite(fit.objective)
     seeing = evaluate(fit.hypothesis, fit.theta, data, Noise())
@@ -186,7 +208,9 @@ def test_near_a_trials_end_the_fixed_lag_smoother_is_that_of_the_whole_trial():
     history = run_filter(data, coordinates.stepper, *inputs, Noise(), keep=True).history
     whole, deviation = smooth(history)
     off = smoothed(data, Robot(), Noise(), starts, 0.5) - whole[starts[:, 1], 0]
-    assert np.abs(off / deviation[starts[:, 1], 0])[1:].max() < 1e-6  # the end is nearer than the lag
+    assert (
+        np.abs(off / deviation[starts[:, 1], 0])[1:].max() < 1e-6
+    )  # the end is nearer than the lag
     assert np.abs(off / deviation[starts[:, 1], 0])[0].max() < 0.5
 
 
@@ -204,7 +228,9 @@ def test_a_smoothed_state_is_as_sure_as_it_says_and_surer_than_the_filtered_one(
     filtered = np.sqrt(np.diagonal(fit.result.history.filtered_P, axis1=2, axis2=3))
     pose, inner = slice(0, 3), slice(100, 500)
     z = (xi[inner, :, pose] - truth.state[inner, :, pose]) / deviation[inner, :, pose]
-    size = np.sqrt(np.mean(z**2, axis=(0, 1)))  # of few independent samples: an error of a pose lasts
+    size = np.sqrt(
+        np.mean(z**2, axis=(0, 1))
+    )  # of few independent samples: an error of a pose lasts
     assert np.all((0.6 < size) & (size < 1.7))
     assert np.all(deviation[inner, :, pose] < 0.9 * filtered[inner, :, pose])
     error = np.mean(np.square(xi[inner, :, pose] - truth.state[inner, :, pose]), axis=(0, 1))
@@ -221,7 +247,9 @@ def test_a_short_trial_is_smoothed_beside_a_long_one_as_alone():
     def smoothed(some):
         return smooth(run_filter(some, coordinates.stepper, *inputs, Noise(), keep=True).history)[0]
 
-    np.testing.assert_allclose(smoothed(uneven)[:90, 1], smoothed(uneven.select([1]))[:, 0], atol=1e-9)
+    np.testing.assert_allclose(
+        smoothed(uneven)[:90, 1], smoothed(uneven.select([1]))[:, 0], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("compiled", [True, False])
@@ -239,8 +267,11 @@ def test_a_filter_that_diverges_says_from_where(compiled):
     else:
         result = Filter(problem, Noise()).run(keep=True)
     lost = ~np.isfinite(result.history.filtered).all(axis=2)
-    assert not lost[:, 0].any() and not lost[:41, 1].any() and lost[50:, 1].all()
-    assert np.isfinite(result.log_likelihood[0]) and not np.isfinite(result.log_likelihood[1])
+    assert not lost[:, 0].any()
+    assert not lost[:41, 1].any()
+    assert lost[50:, 1].all()
+    assert np.isfinite(result.log_likelihood[0])
+    assert not np.isfinite(result.log_likelihood[1])
 
 
 @pytest.mark.parametrize("rate", [60.0, 100.0, 120.0])
@@ -256,7 +287,9 @@ def test_which_images_are_used_does_not_depend_on_the_latency(rate):
             inner = (taken > -0.004) & (taken < 3.98)
             assert np.isin(frames.pose[inner, 0], pose[:, m, 0]).all()
             used = np.isfinite(offset[:, m])
-            found = np.interp(taken[inner], (0.01 * np.arange(400) + offset[:, m])[used], pose[used, m, 0])
+            found = np.interp(
+                taken[inner], (0.01 * np.arange(400) + offset[:, m])[used], pose[used, m, 0]
+            )
             np.testing.assert_allclose(found, frames.pose[inner, 0], atol=1e-9)
             assert np.abs(offset[used, m]).max() <= 0.0055 + 1e-12
 
@@ -277,7 +310,9 @@ def test_a_camera_that_starts_late_is_believed(wait):
     commands = np.stack([program(kind, 6.0, random) for kind in ("turn", "steps")], axis=1)
     commands[..., 0] *= 1.5
     data, _ = record(Robot(), commands, Noise(), random)
-    late = replace(data, frames=tuple(Frames(f.t[f.t > wait], f.pose[f.t > wait]) for f in data.frames))
+    late = replace(
+        data, frames=tuple(Frames(f.t[f.t > wait], f.pose[f.t > wait]) for f in data.frames)
+    )
     w = evaluate(nominal_hypothesis(Robot(), ()), np.zeros(0), late, Noise()).result.whitened
     for m, frames in enumerate(late.frames):
         assert np.hypot(*frames.pose[0, :2]) > (0.1 if wait > 1.0 else 0.0)

@@ -37,7 +37,8 @@ def test_log_likelihood_gradient_and_gate(swum):
     wrong[100, 0] = 40.0
     near = encoder_terms(replace(swum, encoder=wrong), Noise(), model, d_rotor)
     assert far.log_likelihood == pytest.approx(near.log_likelihood)
-    assert far.gradient == pytest.approx(missing.gradient) and far.normal == pytest.approx(missing.normal)
+    assert far.gradient == pytest.approx(missing.gradient)
+    assert far.normal == pytest.approx(missing.normal)
     assert list(far.samples - missing.samples) == [1, 0]
 
 

@@ -28,7 +28,9 @@ def without(
     messages = samples.robot_messages(duration)
 
     def stamp(message: object) -> float:
-        return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec - 1e-9 * samples.START_NS
+        return (
+            message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec - 1e-9 * samples.START_NS
+        )
 
     def stays(name: str, message: object) -> bool:
         return name != f"/fish/{topic}" or not first - 1e-6 <= stamp(message) < last - 1e-6
@@ -46,9 +48,13 @@ def posed(
     """A robot's messages with these poses instead of its own."""
     others = [m for m in samples.robot_messages(duration) if m[1] != "/fish/camera/pose"]
     seen = [
-        (samples.ns(t + 0.025), "/fish/camera/pose", build.camera_pose(samples.ns(t), "pool", pose(t), (4e-6, 4e-6, 1.44e-4)))
+        (
+            samples.ns(t + 0.025),
+            "/fish/camera/pose",
+            build.camera_pose(samples.ns(t), "pool", pose(t), (4e-6, 4e-6, 1.44e-4)),
+        )
         for t in np.arange(0.005, duration, 1.0 / rate)
-    ]  # fmt: skip
+    ]
     return sorted([*others, *seen], key=lambda m: m[0])
 
 
@@ -68,7 +74,8 @@ def test_every_sensor_stands_at_its_own_grid_point(swum: Experiment) -> None:
     np.testing.assert_allclose(swum.encoder[:500, 0], samples.rotor_speed(t) - 0.5, atol=1e-9)
     np.testing.assert_allclose(swum.gyro[:500, 0], t, atol=1e-9)
     np.testing.assert_allclose(swum.accel[:500, 0], np.column_stack([np.ones(500), t]), atol=1e-9)
-    assert np.isnan(swum.gyro[500]).all() and np.isnan(swum.encoder[500]).all()
+    assert np.isnan(swum.gyro[500]).all()
+    assert np.isnan(swum.encoder[500]).all()
 
 
 def test_images_keep_their_own_times_and_headings_do_not_wrap(swum: Experiment) -> None:
@@ -82,7 +89,8 @@ def test_images_keep_their_own_times_and_headings_do_not_wrap(swum: Experiment) 
 
 def test_the_grid_begins_with_the_first_command(tmp_path: Path) -> None:
     late = build_experiment([read(tmp_path / "late", without("joint_command", 0.0, 0.5))])
-    assert late.steps.tolist() == [151] and not late.start_at_rest  # it turned already
+    assert late.steps.tolist() == [151]
+    assert not late.start_at_rest
     np.testing.assert_allclose(late.gyro[:150, 0], 0.5 + 0.01 * np.arange(150), atol=1e-9)
     (frames,) = late.frames
     assert -0.005 <= frames.t[0] < 1 / 30
@@ -111,19 +119,26 @@ def test_a_trial_in_which_too_many_commands_were_lost_is_refused(tmp_path: Path)
 
 
 def test_trials_stand_side_by_side_padded_to_the_longest(tmp_path: Path) -> None:
-    short, long = (read(tmp_path / n, samples.robot_messages(s)) for n, s in (("short", 1.0), ("long", 2.0)))
+    short, long = (
+        read(tmp_path / n, samples.robot_messages(s)) for n, s in (("short", 1.0), ("long", 2.0))
+    )
     both = build_experiment([short, long])
-    assert both.names == ("short", "long") and both.steps.tolist() == [101, 201] and both.length == 201
-    assert np.isnan(both.gyro[101:, 0]).all() and np.isfinite(both.gyro[:200, 1]).all()
+    assert both.names == ("short", "long")
+    assert both.steps.tolist() == [101, 201]
+    assert both.length == 201
+    assert np.isnan(both.gyro[101:, 0]).all()
+    assert np.isfinite(both.gyro[:200, 1]).all()
     assert not both.commands[101:, 0].any()
     alone = both.select([0])
-    assert alone.names == ("short",) and alone.length == 101
+    assert alone.names == ("short",)
+    assert alone.length == 101
     np.testing.assert_array_equal(alone.commands, build_experiment([short]).commands)
 
 
 def test_the_rest_of_a_trial_begins_in_motion_with_its_own_clock(swum: Experiment) -> None:
     rest = replace(swum, start_at_rest=True).rest_of(0, 300)
-    assert rest.steps.tolist() == [201] and not rest.start_at_rest
+    assert rest.steps.tolist() == [201]
+    assert not rest.start_at_rest
     np.testing.assert_array_equal(rest.gyro, swum.gyro[300:])
     (frames,) = rest.frames
     assert 0.0 <= frames.t[0] < 1 / 30
@@ -139,14 +154,19 @@ def test_a_shortened_experiment_has_its_first_steps(swum: Experiment) -> None:
 
 def test_a_fish_that_swims_already_is_not_at_rest(swum: Experiment, tmp_path: Path) -> None:
     """At 0.24 m/s from the first pose on, though it does not turn yet."""
-    assert swum.gyro[0, 0] == 0.0 and not swum.start_at_rest
-    begun = build_experiment([read(tmp_path / "begun", posed(lambda t: samples.pose(max(t - 0.4, 0.0))))])
+    assert swum.gyro[0, 0] == 0.0
+    assert not swum.start_at_rest
+    begun = build_experiment(
+        [read(tmp_path / "begun", posed(lambda t: samples.pose(max(t - 0.4, 0.0))))]
+    )
     assert begun.start_at_rest
 
 
 def test_a_fast_camera_is_thinned_and_one_that_keeps_to_the_grid_is_not(tmp_path: Path) -> None:
     for rate, every in ((60.0, 1 / 60.0), (100.0, 0.01), (120.0, 2 / 120.0), (240.0, 3 / 240.0)):
-        (frames,) = build_experiment([read(tmp_path / f"{rate:g}", posed(samples.pose, rate=rate))]).frames
+        (frames,) = build_experiment(
+            [read(tmp_path / f"{rate:g}", posed(samples.pose, rate=rate))]
+        ).frames
         np.testing.assert_allclose(np.diff(frames.t), every, atol=1e-8)
         np.testing.assert_allclose(frames.pose[:, :2], samples.pose(frames.t)[:, :2], atol=1e-9)
 
@@ -156,13 +176,14 @@ def test_a_fish_that_is_neither_seen_nor_felt_turn_is_refused(tmp_path: Path) ->
     assert build_experiment([read(tmp_path / "felt", late)]).frames[0].t[0] > 1.5
     blind = read(tmp_path / "blind", [m for m in late if m[1] != "/fish/imu/data"])
     with pytest.raises(
-        ExperimentError, match="blind: the first camera pose comes 1.5 s after .* no gyro .* within 1 s"
+        ExperimentError,
+        match=r"blind: the first camera pose comes 1.5 s after .* no gyro .* within 1 s",
     ):
         build_experiment([blind])
 
 
 def test_who_knows_no_rate_does_not_start_at_rest_unless_told(tmp_path: Path) -> None:
-    still = posed(lambda t: np.zeros(3))  # noqa: ARG005
+    still = posed(lambda t: np.zeros(3))
     blind = read(tmp_path / "blind", [m for m in still if m[1] != "/fish/imu/data"])
     assert build_experiment([read(tmp_path / "felt", still)]).start_at_rest
     assert not build_experiment([blind]).start_at_rest

@@ -23,7 +23,9 @@ def quiet(_: str) -> None:
     ("gain", "restarted", "kept", "searches"),
     [(100.0, 90.0, 90.0, 2), (100.0, 10.0, 10.0, 1), (20.0, 19.0, 0.0, 1)],
 )
-def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, restarted, kept, searches):
+def test_a_base_that_a_candidate_improves_is_searched_again(
+    monkeypatch, gain, restarted, kept, searches
+):
     bases = []
 
     def searched(base, *_):
@@ -36,13 +38,19 @@ def test_a_base_that_a_candidate_improves_is_searched_again(monkeypatch, gain, r
     monkeypatch.setattr(
         forward_selection, "restart_base", lambda base, *_: forward_selection.better(base, better)
     )
-    found = forward_selection.settled_round(SimpleNamespace(objective=0.0), {"current": 23.0}, None, quiet)
+    found = forward_selection.settled_round(
+        SimpleNamespace(objective=0.0), {"current": 23.0}, None, quiet
+    )
     assert bases == [0.0, restarted][:searches]
-    assert found.base.objective == kept  # what gains too little for a name tells nothing of the base
+    assert (
+        found.base.objective == kept
+    )  # what gains too little for a name tells nothing of the base
 
 
 @pytest.mark.parametrize("ahead", [True, False])
-def test_a_base_is_restarted_on_whole_trials_only_where_that_leads_on_shortened_ones(monkeypatch, ahead):
+def test_a_base_is_restarted_on_whole_trials_only_where_that_leads_on_shortened_ones(
+    monkeypatch, ahead
+):
     """Both are settled there: parameters and noise fitted to the shortened trials alone gain a little anyway."""
     settled = []
 
@@ -54,7 +62,9 @@ def test_a_base_is_restarted_on_whole_trials_only_where_that_leads_on_shortened_
 
     for module in (forward_selection, refit):
         monkeypatch.setattr(
-            module, "evaluate", lambda _, theta, __, noise: SimpleNamespace(theta=theta, noise=noise)
+            module,
+            "evaluate",
+            lambda _, theta, __, noise: SimpleNamespace(theta=theta, noise=noise),
         )
         monkeypatch.setattr(module, "settle_base", settle)
     monkeypatch.setattr(forward_selection, "shorten", lambda *_: "short")
@@ -63,11 +73,16 @@ def test_a_base_is_restarted_on_whole_trials_only_where_that_leads_on_shortened_
     rival = SimpleNamespace(theta=np.ones(2), noise="the rival's")
     found = forward_selection.restart_base(own, rival, "whole")
     assert settled == [("short", 1.0), ("short", 0.0), *([("whole", 1.0)] if ahead else [])]
-    assert (found is own) is not ahead and (not ahead or (found.theta == 1.0).all())
+    assert (found is own) is not ahead
+    assert not ahead or (found.theta == 1.0).all()
 
 
-def test_what_gains_far_less_than_it_needs_itself_or_no_more_than_chance_is_not_refitted(monkeypatch):
-    ranked = tuple(screening.Ranked(name, 29.0, np.zeros(1)) for name in ("nonuniform_current", "sloshing"))
+def test_what_gains_far_less_than_it_needs_itself_or_no_more_than_chance_is_not_refitted(
+    monkeypatch,
+):
+    ranked = tuple(
+        screening.Ranked(name, 29.0, np.zeros(1)) for name in ("nonuniform_current", "sloshing")
+    )
     monkeypatch.setattr(forward_selection, "rank", lambda *_: ranked)
     monkeypatch.setattr(forward_selection, "excess", lambda _: np.ones(3))
     monkeypatch.setattr(forward_selection, "refit", lambda *_: SimpleNamespace(objective=29.0))
@@ -106,9 +121,13 @@ def test_where_the_base_leaves_a_force_that_no_pool_has_candidates_are_led_from_
     monkeypatch.setattr(forward_selection, "evaluate", lambda *_: None)
     monkeypatch.setattr(forward_selection, "adapt_noise", lambda *_: None)
     monkeypatch.setattr(forward_selection, "settle", lambda *_: None)
-    monkeypatch.setattr(forward_selection, "look_again", lambda *_: SimpleNamespace(objective=800.0))
+    monkeypatch.setattr(
+        forward_selection, "look_again", lambda *_: SimpleNamespace(objective=800.0)
+    )
     monkeypatch.setattr(forward_selection, "evidence", lambda fit: fit.objective)
-    found = forward_selection.search_round(base, {"rudder_lag": 23.0, "rudder_gain": 23.0}, None, quiet)
+    found = forward_selection.search_round(
+        base, {"rudder_lag": 23.0, "rudder_gain": 23.0}, None, quiet
+    )
     gains = {name: fit.objective for name, fit in found.refitted.items()}
     assert gains == ({"rudder_lag": 900.0} if afar else {"rudder_gain": 800.0})
 
@@ -118,7 +137,10 @@ def test_of_those_that_the_camera_led_two_are_refitted_and_of_very_many_numbers_
         ranked = [screening.Ranked(name, gain, np.zeros(1)) for name, gain in gains.items()]
         return [r.name for r in forward_selection.led_shortlist(ranked)]
 
-    assert names(nonuniform_current=700.0, current=650.0, tether=600.0) == ["nonuniform_current", "current"]
+    assert names(nonuniform_current=700.0, current=650.0, tether=600.0) == [
+        "nonuniform_current",
+        "current",
+    ]
     assert names(current=700.0, nonuniform_current=650.0, tether=600.0) == ["current", "tether"]
     assert names(current=700.0, tether=100.0) == ["current"]
 
@@ -128,14 +150,22 @@ def test_a_look_alike_is_refitted_from_where_the_winner_led():
     truth = Robot().with_effect("tip_slip", mobility=1.0 / 6.0)
     commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps")], axis=1)
     experiment = record(truth, commands, Noise(), random)[0]
-    base = evaluate(nominal_hypothesis(Robot(), ("tail_stiffness",)), np.zeros(1), experiment, Noise())
+    base = evaluate(
+        nominal_hypothesis(Robot(), ("tail_stiffness",)), np.zeros(1), experiment, Noise()
+    )
     wake = base.hypothesis.with_effect("wake_memory", screening.SCALE)
     best = settle(evaluate(wake, np.array([0.0, 1.0, 0.0, 0.0]), experiment, Noise()), experiment)
     slip = forward_selection.refit_beside(best, base, "tip_slip", experiment, 20.0)
-    assert slip is not None and slip.objective > best.objective - 10.0  # wake_memory holds tip_slip within it
+    assert slip is not None
+    assert slip.objective > best.objective - 10.0
     assert slip.values["tip_slip.mobility"] == pytest.approx(1.0 / 6.0, rel=0.05)
-    assert forward_selection.refit_beside(best, base, "tail_joint_damping", experiment, 20.0) is None
+    assert (
+        forward_selection.refit_beside(best, base, "tail_joint_damping", experiment, 20.0) is None
+    )
     odds = probabilities(
-        {"slip": forward_selection.evidence(slip, TEMPER), "wake": forward_selection.evidence(best, TEMPER)}
+        {
+            "slip": forward_selection.evidence(slip, TEMPER),
+            "wake": forward_selection.evidence(best, TEMPER),
+        }
     )
     assert odds["slip"] > 0.7  # two numbers more that nothing asks for

@@ -31,7 +31,10 @@ def swim(links: int, seed: int) -> tuple[Hypothesis, Experiment, Fit]:
     robot = with_links(Robot(), links)
     ratios = random.uniform(0.75, 1.25, len(NOMINAL_FREE))
     ratios[NOMINAL_FREE.index("servo_rate_limit")] = 1.0
-    changed = {name: robot.parameters[name] * ratio for name, ratio in zip(NOMINAL_FREE, ratios, strict=True)}
+    changed = {
+        name: robot.parameters[name] * ratio
+        for name, ratio in zip(NOMINAL_FREE, ratios, strict=True)
+    }
     commands = np.stack([program(kind, 4.0, random) for kind in ("sines", "steps")], axis=1)
     fish = record(robot.with_parameters(**changed), commands, Noise(), random)[0]
     hypothesis = nominal_hypothesis(robot)
@@ -48,7 +51,10 @@ def test_a_tail_of_five_links_is_fitted_as_well_as_from_the_truth() -> None:
 
 def test_the_best_of_all_places_and_hops_goes_on(monkeypatch) -> None:
     """A landscape with a basin at every half: `lead` falls into the nearest one, the best lies at a given place."""
-    hypothesis, origin = nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")), np.zeros(2)
+    hypothesis, origin = (
+        nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")),
+        np.zeros(2),
+    )
     best, begun = np.array([1.0, -0.5]), []
 
     def lead(_hypothesis, _experiment, _noise, theta, *_stages):
@@ -64,14 +70,16 @@ def test_the_best_of_all_places_and_hops_goes_on(monkeypatch) -> None:
     assert np.array_equal(global_fit.fit_multistart(hypothesis, None, None, places=(far,)), best)
     starts, hops = 3, 3  # pairs of three links
     assert len(begun) == 2 + starts + hops
-    assert np.array_equal(begun[0], origin) and np.array_equal(begun[1], far)
+    assert np.array_equal(begun[0], origin)
+    assert np.array_equal(begun[1], far)
     moved = np.abs(np.array(begun[-hops:]) - best)  # all from the best so far
     assert 0.0 < moved.max() < 5.0 * global_fit.HOP
 
 
 def test_a_fit_that_has_no_likelihood_is_never_the_better_one() -> None:
     lost, low = SimpleNamespace(objective=np.nan), SimpleNamespace(objective=-5.0)
-    assert global_fit.better(lost, low) is low and global_fit.better(low, lost) is low
+    assert global_fit.better(lost, low) is low
+    assert global_fit.better(low, lost) is low
 
 
 @pytest.mark.parametrize(
@@ -126,7 +134,8 @@ def test_strange_innovations_are_put_down_to_the_likelier_of_sensors_and_model(
 
 
 @pytest.mark.parametrize(
-    ("led", "here", "whole", "best"), [(9.0, 5.0, 70.0, 70.0), (9.0, 5.0, 30.0, 50.0), (7.0, 5.0, 70.0, 50.0)]
+    ("led", "here", "whole", "best"),
+    [(9.0, 5.0, 70.0, 70.0), (9.0, 5.0, 30.0, 50.0), (7.0, 5.0, 70.0, 50.0)],
 )
 def test_a_fit_led_elsewhere_goes_on_where_it_is_ahead(monkeypatch, led, here, whole, best) -> None:
     """On shortened trials, of the fit settled there: else whole trials would be settled for nothing."""
@@ -134,20 +143,26 @@ def test_a_fit_led_elsewhere_goes_on_where_it_is_ahead(monkeypatch, led, here, w
     other = SimpleNamespace(hypothesis=None, theta="led", noise=None, objective=led)
     ends = {("own", "short"): here, ("led", "whole"): whole}
     monkeypatch.setattr(refit, "evaluate", lambda _, theta, experiment, __: (theta, experiment))
-    monkeypatch.setattr(refit, "settle_base", lambda start, _: SimpleNamespace(objective=ends[start]))
+    monkeypatch.setattr(
+        refit, "settle_base", lambda start, _: SimpleNamespace(objective=ends[start])
+    )
     assert refit.better_of(fit, other, "short", "whole").objective == best
 
 
 def without_data(monkeypatch, reached: float) -> None:
     """`base` shortens, measures and evaluates nothing: where fits begin and which is kept is asked."""
     ended = SimpleNamespace(objective=reached)
-    monkeypatch.setattr(refit, "better_of", lambda fit, *_: max(fit, ended, key=lambda one: one.objective))
+    monkeypatch.setattr(
+        refit, "better_of", lambda fit, *_: max(fit, ended, key=lambda one: one.objective)
+    )
     monkeypatch.setattr(refit, "shorten", lambda experiment, _: experiment)
     monkeypatch.setattr(refit, "usual_noise", lambda _: None)
     monkeypatch.setattr(
         refit,
         "evaluate",
-        lambda hypothesis, theta, _, noise: SimpleNamespace(hypothesis=hypothesis, theta=theta, noise=noise),
+        lambda hypothesis, theta, _, noise: SimpleNamespace(
+            hypothesis=hypothesis, theta=theta, noise=noise
+        ),
     )
 
 
@@ -160,11 +175,14 @@ def test_a_fit_whose_innovations_its_own_noise_does_not_explain_is_looked_at_aga
 ) -> None:
     """A camera 51 ms late was fitted 8000 nats below the truth so, and not named: the check saw through the fit."""
     hypothesis = nominal_hypothesis(Robot())
-    fit = SimpleNamespace(hypothesis=hypothesis, theta=np.full(len(hypothesis.free), 0.4), objective=5.0)
+    fit = SimpleNamespace(
+        hypothesis=hypothesis, theta=np.full(len(hypothesis.free), 0.4), objective=5.0
+    )
 
     def fit_held(_hypothesis, _experiment, _noise, theta, held):
         inertias = [hypothesis.free.index(name) for name in held]
-        assert not theta[inertias].any() and np.delete(theta, inertias) == pytest.approx(0.4)
+        assert not theta[inertias].any()
+        assert np.delete(theta, inertias) == pytest.approx(0.4)
         return SimpleNamespace(theta=theta, noise=None)
 
     monkeypatch.setattr(refit, "excess", lambda _: np.array([left]))
@@ -175,12 +193,16 @@ def test_a_fit_whose_innovations_its_own_noise_does_not_explain_is_looked_at_aga
     assert (fit.theta == 0.4).all()
 
 
-@pytest.mark.parametrize(("name", "moves"), [("rudder_offset", True), ("nonuniform_current", False)])
+@pytest.mark.parametrize(
+    ("name", "moves"), [("rudder_offset", True), ("nonuniform_current", False)]
+)
 def test_a_candidate_is_led_from_the_nominal_values_with_its_effect_as_found(
     monkeypatch, name, moves
 ) -> None:
     """One of very many numbers stays as it is until all is free on whole trials."""
-    hypothesis = nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")).with_effect(name, 0.3)
+    hypothesis = nominal_hypothesis(Robot(), ("tail_stiffness", "rotor_inertia")).with_effect(
+        name, 0.3
+    )
     effect = np.full(len(hypothesis.free) - 2, 0.8)
     begun = []
 
@@ -207,7 +229,9 @@ def test_a_slow_strong_force_is_found_from_a_fast_one() -> None:
     )
     fish = record(robot, commands, Noise(), random)[0]
     hypothesis = nominal_hypothesis(Robot())
-    fast = replace(Noise(), wrench=tuple(30.0 * w for w in Noise().wrench), wrench_time=SHORTEST_WRENCH)
+    fast = replace(
+        Noise(), wrench=tuple(30.0 * w for w in Noise().wrench), wrench_time=SHORTEST_WRENCH
+    )
     fit = evaluate(hypothesis, np.zeros(len(hypothesis.free)), fish, fast)
     slow = replace(Noise(), wrench=tuple(16.0 * w for w in Noise().wrench), wrench_time=2.0)
     found = adapt_noise(fit, fish, reach=Reach.COLD)

@@ -19,19 +19,27 @@ def swum():
 
 def test_a_robot_without_effects_is_refitted_as_ever(swum):
     hypothesis = given_hypothesis(Robot(), swum, Noise())
-    assert hypothesis.free == NOMINAL_FREE and own_effects(hypothesis.robot) == ()
+    assert hypothesis.free == NOMINAL_FREE
+    assert own_effects(hypothesis.robot) == ()
 
 
 def test_own_effects_are_free_as_far_as_the_recordings_tell_of_them(swum):
     """The line is never taut and no command reaches the limit: free, the prior would take both away."""
-    robot = Robot().with_effect("rudder_offset", offset=0.06).with_effect("camera_latency", delay=0.03)
+    robot = (
+        Robot().with_effect("rudder_offset", offset=0.06).with_effect("camera_latency", delay=0.03)
+    )
     robot = robot.with_effect("tether", stiffness=0.3, length=4.0).with_effect(
         "rudder_saturation", limit=0.79
     )
     hypothesis = given_hypothesis(robot, swum, Noise())
     assert hypothesis.free == (*NOMINAL_FREE, "rudder_offset.offset", "camera_latency.delay")
     assert hypothesis.robot.effects["tether"] == robot.effects["tether"]
-    assert set(hypothesis.names) == {"rudder_offset", "camera_latency", "tether", "rudder_saturation"}
+    assert set(hypothesis.names) == {
+        "rudder_offset",
+        "camera_latency",
+        "tether",
+        "rudder_saturation",
+    }
 
 
 def test_of_two_that_are_known_together_alone_one_is_held():

@@ -60,7 +60,9 @@ def pushed() -> MissingForce:
     )
 
 
-def test_the_windows_that_hold_most_of_a_force_are_told_with_their_share(pushed: MissingForce) -> None:
+def test_the_windows_that_hold_most_of_a_force_are_told_with_their_share(
+    pushed: MissingForce,
+) -> None:
     rows = time_shares(pushed, UNIT)
     found = sorted((row["trial"], row["from"], row["to"], row["share"]) for row in rows[:3])
     third = pytest.approx(1.0 / 3.0)
@@ -76,15 +78,20 @@ def test_the_cell_of_the_pool_in_which_a_force_acts_is_told(pushed: MissingForce
     cell = place_shares(pushed, UNIT)[0]
     assert cell["share"] == pytest.approx(1.0)
     (left, right), (low, high) = cell["x"], cell["y"]
-    assert left <= 0.25 and 0.35 <= right and low <= 0.0 <= high and right - left < 1.0
+    assert left <= 0.25
+    assert 0.35 <= right
+    assert low <= 0.0 <= high
+    assert right - left < 1.0
 
 
 def test_the_covariate_is_told_in_whose_range_a_force_acts(pushed: MissingForce) -> None:
     rows = {row["name"]: row for row in covariate_shares(pushed, UNIT)}
     assert rows["rudder"]["range"] == pytest.approx([0.3, 0.5], abs=0.06)  # over two bins
-    assert rows["rudder"]["share"] == pytest.approx(1.0) and rows["rudder"]["contrast"] > 3.0
+    assert rows["rudder"]["share"] == pytest.approx(1.0)
+    assert rows["rudder"]["contrast"] > 3.0
     assert rows["surge_speed"]["contrast"] < 1.5
-    assert "rotor_speed" not in rows and "time" not in rows  # one never changes, intervals tell of the other
+    assert "rotor_speed" not in rows
+    assert "time" not in rows
 
 
 def test_a_rudder_that_rests_is_not_what_a_force_depends_on() -> None:
@@ -94,7 +101,8 @@ def test_a_rudder_that_rests_is_not_what_a_force_depends_on() -> None:
     rows = covariate_shares(force(random.standard_normal((4000, 1)), rudder=rudder), UNIT)
     assert rows[0]["contrast"] < 1.2
     rows = covariate_shares(force(np.where(rudder > 0.2, 0.2, 0.0), rudder=rudder), UNIT)
-    assert rows[0]["range"] == pytest.approx([0.2, 0.4], abs=0.15) and rows[0]["contrast"] > 3.0
+    assert rows[0]["range"] == pytest.approx([0.2, 0.4], abs=0.15)
+    assert rows[0]["contrast"] > 3.0
 
 
 def test_the_last_window_of_a_shorter_trial_ends_with_it() -> None:
@@ -102,9 +110,9 @@ def test_the_last_window_of_a_shorter_trial_ends_with_it() -> None:
     surge[550:, 1] = np.nan
     surge[:400] = 0.0
     rows = time_shares(force(surge), UNIT)
-    assert [(r["from"], r["to"]) for r in rows if r["trial"] == "trial_01" and r["share"] > 0.0] == [
-        (4.0, 5.5)
-    ]
+    assert [
+        (r["from"], r["to"]) for r in rows if r["trial"] == "trial_01" and r["share"] > 0.0
+    ] == [(4.0, 5.5)]
 
 
 def test_a_force_is_in_units_of_each_degree_of_freedom() -> None:
@@ -112,7 +120,8 @@ def test_a_force_is_in_units_of_each_degree_of_freedom() -> None:
     wrench = np.zeros((400, 1, 3))
     wrench[:200, 0, 1], wrench[200:, 0, 2] = 0.1, 0.01
     first, second = time_shares(MissingForce(("a",), wrench, wrench, {}), UNIT)
-    assert first["from"] == 2.0 and first["share"] == pytest.approx(100.0 / 101.0)
+    assert first["from"] == 2.0
+    assert first["share"] == pytest.approx(100.0 / 101.0)
     assert second["share"] == pytest.approx(1.0 / 101.0)
 
 
@@ -124,7 +133,8 @@ def test_a_force_that_swings_with_the_tail_acts_all_the_while() -> None:
     np.testing.assert_allclose(size(beating, UNIT)[330:670, 0], 3.0 / np.sqrt(2.0), rtol=0.02)
     assert np.isnan(size(beating, UNIT)[500:, 1]).all()
     (row,) = intervals(beating, UNIT)
-    assert row["trial"] == "trial_00" and row["share"] > 0.95
+    assert row["trial"] == "trial_00"
+    assert row["share"] > 0.95
     assert (row["from"], row["to"]) == pytest.approx((3.0, 7.0), abs=0.25)
 
 
@@ -132,23 +142,29 @@ def test_two_intervals_share_the_impulse_the_larger_first() -> None:
     t = 0.01 * np.arange(1000)
     rows = intervals(force(np.where(t < 2.0, 0.1, np.where(t >= 7.0, 0.1, 0.0))[:, None]), UNIT)
     assert [row["from"] for row in rows] == [pytest.approx(7.0, abs=0.25), 0.0]
-    assert rows[0]["to"] == 10.0 and rows[0]["share"] == pytest.approx(0.6, abs=0.03)
+    assert rows[0]["to"] == 10.0
+    assert rows[0]["share"] == pytest.approx(0.6, abs=0.03)
 
 
 def test_the_most_telling_covariate_comes_first_with_its_range(pushed: MissingForce) -> None:
     rows = regimes(pushed, UNIT)
     assert [row["f1"] for row in rows] == sorted((row["f1"] for row in rows), reverse=True)
     by_name = {row["name"]: row for row in rows}
-    assert by_name["rudder"]["range"] == pytest.approx([0.3, 0.5], abs=0.05) and by_name["rudder"]["f1"] > 0.9
-    assert by_name["x"]["range"] == pytest.approx([0.25, 0.35], abs=0.06) and by_name["x"]["share"] > 0.9
-    assert by_name["surge_speed"]["f1"] < 0.6 and {"time", "rotor_speed"}.isdisjoint(by_name)
+    assert by_name["rudder"]["range"] == pytest.approx([0.3, 0.5], abs=0.05)
+    assert by_name["rudder"]["f1"] > 0.9
+    assert by_name["x"]["range"] == pytest.approx([0.25, 0.35], abs=0.06)
+    assert by_name["x"]["share"] > 0.9
+    assert by_name["surge_speed"]["f1"] < 0.6
+    assert {"time", "rotor_speed"}.isdisjoint(by_name)
 
 
 def fit(*wrench: float, tau: float = 0.2) -> SimpleNamespace:
     return SimpleNamespace(noise=Noise(wrench=wrench, wrench_time=tau))
 
 
-def test_shares_of_the_degrees_of_freedom_are_of_the_variance_that_only_the_nominal_model_needs() -> None:
+def test_shares_of_the_degrees_of_freedom_are_of_the_variance_that_only_the_nominal_model_needs() -> (
+    None
+):
     shares = dof_shares(fit(0.008, 0.004, 6e-4), fit(0.004, 0.008, 2e-4))
     assert shares == {"surge": pytest.approx(3 / 11), "sway": 0.0, "yaw": pytest.approx(8 / 11)}
     assert dof_shares(fit(0.004, 0.008, 2e-4), fit(0.004, 0.008, 2e-4)) == {
@@ -162,7 +178,9 @@ def test_the_unexplained_share_is_what_is_left_of_the_density_beyond_usual_water
     """Usual water has one; ten and four in surge: three of nine are left, a third. Twice as long is twice as dense."""
     usual = Noise().wrench
     ten, four = (fit(f**0.5 * usual[0], *usual[1:]) for f in (10.0, 4.0))
-    assert verdicts.unexplained_share(SimpleNamespace(nominal=ten, final=four)) == pytest.approx(3.0 / 9.0)
+    assert verdicts.unexplained_share(SimpleNamespace(nominal=ten, final=four)) == pytest.approx(
+        3.0 / 9.0
+    )
     calm = fit(*usual)
     assert verdicts.unexplained_share(SimpleNamespace(nominal=calm, final=calm)) == 0.0
     longer = fit(*usual, tau=0.4)
@@ -173,7 +191,9 @@ def test_the_interval_of_a_mean_gain_is_that_of_the_normal_distribution_for_many
     gain = np.random.default_rng(0).normal(0.3, 0.2, 400)
     middle, half = gain.mean(), 1.96 * gain.std() / 20.0
     assert mean_interval(gain) == pytest.approx([middle - half, middle + half], abs=0.1 * half)
-    assert np.isnan(mean_interval(np.array([0.2]))).all()  # one trial does not tell how far trials differ
+    assert np.isnan(
+        mean_interval(np.array([0.2]))
+    ).all()  # one trial does not tell how far trials differ
 
 
 @pytest.mark.parametrize("trials", [2, 3, 4, 6])
@@ -191,13 +211,15 @@ def test_the_worst_trial_tells_whether_residuals_are_white() -> None:
     white[50:, :, 3:6] = np.nan  # too few images
     p = whiteness(SimpleNamespace(result=SimpleNamespace(whitened=white)))
     assert set(p) == {"gyro", "accel_forward"}
-    assert p["gyro"] > 0.05 and p["accel_forward"] < 1e-10
+    assert p["gyro"] > 0.05
+    assert p["accel_forward"] < 1e-10
 
 
 def test_p_values_are_of_the_tempered_ratio_times_the_names_tried() -> None:
-    """chi square with two degrees of freedom is exponential."""
+    """Chi square with two degrees of freedom is exponential."""
     assert p_value(5.0 * TEMPER, 2, 3) == pytest.approx(3.0 * np.exp(-5.0))
-    assert p_value(-1.0, 1, 1) == 1.0 and p_value(0.1, 2, 30) == 1.0
+    assert p_value(-1.0, 1, 1) == 1.0
+    assert p_value(0.1, 2, 30) == 1.0
 
 
 def test_what_is_just_enough_on_unseen_trials_has_the_p_value_of_the_level() -> None:

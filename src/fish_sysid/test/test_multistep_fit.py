@@ -24,7 +24,9 @@ TRUTH = Robot().with_parameters(head_drag_surge=0.26, head_drag_yaw=2.4e-3, tail
 @pytest.fixture(scope="module")
 def outlook() -> Outlook:
     random = np.random.default_rng(4)
-    commands = np.stack([program(kind, 9.0, random) for kind in ("sines", "random", "steps")], axis=1)
+    commands = np.stack(
+        [program(kind, 9.0, random) for kind in ("sines", "random", "steps")], axis=1
+    )
     made = Outlook(record(TRUTH, commands, NOISE, random)[0], nominal_hypothesis(Robot(), FREE))
     made.start_from(made.coordinates.origin(), NOISE)
     return made
@@ -36,7 +38,9 @@ def test_slopes_equal_differences(outlook: Outlook) -> None:
     for k in range(len(FREE)):
         step = np.zeros(len(FREE))
         step[k] = 1e-4
-        numeric = (outlook.errors(theta + step, False)[0] - outlook.errors(theta - step, False)[0]) / 2e-4
+        numeric = (
+            outlook.errors(theta + step, False)[0] - outlook.errors(theta - step, False)[0]
+        ) / 2e-4
         np.testing.assert_allclose(J[:, k], numeric, atol=1e-4 * np.abs(numeric).max())
 
 
@@ -46,7 +50,8 @@ def test_what_a_step_promises_is_about_what_the_fit_brings(outlook: Outlook) -> 
     least = outlook.cost(lowest)
     for theta in (start, lowest + [-0.2, -0.2, 0.1]):
         fall = outlook.cost(theta) - least
-        assert fall > 10.0 and outlook.promised(theta) == pytest.approx(least, abs=0.2 * fall)
+        assert fall > 10.0
+        assert outlook.promised(theta) == pytest.approx(least, abs=0.2 * fall)
     assert outlook.promised(lowest) == pytest.approx(least, abs=1.0)
 
 
@@ -70,7 +75,9 @@ def test_a_sensor_error_keeps_the_value_and_the_covariance_of_the_fit(outlook: O
     name = "camera_heading_offset.offset"
     assert found.values[name] == pytest.approx(0.3, abs=1e-9)
     assert found.standard_errors[name] == pytest.approx(start.standard_errors[name], rel=0.3)
-    assert found.values["head_drag_surge"] == pytest.approx(TRUTH.parameters["head_drag_surge"], rel=0.1)
+    assert found.values["head_drag_surge"] == pytest.approx(
+        TRUTH.parameters["head_drag_surge"], rel=0.1
+    )
 
 
 def test_what_is_to_be_foretold_is_what_the_sensors_at_theta_saw_not_those_at_the_hypothesis_s_start(
@@ -135,7 +142,11 @@ def test_far_errors_pull_no_harder_than_three() -> None:
 def test_nothing_is_foretold_of_what_lies_beyond_a_trial_s_end(outlook: Outlook) -> None:
     """Images may go on after the last command that is used."""
     short = Outlook(shorten(outlook.experiment, 500), nominal_hypothesis(Robot(), FREE))
-    last = [short.starts[t.start, 1] + t.position.max() for found in short.targets.values() for t in found]
+    last = [
+        short.starts[t.start, 1] + t.position.max()
+        for found in short.targets.values()
+        for t in found
+    ]
     assert 450 < max(last) <= 498
 
 
@@ -143,18 +154,26 @@ def test_trials_too_short_to_be_foretold_have_no_errors(outlook: Outlook) -> Non
     short = Outlook(shorten(outlook.experiment, 150), nominal_hypothesis(Robot(), FREE))
     short.start_from(np.zeros(len(FREE)), NOISE)
     e, J = short.errors(np.zeros(len(FREE)))
-    assert e.shape == (0,) and J.shape == (0, len(FREE)) and short.cost(np.zeros(len(FREE))) == 0.0
+    assert e.shape == (0,)
+    assert J.shape == (0, len(FREE))
+    assert short.cost(np.zeros(len(FREE))) == 0.0
 
 
 def test_sensors_far_noisier_than_said_tell_of_a_wrong_model(outlook: Outlook) -> None:
-    fit = evaluate(nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE)
+    fit = evaluate(
+        nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE
+    )
     assert not is_wrong(fit, NOISE)
     assert is_wrong(fit, Noise(gyro=NOISE.gyro / 10.0))
 
 
 def test_a_force_that_no_water_has_tells_of_a_wrong_model(outlook: Outlook) -> None:
-    fit = evaluate(nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE)
+    fit = evaluate(
+        nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE
+    )
     surge, sway, yaw = Noise().wrench
-    rough, impossible = (replace(NOISE, wrench=(surge, sway, factor * yaw)) for factor in (5.0, 6.0))
+    rough, impossible = (
+        replace(NOISE, wrench=(surge, sway, factor * yaw)) for factor in (5.0, 6.0)
+    )
     assert not is_wrong(replace(fit, noise=rough), NOISE)
     assert is_wrong(replace(fit, noise=impossible), NOISE)

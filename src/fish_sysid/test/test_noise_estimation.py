@@ -60,7 +60,9 @@ def test_what_the_fit_knows_of_its_sensors_is_kept(fish: Experiment, reach: Reac
     fit = settle(fitted(fish, Noise()), fish)
     found = adapt_noise(replace(fit, noise=Noise()), fish, reach=reach)
     sensors = ("gyro", "accel", "camera_position", "camera_heading")
-    assert [getattr(found, name) for name in sensors] == [getattr(Noise(), name) for name in sensors]
+    assert [getattr(found, name) for name in sensors] == [
+        getattr(Noise(), name) for name in sensors
+    ]
     near = adapt_noise(fit, fish, reach=Reach.NEAR)
     values = likelihoods(fit.hypothesis, fit.theta, fish, [found, near])
     assert values[0] > values[1] - 10.0
@@ -80,12 +82,16 @@ def test_items_are_worked_on_in_their_order_and_an_error_is_raised() -> None:
         on_all_cores(lambda n: 1 // n, [1, 0])
 
 
-def test_where_every_move_diverges_the_noise_stays(fish: Experiment, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_every_move_diverges_the_noise_stays(
+    fish: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And no warning of NumPy reaches the user."""
     fit = fitted(fish, Noise())
     kept = noise_estimation.starts(fit, fish, Reach.NEAR)
     monkeypatch.setattr(
-        noise_estimation, "likelihoods", lambda _h, _t, _e, n: np.where([m in kept for m in n], 0.0, -np.inf)
+        noise_estimation,
+        "likelihoods",
+        lambda _h, _t, _e, n: np.where([m in kept for m in n], 0.0, -np.inf),
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -43,10 +43,14 @@ def coordinates(several: Hypothesis) -> Coordinates:
 @pytest.fixture
 def theta(coordinates: Coordinates) -> np.ndarray:
     """Somewhere inside all ranges."""
-    return coordinates.origin() + np.random.default_rng(0).uniform(-0.1, 0.1, len(coordinates.start))
+    return coordinates.origin() + np.random.default_rng(0).uniform(
+        -0.1, 0.1, len(coordinates.start)
+    )
 
 
-def test_values_come_back_and_stand_in_the_robot(coordinates: Coordinates, theta: np.ndarray) -> None:
+def test_values_come_back_and_stand_in_the_robot(
+    coordinates: Coordinates, theta: np.ndarray
+) -> None:
     values = coordinates.decode(theta)
     np.testing.assert_allclose(coordinates.encode(values), theta, atol=1e-12)
     robot = coordinates.robot(theta)
@@ -80,7 +84,8 @@ def test_slopes_are_the_derivatives_of_what_the_filter_gets(
         )
         np.testing.assert_allclose(dp[j], (up - down) / 2e-5, rtol=1e-6, atol=1e-9)
         if name == "camera_latency.delay":
-            assert sensors.free == {"camera_latency": j} and not dp[j].any()
+            assert sensors.free == {"camera_latency": j}
+            assert not dp[j].any()
             slope = (s_up.camera_latency - s_down.camera_latency) / 2e-5
             assert sensors.slope["camera_latency"] == pytest.approx(slope)
     assert p.shape == (dp.shape[1],)
@@ -94,8 +99,15 @@ def test_standard_errors_are_those_of_theta_times_the_slope(
     root = random.standard_normal((len(theta), len(theta)))
     covariance = 1e-6 * (root @ root.T + np.eye(len(theta)))
     fit = Fit(
-        several, theta, coordinates.robot(theta), Noise(), np.zeros(1), 0.0, SimpleNamespace(), np.linalg.inv(covariance)
-    )  # fmt: skip
+        several,
+        theta,
+        coordinates.robot(theta),
+        Noise(),
+        np.zeros(1),
+        0.0,
+        SimpleNamespace(),
+        np.linalg.inv(covariance),
+    )
     drawn = random.multivariate_normal(theta, covariance, 20000)
     spread = np.array([coordinates.decode(t) for t in drawn]).std(axis=0)
     np.testing.assert_allclose(list(fit.standard_errors.values()), spread, rtol=0.03)
@@ -111,7 +123,9 @@ def test_theta_is_kept_in_the_physical_ranges(coordinates: Coordinates, theta: n
     assert coordinates.lowest[delay] == 0.0  # an image cannot be of the future
 
 
-def test_one_effect_more_leaves_the_others_where_they_are(several: Hypothesis, theta: np.ndarray) -> None:
+def test_one_effect_more_leaves_the_others_where_they_are(
+    several: Hypothesis, theta: np.ndarray
+) -> None:
     more = several.with_effect("tether", 0.3)
     longer = extend(theta, more, "tether", 1.0, {"x": 0.4})
     values = dict(zip(more.free, Coordinates(more).decode(longer), strict=True))
@@ -120,14 +134,21 @@ def test_one_effect_more_leaves_the_others_where_they_are(several: Hypothesis, t
     assert values["tether.stiffness"] == pytest.approx(parameters["stiffness"].typical)
     assert values["tether.x"] == pytest.approx(0.4)
     less = more.without("tether")
-    assert less.free == several.free and less.names == several.names == (
-        "current",
-        "wall_effect",
-        "camera_latency",
+    assert less.free == several.free
+    assert (
+        less.names
+        == several.names
+        == (
+            "current",
+            "wall_effect",
+            "camera_latency",
+        )
     )
 
 
-def test_numbers_that_are_held_stay_where_theta_has_them(several: Hypothesis, theta: np.ndarray) -> None:
+def test_numbers_that_are_held_stay_where_theta_has_them(
+    several: Hypothesis, theta: np.ndarray
+) -> None:
     """Of the robot, of an effect and of a sensor; the others keep their coordinates."""
     held = [several.free[0], "wall_effect.k", "camera_latency.delay"]
     rest = several.fixing(held, theta)
@@ -160,13 +181,15 @@ def test_a_parameter_of_zero_stays_zero_and_the_others_are_free() -> None:
         moved = coordinates.robot(origin + 0.3)
     assert not origin.any()
     assert moved.parameters["fin_drag_surge"] == 0.0 < moved.parameters["fin_drag_sway"]
-    assert nominal_hypothesis(Robot()).free == NOMINAL_FREE and zeros(Robot()) == ()
+    assert nominal_hypothesis(Robot()).free == NOMINAL_FREE
+    assert zeros(Robot()) == ()
 
 
 def test_a_robot_with_a_wrench_of_its_own_is_refused() -> None:
     """The filter's wrench takes its place; a motion without it would be another robot's."""
     with pytest.raises(
-        UserError, match="robot 'carp' has the effect disturbance .* expected a robot without it; delete it"
+        UserError,
+        match=r"robot 'carp' has the effect disturbance .* expected a robot without it; delete it",
     ):
         nominal_hypothesis(replace(Robot(), name="carp").with_effect("disturbance", sway=0.01))
     nominal_hypothesis(Robot().with_effect("disturbance"))

@@ -21,7 +21,12 @@ from fish_sysid.prediction.prediction_table import COLUMNS, write_predictions
 from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 QUIET = Noise(
-    wrench=(1e-6, 1e-6, 1e-8), gyro=1e-4, accel=1e-3, camera_position=1e-5, camera_heading=1e-5, encoder=1e-3
+    wrench=(1e-6, 1e-6, 1e-8),
+    gyro=1e-4,
+    accel=1e-3,
+    camera_position=1e-5,
+    camera_heading=1e-5,
+    encoder=1e-3,
 )
 ROBOT = Robot()
 
@@ -29,7 +34,9 @@ ROBOT = Robot()
 @pytest.fixture(scope="module")
 def quiet() -> Experiment:
     random = np.random.default_rng(5)
-    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1)
+    commands = np.stack(
+        [program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1
+    )
     experiment = record(ROBOT, commands, QUIET, random)[0]
     return replace(experiment, gyro=experiment.gyro, steps=np.array([800, 800, 500]))
 
@@ -44,7 +51,9 @@ def test_true_model_without_noise_predicts_exactly(quiet: Experiment) -> None:
 @pytest.mark.parametrize("ahead", [0.0, 0.5])
 def test_later_measurements_change_nothing_before_them(quiet: Experiment, ahead: float) -> None:
     cut = 4.0
-    frames = tuple(Frames(f.t, f.pose + np.where(f.t > cut, 1.0, 0.0)[:, None]) for f in quiet.frames)
+    frames = tuple(
+        Frames(f.t, f.pose + np.where(f.t > cut, 1.0, 0.0)[:, None]) for f in quiet.frames
+    )
     gyro = quiet.gyro.copy()
     gyro[int(cut / 0.01) + 1 :] += 1.0
     a = predict(quiet, ROBOT, Noise(), 1.0, ahead=ahead)
@@ -61,7 +70,9 @@ def test_starts_every_horizon_and_end_with_the_trial(quiet: Experiment) -> None:
     assert np.isfinite(last).sum() == 100  # 4.00 .. 4.99 s
 
 
-def test_a_filter_that_diverges_begins_anew(quiet: Experiment, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_filter_that_diverges_begins_anew(
+    quiet: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = prediction.estimate(quiet, ROBOT, Noise())
 
     def diverging(experiment: Experiment, *args: object, **keywords: object) -> FilterResult:
@@ -74,7 +85,9 @@ def test_a_filter_that_diverges_begins_anew(quiet: Experiment, monkeypatch: pyte
     broken = prediction.estimate(quiet, ROBOT, Noise())
     np.testing.assert_array_equal(broken.pose[:, [0, 2]], whole.pose[:, [0, 2]])
     np.testing.assert_allclose(broken.pose[400:800, 1], whole.pose[400:800, 1], atol=0.03)
-    np.testing.assert_allclose(broken.velocity[400:800, 1, 0], whole.velocity[400:800, 1, 0], atol=0.03)
+    np.testing.assert_allclose(
+        broken.velocity[400:800, 1, 0], whole.velocity[400:800, 1, 0], atol=0.03
+    )
 
 
 CAMERA_ERRORS = {
@@ -85,7 +98,9 @@ CAMERA_ERRORS = {
 
 
 @pytest.mark.parametrize("name", CAMERA_ERRORS)
-def test_camera_errors_of_the_model_are_in_what_it_predicts(quiet: Experiment, tmp_path, name: str) -> None:
+def test_camera_errors_of_the_model_are_in_what_it_predicts(
+    quiet: Experiment, tmp_path, name: str
+) -> None:
     key, value, wrong = CAMERA_ERRORS[name]
     robot = ROBOT.with_effect(name, **{key: value})
     seen = replace(quiet, frames=tuple(map(wrong, quiet.frames)))
@@ -96,22 +111,30 @@ def test_camera_errors_of_the_model_are_in_what_it_predicts(quiet: Experiment, t
         rows = list(csv.DictReader(file))
     for row in rows:
         assert abs(float(row["predicted_x"]) - float(row["measured_x"])) < 3e-3
-        assert float(row["start"]) - 1e-9 <= float(row["time"]) - (0.2 if name == "camera_latency" else 0.0)
+        assert float(row["start"]) - 1e-9 <= float(row["time"]) - (
+            0.2 if name == "camera_latency" else 0.0
+        )
 
 
 def test_an_unexplained_force_dies_away_with_the_waters_time(quiet: Experiment) -> None:
     """Against a force that is told to the simulator anew at every step."""
     noise, push, start = replace(Noise(), wrench_time=0.3), np.array([0.05, -0.04, 1e-3]), 100
     state = prediction.estimate(quiet, ROBOT, QUIET).state[start, :1]
-    found = prediction._simulate(quiet, ROBOT, noise, np.array([[0, start]]), state, push[None], 120)
+    found = prediction._simulate(
+        quiet, ROBOT, noise, np.array([[0, start]]), state, push[None], 120
+    )
     robot = ROBOT.with_effect("disturbance")
     stepper = Stepper.of(robot)
     for k in range(120):
         now = push * np.exp(-(k + 0.5) * 0.01 / 0.3)
-        p = stepper.parameters(robot.with_effect("disturbance", surge=now[0], sway=now[1], yaw=now[2]))
+        p = stepper.parameters(
+            robot.with_effect("disturbance", surge=now[0], sway=now[1], yaw=now[2])
+        )
         state = stepper.step(state, quiet.commands[start + k, :1], p[None])
     np.testing.assert_allclose(found[120, 0], state[0, :3], atol=3e-4)
-    free = prediction._simulate(quiet, ROBOT, noise, np.array([[0, start]]), state, np.zeros((1, 3)), 120)
+    free = prediction._simulate(
+        quiet, ROBOT, noise, np.array([[0, start]]), state, np.zeros((1, 3)), 120
+    )
     assert np.abs(found[120] - free[120]).max() > 0.01
 
 
@@ -153,7 +176,8 @@ def test_bad_horizon_is_refused(quiet: Experiment) -> None:
 
 def test_horizon_longer_than_every_trial_has_no_error(quiet: Experiment) -> None:
     errors = prediction_errors(predict(quiet, ROBOT, Noise(), 20.0, 20.0), (20.0,))
-    assert errors.counts.sum() == 0 and errors.as_table() == {}
+    assert errors.counts.sum() == 0
+    assert errors.as_table() == {}
 
 
 def test_table(quiet: Experiment, tmp_path) -> None:
@@ -161,8 +185,11 @@ def test_table(quiet: Experiment, tmp_path) -> None:
     count = write_predictions(path, predict(quiet, ROBOT, Noise(), 2.0))
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == COLUMNS and len(rows) == count
-    inside = [f.t[f.t < 0.01 * (steps - 1)] for f, steps in zip(quiet.frames, quiet.steps, strict=True)]
+    assert tuple(rows[0]) == COLUMNS
+    assert len(rows) == count
+    inside = [
+        f.t[f.t < 0.01 * (steps - 1)] for f, steps in zip(quiet.frames, quiet.steps, strict=True)
+    ]
     assert count == sum(map(len, inside))
     middle = [r for r in rows if r["trial"] == "synthetic_00" and 2.5 < float(r["time"]) < 3.5]
     for row in middle:
@@ -188,7 +215,9 @@ def test_stroke_mean_of_a_circle_and_of_a_swing() -> None:
 def circling(speed: float, rate: float, duration: float = 8.0) -> Experiment:
     """One trial that turns steadily without strokes."""
     steps, t = round(duration / 0.01), np.arange(0.0, duration - 0.01, 1 / 30)
-    pose = np.column_stack([speed / rate * np.sin(rate * t), speed / rate * (1 - np.cos(rate * t)), rate * t])
+    pose = np.column_stack(
+        [speed / rate * np.sin(rate * t), speed / rate * (1 - np.cos(rate * t)), rate * t]
+    )
     commands = np.zeros((steps, 1, 2))
     nothing = np.full((steps, 1), np.nan)
     accel = np.full((steps, 1, 2), np.nan)
@@ -213,8 +242,11 @@ def test_headings_of_the_table_are_wrapped(tmp_path) -> None:
     write_predictions(tmp_path / "table.csv", predict(experiment, ROBOT, Noise(), 2.0))
     with (tmp_path / "table.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    headings = np.array([[float(row["measured_heading"]), float(row["predicted_heading"])] for row in rows])
-    assert headings.min() < -2.0 and np.abs(headings).max() <= np.pi
+    headings = np.array(
+        [[float(row["measured_heading"]), float(row["predicted_heading"])] for row in rows]
+    )
+    assert headings.min() < -2.0
+    assert np.abs(headings).max() <= np.pi
     expected = 0.5 * np.array([float(row["time"]) for row in rows])
     np.testing.assert_allclose(headings[:, 0], np.angle(np.exp(1j * expected)), atol=1e-6)
 
@@ -225,10 +257,14 @@ def test_a_baseline_with_a_lead_knows_nothing_of_what_comes() -> None:
         experiment, ROBOT, replace(Noise(), wrench=(1.0, 1.0, 0.1), gate_camera=1e9), 2.0, 1.0, 2.0
     )
     frames = experiment.frames[0]
-    pose = np.where((frames.t > 2.0)[:, None], 9.0, frames.pose)  # the first prediction starts at 2 s
+    pose = np.where(
+        (frames.t > 2.0)[:, None], 9.0, frames.pose
+    )  # the first prediction starts at 2 s
     other = replace(
         like,
-        estimates=replace(like.estimates, experiment=replace(experiment, frames=(Frames(frames.t, pose),))),
+        estimates=replace(
+            like.estimates, experiment=replace(experiment, frames=(Frames(frames.t, pose),))
+        ),
     )
     first = [predict_baseline(constant(), p, HALF_WINDOW).pose[:, 0] for p in (like, other)]
     np.testing.assert_array_equal(*first)
@@ -240,10 +276,12 @@ def test_a_state_that_knows_a_little_of_what_comes_is_better() -> None:
     commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps")], axis=1)
     experiment, truth = record(ROBOT, commands, Noise(), random)
     past, more = (predict(experiment, ROBOT, Noise(), 1.0, 0.5, 2.0, ahead) for ahead in (0.0, 0.5))
-    error = [np.mean(np.abs(p.pose[0] - truth.state[p.start, p.trial, :3]), axis=0) for p in (past, more)]
+    error = [
+        np.mean(np.abs(p.pose[0] - truth.state[p.start, p.trial, :3]), axis=0) for p in (past, more)
+    ]
     assert np.all(error[1] < [0.8, 0.8, 0.95] * error[0])
 
 
 def test_baselines_need_some_data() -> None:
-    with pytest.raises(ValueError, match="too short|no training trial|without a gap"):
+    with pytest.raises(ValueError, match=r"too short|no training trial|without a gap"):
         fit_baselines(circling(0.2, 0.5, 0.6))

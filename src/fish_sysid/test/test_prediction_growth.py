@@ -18,7 +18,9 @@ def test_where_nothing_is_added_the_better_optimum_that_a_candidate_led_to_is_ke
     def model(objective):
         hypothesis = SimpleNamespace(names=())
         return SimpleNamespace(
-            objective=objective, hypothesis=hypothesis, result=SimpleNamespace(samples=np.array([1000.0]))
+            objective=objective,
+            hypothesis=hypothesis,
+            result=SimpleNamespace(samples=np.array([1000.0])),
         )
 
     poor, better = model(0.0), model(4900.0)
@@ -27,7 +29,9 @@ def test_where_nothing_is_added_the_better_optimum_that_a_candidate_led_to_is_ke
     base, rounds, accepted = prediction_growth.grow(
         poor, Trials(None, None, ()), ("current",), Level(), lambda _: None
     )
-    assert base is better and len(rounds) == 1 and not accepted
+    assert base is better
+    assert len(rounds) == 1
+    assert not accepted
 
 
 @pytest.mark.parametrize(
@@ -44,17 +48,23 @@ def test_a_name_that_foretells_as_well_as_the_law_of_what_is_left_takes_its_plac
     monkeypatch, law, wave_drag, promised, named
 ):
     """A hump of drag at a speed hardly reached had gained 28 nats on the searched trials, of 34 that were asked."""
-    fits = {name: SimpleNamespace(name=name, objective=28.0) for name in ("quadratic_drag", "wave_drag")}
+    fits = {
+        name: SimpleNamespace(name=name, objective=28.0) for name in ("quadratic_drag", "wave_drag")
+    }
     base = SimpleNamespace(name="base")
     foretold = {"quadratic_drag": wave_drag - 2.0, "wave_drag": wave_drag}
     monkeypatch.setattr(prediction_growth, "on_all", lambda fit, _: fit)
     monkeypatch.setattr(prediction_growth, "strength_z", lambda *_: 8.0)
     monkeypatch.setattr(prediction_growth, "evidence", lambda fit: foretold[fit.name])
     left = Description({"surge": law, "sway": 0.0, "yaw": 1.0}, {}, 1e4)
-    monkeypatch.setattr(prediction_growth, "gain_left_out", lambda base, fit: (foretold[fit.name], promised))
+    monkeypatch.setattr(
+        prediction_growth, "gain_left_out", lambda base, fit: (foretold[fit.name], promised)
+    )
     found = Round(base, tuple(range(30)), fits)
     told: list[str] = []
-    accepted = prediction_growth.instead_of_a_law(found, left, Trials(None, None, (0,)), Level(), told.append)
+    accepted = prediction_growth.instead_of_a_law(
+        found, left, Trials(None, None, (0,)), Level(), told.append
+    )
     assert [a.name for a in accepted] == named
     assert all(a.foretold == wave_drag and a.contest == fits for a in accepted)
     assert [line.split()[1] for line in told] == named
@@ -65,7 +75,10 @@ def test_where_nothing_was_refitted_the_law_stays(monkeypatch):
     monkeypatch.setattr(
         prediction_growth, "on_all", lambda *_: pytest.fail("nothing to compare the law with")
     )
-    left, nothing = Description({"surge": 34.0, "sway": 0.0, "yaw": 1.0}, {}, 1e4), Round(None, (), {})
+    left, nothing = (
+        Description({"surge": 34.0, "sway": 0.0, "yaw": 1.0}, {}, 1e4),
+        Round(None, (), {}),
+    )
     assert not prediction_growth.instead_of_a_law(
         nothing, left, Trials(None, None, (0,)), Level(), lambda _: None
     )

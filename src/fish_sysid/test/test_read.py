@@ -16,7 +16,9 @@ def test_what_cannot_be_read_is_left_out_and_said(tmp_path):
     broken.write_bytes(broken.read_bytes()[: broken.stat().st_size // 2])
     experiment, left_out = read_experiment(tmp_path)
     assert experiment.names == ("a", "b")
-    assert len(left_out) == 1 and "c left out" in left_out[0] and "recover" in left_out[0]
+    assert len(left_out) == 1
+    assert "c left out" in left_out[0]
+    assert "recover" in left_out[0]
 
 
 def test_recordings_of_a_laboratory_with_its_own_names(tmp_path, capsys):
@@ -26,10 +28,15 @@ def test_recordings_of_a_laboratory_with_its_own_names(tmp_path, capsys):
     samples.write_mcap(tmp_path / "theirs" / "a", messages)
     names = tmp_path / "topics.yaml"
     names.write_text("topics: {camera: {topic: /tracking/head}, commands: {topic: motors}}\n")
-    for folder, options in (("ours", []), ("theirs", ["--topics", str(names), "--namespace", "/fish"])):
+    for folder, options in (
+        ("ours", []),
+        ("theirs", ["--topics", str(names), "--namespace", "/fish"]),
+    ):
         out = ["--out", str(tmp_path / folder / "robot"), "--hold-out", "0"]
         assert command.main(["identify", str(tmp_path / folder), *out, *options]) == 0
-    fits = [(tmp_path / folder / "robot" / "robot.yaml").read_text() for folder in ("ours", "theirs")]
+    fits = [
+        (tmp_path / folder / "robot" / "robot.yaml").read_text() for folder in ("ours", "theirs")
+    ]
     assert fits[0] == fits[1]
     assert command.main(["diagnose", str(tmp_path / "theirs"), "--out", str(tmp_path / "out")]) == 1
     assert "no trial can be used" in capsys.readouterr().err
@@ -39,14 +46,16 @@ def test_two_robots_are_refused_also_from_two_folders(tmp_path):
     for robot in ("pike", "trout"):
         messages = samples.robot_messages()
         samples.write_mcap(tmp_path / robot / "a", messages, {"robot": robot})
-    with pytest.raises(UserError, match="trials differ in robot .*pike.*trout.*; expected one robot"):
+    with pytest.raises(
+        UserError, match=r"trials differ in robot .*pike.*trout.*; expected one robot"
+    ):
         read_experiment(tmp_path / "pike", tmp_path / "trout")
 
 
 def test_a_set_without_a_usable_trial_says_why(tmp_path):
     messages = [m for m in samples.robot_messages() if m[1] != "/fish/camera/pose"]
     samples.write_mcap(tmp_path / "a", messages)
-    with pytest.raises(UserError, match="no trial can be used: .*camera"):
+    with pytest.raises(UserError, match=r"no trial can be used: .*camera"):
         read_experiment(tmp_path)
 
 
@@ -73,7 +82,9 @@ def test_an_imu_without_an_orientation_still_measures(tmp_path):
 
     messages = samples.robot_messages()
     samples.write_mcap(tmp_path / "known" / "a", messages)
-    samples.write_mcap(tmp_path / "half" / "a", samples.changed(messages, "/fish/imu/data", unknown))
+    samples.write_mcap(
+        tmp_path / "half" / "a", samples.changed(messages, "/fish/imu/data", unknown)
+    )
     known, half = (read_experiment(tmp_path / name)[0] for name in ("known", "half"))
     assert np.isfinite(half.gyro).sum() == np.isfinite(known.gyro).sum() > 100
     np.testing.assert_allclose(half.gyro, known.gyro, atol=1e-12)

@@ -46,7 +46,8 @@ def test_noise_stays_white_enough() -> None:
 def test_nothing_is_made_up_in_a_gap_or_beyond_the_ends() -> None:
     t = np.concatenate([np.arange(1.003, 4.0, DT), np.arange(6.003, 9.0, DT)])
     seen = GRID[np.isfinite(on_grid(t, strokes(t), GRID, DT))]
-    assert seen.min() == pytest.approx(1.01) and seen.max() == pytest.approx(8.99)
+    assert seen.min() == pytest.approx(1.01)
+    assert seen.max() == pytest.approx(8.99)
     assert not ((seen > 4.0) & (seen < 6.0)).any()
     assert np.isnan(on_grid(np.zeros(0), np.zeros((0, 2)), GRID, DT)).all()
 
@@ -56,7 +57,9 @@ def test_stamps_close_together_or_twice_throw_nothing_off() -> None:
     noisy = strokes(t) + 0.05 * np.random.default_rng(3).standard_normal(len(t))
     found = on_grid(t, noisy, GRID, DT)
     assert np.nanmax(np.abs(found - strokes(GRID))) < 0.3
-    assert np.isnan(on_grid(np.array([0.502]), np.array([7.0]), GRID, DT)).all()  # one sample has no slope
+    assert np.isnan(
+        on_grid(np.array([0.502]), np.array([7.0]), GRID, DT)
+    ).all()  # one sample has no slope
 
 
 def test_faster_samples_than_the_grids_are_thinned_and_others_all_kept() -> None:
@@ -70,5 +73,7 @@ def test_faster_samples_than_the_grids_are_thinned_and_others_all_kept() -> None
         kept = t[apart(t, DT)]
         assert np.diff(kept).min() > 0.95 * DT - 1e-12
         slots = np.maximum.accumulate(kept - DT * np.arange(len(kept))) + DT * np.arange(len(kept))
-        assert (slots - kept).max() <= 0.05 * DT + 1e-12  # a grid point each, wherever the grid begins
+        assert (
+            slots - kept
+        ).max() <= 0.05 * DT + 1e-12  # a grid point each, wherever the grid begins
     assert len(apart(np.zeros(0), DT)) == 0

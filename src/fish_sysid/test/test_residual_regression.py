@@ -22,7 +22,9 @@ MOMENT = 1e-3  # N m, of a magnet that turns the fish to the side
 def left_by_the_nominal_model(**hidden: float):
     """The law that the true nominal parameters leave of a fish with these coefficients of a free force."""
     random = np.random.default_rng(4)
-    commands = np.stack([program(k, 6.0, random) for k in ("sines", "steps", "random", "sines")], axis=1)
+    commands = np.stack(
+        [program(k, 6.0, random) for k in ("sines", "steps", "random", "sines")], axis=1
+    )
     with known_to_the_filter() as name:
         robot = Robot().with_effect(name, **hidden) if hidden else Robot()
         fish = record(robot, commands, Noise(), random)[0]
@@ -34,7 +36,8 @@ def left_by_the_nominal_model(**hidden: float):
 def test_a_hidden_law_is_read_off_with_its_coefficient_on_its_degree_of_freedom():
     law = left_by_the_nominal_model(**{f"yaw_{TERMS.index('cos(heading)')}": MOMENT})
     assert law.terms["yaw"]["cos(heading)"] == pytest.approx(MOMENT, rel=0.15)
-    assert max(law.gain, key=lambda dof: law.gain[dof]) == "yaw" and law.gain["yaw"] > 100.0
+    assert max(law.gain, key=lambda dof: law.gain[dof]) == "yaw"
+    assert law.gain["yaw"] > 100.0
 
 
 def test_water_alone_follows_no_law():
@@ -63,7 +66,9 @@ def test_a_term_that_gains_no_more_than_chance_is_not_chosen():
 @pytest.mark.parametrize(
     ("pulls", "gain"), [((1, 1, 1, 1), 4 * 50.0), ((1, 1, 1, -1), 3 * 250.0 / 9.0 - 150.0)]
 )
-def test_a_law_is_judged_on_the_trial_it_was_not_chosen_on(pulls: tuple[int, ...], gain: float) -> None:
+def test_a_law_is_judged_on_the_trial_it_was_not_chosen_on(
+    pulls: tuple[int, ...], gain: float
+) -> None:
     """Four trials of normal matrix 1, a term pulled by 10 each: steps of 10, or of 10 / 3 where one of three pulls back."""
     gradients = -10.0 * np.column_stack([np.zeros(4), pulls])
     normals = np.tile(np.eye(2), (4, 1, 1))
@@ -78,7 +83,9 @@ def test_terms_that_nothing_tells_apart_do_no_harm():
     cost = Quadratic(100.0 * np.array([0.1, 1.0, 1.0, 0.0]), normal, 1)
     chosen = forward(cost, (1, 2, 3))
     assert 3 not in chosen  # never excited
-    assert cost.cost(cost.best_step(chosen)) == pytest.approx(cost.cost(cost.best_step([1])), rel=1e-6)
+    assert cost.cost(cost.best_step(chosen)) == pytest.approx(
+        cost.cost(cost.best_step([1])), rel=1e-6
+    )
 
 
 @pytest.mark.parametrize(("x", "y"), [(LENGTH / 2 - 0.2, 0.0), (0.0, 0.2 - WIDTH / 2)])
@@ -86,8 +93,10 @@ def test_a_wall_is_felt_less_by_a_factor_e_two_decimetres_away(x, y):
     body = BodyMotion("head", x, y, 0.6, 0.8, 0.2, -0.1, 0.5, 0.0, 0.0, 0.0)
     terms = regressors(body, 3.0, Drive(-0.4, 0.0, 20.0, 0.0), NUMPY)
     assert terms["surge_speed exp(-wall_distance/0.2 m)"] == pytest.approx(0.2 / np.e)
-    assert terms["rudder |rudder|"] == pytest.approx(-0.16) and terms["time yaw_rate"] == 1.5
-    assert terms["cos(heading)"] == 0.6 and terms["surge_speed rudder"] == pytest.approx(-0.08)
+    assert terms["rudder |rudder|"] == pytest.approx(-0.16)
+    assert terms["time yaw_rate"] == 1.5
+    assert terms["cos(heading)"] == 0.6
+    assert terms["surge_speed rudder"] == pytest.approx(-0.08)
 
 
 def test_the_free_force_is_no_candidate():

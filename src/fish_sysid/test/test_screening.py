@@ -16,11 +16,25 @@ from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 @pytest.mark.parametrize(
     ("name", "key", "hidden", "near", "look"),
-    [("sloshing", "frequency", {"sine": -0.02, "cosine": 0.01, "frequency": 0.77}, 0.8, screening.look_near),
-     ("wave_drag", "speed", {"amplitude": 0.03, "speed": 0.13, "width": 0.03}, 0.12, screening.look_afar),
-     ("rudder_saturation", "limit", {"limit": 0.11}, 0.13, screening.look_near),
-     ("rudder_saturation", "limit", {"limit": 0.11}, 0.13, screening.look_afar)],
-)  # fmt: skip
+    [
+        (
+            "sloshing",
+            "frequency",
+            {"sine": -0.02, "cosine": 0.01, "frequency": 0.77},
+            0.8,
+            screening.look_near,
+        ),
+        (
+            "wave_drag",
+            "speed",
+            {"amplitude": 0.03, "speed": 0.13, "width": 0.03},
+            0.12,
+            screening.look_afar,
+        ),
+        ("rudder_saturation", "limit", {"limit": 0.11}, 0.13, screening.look_near),
+        ("rudder_saturation", "limit", {"limit": 0.11}, 0.13, screening.look_afar),
+    ],
+)
 def test_an_effect_is_found_from_the_place_that_promises_most(name, key, hidden, near, look):
     """From the one start value that both had before, a search does not walk there."""
     random = np.random.default_rng(4)
@@ -37,9 +51,13 @@ def test_an_effect_is_found_from_the_place_that_promises_most(name, key, hidden,
 def test_a_rotor_that_is_limited_is_found_without_its_encoder(below):
     """No step leads down from a limit that no command reaches, though it is nearer to the truth than any other that is tried."""
     random = np.random.default_rng(1)
-    commands = np.stack([program(kind, 6.0, random) for kind in ("steps", "sines", "random")], axis=1)
+    commands = np.stack(
+        [program(kind, 6.0, random) for kind in ("steps", "sines", "random")], axis=1
+    )
     limit = below * np.abs(commands[..., 0]).max()
-    seen = record(Robot().with_effect("rotor_saturation", limit=limit), commands, Noise(), random)[0]
+    seen = record(Robot().with_effect("rotor_saturation", limit=limit), commands, Noise(), random)[
+        0
+    ]
     experiment = replace(seen, encoder=np.full_like(seen.encoder, np.nan))
     drags = nominal_hypothesis(Robot(), ("head_drag_surge", "head_drag_sway"))
     base = settle(evaluate(drags, np.zeros(2), experiment, Noise()), experiment)
@@ -51,7 +69,9 @@ def test_a_rotor_that_is_limited_is_found_without_its_encoder(below):
 def test_a_hump_of_drag_is_not_lost_while_it_is_weak(look):
     """A step of its speed and width, which seem free while it is weak, leads a weak hump to where the fish never swims."""
     random = np.random.default_rng(9)
-    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "straight", "random")], axis=1)
+    commands = np.stack(
+        [program(kind, 8.0, random) for kind in ("sines", "straight", "random")], axis=1
+    )
     place = {"speed": 0.145, "width": 0.035}
     hump = Robot().with_effect("wave_drag", amplitude=0.02, **place)
     experiment = record(hump, commands, Noise(), random)[0]
@@ -66,7 +86,9 @@ def test_a_hump_of_drag_is_not_lost_while_it_is_weak(look):
 def test_images_half_a_second_old_are_found():
     """A stroke is half a second: the heading fits again without a delay."""
     random = np.random.default_rng(6)
-    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1)
+    commands = np.stack(
+        [program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1
+    )
     experiment = record(Robot(), commands, Noise(), random)[0]
     late = replace(experiment, frames=tuple(replace(f, t=f.t + 0.47) for f in experiment.frames))
     drags = nominal_hypothesis(Robot(), ("head_drag_surge", "head_drag_yaw", "fin_drag_sway"))
@@ -78,7 +100,9 @@ def test_images_half_a_second_old_are_found():
 def test_an_effect_far_weaker_than_typical_is_found_where_little_is_left():
     """From a typical strength, which the data refuse by tens of thousands of nats, no step leads back to a weak one."""
     random = np.random.default_rng(8)
-    commands = np.stack([program(kind, 12.0, random) for kind in ("sines", "steps", "random")], axis=1)
+    commands = np.stack(
+        [program(kind, 12.0, random) for kind in ("sines", "steps", "random")], axis=1
+    )
     weak = Robot().with_effect("tail_hardening", k3=0.036)
     experiment = record(weak, commands, Noise(), random)[0]
     free = nominal_hypothesis(Robot(), ("tail_stiffness", "fin_drag_sway"))
@@ -100,10 +124,13 @@ def test_beside_an_effect_of_many_numbers_these_move_at_the_end_only(monkeypatch
     base = settle(evaluate(flow, np.zeros(len(flow.free)), experiment, Noise()), experiment)
     held = screening.holding(base, experiment)
     assert held.hypothesis.free == drags.free
-    assert held.objective == pytest.approx(base.objective, abs=100.0) and held.robot == base.robot
+    assert held.objective == pytest.approx(base.objective, abs=100.0)
+    assert held.robot == base.robot
     first = screening.rank(base, ["rudder_offset"], experiment, lambda _: None)[0]
     monkeypatch.setattr(screening, "MANY", 100)
     assert screening.holding(base, experiment) is base
     slow = screening.rank(base, ["rudder_offset"], experiment, lambda _: None)[0]
-    assert first.gain == pytest.approx(slow.gain, rel=0.05) and first.gain > 50.0
-    assert len(first.theta) == len(slow.theta) and first.theta[-1] == pytest.approx(slow.theta[-1], rel=0.05)
+    assert first.gain == pytest.approx(slow.gain, rel=0.05)
+    assert first.gain > 50.0
+    assert len(first.theta) == len(slow.theta)
+    assert first.theta[-1] == pytest.approx(slow.theta[-1], rel=0.05)

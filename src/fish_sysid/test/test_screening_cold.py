@@ -20,9 +20,15 @@ NAMES = ("rudder_gain", "rudder_delay", "rudder_lag", "current", "tail_hardening
 def late():
     """A rudder that is late, and a base that makes up for it with wrong parameters and a strong force."""
     random = np.random.default_rng(3)
-    commands = np.stack([program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1)
-    experiment = record(Robot().with_effect("rudder_delay", delay=0.09), commands, Noise(), random)[0]
-    hypothesis = nominal_hypothesis(Robot(), ("head_added_mass_sway", "link_drag_sway", "tail_stiffness"))
+    commands = np.stack(
+        [program(kind, 8.0, random) for kind in ("sines", "steps", "random")], axis=1
+    )
+    experiment = record(Robot().with_effect("rudder_delay", delay=0.09), commands, Noise(), random)[
+        0
+    ]
+    hypothesis = nominal_hypothesis(
+        Robot(), ("head_added_mass_sway", "link_drag_sway", "tail_stiffness")
+    )
     strong = replace(Noise(), wrench=tuple(10.0 * w for w in Noise().wrench))
     base = evaluate(hypothesis, np.array([2.0, 1.5, 1.0]), experiment, strong)
     assert excess(base).max() > TOO_STRONG
@@ -33,12 +39,18 @@ def test_the_right_name_is_far_ahead_and_its_size_known(late):
     base, experiment = late
     said = []
     ranked = screening_cold.rank_afar(base, NAMES, experiment, said.append)
-    assert ranked[0].name == "rudder_delay" and ranked[0].gain > 1.5 * max(1000.0, ranked[1].gain)
+    assert ranked[0].name == "rudder_delay"
+    assert ranked[0].gain > 1.5 * max(1000.0, ranked[1].gain)
     fit = evaluate(
-        base.hypothesis.with_effect("rudder_delay", screening.SCALE), ranked[0].theta, experiment, Noise()
+        base.hypothesis.with_effect("rudder_delay", screening.SCALE),
+        ranked[0].theta,
+        experiment,
+        Noise(),
     )
     assert fit.values["rudder_delay.delay"] == pytest.approx(0.09, abs=0.005)
-    assert fit.values["tail_stiffness"] == pytest.approx(Robot().parameters["tail_stiffness"], rel=0.2)
+    assert fit.values["tail_stiffness"] == pytest.approx(
+        Robot().parameters["tail_stiffness"], rel=0.2
+    )
     assert {r.name for r in ranked} == set(NAMES)
     assert any(text == f"ranking current (4 of {len(NAMES)})" for text in said)
 

@@ -26,7 +26,9 @@ KINDS = ("sines", "random", "steps", "turn")
 
 def recorded(robot: Robot, seed: int) -> Experiment:
     random = np.random.default_rng(seed)
-    return record(robot, np.stack([program(k, 9.0, random) for k in KINDS], axis=1), WATER, random)[0]
+    return record(robot, np.stack([program(k, 9.0, random) for k in KINDS], axis=1), WATER, random)[
+        0
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +52,8 @@ def test_what_helps_is_taken_and_unseen_trials_are_foretold(slipping: Experiment
     """Of three effects, one is true; `current` is neutral here, and a sensor's error predicts no motion."""
     start, said = nominal(slipping), []
     found = stand_in(start, ("current", "camera_scale", "tip_slip"), slipping, said.append)
-    assert "tip_slip" in found.hypothesis.names and "camera_scale" not in found.hypothesis.names
+    assert "tip_slip" in found.hypothesis.names
+    assert "camera_scale" not in found.hypothesis.names
     assert found.values["tip_slip.mobility"] == pytest.approx(0.3, rel=0.15)
     assert found.values["head_drag_surge"] == pytest.approx(0.26, rel=0.1)
     unseen = recorded(SLIPPING, 5)
@@ -67,11 +70,19 @@ def test_what_predictions_call_for_most_is_tried_without_being_told(monkeypatch)
     told = ("camera_scale", "rudder_lag", "current")
     found = stand_in(nominal(drifting), ("tip_slip",), drifting, lambda _: None, told)
     assert {"current", "tip_slip"} <= set(found.hypothesis.names)
-    assert [found.values[f"current.{axis}"] for axis in "xy"] == pytest.approx([0.03, -0.02], abs=0.004)
+    assert [found.values[f"current.{axis}"] for axis in "xy"] == pytest.approx(
+        [0.03, -0.02], abs=0.004
+    )
 
 
 def test_what_promises_nothing_is_not_called_for(monkeypatch, slipping: Experiment) -> None:
-    promised = {"rotor_lag": 99.0, "current": 101.0, "tether": 96.0, "wave_drag": 97.5, "rudder_lag": 98.0}
+    promised = {
+        "rotor_lag": 99.0,
+        "current": 101.0,
+        "tether": 96.0,
+        "wave_drag": 97.5,
+        "rudder_lag": 98.0,
+    }
 
     class Promising:
         def __init__(self, experiment, hypothesis, every) -> None:
@@ -88,11 +99,13 @@ def test_what_promises_nothing_is_not_called_for(monkeypatch, slipping: Experime
     best = module._Tried(hypothesis, np.zeros(len(FREE)), 100.0)
     asked = lambda *names: module._called_for(best, names, WATER, slipping)  # noqa: E731
     # a fall of 4 by four parameters, of 2.5 by three, of 2 and of 1 by one each
-    assert asked(*promised) == ["rudder_lag", "rotor_lag"] and asked("tether", "wave_drag") == [
+    assert asked(*promised) == ["rudder_lag", "rotor_lag"]
+    assert asked("tether", "wave_drag") == [
         "tether",
         "wave_drag",
     ]
-    assert asked("current") == [] and asked() == []
+    assert asked("current") == []
+    assert asked() == []
 
 
 def test_a_model_that_lacks_nothing_gets_nothing_much(slipping: Experiment) -> None:
@@ -116,7 +129,9 @@ def test_an_effect_with_which_nothing_is_foretold_better_is_not_tried_on_trials_
 
     monkeypatch.setattr(module, "_fitted", fitted)
     monkeypatch.setattr(module, "_foretells_better", lambda *_: pytest.fail("tried"))
-    assert stand_in(nominal(slipping), ("tip_slip",), slipping, lambda _: None).hypothesis.names == ()
+    assert (
+        stand_in(nominal(slipping), ("tip_slip",), slipping, lambda _: None).hypothesis.names == ()
+    )
 
 
 def test_a_fit_that_predicts_better_than_what_was_grown_stays(
@@ -126,7 +141,8 @@ def test_a_fit_that_predicts_better_than_what_was_grown_stays(
     good = evaluate(hypothesis, np.zeros(len(FREE)), slipping, WATER)
     bad = module._Tried(hypothesis, np.full(len(FREE), 1.0), 0.0)
     kept = module._best_of(bad, (nominal(slipping), good), slipping)
-    assert (kept.theta == 0.0).all() and kept.hypothesis.names == ("tip_slip",)
+    assert (kept.theta == 0.0).all()
+    assert kept.hypothesis.names == ("tip_slip",)
     kept = module._best_of(
         module._Tried(hypothesis, np.zeros(len(FREE)), 0.0), (nominal(slipping),), slipping
     )
@@ -148,7 +164,9 @@ def test_trials_too_short_to_predict_leave_the_fit_as_it_is(slipping: Experiment
     assert stand_in(start, ("tip_slip",), short, lambda _: None) is start
 
 
-def test_left_out_trials_are_foretold_by_parameters_that_have_not_seen_them(slipping: Experiment) -> None:
+def test_left_out_trials_are_foretold_by_parameters_that_have_not_seen_them(
+    slipping: Experiment,
+) -> None:
     fitted, judged = [], []
 
     class Watched(Unpushed):

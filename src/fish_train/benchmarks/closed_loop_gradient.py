@@ -18,24 +18,34 @@ from types import SimpleNamespace
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
-os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
+os.environ.setdefault(
+    "XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+)
 
-import jax  # noqa: E402
-import jax.numpy as jnp  # noqa: E402
-import numpy as np  # noqa: E402
+import jax
+import jax.numpy as jnp
+import numpy as np
 
-from fish_control.path_batch import LOOKAHEAD_SEARCH  # noqa: E402
-from fish_control.paths import make_path  # noqa: E402
-from fish_sim.dynamics import SLIP_DECAY  # noqa: E402
-from fish_sim.model import DT  # noqa: E402
-from fish_sim.robot import Robot  # noqa: E402
-from fish_sim.scheme import Scheme  # noqa: E402
-from fish_sim.step import Stepper  # noqa: E402
-from fish_train.training.batch_state import Fleet  # noqa: E402
-from fish_train.training.closed_loop_equations import PHYSICS_STEPS, SIZES, Law, act, drive, motion, sense  # noqa: E402
-from fish_train.training.compiled_loop import CompiledLoop  # noqa: E402
-from fish_train.training.network import initial_weights, split  # noqa: E402
-from fish_train.training.path_bank import PathBank  # noqa: E402
+from fish_control.path_batch import LOOKAHEAD_SEARCH
+from fish_control.paths import make_path
+from fish_sim.dynamics import SLIP_DECAY
+from fish_sim.model import DT
+from fish_sim.robot import Robot
+from fish_sim.scheme import Scheme
+from fish_sim.step import Stepper
+from fish_train.training.batch_state import Fleet
+from fish_train.training.closed_loop_equations import (
+    PHYSICS_STEPS,
+    SIZES,
+    Law,
+    act,
+    drive,
+    motion,
+    sense,
+)
+from fish_train.training.compiled_loop import CompiledLoop
+from fish_train.training.network import initial_weights, split
+from fish_train.training.path_bank import PathBank
 
 STEPS = 15
 COST = np.array([1.0, 10.0, 10.0, 0.1, 0.01, 0.1])
@@ -47,16 +57,35 @@ ANGLES = np.array([2, 3, 4, 5, 5])  # of head, links, fin among the coordinates
 LENGTH = np.array([0, 1, 1, 1, 2])  # which length reaches back along each angle
 DIRECTION = np.array([0, 1, 2, 3, 4, 4])  # angle of each body, and of the tip
 TURN = np.array([2, 3, 4, 5, 5])  # coordinate that turns each body
-ARM = np.array([  # of body centres and tip, in lengths along each angle
-    [0, 0, 0, 0, 0], [1, 0.5, 0, 0, 0], [1, 1, 0.5, 0, 0], [1, 1, 1, 0.5, 0], [1, 1, 1, 1, 0.5], [1, 1, 1, 1, 1],
-])  # fmt: skip
+ARM = np.array(
+    [  # of body centres and tip, in lengths along each angle
+        [0, 0, 0, 0, 0],
+        [1, 0.5, 0, 0, 0],
+        [1, 1, 0.5, 0, 0],
+        [1, 1, 1, 0.5, 0],
+        [1, 1, 1, 1, 0.5],
+        [1, 1, 1, 1, 1],
+    ]
+)
 XP = SimpleNamespace(
-    sin=jnp.sin, cos=jnp.cos, exp=jnp.exp, sqrt=jnp.sqrt, tanh=jnp.tanh, fabs=jnp.abs, sign=jnp.sign,
-    floor=jnp.floor, fmin=jnp.minimum, fmax=jnp.maximum, arctan2=jnp.arctan2, where=jnp.where,
-)  # fmt: skip
+    sin=jnp.sin,
+    cos=jnp.cos,
+    exp=jnp.exp,
+    sqrt=jnp.sqrt,
+    tanh=jnp.tanh,
+    fabs=jnp.abs,
+    sign=jnp.sign,
+    floor=jnp.floor,
+    fmin=jnp.minimum,
+    fmax=jnp.maximum,
+    arctan2=jnp.arctan2,
+    where=jnp.where,
+)
 
 
-def motion_rates(x: jax.Array, drive: jax.Array, drive_rate: jax.Array, p: dict[str, jax.Array]) -> jax.Array:
+def motion_rates(
+    x: jax.Array, drive: jax.Array, drive_rate: jax.Array, p: dict[str, jax.Array]
+) -> jax.Array:
     """Time derivative of (q, q') (12, B) of the nominal fish with three links: fish_sim.dynamics on arrays.
 
     Rows of bodies: head, links 1 to 3, fin, and the tip; columns of angles: head, links, fin.
@@ -64,7 +93,9 @@ def motion_rates(x: jax.Array, drive: jax.Array, drive_rate: jax.Array, p: dict[
     q, qd = x[:COORDINATES], x[COORDINATES:]
     angle, rate = q[ANGLES], qd[ANGLES]
     cos, sin = jnp.cos(angle), jnp.sin(angle)
-    lengths = jnp.stack([p["hinge_offset"], p["link_length"], p["fin_length"]])[LENGTH]  # (5 angles, B)
+    lengths = jnp.stack([p["hinge_offset"], p["link_length"], p["fin_length"]])[
+        LENGTH
+    ]  # (5 angles, B)
     arm = -ARM[..., None] * lengths  # (6, 5, B)
     jx, jy = -arm * sin, arm * cos
     J = []
@@ -84,11 +115,20 @@ def motion_rates(x: jax.Array, drive: jax.Array, drive_rate: jax.Array, p: dict[
     N = -skew * u[body] * v[body] + c_w * w
     bend = jnp.diff(q[2:], axis=0).at[0].add(drive[0]) * p["tail_stiffness"]
     h = (along[body] * X[:, None] + left[body] * Y[:, None]).sum(axis=0)
-    h = h.at[TURN].add(N).at[3:].add(bend).at[2:5].add(-bend).at[2].add(p["rotor_inertia"] * drive_rate[1])
-    mu, mv = (mass + surge)[:, None, None], (mass + sway)[:, None, None]
-    M = (mu * along[body, :, None] * along[body, None] + mv * left[body, :, None] * left[body, None]).sum(
-        axis=0
+    h = (
+        h.at[TURN]
+        .add(N)
+        .at[3:]
+        .add(bend)
+        .at[2:5]
+        .add(-bend)
+        .at[2]
+        .add(p["rotor_inertia"] * drive_rate[1])
     )
+    mu, mv = (mass + surge)[:, None, None], (mass + sway)[:, None, None]
+    M = (
+        mu * along[body, :, None] * along[body, None] + mv * left[body, :, None] * left[body, None]
+    ).sum(axis=0)
     M = M.at[TURN, TURN].add(inertia)
     free, response = _solve(M, jnp.stack([-h, left[5]], axis=1))
     slip, course = v[5], u[5]
@@ -171,7 +211,9 @@ class JaxLoop:
         ahead = self._rows_at(path, progress[:, None] + ds[:, None] * self._far)[..., :2]
         distance = jnp.sqrt((ahead[..., 0] - x[:, None]) ** 2 + (ahead[..., 1] - y[:, None]) ** 2)
         leaves = distance >= self._law.tracker.lookahead
-        first = jnp.where(leaves.any(axis=1), jnp.argmax(leaves, axis=1), jnp.argmax(distance, axis=1))
+        first = jnp.where(
+            leaves.any(axis=1), jnp.argmax(leaves, axis=1), jnp.argmax(distance, axis=1)
+        )
         a, b = ahead[each, jnp.maximum(first - 1, 0)], ahead[each, first]
         shift = base - jnp.rint(progress / ds) * ds
         geometry = [bx, by, heading, lowest, highest, *now.T, shift, *a.T, *b.T]
@@ -218,7 +260,10 @@ class JaxLoop:
         self, flat: jax.Array, carry: dict, path: jax.Array, speed: jax.Array, p: jax.Array
     ) -> jax.Array:
         """Mean stage cost of the window."""
-        weights, parameters = split(flat), dict(zip(self._stepper.layout.parameters, p.T, strict=True))
+        weights, parameters = (
+            split(flat),
+            dict(zip(self._stepper.layout.parameters, p.T, strict=True)),
+        )
         stack = lambda values: jnp.stack(jnp.broadcast_arrays(*values))  # noqa: E731
 
         def period(carry: dict, _: None) -> tuple[dict, jax.Array]:
@@ -231,15 +276,23 @@ class JaxLoop:
             acted = act(sensed["errors"], *rows, COST, self._law, XP)
 
             def physics(moving: tuple, _: None) -> tuple[tuple, jax.Array]:
-                actuator, command = drive(list(moving[1]), acted["last"][SIZES["gains"] :], self._law, XP)
+                actuator, command = drive(
+                    list(moving[1]), acted["last"][SIZES["gains"] :], self._law, XP
+                )
                 plant = self._physics(moving[0], stack(command), parameters)
                 return (plant, stack(actuator)), stack(self._motion(plant))
 
             start = (carry["plant"], carry["actuator"])
             (plant, actuator), motions = jax.lax.scan(physics, start, length=PHYSICS_STEPS)
-            after = {"plant": plant, "before": motions[-2], "progress": place[0], "captured": place[1]}
+            after = {
+                "plant": plant,
+                "before": motions[-2],
+                "progress": place[0],
+                "captured": place[1],
+            }
             after |= {
-                k: stack(v) for k, v in (("guidance", sensed["guidance"]), ("control", acted["control"]))
+                k: stack(v)
+                for k, v in (("guidance", sensed["guidance"]), ("control", acted["control"]))
             }
             after |= {"actuator": actuator, "last": stack(acted["last"])}
             return after, sensed["cost"][0].sum() * carry["counts"] + acted["cost"][0].sum()
@@ -269,13 +322,22 @@ def carry_of(fleet: Fleet) -> dict:
     """The fleet's state as JaxLoop carries it: rows are quantities, columns fish."""
     cuts = np.cumsum([SIZES[k] for k in ("guidance", "control", "actuator")])
     parts = dict(
-        zip(("guidance", "control", "actuator", "last"), np.split(fleet.memory.T, cuts), strict=True)
+        zip(
+            ("guidance", "control", "actuator", "last"), np.split(fleet.memory.T, cuts), strict=True
+        )
     )
-    carry = {"plant": fleet.plant.T, "before": fleet.history[:, -1].T, **parts, "progress": fleet.place[:, 0]}
-    return {k: jnp.array(v) for k, v in carry.items()} | {"captured": jnp.array(fleet.place[:, 1] != 0.0)}
+    carry = {
+        "plant": fleet.plant.T,
+        "before": fleet.history[:, -1].T,
+        **parts,
+        "progress": fleet.place[:, 0],
+    }
+    return {k: jnp.array(v) for k, v in carry.items()} | {
+        "captured": jnp.array(fleet.place[:, 1] != 0.0)
+    }
 
 
-def seconds(call, budget: float) -> float:  # noqa: ANN001
+def seconds(call, budget: float) -> float:
     """Shortest time of a call in `budget` seconds: what other programs do to the machine is not measured."""
     times: list[float] = []
     while sum(times) < budget or len(times) < 5:
@@ -294,13 +356,21 @@ def main() -> None:
     jax.config.update("jax_enable_x64", True)
     law, stepper = Law(), Stepper(Robot().structure, Scheme("rk4", 1))
     bank = PathBank(
-        [make_path("circle", radius=1.0), make_path("sinusoid", amplitude=1.0, length=10.0)], law.tracker
+        [make_path("circle", radius=1.0), make_path("sinusoid", amplitude=1.0, length=10.0)],
+        law.tracker,
     )
     rng = np.random.default_rng(0)
-    start = dict(
-        steering_kp=0.5, steering_ki=0.1, steering_kd=0.1, speed_kp=1.0, speed_ki=0.05, speed_kd=0.01
+    start = {
+        "steering_kp": 0.5,
+        "steering_ki": 0.1,
+        "steering_kd": 0.1,
+        "speed_kp": 1.0,
+        "speed_ki": 0.05,
+        "speed_kd": 0.01,
+    }
+    weights = initial_weights(rng, start) + 0.02 * rng.standard_normal(
+        len(initial_weights(rng, start))
     )
-    weights = initial_weights(rng, start) + 0.02 * rng.standard_normal(len(initial_weights(rng, start)))
     ours, theirs = CompiledLoop(stepper, law, bank), JaxLoop(stepper, law, bank)
     for batch in args.batch:
         fleet = make_fleet(stepper, bank, batch, rng)
@@ -324,7 +394,9 @@ def main() -> None:
             ours.window(weights, scratch, STEPS, COST)
 
         a = seconds(kernel, args.seconds)
-        b = seconds(lambda inputs=inputs: jax.block_until_ready(theirs.gradient(*inputs)), args.seconds)
+        b = seconds(
+            lambda inputs=inputs: jax.block_until_ready(theirs.gradient(*inputs)), args.seconds
+        )
         rate = batch * STEPS
         print(
             f"B = {batch:3d}: compiled {rate / a:9.0f} env steps/s, JAX {rate / b:9.0f}, ratio {b / a:.2f} "

@@ -16,7 +16,12 @@ def both(form: str = "network"):
     law, stepper = Law(inputs=FORMS[form].inputs), make_stepper()
     bank = make_bank(law)
     layers = FORMS[form].layers
-    return CompiledLoop(stepper, law, bank, layers), TorchLoop(stepper, law, bank, layers), stepper, bank
+    return (
+        CompiledLoop(stepper, law, bank, layers),
+        TorchLoop(stepper, law, bank, layers),
+        stepper,
+        bank,
+    )
 
 
 def relative(a: np.ndarray, b: np.ndarray) -> float:
@@ -71,7 +76,9 @@ def test_gradient_agrees_with_finite_differences() -> None:
             kernel.window(weights + s * step * along, fleet.copy(), 15, COST, gradient=False).cost
             for s in (1.0, -1.0)
         ]
-        assert (costs[0] - costs[1]) / (2.0 * step) == pytest.approx(gradient @ along, rel=1e-5, abs=1e-9)
+        assert (costs[0] - costs[1]) / (2.0 * step) == pytest.approx(
+            gradient @ along, rel=1e-5, abs=1e-9
+        )
 
 
 @compiled
@@ -124,4 +131,6 @@ def test_hold_must_divide_the_window() -> None:
     bank, stepper, rng = make_bank(law), make_stepper(), np.random.default_rng(7)
     loop = TorchLoop(stepper, law, bank)
     with pytest.raises(ValueError, match="hold: got 4 for a window of 10"):
-        loop.window(make_weights("network", rng), make_fleet(stepper, bank, 1, rng), 10, COST, hold=4)
+        loop.window(
+            make_weights("network", rng), make_fleet(stepper, bank, 1, rng), 10, COST, hold=4
+        )

@@ -14,8 +14,13 @@ def test_sinusoids_and_circles_alternate_once_for_each_threshold() -> None:
     assert [level.threshold for level in levels] == [0.03] * 12 + [0.01] * 12
     assert [level.size for level in levels[1:12:2]] == [1.5, 1.4, 1.3, 1.2, 1.1, 1.0]
     assert [(level.size, level.cycles) for level in levels[0:12:2]] == [
-        (1.0, 0.5), (1.0, 1.0), (1.0, 2.0), (1.5, 0.5), (1.5, 1.0), (1.5, 2.0)
-    ]  # fmt: skip
+        (1.0, 0.5),
+        (1.0, 1.0),
+        (1.0, 2.0),
+        (1.5, 0.5),
+        (1.5, 1.0),
+        (1.5, 2.0),
+    ]
 
 
 def test_paths_of_a_level_have_its_size() -> None:

@@ -62,7 +62,9 @@ SHORT = "straight:length=0.8"
 TIME = 0.02 * np.arange(1, 501)  # s
 
 
-def straight_trace(offset, speed_error=0.0, heading=0.0, wanted: float = 0.2) -> tuple[Trace, object]:
+def straight_trace(
+    offset, speed_error=0.0, heading=0.0, wanted: float = 0.2
+) -> tuple[Trace, object]:
     """A robot on a straight path for 10 s, `offset` to its left, too slow by `speed_error`, headed off by `heading`."""
     path = make_path("straight", length=2.5)
     offset, u, heading = (np.broadcast_to(v, 500) for v in (offset, wanted - speed_error, heading))
@@ -71,9 +73,17 @@ def straight_trace(offset, speed_error=0.0, heading=0.0, wanted: float = 0.2) ->
     alpha, throttle = (0.1 * TIME)[:, None], np.linspace(0.3, 0.5, 500)[:, None]
     course, gains = np.zeros((500, 1)), np.full((500, 1, 6), 0.1)
     trace = Trace(
-        TIME, motion, offset[:, None], course, progress[:, None], alpha, throttle, gains,
-        np.array([wanted]), np.array([True]),
-    )  # fmt: skip
+        TIME,
+        motion,
+        offset[:, None],
+        course,
+        progress[:, None],
+        alpha,
+        throttle,
+        gains,
+        np.array([wanted]),
+        np.array([True]),
+    )
     return trace, path
 
 
@@ -82,7 +92,8 @@ def test_metrics_of_known_errors() -> None:
     wave = np.sin(np.pi * TIME)
     trace, path = straight_trace(0.02 * wave, 0.01 * np.roll(wave, 25), heading=-0.05)
     metrics = measure(trace, 0, path)
-    assert metrics.failure == "" and metrics.approach == pytest.approx(0.02)
+    assert metrics.failure == ""
+    assert metrics.approach == pytest.approx(0.02)
     for sizes in (metrics.settled, metrics.whole):
         assert sizes.cross_track_mean == pytest.approx(0.02 * 2.0 / np.pi, rel=0.01)
         assert sizes.cross_track_rmse == pytest.approx(0.02 / np.sqrt(2.0), rel=0.01)
@@ -101,7 +112,8 @@ def test_metrics_of_known_errors() -> None:
 def test_metrics_are_those_of_a_recorded_run(late: str, side: float) -> None:
     """What `robofish score` says of the same motion, with and without an approach that one error draws out."""
     fades = {
-        name: np.maximum((4.0 if name == late else 1.0) - TIME, 0.0) for name in ("path", "heading", "speed")
+        name: np.maximum((4.0 if name == late else 1.0) - TIME, 0.0)
+        for name in ("path", "heading", "speed")
     }
     stroke = np.sin(4.0 * np.pi * TIME)
     trace, path = straight_trace(
@@ -112,10 +124,21 @@ def test_metrics_are_those_of_a_recorded_run(late: str, side: float) -> None:
     x, y, psi, u, v, r = trace.motion[:, 0].T
     zeros = np.zeros(len(TIME), np.uint8)
     recorded = Odometry(
-        topic="t", frame_id="pool", t=TIME, t_arrival=TIME, flags=zeros, x=x, y=y, psi=psi, u=u, v=v, r=r
+        topic="t",
+        frame_id="pool",
+        t=TIME,
+        t_arrival=TIME,
+        flags=zeros,
+        x=x,
+        y=y,
+        psi=psi,
+        u=u,
+        v=v,
+        r=r,
     )
     score, metrics = score_motion(recorded, path, 0.2, 0.0, "truth"), measure(trace, 0, path)
-    assert metrics.approach == pytest.approx(score.approach_s) and metrics.approach > 2.0
+    assert metrics.approach == pytest.approx(score.approach_s)
+    assert metrics.approach > 2.0
     for ours, with_approach in ((metrics.settled, False), (metrics.whole, True)):
         theirs = score.summaries(with_approach=with_approach)
         cross_track, speed = theirs["cross-track, m"], theirs["speed, m/s"]
@@ -167,7 +190,9 @@ def test_a_run_that_diverges_has_failed_however_small_its_errors_were(path: str)
     condition = replace(make_condition(Robot(), perfect=True), plant=BurstingPlant)
     for row in evaluate(constant_candidate(GAINS), condition, make_cells([path], [0.25], [0, 1])):
         assert row.metrics.failure == "the motion diverged"
-        assert np.isnan([*vars(row.metrics.settled).values(), *vars(row.metrics.whole).values()]).all()
+        assert np.isnan(
+            [*vars(row.metrics.settled).values(), *vars(row.metrics.whole).values()]
+        ).all()
         assert np.isnan(row.metrics.approach)
 
 
@@ -187,24 +212,34 @@ def test_plant_and_sensors_are_those_of_the_simulation() -> None:
 def test_the_water_pushes_as_in_the_simulation() -> None:
     """Root mean squares over many fish that do nothing for 0.6 s; the random numbers are others."""
     plant, seeds = FishSimPlant([Robot()] * 32, range(32), disturbance=0.01), range(32)
-    simulations = [Simulation(Robot(), SimulationConfig(disturbance=0.01, seed=seed)) for seed in seeds]
+    simulations = [
+        Simulation(Robot(), SimulationConfig(disturbance=0.01, seed=seed)) for seed in seeds
+    ]
     for _ in range(60):
         plant.step(np.zeros((32, 2)))
         truths = [simulation.advance().truth for simulation in simulations]
     theirs = np.array([(*truth.pose, *truth.velocity) for truth in truths])
     ratio = np.sqrt(np.mean(plant.motion**2, axis=0) / np.mean(theirs**2, axis=0))
-    assert np.all((0.6 < ratio) & (ratio < 1.7)) and np.all(theirs.std(axis=0) > 1e-4)
+    assert np.all((0.6 < ratio) & (ratio < 1.7))
+    assert np.all(theirs.std(axis=0) > 1e-4)
 
 
 def test_a_run_whose_time_is_over_has_not_finished_even_if_it_drifts_over_the_end_later() -> None:
     candidate, path = constant_candidate(GAINS), read_path(SHORT)
     trace = follow(
-        FishSimPlant([Robot()] * 2, [0, 0]), PerfectSensing(), candidate.gains, [path] * 2,
-        np.array([0.25, 0.25]), np.array([start_pose(path, 0)] * 2), np.array([2.0, 30.0]), law_at_once(candidate),
-    )  # fmt: skip
+        FishSimPlant([Robot()] * 2, [0, 0]),
+        PerfectSensing(),
+        candidate.gains,
+        [path] * 2,
+        np.array([0.25, 0.25]),
+        np.array([start_pose(path, 0)] * 2),
+        np.array([2.0, 30.0]),
+        law_at_once(candidate),
+    )
     assert trace.finished.tolist() == [False, True]
     ends = [trace.time[np.isfinite(trace.cross_track[:, k])].max() for k in range(2)]
-    assert ends[0] == pytest.approx(2.0) and ends[1] == trace.time[-1] < 12.0
+    assert ends[0] == pytest.approx(2.0)
+    assert ends[1] == trace.time[-1] < 12.0
     assert trace.progress[-1, 1] == pytest.approx(path.length)
 
 
@@ -237,24 +272,33 @@ def test_a_study_of_short_swims(tmp_path: Path) -> None:
     assert max(row.metrics.settled.cross_track_rmse for row in rows) < 0.03
     table = summary_table(rows, "t")
     assert [line[:4] for line in table.rows] == [
-        ["steady", "nominal, perfect state, still water", "2", "0"], ["steady", "nominal", "1", "0"]
-    ]  # fmt: skip
+        ["steady", "nominal, perfect state, still water", "2", "0"],
+        ["steady", "nominal", "1", "0"],
+    ]
     write_rows(tmp_path / "runs.csv", rows)
     assert len((tmp_path / "runs.csv").read_text().splitlines()) == 4
     write_study_page(tmp_path / "page.html", rows)
     page = (tmp_path / "page.html").read_text()
-    assert "steady" in page and "a closed one for the time of 2 laps" in page
+    assert "steady" in page
+    assert "a closed one for the time of 2 laps" in page
 
 
 def sizes(cross_track: float, speed: float) -> ErrorSizes:
-    return ErrorSizes(cross_track, cross_track, cross_track, cross_track, 0.0, speed, speed, speed, 0.0, 0.0)
+    return ErrorSizes(
+        cross_track, cross_track, cross_track, cross_track, 0.0, speed, speed, speed, 0.0, 0.0
+    )
 
 
 def rows_of(scale: float, condition: str) -> list[Row]:
     """Sixteen cells, each with errors of its own times `scale`; the third has a speed error of 0.03 m/s."""
     cells = [Cell(letter, speed, 0) for letter in "IROS" for speed in (0.10, 0.15, 0.20, 0.25)]
     return [
-        Row("a", condition, cell, RunMetrics(*[sizes(scale * 0.01 * (k + 1), scale * 0.03)] * 2, 1.0, ""))
+        Row(
+            "a",
+            condition,
+            cell,
+            RunMetrics(*[sizes(scale * 0.01 * (k + 1), scale * 0.03)] * 2, 1.0, ""),
+        )
         for k, cell in enumerate(cells)
     ]
 
@@ -266,20 +310,29 @@ def test_ratios_to_the_nominal_condition() -> None:
     assert list(ratios.values()) == [pytest.approx((1.5, 1.5))] * 16
 
 
-def test_the_table_of_ratios_names_the_worst_cell_and_counts_one_that_failed_as_above_twice() -> None:
+def test_the_table_of_ratios_names_the_worst_cell_and_counts_one_that_failed_as_above_twice() -> (
+    None
+):
     worse = rows_of(1.5, "worse")
     third = worse[2].metrics.settled
     worse[2] = replace(
-        worse[2], metrics=replace(worse[2].metrics, settled=replace(third, speed_rmse=3.0 * third.speed_rmse))
+        worse[2],
+        metrics=replace(
+            worse[2].metrics, settled=replace(third, speed_rmse=3.0 * third.speed_rmse)
+        ),
     )
     worse[5] = replace(worse[5], metrics=replace(worse[5].metrics, failure="lost"))
     table = ratio_table([*rows_of(1.0, "nominal"), *worse], "nominal", "t")
     (line,), cell = table.rows, worse[2].cell
-    assert line[2] == "1" and line[-1] == "2 of 16" and "counts as above twice" in table.note
+    assert line[2] == "1"
+    assert line[-1] == "2 of 16"
+    assert "counts as above twice" in table.note
     assert line[4].endswith(f"4.50 ({cell.path} {cell.speed:g} m/s)")
 
 
-def test_a_cell_that_fails_under_the_nominal_condition_too_or_in_part_is_not_counted_as_lost() -> None:
+def test_a_cell_that_fails_under_the_nominal_condition_too_or_in_part_is_not_counted_as_lost() -> (
+    None
+):
     def failed(row: Row) -> Row:
         return replace(row, metrics=replace(row.metrics, failure="lost"))
 
@@ -315,16 +368,20 @@ def test_a_study_swims_every_cell_once_for_each_candidate_and_condition(
     def evaluate(candidate, condition, cells) -> list[Row]:
         batches.append(len(cells))
         return [
-            Row(candidate.name, condition.name, c, RunMetrics(NO_SIZES, NO_SIZES, 0.0, "")) for c in cells
+            Row(candidate.name, condition.name, c, RunMetrics(NO_SIZES, NO_SIZES, 0.0, ""))
+            for c in cells
         ]
 
     monkeypatch.setattr("fish_train.evaluation.study.evaluate", evaluate)
     candidates = [constant_candidate(f"{name}={GAINS}") for name in "ab"]
     conditions = [make_condition(Robot()), make_condition(Robot(), latency=0.3)]
     cells = make_cells([SHORT, "circle"], [0.1, 0.2], range(5))
-    rows = run_study(candidates, conditions, cells, 1, lambda done, total: told.append((done, total)))
+    rows = run_study(
+        candidates, conditions, cells, 1, lambda done, total: told.append((done, total))
+    )
     expected = {(c.name, d.name, cell) for c in candidates for d in conditions for cell in cells}
-    assert len(rows) == len(expected) and {(r.candidate, r.condition, r.cell) for r in rows} == expected
+    assert len(rows) == len(expected)
+    assert {(r.candidate, r.condition, r.cell) for r in rows} == expected
     assert max(batches) <= LARGEST_BATCH
     assert told == [(k + 1, len(batches)) for k in range(len(batches))]
 
@@ -334,14 +391,18 @@ def test_detuned_robots_keep_what_is_measured() -> None:
     ratio = {k: robot.parameters[k] / Robot().parameters[k] for k in robot.parameters}
     assert ratio["head_mass"] == ratio["link_length"] == 1.0
     others = [v for k, v in ratio.items() if k.endswith(("surge", "sway", "yaw", "stiffness"))]
-    assert min(others) >= 0.7 and max(others) <= 1.3 and np.std(others) > 0.05
+    assert min(others) >= 0.7
+    assert max(others) <= 1.3
+    assert np.std(others) > 0.05
     assert detuned(Robot(), 0.3, 4) == robot
 
 
 def test_speeds_at_throttles_are_those_of_the_feedforward() -> None:
     throttles = np.array([0.0, 0.2, 0.6])
     speeds = speed_of_throttle(Robot(), throttles, ControlLimits())
-    np.testing.assert_allclose(feedforward_throttle(speeds, 0.0, ControlLimits()), throttles, atol=0.02)
+    np.testing.assert_allclose(
+        feedforward_throttle(speeds, 0.0, ControlLimits()), throttles, atol=0.02
+    )
 
 
 def test_starts_are_scattered_to_the_sides_and_in_heading_but_not_along_the_path() -> None:
@@ -361,7 +422,9 @@ def test_starts_are_scattered_to_the_sides_and_in_heading_but_not_along_the_path
 def test_a_run_has_time_for_its_path() -> None:
     """Two laps of a closed path, half as much again for an open one, and time to start."""
     circle, straight = make_path("circle", radius=0.5), make_path("straight", length=0.8)
-    assert longest(circle, 0.2) == pytest.approx((2.0 * 2.0 * np.pi * 0.5 + 0.15) / 0.2 + 4.0, rel=1e-4)
+    assert longest(circle, 0.2) == pytest.approx(
+        (2.0 * 2.0 * np.pi * 0.5 + 0.15) / 0.2 + 4.0, rel=1e-4
+    )
     assert longest(straight, 0.1) == pytest.approx(1.5 * (0.8 + 0.15) / 0.1 + 8.0)
 
 
@@ -370,8 +433,11 @@ def test_starts_and_conditions() -> None:
     assert start_pose(path, 0) == pytest.approx((-0.55, 0.0, 0.0), abs=1e-9)
     names = [condition.name for condition in robust_conditions(Robot())]
     assert names == [
-        "nominal", "nominal, parameters off by up to 30%", "nominal, camera latency 0.3 s", "nominal, current 0.03 m/s"
-    ]  # fmt: skip
+        "nominal",
+        "nominal, parameters off by up to 30%",
+        "nominal, camera latency 0.3 s",
+        "nominal, current 0.03 m/s",
+    ]
 
 
 def test_a_condition_does_only_what_it_says() -> None:
@@ -380,7 +446,9 @@ def test_a_condition_does_only_what_it_says() -> None:
     assert condition.robot == Robot().with_effect("current", x=0.0, y=0.05)  # across the pool
     assert (condition.off, condition.fused, condition.disturbance) == (0.2, False, 0.0)
     late = make_condition(Robot(), latency=0.3)
-    assert late.fused and late.sensors.camera_latency == 0.3 and late.disturbance > 0.0
+    assert late.fused
+    assert late.sensors.camera_latency == 0.3
+    assert late.disturbance > 0.0
 
 
 def test_a_weights_file_the_node_refuses_is_refused_here(tmp_path: Path) -> None:

@@ -21,7 +21,11 @@ from fish_train.evaluation.plant import FishSimPlant
 from fish_train.training.closed_loop_equations import Law
 
 LIMITS = ControlLimits(
-    curvature_gain=0.3, throttle_linear=0.7, throttle_quadratic=5.0, turn_linear=2.0, turn_quadratic=6.0
+    curvature_gain=0.3,
+    throttle_linear=0.7,
+    throttle_quadratic=5.0,
+    turn_linear=2.0,
+    turn_quadratic=6.0,
 )
 GUIDANCE = GuidanceConfig(slip_arm=0.1, slip_time=0.3)
 HEAVY = Robot().with_parameters(head_drag_surge=0.5)
@@ -70,11 +74,15 @@ def test_a_robot_swims_at_the_speed_that_its_own_feed_forward_says() -> None:
     assert swum.surge == pytest.approx([u for u, _ in wanted], abs=0.01)
     nominal = [float(feedforward_throttle(u, alpha, Law().limits)) for u, alpha in wanted]
     assert all(own > 1.3 * other for (own, _), other in zip(rows, nominal, strict=True))
-    assert swum.yaw_rate[2] / swum.surge[2] == pytest.approx(0.25 / law.limits.curvature_gain, rel=0.15)
+    assert swum.yaw_rate[2] / swum.surge[2] == pytest.approx(
+        0.25 / law.limits.curvature_gain, rel=0.15
+    )
 
 
 def test_the_water_of_the_pool_is_no_part_of_the_robot() -> None:
-    there = HEAVY.with_effect("current", x=0.03, y=-0.02).with_effect("wall_effect", k=2.5, length=0.2)
+    there = HEAVY.with_effect("current", x=0.03, y=-0.02).with_effect(
+        "wall_effect", k=2.5, length=0.2
+    )
     assert constants(law_of_robot(there)) == constants(law_of_robot(HEAVY))
     # a plant whose water flows cannot be asked to stop it: two opposite headings tell the current from the fish
     flowing = HEAVY.with_effect("current", x=0.03, y=-0.02)

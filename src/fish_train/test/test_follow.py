@@ -69,14 +69,27 @@ def law_of(listen_time: float) -> Law:
 def setting():
     """Weights, policy, path, stepper; the node's states by how long the fish listens before it swims."""
     rng = np.random.default_rng(9)
-    start = dict(
-        steering_kp=0.4, steering_ki=0.3, steering_kd=0.03, speed_kp=0.6, speed_ki=0.05, speed_kd=0.01
-    )
+    start = {
+        "steering_kp": 0.4,
+        "steering_ki": 0.3,
+        "steering_kd": 0.03,
+        "speed_kp": 0.6,
+        "speed_ki": 0.05,
+        "speed_kd": 0.01,
+    }
     weights = initial_weights(rng, start)
     weights += 0.02 * rng.standard_normal(weights.shape)
     path, stepper = make_path("straight", length=3.0, x=1.5), make_stepper()
-    policies = {t: Policy(PolicySpec(guidance=law_of(t).guidance), to_tensors(weights)) for t in (0.0, 0.5)}
-    return weights, policies, path, stepper, {t: node_swim(p, path, stepper) for t, p in policies.items()}
+    policies = {
+        t: Policy(PolicySpec(guidance=law_of(t).guidance), to_tensors(weights)) for t in (0.0, 0.5)
+    }
+    return (
+        weights,
+        policies,
+        path,
+        stepper,
+        {t: node_swim(p, path, stepper) for t, p in policies.items()},
+    )
 
 
 def test_training_runs_the_nodes_laws(setting) -> None:
@@ -98,7 +111,9 @@ def test_training_runs_the_nodes_laws(setting) -> None:
 def test_the_follower_runs_the_nodes_laws(setting, listen_time) -> None:
     _, policies, path, stepper, node = setting
     law, known, expected = law_of(listen_time), np.ones(2, dtype=bool), node[listen_time]
-    follower = Follower([path, path], np.array([SPEED, 0.3]), PolicyGains(policies[listen_time]), law)
+    follower = Follower(
+        [path, path], np.array([SPEED, 0.3]), PolicyGains(policies[listen_time]), law
+    )
     state, parameters = np.array([stepper.rest(START)] * 2), stepper.parameters(Robot())
     size = stepper.layout.links + 3
     seen = np.array([motion_of(row, size) for row in state])

@@ -30,7 +30,9 @@ def test_along_a_wandering_swim(name: str) -> None:
         heading = float(path.heading_at(s))
         position = path.point(s) + offset * np.array([-np.sin(heading), np.cos(heading)])
         expected = batch.update(position[None])
-        ahead = path_ahead(*position, locate(table, tracker, place, position), tracker.lookahead, NUMPY)
+        ahead = path_ahead(
+            *position, locate(table, tracker, place, position), tracker.lookahead, NUMPY
+        )
         assert place[0] == pytest.approx(expected.progress[0], abs=1e-12)
         assert [ahead.x, ahead.y] == pytest.approx(expected.point[0], abs=1e-12)
         assert [ahead.target_x, ahead.target_y] == pytest.approx(expected.target[0], abs=1e-9)

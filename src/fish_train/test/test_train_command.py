@@ -14,9 +14,18 @@ from fish_train.evaluation.feed_forward import law_of_robot
 from fish_train.verbs.train import command_line
 
 SETTINGS = [
-    "batch=2", "unroll=2", "hold=5", "episode=1.0", "approach=0.2", "amplitudes=[1.0]", "cycles=[0.5]", "radii=[1.5]",
-    "thresholds=[0.4]", "criterion_episodes=1", "polish_updates=4",
-]  # fmt: skip
+    "batch=2",
+    "unroll=2",
+    "hold=5",
+    "episode=1.0",
+    "approach=0.2",
+    "amplitudes=[1.0]",
+    "cycles=[0.5]",
+    "radii=[1.5]",
+    "thresholds=[0.4]",
+    "criterion_episodes=1",
+    "polish_updates=4",
+]
 
 GAINS = "0.3,0.3,0.03,0.6,0.05,0"
 BROKEN = "broken.yaml"
@@ -48,12 +57,24 @@ def test_gains_of_a_robot_carry_its_own_feed_forward(
     for name, robot in {"heavy": heavy, "stuck": stuck}.items():
         file = tmp_path / f"{name}.yaml"
         save_robot(robot, file)
-        given = ["--robot", str(file), "--form", "constant", "--max-seconds", "0", "--set", *SETTINGS]
+        given = [
+            "--robot",
+            str(file),
+            "--form",
+            "constant",
+            "--max-seconds",
+            "0",
+            "--set",
+            *SETTINGS,
+        ]
         main(["train", "--out", str(tmp_path / name), *given])  # one episode
         contracts[name] = read_gains_file(tmp_path / name / "seed_1" / "gains.safetensors").contract
     law = law_of_robot(heavy)
     assert (contracts["heavy"].limits, contracts["heavy"].guidance) == (law.limits, law.guidance)
-    assert (contracts["stuck"].limits, contracts["stuck"].guidance) == (ControlLimits(), GuidanceConfig())
+    assert (contracts["stuck"].limits, contracts["stuck"].guidance) == (
+        ControlLimits(),
+        GuidanceConfig(),
+    )
     said = capsys.readouterr().out
     assert f"heavy.yaml: throttle {law.limits.throttle_linear:.3g} u" in said
     assert "the nominal fish's feed-forward is used" in said
@@ -70,11 +91,17 @@ def test_gains_of_a_robot_carry_its_own_feed_forward(
         (["train", "--seeds", "0"], "expected counts of at least 1"),
         (["train", "--set", "batch=2020-13-45"], "'2020-13-45' is not a value"),
         (["train", "--set", "radii=[1.0"], "'[1.0' is not a value: while parsing a flow sequence"),
-        (["train", "--config", BROKEN], "broken.yaml: cannot be read as YAML: while scanning a simple key"),
+        (
+            ["train", "--config", BROKEN],
+            "broken.yaml: cannot be read as YAML: while scanning a simple key",
+        ),
         (["train", "--resume", "--overwrite"], "--resume --overwrite: one continues the runs"),
         (["train", "--max-seconds", "nan"], "--max-seconds nan: expected at least 0 s"),
         (["train", "--max-seconds", "-1"], "--max-seconds -1: expected at least 0 s"),
-        (["train", "--form", "constant", "--search", "--max-seconds", "9"], "leave out --max-seconds"),
+        (
+            ["train", "--form", "constant", "--search", "--max-seconds", "9"],
+            "leave out --max-seconds",
+        ),
         (
             ["train", "--form", "constant", "--search", "--resume"],
             "--search --resume: a search cannot be continued",
@@ -109,7 +136,8 @@ def test_bad_input_is_one_line(
     (tmp_path / BROKEN).write_text("batch: 2\nunroll")
     assert main(arguments) == 1
     error = capsys.readouterr().err
-    assert said in error and error.count("\n") == 1
+    assert said in error
+    assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -121,7 +149,10 @@ def test_bad_input_is_one_line(
         ),
         ("--out /home/me/runs --robot /home/me/fish/model.yaml --jobs 4", "--robot model.yaml"),
         ("--ou=/home/me/runs --jo 4 --res --seeds 2", "--seeds 2"),
-        ("--overwrite --set=batch=2 unroll=3 --config ../r/e.yaml", "--set=batch=2 unroll=3 --config e.yaml"),
+        (
+            "--overwrite --set=batch=2 unroll=3 --config ../r/e.yaml",
+            "--set=batch=2 unroll=3 --config e.yaml",
+        ),
     ],
 )
 def test_the_command_that_travels_with_the_weights_names_no_folder(typed: str, kept: str) -> None:

@@ -89,7 +89,7 @@ def test_a_restored_run_continues_exactly(tmp_path: Path) -> None:
 
 def test_a_checkpoint_of_another_recipe_is_refused(tmp_path: Path) -> None:
     save_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 3))
-    with pytest.raises(UserError, match="learning_rate was 0.001, is 0.01"):
+    with pytest.raises(UserError, match=r"learning_rate was 0.001, is 0.01"):
         load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(learning_rate=0.01), Robot(), 3))
     with pytest.raises(UserError, match="format, robot and seed"):
         load_checkpoint(tmp_path / CHECKPOINT, Trainer(short(), Robot(), 4))
@@ -121,7 +121,9 @@ def nothing_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_checkpoint_of_another_law_is_refused(tmp_path: Path, nothing_compiled: None) -> None:
     file = tmp_path / CHECKPOINT
     save_checkpoint(file, constant(LAW))
-    with pytest.raises(UserError, match="limits.curvature_gain was 0.3, is 0.21.* give --robot as it was"):
+    with pytest.raises(
+        UserError, match=r"limits.curvature_gain was 0.3, is 0.21.* give --robot as it was"
+    ):
         load_checkpoint(file, constant())
     measured_again = replace(LAW, limits=replace(LAW.limits, curvature_gain=0.3 * (1.0 + 1e-12)))
     load_checkpoint(file, constant(measured_again))
@@ -138,7 +140,9 @@ def test_a_checkpoint_of_old_which_did_not_note_its_law_has_the_nominal_one(
     del plain["law"]
     np.savez(file, plain=np.array(json.dumps(plain)), **arrays)
     load_checkpoint(file, constant())
-    with pytest.raises(UserError, match="made before checkpoints noted the law's feed-forward.* start anew"):
+    with pytest.raises(
+        UserError, match=r"made before checkpoints noted the law's feed-forward.* start anew"
+    ):
         load_checkpoint(file, constant(LAW))
 
 
@@ -167,11 +171,15 @@ def test_a_warm_start_from_other_scales_is_refused(tmp_path: Path) -> None:
         ("run/gains.safetensors", "--overwrite deletes; copy it"),
     ],
 )
-def test_a_run_is_not_overwritten_by_one_that_cannot_start(start: str, said: str, tmp_path: Path) -> None:
+def test_a_run_is_not_overwritten_by_one_that_cannot_start(
+    start: str, said: str, tmp_path: Path
+) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / CHECKPOINT).write_bytes(b"days of work")
-    write_gains_file(folder / "gains.safetensors", Policy(PolicySpec(), to_tensors(np.zeros(weight_count()))))
+    write_gains_file(
+        folder / "gains.safetensors", Policy(PolicySpec(), to_tensors(np.zeros(weight_count())))
+    )
     with pytest.raises(UserError, match=said):
         run(job(folder, overwrite=True, warm_start=tmp_path / start), lambda _: None)
     assert (folder / CHECKPOINT).read_bytes() == b"days of work"
@@ -196,7 +204,9 @@ def test_of_several_seeds_none_begins_where_one_is_refused(
 ) -> None:
     (tmp_path / "2").mkdir()
     (tmp_path / "2" / CHECKPOINT).write_bytes(b"days of work")
-    monkeypatch.setattr(parallel_runs, "worker_pool", lambda *_: pytest.fail("workers were started"))
+    monkeypatch.setattr(
+        parallel_runs, "worker_pool", lambda *_: pytest.fail("workers were started")
+    )
     with pytest.raises(UserError, match="2: holds a training run; continue it with --resume"):
         parallel_runs.run_all([job(tmp_path / name) for name in "12"], 2, lambda _: None)
     assert not (tmp_path / "1").exists()
@@ -205,10 +215,12 @@ def test_of_several_seeds_none_begins_where_one_is_refused(
 def test_a_run_finishes_and_its_weights_are_those_of_torch(tmp_path: Path) -> None:
     statuses: list[Status] = []
     last = run(job(tmp_path / "run"), statuses.append)
-    assert last.state == "finished" and last.progress.level == 2
+    assert last.state == "finished"
+    assert last.progress.level == 2
     assert [row.level for row in read_curve(tmp_path / "run")][-1] == 2
     policy = read_gains_file(tmp_path / "run" / "gains.safetensors")
-    assert policy.contract.training_seed == 3 and policy.contract.robot_hash == Robot().digest()
+    assert policy.contract.training_seed == 3
+    assert policy.contract.robot_hash == Robot().digest()
     rng = np.random.default_rng(1)
     x = torch.from_numpy(rng.standard_normal((20, 6)))
     h = x
@@ -232,7 +244,9 @@ def test_a_run_stopped_and_resumed_ends_like_one_in_one_go(tmp_path: Path) -> No
     with pytest.raises(UserError, match="--resume"):
         run(job(tmp_path / "parts"), lambda _: None)
     assert run(job(tmp_path / "parts", resume=True), lambda _: None).state == "finished"
-    whole, parts = (read_gains_file(tmp_path / k / "gains.safetensors").tensors for k in ("whole", "parts"))
+    whole, parts = (
+        read_gains_file(tmp_path / k / "gains.safetensors").tensors for k in ("whole", "parts")
+    )
     assert all(np.array_equal(whole[name], parts[name]) for name in whole)
 
 
@@ -240,9 +254,12 @@ def test_a_run_out_of_updates_says_which_level_it_did_not_pass(tmp_path: Path) -
     hard = job(tmp_path)
     hard = replace(hard, config=replace(hard.config, thresholds=(1e-4,), max_updates=20))
     last = run(hard, lambda _: None)
-    assert last.state == "stopped" and last.progress.level == 0
-    assert "(sinusoid 1 m x 0.5, 0.0001 m)" in last.message and "expected below 0.0001 m" in last.message
-    assert "stopped at max_updates 20 before" in last.message and "max_updates can be raised" in last.message
+    assert last.state == "stopped"
+    assert last.progress.level == 0
+    assert "(sinusoid 1 m x 0.5, 0.0001 m)" in last.message
+    assert "expected below 0.0001 m" in last.message
+    assert "stopped at max_updates 20 before" in last.message
+    assert "max_updates can be raised" in last.message
 
 
 @pytest.mark.parametrize(("updates", "seconds"), [(4, float("inf")), (1000, 0.0)])
@@ -257,10 +274,14 @@ def test_a_run_at_its_limit_goes_on_only_when_it_is_raised(
     curve, file = read_curve(parts.folder), parts.folder / "gains.safetensors"
     made = file.stat().st_mtime_ns
     again = run(limited, lambda _: None)
-    assert again.state == "stopped" and "before the level was passed" in again.message
-    assert read_curve(parts.folder) == curve and file.stat().st_mtime_ns == made
+    assert again.state == "stopped"
+    assert "before the level was passed" in again.message
+    assert read_curve(parts.folder) == curve
+    assert file.stat().st_mtime_ns == made
     assert run(parts, lambda _: None).state == "finished"
-    found, expected = (read_gains_file(k.folder / "gains.safetensors").tensors for k in (parts, whole))
+    found, expected = (
+        read_gains_file(k.folder / "gains.safetensors").tensors for k in (parts, whole)
+    )
     assert np.array_equal(found["gains"], expected["gains"])
 
 
@@ -286,14 +307,19 @@ def test_a_finished_run_resumed_keeps_its_weights_and_what_they_say(tmp_path: Pa
     assert read_gains_file(file).contract.note == "trained by: robofish paper"
 
 
-def test_a_schedule_is_swum_on_the_law_it_was_trained_with(tmp_path: Path, nothing_compiled: None) -> None:
+def test_a_schedule_is_swum_on_the_law_it_was_trained_with(
+    tmp_path: Path, nothing_compiled: None
+) -> None:
     trainer = Trainer(short(), Robot(), 3, LAW, form=FORMS["schedule"])
     write_weights(tmp_path, trainer, "robofish train")
     file = tmp_path / SCHEDULE
     found = read_candidate(str(file))
-    assert found.law == LAW and np.array_equal(found.gains.weights, trainer.weights)
+    assert found.law == LAW
+    assert np.array_equal(found.gains.weights, trainer.weights)
     content = json.loads(file.read_text())
-    file.write_text(json.dumps({"form": "schedule", "weights": content["weights"]}))  # as it was of old
+    file.write_text(
+        json.dumps({"form": "schedule", "weights": content["weights"]})
+    )  # as it was of old
     assert read_candidate(str(file)).law == Law()
     for broken, said in (
         ({**content, "limits": {}}, "limits lacks amplitude_rate"),
@@ -308,7 +334,11 @@ def test_a_schedule_is_swum_on_the_law_it_was_trained_with(tmp_path: Path, nothi
 def test_robots_differ_in_what_is_uncertain_of_them_and_not_in_their_effects(
     nothing_compiled: None,
 ) -> None:
-    robot = Robot().with_effect("rudder_placement", tip_share=0.9).with_effect("current", x=0.03, y=-0.02)
+    robot = (
+        Robot()
+        .with_effect("rudder_placement", tip_share=0.9)
+        .with_effect("current", x=0.03, y=-0.02)
+    )
     trainer = Trainer(short(batch=50), robot, 3)
     own = dict(zip(trainer._stepper.layout.parameters, robot.vector(), strict=True))
     drawn = dict(zip(own, trainer.fleet.parameters.T, strict=True))
@@ -334,7 +364,9 @@ def test_what_was_logged_after_the_checkpoint_is_forgotten(tmp_path: Path) -> No
     assert len(read_curve(tmp_path)) == 2
 
 
-def test_diverging_training_is_said_and_rolled_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_diverging_training_is_said_and_rolled_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     good = Trainer(short(), Robot(), 3)
     calls = 0
     honest = type(good._loop).window
@@ -349,14 +381,17 @@ def test_diverging_training_is_said_and_rolled_back(tmp_path: Path, monkeypatch:
     statuses: list[Status] = []
     last = run(job(tmp_path / "run"), statuses.append)
     assert last.state == "diverged"
-    assert "rolled back to update 0" in last.message and "smaller learning_rate" in last.message
+    assert "rolled back to update 0" in last.message
+    assert "smaller learning_rate" in last.message
     weights = from_tensors(read_gains_file(tmp_path / "run" / "gains.safetensors").tensors)
     assert np.array_equal(weights, good.weights)
     assert any(status.progress is not None for status in statuses)  # of updates that are no more
-    assert last.progress is None and read_curve(tmp_path / "run") == []
+    assert last.progress is None
+    assert read_curve(tmp_path / "run") == []
     card = (tmp_path / "run" / "model_card.md").read_text()
     assert "training diverged, rolled back to level 0 of 2 after 0 updates" in card
-    assert "last training episode" not in card and "stopped" not in card
+    assert "last training episode" not in card
+    assert "stopped" not in card
 
 
 def test_a_diverged_run_tells_of_the_checkpoint_whose_weights_it_hands_out(
@@ -369,7 +404,9 @@ def test_a_diverged_run_tells_of_the_checkpoint_whose_weights_it_hands_out(
         nonlocal calls
         calls += 1
         # one episode is three updates of 0.4 s
-        monkeypatch.setattr("fish_train.training.run.CHECKPOINT_PERIOD", 0.0 if calls <= 6 else np.inf)
+        monkeypatch.setattr(
+            "fish_train.training.run.CHECKPOINT_PERIOD", 0.0 if calls <= 6 else np.inf
+        )
         if calls == 11:
             raise TrainingDiverged("cost nan")
         return honest(self)
@@ -380,8 +417,10 @@ def test_a_diverged_run_tells_of_the_checkpoint_whose_weights_it_hands_out(
     statuses: list[Status] = []
     last = run(hard, statuses.append)
     told = [status.progress.update for status in statuses[:-1]]
-    assert last.state == "diverged" and told == [3, 6, 9]
-    assert last.progress.update == 6 and "rolled back to update 6" in last.message
+    assert last.state == "diverged"
+    assert told == [3, 6, 9]
+    assert last.progress.update == 6
+    assert "rolled back to update 6" in last.message
     curve = read_curve(tmp_path)
     assert [row.update for row in curve] == [3, 6]
     assert f"({last.progress.name}): mean |cross-track| {curve[-1].cross_track:.4f} m" in (
@@ -401,7 +440,8 @@ def test_a_search_says_so_on_its_card(tmp_path: Path, short_search: None) -> Non
     assert run(job(tmp_path, form="constant", search=True), lambda _: None).state == "finished"
     assert read_gains_file(tmp_path / "gains.safetensors").contract.layers == ()
     card = (tmp_path / "model_card.md").read_text()
-    assert "found by differential evolution" in card and "training stopped" not in card
+    assert "found by differential evolution" in card
+    assert "training stopped" not in card
 
 
 def test_search_does_not_lose_against_its_start(short_search: None) -> None:
@@ -413,11 +453,15 @@ def test_search_does_not_lose_against_its_start(short_search: None) -> None:
     fleet, noise = again.draw_fleet(again.ladder_bank()), again.draw_noise()
     assert again.rollout_cost(weights, fleet.copy(), bank, noise) == pytest.approx(found)
     assert found <= again.rollout_cost(again.weights, fleet.copy(), bank, noise)
-    assert again.rollout_cost(weights, fleet.copy(), bank) != pytest.approx(found)  # what is seen has errors
-    assert said and "generation 1" in said[0]
+    assert again.rollout_cost(weights, fleet.copy(), bank) != pytest.approx(
+        found
+    )  # what is seen has errors
+    assert said
+    assert "generation 1" in said[0]
 
 
 def test_a_search_may_start_with_gains_at_the_ends_of_their_ranges(short_search: None) -> None:
     config = short(start_speed_kd=0.0, start_steering_kp=1.0)
     found, weights = search(Trainer(config, Robot(), 3, form=FORMS["constant"]), lambda _: None)
-    assert np.isfinite(found) and np.abs(weights).max() <= 3.0
+    assert np.isfinite(found)
+    assert np.abs(weights).max() <= 3.0

@@ -1,5 +1,6 @@
 """The picture with what the tracker saw in it, for people."""
 
+import itertools
 from math import cos, sin
 
 import cv2
@@ -27,9 +28,7 @@ def annotated(
     centre, ahead = np.array([head.x, head.y]), np.array([cos(head.heading), sin(head.heading)])
     _line(picture, calibration, np.array([centre, centre + ARROW * ahead]), GREEN)
     _line(picture, calibration, tail_points(found, config), GREEN)
-    numbers = (
-        f"x {head.x:+.3f} m  y {head.y:+.3f} m  heading {head.heading:+.3f} rad  spacing {found.spacing:.3f}"
-    )
+    numbers = f"x {head.x:+.3f} m  y {head.y:+.3f} m  heading {head.heading:+.3f} rad  spacing {found.spacing:.3f}"
     if found.tail is not None:
         numbers += "  tail " + " ".join(f"{angle:+.2f}" for angle in found.tail)
     return _text(picture, numbers, WHITE)
@@ -49,7 +48,7 @@ def _outline(points: int = 20) -> np.ndarray:
     """(N, 2) points along the pool's walls, m: many, because the lens bends them."""
     x, y = POOL[0] / 2, POOL[1] / 2
     corners = np.array([[x, y], [-x, y], [-x, -y], [x, -y], [x, y]])
-    sides = zip(corners[:-1], corners[1:], strict=True)
+    sides = itertools.pairwise(corners)
     return np.vstack([np.linspace(a, b, points, endpoint=False) for a, b in sides])
 
 

@@ -26,12 +26,15 @@ def lens_from_chessboards(
         pictures: same size, board in different places and tilts, also near the edges.
         corners: inner corners along the board's two sides.
         square: side of one square, m.
+
     Returns:
         Lens, root mean square reprojection error (pixels), numbers of the pictures in which the board was
         found.
+
     Raises:
         CalibrationError: pictures of different sizes, the board in fewer than BOARDS_MIN of them, or boards
             that leave the focal length open.
+
     """
     sizes = {picture.shape[1::-1] for picture in pictures}
     if len(sizes) > 1:
@@ -90,9 +93,11 @@ def mount_from_points(lens: Lens, points: ArrayLike, pixels: ArrayLike) -> tuple
 
     Returns:
         Mount, root mean square reprojection error (pixels).
+
     Raises:
         CalibrationError: fewer than POINTS_MIN points, points that fix no pose (not finite, on one line), or
             a camera that is not above all of them.
+
     """
     points = np.ascontiguousarray(points, float).reshape(-1, 3)
     pixels = np.ascontiguousarray(pixels, float).reshape(-1, 2)

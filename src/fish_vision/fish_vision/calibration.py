@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[Any]  # float64
 
-R_DOWN = np.diag([1.0, -1.0, -1.0])  # optical axes of an untilted camera: right = pool x, down = pool -y
+R_DOWN = np.diag(
+    [1.0, -1.0, -1.0]
+)  # optical axes of an untilted camera: right = pool x, down = pool -y
 MODELS = {"plumb_bob": 5, "rational_polynomial": 8}  # distortion model -> number of coefficients
 POOL = (4.27, 2.13)  # m, along pool x and y
 FOCAL_MIN = 1.0  # pixels; a real lens has hundreds
@@ -40,6 +42,7 @@ class Lens:
 
         Raises:
             CalibrationError: sizes, model or numbers that no calibrated camera has.
+
         """
         if width <= 0 or height <= 0:
             raise CalibrationError(
@@ -134,7 +137,9 @@ class Calibration:
         """(N, 2) x, y in the markers' plane, m -> (N, 2) pixels."""
         points = np.asarray(points, float).reshape(-1, 2)
         solid = np.column_stack([points, np.full(len(points), self.plane_height)])
-        return cv2.projectPoints(solid, self._rotation, self._t, self.lens.K, self.lens.D)[0].reshape(-1, 2)
+        return cv2.projectPoints(solid, self._rotation, self._t, self.lens.K, self.lens.D)[
+            0
+        ].reshape(-1, 2)
 
     def pixel_to_pool(self, pixels: ArrayLike) -> Array:
         """(N, 2) pixels -> (N, 2) x, y in the markers' plane, m."""
@@ -147,7 +152,9 @@ class Calibration:
         pixels = np.asarray(pixels, float).reshape(-1, 2)
         cross = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
         points = self.pixel_to_pool((pixels[:, None] + cross).reshape(-1, 2)).reshape(-1, 5, 2)
-        return points[:, 0], np.stack([points[:, 1] - points[:, 2], points[:, 3] - points[:, 4]], axis=-1)
+        return points[:, 0], np.stack(
+            [points[:, 1] - points[:, 2], points[:, 3] - points[:, 4]], axis=-1
+        )
 
 
 def undistort(pixels: Array, lens: Lens) -> Array:

@@ -24,7 +24,11 @@ class TrackerConfig:
     use_raw: bool = False  # take camera/image_raw instead of camera/image_raw/compressed
     debug_image: bool = False  # publish camera/debug/compressed, the annotated picture
     camera_position: tuple[float, ...] = (0.05, -0.08, 3.2)  # optical centre in the pool frame, m
-    camera_tilt: tuple[float, ...] = (-0.022, 0.018, 0.010)  # about the optical axes, rad; 0 = straight down
+    camera_tilt: tuple[float, ...] = (
+        -0.022,
+        0.018,
+        0.010,
+    )  # about the optical axes, rad; 0 = straight down
     marker_height: float = 0.0  # of the markers above the pool frame's origin, m
     front_colour: tuple[int, ...] = (20, 36, 110, 90)  # yellow
     rear_colour: tuple[int, ...] = (136, 166, 90, 80)  # magenta
@@ -59,7 +63,9 @@ class TrackerConfig:
                 raise ValueError(f"{name} = {value}: expected {low} to {high}")
         for name in ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour"):
             value = getattr(self, name)
-            if not (all(0 <= h < HUES for h in value[:2]) and all(0 <= v <= 255 for v in value[2:])):
+            if not (
+                all(0 <= h < HUES for h in value[:2]) and all(0 <= v <= 255 for v in value[2:])
+            ):
                 raise ValueError(
                     f"{name} = {list(value)}: expected two hues 0 to 179 and two levels 0 to 255"
                 )
@@ -89,6 +95,7 @@ def config_from_file(path: Path) -> TrackerConfig:
 
     Raises:
         ValueError: not such a file, an unknown parameter, or a value of the wrong type or out of range; names the file.
+
     """
     return read_settings(path, NODE, TrackerConfig, _refuse)
 

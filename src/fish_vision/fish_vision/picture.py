@@ -25,6 +25,7 @@ def from_compressed(data: bytes, size: tuple[int, int]) -> Image:
 
     Raises:
         PictureError: not an image, or not of the expected size (width, height).
+
     """
     packed = np.frombuffer(data, np.uint8)
     if packed[:2].tobytes() == JPEG_START and JPEG_END not in packed[-TRAILER:].tobytes():
@@ -38,11 +39,14 @@ def from_compressed(data: bytes, size: tuple[int, int]) -> Image:
     return _of_size(picture, size)
 
 
-def from_raw(data: bytes, encoding: str, width: int, height: int, step: int, size: tuple[int, int]) -> Image:
+def from_raw(
+    data: bytes, encoding: str, width: int, height: int, step: int, size: tuple[int, int]
+) -> Image:
     """Picture from the fields of sensor_msgs/Image (rows of `step` bytes).
 
     Raises:
         PictureError: unknown encoding, too few bytes, or not of the expected size (width, height).
+
     """
     if encoding not in CONVERSIONS:
         raise PictureError(f"encoding {encoding!r}: expected one of {', '.join(CONVERSIONS)}")
@@ -69,5 +73,7 @@ def to_jpeg(picture: Image, quality: int = 80) -> bytes:
 def _of_size(picture: Image, size: tuple[int, int]) -> Image:
     height, width = picture.shape[:2]
     if (width, height) != size:
-        raise PictureError(f"image of {width} x {height}, but camera_info says {size[0]} x {size[1]}")
+        raise PictureError(
+            f"image of {width} x {height}, but camera_info says {size[0]} x {size[1]}"
+        )
     return picture

@@ -78,7 +78,9 @@ def head_pose(front: Spot, rear: Spot, layout: MarkerLayout) -> HeadPose:
     R = np.array([[cos(heading), -sin(heading)], [sin(heading), cos(heading)]])
     middle = R @ (m_f + m_r) / 2
     x, y = (front.position + rear.position) / 2 - middle
-    across = np.array([-line[1], line[0]]) / float(line @ line)  # d heading / d p_f = - d heading / d p_r
+    across = np.array([-line[1], line[0]]) / float(
+        line @ line
+    )  # d heading / d p_f = - d heading / d p_r
     turn = np.array([middle[1], -middle[0]])  # d p / d heading
     J_f = np.vstack([np.eye(2) / 2 + np.outer(turn, across), across])
     J_r = np.vstack([np.eye(2) / 2 - np.outer(turn, across), -across])
@@ -98,9 +100,11 @@ def tail_angles(
     Args:
         spots: candidates for each link, in order.
         tolerance: greatest misfit of the distance, m.
+
     Returns:
         One angle per link, or None if a link's marker is missing (a chain with a hole has no angles after
         it).
+
     """
     hinge = np.array([head.x, head.y]) - layout.hinge_offset * np.array(
         [cos(head.heading), sin(head.heading)]

@@ -67,12 +67,15 @@ def find_blobs(hsv: Image, colour: ColourRange, area_range: tuple[float, float])
     Args:
         hsv: (h, w, 3) part of an image.
         area_range: least and greatest area, pixels.
+
     """
     mask = colour.mask(hsv)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     boxes = [cv2.boundingRect(contour) for contour in contours]
     side = 4.0 * np.sqrt(area_range[1])  # of a box that may still hold a blob in the range
-    boxes = [box for box in boxes if max(box[2:]) <= side and 2.0 * box[2] * box[3] >= area_range[0]]
+    boxes = [
+        box for box in boxes if max(box[2:]) <= side and 2.0 * box[2] * box[3] >= area_range[0]
+    ]
     boxes = sorted(boxes, key=lambda box: -box[2] * box[3])[:MOST]
     blobs = [_measure(hsv, mask, colour, (x, y, x + w, y + h)) for x, y, w, h in boxes]
     blobs = [blob for blob in blobs if area_range[0] <= blob.area <= area_range[1]]
@@ -97,7 +100,10 @@ def _measure(hsv: Image, mask: Image, colour: ColourRange, box: Box) -> Blob:
 
 def around(points: NDArray[np.float64], size: Sequence[int]) -> Box:
     """Smallest box inside an image of size (width, height) that holds all points (N, 2), pixels."""
-    low, high = np.floor(points.min(axis=0)).astype(int), np.ceil(points.max(axis=0)).astype(int) + 1
+    low, high = (
+        np.floor(points.min(axis=0)).astype(int),
+        np.ceil(points.max(axis=0)).astype(int) + 1,
+    )
     width, height = size
     return (
         int(np.clip(low[0], 0, width)),

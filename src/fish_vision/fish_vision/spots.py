@@ -19,12 +19,16 @@ class SpotFinder:
     def __init__(self, config: TrackerConfig, calibration: Calibration) -> None:
         self._config, self._calibration = config, calibration
         _, scale = calibration.place_and_scale(calibration.pool_to_pixel([[0.0, 0.0]]))
-        self._pixel = float(abs(np.linalg.det(scale[0])))  # m^2 of water that a pixel shows in the middle
+        self._pixel = float(
+            abs(np.linalg.det(scale[0]))
+        )  # m^2 of water that a pixel shows in the middle
 
     def find(self, hsv: Image, marker: str, origin: tuple[int, int], step: int = 1) -> list[Spot]:
         """Spots of a marker in a part of an image: first pixel at origin, every step-th pixel."""
         config = self._config
-        diameter = config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
+        diameter = (
+            config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
+        )
         disc = pi / 4 * diameter**2
         pixel = self._pixel * step**2
         limits = (0.5 * config.area_min * disc / pixel, 2.0 * config.area_max * disc / pixel)

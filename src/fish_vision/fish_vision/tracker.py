@@ -16,9 +16,7 @@ from fish_vision.spots import SpotFinder
 
 Array = NDArray[Any]  # float64
 
-COARSE = (
-    2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
-)
+COARSE = 2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
 JUMP_DISTANCE = 0.03  # m, never counted as a jump
 JUMP_TURN = 0.3  # rad, never counted as a jump
 
@@ -70,9 +68,16 @@ class Tracker:
 
     def track(self, image: Image, stamp: float) -> Detection | Lost:
         """Pose in an image (h, w, 3; blue, green, red) of the calibration's size taken at stamp (s)."""
-        if self._last is not None and not 0.0 <= stamp - self._last.stamp <= self._config.reacquire_s:
+        if (
+            self._last is not None
+            and not 0.0 <= stamp - self._last.stamp <= self._config.reacquire_s
+        ):
             self._last = None
-        found = Lost(stamp, Reason.NO_FRONT) if self._last is None else self._look_near_last(image, stamp)
+        found = (
+            Lost(stamp, Reason.NO_FRONT)
+            if self._last is None
+            else self._look_near_last(image, stamp)
+        )
         if isinstance(found, Lost):
             found = self._look_everywhere(image, stamp)
         if isinstance(found, Detection):
@@ -93,7 +98,9 @@ class Tracker:
         middle = (head[0].position + head[1].position) / 2
         return self._measure(image, stamp, middle[0], middle[1], True)
 
-    def _measure(self, image: Image, stamp: float, x: float, y: float, whole_image: bool) -> Detection | Lost:
+    def _measure(
+        self, image: Image, stamp: float, x: float, y: float, whole_image: bool
+    ) -> Detection | Lost:
         """Pose from the part of the image within roi_radius of a place in the pool."""
         box = self._box(x, y)
         if box[0] >= box[2] or box[1] >= box[3]:
@@ -129,7 +136,9 @@ class Tracker:
 
     def _tail(self, head: HeadPose, tail: Sequence[Sequence[Spot]]) -> tuple[float, ...] | None:
         links = [tail[i % 2] for i in range(self._config.tail_links)]
-        return tail_angles(head, links, self._layout, self._config.tail_tolerance) if links else None
+        return (
+            tail_angles(head, links, self._layout, self._config.tail_tolerance) if links else None
+        )
 
     def _refuse(self, head: HeadPose, tail: Sequence[Spot], stamp: float) -> Reason | None:
         """Why a pose is not believed, or None."""
@@ -142,6 +151,8 @@ class Tracker:
         if self._last is None:
             return None
         dt, last = stamp - self._last.stamp, self._last.head
-        far = np.hypot(head.x - last.x, head.y - last.y) > self._config.max_speed * dt + JUMP_DISTANCE
+        far = (
+            np.hypot(head.x - last.x, head.y - last.y) > self._config.max_speed * dt + JUMP_DISTANCE
+        )
         turned = abs(wrap(head.heading - last.heading)) > self._config.max_yaw_rate * dt + JUMP_TURN
         return Reason.JUMP if far or turned else None

@@ -9,7 +9,12 @@ from fish_vision.config import TrackerConfig
 
 SIZE, SCALE = (1280, 720), 300.0  # pixels, pixels per metre
 WATER, BODY = (190, 165, 90), (52, 50, 50)
-COLOURS = {"front": (0, 215, 255), "rear": (210, 20, 235), "odd": (35, 55, 240), "even": (40, 205, 45)}
+COLOURS = {
+    "front": (0, 215, 255),
+    "rear": (210, 20, 235),
+    "odd": (35, 55, 240),
+    "even": (40, 205, 45),
+}
 HEIGHT = 3.0  # m; with 900 pixels of focal length gives SCALE
 CONFIG = TrackerConfig(camera_position=(0.0, 0.0, HEIGHT), camera_tilt=(0.0, 0.0, 0.0))
 
@@ -24,7 +29,9 @@ def calibration() -> Calibration:
     return Calibration(Lens.from_camera_info(*lens_fields()), CONFIG.mount())
 
 
-def discs_of_fish(x: float, y: float, heading: float, tail: tuple[float, ...] = (0.0, 0.0, 0.0)) -> list:
+def discs_of_fish(
+    x: float, y: float, heading: float, tail: tuple[float, ...] = (0.0, 0.0, 0.0)
+) -> list:
     """(x, y, diameter, colour name) of every marker, m."""
     ahead = np.array([cos(heading), sin(heading)])
     head = np.array([x, y])
@@ -49,7 +56,9 @@ def draw(discs: list, noise: float = 2.0, seed: int = 0) -> np.ndarray:
     return np.clip(np.round(picture), 0, 255).astype(np.uint8)
 
 
-def _disc(picture: np.ndarray, x: float, y: float, diameter: float, colour: tuple[int, int, int]) -> None:
+def _disc(
+    picture: np.ndarray, x: float, y: float, diameter: float, colour: tuple[int, int, int]
+) -> None:
     u_0, v_0, r = 640.0 + SCALE * x, 360.0 - SCALE * y, SCALE * diameter / 2
     left, top = max(int(u_0 - r) - 2, 0), max(int(v_0 - r) - 2, 0)
     right, bottom = min(int(u_0 + r) + 3, SIZE[0]), min(int(v_0 + r) + 3, SIZE[1])

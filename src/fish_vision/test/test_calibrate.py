@@ -66,8 +66,12 @@ def pictures(rays: np.ndarray) -> list[np.ndarray]:
 
 
 def test_lens_is_recovered_from_chessboards(pictures: list[np.ndarray]) -> None:
-    lens, rms, used = lens_from_chessboards([*pictures, np.zeros_like(pictures[0])], CORNERS, SQUARE)
-    assert used == list(range(6)) and rms < 0.15 and lens.size == SIZE
+    lens, rms, used = lens_from_chessboards(
+        [*pictures, np.zeros_like(pictures[0])], CORNERS, SQUARE
+    )
+    assert used == list(range(6))
+    assert rms < 0.15
+    assert lens.size == SIZE
     u, v = np.meshgrid(np.linspace(60, 420, 9), np.linspace(50, 310, 7))  # where boards were
     pixels = np.column_stack([u.ravel(), v.ravel()])
     error = (undistort(pixels, lens) - undistort(pixels, TRUE)) * 400  # in pixels
@@ -82,21 +86,23 @@ def test_too_few_boards_are_refused(pictures: list[np.ndarray]) -> None:
 
 @pytest.mark.parametrize("number", [0, 1], ids=["square to the camera", "tilted"])
 def test_copies_of_one_picture_are_refused(pictures: list[np.ndarray], number: int) -> None:
-    with pytest.raises(CalibrationError, match="tilts differ by 0.0 deg.*tilt the board"):
+    with pytest.raises(CalibrationError, match=r"tilts differ by 0.0 deg.*tilt the board"):
         lens_from_chessboards([pictures[number]] * 4, CORNERS, SQUARE)
 
 
 def test_boards_that_are_not_tilted_are_refused(rays: np.ndarray) -> None:
     places = [(-0.15, -0.1, 0.5), (-0.25, -0.15, 0.6), (-0.05, -0.12, 0.55), (-0.2, -0.02, 0.6)]
     flat = [board_picture(rays, 3, (0.0, 0.0, 0.0), place) for place in places]
-    with pytest.raises(CalibrationError, match="tilts differ by .* expected 15 or more"):
+    with pytest.raises(CalibrationError, match=r"tilts differ by .* expected 15 or more"):
         lens_from_chessboards(flat, CORNERS, SQUARE)
 
 
 def test_an_uncertain_focal_length_is_refused(pictures: list[np.ndarray]) -> None:
     """Two poses, one of them square to the camera: the fit is good, and its focal length 9 % wrong."""
     few = [pictures[0], pictures[0], pictures[1], pictures[1]]
-    with pytest.raises(CalibrationError, match=r"focal length uncertain by [4-7]\.. %: expected 3 % at most"):
+    with pytest.raises(
+        CalibrationError, match=r"focal length uncertain by [4-7]\.. %: expected 3 % at most"
+    ):
         lens_from_chessboards(few, CORNERS, SQUARE)
 
 
@@ -115,16 +121,22 @@ def test_pictures_of_different_sizes_are_refused(pictures: list[np.ndarray]) -> 
 
 
 def corners_and_pixels(height: float) -> tuple[np.ndarray, np.ndarray]:
-    points = np.array([[2.135, 1.065], [-2.135, 1.065], [-2.135, -1.065], [2.135, -1.065], [0.0, 1.065]])
-    lens = Lens.from_camera_info(1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07])
-    return np.column_stack([points, np.full(5, height)]), Calibration(lens, MOUNT, height).pool_to_pixel(
-        points
+    points = np.array(
+        [[2.135, 1.065], [-2.135, 1.065], [-2.135, -1.065], [2.135, -1.065], [0.0, 1.065]]
     )
+    lens = Lens.from_camera_info(
+        1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07]
+    )
+    return np.column_stack([points, np.full(5, height)]), Calibration(
+        lens, MOUNT, height
+    ).pool_to_pixel(points)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.2])
 def test_mount_is_recovered_from_the_pool_corners(height: float) -> None:
-    lens = Lens.from_camera_info(1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07])
+    lens = Lens.from_camera_info(
+        1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07]
+    )
     mount, rms = mount_from_points(lens, *corners_and_pixels(height))
     np.testing.assert_allclose(mount.position, MOUNT.position, atol=1e-5)
     np.testing.assert_allclose(mount.tilt, MOUNT.tilt, atol=1e-5)
@@ -132,7 +144,9 @@ def test_mount_is_recovered_from_the_pool_corners(height: float) -> None:
 
 
 def test_mount_from_points_read_to_a_pixel_is_good_to_millimetres() -> None:
-    lens = Lens.from_camera_info(1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07])
+    lens = Lens.from_camera_info(
+        1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07]
+    )
     points, pixels = corners_and_pixels(0.0)
     mount, rms = mount_from_points(lens, points, np.round(pixels))
     assert 0.0 < rms < 1.0
@@ -150,7 +164,10 @@ def test_points_that_are_no_numbers_are_refused(bad: float) -> None:
 
 @pytest.mark.parametrize(
     ("points", "message"),
-    [([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "at least 4"), ([[x, 0, 0] for x in range(5)], "one line")],
+    [
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "at least 4"),
+        ([[x, 0, 0] for x in range(5)], "one line"),
+    ],
 )
 def test_points_that_fix_no_pose_are_refused(points: list, message: str) -> None:
     with pytest.raises(CalibrationError, match=message):
@@ -160,9 +177,11 @@ def test_points_that_fix_no_pose_are_refused(points: list, message: str) -> None
 @pytest.mark.parametrize("height", [0.0, 0.2])
 def test_a_camera_below_the_points_is_refused(height: float) -> None:
     points, pixels = corners_and_pixels(height)
-    lens = Lens.from_camera_info(1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07])
+    lens = Lens.from_camera_info(
+        1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07]
+    )
     for mirrored in (points * [1, -1, 1], points[[3, 2, 1, 0, 4]]):
-        with pytest.raises(CalibrationError, match="not above the points.*is y counted downwards"):
+        with pytest.raises(CalibrationError, match=r"not above the points.*is y counted downwards"):
             mount_from_points(lens, mirrored[:4], pixels[:4])
 
 

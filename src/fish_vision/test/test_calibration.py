@@ -35,7 +35,9 @@ def test_untilted_pinhole_is_a_similar_triangle() -> None:
 def test_markers_above_the_water_appear_larger_by_their_height() -> None:
     mount = Mount((0.0, 0.0, 3.0), (0.0, 0.0, 0.0))
     low, high = Calibration(lens(()), mount), Calibration(lens(()), mount, plane_height=0.3)
-    np.testing.assert_allclose(high.pixel_to_pool([[900, 500]]), 0.9 * low.pixel_to_pool([[900, 500]]))
+    np.testing.assert_allclose(
+        high.pixel_to_pool([[900, 500]]), 0.9 * low.pixel_to_pool([[900, 500]])
+    )
 
 
 def test_undistort_inverts_the_plumb_bob_formula_at_the_image_edge() -> None:
@@ -65,12 +67,16 @@ def test_undistort_inverts_the_rational_formula_too() -> None:
     x_d = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
     y_d = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
     pixels = np.column_stack([634 + 1000 * x_d, 366 + 1000 * y_d])
-    np.testing.assert_allclose(undistort(pixels, rational_lens()), np.column_stack([x, y]), atol=1e-8)
+    np.testing.assert_allclose(
+        undistort(pixels, rational_lens()), np.column_stack([x, y]), atol=1e-8
+    )
 
 
 def test_a_lens_without_distortion_needs_no_model() -> None:
     bare = Lens.from_camera_info(1280, 720, "", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [])
-    np.testing.assert_allclose(undistort(np.array([[734.0, 566.0]]), bare), [[0.1, 0.2]], atol=1e-12)
+    np.testing.assert_allclose(
+        undistort(np.array([[734.0, 566.0]]), bare), [[0.1, 0.2]], atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("height", [0.0, 0.05])
@@ -108,8 +114,14 @@ def test_no_points_give_no_points() -> None:
     [
         ((0, 720, "plumb_bob", [1.0] * 9, []), "0 x 720"),
         ((1280, 0, "plumb_bob", [1.0] * 9, []), "1280 x 0"),
-        ((1280, 720, "plumb_bob", [1e3, 0.0, 640.0, 0.0, 0.0, 360.0, 0.0, 0.0, 1.0], []), "1000.0, 0.0"),
-        ((1280, 720, "plumb_bob", [0.0, 0.0, 640.0, 0.0, 1e3, 360.0, 0.0, 0.0, 1.0], []), "0.0, 1000.0"),
+        (
+            (1280, 720, "plumb_bob", [1e3, 0.0, 640.0, 0.0, 0.0, 360.0, 0.0, 0.0, 1.0], []),
+            "1000.0, 0.0",
+        ),
+        (
+            (1280, 720, "plumb_bob", [0.0, 0.0, 640.0, 0.0, 1e3, 360.0, 0.0, 0.0, 1.0], []),
+            "0.0, 1000.0",
+        ),
         ((1280, 720, "plumb_bob", [0.0] * 9, [0.0] * 5), "not calibrated"),
         ((1280, 720, "plumb_bob", [float("nan")] * 9, []), "not finite"),
         ((1280, 720, "plumb_bob", [1e-300] * 9, []), "not calibrated"),
@@ -126,7 +138,10 @@ def test_unusable_camera_info_is_refused_with_the_reason(fields: tuple, message:
 @pytest.mark.parametrize(
     "mount",
     [
-        *(Mount((x, y, 3.0), (0.0,) * 3) for x, y in ((9.0, 0.0), (-9.0, 0.0), (0.0, 9.0), (0.0, -9.0))),
+        *(
+            Mount((x, y, 3.0), (0.0,) * 3)
+            for x, y in ((9.0, 0.0), (-9.0, 0.0), (0.0, 9.0), (0.0, -9.0))
+        ),
         Mount((0.0, 0.0, 3.0), (3.1, 0.0, 0.0)),
         Mount((0.0, 0.0, -3.0), (0.0, 0.0, 0.0)),
     ],
@@ -138,14 +153,14 @@ def test_a_mount_that_does_not_see_the_pool_is_refused(mount: Mount) -> None:
 
 @pytest.mark.parametrize("height", [0.0, 0.3])
 def test_a_camera_in_the_plane_of_the_markers_is_refused(height: float) -> None:
-    with pytest.raises(CalibrationError, match="camera_position.*in the plane of the markers"):
+    with pytest.raises(CalibrationError, match=r"camera_position.*in the plane of the markers"):
         Calibration(lens(), Mount((0.0, 0.0, height), (0.0, 0.0, 0.0)), height)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.3])
 def test_a_camera_under_the_water_is_refused(height: float) -> None:
     """It looks up at the pool's centre, which is in the picture, but mirrored."""
-    with pytest.raises(CalibrationError, match="in the plane of the markers.*or below it"):
+    with pytest.raises(CalibrationError, match=r"in the plane of the markers.*or below it"):
         Calibration(lens(), Mount((0.0, 0.0, -3.0), (np.pi, 0.0, 0.0)), height)
 
 
@@ -184,5 +199,5 @@ def test_a_broken_lens_file_is_refused_with_its_name(tmp_path: Path, text: str |
     path = tmp_path / "bad.yaml"
     if text is not None:
         path.write_text(text)
-    with pytest.raises(CalibrationError, match="bad.yaml"):
+    with pytest.raises(CalibrationError, match=r"bad.yaml"):
         read_lens(path)

@@ -10,11 +10,11 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pool_picture import CONFIG, calibration, discs_of_fish, draw  # noqa: E402
+from pool_picture import CONFIG, calibration, discs_of_fish, draw
 
-from fish_vision.calibration import lens_document  # noqa: E402
-from fish_vision.commands import calibrate, check_image  # noqa: E402
-from fish_vision.config import config_from_file  # noqa: E402
+from fish_vision.calibration import lens_document
+from fish_vision.commands import calibrate, check_image
+from fish_vision.config import config_from_file
 
 
 def call(command, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
@@ -30,23 +30,42 @@ def files(tmp_path: Path) -> Path:
     points = np.array([[2.0, 1.0], [-2.0, 1.0], [-2.0, -1.0], [2.0, -1.0]])
     rows = np.column_stack([points, calibration().pool_to_pixel(points)])
     np.savetxt(tmp_path / "points.csv", rows, delimiter=",", header="x,y,u,v", comments="")
-    mount = {"camera_position": list(CONFIG.camera_position), "camera_tilt": list(CONFIG.camera_tilt)}
+    mount = {
+        "camera_position": list(CONFIG.camera_position),
+        "camera_tilt": list(CONFIG.camera_tilt),
+    }
     (tmp_path / "params.yaml").write_text(yaml.safe_dump({"/**": {"ros__parameters": mount}}))
     cv2.imwrite(str(tmp_path / "fish.png"), draw(discs_of_fish(0.5, 0.2, 1.0)))
     return tmp_path
 
 
 def test_check_image_prints_the_pose_and_draws_it(files: Path, monkeypatch, capsys) -> None:
-    arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / "out.png")
+    arguments = (
+        "--lens",
+        files / "lens.yaml",
+        "--params",
+        files / "params.yaml",
+        "--out",
+        files / "out.png",
+    )
     assert call(check_image, monkeypatch, files / "fish.png", *arguments) == 0
     printed = capsys.readouterr().out
-    assert "head +0.5" in printed and "+0.2" in printed and "heading +1.0" in printed
+    assert "head +0.5" in printed
+    assert "+0.2" in printed
+    assert "heading +1.0" in printed
     assert cv2.imread(str(files / "out.png")).shape == (720, 1280, 3)
 
 
 def test_check_image_says_what_is_missing(files: Path, monkeypatch, capsys) -> None:
     cv2.imwrite(str(files / "empty.png"), draw([]))
-    arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / "out.png")
+    arguments = (
+        "--lens",
+        files / "lens.yaml",
+        "--params",
+        files / "params.yaml",
+        "--out",
+        files / "out.png",
+    )
     assert call(check_image, monkeypatch, files / "empty.png", *arguments) == 1
     assert "no front marker" in capsys.readouterr().out
     assert call(check_image, monkeypatch, files / "none.png", "--lens", files / "lens.yaml") == 1
@@ -57,20 +76,37 @@ def test_check_image_says_what_is_missing(files: Path, monkeypatch, capsys) -> N
 def test_check_image_says_in_one_line_that_it_cannot_write(
     files: Path, monkeypatch, capsys, name: str
 ) -> None:
-    arguments = ("--lens", files / "lens.yaml", "--params", files / "params.yaml", "--out", files / name)
+    arguments = (
+        "--lens",
+        files / "lens.yaml",
+        "--params",
+        files / "params.yaml",
+        "--out",
+        files / name,
+    )
     assert call(check_image, monkeypatch, files / "fish.png", *arguments) == 1
     error = capsys.readouterr().err
-    assert error.startswith("check_image: ") and name in error and error.count("\n") == 1
+    assert error.startswith("check_image: ")
+    assert name in error
+    assert error.count("\n") == 1
 
 
 def test_calibrate_mount_names_the_line_that_is_no_number(files: Path, monkeypatch, capsys) -> None:
     rows = (files / "points.csv").read_text().splitlines()
     rows[2] = "nan,1,2,3"
     (files / "points.csv").write_text("\n".join(rows))
-    mount = ("mount", files / "points.csv", "--lens", files / "lens.yaml", "--out", files / "mount.yaml")
+    mount = (
+        "mount",
+        files / "points.csv",
+        "--lens",
+        files / "lens.yaml",
+        "--out",
+        files / "mount.yaml",
+    )
     assert call(calibrate, monkeypatch, *mount) == 1
     error = capsys.readouterr().err
-    assert "points.csv: line 3 has [nan, 1.0, 2.0, 3.0]" in error and error.count("\n") == 1
+    assert "points.csv: line 3 has [nan, 1.0, 2.0, 3.0]" in error
+    assert error.count("\n") == 1
     assert not (files / "mount.yaml").exists()
 
 
@@ -95,7 +131,14 @@ def test_calibrate_lens_refuses_a_square_without_a_size(
 
 
 def test_calibrate_mount_writes_params_of_the_tracker(files: Path, monkeypatch, capsys) -> None:
-    arguments = ("mount", files / "points.csv", "--lens", files / "lens.yaml", "--out", files / "mount.yaml")
+    arguments = (
+        "mount",
+        files / "points.csv",
+        "--lens",
+        files / "lens.yaml",
+        "--out",
+        files / "mount.yaml",
+    )
     assert call(calibrate, monkeypatch, *arguments) == 0
     config = config_from_file(files / "mount.yaml")
     assert config.camera_position == pytest.approx(CONFIG.camera_position, abs=1e-4)
@@ -105,23 +148,37 @@ def test_calibrate_mount_writes_params_of_the_tracker(files: Path, monkeypatch, 
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [("x,y\n1,2\n", "header x,y,u,v"), ("x,y,u,v\n1,2,3,a\n", "header x,y,u,v"), ("x,y,u,v\n", "at least 4")],
+    [
+        ("x,y\n1,2\n", "header x,y,u,v"),
+        ("x,y,u,v\n1,2,3,a\n", "header x,y,u,v"),
+        ("x,y,u,v\n", "at least 4"),
+    ],
 )
 def test_calibrate_mount_refuses_other_files(
     files: Path, monkeypatch, capsys, content: str, message: str
 ) -> None:
     (files / "points.csv").write_text(content)
-    assert call(calibrate, monkeypatch, "mount", files / "points.csv", "--lens", files / "lens.yaml") == 1
+    assert (
+        call(calibrate, monkeypatch, "mount", files / "points.csv", "--lens", files / "lens.yaml")
+        == 1
+    )
     error = capsys.readouterr().err
-    assert message in error and error.count("\n") == 1
+    assert message in error
+    assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda rows: rows * [1, -1, 1, 1], "is y counted downwards"),
-        (lambda rows: np.column_stack([rows[:, :2], rows[::-1, 2:]]), "in another order than the pixels"),
-        (lambda rows: np.column_stack([rows[:, :2], np.full((4, 2), 100.0)]), "no camera sees the points"),
+        (
+            lambda rows: np.column_stack([rows[:, :2], rows[::-1, 2:]]),
+            "in another order than the pixels",
+        ),
+        (
+            lambda rows: np.column_stack([rows[:, :2], np.full((4, 2), 100.0)]),
+            "no camera sees the points",
+        ),
     ],
     ids=["y downwards", "pixels in reverse", "one pixel"],
 )
@@ -130,19 +187,32 @@ def test_calibrate_mount_refuses_points_that_no_camera_above_sees(
 ) -> None:
     rows = change(np.loadtxt(files / "points.csv", delimiter=",", skiprows=1))
     np.savetxt(files / "points.csv", rows, delimiter=",", header="x,y,u,v", comments="")
-    mount = ("mount", files / "points.csv", "--lens", files / "lens.yaml", "--out", files / "mount.yaml")
+    mount = (
+        "mount",
+        files / "points.csv",
+        "--lens",
+        files / "lens.yaml",
+        "--out",
+        files / "mount.yaml",
+    )
     assert call(calibrate, monkeypatch, *mount) == 1
     error = capsys.readouterr().err
-    assert message in error and error.count("\n") == 1
+    assert message in error
+    assert error.count("\n") == 1
     assert not (files / "mount.yaml").exists()
 
 
-def test_check_image_says_which_parameter_has_the_wrong_type(files: Path, monkeypatch, capsys) -> None:
+def test_check_image_says_which_parameter_has_the_wrong_type(
+    files: Path, monkeypatch, capsys
+) -> None:
     params = files / "params.yaml"
     params.write_text("/**: {ros__parameters: {tail_links: 3.0}}")
     arguments = ("--lens", files / "lens.yaml", "--params", params, "--out", files / "out.png")
     assert call(check_image, monkeypatch, files / "fish.png", *arguments) == 1
-    assert capsys.readouterr().err == f"check_image: {params}: tail_links is 3.0, expected int such as 3\n"
+    assert (
+        capsys.readouterr().err
+        == f"check_image: {params}: tail_links is 3.0, expected int such as 3\n"
+    )
 
 
 def test_calibrate_mount_refuses_mistaken_points(files: Path, monkeypatch, capsys) -> None:
@@ -150,7 +220,10 @@ def test_calibrate_mount_refuses_mistaken_points(files: Path, monkeypatch, capsy
     x, y, u, v = rows[1].split(",")
     rows[1] = ",".join([x, y, str(float(u) - 80), v])
     (files / "points.csv").write_text("\n".join(rows))
-    assert call(calibrate, monkeypatch, "mount", files / "points.csv", "--lens", files / "lens.yaml") == 1
+    assert (
+        call(calibrate, monkeypatch, "mount", files / "points.csv", "--lens", files / "lens.yaml")
+        == 1
+    )
     assert "mistaken" in capsys.readouterr().err
 
 
@@ -158,5 +231,10 @@ def test_calibrate_lens_refuses_pictures_without_a_board(files: Path, monkeypatc
     arguments = ("lens", files / "fish.png", "--corners", "7x5", "--square", "0.05")
     assert call(calibrate, monkeypatch, *arguments) == 1
     assert "found in 0 of 1" in capsys.readouterr().err
-    assert call(calibrate, monkeypatch, "lens", files / "fish.png", "--corners", "7", "--square", "0.05") == 1
+    assert (
+        call(
+            calibrate, monkeypatch, "lens", files / "fish.png", "--corners", "7", "--square", "0.05"
+        )
+        == 1
+    )
     assert "expected like 8x6" in capsys.readouterr().err

@@ -7,7 +7,9 @@ import pytest
 from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
 
 SIZE = (32, 24)
-PICTURE = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (24, 32, 3)).astype(np.uint8), (5, 5), 2)
+PICTURE = cv2.GaussianBlur(
+    np.random.default_rng(0).integers(0, 256, (24, 32, 3)).astype(np.uint8), (5, 5), 2
+)
 
 
 def test_jpeg_goes_there_and_back() -> None:
@@ -28,7 +30,8 @@ def test_raw_encodings_and_padded_rows(encoding: str, channels: list[int]) -> No
 def test_yuyv_grey_is_grey() -> None:
     data = np.tile(np.array([120, 128], np.uint8), 32 * 24).tobytes()
     picture = from_raw(data, "yuv422_yuy2", 32, 24, 64, SIZE)
-    assert picture.shape == (24, 32, 3) and np.ptp(picture) <= 1
+    assert picture.shape == (24, 32, 3)
+    assert np.ptp(picture) <= 1
 
 
 def test_yuyv_keeps_its_colours() -> None:
@@ -62,7 +65,9 @@ def test_broken_jpeg_is_refused_with_the_reason(data: bytes, message: str) -> No
 
 def test_a_padded_jpeg_is_taken_and_an_early_end_marker_hides_no_cut() -> None:
     data = to_jpeg(PICTURE)
-    np.testing.assert_array_equal(from_compressed(data + bytes(60), SIZE), from_compressed(data, SIZE))
+    np.testing.assert_array_equal(
+        from_compressed(data + bytes(60), SIZE), from_compressed(data, SIZE)
+    )
     with_thumbnail = data[:100] + b"\xff\xd9" + data[100:300]
     with pytest.raises(PictureError, match="cut off after 302 bytes"):
         from_compressed(with_thumbnail, SIZE)

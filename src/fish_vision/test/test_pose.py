@@ -34,9 +34,8 @@ def seen(pose: tuple[float, float, float], layout: MarkerLayout) -> tuple[Spot, 
 @pytest.mark.parametrize("heading", [-3.1, -pi / 2, 0.0, 1.0, 3.1])
 def test_pose_is_recovered(layout: MarkerLayout, heading: float) -> None:
     head = head_pose(*seen((0.3, -0.8, heading), layout), layout)
-    assert (head.x, head.y) == pytest.approx((0.3, -0.8)) and wrap(head.heading - heading) == pytest.approx(
-        0.0
-    )
+    assert (head.x, head.y) == pytest.approx((0.3, -0.8))
+    assert wrap(head.heading - heading) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("layout", [LAYOUT, ODD])
@@ -46,7 +45,9 @@ def test_covariance_is_that_of_the_markers_carried_through_the_pose(layout: Mark
     a, b = np.array([[2.0, 0.5], [0.5, 1.0]]) * 1e-7, np.array([[1.0, -0.3], [-0.3, 3.0]]) * 1e-7
 
     def pose(shift: np.ndarray) -> np.ndarray:
-        head = head_pose(Spot(front.position + shift[:2], a), Spot(rear.position + shift[2:], b), layout)
+        head = head_pose(
+            Spot(front.position + shift[:2], a), Spot(rear.position + shift[2:], b), layout
+        )
         return np.array([head.x, head.y, head.heading])
 
     h = 1e-6
@@ -64,7 +65,10 @@ def test_spacing_is_the_distance_of_the_markers_however_they_sit() -> None:
 def test_the_pair_with_the_right_distance_is_picked() -> None:
     front, rear = seen((0.0, 0.0, 0.0), LAYOUT)
     stray, almost = spot(1.0, 1.0), spot(-0.036, 0.0)  # almost: 10 % too near to the front marker
-    assert pick_head([stray, front], [almost, rear, spot(1.0, 1.05)], LAYOUT.spacing, 0.15) == (front, rear)
+    assert pick_head([stray, front], [almost, rear, spot(1.0, 1.05)], LAYOUT.spacing, 0.15) == (
+        front,
+        rear,
+    )
     assert pick_head([front], [almost], LAYOUT.spacing, 0.15) == (front, almost)
     assert pick_head([front], [almost], LAYOUT.spacing, 0.09) is None
     assert pick_head([stray], [rear], LAYOUT.spacing, 0.15) is None
@@ -99,7 +103,10 @@ def test_a_tail_marker_to_the_left_counts_negative() -> None:
 def test_a_chain_with_a_hole_has_no_angles() -> None:
     pose = (0.5, 0.1, 1.0)
     one, _, three = chain(pose, [0.1, 0.1, 0.1])
-    assert tail_angles(HeadPose(*pose, np.eye(3)), [[one, three], [], [one, three]], LAYOUT, 0.008) is None
+    assert (
+        tail_angles(HeadPose(*pose, np.eye(3)), [[one, three], [], [one, three]], LAYOUT, 0.008)
+        is None
+    )
 
 
 @pytest.mark.parametrize("share", [1.0 - 0.009 / 0.0233, 1.0 + 0.009 / 0.0233])

@@ -11,7 +11,9 @@ YELLOW = ColourRange(20, 36, 110, 90)
 BGR = {"red": (35, 55, 240), "yellow": (0, 215, 255), "white": (255, 255, 255)}
 
 
-def picture(discs: list[tuple[float, float, float, str]], ground: int = 55, noise: float = 0.0) -> np.ndarray:
+def picture(
+    discs: list[tuple[float, float, float, str]], ground: int = 55, noise: float = 0.0
+) -> np.ndarray:
     """(40, 60, 3) grey picture with discs (u, v, radius, colour), 16 x 16 subpixels per pixel."""
     fine = 16
     u = (np.arange(60 * fine) + 0.5) / fine - 0.5
@@ -25,7 +27,9 @@ def picture(discs: list[tuple[float, float, float, str]], ground: int = 55, nois
     return np.clip(np.round(result), 0, 255).astype(np.uint8)
 
 
-def blobs(image: np.ndarray, colour: ColourRange, area: tuple[float, float] = (10.0, 300.0)) -> list:
+def blobs(
+    image: np.ndarray, colour: ColourRange, area: tuple[float, float] = (10.0, 300.0)
+) -> list:
     return find_blobs(hsv_of(image, (0, 0, image.shape[1], image.shape[0])), colour, area)
 
 
@@ -33,7 +37,8 @@ def blobs(image: np.ndarray, colour: ColourRange, area: tuple[float, float] = (1
 @pytest.mark.parametrize("radius", [2.5, 4.8])
 def test_middle_is_found_far_finer_than_a_pixel(shift: float, radius: float) -> None:
     [blob] = blobs(picture([(30 + shift, 20 - shift, radius, "yellow")], noise=3.0), YELLOW)
-    assert blob.u == pytest.approx(30 + shift, abs=0.07) and blob.v == pytest.approx(20 - shift, abs=0.07)
+    assert blob.u == pytest.approx(30 + shift, abs=0.07)
+    assert blob.v == pytest.approx(20 - shift, abs=0.07)
     assert blob.area == pytest.approx(np.pi * radius**2, rel=0.15)
 
 
@@ -41,7 +46,8 @@ def test_hue_range_may_wrap_through_red() -> None:
     image = picture([(20, 20, 5, "red"), (45, 20, 5, "yellow")])
     [red] = blobs(image, RED)
     [yellow] = blobs(image, YELLOW)
-    assert red.u == pytest.approx(20, abs=0.05) and yellow.u == pytest.approx(45, abs=0.05)
+    assert red.u == pytest.approx(20, abs=0.05)
+    assert yellow.u == pytest.approx(45, abs=0.05)
 
 
 def test_glare_has_no_colour() -> None:
@@ -58,7 +64,8 @@ def test_blobs_out_of_the_area_range_are_left_out_and_the_largest_is_first() -> 
 
 def test_a_blob_at_the_edge_is_measured_as_far_as_it_is_seen() -> None:
     [blob] = blobs(picture([(0, 20, 5, "yellow")]), YELLOW)
-    assert 0.0 < blob.u < 4.0 and blob.v == pytest.approx(20, abs=0.05)
+    assert 0.0 < blob.u < 4.0
+    assert blob.v == pytest.approx(20, abs=0.05)
 
 
 def test_pictures_of_noise_do_no_harm() -> None:
@@ -85,7 +92,9 @@ def test_hues_at_the_edge_of_a_blob_may_leave_the_range_by_a_little(
     colour: ColourRange, expected: list[int]
 ) -> None:
     near = colour.near(np.arange(180, dtype=np.uint8))
-    assert set(np.flatnonzero(near)) == set(expected)  # 8 half degrees either side, round the circle
+    assert set(np.flatnonzero(near)) == set(
+        expected
+    )  # 8 half degrees either side, round the circle
 
 
 def test_mask_agrees_with_a_slow_comparison() -> None:

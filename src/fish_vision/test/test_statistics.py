@@ -9,7 +9,9 @@ from fish_vision.tracker import Detection, Lost, Reason
 
 
 def detection(spacing: float, whole_image: bool = False) -> Detection:
-    return Detection(0.0, HeadPose(0.0, 0.0, 0.0, np.eye(3)), None, spacing, (0, 0, 1, 1), whole_image)
+    return Detection(
+        0.0, HeadPose(0.0, 0.0, 0.0, np.eye(3)), None, spacing, (0, 0, 1, 1), whole_image
+    )
 
 
 def test_results_and_refusals_are_counted_by_kind() -> None:
@@ -19,15 +21,19 @@ def test_results_and_refusals_are_counted_by_kind() -> None:
     statistics.add(Lost(0.0, Reason.JUMP), 0.006, 0.06)
     statistics.refuse("bad image", "JPEG cut off")
     values = statistics.values()
-    assert statistics.images == 2 and values["tracked"] == values["from_whole_image"] == "1"
-    assert values["refused: bad image"] == "1" and statistics.last_error == "JPEG cut off"
+    assert statistics.images == 2
+    assert values["tracked"] == values["from_whole_image"] == "1"
+    assert values["refused: bad image"] == "1"
+    assert statistics.last_error == "JPEG cut off"
     assert statistics.last_reason == Reason.JUMP.value
     assert values[f"lost: {Reason.JUMP.value}"] == "1"
     assert float(values["processing_ms_p50"]) == pytest.approx(5.0)
     assert float(values["stamp_to_pose_ms_p99"]) == pytest.approx(60.0)
 
 
-@pytest.mark.parametrize(("spacing", "wrong"), [(1.0, False), (1.049, False), (1.051, True), (0.949, True)])
+@pytest.mark.parametrize(
+    ("spacing", "wrong"), [(1.0, False), (1.049, False), (1.051, True), (0.949, True)]
+)
 def test_a_wrong_marker_spacing_shows_after_enough_poses(spacing: float, wrong: bool) -> None:
     statistics = Statistics()
     for _ in range(SPACINGS - 1):

@@ -10,10 +10,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pool_picture import CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw  # noqa: E402
+from pool_picture import CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw
 
-from fish_vision.annotate import annotated, tail_points  # noqa: E402
-from fish_vision.tracker import Detection, Lost, Reason, Tracker  # noqa: E402
+from fish_vision.annotate import annotated, tail_points
+from fish_vision.tracker import Detection, Lost, Reason, Tracker
 
 
 @pytest.fixture
@@ -34,16 +34,22 @@ def reason(found: Detection | Lost) -> Reason:
 @pytest.mark.parametrize(
     "pose", [(0.0, 0.0, 0.0), (1.9, 0.9, 2.5), (-1.95, -0.9, -2.0), (-0.5, 0.4, -pi / 2)]
 )
-def test_pose_is_found_and_then_followed(tracker: Tracker, pose: tuple[float, float, float]) -> None:
+def test_pose_is_found_and_then_followed(
+    tracker: Tracker, pose: tuple[float, float, float]
+) -> None:
     tail = (0.3, -0.2, 0.1)
     first = seen(tracker.track(draw(discs_of_fish(*pose, tail)), 1.0))
-    second = seen(tracker.track(draw(discs_of_fish(pose[0] - 0.01, pose[1], pose[2] + 0.05, tail)), 1.033))
-    assert first.whole_image and not second.whole_image
+    second = seen(
+        tracker.track(draw(discs_of_fish(pose[0] - 0.01, pose[1], pose[2] + 0.05, tail)), 1.033)
+    )
+    assert first.whole_image
+    assert not second.whole_image
     for found, (dx, turn) in ((first, (0.0, 0.0)), (second, (-0.01, 0.05))):
         assert found.head.x == pytest.approx(pose[0] + dx, abs=5e-4)
         assert found.head.y == pytest.approx(pose[1], abs=5e-4)
         assert found.head.heading == pytest.approx(pose[2] + turn, abs=0.006)
-        assert found.tail == pytest.approx(tail, abs=0.08) and found.spacing == pytest.approx(1.0, abs=0.01)
+        assert found.tail == pytest.approx(tail, abs=0.08)
+        assert found.spacing == pytest.approx(1.0, abs=0.01)
 
 
 def test_an_empty_pool_has_no_front_marker(tracker: Tracker) -> None:
@@ -112,7 +118,8 @@ def test_a_stamp_that_goes_back_starts_again(tracker: Tracker) -> None:
 def test_without_a_tail_marker_the_head_is_still_found(tracker: Tracker) -> None:
     discs = [d for d in discs_of_fish(0.3, 0.3, 2.0) if d[3] != "even"]
     found = seen(tracker.track(draw(discs), 0.0))
-    assert found.tail is None and found.head.heading == pytest.approx(2.0, abs=0.006)
+    assert found.tail is None
+    assert found.head.heading == pytest.approx(2.0, abs=0.006)
 
 
 def test_a_fish_without_marked_tail() -> None:
@@ -149,7 +156,9 @@ def changed(drawn: np.ndarray, picture: np.ndarray, x: float, y: float) -> bool:
     return bool(np.any(drawn[part] != picture[part]))
 
 
-def test_the_annotated_picture_points_where_the_fish_looks_and_follows_its_tail(tracker: Tracker) -> None:
+def test_the_annotated_picture_points_where_the_fish_looks_and_follows_its_tail(
+    tracker: Tracker,
+) -> None:
     discs = discs_of_fish(0.3, 0.3, 2.0, (0.4, -0.2, 0.3))
     picture = draw(discs)
     before = picture.copy()
@@ -157,8 +166,11 @@ def test_the_annotated_picture_points_where_the_fish_looks_and_follows_its_tail(
     drawn = annotated(picture, found, CONFIG, calibration())
     np.testing.assert_array_equal(picture, before)
     along = np.array([cos(2.0), sin(2.0)])
-    assert changed(drawn, picture, *(0.3 + 0.2 * along)) and not changed(drawn, picture, *(0.3 - 0.2 * along))
-    assert all(changed(drawn, picture, x, y) for x in (-1.5, 1.5) for y in (-1.065, 1.065))  # the walls
+    assert changed(drawn, picture, *(0.3 + 0.2 * along))
+    assert not changed(drawn, picture, *(0.3 - 0.2 * along))
+    assert all(
+        changed(drawn, picture, x, y) for x in (-1.5, 1.5) for y in (-1.065, 1.065)
+    )  # the walls
     links = tail_points(found, CONFIG)[2:]  # after centre of mass and hinge
     np.testing.assert_allclose(links, [disc[:2] for disc in discs[2:]], atol=2e-3)
 

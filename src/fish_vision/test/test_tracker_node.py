@@ -12,18 +12,18 @@ import pytest
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 sys.path.insert(0, str(Path(__file__).parent))
 
-import rclpy  # noqa: E402
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
-from geometry_msgs.msg import PoseWithCovarianceStamped  # noqa: E402
-from pool_picture import CONFIG, discs_of_fish, draw, lens_fields  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.node import Node  # noqa: E402
-from rclpy.qos import ReliabilityPolicy  # noqa: E402
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState  # noqa: E402
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from pool_picture import CONFIG, discs_of_fish, draw, lens_fields
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 
-from fish_vision.config import config_from_file  # noqa: E402
-from fish_vision.nodes.tracker import TrackerNode  # noqa: E402
-from fish_vision.picture import to_jpeg  # noqa: E402
+from fish_vision.config import config_from_file
+from fish_vision.nodes.tracker import TrackerNode
+from fish_vision.picture import to_jpeg
 
 pytestmark = pytest.mark.ros
 DOMAIN = 142
@@ -74,9 +74,17 @@ class Bench:
 
     def send_info(self, **changes: object) -> None:
         width, height, model, k, d = lens_fields()
-        fields = {"width": width, "height": height, "distortion_model": model, "k": k, "d": d} | changes
+        fields = {
+            "width": width,
+            "height": height,
+            "distortion_model": model,
+            "k": k,
+            "d": d,
+        } | changes
         self.info.publish(self._stamped(CameraInfo(**fields)))
-        self.spin_until(lambda: self.tracker._info is not None and list(self.tracker._info[3]) == fields["k"])
+        self.spin_until(
+            lambda: self.tracker._info is not None and list(self.tracker._info[3]) == fields["k"]
+        )
 
     def send_jpeg(self, data: bytes) -> None:
         self.jpeg.publish(self._stamped(CompressedImage(format="jpeg", data=data)))
@@ -84,12 +92,16 @@ class Bench:
     def send_raw(self, picture: np.ndarray, encoding: str) -> None:
         height, width = picture.shape[:2]
         step = picture[0].nbytes
-        msg = Image(height=height, width=width, encoding=encoding, step=step, data=picture.tobytes())
+        msg = Image(
+            height=height, width=width, encoding=encoding, step=step, data=picture.tobytes()
+        )
         self.raw.publish(self._stamped(msg))
 
     def says(self, text: str) -> bool:
         """Whether a diagnostic message with the text comes."""
-        return self.spin_until(lambda: any(text in d.status[0].message for d in self.got["diagnostics"]))
+        return self.spin_until(
+            lambda: any(text in d.status[0].message for d in self.got["diagnostics"])
+        )
 
     def close(self) -> None:
         self.executor.shutdown()
@@ -109,7 +121,8 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
 def test_check_image_reads_a_params_file_as_the_node_does(tmp_path: Path, own_first: bool) -> None:
     parts = ["/**:\n  ros__parameters: {pixel_std: 0.03, max_speed: 1.0}\n"]
     parts.insert(
-        0 if own_first else 1, "/fish/tracker:\n  ros__parameters: {pixel_std: 0.07, tail_links: 2}\n"
+        0 if own_first else 1,
+        "/fish/tracker:\n  ros__parameters: {pixel_std: 0.07, tail_links: 2}\n",
     )
     path = tmp_path / "params.yaml"
     path.write_text("".join(parts))
@@ -127,7 +140,8 @@ def check_pose(msg: PoseWithCovarianceStamped) -> None:
     assert (p.x, p.y, p.z) == pytest.approx((*POSE[:2], 0.0), abs=1e-3)
     assert 2 * atan2(q.z, q.w) == pytest.approx(POSE[2], abs=0.01)
     covariance = np.array(msg.pose.covariance).reshape(6, 6)
-    assert 0 < covariance[0, 0] < 1e-5 and 0 < covariance[5, 5] < 1e-3
+    assert 0 < covariance[0, 0] < 1e-5
+    assert 0 < covariance[5, 5] < 1e-3
     np.testing.assert_allclose(covariance, covariance.T)
     assert (np.diag(covariance)[2:5] > 1e3).all()  # z, roll, pitch are not seen,
     unseen = covariance[2:5] - np.eye(6)[2:5] * covariance[2:5]
@@ -142,8 +156,10 @@ def test_pose_and_tail_come_with_the_stamp_of_the_image(bench: Bench) -> None:
     pose, tail = bench.got["pose"][0], bench.got["tail"][0]
     check_pose(pose)
     assert pose.header.frame_id == tail.header.frame_id == "pool"
-    assert pose.header.stamp.sec == 1000 and pose.header.stamp.nanosec == bench.frame * 33_000_000
-    assert tail.header.stamp == pose.header.stamp and tail.name == ["tail_1", "tail_2", "tail_3"]
+    assert pose.header.stamp.sec == 1000
+    assert pose.header.stamp.nanosec == bench.frame * 33_000_000
+    assert tail.header.stamp == pose.header.stamp
+    assert tail.name == ["tail_1", "tail_2", "tail_3"]
     assert list(tail.position) == pytest.approx([0.3, -0.2, 0.1], abs=0.1)
     assert bench.says("fish seen in all 1 images")
 
@@ -206,7 +222,11 @@ def test_bad_calibrations_are_said_and_a_good_one_mends_it(
     for changes, text in (
         ({"k": [0.0] * 9}, "not calibrated"),
         (
-            {"distortion_model": "equidistant", "d": [0.1] * 4, "k": [901.0] + lens_fields()[3][1:]},
+            {
+                "distortion_model": "equidistant",
+                "d": [0.1] * 4,
+                "k": [901.0, *lens_fields()[3][1:]],
+            },
             "equidistant",
         ),
         ({"k": [1e-300, 0.0, 640.0, 0.0, 1e-300, 360.0, 0.0, 0.0, 1.0]}, "not calibrated"),
@@ -216,7 +236,8 @@ def test_bad_calibrations_are_said_and_a_good_one_mends_it(
         assert bench.says(text)
         assert bench.got["diagnostics"][-1].status[0].level == DiagnosticStatus.ERROR
     said = [line for line in capfd.readouterr().err.splitlines() if "not calibrated" in line]
-    assert len(said) == 1 and "[ERROR]" in said[0]  # on the console too, and once
+    assert len(said) == 1
+    assert "[ERROR]" in said[0]
     bench.send_info()
     bench.send_jpeg(to_jpeg(PICTURE, 95))
     assert bench.spin_until(lambda: bool(bench.got["pose"]))

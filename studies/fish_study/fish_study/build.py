@@ -58,6 +58,7 @@ def make_readings(world: World) -> list[Readings]:
     Raises:
         NoWorld: no program keeps the fish off the walls, or the engine became unstable.
         ValueError: the plant is not known.
+
     """
     random = np.random.default_rng(world.seed)
     if world.plant == "fish_sim":
@@ -74,15 +75,24 @@ def make_readings(world: World) -> list[Readings]:
         from fish_study.mujoco_plant import MujocoPlant, instrument_errors
 
         return _trials(
-            world, lambda count: MujocoPlant.of(world, count, random), instrument_errors(world), random
+            world,
+            lambda count: MujocoPlant.of(world, count, random),
+            instrument_errors(world),
+            random,
         )
     raise ValueError(f"plant: got {world.plant!r}; expected fish_sim or mujoco")
 
 
-def _trials(world: World, make: MakePlant, errors: Errors, random: np.random.Generator) -> list[Readings]:
+def _trials(
+    world: World, make: MakePlant, errors: Errors, random: np.random.Generator
+) -> list[Readings]:
     steps = round(world.duration / PERIOD)
     closed = (
-        world.count if world.trials == "closed" else 0 if world.trials == "one_speed" else world.count // 3
+        world.count
+        if world.trials == "closed"
+        else 0
+        if world.trials == "one_speed"
+        else world.count // 3
     )
     readings = []
     if world.count > closed:
@@ -96,7 +106,12 @@ def _trials(world: World, make: MakePlant, errors: Errors, random: np.random.Gen
 
 
 def _open(
-    world: World, make: MakePlant, errors: Errors, random: np.random.Generator, count: int, steps: int
+    world: World,
+    make: MakePlant,
+    errors: Errors,
+    random: np.random.Generator,
+    count: int,
+    steps: int,
 ) -> Readings:
     """A program whose way fits nowhere into the pool is drawn again, a little slower. Raises NoWorld after TRIES."""
     kinds = np.array([OPEN[i % len(OPEN)] for i in range(count)])

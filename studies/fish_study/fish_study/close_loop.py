@@ -42,14 +42,27 @@ from fish_train.training.closed_loop_equations import Law
 
 Array = NDArray[np.float64]
 
-PATHS, SPEEDS = ("circle:radius=0.6", "figure_eight:length=2.6,width=1.1", "S"), (0.1, 0.15)  # speeds in m/s
+PATHS, SPEEDS = (
+    ("circle:radius=0.6", "figure_eight:length=2.6,width=1.1", "S"),
+    (0.1, 0.15),
+)  # speeds in m/s
 # those between were seen when recipe and plant were chosen
 SEARCH_SEEDS, JUDGE_SEEDS = (1,), (22, 23, 24, 25)
 LINKS = 5
 # of every training: runs are judged through camera, IMU and fusion, on a robot that no model is exactly; with such noise a
 # level of 0.01 m is not passed. What is judged is the path: a fish that holds its speed in a bend leaves it
-TRAINING = ("--set", "randomise=0.2", "latency=0.1", "noise_position=0.003", "noise_heading=0.02", "noise_speed=0.01",
-            "noise_rate=0.05", "thresholds=[0.03,0.02]", "cost_speed=5.0", "cost_setpoint_change=0.2")  # fmt: skip
+TRAINING = (
+    "--set",
+    "randomise=0.2",
+    "latency=0.1",
+    "noise_position=0.003",
+    "noise_heading=0.02",
+    "noise_speed=0.01",
+    "noise_rate=0.05",
+    "thresholds=[0.03,0.02]",
+    "cost_speed=5.0",
+    "cost_setpoint_change=0.2",
+)
 
 
 def loop_world(concealed: str, seed: int, trials: int, duration: float) -> World:
@@ -58,7 +71,9 @@ def loop_world(concealed: str, seed: int, trials: int, duration: float) -> World
     if concealed not in known:
         raise ValueError(f"concealed: got {concealed!r}; expected one of {', '.join(known)}")
     effects = {concealed: known[concealed]} if known[concealed] else {}
-    return World("mujoco", seed, effects, count=trials, duration=duration, plant="mujoco", links=LINKS)
+    return World(
+        "mujoco", seed, effects, count=trials, duration=duration, plant="mujoco", links=LINKS
+    )
 
 
 @dataclass(frozen=True)
@@ -67,7 +82,12 @@ class SecondPlant:
 
     world: World
 
-    def __call__(self, robots: Sequence[Robot], seeds: Sequence[int], disturbance: float = 0.0) -> Plant:  # noqa: ARG002
+    def __call__(
+        self,
+        robots: Sequence[Robot],
+        seeds: Sequence[int],
+        disturbance: float = 0.0,  # noqa: ARG002
+    ) -> Plant:
         """One fish for each robot; `disturbance` is the world's own."""
         return Swimmer(MujocoPlant.of(self.world, len(robots), np.random.default_rng([*seeds, 5])))
 
@@ -80,7 +100,9 @@ class Swimmer:
 
     def step(self, commands: Array) -> None:
         """One period."""
-        with contextlib.suppress(MujocoError):  # the motion says it: NaN of this fish, the others swim on
+        with contextlib.suppress(
+            MujocoError
+        ):  # the motion says it: NaN of this fish, the others swim on
             self._plant.step(commands)
 
     @property
@@ -143,7 +165,9 @@ def _models(plan: Plan, say: Say) -> dict[str, Path]:
     return files
 
 
-def _trained(plan: Plan, robots: Mapping[str, Path | None], jobs: int, say: Say) -> dict[str, Candidate]:
+def _trained(
+    plan: Plan, robots: Mapping[str, Path | None], jobs: int, say: Say
+) -> dict[str, Candidate]:
     """The gains of all trainings on each model, MODEL_SEED, `jobs` of them side by side."""
     say(f"training on the models {', '.join(robots)}, {plan.trainings} times on each")
     runs = list(product(range(1, plan.trainings + 1), robots))
@@ -163,7 +187,9 @@ def _train(plan: Plan, name: str, robot: Path | None, seed: int) -> Path:
     if not weights.exists():
         given = ["--robot", str(robot)] if robot else []
         try:
-            _verb("train", "--out", str(out), "--seed", str(seed), "--resume", *given, *plan.training)
+            _verb(
+                "train", "--out", str(out), "--seed", str(seed), "--resume", *given, *plan.training
+            )
         except UserError:
             # a recipe that this robot cannot swim to its end leaves gains all the same
             if not weights.exists():

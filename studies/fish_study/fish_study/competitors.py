@@ -43,7 +43,9 @@ SEEN = ("surge_speed", "sway_speed", "yaw_rate", "rudder", "rotor_speed", "wall_
 class Rivals:
     """What the competitors say about one world."""
 
-    sindy: str | None  # name of the largest term, its text if it has no name; None: no term is large enough
+    sindy: (
+        str | None
+    )  # name of the largest term, its text if it has no name; None: no term is large enough
     sindy_r2: float  # of the residual force, held out
     neural_r2: float
 
@@ -73,7 +75,9 @@ def _sparse(fitted: MissingForce, unseen: MissingForce) -> tuple[str | None, flo
     B, z = columns(terms(unseen), unseen.wrench)
     middle, scale, size = A.mean(axis=0), A.std(axis=0) + 1e-12, y.std(axis=0) + 1e-12
     law = STLSQ(threshold=THRESHOLD, alpha=1e-3, normalize_columns=False)
-    with warnings.catch_warnings():  # it says so when no term is large enough, which is an answer here
+    with (
+        warnings.catch_warnings()
+    ):  # it says so when no term is large enough, which is an answer here
         warnings.simplefilter("ignore", UserWarning)
         law.fit((A - middle) / scale, (y - y.mean(axis=0)) / size)
     found: Array = np.atleast_2d(law.coef_)
@@ -108,5 +112,8 @@ def columns(library: Mapping[str, Array], wrench: Array) -> tuple[Array, Array]:
 
 def r2(true: Array, predicted: Array) -> float:
     """Mean over the degrees of freedom."""
-    left, all_ = ((true - predicted) ** 2).sum(axis=0), ((true - true.mean(axis=0)) ** 2).sum(axis=0)
+    left, all_ = (
+        ((true - predicted) ** 2).sum(axis=0),
+        ((true - true.mean(axis=0)) ** 2).sum(axis=0),
+    )
     return float(np.mean(1.0 - left / all_))

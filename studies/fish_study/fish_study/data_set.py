@@ -35,7 +35,9 @@ def write_data_set(folder: Path, readings: Sequence[Readings], encoder: bool = T
     number = 0
     for part in readings:
         for m in range(part.commands.shape[1]):
-            write_trial(folder / f"trial_{number:02d}", part, m, START_NS + number * SPACING_NS, encoder)
+            write_trial(
+                folder / f"trial_{number:02d}", part, m, START_NS + number * SPACING_NS, encoder
+            )
             number += 1
 
 
@@ -44,7 +46,10 @@ def write_trial(directory: Path, r: Readings, m: int, start_ns: int, encoder: bo
     batches = [_commands(r, m, start_ns), _imu(r, m, start_ns), _poses(r, m, start_ns)]
     if encoder:
         batches.append(_encoder(r, m, start_ns))
-    arrivals = [(start_ns + np.round(1e9 * (t + LATENCY[topic]))).astype(np.int64) for topic, t, _ in batches]
+    arrivals = [
+        (start_ns + np.round(1e9 * (t + LATENCY[topic]))).astype(np.int64)
+        for topic, t, _ in batches
+    ]
     order = np.argsort(np.concatenate(arrivals), kind="stable")
     which = np.repeat(np.arange(len(batches)), [len(a) for a in arrivals])[order]
     place = np.concatenate([np.arange(len(a)) for a in arrivals])[order]
@@ -63,15 +68,23 @@ def write_trial(directory: Path, r: Readings, m: int, start_ns: int, encoder: bo
             recording.write(topics[b], int(arrivals[b][i]), batches[b][2][i])
 
 
-def serialise(template: Any, stamps_ns: NDArray[np.int64], columns: dict[str, Array]) -> list[bytes]:
+def serialise(
+    template: Any, stamps_ns: NDArray[np.int64], columns: dict[str, Array]
+) -> list[bytes]:
     """Messages like `template` with these stamps and other numbers: path -> (N,) or, for arrays, (N, count)."""
     raw = bytes(typestore().serialize_cdr(template, template.__msgtype__))
     layout = find_layout(raw, template.__msgtype__, typestore().fielddefs, False)
     rows = np.repeat(np.frombuffer(raw, np.uint8)[None], len(stamps_ns), axis=0)
-    values = {"header.stamp.sec": stamps_ns // 10**9, "header.stamp.nanosec": stamps_ns % 10**9, **columns}
+    values = {
+        "header.stamp.sec": stamps_ns // 10**9,
+        "header.stamp.nanosec": stamps_ns % 10**9,
+        **columns,
+    }
     for column in layout.columns:
         if column.path in values:
-            own = np.ascontiguousarray(values[column.path], dtype=column.dtype).reshape(len(rows), -1)
+            own = np.ascontiguousarray(values[column.path], dtype=column.dtype).reshape(
+                len(rows), -1
+            )
             rows[:, column.offset : column.offset + column.nbytes] = own.view(np.uint8)
     return [row.tobytes() for row in rows]
 
@@ -86,7 +99,11 @@ def _commands(r: Readings, m: int, start_ns: int) -> Batch:
     template = build.joints(0, ["rotor", "rudder"], [0.0, 0.0], [0.0, np.nan])
     position = np.column_stack([r.phase[:, m], r.commands[:, m, 1]])
     velocity = np.column_stack([r.commands[:, m, 0], np.full(len(t), np.nan)])
-    return "joint_command", t, serialise(template, stamps, {"position": position, "velocity": velocity})
+    return (
+        "joint_command",
+        t,
+        serialise(template, stamps, {"position": position, "velocity": velocity}),
+    )
 
 
 def _encoder(r: Readings, m: int, start_ns: int) -> Batch:

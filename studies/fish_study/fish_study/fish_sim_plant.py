@@ -14,7 +14,9 @@ from fish_study.trials import PERIOD
 Array = NDArray[np.float64]
 
 WRENCH = ("disturbance.surge", "disturbance.sway", "disturbance.yaw")
-WATER = np.array([0.003, 0.006, 1.5e-4])  # N, N, N m: standard deviations of the water's random push
+WATER = np.array(
+    [0.003, 0.006, 1.5e-4]
+)  # N, N, N m: standard deviations of the water's random push
 WATER_TIME = 0.2  # s, its correlation time
 
 
@@ -39,7 +41,9 @@ class FishSimPlant:
 
     def reset(self, poses: Array) -> None:
         """All at rest."""
-        self.state = np.array([self._stepper.rest(tuple(pose), parameters=self._p[0]) for pose in poses])
+        self.state = np.array(
+            [self._stepper.rest(tuple(pose), parameters=self._p[0]) for pose in poses]
+        )
         self._push = self._size * self._random.standard_normal((len(poses), 3))
 
     def step(self, commands: Array) -> Inertial:
@@ -50,9 +54,13 @@ class FishSimPlant:
         kept = np.exp(-PERIOD / WATER_TIME)
         fresh = self._random.standard_normal(self._push.shape)
         self._push = kept * self._push + np.sqrt(1.0 - kept**2) * self._size * fresh
-        drive = before[:, nx : nx + 2], (self.state[:, nx : nx + 2] - before[:, nx : nx + 2]) / PERIOD
+        drive = (
+            before[:, nx : nx + 2],
+            (self.state[:, nx : nx + 2] - before[:, nx : nx + 2]) / PERIOD,
+        )
         return self.inertial(
-            before, np.stack([drive[0][:, 0], drive[1][:, 0], drive[0][:, 1], drive[1][:, 1]], axis=-1)
+            before,
+            np.stack([drive[0][:, 0], drive[1][:, 0], drive[0][:, 1], drive[1][:, 1]], axis=-1),
         )
 
     def inertial(self, state: Array, drive: Array) -> Inertial:

@@ -62,13 +62,19 @@ def search(
         key = tuple(x.tolist())
         if key not in tried:
             candidate = Candidate("", PolicyGains(Policy.constant(gains(x))), law or Law())
-            tried[key] = float(np.mean([_cost(row) for row in run_study([candidate], [seen], cells, jobs)]))
+            tried[key] = float(
+                np.mean([_cost(row) for row in run_study([candidate], [seen], cells, jobs)])
+            )
             write_json(file, [{"x": k, "cost": v} for k, v in tried.items()])
-            say(f"gains {len(tried)} of {runs}: cost {tried[key]:.2f}, best {min(tried.values()):.2f}")
+            say(
+                f"gains {len(tried)} of {runs}: cost {tried[key]:.2f}, best {min(tried.values()):.2f}"
+            )
         return tried[key]
 
     start = np.vstack([np.zeros(len(SEARCHED)), WIDE * np.eye(len(SEARCHED))])
-    found = minimize(cost, start[0], method="Nelder-Mead", options={"maxfev": runs, "initial_simplex": start})
+    found = minimize(
+        cost, start[0], method="Nelder-Mead", options={"maxfev": runs, "initial_simplex": start}
+    )
     return gains(found.x)
 
 

@@ -33,7 +33,9 @@ def swim_each(
 ) -> list[Row]:
     """Rows of all cells for each gains, in order; `folder` has NAME.json of those that are swum."""
     folder.mkdir(parents=True, exist_ok=True)
-    rows = {name: _kept(folder / f"{name}.json", candidate, cells) for name, candidate in gains.items()}
+    rows = {
+        name: _kept(folder / f"{name}.json", candidate, cells) for name, candidate in gains.items()
+    }
 
     def keep(_: int, batch: list[Row]) -> None:
         name = batch[0].candidate
@@ -45,7 +47,12 @@ def swim_each(
     if left:
         say(f"swimming: {len(cells)} runs with each of {len(left)} gains")
         run_study(
-            left, [condition], cells, jobs, lambda done, all_: say(f"swum: {done} of {all_} batches"), keep
+            left,
+            [condition],
+            cells,
+            jobs,
+            lambda done, all_: say(f"swum: {done} of {all_} batches"),
+            keep,
         )
     return [
         replace(row, candidate=candidate.name)
@@ -61,7 +68,11 @@ def _keep(file: Path, candidate: Candidate, cells: Sequence[Cell], rows: Sequenc
 def _kept(file: Path, candidate: Candidate, cells: Sequence[Cell]) -> list[Row]:
     """Empty where nothing was swum, or with other gains, another law or other cells."""
     content = read_json(file) if file.exists() else {}
-    return [_row(row) for row in content["rows"]] if content.get("of") == _what(candidate, cells) else []
+    return (
+        [_row(row) for row in content["rows"]]
+        if content.get("of") == _what(candidate, cells)
+        else []
+    )
 
 
 def _row(content: Mapping[str, Any]) -> Row:

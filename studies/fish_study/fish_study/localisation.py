@@ -36,7 +36,9 @@ def dof_overlap(stated: Mapping[str, float], true: Mapping[str, float]) -> float
     return float(sum(min(share, true.get(name, 0.0)) for name, share in stated.items()))
 
 
-def stated_times(stated: Sequence[Mapping[str, Any]], names: Sequence[str], length: int) -> NDArray[np.bool_]:
+def stated_times(
+    stated: Sequence[Mapping[str, Any]], names: Sequence[str], length: int
+) -> NDArray[np.bool_]:
     """(T, M) when the intervals stated say that an effect acts, on the trials `names`."""
     said = np.zeros((length, len(names)), dtype=bool)
     for interval in stated:

@@ -40,7 +40,9 @@ def _claim(plan: Plan) -> None:
     differ = [key for key in {**made, **asked} if made.get(key) != asked.get(key)]
     if differ:
         said = "; ".join(f"{key} {made.get(key)}, got {asked.get(key)}" for key in differ)
-        raise StudyError(f"{plan.out}: holds a loop of {said}: ask for the same, or choose another --out")
+        raise StudyError(
+            f"{plan.out}: holds a loop of {said}: ask for the same, or choose another --out"
+        )
 
 
 def _asked(plan: Plan) -> dict[str, Any]:

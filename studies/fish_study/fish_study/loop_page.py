@@ -65,7 +65,10 @@ def loop_figure(rows: Sequence[Row]) -> go.Figure:
     figure = go.Figure()
     for name in dict.fromkeys(row.candidate for row in rows):
         own = [r for r in rows if r.candidate == name]
-        what = [f"{r.cell.path}, {r.cell.speed} m/s, seed {r.cell.seed}<br>{r.metrics.failure}" for r in own]
+        what = [
+            f"{r.cell.path}, {r.cell.speed} m/s, seed {r.cell.seed}<br>{r.metrics.failure}"
+            for r in own
+        ]
         figure.add_box(
             y=1e3 * _sizes(rows, name, "cross_track_rmse").ravel(),
             name=name,
@@ -73,7 +76,9 @@ def loop_figure(rows: Sequence[Row]) -> go.Figure:
             boxpoints="all",
             boxmean=True,
         )
-    figure.update_layout(template="simple_white", showlegend=False, yaxis_title=TITLES["cross_track_rmse"])
+    figure.update_layout(
+        template="simple_white", showlegend=False, yaxis_title=TITLES["cross_track_rmse"]
+    )
     return figure
 
 

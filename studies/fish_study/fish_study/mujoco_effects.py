@@ -19,8 +19,12 @@ class Concealed:
 
 
 CONCEALED: dict[str, Concealed] = {
-    "wind": Concealed(("current",), {"x": 0.03, "y": -0.02}, "m/s, velocity of the medium", signed=True),
-    "servo_filter": Concealed(("rudder_lag",), {"time": 0.12}, "s, filter before the position servo"),
+    "wind": Concealed(
+        ("current",), {"x": 0.03, "y": -0.02}, "m/s, velocity of the medium", signed=True
+    ),
+    "servo_filter": Concealed(
+        ("rudder_lag",), {"time": 0.12}, "s, filter before the position servo"
+    ),
     "servo_trim": Concealed(
         ("rudder_offset",), {"angle": 0.06}, "rad, zero of the position servo", signed=True
     ),
@@ -28,7 +32,9 @@ CONCEALED: dict[str, Concealed] = {
     "ballast": Concealed(
         ("payload",), {"mass": 0.06, "forward": 0.04, "left": 0.02}, "kg, m, m; rigid on the head"
     ),
-    "joint_damping": Concealed(("tail_joint_damping",), {"c": 1e-3}, "N m s/rad in every tail joint"),
+    "joint_damping": Concealed(
+        ("tail_joint_damping",), {"c": 1e-3}, "N m s/rad in every tail joint"
+    ),
     "joint_friction": Concealed((), {"loss": 1.5e-3}, "N m of dry friction in every tail joint"),
     "viscosity": Concealed((), {"factor": 300.0}, "times the viscosity of water"),
 }

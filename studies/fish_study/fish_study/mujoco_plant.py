@@ -51,11 +51,15 @@ def _mujoco() -> Any:
     try:
         import mujoco
     except ImportError as error:
-        raise MujocoError("the second plant needs mujoco: pip install -r requirements-bench.txt") from error
+        raise MujocoError(
+            "the second plant needs mujoco: pip install -r requirements-bench.txt"
+        ) from error
     return mujoco
 
 
-def model_text(links: int, factors: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> str:
+def model_text(
+    links: int, factors: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
+) -> str:
     """The fish in MuJoCo's language. factors: on NOMINAL; effects: of `mujoco_effects.CONCEALED`."""
     value = {name: size * factors.get(name, 1.0) for name, size in NOMINAL.items()}
     wind = effects.get("wind", {"x": 0.0, "y": 0.0})
@@ -66,15 +70,23 @@ def model_text(links: int, factors: Mapping[str, float], effects: Mapping[str, M
     dynamics = f'dyntype="filterexact" dynprm="{lag["time"]}"' if lag else ""
     weight = effects.get("ballast") or {"mass": 1e-6, "forward": 0.0, "left": 0.0}
     length, stiffness = TAIL_LENGTH / links, value["tail_stiffness"] * links / 3.0
-    joint = f'<joint axis="0 0 1" stiffness="{stiffness}" damping="{damping}" frictionloss="{loss}"/>'
+    joint = (
+        f'<joint axis="0 0 1" stiffness="{stiffness}" damping="{damping}" frictionloss="{loss}"/>'
+    )
     fin = _shape("fin", FIN_LENGTH, 0.001, 0.02, -length) + _entrained(
         STRIP * FIN_LENGTH, -length - FIN_LENGTH / 2.0
     )
     tail = fin
     for _ in range(links):
-        shape = _shape("link", length, 0.008, 0.05 / links, 0.0) + _entrained(STRIP * length, -length / 2.0)
-        tail = f'<body pos="{{at}} 0 0">{joint}{shape}{tail}</body>'.replace("{at}", f"{-length}", 1)
-    tail = tail.replace(f'pos="{-length} 0 0"', 'pos="0 0 0"', 1)  # the first link begins at the horn
+        shape = _shape("link", length, 0.008, 0.05 / links, 0.0) + _entrained(
+            STRIP * length, -length / 2.0
+        )
+        tail = f'<body pos="{{at}} 0 0">{joint}{shape}{tail}</body>'.replace(
+            "{at}", f"{-length}", 1
+        )
+    tail = tail.replace(
+        f'pos="{-length} 0 0"', 'pos="0 0 0"', 1
+    )  # the first link begins at the horn
     return f"""
 <mujoco>
   <option timestep="{PERIOD / HOLDS / STEPS}" gravity="0 0 0" integrator="implicitfast" density="1000"
@@ -142,7 +154,13 @@ class MujocoPlant:
     def of(cls, world: World, count: int, random: np.random.Generator) -> MujocoPlant:
         """The plant of a world."""
         trim = world.effects.get("servo_trim", {"angle": 0.0})["angle"]
-        return cls(model_text(world.links, world.parameters, world.effects), count, world.noise, random, trim)
+        return cls(
+            model_text(world.links, world.parameters, world.effects),
+            count,
+            world.noise,
+            random,
+            trim,
+        )
 
     def reset(self, poses: Array) -> None:
         """Afloat at (M, 3) poses with a straight tail, at rest in the water, which carries the fish along.
@@ -191,7 +209,11 @@ class MujocoPlant:
             data.ctrl[:] = rotor, -(alpha + self._trim)
             self._engine.mj_step(self._model, data, STEPS if j > 1 else 1)
             if j == 1:  # the engine's sensors speak of the start of the last step
-                felt = float(data.sensordata[2]), float(data.sensordata[3]), float(data.sensordata[4])
+                felt = (
+                    float(data.sensordata[2]),
+                    float(data.sensordata[3]),
+                    float(data.sensordata[4]),
+                )
                 self._engine.mj_step(self._model, data, STEPS - 1)
         # the engine warns and puts an unstable fish back to its start
         self._unstable[m] = not np.isfinite(data.qpos).all() or data.warning.number.any()

@@ -19,9 +19,19 @@ def null_table(scores: Sequence[Score]) -> Table | None:
         return None
     rows = []
     for links, noise in sorted({(s.world.links, s.world.noise) for s in nulls}):
-        gains = [max(s.ranking.values()) for s in nulls if (s.world.links, s.world.noise) == (links, noise)]
+        gains = [
+            max(s.ranking.values())
+            for s in nulls
+            if (s.world.links, s.world.noise) == (links, noise)
+        ]
         rows.append(
-            [str(links), f"{noise:g}", str(len(gains)), f"{np.median(gains):.1f}", f"{max(gains):.1f}"]
+            [
+                str(links),
+                f"{noise:g}",
+                str(len(gains)),
+                f"{np.median(gains):.1f}",
+                f"{max(gains):.1f}",
+            ]
         )
     names = max(len(s.ranking) for s in nulls)
     level = Level()

@@ -60,7 +60,10 @@ class Sight:
     @classmethod
     def read(cls, content: Mapping[str, Any]) -> Sight:
         """From JSON, in which what is not finite is null."""
-        tables = ([[number(v) for v in row] for row in content[key]] for key in ("rms_nominal", "rms_true"))
+        tables = (
+            [[number(v) for v in row] for row in content[key]]
+            for key in ("rms_nominal", "rms_true")
+        )
         return cls(number(content["gain"], -np.inf), content["parameters"], *tables)
 
 
@@ -76,11 +79,16 @@ def as_experiment(readings: Sequence[Readings], encoder: bool) -> Experiment:
     frames = tuple(Frames(t, p) for t, p in zip(stamps, poses, strict=True))
     names = tuple(f"trial_{m:02d}" for m in range(count))
     rotor = speed if encoder else np.full_like(speed, np.nan)
-    return Experiment(names, np.full(count, len(commands)), commands, gyro, accel, rotor, frames, True)
+    return Experiment(
+        names, np.full(count, len(commands)), commands, gyro, accel, rotor, frames, True
+    )
 
 
 def look(
-    world: World, experiment: Experiment, held_out: Sequence[str], names: Sequence[str] | None = None
+    world: World,
+    experiment: Experiment,
+    held_out: Sequence[str],
+    names: Sequence[str] | None = None,
 ) -> Looked:
     """Fit the structure with `names` (default: what is hidden) and the nominal one, from the true values."""
     looked_for = tuple(world.names if names is None else names)

@@ -74,8 +74,16 @@ def judge(world: World, diagnosis: Mapping[str, Any] | None) -> dict[str, Any]:
 
     A world without an answer is judged as well: what the oracle sees there the tool has missed.
     """
-    content: dict[str, Any] = {"sight": None, "dof": None, "overlap": None, "f1": None, "range_f1": None}
-    if world.plant != "fish_sim" or world.links != 3:  # of those no structure of the oracle's is the true one
+    content: dict[str, Any] = {
+        "sight": None,
+        "dof": None,
+        "overlap": None,
+        "f1": None,
+        "range_f1": None,
+    }
+    if (
+        world.plant != "fish_sim" or world.links != 3
+    ):  # of those no structure of the oracle's is the true one
         return content
     try:
         experiment = as_experiment(make_readings(world), world.encoder)
@@ -127,7 +135,9 @@ def judge_studies(
     for study, own in of_study.items():
         study.check_files("judged.json", {t.name: read_json(t.file) for t in own})
     judged = {t.world.seed: read_json(t.file) for t in tasks}
-    sights = {seed: Sight.read(content["sight"]) for seed, content in judged.items() if content["sight"]}
+    sights = {
+        seed: Sight.read(content["sight"]) for seed, content in judged.items() if content["sight"]
+    }
     nulls = [sights[t.world.seed] for t in tasks if not t.world.names and t.world.seed in sights]
     seen = {
         t.world.seed: detects(sights[t.world.seed], nulls)
@@ -176,7 +186,8 @@ def judged_table(
     ]
     found_first = [judged[s.world.seed] for s in scores if s.top1 and s.world.seed in judged]
     dof, times, regime, by_range = (
-        _finite([content.get(key) for content in found_first]) for key in ("dof", "overlap", "f1", "range_f1")
+        _finite([content.get(key) for content in found_first])
+        for key in ("dof", "overlap", "f1", "range_f1")
     )
     found = sum(s.in_set for s in clear) / len(clear) if clear else float("nan")
     rows = [
@@ -202,8 +213,16 @@ def judged_table(
             _median(dof, "mean"),
         ],
         ["time overlap (IoU) of localised effects", "at least 0.7", _median(times, "mean")],
-        ["regime F1: the samples in which a localised effect acts", "at least 0.9", _median(regime, "mean")],
-        ["the same from the range of the one most telling covariate", "", _median(by_range, "mean")],
+        [
+            "regime F1: the samples in which a localised effect acts",
+            "at least 0.9",
+            _median(regime, "mean"),
+        ],
+        [
+            "the same from the range of the one most telling covariate",
+            "",
+            _median(by_range, "mean"),
+        ],
     ]
     note = (
         "The oracle starts from the true values and knows the name; errors where exactly the hidden names were given. Only "
@@ -236,7 +255,12 @@ def rivals_table(scores: Sequence[Score], rivals: Mapping[int, Mapping[str, Any]
     hidden, nothing = [s for s in own if s.truth], [s for s in own if s.world.group == "null"]
     answers = [s for s in nothing if s.has_answer]
     rows = [
-        ["this tool", str(Share.of(hidden, lambda s: s.top1)), str(Share.of(answers, lambda s: s.alarm)), ""],
+        [
+            "this tool",
+            str(Share.of(hidden, lambda s: s.top1)),
+            str(Share.of(answers, lambda s: s.alarm)),
+            "",
+        ],
         [
             "PySINDy",
             str(Share.of(hidden, lambda s: said[s.world.seed] in s.truth)),

@@ -165,7 +165,15 @@ class TurningThrust(Effect):
 
 OUTSIDE: dict[str, type[Effect]] = {
     effect.name: effect
-    for effect in (StrokeAsymmetry, RotorDrag, GrowingDrag, RudderInducedDrag, Compass, Jet, TurningThrust)
+    for effect in (
+        StrokeAsymmetry,
+        RotorDrag,
+        GrowingDrag,
+        RudderInducedDrag,
+        Compass,
+        Jet,
+        TurningThrust,
+    )
 }
 
 

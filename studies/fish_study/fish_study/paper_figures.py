@@ -26,12 +26,17 @@ def portrait_figure(swim: Swim, last: float) -> go.Figure:
     """Yaw rate over surge speed while the fish gathers speed and in its limit cycle, and the path swum."""
     figure = make_subplots(cols=2, subplot_titles=("phase portrait", "path of the head"))
     late = swim.time >= swim.time[-1] - last
-    for name, rows, colour in (("from rest", ~late, "#bbbbbb"), (f"last {last:g} s", late, COLOURS[0])):
+    for name, rows, colour in (
+        ("from rest", ~late, "#bbbbbb"),
+        (f"last {last:g} s", late, COLOURS[0]),
+    ):
         line = {"color": colour, "width": 1.5}
         u, rate = swim.velocity[rows, 0], swim.velocity[rows, 2]
         figure.add_scatter(x=u, y=rate, name=name, line=line, mode="lines", row=1, col=1)
         x, y = swim.pose[rows, 0], swim.pose[rows, 1]
-        figure.add_scatter(x=x, y=y, name=name, line=line, mode="lines", showlegend=False, row=1, col=2)
+        figure.add_scatter(
+            x=x, y=y, name=name, line=line, mode="lines", showlegend=False, row=1, col=2
+        )
     figure.update_xaxes(title="surge speed, m/s", row=1, col=1)
     figure.update_yaxes(title="yaw rate, rad/s", row=1, col=1)
     figure.update_xaxes(title="x, m", row=1, col=2)
@@ -52,18 +57,34 @@ def training_figure(curves: Sequence[Sequence[CurveRow]]) -> go.Figure:
     end = min(curve[-1].environment_steps for curve in curves)
     begin = max(curve[0].environment_steps for curve in curves)
     steps = np.linspace(begin, end, GRID)
-    figure = make_subplots(cols=2, subplot_titles=("mean |cross-track|, mm", "mean |speed error|, mm/s"))
+    figure = make_subplots(
+        cols=2, subplot_titles=("mean |cross-track|, mm", "mean |speed error|, mm/s")
+    )
     for col, field in enumerate(("cross_track", "speed"), start=1):
-        values = 1e3 * np.array([
-            np.interp(steps, [r.environment_steps for r in curve], _smooth([getattr(r, field) for r in curve]))
-            for curve in curves
-        ])  # fmt: skip
+        values = 1e3 * np.array(
+            [
+                np.interp(
+                    steps,
+                    [r.environment_steps for r in curve],
+                    _smooth([getattr(r, field) for r in curve]),
+                )
+                for curve in curves
+            ]
+        )
         mean, std = values.mean(axis=0), values.std(axis=0)
         band = np.r_[mean + std, (mean - std)[::-1]]
         figure.add_scatter(
-            x=np.r_[steps, steps[::-1]], y=band, fill="toself", line={"width": 0}, fillcolor="rgba(31,119,180,0.2)",
-            name="± 1 std", hoverinfo="skip", showlegend=col == 1, row=1, col=col,
-        )  # fmt: skip
+            x=np.r_[steps, steps[::-1]],
+            y=band,
+            fill="toself",
+            line={"width": 0},
+            fillcolor="rgba(31,119,180,0.2)",
+            name="± 1 std",
+            hoverinfo="skip",
+            showlegend=col == 1,
+            row=1,
+            col=col,
+        )
         figure.add_scatter(
             x=steps,
             y=mean,
@@ -83,7 +104,9 @@ def path_figure(path: ReferencePath, traces: Sequence[tuple[str, Array]]) -> go.
     figure = go.Figure()
     closing = [0] if path.closed else []
     points = np.vstack([path.points, path.points[closing]])
-    figure.add_scatter(x=points[:, 0], y=points[:, 1], mode="lines", name="reference", line=REFERENCE)
+    figure.add_scatter(
+        x=points[:, 0], y=points[:, 1], mode="lines", name="reference", line=REFERENCE
+    )
     for (name, position), colour in zip(traces, COLOURS, strict=False):
         line = {"color": colour, "width": 1.5}
         figure.add_scatter(x=position[:, 0], y=position[:, 1], mode="lines", name=name, line=line)
@@ -98,9 +121,14 @@ def gains_figure(trace: Trace, run: int) -> go.Figure:
     swum = np.isfinite(trace.cross_track[:, run])
     for k, output in enumerate(OUTPUTS):
         figure.add_scatter(
-            x=trace.time[swum], y=trace.gains[swum, run, k], mode="lines", name=output.name, line={"color": COLOURS[k % 3]},
-            row=1, col=1 + k // 3,
-        )  # fmt: skip
+            x=trace.time[swum],
+            y=trace.gains[swum, run, k],
+            mode="lines",
+            name=output.name,
+            line={"color": COLOURS[k % 3]},
+            row=1,
+            col=1 + k // 3,
+        )
     figure.update_xaxes(title="time, s")
     return _with_titles(styled(figure, 320))
 

@@ -45,14 +45,18 @@ GAINS_SPEED = 0.20  # m/s, of the letters whose gains are shown
 
 def open_loop_blocks(robot: Robot) -> list[Block]:
     """Phase portrait and speed against throttle."""
-    [portrait] = swing(robot, np.array([paper.PORTRAIT_AMPLITUDE]), paper.PORTRAIT_FREQUENCY, PORTRAIT_TIME)
+    [portrait] = swing(
+        robot, np.array([paper.PORTRAIT_AMPLITUDE]), paper.PORTRAIT_FREQUENCY, PORTRAIT_TIME
+    )
     throttle = np.linspace(0.0, 1.0, 21)
     speed = speed_of_throttle(robot, throttle, ControlLimits())
     title = f"Open loop, A = {paper.PORTRAIT_AMPLITUDE:g} rad, f = {paper.PORTRAIT_FREQUENCY:g} Hz"
     return [
         Figure(title, portrait_figure(portrait, LIMIT_CYCLE)),
         Figure(
-            "Speed against throttle", throttle_figure(throttle, speed), f"Full throttle: {speed[-1]:.2f} m/s."
+            "Speed against throttle",
+            throttle_figure(throttle, speed),
+            f"Full throttle: {speed[-1]:.2f} m/s.",
         ),
     ]
 
@@ -82,10 +86,15 @@ def simulation_blocks(candidate: Candidate, condition: Condition) -> list[Block]
     for k, (specification, speed, cross_track, speed_error) in enumerate(cases):
         path = read_path(specification)
         sizes = measure(trace, k, path).settled
-        lines.append([
-            f"{specification}, {speed:g} m/s", f"{1e3 * sizes.cross_track_mean:.1f}", f"about {1e3 * cross_track:.0f}",
-            f"{1e3 * sizes.speed_mean:.1f}", f"{1e3 * speed_error:.0f}",
-        ])  # fmt: skip
+        lines.append(
+            [
+                f"{specification}, {speed:g} m/s",
+                f"{1e3 * sizes.cross_track_mean:.1f}",
+                f"about {1e3 * cross_track:.0f}",
+                f"{1e3 * sizes.speed_mean:.1f}",
+                f"{1e3 * speed_error:.0f}",
+            ]
+        )
         title = f"{path.name.capitalize()} at {speed:g} m/s, perfect state"
         blocks.append(Figure(title, path_figure(path, [("simulated", trace.motion[:, k, :2])])))
         blocks.append(Figure(f"Gains, {path.name}", gains_figure(trace, k)))
@@ -99,13 +108,20 @@ def letter_blocks(
     """Letters swum through the full chain, and the gains on R and S."""
     blocks: list[Block] = []
     for letter in paper.LETTERS:
-        chosen = [(c.speed, t.motion[:, k, :2]) for c, t, k in traces if c.path == letter and c.seed == 0]
-        lines = [(f"{speed:g} m/s", position) for speed, position in sorted(chosen, key=lambda item: item[0])]
+        chosen = [
+            (c.speed, t.motion[:, k, :2]) for c, t, k in traces if c.path == letter and c.seed == 0
+        ]
+        lines = [
+            (f"{speed:g} m/s", position)
+            for speed, position in sorted(chosen, key=lambda item: item[0])
+        ]
         blocks.append(Figure(f"Letter {letter}", path_figure(read_path(letter), lines)))
     for letter in ("R", "S"):
         for cell, trace, k in traces:
             if cell == Cell(letter, GAINS_SPEED, 0):
-                blocks.append(Figure(f"Gains on {letter} at {GAINS_SPEED:g} m/s", gains_figure(trace, k)))
+                blocks.append(
+                    Figure(f"Gains on {letter} at {GAINS_SPEED:g} m/s", gains_figure(trace, k))
+                )
     lead = f"{candidate.name}; {condition.name}: camera, IMU and fusion in the loop."
     return [Text("Full chain", lead), *blocks]
 
@@ -116,12 +132,27 @@ def error_table(rows: Sequence[Row]) -> Table:
     for letter in paper.LETTERS:
         for k, speed in enumerate(paper.SPEEDS):
             runs = [r.metrics for r in rows if (r.cell.path, r.cell.speed) == (letter, speed)]
-            settled, whole = mean_sizes([m.settled for m in runs]), mean_sizes([m.whole for m in runs])
+            settled, whole = (
+                mean_sizes([m.settled for m in runs]),
+                mean_sizes([m.whole for m in runs]),
+            )
             theirs = paper.CROSS_TRACK[letter][k], paper.SPEED[letter][k]
             failed = _failures(runs)
-            lines.append([letter, f"{speed:.2f}", *_compared(settled, whole, theirs, failed), str(failed)])
-    header = ["path", "m/s", "cross-track RMSE, mm", "with approach", "paper", "speed RMSE, mm/s", "with approach",
-              "paper", "better", "failed"]  # fmt: skip
+            lines.append(
+                [letter, f"{speed:.2f}", *_compared(settled, whole, theirs, failed), str(failed)]
+            )
+    header = [
+        "path",
+        "m/s",
+        "cross-track RMSE, mm",
+        "with approach",
+        "paper",
+        "speed RMSE, mm/s",
+        "with approach",
+        "paper",
+        "better",
+        "failed",
+    ]
     note = "Ours: simulated camera, IMU and fusion on the simulated fish, mean over seeds. Paper: the real robot."
     return Table("Errors", header, lines, note)
 
@@ -131,13 +162,20 @@ def better_cells(rows: Sequence[Row]) -> int:
     return sum(line[-2] == "yes" for line in error_table(rows).rows)
 
 
-def _compared(settled: ErrorSizes, whole: ErrorSizes, theirs: tuple[float, float], failed: int) -> list[str]:
+def _compared(
+    settled: ErrorSizes, whole: ErrorSizes, theirs: tuple[float, float], failed: int
+) -> list[str]:
     ours = settled.cross_track_rmse, settled.speed_rmse
     better = not failed and ours[0] < theirs[0] and ours[1] < theirs[1]
     return [
-        f"{1e3 * ours[0]:.1f}", f"{1e3 * whole.cross_track_rmse:.1f}", f"{1e3 * theirs[0]:.0f}",
-        f"{1e3 * ours[1]:.1f}", f"{1e3 * whole.speed_rmse:.1f}", f"{1e3 * theirs[1]:.0f}", "yes" if better else "no",
-    ]  # fmt: skip
+        f"{1e3 * ours[0]:.1f}",
+        f"{1e3 * whole.cross_track_rmse:.1f}",
+        f"{1e3 * theirs[0]:.0f}",
+        f"{1e3 * ours[1]:.1f}",
+        f"{1e3 * whole.speed_rmse:.1f}",
+        f"{1e3 * theirs[1]:.0f}",
+        "yes" if better else "no",
+    ]
 
 
 def _failures(runs: Sequence[RunMetrics]) -> int:

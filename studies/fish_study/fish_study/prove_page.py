@@ -41,15 +41,23 @@ def tables(
     steps = power(scores, oracle)
     failed = [failure_table(scores)] if any(not s.has_answer for s in scores) else []
     nulls = null_table(scores)
-    shown = [asked_table(scores), group_table(scores), calibration_table(scores), criterion_table(scores)]
+    shown = [
+        asked_table(scores),
+        group_table(scores),
+        calibration_table(scores),
+        criterion_table(scores),
+    ]
     shown += [power_table(steps)] if steps else []
     return [*shown, *more, *([nulls] if nulls else []), name_table(scores), *failed]
 
 
 def write_prove_page(
-    path: Path, about: Sequence[Mapping[str, Any]], scores: Sequence[Score], oracle: dict[int, bool] | None = None,
+    path: Path,
+    about: Sequence[Mapping[str, Any]],
+    scores: Sequence[Score],
+    oracle: dict[int, bool] | None = None,
     more: Sequence[Table] = (),
-) -> None:  # fmt: skip
+) -> None:
     """Write report.html; about: what was asked for, of each study."""
     which = "; ".join(f"seed {a['seed']}, {a['began']}" for a in about)
     lead = (
@@ -62,7 +70,9 @@ def write_prove_page(
         blocks.append(Figure("Power over strength", _power(steps), "bars: exact 95 % intervals"))
     blocks.append(
         Figure(
-            "Calibration", _reliability(calibration(scores)), "on the line the stated probabilities are right"
+            "Calibration",
+            _reliability(calibration(scores)),
+            "on the line the stated probabilities are right",
         )
     )
     blocks.append(
@@ -73,7 +83,10 @@ def write_prove_page(
         )
     )
     blocks.append(
-        Text("How", " ".join([HOW, seeds_sentence(about), *(f"Command: {a['command']}." for a in about)]))
+        Text(
+            "How",
+            " ".join([HOW, seeds_sentence(about), *(f"Command: {a['command']}." for a in about)]),
+        )
     )
     write_page(path, "Blind study of the diagnosis", lead, blocks)
 
@@ -133,7 +146,13 @@ def _confusion(scores: Sequence[Score]) -> go.Figure:
     for h, a in zip(hidden, answered, strict=True):
         counts[rows.index(h), columns.index(a)] += 1
     heat = go.Heatmap(
-        z=counts, x=columns, y=rows, colorscale="Blues", text=counts, texttemplate="%{text}", showscale=False
+        z=counts,
+        x=columns,
+        y=rows,
+        colorscale="Blues",
+        text=counts,
+        texttemplate="%{text}",
+        showscale=False,
     )
     figure = go.Figure(heat)
     figure.update_xaxes(title="answered")

@@ -112,7 +112,12 @@ def _end_with_the_study() -> None:
 
 
 def run_study(
-    study: Study, jobs: int, done: Done, tool: Sequence[str] = DIAGNOSE, keep: bool = False, cluster: str = ""
+    study: Study,
+    jobs: int,
+    done: Done,
+    tool: Sequence[str] = DIAGNOSE,
+    keep: bool = False,
+    cluster: str = "",
 ) -> None:
     """Run every world without a result; `done` hears each name. cluster: address of a Dask scheduler."""
     threads = max(1, len(os.sched_getaffinity(0)) // max(jobs, 1))
@@ -125,7 +130,9 @@ def run_study(
         done(name)
 
 
-def spread(work: Callable[[Any], Any], tasks: Sequence[Any], jobs: int, cluster: str = "") -> Iterator[Any]:
+def spread(
+    work: Callable[[Any], Any], tasks: Sequence[Any], jobs: int, cluster: str = ""
+) -> Iterator[Any]:
     """Results of work(task) as they come, from local processes or a Dask cluster with a shared file system."""
     if cluster:
         from dask.distributed import Client
@@ -135,7 +142,9 @@ def spread(work: Callable[[Any], Any], tasks: Sequence[Any], jobs: int, cluster:
             for future in completed(client.map(work, tasks, pure=False)):
                 yield future.result()
         return
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _end_with_the_study) as pool:
+    with ProcessPoolExecutor(
+        jobs, multiprocessing.get_context("spawn"), _end_with_the_study
+    ) as pool:
         futures: list[Future[Any]] = [pool.submit(work, task) for task in tasks]
         try:
             for future in as_completed(futures):

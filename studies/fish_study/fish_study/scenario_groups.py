@@ -22,8 +22,16 @@ Random = np.random.Generator
 Item = TypeVar("Item")
 
 SPREAD = 0.25  # of the true fish's parameters about the nominal ones
-MEASURED = ("head_mass", "hinge_offset", "link_length", "link_mass", "fin_length", "fin_mass", "rudder_range",
-            "servo_rate_limit")  # fmt: skip
+MEASURED = (
+    "head_mass",
+    "hinge_offset",
+    "link_length",
+    "link_mass",
+    "fin_length",
+    "fin_mass",
+    "rudder_range",
+    "servo_rate_limit",
+)
 VALUE_SPREAD = 0.15  # of strengths about the typical one
 ELSEWHERE = {  # parameters that say where or when; drawn afresh in every world
     "tether": {"x": (-0.6, 0.6), "y": (-0.4, 0.4), "length": (0.3, 0.6)},
@@ -36,8 +44,18 @@ ELSEWHERE = {  # parameters that say where or when; drawn afresh in every world
     "vortex": {"at_x": (-0.8, 0.8), "at_y": (-0.4, 0.4), "core": (0.3, 0.8)},
     "jet": {"at_x": (-0.8, 0.8), "at_y": (-0.4, 0.4), "width": (0.25, 0.4)},
 }
-SIGNED = ("current", "nonuniform_current", "hull_asymmetry", "rudder_offset", "camera_heading_offset", "imu_misalignment",
-          "rotor_imbalance", "compass", "jet", "vortex")  # fmt: skip
+SIGNED = (
+    "current",
+    "nonuniform_current",
+    "hull_asymmetry",
+    "rudder_offset",
+    "camera_heading_offset",
+    "imu_misalignment",
+    "rotor_imbalance",
+    "compass",
+    "jet",
+    "vortex",
+)
 LIMITS = ("rudder_saturation", "rotor_saturation")  # act by being small
 HIDDEN_BY_THE_ENCODER = ("rotor_lag", "rotor_saturation", "battery_sag")
 ABSORBED = (
@@ -50,10 +68,17 @@ ABSORBED = (
     "tail_hardening",
 )
 PAIRS = (
-    ("current", "rudder_offset"), ("quadratic_drag", "camera_latency"), ("tip_slip", "current"), ("wall_effect", "rudder_lag"),
-    ("tail_hardening", "rudder_offset"), ("hull_asymmetry", "rudder_delay"), ("nonuniform_current", "camera_scale"),
-    ("tether", "rudder_gain"), ("quadratic_drag", "rudder_backlash"), ("sloshing", "camera_heading_offset"),
-)  # fmt: skip
+    ("current", "rudder_offset"),
+    ("quadratic_drag", "camera_latency"),
+    ("tip_slip", "current"),
+    ("wall_effect", "rudder_lag"),
+    ("tail_hardening", "rudder_offset"),
+    ("hull_asymmetry", "rudder_delay"),
+    ("nonuniform_current", "camera_scale"),
+    ("tether", "rudder_gain"),
+    ("quadratic_drag", "rudder_backlash"),
+    ("sloshing", "camera_heading_offset"),
+)
 NOISES = (0.5, 1.0, 2.0, 4.0)
 STRENGTHS = (0.125, 0.25, 0.5, 1.0, 2.0)
 # number of links, integrator, its steps in 10 ms
@@ -155,7 +180,9 @@ def null(random: Random, number: int) -> World:
     """Nothing is hidden; other noise, more tail links than the tool's model, other integrators."""
     links, method, substeps = _turn(OTHER_PLANTS, number)
     level = float(random.choice((0.5, 1.0, 2.0)))
-    return replace(_world("null", random, ()), links=links, method=method, substeps=substeps, noise=level)
+    return replace(
+        _world("null", random, ()), links=links, method=method, substeps=substeps, noise=level
+    )
 
 
 def mujoco(random: Random, number: int) -> World:
@@ -164,15 +191,28 @@ def mujoco(random: Random, number: int) -> World:
 
     name, values = draw(number, random)
     effects = {name: values} if name else {}
-    return replace(_world("mujoco", random, ()), effects=effects, plant="mujoco", links=5, encoder=True)
+    return replace(
+        _world("mujoco", random, ()), effects=effects, plant="mujoco", links=5, encoder=True
+    )
 
 
 GROUPS: dict[str, Callable[[Random, int], World]] = {
-    f.__name__: f for f in (single, absorbed, feedback, noise, ladder, two, sensor, outside, null, mujoco)
+    f.__name__: f
+    for f in (single, absorbed, feedback, noise, ladder, two, sensor, outside, null, mujoco)
 }
 # share of a study's worlds
-SHARES = {"single": 0.22, "absorbed": 0.06, "feedback": 0.12, "noise": 0.08, "ladder": 0.12, "two": 0.08, "sensor": 0.04,
-          "outside": 0.08, "null": 0.14, "mujoco": 0.06}  # fmt: skip
+SHARES = {
+    "single": 0.22,
+    "absorbed": 0.06,
+    "feedback": 0.12,
+    "noise": 0.08,
+    "ladder": 0.12,
+    "two": 0.08,
+    "sensor": 0.04,
+    "outside": 0.08,
+    "null": 0.14,
+    "mujoco": 0.06,
+}
 
 
 def draw_worlds(count: int, groups: list[str], seed: int) -> list[World]:
@@ -191,6 +231,7 @@ def draw_worlds(count: int, groups: list[str], seed: int) -> list[World]:
     for group, number in zip(groups, numbers, strict=True):
         first = int(random.integers(1000))
         worlds += [
-            GROUPS[group](np.random.default_rng(random.integers(2**62)), first + i) for i in range(number)
+            GROUPS[group](np.random.default_rng(random.integers(2**62)), first + i)
+            for i in range(number)
         ]
     return [worlds[i] for i in random.permutation(len(worlds))]

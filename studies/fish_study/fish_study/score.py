@@ -13,9 +13,7 @@ from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_study.scenario import World
 
-CONFIDENT = (
-    0.9  # stated probability from which a wrong name counts as given with confidence; fixed before any run
-)
+CONFIDENT = 0.9  # stated probability from which a wrong name counts as given with confidence; fixed before any run
 NOTHING = "no_mismatch"
 FAILED = "failed"  # in place of a verdict
 
@@ -51,7 +49,9 @@ class Score:
     parameters: tuple[ParameterError, ...]
     rms: Mapping[str, Any]  # model -> horizon -> errors, as in diagnosis.json
     ranking: Mapping[str, float]  # name -> quick gain, nats
-    free: Mapping[str, int]  # name -> numbers it took in the ranking; empty in answers that do not tell
+    free: Mapping[
+        str, int
+    ]  # name -> numbers it took in the ranking; empty in answers that do not tell
     seconds: float
     error: str = ""  # why there is no answer
     # refitted name -> position error 2 s ahead on held-out trials [m]
@@ -103,7 +103,9 @@ def vocabulary() -> frozenset[str]:
     return frozenset({*EFFECTS, *SENSOR_EFFECTS} - {"disturbance"})
 
 
-def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] | None = None) -> Score:
+def score_world(
+    world: World, result: Mapping[str, Any], truth: tuple[str, ...] | None = None
+) -> Score:
     """Score a result. truth: names that count as right, for a plant whose effects have other names (default: its own)."""
     known = vocabulary()
     names = tuple(n for n in world.names if n in known) if truth is None else truth
@@ -141,7 +143,9 @@ def score_world(world: World, result: Mapping[str, Any], truth: tuple[str, ...] 
         parameters=tuple(p for e in effects for p in _parameter_errors(world, e)),
         rms={k: fit[k]["rms"] for k in ("nominal", "refitted", "with_effects") if k in fit},
         ranking={r["name"]: number(r["gain"], -np.inf) for r in d.get("ranking", ())},
-        free={r["name"]: r["free_parameters"] for r in d.get("ranking", ()) if "free_parameters" in r},
+        free={
+            r["name"]: r["free_parameters"] for r in d.get("ranking", ()) if "free_parameters" in r
+        },
         seconds=result["seconds"],
         held_out={r["name"]: _position(r["held_out_rms"]) for r in d.get("refitted", ())},
     )

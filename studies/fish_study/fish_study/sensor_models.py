@@ -15,9 +15,20 @@ from fish_study.trials import PERIOD
 
 Array = NDArray[np.float64]
 
-GYRO, ACCEL, CAMERA, HEADING, ENCODER = 0.006, 0.05, 0.002, 0.012, 0.15  # rad/s, m/s^2, m, rad, rad/s
+GYRO, ACCEL, CAMERA, HEADING, ENCODER = (
+    0.006,
+    0.05,
+    0.002,
+    0.012,
+    0.15,
+)  # rad/s, m/s^2, m, rad, rad/s
 BIAS = (0.003, 0.03, 0.03)  # rad/s, m/s^2, m/s^2
-RATE, JITTER, LOST, TRANSPORT = 30.0, 0.002, 0.01, 0.05  # Hz, s, share of frames, s from exposure to arrival
+RATE, JITTER, LOST, TRANSPORT = (
+    30.0,
+    0.002,
+    0.01,
+    0.05,
+)  # Hz, s, share of frames, s from exposure to arrival
 
 
 @dataclass(frozen=True)
@@ -33,9 +44,16 @@ class Errors:
     @classmethod
     def of(cls, sensors: Mapping[str, Mapping[str, float]]) -> Errors:
         """From the vocabulary's names."""
-        fields = {"camera_latency": "latency", "camera_scale": "scale", "camera_heading_offset": "heading_offset",
-                  "gyro_scale": "gyro_scale", "imu_misalignment": "misalignment"}  # fmt: skip
-        return cls(**{fields[name]: next(iter(values.values())) for name, values in sensors.items()})
+        fields = {
+            "camera_latency": "latency",
+            "camera_scale": "scale",
+            "camera_heading_offset": "heading_offset",
+            "gyro_scale": "gyro_scale",
+            "imu_misalignment": "misalignment",
+        }
+        return cls(
+            **{fields[name]: next(iter(values.values())) for name, values in sensors.items()}
+        )
 
 
 class Instruments:

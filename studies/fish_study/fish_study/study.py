@@ -38,7 +38,9 @@ class Study:
             raise StudyError(f"{folder}: holds a study already")
         folder.mkdir(parents=True, exist_ok=True)
         names = [f"world_{i:04d}" for i in range(len(worlds))]
-        sealed = {name: seal_label(world.label()) for name, world in zip(names, worlds, strict=True)}
+        sealed = {
+            name: seal_label(world.label()) for name, world in zip(names, worlds, strict=True)
+        }
         write_json(folder / "sealed.json", {k: asdict(s) for k, s in sealed.items()}, private=True)
         write_json(folder / "seals.json", {name: s.seal for name, s in sealed.items()})
         write_json(folder / "study.json", about)
@@ -118,12 +120,17 @@ class Study:
         opened, seals = self._sealed(), read_json(self.folder / "seals.json")
         broken = broken_seals(seals, opened)
         if broken:
-            raise StudyError(f"{self.folder}: labels that are not what was sealed: {', '.join(broken)}")
+            raise StudyError(
+                f"{self.folder}: labels that are not what was sealed: {', '.join(broken)}"
+            )
         write_json(self.folder / "labels.json", {k: asdict(s) for k, s in opened.items()})
         return {name: World.of(s.label) for name, s in opened.items()}
 
     def _sealed(self) -> dict[str, Sealed]:
-        return {name: Sealed(**content) for name, content in read_json(self.folder / "sealed.json").items()}
+        return {
+            name: Sealed(**content)
+            for name, content in read_json(self.folder / "sealed.json").items()
+        }
 
 
 def check_apart(studies: Sequence[Study]) -> None:

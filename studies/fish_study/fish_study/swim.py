@@ -65,7 +65,9 @@ class Readings:
     truth: Array  # (T, M, 3) poses
 
 
-def swim(plant: Plant, starts: Array, driver: Driver, instruments: Instruments, steps: int) -> Readings:
+def swim(
+    plant: Plant, starts: Array, driver: Driver, instruments: Instruments, steps: int
+) -> Readings:
     """`steps` grid points from rest at `starts` (M, 3)."""
     plant.reset(starts)
     count = len(starts)
@@ -80,11 +82,15 @@ def swim(plant: Plant, starts: Array, driver: Driver, instruments: Instruments, 
         truth[k + 1] = plant.pose
         arrived = []
         for m in range(count):
-            new = int(np.searchsorted(instruments.stamps[m], PERIOD * (k + 1) - TRANSPORT, side="right"))
+            new = int(
+                np.searchsorted(instruments.stamps[m], PERIOD * (k + 1) - TRANSPORT, side="right")
+            )
             frames = slice(shown[m], new)
             poses = instruments.poses(m, frames, truth[: k + 2, m]) if new > shown[m] else ()
             stamps = instruments.stamps[m][frames]
-            arrived.append([(float(t), x, y, psi) for t, (x, y, psi) in zip(stamps, poses, strict=True)])
+            arrived.append(
+                [(float(t), x, y, psi) for t, (x, y, psi) in zip(stamps, poses, strict=True)]
+            )
             shown[m] = new
         driver.see(k, gyro[k], accel[k], arrived)
     everything = tuple(instruments.poses(m, slice(None), truth[:steps, m]) for m in range(count))

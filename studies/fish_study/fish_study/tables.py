@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -32,7 +33,7 @@ class Share:
 
     @property
     def value(self) -> float:
-        """k / n; NaN without any."""
+        """K / n; NaN without any."""
         return self.k / self.n if self.n else float("nan")
 
     @property
@@ -81,18 +82,44 @@ def _answers(group: str) -> Callable[[Score], bool]:
 ASKED = (
     Asked("right name first, single effects", "at least 90 %", _one, lambda s: s.top1),
     Asked("truth in the answered set, single effects", "at least 98 %", _one, lambda s: s.in_set),
-    Asked("right name first, closed loop only", "at most 5 points below open loop", lambda s: s.world.group == "feedback",
-          lambda s: s.top1),
+    Asked(
+        "right name first, closed loop only",
+        "at most 5 points below open loop",
+        lambda s: s.world.group == "feedback",
+        lambda s: s.top1,
+    ),
     Asked("false alarms, nothing hidden", "at most 2 %", _answers("null"), lambda s: s.alarm),
-    Asked("both of two effects", "at least 75 %", lambda s: s.world.group == "two", lambda s: set(s.truth) <= set(s.named)),
-    Asked("no false third name", "at least 95 %", lambda s: s.world.group == "two",
-          lambda s: s.has_answer and not s.false_names),
-    Asked("no name exists: called unexplained", "at least 85 %", lambda s: s.unnamed and s.world.group == "outside",
-          lambda s: s.verdict == "unexplained"),
-    Asked("no name exists: wrong name with confidence", "at most 5 %",
-          lambda s: s.unnamed and s.world.group == "outside" and s.has_answer, lambda s: s.confident_wrong),
-    Asked("sensor impostors called physics", "at most 3 %", _answers("sensor"), lambda s: s.called_physics),
-)  # fmt: skip
+    Asked(
+        "both of two effects",
+        "at least 75 %",
+        lambda s: s.world.group == "two",
+        lambda s: set(s.truth) <= set(s.named),
+    ),
+    Asked(
+        "no false third name",
+        "at least 95 %",
+        lambda s: s.world.group == "two",
+        lambda s: s.has_answer and not s.false_names,
+    ),
+    Asked(
+        "no name exists: called unexplained",
+        "at least 85 %",
+        lambda s: s.unnamed and s.world.group == "outside",
+        lambda s: s.verdict == "unexplained",
+    ),
+    Asked(
+        "no name exists: wrong name with confidence",
+        "at most 5 %",
+        lambda s: s.unnamed and s.world.group == "outside" and s.has_answer,
+        lambda s: s.confident_wrong,
+    ),
+    Asked(
+        "sensor impostors called physics",
+        "at most 3 %",
+        _answers("sensor"),
+        lambda s: s.called_physics,
+    ),
+)
 
 
 def asked_table(scores: Sequence[Score]) -> Table:
@@ -111,7 +138,11 @@ def asked_table(scores: Sequence[Score]) -> Table:
     rows.append(["parameters within 3 standard errors or 20 %, right names", "all", str(good)])
     seconds = [s.seconds for s in scores]
     rows.append(
-        ["seconds per data set, median (longest)", "180", f"{np.median(seconds):.0f} ({max(seconds):.0f})"]
+        [
+            "seconds per data set, median (longest)",
+            "180",
+            f"{np.median(seconds):.0f} ({max(seconds):.0f})",
+        ]
     )
     note = (
         "Thresholds were fixed before the run. Intervals: exact, 95 %. A world without an answer is not right, and no evidence "
@@ -122,8 +153,19 @@ def asked_table(scores: Sequence[Score]) -> Table:
 
 def group_table(scores: Sequence[Score]) -> Table:
     """One row per group."""
-    header = ["group", "worlds", "right name first", "truth in set", "set size", "all right", "a false name", "alarm",
-              "unexplained", "no answer", "s, median"]  # fmt: skip
+    header = [
+        "group",
+        "worlds",
+        "right name first",
+        "truth in set",
+        "set size",
+        "all right",
+        "a false name",
+        "alarm",
+        "unexplained",
+        "no answer",
+        "s, median",
+    ]
     rows = []
     for group in GROUPS:
         own = [s for s in scores if s.world.group == group]
@@ -131,14 +173,24 @@ def group_table(scores: Sequence[Score]) -> Table:
             continue
         named = [s for s in own if s.truth]
         sizes = [len(s.answered) for s in own if s.answered]
-        rows.append([
-            group, str(len(own)), Share.of(named, lambda s: s.top1).short, Share.of(named, lambda s: s.in_set).short,
-            f"{np.mean(sizes):.2f}" if sizes else "–", Share.of(named, lambda s: s.exact).short,
-            Share.of(own, lambda s: bool(s.false_names)).short, Share.of(own, lambda s: s.alarm).short,
-            Share.of(own, lambda s: s.verdict == "unexplained").short, str(sum(not s.has_answer for s in own)),
-            f"{np.median([s.seconds for s in own]):.0f}",
-        ])  # fmt: skip
-    note = "; ".join(f"{name}: {(f.__doc__ or '').strip().rstrip('.')}" for name, f in GROUPS.items())
+        rows.append(
+            [
+                group,
+                str(len(own)),
+                Share.of(named, lambda s: s.top1).short,
+                Share.of(named, lambda s: s.in_set).short,
+                f"{np.mean(sizes):.2f}" if sizes else "–",
+                Share.of(named, lambda s: s.exact).short,
+                Share.of(own, lambda s: bool(s.false_names)).short,
+                Share.of(own, lambda s: s.alarm).short,
+                Share.of(own, lambda s: s.verdict == "unexplained").short,
+                str(sum(not s.has_answer for s in own)),
+                f"{np.median([s.seconds for s in own]):.0f}",
+            ]
+        )
+    note = "; ".join(
+        f"{name}: {(f.__doc__ or '').strip().rstrip('.')}" for name, f in GROUPS.items()
+    )
     return Table("Groups", header, rows, note + ".")
 
 
@@ -149,7 +201,9 @@ def name_table(scores: Sequence[Score]) -> Table:
         own = [s for s in scores if s.world.names == (name,)]
         answers = [", ".join(s.named) or s.verdict for s in own]
         if answers:
-            counted = sorted({a: answers.count(a) for a in answers}.items(), key=lambda item: -item[1])
+            counted = sorted(
+                {a: answers.count(a) for a in answers}.items(), key=lambda item: -item[1]
+            )
             rows.append([name, str(len(own)), "; ".join(f"{a} ({n})" for a, n in counted)])
     note = "All groups with one hidden thing, whatever its strength and noise."
     return Table("Answers by what was hidden", ["hidden", "worlds", "answers"], rows, note)
@@ -183,7 +237,7 @@ class Bin:
 def calibration(scores: Sequence[Score]) -> list[Bin]:
     """Stated probability of the first name against how often it is a hidden one."""
     bins = []
-    for low, high in zip(CALIBRATION[:-1], CALIBRATION[1:], strict=True):
+    for low, high in itertools.pairwise(CALIBRATION):
         own = [s for s in scores if s.named and low <= s.probability < high + (high == 1.0)]
         if own:
             mean = float(np.mean([s.probability for s in own]))
@@ -193,11 +247,15 @@ def calibration(scores: Sequence[Score]) -> list[Bin]:
 
 def calibration_table(scores: Sequence[Score]) -> Table:
     """Bins and the Brier score."""
-    rows = [[f"{b.low:g} to {b.high:g}", f"{b.stated:.2f}", str(b.right)] for b in calibration(scores)]
+    rows = [
+        [f"{b.low:g} to {b.high:g}", f"{b.stated:.2f}", str(b.right)] for b in calibration(scores)
+    ]
     named = [s for s in scores if s.named]
     brier = np.mean([(s.probability - s.top1) ** 2 for s in named]) if named else float("nan")
     note = f"Over all worlds in which a name was given, whatever was hidden. Brier score {brier:.3f} (0 is best)."
-    return Table("Are the stated probabilities right?", ["stated", "mean", "first name right"], rows, note)
+    return Table(
+        "Are the stated probabilities right?", ["stated", "mean", "first name right"], rows, note
+    )
 
 
 @dataclass(frozen=True)
@@ -217,7 +275,11 @@ def power(scores: Sequence[Score], oracle: dict[int, bool] | None = None) -> lis
         own = [s for s in ladder if s.world.strength == strength]
         seen = [oracle[s.world.seed] for s in own if s.world.seed in oracle] if oracle else []
         steps.append(
-            Power(strength, Share.of(own, lambda s: s.in_set), Share(sum(seen), len(seen)) if seen else None)
+            Power(
+                strength,
+                Share.of(own, lambda s: s.in_set),
+                Share(sum(seen), len(seen)) if seen else None,
+            )
         )
     return steps
 
@@ -243,14 +305,25 @@ def criterion_table(scores: Sequence[Score]) -> Table:
     for name, cost in (("AIC", aic_cost), ("BIC", bic_cost)):
         right = [choice(s, cost) in s.truth for s in hidden]
         alarms = [choice(s, cost) is not None for s in nothing]
-        rows.append([name, str(Share(sum(right), len(right))), str(Share(sum(alarms), len(alarms)))])
+        rows.append(
+            [name, str(Share(sum(right), len(right))), str(Share(sum(alarms), len(alarms)))]
+        )
     right = [smallest_error(s) in s.truth for s in hidden]
     alarms = [smallest_error(s) is not None for s in nothing if s.held_out]
     rows.append(
-        ["smallest held-out error", str(Share(sum(right), len(right))), str(Share(sum(alarms), len(alarms)))]
+        [
+            "smallest held-out error",
+            str(Share(sum(right), len(right))),
+            str(Share(sum(alarms), len(alarms))),
+        ]
     )
     rows.insert(
-        0, ["this tool", str(Share.of(hidden, lambda s: s.top1)), str(Share.of(nothing, lambda s: s.alarm))]
+        0,
+        [
+            "this tool",
+            str(Share.of(hidden, lambda s: s.top1)),
+            str(Share.of(nothing, lambda s: s.alarm)),
+        ],
     )
     note = (
         "Worlds with one hidden name, and nulls. AIC and BIC choose among the quick refits of all names on the search "

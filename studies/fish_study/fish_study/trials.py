@@ -38,7 +38,9 @@ class OpenLoop:
 
     def command(self, k: int) -> tuple[Array, Array]:
         """Commands (M, 2) and rotor phases (M,) at grid point k."""
-        phase = np.full(self.table.shape[1], np.remainder(2.0 * np.pi * STROKE * PERIOD * k, 2.0 * np.pi))
+        phase = np.full(
+            self.table.shape[1], np.remainder(2.0 * np.pi * STROKE * PERIOD * k, 2.0 * np.pi)
+        )
         return self.table[k], phase
 
     def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
@@ -98,7 +100,9 @@ class _Captain:
         return command[0], command[1], command[2]
 
 
-def open_loop(kinds: Iterable[str], duration: float, random: np.random.Generator, calm: Array) -> Array:
+def open_loop(
+    kinds: Iterable[str], duration: float, random: np.random.Generator, calm: Array
+) -> Array:
     """Commands (T, M, 2) of open-loop programs, rotor slowed by `calm` (M,)."""
     table = np.stack([program(kind, duration, random) for kind in kinds], axis=1)
     return table * np.stack([calm, np.ones_like(calm)], axis=-1)
@@ -137,10 +141,16 @@ def feedback_paths(
 def _path(kind: str, random: np.random.Generator) -> ReferencePath:
     """One of CLOSED, its size and place drawn."""
     if kind == "figure_eight":
-        return make_path(kind, length=float(random.uniform(2.2, 2.8)), width=float(random.uniform(0.9, 1.2)))
+        return make_path(
+            kind, length=float(random.uniform(2.2, 2.8)), width=float(random.uniform(0.9, 1.2))
+        )
     if kind == "circle":
-        return make_path(kind, radius=float(random.uniform(0.45, 0.7)), x=float(random.uniform(-0.8, 0.8)),
-                         direction=int(random.choice([-1, 1])))  # fmt: skip
+        return make_path(
+            kind,
+            radius=float(random.uniform(0.45, 0.7)),
+            x=float(random.uniform(-0.8, 0.8)),
+            direction=int(random.choice([-1, 1])),
+        )
     if kind != "oval":
         raise ValueError(f"path: got {kind!r}; expected one of {', '.join(CLOSED)}")
     t = np.linspace(0.0, 2.0 * np.pi, 4097)[:-1]

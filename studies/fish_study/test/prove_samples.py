@@ -39,5 +39,11 @@ def diagnosis(
     fit = {"with_effects": {"rms": {}}, "refitted": {"rms": {"2 s": {"position_m": 0.010}}}}
     errors = {"current": 0.012, "wall_effect": 0.009}
     refitted = [{"name": n, "held_out_rms": {"2 s": {"position_m": e}}} for n, e in errors.items()]
-    content = {"verdict": verdict, "effects": rows, "fit": fit, "ranking": ranking, "refitted": refitted}
+    content = {
+        "verdict": verdict,
+        "effects": rows,
+        "fit": fit,
+        "ranking": ranking,
+        "refitted": refitted,
+    }
     return {"seconds": 60.0, "diagnosis": content}

@@ -63,12 +63,16 @@ def test_the_folder_of_a_loop_serves_its_own_world_alone(tmp_path: Path, monkeyp
         return Plan(loop_world(concealed, seed, 3, 4.0), out / "recordings", out, **changes)
 
     made = []
-    monkeypatch.setattr(loop_folder, "make_world", lambda world, folder: made.append(world) or folder.mkdir())
+    monkeypatch.setattr(
+        loop_folder, "make_world", lambda world, folder: made.append(world) or folder.mkdir()
+    )
     prepare(plan())
     prepare(plan(search=8, trainings=5))  # goes on: neither changes what is kept
-    assert made == [plan().world] and (tmp_path / "out" / "recordings").exists()
+    assert made == [plan().world]
+    assert (tmp_path / "out" / "recordings").exists()
     with pytest.raises(
-        StudyError, match=r"holds a loop of seed 1, got 7; effects \{'wind': .*, got \{'ballast': .*: ask"
+        StudyError,
+        match=r"holds a loop of seed 1, got 7; effects \{'wind': .*, got \{'ballast': .*: ask",
     ):
         prepare(plan("ballast", 7))
     for changed in (
@@ -79,12 +83,14 @@ def test_the_folder_of_a_loop_serves_its_own_world_alone(tmp_path: Path, monkeyp
         with pytest.raises(StudyError, match=next(iter(changed)).replace("nominal", "robot")):
             prepare(plan(**changed))
     (tmp_path / "out" / "loop.json").unlink()
-    with pytest.raises(StudyError, match="has no loop.json.*choose another --out, or move"):
+    with pytest.raises(StudyError, match=r"has no loop.json.*choose another --out, or move"):
         prepare(plan())
     assert len(made) == 1
 
 
-def test_recordings_of_a_loop_that_were_interrupted_are_made_again(tmp_path: Path, monkeypatch) -> None:
+def test_recordings_of_a_loop_that_were_interrupted_are_made_again(
+    tmp_path: Path, monkeypatch
+) -> None:
     plan = Plan(loop_world("wind", 1, 3, 4.0), tmp_path / "recordings", tmp_path)
 
     def make(world, folder: Path, trials: int = 3) -> None:
@@ -116,13 +122,24 @@ def test_the_command_says_how_long_the_search_is_and_how_many_trainings_there_ar
     monkeypatch.setattr(loop_folder, "prepare", lambda plan: plan.out.mkdir(exist_ok=True))
     monkeypatch.setattr(close_loop, "close_loop", loop)
     out = tmp_path / "out"
-    asked = ["prove", "--close-loop", "wind", "--out", str(out), "--trainings", "6", "--search", "5"]
+    asked = [
+        "prove",
+        "--close-loop",
+        "wind",
+        "--out",
+        str(out),
+        "--trainings",
+        "6",
+        "--search",
+        "5",
+    ]
     assert main(asked) == 0
     assert [(p.trainings, p.search, p.world.effects) for p in plans] == [
         (6, 5, loop_world("wind", 1, 12, 20.0).effects)
     ]
     assert sorted(p.name for p in out.iterdir()) == ["loop.html", "runs.csv"]
-    assert main([*asked, "--trainings", "0"]) == 1 and len(plans) == 1
+    assert main([*asked, "--trainings", "0"]) == 1
+    assert len(plans) == 1
 
 
 class Engine:
@@ -138,7 +155,8 @@ class Engine:
     def MjData(self, model) -> SimpleNamespace:
         sizes = {"qpos": 4, "qvel": 4, "ctrl": 2, "sensordata": 6, "xfrc_applied": (1, 6)}
         return SimpleNamespace(
-            **{k: np.zeros(n) for k, n in sizes.items()}, warning=SimpleNamespace(number=np.zeros(8, int))
+            **{k: np.zeros(n) for k, n in sizes.items()},
+            warning=SimpleNamespace(number=np.zeros(8, int)),
         )
 
     def mj_resetData(self, model, data) -> None:
@@ -149,7 +167,9 @@ class Engine:
         data.warning.number[6] += data.ctrl[0] > 100.0
 
 
-def test_a_fish_that_becomes_unstable_is_a_run_that_diverged_and_the_others_swim_on(monkeypatch) -> None:
+def test_a_fish_that_becomes_unstable_is_a_run_that_diverged_and_the_others_swim_on(
+    monkeypatch,
+) -> None:
     monkeypatch.setattr(mujoco_plant, "_mujoco", Engine)
     plant = MujocoPlant("", 3, 0.0, np.random.default_rng(0))
     swimmer = close_loop.Swimmer(plant)
@@ -161,7 +181,9 @@ def test_a_fish_that_becomes_unstable_is_a_run_that_diverged_and_the_others_swim
     np.testing.assert_allclose(swimmer.motion[[0, 2], 0], 3 * 20 * 1e-3)
     swimmer.reset(np.zeros((3, 3)))
     assert np.isfinite(swimmer.motion).all()
-    with pytest.raises(MujocoError, match="the engine became unstable"):  # no data set is made of it
+    with pytest.raises(
+        MujocoError, match="the engine became unstable"
+    ):  # no data set is made of it
         plant.step(fast)
 
 
@@ -174,7 +196,9 @@ def test_a_search_on_the_plant_goes_on_where_it_was_stopped(tmp_path, monkeypatc
             raise KeyboardInterrupt
         gains = candidates[0].gains.policy.gains(np.zeros(0))
         swum.append(gains)
-        sizes = SimpleNamespace(cross_track_rmse=abs(np.log(gains.steering_kp)), speed_rmse=gains.speed_kp)
+        sizes = SimpleNamespace(
+            cross_track_rmse=abs(np.log(gains.steering_kp)), speed_rmse=gains.speed_kp
+        )
         return [SimpleNamespace(metrics=SimpleNamespace(whole=sizes))]
 
     monkeypatch.setattr(gain_search, "run_study", swim)
@@ -184,7 +208,8 @@ def test_a_search_on_the_plant_goes_on_where_it_was_stopped(tmp_path, monkeypatc
     with pytest.raises(KeyboardInterrupt):
         search(plant, ("stop",), 20, 1, tmp_path / "again.json")
     assert search(plant, (), 20, 1, tmp_path / "again.json") == whole
-    assert swum == expected and len(swum) >= 15
+    assert swum == expected
+    assert len(swum) >= 15
 
 
 def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -> None:
@@ -228,42 +253,64 @@ def test_the_search_never_sees_the_runs_that_are_judged(tmp_path, monkeypatch) -
     assert "swum: 3 of 20 batches" in said
     count = Counter(r.candidate for r in rows)
     assert {count[n] / count["true"] for n in ("nominal", "refitted", "corrected")} == {3.0}
-    assert list(dict.fromkeys(r.candidate for r in rows)) == ["nominal", "refitted", "corrected", "true"]
+    assert list(dict.fromkeys(r.candidate for r in rows)) == [
+        "nominal",
+        "refitted",
+        "corrected",
+        "true",
+    ]
     assert "trained: 9 of 9" in said
-    assert {v[0] for v in verbs[:2]} == {"identify", "diagnose"} and {v[0] for v in verbs[2:]} == {"train"}
+    assert {v[0] for v in verbs[:2]} == {"identify", "diagnose"}
+    assert {v[0] for v in verbs[2:]} == {"train"}
     given = {Path(v[v.index("--out") + 1]).name: v for v in verbs[2:]}
-    runs = Counter((Path(v[v.index("--out") + 1]).name, v[v.index("--seed") + 1]) for v in verbs[2:])
+    runs = Counter(
+        (Path(v[v.index("--out") + 1]).name, v[v.index("--seed") + 1]) for v in verbs[2:]
+    )
     assert runs == Counter(product(given, "123"))  # each model from the same seeds
     assert len({v[v.index("--set") :] for v in verbs[2:]}) == 1  # all trained alike
     assert "--robot" not in given["nominal"]
     assert str(tmp_path / "out" / "identify" / "robot.yaml") in given["refitted"]
     assert str(tmp_path / "out" / "diagnose" / "model.yaml") in given["corrected"]
-    assert laws["true"] == own and laws["corrected_1"].limits == ControlLimits()
+    assert laws["true"] == own
+    assert laws["corrected_1"].limits == ControlLimits()
     assert {c.seed for c in judged} == set(JUDGE_SEEDS)
     assert {(c.path, c.speed) for c in judged} == {(c.path, c.speed) for c in searched}
     assert {c.seed for c in searched}.isdisjoint(JUDGE_SEEDS)
     done = len(verbs)
     close_loop.close_loop(plan, 2, lambda _: None)
     assert len(verbs) == done  # what is there is used
-    (tmp_path / "out" / "training" / "nominal" / "seed_2" / "gains.safetensors").unlink()  # was stopped
+    (
+        tmp_path / "out" / "training" / "nominal" / "seed_2" / "gains.safetensors"
+    ).unlink()  # was stopped
     close_loop.close_loop(replace(plan, trainings=4), 2, lambda _: None)
     again = [(Path(v[v.index("--out") + 1]).name, v[v.index("--seed") + 1]) for v in verbs[done:]]
-    assert sorted(again) == [("corrected", "4"), ("nominal", "2"), ("nominal", "4"), ("refitted", "4")]
+    assert sorted(again) == [
+        ("corrected", "4"),
+        ("nominal", "2"),
+        ("nominal", "4"),
+        ("refitted", "4"),
+    ]
     assert all("--resume" in v and "--overwrite" not in v for v in verbs[done:])
 
 
-def test_swims_that_are_kept_are_not_swum_again_and_those_of_other_gains_are(tmp_path, monkeypatch) -> None:
+def test_swims_that_are_kept_are_not_swum_again_and_those_of_other_gains_are(
+    tmp_path, monkeypatch
+) -> None:
     cells = [Cell("S", 0.1, seed) for seed in (1, 2, 3)]
     swum = []
 
     def swim(candidates, conditions, cells, jobs, report, keep):
         for c in candidates:
             if c.name == "b_1" and not swum[1:]:
-                keep(1, [row(c.name, 9.0, cell=cells[0])])  # half of its runs, then the loop is stopped
+                keep(
+                    1, [row(c.name, 9.0, cell=cells[0])]
+                )  # half of its runs, then the loop is stopped
                 raise KeyboardInterrupt
             swum.append(c.name)
             keep(1, [row(c.name, len(swum) + 0.1, cell=cells[2])])
-            keep(0, [replace(row(c.name, np.nan, cell=cell), condition="pool") for cell in cells[:2]])
+            keep(
+                0, [replace(row(c.name, np.nan, cell=cell), condition="pool") for cell in cells[:2]]
+            )
 
     def gains(steering: float) -> Candidate:
         policy = Policy.constant(HAND_TUNED._replace(steering_kp=steering))
@@ -280,17 +327,28 @@ def test_swims_that_are_kept_are_not_swum_again_and_those_of_other_gains_are(tmp
     swum.append("stopped")
     first = each(runs)
     assert swum == ["a_1", "stopped", "b_1"]
-    assert [r.cell for r in first] == cells * 2 and {r.candidate for r in first} == {"model"}
+    assert [r.cell for r in first] == cells * 2
+    assert {r.candidate for r in first} == {"model"}
     sizes = [r.metrics.whole.cross_track_rmse for r in first]
     np.testing.assert_array_equal(sizes, [np.nan, np.nan, 1.1, np.nan, np.nan, 3.1])
     assert [r.condition for r in first[:3]] == ["pool", "pool", "second plant"]
-    assert str(each(runs)) == str(first) and len(swum) == 3
+    assert str(each(runs)) == str(first)
+    assert len(swum) == 3
     each({**runs, "a_1": gains(1.5)})
-    each({**runs, "b_1": replace(gains(2.0), law=replace(Law(), limits=ControlLimits(curvature_gain=0.18)))})
+    each(
+        {
+            **runs,
+            "b_1": replace(
+                gains(2.0), law=replace(Law(), limits=ControlLimits(curvature_gain=0.18))
+            ),
+        }
+    )
     assert swum[3:] == ["a_1", "a_1", "b_1"]
 
 
-@pytest.mark.parametrize(("concealed", "kept"), [("wind", set()), ("servo_filter", {"servo_filter"})])
+@pytest.mark.parametrize(
+    ("concealed", "kept"), [("wind", set()), ("servo_filter", {"servo_filter"})]
+)
 def test_the_plants_own_feed_forward_is_of_still_water(concealed, kept, monkeypatch) -> None:
     """The simulator stands in for MuJoCo here."""
     asked = []
@@ -312,16 +370,25 @@ def test_the_gap_is_shared_out_by_hand() -> None:
     assert table.rows[1][4] == "no gap"
     assert [r[1] for r in table.rows] == ["30.0", "14.0", "10.0"]  # mm
     lost = replace(rows[1], metrics=replace(rows[1].metrics, failure="left the pool"))
-    assert [r[6] for r in loop_table([rows[0], lost, rows[2]]).rows] == ["0 of 1", "1 of 1", "0 of 1"]
+    assert [r[6] for r in loop_table([rows[0], lost, rows[2]]).rows] == [
+        "0 of 1",
+        "1 of 1",
+        "0 of 1",
+    ]
     assert [box.y[0] for box in loop_figure(rows).data] == pytest.approx([30.0, 14.0, 10.0])
 
 
 def test_a_run_that_diverges_is_no_gap_that_is_missing() -> None:
     rows = [
-        row(name, size, size) for name, size in {"nominal": 0.03, "corrected": np.nan, "true": 0.01}.items()
+        row(name, size, size)
+        for name, size in {"nominal": 0.03, "corrected": np.nan, "true": 0.01}.items()
     ]
     assert [r[2] for r in loop_table(rows).rows] == ["0%", "unknown: a run diverged", "100%"]
-    rows = [replace(rows[0]), replace(rows[2], candidate="corrected"), replace(rows[1], candidate="true")]
+    rows = [
+        replace(rows[0]),
+        replace(rows[2], candidate="corrected"),
+        replace(rows[1], candidate="true"),
+    ]
     assert {r[2] for r in loop_table(rows).rows} == {"unknown: a run diverged"}
 
 
@@ -342,7 +409,8 @@ def test_the_interval_of_a_share_is_as_wide_as_runs_differ() -> None:
     calm = gap_share(nominal, 0.056 + water[None], true)
     assert calm == pytest.approx((0.8, 0.8, 0.8), abs=1e-6)
     share, low, high = gap_share(nominal, 0.056 + water + random.normal(0.0, 0.01, (1, 24)), true)
-    assert low < 0.8 < high and low < share < high
+    assert low < 0.8 < high
+    assert low < share < high
     assert 0.1 < high - low < 0.6  # 4 standard errors of 0.01 / sqrt(24) / 0.03: 0.27
     assert np.isnan(gap_share(true, nominal, nominal)[0])
     unsure = np.array([[0.10, 0.01] * 12])  # a gap of 0.005 that other runs may not have
@@ -355,12 +423,21 @@ def test_the_interval_of_a_share_holds_what_it_says(trainings: float, runs: floa
     random = np.random.default_rng(1)
 
     def swum(mean: float, count: int, scatter: float) -> np.ndarray:
-        return mean + water + random.normal(0.0, scatter, (count, 1)) + random.normal(0.0, runs, (count, 24))
+        return (
+            mean
+            + water
+            + random.normal(0.0, scatter, (count, 1))
+            + random.normal(0.0, runs, (count, 24))
+        )
 
     share, hits = 0.9, 0
     for _ in range(600):
         water = random.normal(0.0, 20.0, 24)
-        models = swum(73.0, 3, trainings), swum(73.0 - 26.0 * share, 3, trainings), swum(47.0, 1, 0.0)
+        models = (
+            swum(73.0, 3, trainings),
+            swum(73.0 - 26.0 * share, 3, trainings),
+            swum(47.0, 1, 0.0),
+        )
         _, low, high = gap_share(*models)
         hits += low <= share <= high
     assert hits / 600 >= 0.94
@@ -373,12 +450,29 @@ def test_trainings_that_differ_widen_the_interval_and_all_count() -> None:
     wide = 4.303 * 0.006 / np.sqrt(3.0) / 0.03  # t of two degrees of freedom
     assert (share, low, high) == pytest.approx((0.8, 0.8 - wide, 0.8 + wide), abs=1e-3)
     cells = [Cell("S", 0.1, seed) for seed in (1, 2)]
-    rows = [row(n, size, cell=c) for n, sizes in {"nominal": (0.05, 0.05), "corrected": (0.02, 0.04), "true": (0.03,)}.items()
-            for size in sizes for c in cells]  # fmt: skip
+    rows = [
+        row(n, size, cell=c)
+        for n, sizes in {
+            "nominal": (0.05, 0.05),
+            "corrected": (0.02, 0.04),
+            "true": (0.03,),
+        }.items()
+        for size in sizes
+        for c in cells
+    ]
     table = loop_table(rows)
-    assert [r[1] for r in table.rows] == ["50.0", "30.0", "30.0"] and table.rows[1][2].startswith("100% (")
+    assert [r[1] for r in table.rows] == ["50.0", "30.0", "30.0"]
+    assert table.rows[1][2].startswith("100% (")
     assert [r[5] for r in table.rows] == ["50.0, 50.0", "20.0, 40.0", "30.0"]
     assert [r[6] for r in table.rows] == ["0 of 4", "0 of 4", "0 of 2"]
-    rows = [row(n, size, cell=c) for n, sizes in {"nominal": (0.05, 0.02), "corrected": (0.02, 0.04), "true": (0.03,)}.items()
-            for size in sizes for c in cells]  # fmt: skip
+    rows = [
+        row(n, size, cell=c)
+        for n, sizes in {
+            "nominal": (0.05, 0.02),
+            "corrected": (0.02, 0.04),
+            "true": (0.03,),
+        }.items()
+        for size in sizes
+        for c in cells
+    ]
     assert [r[2] for r in loop_table(rows).rows] == ["0%", "100% (anything: no sure gap)", "100%"]

@@ -19,7 +19,9 @@ from fish_train.training.run_log import CurveRow
 
 
 def sizes(cross_track: float, speed: float) -> ErrorSizes:
-    return ErrorSizes(cross_track, cross_track, cross_track, cross_track, 0.0, speed, speed, speed, 0.0, 0.0)
+    return ErrorSizes(
+        cross_track, cross_track, cross_track, cross_track, 0.0, speed, speed, speed, 0.0, 0.0
+    )
 
 
 def rows_of(scale: float) -> list[Row]:
@@ -27,7 +29,9 @@ def rows_of(scale: float) -> list[Row]:
     return [
         Row("a", "c", Cell(letter, v, 0), RunMetrics(*[sizes(scale * y, scale * u)] * 2, 1.0, ""))
         for letter in paper.LETTERS
-        for v, y, u in zip(paper.SPEEDS, paper.CROSS_TRACK[letter], paper.SPEED[letter], strict=True)
+        for v, y, u in zip(
+            paper.SPEEDS, paper.CROSS_TRACK[letter], paper.SPEED[letter], strict=True
+        )
     ]
 
 
@@ -46,7 +50,8 @@ def test_seeds_that_diverged_are_counted() -> None:
         for k in (1, 2)
     ]
     (note,) = training_blocks([curve, []], 2)
-    assert "0 of 2 seeds passed all 2 levels" in note.note and "1 of 2 seeds diverged" in note.note
+    assert "0 of 2 seeds passed all 2 levels" in note.note
+    assert "1 of 2 seeds diverged" in note.note
     (text,) = training_blocks([[]], 2)
     assert "1 of 1 seeds diverged" in text.text
 
@@ -57,11 +62,14 @@ def test_the_papers_training_on_a_robot_has_that_robots_law(
     jobs = []
     own = Law(limits=replace(Law().limits, curvature_gain=0.3))
     monkeypatch.setattr("fish_train.evaluation.feed_forward.law_of_robot", lambda _: own)
-    monkeypatch.setattr("fish_train.training.parallel_runs.run_all", lambda todo, *_: jobs.extend(todo))
+    monkeypatch.setattr(
+        "fish_train.training.parallel_runs.run_all", lambda todo, *_: jobs.extend(todo)
+    )
     monkeypatch.setattr("fish_train.training.run_log.read_curve", lambda _: [])
     for file in (Path("models/heavy.yaml"), None):
         trained(tmp_path, 1, Robot(), file, 1, Console(file=StringIO()))
     assert [job.law for job in jobs] == [own, Law()]
     assert [job.command for job in jobs] == [
-        "robofish train --robot heavy.yaml --seed 1", "robofish train --seed 1"
-    ]  # fmt: skip
+        "robofish train --robot heavy.yaml --seed 1",
+        "robofish train --seed 1",
+    ]

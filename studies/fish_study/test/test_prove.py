@@ -60,7 +60,10 @@ TOOL = (sys.executable, str(Path(__file__).with_name("fake_tool.py")))
 
 
 def test_labels_cannot_be_changed_after_the_seal() -> None:
-    sealed = {"a": seal_label({"effects": {"current": {"x": 0.1}}}), "b": seal_label({"effects": {}})}
+    sealed = {
+        "a": seal_label({"effects": {"current": {"x": 0.1}}}),
+        "b": seal_label({"effects": {}}),
+    }
     seals = {name: s.seal for name, s in sealed.items()}
     assert broken_seals(seals, sealed) == []
     assert seal_label({"effects": {}}).seal != sealed["b"].seal  # the salt hides equal labels
@@ -110,7 +113,8 @@ def test_labels_stay_sealed_until_every_world_has_a_result(tmp_path: Path) -> No
 
 
 def test_a_study_goes_on_where_it_was_stopped(ran: SimpleNamespace) -> None:
-    assert ran.stopped.done == ["world_0000", "world_0001"] and ran.stopped.left == ["world_0002"]
+    assert ran.stopped.done == ["world_0000", "world_0001"]
+    assert ran.stopped.left == ["world_0002"]
     assert ran.done == ["world_0000", "world_0001", "world_0002"]
     run_study(ran.study, 1, lambda name: pytest.fail(f"{name} ran twice"), TOOL)
     assert read_json(ran.study.folder / "seals.json") == ran.seals
@@ -127,7 +131,9 @@ def test_the_tool_is_given_the_recordings_and_no_more(ran: SimpleNamespace) -> N
 def test_an_opened_study_has_the_labels_that_were_sealed(study: Study) -> None:
     opened = study.reveal()
     assert list(opened.values()) == three_worlds()
-    assert {n: World.of(s["label"]) for n, s in read_json(study.folder / "labels.json").items()} == opened
+    assert {
+        n: World.of(s["label"]) for n, s in read_json(study.folder / "labels.json").items()
+    } == opened
     scores = [score_world(world, study.results[name]) for name, world in opened.items()]
     assert [s.verdict for s in scores] == ["no_mismatch", "failed", "no_mismatch"]
     assert "exit status 3: cannot" in scores[1].error
@@ -139,25 +145,37 @@ def test_an_opened_study_has_the_labels_that_were_sealed(study: Study) -> None:
 
 def test_finished_studies_of_one_version_are_pooled(study: Study, tmp_path: Path) -> None:
     about = {**study.about, "seed": 2, "began": "later", "command": "again"}
-    other = Study.create(tmp_path / "other", [replace(w, seed=w.seed + 3) for w in three_worlds()], about)
+    other = Study.create(
+        tmp_path / "other", [replace(w, seed=w.seed + 3) for w in three_worlds()], about
+    )
     shutil.copytree(study.folder / "worlds", other.folder / "worlds")
     result = other.place("world_0002") / "result.json"
     kept = result.read_bytes()
     result.unlink()
-    pool = ["prove", "--pool", str(study.folder), str(other.folder), "--out", str(tmp_path / "pooled")]
+    pool = [
+        "prove",
+        "--pool",
+        str(study.folder),
+        str(other.folder),
+        "--out",
+        str(tmp_path / "pooled"),
+    ]
     assert main(pool) == 1  # nothing is said before every label may be opened
     result.write_bytes(kept)
     assert main(pool) == 0
     page = (tmp_path / "pooled" / "report.html").read_text()
     assert "6 worlds, 4 of them with something hidden; seed 1, today; seed 2, later" in page
-    assert "exit status 3: cannot" in page and "Asked and measured" in page
+    assert "exit status 3: cannot" in page
+    assert "Asked and measured" in page
     newer = Study.create(tmp_path / "newer", three_worlds(), {"tool": "0123456789abcdef"})
     assert main([*pool[:2], str(study.folder), str(newer.folder), *pool[4:]]) == 1
     with pytest.raises(StudyError, match="got version 0123456789abcdef of the tool, expected"):
         newer.check_tool(tool_digest())
 
 
-def test_no_world_counts_twice(study: Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_world_counts_twice(
+    study: Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     def pool(*folders: Path) -> str:
         assert main(["prove", "--pool", *map(str, folders), "--out", str(tmp_path / "pooled")]) == 1
         return " ".join(capsys.readouterr().err.split())
@@ -185,14 +203,19 @@ def test_answers_of_two_versions_make_no_study(study: Study) -> None:
     assert len(study.results) == 3
     retold(files[2], "0123456789abcdef")
     with pytest.raises(
-        StudyError, match=f"got result.json in world_0002 of 0123456789abcdef, expected version {own}"
+        StudyError,
+        match=f"got result.json in world_0002 of 0123456789abcdef, expected version {own}",
     ):
         study.results  # noqa: B018
 
 
 def test_a_tool_that_changes_while_a_study_runs_stops_it(tmp_path: Path) -> None:
-    study = Study.create(tmp_path / "study", [small("null")], {"seed": 1, "tool": "0123456789abcdef"})
-    with pytest.raises(StudyError, match="world_0000: got version .* of the tool, expected 0123456789abcdef"):
+    study = Study.create(
+        tmp_path / "study", [small("null")], {"seed": 1, "tool": "0123456789abcdef"}
+    )
+    with pytest.raises(
+        StudyError, match=r"world_0000: got version .* of the tool, expected 0123456789abcdef"
+    ):
         run_study(study, 1, lambda _: None, TOOL)
     assert study.open_worlds == ["world_0000"]
 
@@ -212,17 +235,20 @@ def test_a_study_is_judged_by_its_own_tool(study: Study, monkeypatch: pytest.Mon
     judge_it()
     retold(files[1], "0123456789abcdef")
     with pytest.raises(
-        StudyError, match="got judged.json in world_0001 of 0123456789abcdef, expected version"
+        StudyError, match=r"got judged.json in world_0001 of 0123456789abcdef, expected version"
     ):
         judge_it()
-    for name in study.worlds:  # a study of another tool: what is judged is read, nothing is judged anew
+    for (
+        name
+    ) in study.worlds:  # a study of another tool: what is judged is read, nothing is judged anew
         retold(study.place(name) / "result.json", "0123456789abcdef")
         retold(study.place(name) / "judged.json", "0123456789abcdef")
     retold(study.folder / "study.json", "0123456789abcdef")
     judge_it()
     files[2].unlink()
     with pytest.raises(
-        StudyError, match="1 worlds are not judged yet, .* check out the version that the study ran with"
+        StudyError,
+        match=r"1 worlds are not judged yet, .* check out the version that the study ran with",
     ):
         judge_it()
     assert not files[2].exists()
@@ -244,13 +270,15 @@ def run_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., d
 def test_a_tool_that_does_not_end_is_a_result(run_with, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "LONGEST", 0.2)
     result = run_with("time.sleep(60)")
-    assert result["diagnosis"] is None and result["error"] == "no answer within 0.2 s"
+    assert result["diagnosis"] is None
+    assert result["error"] == "no answer within 0.2 s"
     assert 0.2 <= result["seconds"] < 30.0
 
 
 def test_of_a_tool_that_fails_the_last_words_are_kept(run_with) -> None:
     result = run_with("sys.exit('first ' + 'x' * 3000 + ' last')")
-    assert result["error"].startswith("exit status 1: x") and result["error"].endswith(" last\n")
+    assert result["error"].startswith("exit status 1: x")
+    assert result["error"].endswith(" last\n")
 
 
 def test_a_tool_that_somebody_stopped_is_no_result(run_with, tmp_path: Path) -> None:
@@ -285,7 +313,8 @@ run_study(Study(Path({str(tmp_path / "study")!r})), 1, print, ({sys.executable!r
 
 def test_the_tool_s_version_is_that_of_its_texts(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = tool_digest()
-    assert len(whole) == 16 and whole == tool_digest()
+    assert len(whole) == 16
+    assert whole == tool_digest()
     monkeypatch.setattr(tool_version, "PARTS", tool_version.PARTS[:-1])
     assert tool_digest() != whole
 
@@ -295,7 +324,10 @@ def test_the_tool_s_version_leaves_out_what_no_answer_depends_on(tmp_path: Path)
     (tmp_path / "methods").mkdir()
     for file in ("nodes/pacer.py", "methods/heun.py", "step.py", "notes.txt"):
         (tmp_path / file).write_text("x = 1\n")
-    assert sorted(name for name, _ in tool_version._texts(tmp_path)) == ["methods/heun.py", "step.py"]
+    assert sorted(name for name, _ in tool_version._texts(tmp_path)) == [
+        "methods/heun.py",
+        "step.py",
+    ]
 
 
 def test_a_tool_is_the_same_after_a_word_about_it_and_another_after_a_number():
@@ -314,7 +346,10 @@ def comes_true(condition: Callable[[], object], patience: float = 60.0) -> bool:
 def test_overlap_of_times_and_degrees_of_freedom() -> None:
     acts, names = np.zeros((800, 2), dtype=bool), ["trial_00", "trial_01"]
     acts[200:400, 1] = True
-    hit = [{"trial": "trial_01", "from": 2.0, "to": 4.0}, {"trial": "elsewhere", "from": 0.0, "to": 8.0}]
+    hit = [
+        {"trial": "trial_01", "from": 2.0, "to": 4.0},
+        {"trial": "elsewhere", "from": 0.0, "to": 8.0},
+    ]
     assert overlap(stated_times(hit, names, 800), acts) == 1.0
     assert overlap(stated_times([{**hit[0], "to": 6.0}], names, 800), acts) == 0.5
     assert overlap(stated_times([{**hit[0], "trial": "trial_00"}], names, 800), acts) == 0.0
@@ -331,7 +366,8 @@ def test_a_localised_effect_is_seen_where_it_acts() -> None:
     assert push is not None
     acts = acting(push, np.array(Noise().wrench))
     near = push.covariates["wall_distance"]
-    assert 0.02 < acts.mean() < 0.8 and near[acts].mean() < near[~acts].mean()
+    assert 0.02 < acts.mean() < 0.8
+    assert near[acts].mean() < near[~acts].mean()
     assert stated_range(regimes(push, np.array(Noise().wrench)), push.covariates)[acts].mean() > 0.5
     assert true_push(World("single", 1, {"current": {"x": 0.03}}), experiment) is None
 
@@ -339,7 +375,11 @@ def test_a_localised_effect_is_seen_where_it_acts() -> None:
 def test_the_own_force_of_a_drag_is_its_equation() -> None:
     """-k |u| u on the head, from the accelerations with and without it."""
     world = World(
-        "single", 3, {"quadratic_drag": {"surge": 0.5, "sway": 0.0, "yaw": 0.0}}, count=2, duration=4.0
+        "single",
+        3,
+        {"quadratic_drag": {"surge": 0.5, "sway": 0.0, "yaw": 0.0}},
+        count=2,
+        duration=4.0,
     )
     experiment = as_experiment(make_readings(world), True)
     hypothesis, theta = with_truth(world, world.names)
@@ -352,27 +392,36 @@ def test_the_own_force_of_a_drag_is_its_equation() -> None:
 def test_the_own_force_of_a_flow_is_that_of_all_of_it() -> None:
     """The mean of a flow that differs hardly from place to place pushes as the uniform current does."""
     push = {}
-    for name, values in (("current", {"x": 0.05}), ("nonuniform_current", {"mean_x": 0.05, "shear_x": 1e-4})):
+    for name, values in (
+        ("current", {"x": 0.05}),
+        ("nonuniform_current", {"mean_x": 0.05, "shear_x": 1e-4}),
+    ):
         world = World("single", 3, {name: values}, count=2, duration=2.0)
         experiment = as_experiment(make_readings(world), True)
         hypothesis, theta = with_truth(world, world.names)
-        push[name] = own_force(evaluate(hypothesis, theta, experiment, Noise()), name, experiment).wrench
+        push[name] = own_force(
+            evaluate(hypothesis, theta, experiment, Noise()), name, experiment
+        ).wrench
     size = np.abs(push["current"]).max()
     np.testing.assert_allclose(push["nonuniform_current"], push["current"], atol=0.05 * size)
 
 
 def test_the_oracle_and_the_rivals_by_hand() -> None:
     def sight(gain: float) -> Sight:
-        return Sight(gain, 1, [[0.02] * 3, [0.04] * 3, [0.1] * 3], [[0.01] * 3, [0.02] * 3, [0.05] * 3])
+        return Sight(
+            gain, 1, [[0.02] * 3, [0.04] * 3, [0.1] * 3], [[0.01] * 3, [0.02] * 3, [0.05] * 3]
+        )
 
-    assert detects(sight(3.0), []) and not detects(
-        sight(2.6), []
-    )  # chi square, one parameter, 2 %: 2.71 nats
+    assert detects(sight(3.0), [])
+    assert not detects(sight(2.6), [])
     assert not detects(sight(3.0), [sight(100.0)] * 25)  # but not where nothing looks like that too
     world = World("single", 1, {"current": {"x": 0.03}})
     answer = diagnosis(("current", "physics", 0.9))
     answer["diagnosis"]["fit"]["with_effects"]["rms"] = {"2 s": {"position_m": 0.022}}
-    right, null = score_world(world, answer), score_world(World("null", 2), diagnosis(verdict="no_mismatch"))
+    right, null = (
+        score_world(world, answer),
+        score_world(World("null", 2), diagnosis(verdict="no_mismatch")),
+    )
     judged = {
         1: {"overlap": 0.5, "f1": 0.6, "range_f1": None, "dof": 0.7},
         2: {"overlap": None, "f1": None, "dof": None},
@@ -398,10 +447,14 @@ def test_the_oracle_and_the_rivals_by_hand() -> None:
         2: {"sindy": None, "sindy_r2": 0.0, "neural_r2": 0.0},
     }
     rows = rivals_table([right, null], said).rows
-    assert rows[0][1].startswith("1/1") and rows[1][1].startswith("0/1") and rows[1][2].startswith("0/1")
+    assert rows[0][1].startswith("1/1")
+    assert rows[1][1].startswith("0/1")
+    assert rows[1][2].startswith("0/1")
 
 
-def test_the_judge_sees_a_hidden_current_as_the_oracle_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_judge_sees_a_hidden_current_as_the_oracle_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Its fit from the true values predicts better, with the noise of the world; a current acts everywhere, so no times."""
     seen: list[Looked] = []
     monkeypatch.setattr(judging, "look", lambda *given: seen.append(look(*given)) or seen[0])
@@ -410,16 +463,25 @@ def test_the_judge_sees_a_hidden_current_as_the_oracle_does(monkeypatch: pytest.
     assert world.names == ("current",)
     content = judge(world, {"fit": {"held_out_trials": ["trial_02"]}, "effects": []})
     sight = Sight.read(content["sight"])
-    assert detects(sight, []) and sight.gain > 100.0 and sight.parameters == 2
+    assert detects(sight, [])
+    assert sight.gain > 100.0
+    assert sight.parameters == 2
     assert sight.rms_true[1][0] < 0.7 * sight.rms_nominal[1][0]
-    assert {k: content[k] for k in ("dof", "overlap", "f1")} == {"dof": None, "overlap": None, "f1": None}
+    assert {k: content[k] for k in ("dof", "overlap", "f1")} == {
+        "dof": None,
+        "overlap": None,
+        "f1": None,
+    }
     assert content["rivals"] == {"sindy": "current", "sindy_r2": 0.5, "neural_r2": 0.6}
     (looked,) = seen
-    assert looked.training.names == ("trial_00", "trial_01") and looked.held_out.names == ("trial_02",)
+    assert looked.training.names == ("trial_00", "trial_01")
+    assert looked.held_out.names == ("trial_02",)
     assert looked.true.noise.gyro == pytest.approx(2.0 * Noise().gyro, rel=0.1)
     for key, true in world.effects["current"].items():
         name = f"current.{key}"
-        assert looked.true.values[name] == pytest.approx(true, abs=4.0 * looked.true.standard_errors[name])
+        assert looked.true.values[name] == pytest.approx(
+            true, abs=4.0 * looked.true.standard_errors[name]
+        )
 
 
 def test_a_world_without_an_answer_is_judged_and_counts_as_not_right(
@@ -436,18 +498,20 @@ def test_a_world_without_an_answer_is_judged_and_counts_as_not_right(
     for name in study.worlds:
         study.place(name).mkdir(parents=True)
         write_json(
-            study.place(name) / "result.json", {"seconds": 1.0, "diagnosis": None, "error": "exit status 3"}
+            study.place(name) / "result.json",
+            {"seconds": 1.0, "diagnosis": None, "error": "exit status 3"},
         )
     scores = [score_world(w, study.results[n]) for n, w in study.reveal().items()]
     oracle, (against, rivals) = judging.judge_studies([study], scores, 1, lambda _: None)
-    assert worlds[1].links > 3 and worlds[2].links == 3  # of more links no structure is the true one
-    assert len(seen) == 2 and {s.held_out.names for s in seen} == {("trial_02",)}
+    assert worlds[1].links > 3
+    assert worlds[2].links == 3
+    assert len(seen) == 2
+    assert {s.held_out.names for s in seen} == {("trial_02",)}
     assert oracle == {worlds[0].seed: True}
     assert against.rows[0][2] == "0% of 1"
     assert [row[1].split(" =")[0] for row in rivals.rows[:2]] == ["0/1", "1/1"]
-    assert rivals.rows[0][2] == "–" and rivals.rows[1][2].startswith(
-        "1/1"
-    )  # no answer, no evidence of few alarms
+    assert rivals.rows[0][2] == "–"
+    assert rivals.rows[1][2].startswith("1/1")
 
 
 def test_what_could_not_be_made_is_judged_as_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -462,8 +526,12 @@ def test_the_judge_sees_what_has_no_name(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(judging, "compete", lambda *_: Rivals(None, 0.0, 0.0))
     world = small("outside", 4, encoder=True)
     assert world.names == ("compass",)
-    sight = Sight.read(judge(world, {"fit": {"held_out_trials": ["trial_02"]}, "effects": []})["sight"])
-    assert detects(sight, []) and sight.parameters == 2 and np.isfinite(sight.rms_true[1][0])
+    sight = Sight.read(
+        judge(world, {"fit": {"held_out_trials": ["trial_02"]}, "effects": []})["sight"]
+    )
+    assert detects(sight, [])
+    assert sight.parameters == 2
+    assert np.isfinite(sight.rms_true[1][0])
 
 
 def test_a_competitor_finds_the_law_it_was_shown() -> None:
@@ -491,7 +559,8 @@ def test_a_competitor_finds_the_law_it_was_shown() -> None:
         return MissingForce(("a", "b"), wrench, np.ones_like(wrench), c)
 
     name, share = _sparse(force(0.01), force(0.01))
-    assert name == "current" and share < 1.0
+    assert name == "current"
+    assert share < 1.0
     assert _sparse(force(0.0), force(0.0))[0] is None
 
 
@@ -502,7 +571,8 @@ def test_a_study_goes_on_with_the_same_command_and_with_no_other(
         for name in study.open_worlds:
             study.place(name).mkdir(parents=True)
             write_json(
-                study.place(name) / "result.json", {"seconds": 1.0, **diagnosis(verdict="no_mismatch")}
+                study.place(name) / "result.json",
+                {"seconds": 1.0, **diagnosis(verdict="no_mismatch")},
             )
 
     monkeypatch.setattr(runner, "run_study", run)
@@ -522,11 +592,19 @@ def test_a_study_goes_on_with_the_same_command_and_with_no_other(
     ]
     assert main(command) == 0
     about = read_json(out / "study.json")
-    assert {key: about[key] for key in ("worlds", "trials", "groups", "duration", "seed", "drawn")} == {
-        "worlds": 3, "trials": 4, "groups": ["null"], "duration": 20.0, "seed": 5, "drawn": False,
-    }  # fmt: skip
+    assert {
+        key: about[key] for key in ("worlds", "trials", "groups", "duration", "seed", "drawn")
+    } == {
+        "worlds": 3,
+        "trials": 4,
+        "groups": ["null"],
+        "duration": 20.0,
+        "seed": 5,
+        "drawn": False,
+    }
     assert "Seed 5 was given" in (out / "report.html").read_text()
-    assert main(command) == 0 and main(["prove", "--out", str(out)]) == 0
+    assert main(command) == 0
+    assert main(["prove", "--out", str(out)]) == 0
     capsys.readouterr()
     for option, said in (
         (["--worlds", "300"], "got worlds 300, expected 3:"),
@@ -536,7 +614,9 @@ def test_a_study_goes_on_with_the_same_command_and_with_no_other(
     ):
         assert main(["prove", *option, "--out", str(out)]) == 1
         assert said in " ".join(capsys.readouterr().err.split())
-    assert main(["prove", "--worlds", "2", "--groups", "null", "--out", str(tmp_path / "drawn")]) == 0
+    assert (
+        main(["prove", "--worlds", "2", "--groups", "null", "--out", str(tmp_path / "drawn")]) == 0
+    )
     assert read_json(tmp_path / "drawn" / "study.json")["drawn"] is True
 
 

@@ -62,19 +62,34 @@ def failed(group: str, *hidden: str) -> Score:
 
 def test_an_answer_is_right_exact_in_the_set_or_confidently_wrong() -> None:
     right = score_world(CURRENT, diagnosis(("current", "physics", 0.97), rivals=("tether",)))
-    assert right.top1 and right.in_set and right.exact and not right.confident_wrong
+    assert right.top1
+    assert right.in_set
+    assert right.exact
+    assert not right.confident_wrong
     assert right.answered == {"current", "tether"}
     assert [p.within for p in right.parameters] == [True]  # ten standard errors, but 3 %
     wrong = score_world(CURRENT, diagnosis(("tether", "physics", 0.97), rivals=("current",)))
-    assert not wrong.top1 and wrong.in_set and wrong.confident_wrong and wrong.false_names == ("tether",)
+    assert not wrong.top1
+    assert wrong.in_set
+    assert wrong.confident_wrong
+    assert wrong.false_names == ("tether",)
     nothing = score_world(World("null", 2), diagnosis(verdict="no_mismatch"))
-    assert not nothing.alarm and nothing.exact and not nothing.in_set and not nothing.unnamed
+    assert not nothing.alarm
+    assert nothing.exact
+    assert not nothing.in_set
+    assert not nothing.unnamed
     odd = score_world(World("outside", 3, {"jet": {"x": 0.1}}), diagnosis(verdict="unexplained"))
-    assert odd.unnamed and odd.alarm and not odd.truth
+    assert odd.unnamed
+    assert odd.alarm
+    assert not odd.truth
     pair = World("two", 4, {"current": {}, "rudder_offset": {}})
     half = score_world(pair, diagnosis(("current", "physics", 0.6)))
-    assert half.top1 and not half.in_set and not half.exact
-    lens = score_world(World("sensor", 5, {"camera_scale": {}}), diagnosis(("payload", "physics", 0.99)))
+    assert half.top1
+    assert not half.in_set
+    assert not half.exact
+    lens = score_world(
+        World("sensor", 5, {"camera_scale": {}}), diagnosis(("payload", "physics", 0.99))
+    )
     assert lens.called_physics
 
 
@@ -89,7 +104,9 @@ def test_an_answer_is_right_exact_in_the_set_or_confidently_wrong() -> None:
         (0.03, 0.03, float("nan"), True),
     ],
 )
-def test_a_parameter_is_right_within_three_standard_errors_or_a_fifth(true, found, std, within) -> None:
+def test_a_parameter_is_right_within_three_standard_errors_or_a_fifth(
+    true, found, std, within
+) -> None:
     assert ParameterError("current.x", true, found, std).within is within
 
 
@@ -114,10 +131,13 @@ def test_a_world_without_an_answer_is_right_for_no_method() -> None:
         answered("null", (), verdict="no_mismatch"),
         failed("null"),
     ]
-    rows = {row[0]: [cell.split(" =")[0] for cell in row[1:]] for row in criterion_table(scores).rows}
+    rows = {
+        row[0]: [cell.split(" =")[0] for cell in row[1:]] for row in criterion_table(scores).rows
+    }
     assert rows["this tool"] == ["1/2", "0/1"]
     assert all(right.endswith("/2") and alarms.endswith("/1") for right, alarms in rows.values())
-    assert choice(scores[1], lambda *_: 0.0) is None and smallest_error(scores[1]) is None
+    assert choice(scores[1], lambda *_: 0.0) is None
+    assert smallest_error(scores[1]) is None
 
 
 def test_the_page_says_of_every_seed_whether_it_was_drawn() -> None:
@@ -130,7 +150,8 @@ def test_the_page_says_of_every_seed_whether_it_was_drawn() -> None:
     ]  # of before studies told it
     for a, b in ((drawn, given), old):
         assert seeds_sentence([a, a]).startswith("The seeds were drawn at run time; salted hashes")
-        assert seeds_sentence([b]).startswith("Seed 5 was given") and "drawn" not in seeds_sentence([b])
+        assert seeds_sentence([b]).startswith("Seed 5 was given")
+        assert "drawn" not in seeds_sentence([b])
         assert seeds_sentence([b, b]).startswith("Seeds 5, 5 were given")
         assert seeds_sentence([a, b]).endswith("first run. The other seeds were drawn at run time.")
 
@@ -152,7 +173,11 @@ def test_a_name_costs_the_numbers_that_it_took_in_its_answer() -> None:
     result["diagnosis"]["ranking"][0]["free_parameters"] = 17
     score = score_world(CURRENT, result)
     assert aic_cost("current", score) == 17.0
-    assert aic_cost("quadratic_drag", score) == aic_cost("quadratic_drag", replace(score, free={})) > 0.0
+    assert (
+        aic_cost("quadratic_drag", score)
+        == aic_cost("quadratic_drag", replace(score, free={}))
+        > 0.0
+    )
 
 
 def test_what_was_asked_is_counted_over_its_own_worlds() -> None:
@@ -211,13 +236,16 @@ def test_gains_of_null_worlds_by_hand() -> None:
     scores[0] = replace(scores[0], ranking={"current": 2.0, "tether": -np.inf})
     table = null_table([*scores, score_world(World("single", 9, {"current": {}}), diagnosis())])
     assert table.rows == [["3", "1", "2", "6.0", "10.0"], ["5", "1", "1", "10.0", "10.0"]]
-    assert "0.6 in the median" in table.note  # the larger of two chi square / 2 with one degree of freedom
+    assert (
+        "0.6 in the median" in table.note
+    )  # the larger of two chi square / 2 with one degree of freedom
     assert null_table([]) is None
 
 
 def test_share_has_the_exact_interval() -> None:
     low, high = Share(0, 100).interval
-    assert low == 0.0 and high == pytest.approx(1.0 - 0.025 ** (1 / 100))
+    assert low == 0.0
+    assert high == pytest.approx(1.0 - 0.025 ** (1 / 100))
     assert Share(100, 100).interval == pytest.approx((0.025 ** (1 / 100), 1.0))
     assert str(Share(0, 0)) == "–"
 
@@ -250,7 +278,8 @@ def test_power_counts_names_and_rivals_per_strength() -> None:
         world = World("ladder", i, {"current": {"x": 0.03}}, strength)
         scores.append(score_world(world, diagnosis((name, "physics", 0.9))))
     beside = score_world(
-        World("ladder", 3, {"current": {}}, 0.5), diagnosis(("tether", "physics", 0.9), rivals=("current",))
+        World("ladder", 3, {"current": {}}, 0.5),
+        diagnosis(("tether", "physics", 0.9), rivals=("current",)),
     )
     elsewhere = score_world(World("single", 4, {"current": {}}), diagnosis())
     steps = power([*scores, beside, elsewhere], {0: True, 1: True, 2: False})
@@ -264,21 +293,31 @@ def test_bars_of_the_power_curve_reach_to_both_ends_of_the_interval() -> None:
     found = Share(9, 10)
     (line,) = _power([Power(1.0, found, None)]).data
     low, high = found.interval
-    assert line.y == (0.9,) and line.error_y.array == pytest.approx([high - 0.9])
+    assert line.y == (0.9,)
+    assert line.error_y.array == pytest.approx([high - 0.9])
     assert line.error_y.arrayminus == pytest.approx([0.9 - low])
 
 
 def test_competitors_are_judged_on_worlds_with_one_name_and_on_nulls() -> None:
     single = answered("single", ("current",), "tether")
-    found = replace(single, ranking={"current": 30.0, "quadratic_drag": 20.0}, held_out={"current": 0.009})
+    found = replace(
+        single, ranking={"current": 30.0, "quadratic_drag": 20.0}, held_out={"current": 0.009}
+    )
     calm = replace(
-        answered("null", (), verdict="no_mismatch"), ranking={"current": 4.0}, held_out={"current": 0.02}
+        answered("null", (), verdict="no_mismatch"),
+        ranking={"current": 4.0},
+        held_out={"current": 0.02},
     )
     silent = answered(
         "null", (), verdict="no_mismatch"
     )  # no name was refitted: the held-out error had no choice
     silent = replace(silent, ranking={"current": 1.0}, held_out={})
-    others = [silent, answered("outside", ("jet",)), answered("two", ("current", "tip_slip")), failed("null")]
+    others = [
+        silent,
+        answered("outside", ("jet",)),
+        answered("two", ("current", "tip_slip")),
+        failed("null"),
+    ]
     rows = criterion_table([found, calm, *others]).rows
     assert [[row[0], *(cell.split(" =")[0] for cell in row[1:])] for row in rows] == [
         ["this tool", "0/1", "0/2"],
@@ -296,11 +335,14 @@ def test_the_page_counts_each_hidden_thing_against_the_first_answer(tmp_path) ->
         answered("two", ("current", "tether"), "tether"),
         failed("single", "tether"),
     ]
-    write_prove_page(tmp_path / "report.html", [{"seed": 7, "began": "today", "command": "prove"}], scores)
+    write_prove_page(
+        tmp_path / "report.html", [{"seed": 7, "began": "today", "command": "prove"}], scores
+    )
     page = (tmp_path / "report.html").read_text()
     assert "5 worlds, 4 of them with something hidden; seed 7, today" in page
     shown = [table.title for table in tables(scores)]
-    assert "No answer" in shown and "Detection power over strength" not in shown
+    assert "No answer" in shown
+    assert "Detection power over strength" not in shown
     heat = _confusion(scores).data[0]
     counted = {
         (h, a): n

@@ -43,12 +43,18 @@ from fish_sysid.estimation.map_fit import evaluate
 def test_worlds_are_drawn_from_the_seed_alone() -> None:
     names = list(scenario_groups.GROUPS)
     worlds = scenario_groups.draw_worlds(60, names, 7)
-    assert worlds == scenario_groups.draw_worlds(60, names, 7) != scenario_groups.draw_worlds(60, names, 8)
-    assert len(worlds) == 60 and {w.group for w in worlds} == set(names)
+    assert (
+        worlds
+        == scenario_groups.draw_worlds(60, names, 7)
+        != scenario_groups.draw_worlds(60, names, 8)
+    )
+    assert len(worlds) == 60
+    assert {w.group for w in worlds} == set(names)
     assert [w.group for w in worlds] != sorted((w.group for w in worlds), key=names.index)
     assert all(World.of(w.label()) == w for w in worlds)
     hidden = {
-        scenario_groups.single(np.random.default_rng(0), k).names[0] for k in range(len(candidates()) + 1)
+        scenario_groups.single(np.random.default_rng(0), k).names[0]
+        for k in range(len(candidates()) + 1)
     }
     assert hidden == {*candidates(), *OTHER_FORMS}
     with pytest.raises(ValueError, match="known: single"):
@@ -66,7 +72,8 @@ def test_the_example_s_script_deletes_nothing_that_it_has_not_written(tmp_path: 
     own = folder_of.__globals__["OWN"]
     assert own == script.parent / "recordings"
     folder_of.__globals__["OWN"] = tmp_path
-    assert folder_of([]) == tmp_path and not tmp_path.exists()
+    assert folder_of([]) == tmp_path
+    assert not tmp_path.exists()
 
 
 def test_no_outside_effect_is_in_the_vocabulary() -> None:
@@ -78,9 +85,13 @@ def test_no_outside_effect_is_in_the_vocabulary() -> None:
 
 
 def test_another_form_of_a_name_counts_as_that_name() -> None:
-    flow, p = OTHER_FORMS["vortex"].water, SimpleNamespace(speed=0.04, at_x=0.3, at_y=-0.1, core=0.5)
+    flow, p = (
+        OTHER_FORMS["vortex"].water,
+        SimpleNamespace(speed=0.04, at_x=0.3, at_y=-0.1, core=0.5),
+    )
     velocity, ((a, b), (c, d)) = flow(p, 0.3, 0.4, None, NUMPY)  # a core above its middle
-    assert velocity == pytest.approx((-0.04, 0.0), abs=1e-15) and a + d == pytest.approx(0.0, abs=1e-15)
+    assert velocity == pytest.approx((-0.04, 0.0), abs=1e-15)
+    assert a + d == pytest.approx(0.0, abs=1e-15)
     h = 1e-6
     up, right = (flow(p, 0.2 + dx, 0.1 + dy, None, NUMPY)[0] for dx, dy in ((0.0, h), (h, 0.0)))
     down, left = (flow(p, 0.2 - dx, 0.1 - dy, None, NUMPY)[0] for dx, dy in ((0.0, h), (h, 0.0)))
@@ -88,7 +99,8 @@ def test_another_form_of_a_name_counts_as_that_name() -> None:
     slopes = [(u - v) / (2 * h) for u, v in zip((*right, *up), (*left, *down), strict=True)]
     assert slopes == pytest.approx([a, c, b, d], abs=1e-9)
     world = scenario_groups.single(np.random.default_rng(0), len(candidates()))
-    assert world.names == ("vortex",) and truths_of(world) == ("nonuniform_current",)
+    assert world.names == ("vortex",)
+    assert truths_of(world) == ("nonuniform_current",)
     assert truths_of(small("single")) is None
 
 
@@ -101,7 +113,10 @@ def test_recordings_say_what_the_instruments_read(tmp_path) -> None:
     read, direct = build_experiment(list(data)), as_experiment(make_readings(world), True)
     for key in ("commands", "gyro", "accel", "encoder"):
         assert np.allclose(
-            getattr(read, key)[:-1], getattr(direct, key)[: len(read.commands) - 1], atol=1e-9, equal_nan=True
+            getattr(read, key)[:-1],
+            getattr(direct, key)[: len(read.commands) - 1],
+            atol=1e-9,
+            equal_nan=True,
         )
     for a, b in zip(read.frames, direct.frames, strict=True):
         turns = np.round((a.pose - b.pose) / (2.0 * np.pi)) * [
@@ -109,7 +124,8 @@ def test_recordings_say_what_the_instruments_read(tmp_path) -> None:
             0.0,
             2.0 * np.pi,
         ]  # a heading may wrap elsewhere
-        assert np.allclose(a.t, b.t, atol=1e-8) and np.allclose(a.pose - turns, b.pose, atol=1e-9)
+        assert np.allclose(a.t, b.t, atol=1e-8)
+        assert np.allclose(a.pose - turns, b.pose, atol=1e-9)
     for trial in data:
         latency = {
             s: np.median(getattr(trial, s).t_arrival - getattr(trial, s).t)
@@ -137,22 +153,28 @@ def test_the_hidden_effect_changes_the_motion_and_the_rest_stays() -> None:
 def test_an_effect_is_drawn_as_strong_as_asked_and_elsewhere_in_every_world(name: str) -> None:
     """Strengths are distances from neutral in typical ones; a limit acts by being small: half as strong is twice as high."""
     effect = {**EFFECTS, **SENSOR_EFFECTS, **OUTSIDE, **OTHER_FORMS}[name]
-    drawn = [scenario_groups.draw_effect(name, 0.5, np.random.default_rng(seed)) for seed in range(40)]
+    drawn = [
+        scenario_groups.draw_effect(name, 0.5, np.random.default_rng(seed)) for seed in range(40)
+    ]
     signs = set()
     for key, p in effect.parameters.items():
         values = np.array([d[key] for d in drawn])
-        assert (p.lowest <= values).all() and (values <= p.highest).all()
+        assert (p.lowest <= values).all()
+        assert (values <= p.highest).all()
         if key in scenario_groups.ELSEWHERE.get(name, {}):
             low, high = scenario_groups.ELSEWHERE[name][key]
             near = 0.2 * (high - low)
-            assert low <= values.min() < low + near and high - near < values.max() <= high
+            assert low <= values.min() < low + near
+            assert high - near < values.max() <= high
         elif key not in effect.strength:
             assert (values == p.value).all()
         elif name in ("rudder_saturation", "rotor_saturation"):
             assert np.all((values >= p.typical / 0.5 / 1.15) & (values <= p.typical / 0.5 / 0.85))
         elif p.typical != p.value:
             share = (values - p.value) / (p.typical - p.value)
-            assert np.all((np.abs(share) >= 0.5 * 0.85 - 1e-12) & (np.abs(share) <= 0.5 * 1.15 + 1e-12))
+            assert np.all(
+                (np.abs(share) >= 0.5 * 0.85 - 1e-12) & (np.abs(share) <= 0.5 * 1.15 + 1e-12)
+            )
             signs |= set(np.sign(share))
     assert signs <= ({1.0, -1.0} if name in scenario_groups.SIGNED else {1.0})
     assert name not in scenario_groups.SIGNED or signs == {1.0, -1.0}
@@ -168,19 +190,30 @@ def test_worlds_of_a_group_are_what_the_group_says() -> None:
     ladder = drawn("ladder")
     assert {w.strength for w in ladder} == {0.125, 0.25, 0.5, 1.0, 2.0}
     weak = {name for w in ladder if w.strength < 1.0 for name in w.names}
-    assert weak.isdisjoint({"rudder_saturation", "rotor_saturation"})  # no command reaches a weak limit
-    assert all(len(w.names) == 2 for w in drawn("two")) and not any(w.names for w in drawn("null"))
+    assert weak.isdisjoint(
+        {"rudder_saturation", "rotor_saturation"}
+    )  # no command reaches a weak limit
+    assert all(len(w.names) == 2 for w in drawn("two"))
+    assert not any(w.names for w in drawn("null"))
     assert {w.names[0] for w in drawn("sensor")} == set(SENSOR_EFFECTS)
     assert {w.names[0] for w in drawn("outside")} == set(OUTSIDE)
     assert {(w.links, w.method) for w in drawn("null")} >= {(3, "dop853"), (5, "rk4")}
     named = {n: w for w in drawn("single") for n in w.names}
-    for name in ("rotor_lag", "rotor_saturation", "battery_sag"):  # an encoder would give the answer away
+    for name in (
+        "rotor_lag",
+        "rotor_saturation",
+        "battery_sag",
+    ):  # an encoder would give the answer away
         assert not named[name].encoder
     encoders = [w.encoder for w in drawn("null")]
     assert 0 < encoders.count(False) < 15
     factors = np.array([f for w in drawn("null") for f in w.parameters.values()])
-    assert factors.min() >= 0.75 and factors.max() <= 1.25 and abs(factors.mean() - 1.0) < 0.02
-    assert not {"head_mass", "link_length", "servo_rate_limit"} & set(drawn("null", 1)[0].parameters)
+    assert factors.min() >= 0.75
+    assert factors.max() <= 1.25
+    assert abs(factors.mean() - 1.0) < 0.02
+    assert not {"head_mass", "link_length", "servo_rate_limit"} & set(
+        drawn("null", 1)[0].parameters
+    )
 
 
 def test_what_the_second_plant_conceals_is_drawn_in_turn_nothing_included() -> None:
@@ -195,7 +228,8 @@ def test_what_the_second_plant_conceals_is_drawn_in_turn_nothing_included() -> N
     assert {truths_of(w) for w in worlds if w.names == ("viscosity",)} == {()}
     wind = np.array([list(w.effects["wind"].values()) for w in worlds if w.names == ("wind",)])
     factors = wind / list(CONCEALED["wind"].typical.values())
-    assert np.allclose(factors[:, 0], factors[:, 1]) and set(np.sign(factors[:, 0])) == {1.0, -1.0}
+    assert np.allclose(factors[:, 0], factors[:, 1])
+    assert set(np.sign(factors[:, 0])) == {1.0, -1.0}
     assert np.all((np.abs(factors) >= 0.85) & (np.abs(factors) <= 1.15))
 
 
@@ -206,10 +240,12 @@ def of_trials(kind: str) -> list[Readings]:
 def test_trials_are_open_loop_under_feedback_or_at_one_speed() -> None:
     assert [r.commands.shape[1] for r in of_trials("mixed")] == [2, 1]
     (closed,) = of_trials("closed")
-    assert closed.commands.shape == (400, 3, 2) and closed.truth.shape == (400, 3, 3)
+    assert closed.commands.shape == (400, 3, 2)
+    assert closed.truth.shape == (400, 3, 3)
     (one,) = of_trials("one_speed")
     rotor, second = one.commands[..., 0], slice(100, None)
-    assert np.array_equal(rotor[:, 0], rotor[:, 1]) and np.array_equal(rotor[:, 0], rotor[:, 2])
+    assert np.array_equal(rotor[:, 0], rotor[:, 1])
+    assert np.array_equal(rotor[:, 0], rotor[:, 2])
     assert np.abs(rotor[second]).max() == pytest.approx(np.sqrt(0.15) * FULL_SPEED, rel=0.01)
     assert not np.array_equal(one.commands[:, 0, 1], one.commands[:, 1, 1])
     np.testing.assert_allclose(  # the phase that is recorded is that of the speed
@@ -229,7 +265,9 @@ def test_the_water_pushes_a_fish_as_long_and_as_hard_as_it_says() -> None:
     np.testing.assert_allclose(kept, np.exp(-1.0), atol=0.15)
 
 
-def test_a_program_whose_way_fits_nowhere_is_swum_more_slowly(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_whose_way_fits_nowhere_is_swum_more_slowly(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     asked = []
 
     def find_start(way: np.ndarray, *_: object) -> tuple[float, float, float] | None:
@@ -243,7 +281,9 @@ def test_a_program_whose_way_fits_nowhere_is_swum_more_slowly(monkeypatch: pytes
         lambda kinds, duration, random, calm: np.ones((400, len(kinds), 2)) * calm[:, None],
     )
     first, _ = make_readings(small("null"))
-    assert first.commands[0, :, 0] == pytest.approx([build.SLOWER**2] * 2)  # both fit at the third try
+    assert first.commands[0, :, 0] == pytest.approx(
+        [build.SLOWER**2] * 2
+    )  # both fit at the third try
 
 
 def test_a_program_at_one_speed_is_swum_more_slowly_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -251,19 +291,24 @@ def test_a_program_at_one_speed_is_swum_more_slowly_too(monkeypatch: pytest.Monk
 
     def find_start(way: np.ndarray, *_: object) -> tuple[float, float, float] | None:
         asked.append(way)
-        return None if len(asked) in (2, 4) else (0.0, 0.0, 0.0)  # the second of three trials, twice
+        return (
+            None if len(asked) in (2, 4) else (0.0, 0.0, 0.0)
+        )  # the second of three trials, twice
 
     monkeypatch.setattr(build, "find_start", find_start)
     (one,) = of_trials("one_speed")
     rotor = one.commands[..., 0]
     np.testing.assert_allclose(rotor[:, 1], build.SLOWER**2 * rotor[:, 0])
-    assert np.array_equal(rotor[:, 2], rotor[:, 0]) and len(asked) == 5
+    assert np.array_equal(rotor[:, 2], rotor[:, 0])
+    assert len(asked) == 5
 
 
 def test_a_fish_that_fits_nowhere_into_the_pool_is_no_world(tmp_path: Path, monkeypatch) -> None:
     """It began at the centre and swam through the walls."""
     monkeypatch.setattr(build, "find_start", lambda *_: None)
-    with pytest.raises(NoWorld, match="2 of 2 trials of 4 s fit nowhere into the pool, 12 programs tried"):
+    with pytest.raises(
+        NoWorld, match="2 of 2 trials of 4 s fit nowhere into the pool, 12 programs tried"
+    ):
         make_readings(small("null"))
     run_world(Job("a", small("null"), tmp_path, ("false",)))
     assert read_json(tmp_path / "result.json")["error"].startswith("no world: 2 of 2 trials")
@@ -300,7 +345,8 @@ def test_noise_scales_with_the_world_and_a_hundredth_of_the_frames_is_lost() -> 
     read = Instruments(60001, 2, 2.0, Errors(), np.random.default_rng(0))
     zero = np.zeros(2)
     gyro, accel = (
-        np.array(v) for v in zip(*(read.imu(k, zero, zero, zero) for k in range(20000)), strict=True)
+        np.array(v)
+        for v in zip(*(read.imu(k, zero, zero, zero) for k in range(20000)), strict=True)
     )
     np.testing.assert_allclose(gyro.std(axis=0), 2.0 * 0.006, rtol=0.03)
     np.testing.assert_allclose(accel.std(axis=0), 2.0 * 0.05, rtol=0.03)
@@ -309,7 +355,8 @@ def test_noise_scales_with_the_world_and_a_hundredth_of_the_frames_is_lost() -> 
     seen = read.poses(0, slice(None), np.zeros((60001, 3)))
     np.testing.assert_allclose(seen.std(axis=0), [0.004, 0.004, 0.024], rtol=0.05)
     periods = np.diff(read.stamps[0])
-    assert periods.min() >= 0.0 and np.median(periods) == pytest.approx(1 / 30, abs=2e-4)
+    assert periods.min() >= 0.0
+    assert np.median(periods) == pytest.approx(1 / 30, abs=2e-4)
 
 
 class Tram:
@@ -341,7 +388,9 @@ class Listener:
     def command(self, k: int) -> tuple[np.ndarray, np.ndarray]:
         return np.full((2, 2), float(k)), np.zeros(2)
 
-    def see(self, k: int, gyro: np.ndarray, accel: np.ndarray, poses: Sequence[Sequence[tuple]]) -> None:
+    def see(
+        self, k: int, gyro: np.ndarray, accel: np.ndarray, poses: Sequence[Sequence[tuple]]
+    ) -> None:
         for m, arrived in enumerate(poses):
             self.seen += [(k, m, stamp) for stamp, *_ in arrived]
             self.poses[m] += [pose for _, *pose in arrived]
@@ -354,7 +403,8 @@ def test_a_driver_sees_an_image_when_it_has_arrived_and_the_recording_has_the_sa
     driver = Listener()
     readings = swim(Tram(), np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]), driver, quiet, 400)
     for k, _, stamp in driver.seen:
-        assert 0.01 * k < stamp + TRANSPORT + 1e-9 and stamp + TRANSPORT <= 0.01 * (k + 1) + 1e-9
+        assert 0.01 * k < stamp + TRANSPORT + 1e-9
+        assert stamp + TRANSPORT <= 0.01 * (k + 1) + 1e-9
     for m in range(2):
         count = len(driver.poses[m])
         assert count == (readings.stamps[m] <= 4.0 - TRANSPORT).sum()
@@ -364,9 +414,12 @@ def test_a_driver_sees_an_image_when_it_has_arrived_and_the_recording_has_the_sa
         expected = expected * [1.1, 1.1, 1.0] + [0.0, 0.0, 0.2]
         np.testing.assert_allclose(readings.poses[m], expected, atol=1e-12)
     assert np.array_equal(readings.commands[:, 0, 0], np.arange(400.0))
-    assert np.array_equal(readings.encoder[:, 1], 0.5 * np.arange(400))  # at the grid point, not a step later
+    assert np.array_equal(
+        readings.encoder[:, 1], 0.5 * np.arange(400)
+    )  # at the grid point, not a step later
     assert np.ptp(readings.gyro, axis=0) == pytest.approx(0.0, abs=1e-15)  # the truth and a bias
-    assert np.abs(readings.gyro - 0.3).max() < 0.02 and np.abs(readings.accel - [0.02, -0.01]).max() < 0.15
+    assert np.abs(readings.gyro - 0.3).max() < 0.02
+    assert np.abs(readings.accel - [0.02, -0.01]).max() < 0.15
 
 
 @pytest.fixture(scope="module")
@@ -392,8 +445,10 @@ def drive(plant, rudder: np.ndarray, seconds: float) -> np.ndarray:
 @pytest.mark.slow
 def test_the_second_plant_swims_and_turns_as_the_rudder_says(basin) -> None:
     motion = drive(basin(3), np.array([0.0, 0.5, -0.5]), 6.0)[-200:].mean(axis=0)
-    assert 0.05 < motion[0, 3] < 0.3 and abs(motion[0, 5]) < 0.02
-    assert motion[1, 5] > 0.05 and motion[2, 5] < -0.05  # a positive rudder steers left
+    assert 0.05 < motion[0, 3] < 0.3
+    assert abs(motion[0, 5]) < 0.02
+    assert motion[1, 5] > 0.05
+    assert motion[2, 5] < -0.05
 
 
 def test_the_second_plants_wind_carries_the_fish(basin) -> None:
@@ -409,8 +464,12 @@ def test_the_second_plants_wind_carries_the_fish(basin) -> None:
 def test_seen_from_the_water_the_second_plant_swims_in_wind_as_in_still_water(basin) -> None:
     """Galilei: whichever way it faces, also at low throttle with the wind from behind."""
     wind, rudder = np.array([0.04, -0.03]), np.array([0.0, 0.1])
-    still, blown = (drive(p, rudder, 6.0) for p in (basin(2), basin(2, wind={"x": wind[0], "y": wind[1]})))
+    still, blown = (
+        drive(p, rudder, 6.0) for p in (basin(2), basin(2, wind={"x": wind[0], "y": wind[1]}))
+    )
     carried = 0.01 * np.arange(1, len(blown) + 1)[:, None, None] * wind
     np.testing.assert_allclose(blown[..., :2] - carried, still[..., :2], atol=1e-3)
     np.testing.assert_allclose(blown[..., 2], still[..., 2], atol=1e-2)
-    assert blown[-100:, 0, 3].mean() > still[-100:, 0, 3].mean() + 0.03  # from behind: faster over ground
+    assert (
+        blown[-100:, 0, 3].mean() > still[-100:, 0, 3].mean() + 0.03
+    )  # from behind: faster over ground

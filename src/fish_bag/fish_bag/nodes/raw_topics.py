@@ -15,6 +15,7 @@ def message_class(msgtype: str) -> type:
 
     Raises:
         RecordingError: its package is not installed here.
+
     """
     package, _, name = msgtype.split("/")
     try:
@@ -38,5 +39,7 @@ def to_profile(qos: Qos) -> QoSProfile:
     return QoSProfile(
         depth=qos.depth,
         reliability=ReliabilityPolicy.RELIABLE if qos.reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if qos.transient_local else DurabilityPolicy.VOLATILE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL
+        if qos.transient_local
+        else DurabilityPolicy.VOLATILE,
     )

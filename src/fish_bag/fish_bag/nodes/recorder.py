@@ -31,7 +31,9 @@ class RecorderNode(Node):
     """Finds topics, subscribes raw, hands bytes to a McapRecording."""
 
     def __init__(self) -> None:
-        super().__init__("recorder", namespace="fish", automatically_declare_parameters_from_overrides=True)
+        super().__init__(
+            "recorder", namespace="fish", automatically_declare_parameters_from_overrides=True
+        )
         self._config = read_parameters(self, RecorderConfig)
         directory = self._config.directory(datetime.now())
         custom = {"robot": self._config.robot} if self._config.robot else {}
@@ -78,7 +80,9 @@ class RecorderNode(Node):
             self.get_logger().error(f"{topic} is not recorded: {error}")
             return
         callback = partial(self._store, entry)
-        subscription = self.create_subscription(message, topic, callback, to_profile(wanted), raw=True)
+        subscription = self.create_subscription(
+            message, topic, callback, to_profile(wanted), raw=True
+        )
         self._subscriptions_of[key] = (subscription, wanted)
         self.get_logger().info(f"recording {topic} ({msgtype})")
 
@@ -93,7 +97,9 @@ class RecorderNode(Node):
         status.level, status.message = DiagnosticStatus.OK, "recording"
         if self._refused:
             status.level = DiagnosticStatus.WARN
-            status.message = f"not recorded: {', '.join(sorted(topic for topic, _ in self._refused))}"
+            status.message = (
+                f"not recorded: {', '.join(sorted(topic for topic, _ in self._refused))}"
+            )
         elif not self.recording.message_count:
             status.level, status.message = DiagnosticStatus.WARN, "nothing received yet"
         values = {

@@ -39,7 +39,9 @@ class ReplayerNode(Node):
     """Publishes what a Playback says is due."""
 
     def __init__(self) -> None:
-        super().__init__("replayer", namespace="fish", automatically_declare_parameters_from_overrides=True)
+        super().__init__(
+            "replayer", namespace="fish", automatically_declare_parameters_from_overrides=True
+        )
         config = read_parameters(self, ReplayerConfig)
         self._playback = Playback(config, self.get_namespace())
         self._loop, self._sent, self._rounds, self._latest_ns = config.loop, 0, 0, 0
@@ -57,7 +59,9 @@ class ReplayerNode(Node):
         self.create_service(SetBool, "~/pause", self._on_pause)
         delay_ns = round(config.start_delay_s * 1e9)
         start = self._playback.start_ns
-        self._time = PlaybackClock(config.rate, start, time.monotonic_ns() + delay_ns, config.paused)
+        self._time = PlaybackClock(
+            config.rate, start, time.monotonic_ns() + delay_ns, config.paused
+        )
         self._messages = self._playback.messages()
         self._next: tuple[Connection, int, bytes] | None = next(self._messages)
         self._next_tick = start

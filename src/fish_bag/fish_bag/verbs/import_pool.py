@@ -12,7 +12,9 @@ from rich.table import Table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("bags", type=Path, nargs="+", help=".bag files or folders of them")
-    parser.add_argument("--out", type=Path, required=True, help="folder in which every bag gets a recording")
+    parser.add_argument(
+        "--out", type=Path, required=True, help="folder in which every bag gets a recording"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

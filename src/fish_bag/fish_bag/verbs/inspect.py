@@ -24,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "recording", type=Path, help="rosbag2 folder, .mcap, .db3 or .bag file, or a folder of them"
     )
     add_topic_arguments(parser)
-    parser.add_argument("--html", type=Path, help="page to write (default: inspect_<name>.html here)")
+    parser.add_argument(
+        "--html", type=Path, help="page to write (default: inspect_<name>.html here)"
+    )
     parser.add_argument("--no-html", action="store_true", help="print only")
 
 

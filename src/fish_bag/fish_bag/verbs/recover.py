@@ -12,7 +12,9 @@ from rich.table import Table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, help=".mcap file or recording folder")
-    parser.add_argument("--out", type=Path, help="folder to be made (default: <recording>_recovered)")
+    parser.add_argument(
+        "--out", type=Path, help="folder to be made (default: <recording>_recovered)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -23,11 +25,15 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or named.parent / f"{named.stem if named.is_file() else named.name}_recovered"
     result = recover(args.recording, out)
     console = Console()
-    table = Table("topic", "messages saved", title=f"{result.count} messages saved in {result.directory}")
+    table = Table(
+        "topic", "messages saved", title=f"{result.count} messages saved in {result.directory}"
+    )
     for topic, count in result.saved.items():
         table.add_row(topic, str(count))
     console.print(table)
-    console.print(f"saved: {(result.last_ns - result.first_ns) * 1e-9:.3f} s from first to last message")
+    console.print(
+        f"saved: {(result.last_ns - result.first_ns) * 1e-9:.3f} s from first to last message"
+    )
     for loss in result.lost or ("nothing: the recording was complete",):
         console.print(f"lost: {loss}", soft_wrap=True)
     return 0

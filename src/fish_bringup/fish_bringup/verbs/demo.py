@@ -50,12 +50,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--speed", type=float, default=0.2, help="surge speed, m/s (0.2)")
     parser.add_argument(
-        "--duration", type=float, default=LONGEST, help="s, the longest run; a lap ends a closed path"
+        "--duration",
+        type=float,
+        default=LONGEST,
+        help="s, the longest run; a lap ends a closed path",
     )
-    parser.add_argument("--weights", type=Path, help="weights file of the controller (the one it ships with)")
-    parser.add_argument("--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims")
+    parser.add_argument(
+        "--weights", type=Path, help="weights file of the controller (the one it ships with)"
+    )
+    parser.add_argument(
+        "--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims"
+    )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
-    parser.add_argument("--out", type=Path, help="new folder for recording, page and logs (out/...)")
+    parser.add_argument(
+        "--out", type=Path, help="new folder for recording, page and logs (out/...)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -67,8 +76,12 @@ def run(args: argparse.Namespace) -> int:
     start = start_pose(args.letter, args.path_args)
     folder = new_folder(args.out, "demo_" + "".join(c if c.isalnum() else "_" for c in args.letter))
     console = Console(highlight=False)
-    console.print(f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}")
-    end, latency = _swim(domain, node_parameters(args, start, folder), folder, args.duration, console)
+    console.print(
+        f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}"
+    )
+    end, latency = _swim(
+        domain, node_parameters(args, start, folder), folder, args.duration, console
+    )
     console.print(f"ended {end.reason}, {end.seconds:.1f} s after the first odometry")
     trial = read_trial(folder / "recording")
     score = score_trial(trial)
@@ -102,6 +115,7 @@ def start_pose(name: str, path_args: str) -> Parameters:
 
     Raises:
         UserError: no such path.
+
     """
     try:
         path = make_path(name, **read_arguments(path_args, "path-args"))
@@ -112,7 +126,11 @@ def start_pose(name: str, path_args: str) -> Parameters:
 
 
 def _swim(
-    domain: int, changed: Mapping[NodeSpec, Parameters], folder: Path, duration: float, console: Console
+    domain: int,
+    changed: Mapping[NodeSpec, Parameters],
+    folder: Path,
+    duration: float,
+    console: Console,
 ) -> tuple[SwimEnd, Table]:
     """Start the nodes, watch the run, end them; the recorder comes before the fish moves and ends first."""
     with Interruption() as interruption, NodeProcesses(domain, folder / "logs") as nodes:
@@ -132,14 +150,21 @@ def _swim(
 
 def _latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:
     """What the controller says of its own latency and period."""
-    said = next((values for name, values in diagnostics.items() if name.endswith("/controller")), {})
+    said = next(
+        (values for name, values in diagnostics.items() if name.endswith("/controller")), {}
+    )
     rows = [[key, value] for key, value in said.items() if "latency" in key or "period" in key]
     return Table(
-        "Controller", ["value", "measured"], rows, "Latency: stamp of the measurement to the command."
+        "Controller",
+        ["value", "measured"],
+        rows,
+        "Latency: stamp of the measurement to the command.",
     )
 
 
 def _cpu_table(end: SwimEnd) -> Table:
     rows = [[spec.name, f"{100 * share:.0f} %"] for spec, share in end.cpu.items()]
     rows.append(["all nodes", f"{100 * sum(end.cpu.values()):.0f} %"])
-    return Table("CPU", ["node", "of one core"], rows, f"Mean over {end.seconds:.0f} s of swimming.")
+    return Table(
+        "CPU", ["node", "of one core"], rows, f"Mean over {end.seconds:.0f} s of swimming."
+    )

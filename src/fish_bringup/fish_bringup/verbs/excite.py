@@ -55,9 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help=f"diagnosis.json, or a JSON or YAML file of rows; the last row lasts {LAST_ROW:g} s",
     )
-    parser.add_argument("--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims")
-    parser.add_argument("--begin", type=float, default=0.0, help="s of the program's time to begin at (0)")
-    parser.add_argument("--plan", action="store_true", help="only list the swims and where the fish is put")
+    parser.add_argument(
+        "--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims"
+    )
+    parser.add_argument(
+        "--begin", type=float, default=0.0, help="s of the program's time to begin at (0)"
+    )
+    parser.add_argument(
+        "--plan", action="store_true", help="only list the swims and where the fish is put"
+    )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
     parser.add_argument("--out", type=Path, help="new folder for recordings and logs (out/...)")
 
@@ -91,14 +97,26 @@ def run(args: argparse.Namespace) -> int:
 def plan_table(swims: Iterable[Excursion]) -> Table:
     """Which part of the program each swim is, and where the fish is put, at rest."""
     rows = [
-        [f"{k}", f"{s.begin:.1f}", f"{s.end:.1f}", f"{s.x:+.2f}", f"{s.y:+.2f}", f"{s.heading:+.2f}"]
+        [
+            f"{k}",
+            f"{s.begin:.1f}",
+            f"{s.end:.1f}",
+            f"{s.x:+.2f}",
+            f"{s.y:+.2f}",
+            f"{s.heading:+.2f}",
+        ]
         for k, s in enumerate(swims)
     ]
     return Table("Swims", ["swim", "begin, s", "end, s", "x, m", "y, m", "heading, rad"], rows)
 
 
 def _swim_all(
-    program: Program, robot: Robot, args: argparse.Namespace, domain: int, folder: Path, console: Console
+    program: Program,
+    robot: Robot,
+    args: argparse.Namespace,
+    domain: int,
+    folder: Path,
+    console: Console,
 ) -> int:
     """Swim after swim until the program is through or Ctrl-C; how many were recorded."""
     begin, count = args.begin, 0
@@ -135,10 +153,16 @@ def parameters(
         start["robot_file"] = str(args.robot.resolve())
     changed: dict[NodeSpec, dict[str, object]] = {
         SIMULATOR: {**start, "lockstep": PATIENCE},
-        EXCITER: {"program_file": str(args.program.resolve()), "begin": swim.begin, "end": swim.end},
+        EXCITER: {
+            "program_file": str(args.program.resolve()),
+            "begin": swim.begin,
+            "end": swim.end,
+        },
         RECORDER: {"output": str((folder / "recordings").resolve()), "name": name},
     }
-    return {spec: {"use_sim_time": True, **changed.get(spec, {})} for spec in open_loop(ROBOTS["sim"])}
+    return {
+        spec: {"use_sim_time": True, **changed.get(spec, {})} for spec in open_loop(ROBOTS["sim"])
+    }
 
 
 def _swim(

@@ -45,7 +45,10 @@ class ControllerNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(
-            "controller", namespace="fish", automatically_declare_parameters_from_overrides=True, **options
+            "controller",
+            namespace="fish",
+            automatically_declare_parameters_from_overrides=True,
+            **options,
         )
         self._config = config = read_parameters(self, ControllerConfig)
         file = config.weights_file or installed_weights()
@@ -77,7 +80,9 @@ class ControllerNode(Node):
     def _on_odometry(self, message: Odometry) -> None:
         self._odometry, self._odometry_time = message, seconds(message.header.stamp)
         signs = estimate_signs(message, self._odometry_time)
-        if signs.finite and not loss(signs, self._config.largest_variance):  # the water is learned from it
+        if signs.finite and not loss(
+            signs, self._config.largest_variance
+        ):  # the water is learned from it
             self._controller.observe(self._odometry_time, motion_of(message))
 
     def _on_twist(self, message: TwistStamped) -> None:
@@ -137,7 +142,9 @@ class ControllerNode(Node):
         values: dict[str, object] = {"stops": self._watchdog.stops}
         delays = self._latency.percentiles()
         if delays is not None:
-            values["latency_p50_ms"], values["latency_p99_ms"] = (f"{1e3 * delay:.1f}" for delay in delays)
+            values["latency_p50_ms"], values["latency_p99_ms"] = (
+                f"{1e3 * delay:.1f}" for delay in delays
+            )
         self._reporter.report(level, message, values)
 
 

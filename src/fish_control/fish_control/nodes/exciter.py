@@ -29,7 +29,11 @@ from fish_control.nodes.messages import (
 from fish_control.nodes.reporter import Reporter
 from fish_node.nodes.start import read_parameters, run
 
-LEVELS: dict[State, bytes] = {"waiting": WARN, "before a wall": WARN, "lost": ERROR}  # the others are well
+LEVELS: dict[State, bytes] = {
+    "waiting": WARN,
+    "before a wall": WARN,
+    "lost": ERROR,
+}  # the others are well
 
 
 class ExciterNode(Node):
@@ -37,7 +41,10 @@ class ExciterNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(
-            "exciter", namespace="fish", automatically_declare_parameters_from_overrides=True, **options
+            "exciter",
+            namespace="fish",
+            automatically_declare_parameters_from_overrides=True,
+            **options,
         )
         config = read_parameters(self, ExciterConfig)
         if not config.program_file:

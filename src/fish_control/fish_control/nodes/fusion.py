@@ -41,7 +41,10 @@ class FusionNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(
-            "fusion", namespace="fish", automatically_declare_parameters_from_overrides=True, **options
+            "fusion",
+            namespace="fish",
+            automatically_declare_parameters_from_overrides=True,
+            **options,
         )
         self._fusion = Fusion(read_parameters(self, FusionConfig))
         self._odometry = self.create_publisher(Odometry, "odometry/filtered", 10)
@@ -75,7 +78,9 @@ class FusionNode(Node):
     def _estimate(self) -> Estimate | None:
         """Lost is what is silent for too long, even where the sensors' clock is not this node's."""
         now = self._now()
-        self._used = min(self._used, now)  # a clock that was set back does not vouch for what is silent
+        self._used = min(
+            self._used, now
+        )  # a clock that was set back does not vouch for what is silent
         return self._fusion.estimate(now - self._used)
 
     def _publish(self, estimate: Estimate | None) -> None:
@@ -91,7 +96,11 @@ class FusionNode(Node):
     def _state(self, estimate: Estimate | None) -> tuple[bytes, str]:
         if estimate is None:
             return WARN, "waiting for camera poses that agree"
-        lost = [name for name, gone in (("camera", estimate.camera_lost), ("IMU", estimate.imu_lost)) if gone]
+        lost = [
+            name
+            for name, gone in (("camera", estimate.camera_lost), ("IMU", estimate.imu_lost))
+            if gone
+        ]
         return (ERROR, f"{' and '.join(lost)} lost") if lost else (OK, "estimating")
 
     def _report(self, estimate: Estimate | None) -> None:
@@ -118,7 +127,7 @@ def to_odometry(estimate: Estimate) -> Odometry:
 
 
 def to_transform(odometry: Odometry) -> TransformStamped:
-    """pool -> base_link."""
+    """Pool -> base_link."""
     message = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
     position = odometry.pose.pose.position
     message.transform.translation.x, message.transform.translation.y = position.x, position.y

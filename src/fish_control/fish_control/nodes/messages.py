@@ -56,7 +56,9 @@ def joint_command(stamp: Time, command: Command) -> JointState:
 def motion_of(message: Odometry) -> Motion:
     """Pose in the pool and velocity in base_link."""
     p, v = message.pose.pose, message.twist.twist
-    return Motion(p.position.x, p.position.y, yaw_of(p.orientation), v.linear.x, v.linear.y, v.angular.z)
+    return Motion(
+        p.position.x, p.position.y, yaw_of(p.orientation), v.linear.x, v.linear.y, v.angular.z
+    )
 
 
 def planar_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -66,7 +68,10 @@ def planar_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
     """What speaks for an estimate at `now` [s]."""
-    pose, twist = planar_covariance(message.pose.covariance), planar_covariance(message.twist.covariance)
+    pose, twist = (
+        planar_covariance(message.pose.covariance),
+        planar_covariance(message.twist.covariance),
+    )
     return EstimateHealth(
         age=now - seconds(message.header.stamp),
         finite=motion_is_finite(motion_of(message)),
@@ -86,7 +91,9 @@ def diagnostics(
     stamp: Time, name: str, level: bytes, message: str, values: dict[str, object]
 ) -> DiagnosticArray:
     """One status of one node."""
-    status = DiagnosticStatus(level=level, name=name.lstrip("/"), message=message, hardware_id="fish")
+    status = DiagnosticStatus(
+        level=level, name=name.lstrip("/"), message=message, hardware_id="fish"
+    )
     status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
     array = DiagnosticArray(status=[status])
     array.header.stamp = stamp

@@ -53,7 +53,10 @@ class PlannerNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(
-            "planner", namespace="fish", automatically_declare_parameters_from_overrides=True, **options
+            "planner",
+            namespace="fish",
+            automatically_declare_parameters_from_overrides=True,
+            **options,
         )
         self._config = config = read_parameters(self, PlannerConfig)
         self._target = self.create_publisher(PoseStamped, "control/target", 10)
@@ -61,7 +64,9 @@ class PlannerNode(Node):
         self._error = self.create_publisher(Vector3Stamped, "tracking/error", 10)
         self._speed = self.create_publisher(Float64, "reference/speed", LATCHED)
         self._reporter = Reporter(self, self._target)
-        self._progress = ProgressFile(FilePath(config.state_file or default_state_file(self.get_namespace())))
+        self._progress = ProgressFile(
+            FilePath(config.state_file or default_state_file(self.get_namespace()))
+        )
         self._planner: Planner | None = None
         self._plan: Plan | None = None
         self._fresh = False
@@ -99,7 +104,9 @@ class PlannerNode(Node):
         points = [(pose.pose.position.x, pose.pose.position.y) for pose in message.poses]
         closed = len(points) > 3 and math.dist(points[0], points[-1]) < 1e-3
         try:
-            check_frames({message.header.frame_id, *(pose.header.frame_id for pose in message.poses)})
+            check_frames(
+                {message.header.frame_id, *(pose.header.frame_id for pose in message.poses)}
+            )
             path = ReferencePath.from_points(
                 points, name="reference/path", closed=closed, end=self._config.ending()
             )
@@ -118,7 +125,9 @@ class PlannerNode(Node):
             self._loss = "odometry is not finite"
             return
         self._loss = pose_loss(signs, self._config.largest_variance)
-        if self._planner is None or self._loss:  # the target goes stale, so that the controller stops
+        if (
+            self._planner is None or self._loss
+        ):  # the target goes stale, so that the controller stops
             return
         if self._fresh:
             self._fresh = False
@@ -163,7 +172,7 @@ class PlannerNode(Node):
         return self.get_clock().now().nanoseconds * 1e-9, time.monotonic()
 
     def _silence(self) -> float:
-        """s since odometry came, on the clock that says less; 0 before the first.
+        """S since odometry came, on the clock that says less; 0 before the first.
 
         Neither a clock that was set ahead is a silence, nor simulated time that runs fast, nor that which waits for a busy
         computer.
@@ -179,7 +188,9 @@ class PlannerNode(Node):
             level, message = WARN, "waiting for reference/path"
         elif self._plan is not None:
             path = self._planner.path
-            message = f"finished {path.name}" if self._planner.finished else f"following {path.name}"
+            message = (
+                f"finished {path.name}" if self._planner.finished else f"following {path.name}"
+            )
             values["progress_m"] = f"{self._plan.at.progress:.3f}"
             values["length_m"] = f"{path.length:.3f}"
             values["cross_track_m"] = f"{self._plan.errors.cross_track:.4f}"

@@ -32,6 +32,7 @@ def letter(
         height: [m]; by default up to TALLEST, lower and off the centre where the fish needs room to stop at the end.
         x, y: offset from there, or with a height of the letter's middle from the pool's centre [m].
         easing: arc length over which curvature builds up [m].
+
     """
     key = str(letter).upper()
     if key not in STROKES:
@@ -51,7 +52,9 @@ def letter(
 def _unit_shape(stroke: Stroke) -> NDArray[np.float64]:
     """The rounded letter, one high, about its middle."""
     corners = np.array([corner[:2] for corner in stroke.corners], dtype=float)
-    radius = np.array([corner[2] if len(corner) > 2 else stroke.radius for corner in stroke.corners])
+    radius = np.array(
+        [corner[2] if len(corner) > 2 else stroke.radius for corner in stroke.corners]
+    )
     points = round_corners(corners, radius, stroke.closed)
     low, high = points.min(axis=0), points.max(axis=0)
     shape: NDArray[np.float64] = (points - 0.5 * (low + high)) / (high[1] - low[1])

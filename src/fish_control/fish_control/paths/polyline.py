@@ -33,6 +33,7 @@ def polyline(
         radius: corners are rounded to this [m].
         closed: join the last point to the first; by default when they coincide, or when an SVG outline is
             closed.
+
     """
     if not file:
         raise PathError("polyline: no file given; set file to a .csv or .svg")

@@ -8,7 +8,9 @@ from scipy.ndimage import gaussian_filter1d
 
 Array = NDArray[np.float64]
 
-ARC_STEP = 5e-4  # m between points on an arc; leaves a heading error of ARC_STEP / (8 radius) ~ 3e-4 rad
+ARC_STEP = (
+    5e-4  # m between points on an arc; leaves a heading error of ARC_STEP / (8 radius) ~ 3e-4 rad
+)
 EASED_STEP = 2e-3  # m between points of an eased curve
 HAIRPIN = np.deg2rad(175.0)  # a corner sharper than this has no useful fillet
 
@@ -23,8 +25,10 @@ def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) 
     Args:
         vertices: (V, 2) corners [m]; the ends of an open polyline stay where they are.
         radius: wanted radius of the arcs [m], one for all or (V,); 0 leaves a corner sharp.
+
     Returns:
         (M, 2) dense points [m]; the first is not repeated when closed.
+
     """
     corners = np.asarray(vertices, dtype=float)
     sides = np.roll(corners, -1, axis=0) - corners  # side i leads from corner i to the next
@@ -36,7 +40,9 @@ def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) 
         tangent[[0, -1]] = 0.0
     fits = np.minimum(1.0, length / np.maximum(tangent + np.roll(tangent, -1), 1e-12))
     tangent = tangent * np.minimum(fits, np.roll(fits, 1))
-    return np.vstack([_fillet(corners[i], angle[i - 1], turn[i], tangent[i]) for i in range(len(corners))])
+    return np.vstack(
+        [_fillet(corners[i], angle[i - 1], turn[i], tangent[i]) for i in range(len(corners))]
+    )
 
 
 def _fillet(corner: Array, heading: float, turn: float, tangent: float) -> Array:
@@ -48,7 +54,11 @@ def _fillet(corner: Array, heading: float, turn: float, tangent: float) -> Array
     radius = tangent / np.tan(abs(turn) / 2.0)
     normal = heading + np.sign(turn) * np.pi / 2.0
     centre = corner - tangent * _unit(heading) + radius * _unit(normal)
-    polar = normal + np.pi + np.linspace(0.0, turn, max(int(np.ceil(radius * abs(turn) / ARC_STEP)), 4) + 1)
+    polar = (
+        normal
+        + np.pi
+        + np.linspace(0.0, turn, max(int(np.ceil(radius * abs(turn) / ARC_STEP)), 4) + 1)
+    )
     arc: Array = centre + radius * np.column_stack([np.cos(polar), np.sin(polar)])
     return arc
 
@@ -65,8 +75,10 @@ def ease(points: ArrayLike, width: float, closed: bool = False) -> Array:
 
     Args:
         points: (M, 2) [m].
+
     Returns:
         (N, 2) points every 2 mm.
+
     """
     vertices = np.asarray(points, dtype=float)
     if closed:
@@ -79,6 +91,9 @@ def ease(points: ArrayLike, width: float, closed: bool = False) -> Array:
         around: Array = gaussian_filter1d(samples[:-1], sigma, axis=0, mode="wrap")
         return around
     reach = min(int(np.ceil(4.0 * sigma)), len(samples) - 1)
-    before, after = 2.0 * samples[0] - samples[reach:0:-1], 2.0 * samples[-1] - samples[-2 : -reach - 2 : -1]
+    before, after = (
+        2.0 * samples[0] - samples[reach:0:-1],
+        2.0 * samples[-1] - samples[-2 : -reach - 2 : -1],
+    )
     extended: Array = gaussian_filter1d(np.vstack([before, samples, after]), sigma, axis=0)
     return extended[reach : reach + len(samples)]

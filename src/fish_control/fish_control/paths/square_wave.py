@@ -19,7 +19,9 @@ def square_wave(
     end: End | None = None,
 ) -> ReferencePath:
     """Square wave of +-amplitude over `length` [m], centred on (x, y), corners of `radius` [m]."""
-    require_positive("square_wave", amplitude=amplitude, length=length, cycles=cycles, radius=radius)
+    require_positive(
+        "square_wave", amplitude=amplitude, length=length, cycles=cycles, radius=radius
+    )
     if cycles != int(cycles):
         raise PathError(f"square_wave: cycles is {cycles!r}, expected a whole number")
     half_periods = 2 * int(cycles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import xml.etree.ElementTree as ElementTree
@@ -28,10 +29,15 @@ def read_svg(file: Path) -> tuple[Array, bool]:
 
     Raises:
         PathError: not an SVG drawing, or one that cannot be swum in one stroke.
+
     """
     try:
         root = ElementTree.parse(file).getroot()
-    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: an unknown encoding
+    except (
+        ElementTree.ParseError,
+        LookupError,
+        ValueError,
+    ) as error:  # the last two: an unknown encoding
         raise PathError(f"{file}: not an SVG drawing ({error})") from error
     for element in root.iter():
         tag = element.tag.rsplit("}", 1)[-1]
@@ -97,7 +103,9 @@ def _origin(command: str, here: Array) -> Array:
 def _segments(d: str, file: Path) -> Iterator[tuple[str, Array]]:
     """(command, its numbers), repeated commands written out."""
     if d.strip()[:1].upper() != "M":
-        raise PathError(f"{file}: an SVG path begins with {d.strip()[:10]!r}, expected M and a point")
+        raise PathError(
+            f"{file}: an SVG path begins with {d.strip()[:10]!r}, expected M and a point"
+        )
     tokens = _tokens(d, file)
     i = 0
     command = ""
@@ -129,7 +137,7 @@ def _bezier(controls: list[Array]) -> Array:
     t = np.linspace(0.0, 1.0, CURVE_POINTS + 1)[1:, None]
     levels = [np.broadcast_to(c, (CURVE_POINTS, 2)) for c in controls]
     while len(levels) > 1:
-        levels = [(1.0 - t) * a + t * b for a, b in zip(levels, levels[1:], strict=False)]
+        levels = [(1.0 - t) * a + t * b for a, b in itertools.pairwise(levels)]
     return levels[0]
 
 

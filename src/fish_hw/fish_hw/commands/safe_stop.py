@@ -55,14 +55,19 @@ def _warn(device: str, text: str) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Stop what is named; 1 if something could not be stopped, after trying everything."""
-    parser = argparse.ArgumentParser(prog="safe_stop", description="Coast the rotor and centre the rudder.")
+    parser = argparse.ArgumentParser(
+        prog="safe_stop", description="Coast the rotor and centre the rudder."
+    )
     parser.add_argument("--rotor", type=Path, help="parameter file of the rotor node")
     parser.add_argument("--rudder", type=Path, help="parameter file of the rudder node")
     options = parser.parse_args(arguments)
     if options.rotor is None and options.rudder is None:
         parser.error("nothing to stop: give --rotor FILE, --rudder FILE or both")
     failed = False
-    for name, path, stop in (("rotor", options.rotor, stop_rotor), ("rudder", options.rudder, stop_rudder)):
+    for name, path, stop in (
+        ("rotor", options.rotor, stop_rotor),
+        ("rudder", options.rudder, stop_rudder),
+    ):
         try:
             if path is not None:
                 stop(path)

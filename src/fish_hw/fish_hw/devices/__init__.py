@@ -1,2 +1,3 @@
 """Devices: registers and commands as data, SI units and REP-103 axes at their surface, time passed in or
-injected."""
+injected.
+"""

@@ -35,7 +35,10 @@ MAX_PIECES = 65  # of one cargo: 32766 bytes; more come from a hub, or a bus, th
 MAX_ACCELERATION = 136.0  # m/s^2, magnitude; the sensor ends at 8 g per axis
 MAX_RATE = 60.5  # rad/s, magnitude; the sensor ends at 2000 deg/s per axis
 UNIT_TOLERANCE = 0.02
-OLDEST_S, NEWEST_S = 1.0, 0.05  # before and after the read; a bit error in the time base leads anywhere
+OLDEST_S, NEWEST_S = (
+    1.0,
+    0.05,
+)  # before and after the read; a bit error in the time base leads anywhere
 HINT = "check power, wiring, PS0/PS1 = 00, the address (0x4a or 0x4b) and the bus speed (400 kHz)"
 LINE_HINT = "; the hub is read only while int_line is low: check that H_INTN is wired to it"
 
@@ -218,7 +221,9 @@ class Bno085:
 
     def _read_header(self) -> Header | None:
         data = self._read(shtp.HEADER_BYTES)
-        self._read_s = self._clock()  # after the read: the hub may have stretched it until it had data
+        self._read_s = (
+            self._clock()
+        )  # after the read: the hub may have stretched it until it had data
         if data is None:
             return None
         header = shtp.parse_header(data)
@@ -231,7 +236,10 @@ class Bno085:
         if data is None:
             return None
         repeated = shtp.parse_header(data)
-        if repeated is None or (repeated.length, repeated.channel) != (header.length, header.channel):
+        if repeated is None or (repeated.length, repeated.channel) != (
+            header.length,
+            header.channel,
+        ):
             self.counters.bad_packets += 1
             return None
         return data[shtp.HEADER_BYTES :]

@@ -64,5 +64,6 @@ class Bno085Rvc:
 def attitude(message: RvcMessage) -> Quaternion:
     """Sensor axes to the level frame: R_z(yaw) R_x(pitch) R_y(roll)."""
     return multiply(
-        from_yaw_pitch_roll(message.yaw, 0.0, message.pitch), from_yaw_pitch_roll(0.0, message.roll, 0.0)
+        from_yaw_pitch_roll(message.yaw, 0.0, message.pitch),
+        from_yaw_pitch_roll(0.0, message.roll, 0.0),
     )

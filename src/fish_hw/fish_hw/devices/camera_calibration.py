@@ -34,18 +34,24 @@ def read_calibration(path: Path) -> CameraCalibration:
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise CalibrationError(f"calibration {path}: {' '.join(str(error).split())}") from error
     if not isinstance(document, dict):
-        raise CalibrationError(f"calibration {path}: expected a YAML mapping, got {type(document).__name__}")
+        raise CalibrationError(
+            f"calibration {path}: expected a YAML mapping, got {type(document).__name__}"
+        )
     model = str(_field(document, "distortion_model", path))
     if model not in DISTORTION_SIZES:
         known = ", ".join(DISTORTION_SIZES)
-        raise CalibrationError(f"calibration {path}: distortion_model is {model!r}, expected one of {known}")
+        raise CalibrationError(
+            f"calibration {path}: distortion_model is {model!r}, expected one of {known}"
+        )
     return CameraCalibration(
         width=_whole(document, "image_width", path),
         height=_whole(document, "image_height", path),
         distortion_model=model,
         distortion=_numbers(document, "distortion_coefficients", DISTORTION_SIZES[model], path),
         camera_matrix=_numbers(document, "camera_matrix", SIZES["camera_matrix"], path),
-        rectification=_numbers(document, "rectification_matrix", SIZES["rectification_matrix"], path),
+        rectification=_numbers(
+            document, "rectification_matrix", SIZES["rectification_matrix"], path
+        ),
         projection=_numbers(document, "projection_matrix", SIZES["projection_matrix"], path),
     )
 
@@ -59,13 +65,21 @@ def _field(document: dict[str, Any], name: str, path: Path) -> Any:
 def _whole(document: dict[str, Any], name: str, path: Path) -> int:
     value = _field(document, name, path)
     if not isinstance(value, int) or value <= 0:
-        raise CalibrationError(f"calibration {path}: {name} is {value!r}, expected a number of pixels")
+        raise CalibrationError(
+            f"calibration {path}: {name} is {value!r}, expected a number of pixels"
+        )
     return value
 
 
 def _numbers(document: dict[str, Any], name: str, count: int, path: Path) -> tuple[float, ...]:
     matrix = _field(document, name, path)
     data = matrix.get("data") if isinstance(matrix, dict) else None
-    if not isinstance(data, list) or len(data) != count or not all(isinstance(v, int | float) for v in data):
-        raise CalibrationError(f"calibration {path}: {name}.data is {data!r}, expected {count} numbers")
+    if (
+        not isinstance(data, list)
+        or len(data) != count
+        or not all(isinstance(v, int | float) for v in data)
+    ):
+        raise CalibrationError(
+            f"calibration {path}: {name}.data is {data!r}, expected {count} numbers"
+        )
     return tuple(float(value) for value in data)

@@ -8,7 +8,9 @@ from fish_hw.devices.rotation import Vector, rotate
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 QUIET = 0.05  # share of 1 g; samples that are further from it say little about where up is
-WINDOW_S = 2.0  # of quiet samples: a strong sway tilts single ones by 15 deg, its mean stays upright
+WINDOW_S = (
+    2.0  # of quiet samples: a strong sway tilts single ones by 15 deg, its mean stays upright
+)
 LIMIT_DEG = 10.0  # the sensor's worst is 3.5 deg
 
 
@@ -48,8 +50,6 @@ class GravityCheck:
         if angle <= LIMIT_DEG:
             self.trouble = ""
             return []
-        self.trouble = (
-            f"attitude and acceleration disagree by {angle:.0f} deg on where up is: roll and pitch are wrong"
-        )
+        self.trouble = f"attitude and acceleration disagree by {angle:.0f} deg on where up is: roll and pitch are wrong"
         said, self._said = self._said, True
         return [] if said else [Doubt(f"IMU: {self.trouble}")]

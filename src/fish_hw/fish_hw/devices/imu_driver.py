@@ -105,7 +105,8 @@ class SerialSensor:
 
 class ImuDriver:
     """Delivers samples in base_link axes; starts the sensor again when it is silent or its values stand
-    still."""
+    still.
+    """
 
     def __init__(
         self,
@@ -154,7 +155,9 @@ class ImuDriver:
         try:
             if self._sensor is None:
                 return self._reconnect(now, timeout_s)
-            samples = [self._in_order(self._mounting.to_base(s)) for s in self._sensor.poll(timeout_s)]
+            samples = [
+                self._in_order(self._mounting.to_base(s)) for s in self._sensor.poll(timeout_s)
+            ]
             return ImuCycle(samples, self._watch(samples))
         except (TransportError, DeviceError) as error:
             self.close()
@@ -169,7 +172,10 @@ class ImuDriver:
     def status(self) -> Status:
         """State in one line with counters and the rate since the last call."""
         rate = self._rate()
-        values: dict[str, object] = {"samples": self.samples, "reconnect attempts": self._link.attempts}
+        values: dict[str, object] = {
+            "samples": self.samples,
+            "reconnect attempts": self._link.attempts,
+        }
         sensor = self._sensor
         if sensor is None:
             return Status(ERROR, self._link.trouble, values)

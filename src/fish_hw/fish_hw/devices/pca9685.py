@@ -22,7 +22,9 @@ def prescale(clock_hz: float, pwm_hz: float) -> int:
     """Divider for a repetition rate; ValueError if the chip cannot do it."""
     value = round(clock_hz / (COUNTS * pwm_hz)) - 1
     if not MIN_PRESCALE <= value <= MAX_PRESCALE:
-        raise ValueError(f"pwm_hz is {pwm_hz}: the PCA9685 would need a divider of {value}, has 3 to 255")
+        raise ValueError(
+            f"pwm_hz is {pwm_hz}: the PCA9685 would need a divider of {value}, has 3 to 255"
+        )
     return value
 
 

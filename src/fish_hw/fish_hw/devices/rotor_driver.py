@@ -22,7 +22,9 @@ from fish_hw.transport.interfaces import ByteStream
 SILENCE_S = 0.5  # unanswered questions for this long, and at least
 SILENT_QUESTIONS = 5  # of them (a stalled computer asks few), mean that the module is gone
 TELEMETRY_S = 0.2
-UNWATCHED_QUESTIONS = 10  # for telemetry, 2 s of asking; without an answer nobody protects battery and rotor
+UNWATCHED_QUESTIONS = (
+    10  # for telemetry, 2 s of asking; without an answer nobody protects battery and rotor
+)
 
 
 @dataclass
@@ -69,12 +71,17 @@ class RotorDriver:
 
     def connect(self) -> None:
         """Open the port, coast the module and set its watchdog; PortUnavailable or DeviceError if it
-        cannot."""
+        cannot.
+        """
         settings = self._settings
         self._stream = self._open_stream()
         try:
             vertiq = Vertiq(
-                self._stream, settings.module_id, settings.sign, settings.reply_timeout_s, self._clock
+                self._stream,
+                settings.module_id,
+                settings.sign,
+                settings.reply_timeout_s,
+                self._clock,
             )
             vertiq.coast()
             found = vertiq.configure(settings.module_timeout_s)
@@ -151,7 +158,9 @@ class RotorDriver:
         if vertiq is None:
             return Status(ERROR, self._link.trouble, values)
         values |= self._line_values(vertiq)
-        unwatched = [name for name, missed in self._unanswered.items() if missed >= UNWATCHED_QUESTIONS]
+        unwatched = [
+            name for name, missed in self._unanswered.items() if missed >= UNWATCHED_QUESTIONS
+        ]
         if self._health.stops:
             return Status(ERROR, "; ".join(self._health.stops), values)
         if unwatched:
@@ -171,7 +180,9 @@ class RotorDriver:
         if cycle.sample is not None:
             self._events += [*self._found, *self._link.works()]
             self._found = []
-        if action.ask and self._clear_faults.is_set():  # else the question would feed the module's watchdog
+        if (
+            action.ask and self._clear_faults.is_set()
+        ):  # else the question would feed the module's watchdog
             self._clear_module_faults(vertiq)
         if action.ask and now - self._telemetry_time >= TELEMETRY_S:
             self._telemetry_time = now
@@ -197,7 +208,9 @@ class RotorDriver:
         self._silent_since = now if self._silent_since is None else self._silent_since
         self._silent_questions += 1
         if now - self._silent_since > SILENCE_S and self._silent_questions >= SILENT_QUESTIONS:
-            raise DeviceError(f"{self._settings.port}: module {self._settings.module_id} stopped answering")
+            raise DeviceError(
+                f"{self._settings.port}: module {self._settings.module_id} stopped answering"
+            )
 
     def _check(self, vertiq: Vertiq, telemetry: RotorTelemetry, now: float) -> None:
         """Health, and the two ways in which a module forgets what it was told."""
@@ -239,7 +252,9 @@ class RotorDriver:
         if ever is None:
             self._events.append("fault memory not cleared: the module did not say what it holds")
             return
-        self._events.append(f"fault memory cleared; it held: {', '.join(fault_names(ever)) or 'none'}")
+        self._events.append(
+            f"fault memory cleared; it held: {', '.join(fault_names(ever)) or 'none'}"
+        )
 
     def _note_phase(self, before: Phase) -> None:
         if self.guard.phase is not before:
@@ -254,4 +269,6 @@ class RotorDriver:
             "skipped bytes": vertiq.parser.skipped_bytes,
             "filtered volts": round(self._judge.filtered_volts, 2),
         }
-        return values | {name: value for name, value in vars(self._telemetry).items() if value is not None}
+        return values | {
+            name: value for name, value in vars(self._telemetry).items() if value is not None
+        }

@@ -33,7 +33,8 @@ class Phase(Enum):
 @dataclass(frozen=True)
 class Action:
     """What to send now: a speed [rad/s] if not None, or coast, and whether the module may be asked
-    anything."""
+    anything.
+    """
 
     velocity: float | None = None
     coast: bool = False
@@ -121,7 +122,12 @@ class RotorGuard:
     def _rearm(self, fresh: bool, now: float) -> None:
         resume, since = self._settings.resume, self._rest_since
         rested = since is not None and now - since >= self._settings.rearm_s
-        if self.latched and fresh and not self._held and (resume == "auto" or (resume == "zero" and rested)):
+        if (
+            self.latched
+            and fresh
+            and not self._held
+            and (resume == "auto" or (resume == "zero" and rested))
+        ):
             self.enable()
 
     def _follow(self, dt: float) -> Action:

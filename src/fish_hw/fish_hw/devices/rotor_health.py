@@ -70,7 +70,9 @@ class RotorHealth:
         if volts / settings.battery_cells > settings.cell_over_v:
             warnings.append(f"battery driven up to {volts / settings.battery_cells:.2f} V per cell")
 
-    def _judge_temperature(self, telemetry: RotorTelemetry, warnings: list[str], stops: list[str]) -> None:
+    def _judge_temperature(
+        self, telemetry: RotorTelemetry, warnings: list[str], stops: list[str]
+    ) -> None:
         for name, value in (("controller", telemetry.controller_c), ("coil", telemetry.coil_c)):
             if value is None:
                 continue

@@ -75,7 +75,9 @@ class RudderDriver:
         output = self._open_output()
         self._pulse_ns = self.servo.centre_ns()
         self._checked = self._connected_s = self._clock()
-        self._output = output  # before there are pulses: close() ends them, too, if a signal interrupts this
+        self._output = (
+            output  # before there are pulses: close() ends them, too, if a signal interrupts this
+        )
         try:
             output.start(self._pulse_ns)
         except TransportError:
@@ -163,7 +165,8 @@ class RudderDriver:
 
     def _travel_s(self) -> float:
         """How long the servo needs to the centre at the most: from the angle that was sent, and right after
-        connect(), which knows nothing of the angle before, from stop to stop."""
+        connect(), which knows nothing of the angle before, from stop to stop.
+        """
         settings = self._settings
         unknown_s = 2 * settings.max_angle / settings.max_rate - (self._clock() - self._connected_s)
         return max(abs(self.servo.alpha) / settings.max_rate, unknown_s)

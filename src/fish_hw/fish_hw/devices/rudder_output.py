@@ -15,5 +15,7 @@ def open_output(settings: RudderSettings) -> PwmOutput:
         raise ValueError("backend is 'emulator': there is no output to open")
     if settings.backend == "pca9685":
         bus = KernelI2c(settings.bus)
-        return Pca9685Pwm(bus, settings.address, settings.channel, settings.pca_clock_hz, settings.pwm_hz)
+        return Pca9685Pwm(
+            bus, settings.address, settings.channel, settings.pca_clock_hz, settings.pwm_hz
+        )
     return SysfsPwm(settings.chip, settings.channel, round(NS_PER_S / settings.pwm_hz))

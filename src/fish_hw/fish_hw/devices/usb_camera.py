@@ -1,5 +1,6 @@
 """The overhead camera as a whole: frames as JPEG with the middle of their exposure, found again after it was
-lost."""
+lost.
+"""
 
 import threading
 import time
@@ -123,9 +124,13 @@ class UsbCamera:
             return Status(ERROR, "no frames", values)
         if self._size != (self._settings.width, self._settings.height):
             wanted = f"{self._settings.width}x{self._settings.height}"
-            return Status(WARN, f"frames are {self._size[0]}x{self._size[1]} px instead of {wanted}", values)
+            return Status(
+                WARN, f"frames are {self._size[0]}x{self._size[1]} px instead of {wanted}", values
+            )
         if rate < SLOW * self._settings.rate_hz:
-            return Status(WARN, f"{rate:.0f} frames/s instead of {self._settings.rate_hz:.0f}", values)
+            return Status(
+                WARN, f"{rate:.0f} frames/s instead of {self._settings.rate_hz:.0f}", values
+            )
         return Status(OK, f"{rate:.0f} frames/s", values)
 
     def _picture(self, frame: Frame) -> Picture | None:
@@ -145,7 +150,9 @@ class UsbCamera:
     def _miss(self) -> None:
         self.missed += 1
         if self._clock() - self._last_frame > self._settings.reopen_s:
-            raise DeviceError(f"camera {self._settings.device}: no frames for {self._settings.reopen_s} s")
+            raise DeviceError(
+                f"camera {self._settings.device}: no frames for {self._settings.reopen_s} s"
+            )
 
     def _rate(self) -> float:
         now, (frames, since) = self._clock(), self._rated
@@ -162,7 +169,9 @@ def encode_jpeg(image: np.ndarray, quality: int) -> bytes:
     """JPEG of a BGR image (height, width, 3)."""
     ok, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not ok:
-        raise ValueError(f"an image of shape {image.shape} and type {image.dtype} cannot be encoded as JPEG")
+        raise ValueError(
+            f"an image of shape {image.shape} and type {image.dtype} cannot be encoded as JPEG"
+        )
     return bytes(data)
 
 

@@ -51,7 +51,9 @@ class RotorTelemetry:
         """These values, and older ones where an answer is missing."""
         names = [field.name for field in fields(self)]
         values = {name: getattr(self, name) for name in names}
-        return RotorTelemetry(**{n: getattr(older, n) if v is None else v for n, v in values.items()})
+        return RotorTelemetry(
+            **{n: getattr(older, n) if v is None else v for n, v in values.items()}
+        )
 
 
 @dataclass
@@ -102,7 +104,8 @@ class Vertiq:
 
     def clear_faults(self) -> int | None:
         """Clear the fault memory and return what was in it; None, and nothing cleared, if the module did not
-        answer."""
+        answer.
+        """
         (ever,) = self.read(reg.FAULT_EVER)
         if ever is None:
             return None
@@ -132,8 +135,10 @@ class Vertiq:
 
         Returns:
             warnings: settings that this firmware does not have.
+
         Raises:
             DeviceError: the module does not answer, or refuses the timeout.
+
         """
         if self._verified(reg.TIMEOUT, timeout_s) is not True:
             raise DeviceError(
@@ -142,7 +147,9 @@ class Vertiq:
                 " check its power, wiring, baud rate and module_id"
             )
         wanted = ((reg.TIMEOUT_BEHAVIOR, 0), (reg.TIMEOUT_MEANING, 0), (reg.TIMEOUT_SONG, 0))
-        return [f"module does not take {r.name} = {v}" for r, v in wanted if not self._verified(r, v)]
+        return [
+            f"module does not take {r.name} = {v}" for r, v in wanted if not self._verified(r, v)
+        ]
 
     def tuning(self) -> dict[str, float]:
         """Gains, filter and firmware version as the module has them, for the log."""
@@ -172,12 +179,15 @@ class Vertiq:
             self.counters.unexpected += 1
             return None
         time_s = (self._asked_s + self._clock()) / 2
-        self._last = RotorSample(time_s, self._unwrap(self._sign * wrapped, time_s), self._sign * speed)
+        self._last = RotorSample(
+            time_s, self._unwrap(self._sign * wrapped, time_s), self._sign * speed
+        )
         return self._last
 
     def _unwrap(self, wrapped: float, time_s: float) -> float:
         """The angle that is nearest to where the last sample's speed leads; the module reports it within
-        +-pi."""
+        +-pi.
+        """
         if self._last is None:
             return wrapped
         expected = self._last.angle + self._last.velocity * (time_s - self._last.time_s)
@@ -204,7 +214,8 @@ class Vertiq:
 
     def _drain(self, wait_s: float) -> None:
         """Throw away what came too late for the last exchange; bounded, a babbling line must not block a
-        command."""
+        command.
+        """
         for _ in range(DRAIN_READS):
             late = self._stream.read(wait_s)
             if not late:

@@ -24,20 +24,25 @@ NOTHING = bytes(shtp.HEADER_BYTES)
 
 class Bno085Emulator:
     """Answers plain reads and writes; repeats the header as the hub does, cuts long cargoes as the reader
-    asks."""
+    asks.
+    """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, seed: int = 0) -> None:
         self.written: list[bytes] = []
         self.intervals_us: dict[int, int] = {}
         self.frozen = False
-        self.damage: Callable[[bytes], bytes] = lambda packet: packet  # a test's way to break packets
+        self.damage: Callable[[bytes], bytes] = lambda packet: (
+            packet
+        )  # a test's way to break packets
         self._clock = clock
         self._random = random.Random(seed)
         self._queue: deque[tuple[int, bytes]] = deque()
         self._sequence = [0] * 6
         self._report_sequence = 0
         self._started = self._due = clock()
-        self._open: tuple[int, int, bytes, bool] | None = None  # channel, sequence, rest, continuation
+        self._open: tuple[int, int, bytes, bool] | None = (
+            None  # channel, sequence, rest, continuation
+        )
         self._values: tuple[float, float, tuple[float, float, float]] = (
             0.0,
             0.0,

@@ -49,7 +49,9 @@ class CameraNode(DeviceNode):
         """Calibration from the file; without one K[0] = 0 says "not calibrated" (sensor_msgs/CameraInfo)."""
         settings = self.settings
         if not settings.calibration_file:
-            self.get_logger().warning("no calibration_file: camera_info is published without calibration")
+            self.get_logger().warning(
+                "no calibration_file: camera_info is published without calibration"
+            )
             return CameraInfo(width=settings.width, height=settings.height)
         calibration = read_calibration(Path(settings.calibration_file).expanduser())
         if (calibration.width, calibration.height) != (settings.width, settings.height):

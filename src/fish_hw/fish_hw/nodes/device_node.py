@@ -1,5 +1,6 @@
 """What the four driver nodes share: parameters, the thread that owns the device, diagnostics, the way to
-end."""
+end.
+"""
 
 import signal
 import sys
@@ -57,10 +58,13 @@ class DeviceNode(Node):
     Args:
         name: of the node, relative to the namespace.
         settings_class: dataclass whose fields are the parameters.
+
     """
 
     def __init__(self, name: str, settings_class: type[Any]) -> None:
-        super().__init__(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        super().__init__(
+            name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True
+        )
         self.settings = read_parameters(self, settings_class)
         self.failure = ""
         self._device: Device | None = None
@@ -72,7 +76,9 @@ class DeviceNode(Node):
         self._log = StatusLog(self.get_logger())
         self.create_timer(1.0, self._on_diagnostics)
 
-    def use(self, device: Device, step: Callable[[], None], period_s: float, emulated: bool) -> None:
+    def use(
+        self, device: Device, step: Callable[[], None], period_s: float, emulated: bool
+    ) -> None:
         """What begin() is to connect, and what it is to repeat then."""
         self._device, self._repeat, self._emulated = device, (step, period_s), emulated
 
@@ -81,7 +87,8 @@ class DeviceNode(Node):
 
         Apart from the constructor: a signal may come at any moment, and only a node that its caller has can be closed.
         """
-        assert self._device is not None and self._repeat is not None  # the constructor ends with use()
+        assert self._device is not None
+        assert self._repeat is not None
         device, (step, period_s) = self._device, self._repeat
         try:
             device.connect()
@@ -116,7 +123,8 @@ class DeviceNode(Node):
 
     def publish(self, publisher: Any, message: Any) -> None:
         """Publish, unless the node is about to end (the device's thread lives a little longer than the
-        context)."""
+        context).
+        """
         try:
             publisher.publish(message)
         except RCLError:
@@ -154,7 +162,9 @@ class DeviceNode(Node):
             return
         status = self._device.status()
         if self._emulated:  # nobody should go to the pool with it
-            status = Status(max(status.level, WARN), f"{status.message} (emulated device)", status.values)
+            status = Status(
+                max(status.level, WARN), f"{status.message} (emulated device)", status.values
+            )
         self._log.say(bytes([status.level]), status.message)
         message = DiagnosticArray()
         message.header.stamp = self.get_clock().now().to_msg()
@@ -164,7 +174,9 @@ class DeviceNode(Node):
                 name=self.get_fully_qualified_name().lstrip("/"),
                 message=status.message,
                 hardware_id=self.get_name(),
-                values=[KeyValue(key=key, value=str(value)) for key, value in status.values.items()],
+                values=[
+                    KeyValue(key=key, value=str(value)) for key, value in status.values.items()
+                ],
             )
         ]
         self._diagnostics.publish(message)
@@ -183,7 +195,9 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
     failure = ""
     node: DeviceNode | None = None
     try:
-        executor = SingleThreadedExecutor()  # before the node: a signal while it is made upsets rclpy.spin
+        executor = (
+            SingleThreadedExecutor()
+        )  # before the node: a signal while it is made upsets rclpy.spin
         node = make_node()
         node.begin()
         executor.add_node(node)
@@ -196,7 +210,10 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
                 raise
             failure = one_line(error)
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not interrupt the way to safety
+        for number in (
+            signal.SIGINT,
+            signal.SIGTERM,
+        ):  # a second Ctrl-C must not interrupt the way to safety
             signal.signal(number, signal.SIG_IGN)
         if node is not None:
             node.close()

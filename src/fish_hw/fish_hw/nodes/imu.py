@@ -33,7 +33,9 @@ class ImuNode(DeviceNode):
         )
         self._template = self._message_template()
         emulated = settings.interface == "i2c" and settings.bus == "emulator"
-        waits = settings.interface == "rvc" or settings.int_line >= 0  # a step then lasts until there is data
+        waits = (
+            settings.interface == "rvc" or settings.int_line >= 0
+        )  # a step then lasts until there is data
         self.use(self._driver, self._cycle, 0.0 if waits else self._period_s, emulated)
 
     def _open_bus(self) -> I2cBus:

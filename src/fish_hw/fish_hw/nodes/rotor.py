@@ -31,7 +31,9 @@ class RotorNode(DeviceNode):
         super().__init__("rotor", RotorSettings)
         self._joint_states = self.create_publisher(JointState, "joint_states", 10)
         self._battery_state = self.create_publisher(BatteryState, "battery_state", 10)
-        self._emulator = VertiqEmulator(self.settings.module_id) if self.settings.port == "emulator" else None
+        self._emulator = (
+            VertiqEmulator(self.settings.module_id) if self.settings.port == "emulator" else None
+        )
         self._driver = RotorDriver(self.settings, self._open_port)
         self._telemetry: RotorTelemetry | None = None
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
@@ -57,11 +59,15 @@ class RotorNode(DeviceNode):
         response.message = "enabled" if request.data else "stopping"
         return response
 
-    def _on_clear_faults(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_clear_faults(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
         self._driver.clear_faults()
         response.success = self._driver.connected
         response.message = (
-            "the module is asked as soon as it may be" if response.success else "the module is not connected"
+            "the module is asked as soon as it may be"
+            if response.success
+            else "the module is not connected"
         )
         return response
 

@@ -8,7 +8,9 @@ from collections.abc import Callable
 class Worker:
     """Calls step() every period_s until stop(); calls on_failure() if a step raises."""
 
-    def __init__(self, step: Callable[[], None], period_s: float, on_failure: Callable[[], None]) -> None:
+    def __init__(
+        self, step: Callable[[], None], period_s: float, on_failure: Callable[[], None]
+    ) -> None:
         self._step = step
         self._period_s = period_s
         self._on_failure = on_failure

@@ -38,8 +38,13 @@ def encode(message: Message) -> bytes:
         raise ValueError(f"module id is {message.module}, expected 0 to {MAX_MODULE}")
     length = MIN_PAYLOAD + len(message.data)
     if length > MAX_PAYLOAD:
-        raise ValueError(f"{len(message.data)} bytes of data, expected at most {MAX_PAYLOAD - MIN_PAYLOAD}")
-    body = bytes([length, message.type, message.param, message.module << 2 | message.access]) + message.data
+        raise ValueError(
+            f"{len(message.data)} bytes of data, expected at most {MAX_PAYLOAD - MIN_PAYLOAD}"
+        )
+    body = (
+        bytes([length, message.type, message.param, message.module << 2 | message.access])
+        + message.data
+    )
     return bytes([START]) + body + struct.pack("<H", crc_hqx(body, CRC_INITIAL))
 
 
@@ -70,7 +75,8 @@ class Parser:
 
     def flush(self) -> list[Message]:
         """End of a burst: give up the incomplete message and return complete ones that hid behind a false
-        start."""
+        start.
+        """
         messages = []
         while self._buffer:
             self._skip(1)

@@ -77,4 +77,6 @@ def encode(message: RvcMessage) -> bytes:
 def _decode(frame: bytes) -> RvcMessage:
     index, yaw, pitch, roll, *milli_g = struct.unpack_from("<B6h", frame, 2)
     x, y, z = (value * STANDARD_GRAVITY / 1000 for value in milli_g)
-    return RvcMessage(index, yaw * RAD_PER_COUNT, pitch * RAD_PER_COUNT, roll * RAD_PER_COUNT, (x, y, z))
+    return RvcMessage(
+        index, yaw * RAD_PER_COUNT, pitch * RAD_PER_COUNT, roll * RAD_PER_COUNT, (x, y, z)
+    )

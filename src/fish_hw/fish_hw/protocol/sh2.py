@@ -28,7 +28,8 @@ HEADER_BYTES = 4  # id, sequence, status, delay
 @dataclass(frozen=True)
 class Layout:
     """Length of a report in bytes and the fixed-point numbers in it: how many, with how many fraction
-    bits."""
+    bits.
+    """
 
     length: int
     count: int = 0
@@ -122,6 +123,7 @@ def parse_reports(payload: bytes, read_time_s: float, drops: Drops) -> list[Repo
     Args:
         payload: cargo of the report channel, without packet header.
         read_time_s: when the hub announced it.
+
     """
     reports: list[Report] = []
     base_s: float | None = (

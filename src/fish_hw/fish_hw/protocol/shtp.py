@@ -75,7 +75,9 @@ class Reassembler:
         self.orphans = 0
         self.sequence_gaps = 0
         self._last: dict[int, int] = {}
-        self._open: dict[int, tuple[int, bytearray]] = {}  # channel: total payload size, bytes so far
+        self._open: dict[
+            int, tuple[int, bytearray]
+        ] = {}  # channel: total payload size, bytes so far
 
     def feed(self, header: Header, body: bytes) -> Cargo | None:
         """Take one packet (body without header); return the cargo if it is complete."""

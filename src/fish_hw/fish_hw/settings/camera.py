@@ -10,7 +10,9 @@ class CameraSettings:
     """USB camera: device, picture, fixed exposure against glare, calibration."""
 
     device: str = "/dev/video0"  # V4L2 device, video file (played in a loop), or "emulator"
-    startup_timeout_s: float = 0.0  # s to wait for the camera at start; then the node ends with an error
+    startup_timeout_s: float = (
+        0.0  # s to wait for the camera at start; then the node ends with an error
+    )
     width: int = 1280  # px
     height: int = 720  # px
     rate_hz: float = 30.0  # Hz

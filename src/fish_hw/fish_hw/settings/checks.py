@@ -12,4 +12,6 @@ def require_range(name: str, value: float, low: float, high: float) -> None:
 def require_choice(name: str, value: object, choices: tuple[object, ...]) -> None:
     """ValueError unless value is one of choices."""
     if value not in choices:
-        raise ValueError(f"{name} is {value!r}, expected one of {', '.join(repr(c) for c in choices)}")
+        raise ValueError(
+            f"{name} is {value!r}, expected one of {', '.join(repr(c) for c in choices)}"
+        )

@@ -24,9 +24,13 @@ class ImuSettings:
         -1
     )  # i2c: line that H_INTN is wired to (BCM number); -1 not wired: time stamps up to 10 ms late
     port: str = "/dev/ttyUSB0"  # rvc: serial device
-    startup_timeout_s: float = 0.0  # s to wait for the sensor at start; then the node ends with an error
+    startup_timeout_s: float = (
+        0.0  # s to wait for the sensor at start; then the node ends with an error
+    )
     rate_hz: float = 100.0  # Hz, asked of the sensor (rvc: 100 always)
-    watchdog_s: float = 1.0  # s without a sample, or with frozen values, until the sensor is started again
+    watchdog_s: float = (
+        1.0  # s without a sample, or with frozen values, until the sensor is started again
+    )
     mount_roll: float = 0.0  # rad
     mount_pitch: float = 0.0  # rad
     mount_yaw: float = 0.0  # rad

@@ -19,15 +19,21 @@ class RotorSettings:
     port: str = "/dev/serial0"  # serial device, or "emulator"
     baud: int = 115200  # bit/s; must be what the module is set to
     module_id: int = 0  # 0 to 63
-    startup_timeout_s: float = 0.0  # s to wait for the port at start; then the node ends with an error
+    startup_timeout_s: float = (
+        0.0  # s to wait for the port at start; then the node ends with an error
+    )
     rate_hz: float = 100.0  # Hz, commands to the module and joint_states
     reply_timeout_s: float = 0.008  # s to wait for the answers of one cycle
     sign: int = 1  # -1 if positive speed of the motor turns the rotor clockwise seen from above
     max_velocity: float = 160.0  # rad/s; full throttle at 2 Hz needs 150.8
     max_acceleration: float = 2200.0  # rad/s^2; full throttle at 2 Hz needs 1895
     stale_s: float = 0.15  # s without a command until the rotor is stopped; 3 / rate_hz at least
-    ramp_s: float = 0.25  # s from the last speed to zero, then coast; at most one period of the oscillation
-    module_timeout_s: float = 0.25  # s without any byte until it coasts by itself; 3 / rate_hz at least
+    ramp_s: float = (
+        0.25  # s from the last speed to zero, then coast; at most one period of the oscillation
+    )
+    module_timeout_s: float = (
+        0.25  # s without any byte until it coasts by itself; 3 / rate_hz at least
+    )
     resume: str = "zero"  # zero | auto | manual
     rearm_s: float = 0.3  # s of commands at rest that end a stop (resume: zero)
     battery_cells: int = 4  # cells in series

@@ -18,7 +18,9 @@ class RudderSettings:
     channel: int = 0  # of the chip or board
     pca_clock_hz: float = 25e6  # Hz, real clock of the board (measure the pulses and correct)
     pwm_hz: float = 50.0  # Hz, repetition of the pulses
-    startup_timeout_s: float = 0.0  # s to wait for the port at start; then the node ends with an error
+    startup_timeout_s: float = (
+        0.0  # s to wait for the port at start; then the node ends with an error
+    )
     rate_hz: float = 100.0  # Hz, updates of the pulse
     sign: int = 1  # -1 if longer pulses steer right
     centre_us: float = 1500.0  # us, pulse that centres the servo horn
@@ -29,7 +31,9 @@ class RudderSettings:
     max_angle: float = 0.8  # rad, limit of alpha
     max_rate: float = 6.0  # rad/s, slew limit of alpha
     stale_s: float = 0.25  # s without a command until the rudder goes to the centre
-    off_at_exit: bool = True  # pulses off after centring; some digital servos hold their place all the same
+    off_at_exit: bool = (
+        True  # pulses off after centring; some digital servos hold their place all the same
+    )
 
     def __post_init__(self) -> None:
         require_choice("backend", self.backend, BACKENDS)

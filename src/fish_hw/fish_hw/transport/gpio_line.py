@@ -36,6 +36,7 @@ class InterruptLine:
     Args:
         chip: GPIO chip, /dev/gpiochip0.
         line: number of the line on that chip (on a Raspberry Pi the BCM number).
+
     """
 
     def __init__(self, chip: str, line: int) -> None:
@@ -51,7 +52,9 @@ class InterruptLine:
         """Time [s, monotonic clock] of the newest falling edge within timeout_s; None if none came."""
         newest = None
         try:
-            while select.select([self._descriptor], [], [], timeout_s if newest is None else 0.0)[0]:
+            while select.select([self._descriptor], [], [], timeout_s if newest is None else 0.0)[
+                0
+            ]:
                 data = os.read(self._descriptor, EVENT.size)
                 newest = EVENT.unpack(data)[0] * NS
         except (OSError, ValueError, struct.error) as error:

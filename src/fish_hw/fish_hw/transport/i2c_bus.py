@@ -59,5 +59,8 @@ class KernelI2c:
     def _transfer(self, message: Any, address: int) -> None:
         try:
             self._bus.i2c_rdwr(message)
-        except (OSError, TypeError) as error:  # TypeError: the bus has been closed, its descriptor is None
+        except (
+            OSError,
+            TypeError,
+        ) as error:  # TypeError: the bus has been closed, its descriptor is None
             raise TransportError(f"I2C bus {self.bus}, device 0x{address:02x}: {error}") from error

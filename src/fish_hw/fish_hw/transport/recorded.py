@@ -19,7 +19,7 @@ class RecordedStream:
         """Keep data for the test to look at."""
         self.written.append(bytes(data))
 
-    def read(self, timeout_s: float) -> bytes:  # noqa: ARG002 (recorded bytes do not make anybody wait)
+    def read(self, timeout_s: float) -> bytes:  # noqa: ARG002
         """The next recorded chunk."""
         if not self.chunks:
             return b""

@@ -20,8 +20,10 @@ class SysfsPwm:
         chip: folder of the PWM chip, /sys/class/pwm/pwmchip0.
         channel: channel number on that chip.
         period_ns: repetition time.
+
     Raises:
         PortUnavailable: chip absent, channel refused or files not writable.
+
     """
 
     def __init__(
@@ -84,7 +86,8 @@ class SysfsPwm:
                 return
             self._sleep(RETRY_S)
         raise OSError(
-            errno.EACCES, "period, duty_cycle and enable did not become writable (udev rule for group gpio?)"
+            errno.EACCES,
+            "period, duty_cycle and enable did not become writable (udev rule for group gpio?)",
         )
 
     def _writable(self) -> bool:
@@ -109,4 +112,6 @@ class SysfsPwm:
         try:
             (self._pwm / name).write_text(f"{value}\n")
         except OSError as error:
-            raise TransportError(f"PWM {self._pwm}: cannot write {value} to {name}: {error}") from error
+            raise TransportError(
+                f"PWM {self._pwm}: cannot write {value} to {name}: {error}"
+            ) from error

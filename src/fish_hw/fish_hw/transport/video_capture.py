@@ -1,5 +1,6 @@
 """A V4L2 camera or a video file by OpenCV: the newest frame with its time, JPEG as the camera sent it if it
-can."""
+can.
+"""
 
 import os
 import time
@@ -25,7 +26,8 @@ JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
 @dataclass(frozen=True)
 class Frame:
     """One picture: JPEG bytes if the camera sent such, else a BGR image (height, width, 3); monotonic time
-    [s]."""
+    [s].
+    """
 
     time_s: float
     jpeg: bytes | None = None
@@ -41,7 +43,9 @@ class VideoCapture:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # the reason is said once, here
+        cv2.utils.logging.setLogLevel(
+            cv2.utils.logging.LOG_LEVEL_SILENT
+        )  # the reason is said once, here
         self._settings = settings
         self._clock, self._sleep = clock, sleep
         self._live = settings.device.startswith("/dev/")
@@ -91,7 +95,9 @@ class VideoCapture:
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
         if capture.get(cv2.CAP_PROP_FOURCC) == MJPG:
             capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)  # pass the camera's JPEG through
-        capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, AUTO_EXPOSURE if settings.exposure < 0 else MANUAL_EXPOSURE)
+        capture.set(
+            cv2.CAP_PROP_AUTO_EXPOSURE, AUTO_EXPOSURE if settings.exposure < 0 else MANUAL_EXPOSURE
+        )
         if settings.exposure >= 0:
             capture.set(cv2.CAP_PROP_EXPOSURE, settings.exposure)
         capture.set(cv2.CAP_PROP_AUTOFOCUS, float(settings.focus < 0))  # OpenCV 5 takes no bool

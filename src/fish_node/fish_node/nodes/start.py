@@ -27,6 +27,7 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
     Raises:
         ValueError: an unknown name, or a value of the wrong type or out of range, naming parameter, value and
             what was expected.
+
     """
     defaults = asdict(kind())  # type: ignore[call-overload]
     if unknown := unknown_names(node.get_parameters_by_prefix(""), defaults):
@@ -34,7 +35,9 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
     descriptor = ParameterDescriptor(dynamic_typing=True, read_only=True)
     values = {}
     for name, like in defaults.items():
-        if node.has_parameter(name):  # declared with the type that came, which may not be the right one
+        if node.has_parameter(
+            name
+        ):  # declared with the type that came, which may not be the right one
             node.undeclare_parameter(name)
         start = list(like) if isinstance(like, tuple) else like
         given = node.declare_parameter(name, start, descriptor).value
@@ -42,7 +45,9 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
     return kind(**values)
 
 
-def run(make_node: Callable[[], Made], name: str, at_end: Callable[[Made], None] | None = None) -> int:
+def run(
+    make_node: Callable[[], Made], name: str, at_end: Callable[[Made], None] | None = None
+) -> int:
     """Spin a node until SIGINT or SIGTERM: 0; or 1 and one line on stderr if its arguments are refused.
 
     A signal may come while the node is still being made: its context ends there and then, and whatever that makes fail is
@@ -52,6 +57,7 @@ def run(make_node: Callable[[], Made], name: str, at_end: Callable[[Made], None]
         make_node: the node's class.
         name: for the line on stderr.
         at_end: is handed the node on the clean way out, not after an error.
+
     """
     try:
         rclpy.init()

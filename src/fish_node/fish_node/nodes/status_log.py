@@ -19,6 +19,7 @@ class StatusLog:
     Args:
         logger: of the node.
         now: clock [s].
+
     """
 
     def __init__(self, logger: Any, now: Callable[[], float] = time.monotonic) -> None:

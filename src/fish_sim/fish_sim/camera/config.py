@@ -17,9 +17,19 @@ class CameraConfig:
     rate_hz: float = 30.0  # frames per second
     focal: tuple[float, ...] = (1000.0, 1000.0)  # fx, fy, pixels
     centre: tuple[float, ...] = (634.0, 366.0)  # cx, cy, pixels
-    distortion: tuple[float, ...] = (-0.26, 0.07, 0.0008, -0.0005, 0.0)  # k1 k2 p1 p2 k3, a wide-angle webcam
+    distortion: tuple[float, ...] = (
+        -0.26,
+        0.07,
+        0.0008,
+        -0.0005,
+        0.0,
+    )  # k1 k2 p1 p2 k3, a wide-angle webcam
     camera_position: tuple[float, ...] = (0.05, -0.08, 3.2)  # optical centre in the pool frame, m
-    camera_tilt: tuple[float, ...] = (-0.022, 0.018, 0.010)  # about the optical axes, rad; 0 = straight down
+    camera_tilt: tuple[float, ...] = (
+        -0.022,
+        0.018,
+        0.010,
+    )  # about the optical axes, rad; 0 = straight down
     frame_id: str = "overhead_optical"  # of image and camera_info headers
     latency_s: float = 0.05  # from exposure to publication, s
     drop_rate: float = 0.01  # probability that a frame is lost
@@ -78,7 +88,10 @@ class CameraConfig:
     def look(self) -> Look:
         """Noise, glare and compression of the picture."""
         return Look(
-            noise_std=self.noise_std, glare=self.glare, jpeg_quality=self.jpeg_quality, seed=self.seed
+            noise_std=self.noise_std,
+            glare=self.glare,
+            jpeg_quality=self.jpeg_quality,
+            seed=self.seed,
         )
 
 

@@ -71,7 +71,9 @@ def joints(pose: FishPose, shape: FishShape) -> tuple[Array, Array]:
     relative[:count] = pose.tail[:count]
     theta = pose.heading + np.cumsum(relative)
     steps = -np.column_stack([np.cos(theta), np.sin(theta)]) * shape.link_length
-    h_0 = np.array([pose.x, pose.y]) - shape.hinge_offset * np.array([cos(pose.heading), sin(pose.heading)])
+    h_0 = np.array([pose.x, pose.y]) - shape.hinge_offset * np.array(
+        [cos(pose.heading), sin(pose.heading)]
+    )
     return np.vstack([h_0, h_0 + np.cumsum(steps, axis=0)]), theta
 
 
@@ -84,7 +86,8 @@ def markers(pose: FishPose, shape: FishShape) -> list[tuple[Array, float, Colour
     ]
     hinges, _ = joints(pose, shape)
     return head + [
-        (h, shape.tail_marker_diameter, TAIL_COLOURS[i % len(TAIL_COLOURS)]) for i, h in enumerate(hinges[1:])
+        (h, shape.tail_marker_diameter, TAIL_COLOURS[i % len(TAIL_COLOURS)])
+        for i, h in enumerate(hinges[1:])
     ]
 
 
@@ -94,18 +97,27 @@ def patches(pose: FishPose, shape: FishShape) -> list[Patch]:
     fin_end = hinges[-1] - shape.fin_length * np.array([cos(theta[-1]), sin(theta[-1])])
     widths = np.linspace(shape.tail_width, shape.tail_width / 2, shape.links + 1)
     result = [Patch(_taper(hinges[-1], fin_end, widths[-1] * 0.5, shape.tail_width * 0.9), FIN)]
-    for near, far, wide, narrow in zip(hinges[:-1], hinges[1:], widths[:-1], widths[1:], strict=True):
+    for near, far, wide, narrow in zip(
+        hinges[:-1], hinges[1:], widths[:-1], widths[1:], strict=True
+    ):
         result += [Patch(_disc(near, wide), TAIL), Patch(_taper(near, far, wide, narrow), TAIL)]
     result.append(Patch(_disc(hinges[-1], widths[-1]), TAIL))
-    result += [Patch(_head(pose, shape, scale), colour) for scale, colour in ((1.0, BODY), (0.72, BACK))]
-    result += [Patch(_disc(centre, diameter), colour) for centre, diameter, colour in markers(pose, shape)]
+    result += [
+        Patch(_head(pose, shape, scale), colour) for scale, colour in ((1.0, BODY), (0.72, BACK))
+    ]
+    result += [
+        Patch(_disc(centre, diameter), colour) for centre, diameter, colour in markers(pose, shape)
+    ]
     return result
 
 
 def silhouette(pose: FishPose, shape: FishShape) -> Sequence[Array]:
     """Outlines of head and tail alone, for the shadow on the floor."""
     hinges, _ = joints(pose, shape)
-    return [_head(pose, shape, 1.0), _taper(hinges[0], hinges[-1], shape.tail_width, shape.tail_width / 2)]
+    return [
+        _head(pose, shape, 1.0),
+        _taper(hinges[0], hinges[-1], shape.tail_width, shape.tail_width / 2),
+    ]
 
 
 def _disc(centre: Array, diameter: float, points: int = 24) -> Array:

@@ -9,7 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[Any]  # float64
 
-R_DOWN = np.diag([1.0, -1.0, -1.0])  # optical axes of an untilted camera: right = pool x, down = pool -y
+R_DOWN = np.diag(
+    [1.0, -1.0, -1.0]
+)  # optical axes of an untilted camera: right = pool x, down = pool -y
 
 
 @dataclass(frozen=True)

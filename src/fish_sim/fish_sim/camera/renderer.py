@@ -57,6 +57,7 @@ class PoolRenderer:
         Args:
             poses: the fish at equal parts of the exposure (one pose = no motion blur, none = empty pool).
             time: s, moves the light on the water.
+
         """
         picture = self._picture
         self._add_light(self._pool, self._caustics.at(time), picture)
@@ -79,7 +80,8 @@ class PoolRenderer:
     def _draw_fish(self, picture: Image, poses: Sequence[FishPose]) -> None:
         """Shadow, then the mean of all poses, into the patch of the picture that holds them."""
         shapes = [
-            [(self._pixels(p.outline, 0.0), p.colour) for p in patches(pose, self._shape)] for pose in poses
+            [(self._pixels(p.outline, 0.0), p.colour) for p in patches(pose, self._shape)]
+            for pose in poses
         ]
         shadows = [self._pixels(s, -DEPTH) for s in silhouette(poses[len(poses) // 2], self._shape)]
         corners = np.vstack([outline for fish in shapes for outline, _ in fish] + shadows)
@@ -102,13 +104,18 @@ class PoolRenderer:
         return self.camera.project(np.column_stack([outline, np.full(len(outline), height)]))
 
     def _with_noise(self, picture: Image) -> Image:
-        rows, columns = self._noise.shape[0] - picture.shape[0], self._noise.shape[1] - picture.shape[1]
+        rows, columns = (
+            self._noise.shape[0] - picture.shape[0],
+            self._noise.shape[1] - picture.shape[1],
+        )
         i, j = self._random.integers(0, rows + 1), self._random.integers(0, columns + 1)
         tile = self._noise[i : i + picture.shape[0], j : j + picture.shape[1]]
         return cv2.addWeighted(picture, 1.0, tile, 1.0, -self._noise_mean)
 
 
-def _noise_tile(size: tuple[int, int], std: float, random: np.random.Generator) -> tuple[Image, float]:
+def _noise_tile(
+    size: tuple[int, int], std: float, random: np.random.Generator
+) -> tuple[Image, float]:
     """Noise with its mean raised so that it fits unsigned bytes, larger than the image for random offsets."""
     mean = float(np.ceil(4.0 * std))
     shape = (size[1] + 61, size[0] + 127, 3)

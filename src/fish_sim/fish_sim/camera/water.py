@@ -31,7 +31,9 @@ def still_pool(camera: CameraModel, seed: int) -> Image:
     surface = np.array([x, y], np.float32) - rays[:, :2] * (z / rays[:, 2])[:, None]
     colour = _colours(surface, _through_water(surface, rays), z / camera.focal[0])
     coarse = (
-        np.random.default_rng(seed).normal(0.0, 2.0, (height // 8 + 1, width // 8 + 1)).astype(np.float32)
+        np.random.default_rng(seed)
+        .normal(0.0, 2.0, (height // 8 + 1, width // 8 + 1))
+        .astype(np.float32)
     )
     grain = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC).reshape(-1, 1)
     picture: Array = (colour + grain).reshape(height, width, 3) * vignette(camera)[..., None]
@@ -42,8 +44,12 @@ def _all_rays(camera: CameraModel, step: int = 8) -> Array:
     """(height * width, 3) directions of all pixels: exact at every step-th, bilinear between (0.01 pixel)."""
     width, height = camera.size
     u, v = np.meshgrid(np.arange(0, width + step, step), np.arange(0, height + step, step))
-    coarse = camera.rays(np.column_stack([u.ravel(), v.ravel()])).reshape(*u.shape, 3).astype(np.float32)
-    column, row = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    coarse = (
+        camera.rays(np.column_stack([u.ravel(), v.ravel()])).reshape(*u.shape, 3).astype(np.float32)
+    )
+    column, row = np.meshgrid(
+        np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)
+    )
     return cv2.remap(coarse, column / step, row / step, cv2.INTER_LINEAR).reshape(-1, 3)
 
 
@@ -82,15 +88,18 @@ def _colours(surface: Array, end: Array, pixel: float) -> Array:
     colour = _blend(colour, GROUT, (tile - 0.485) * TILE / pixel)
     colour = _blend(colour, LANE, -lane / pixel)
     colour = _blend(colour, WALL, (end[:, 2] + DEPTH) / pixel - 0.5)
-    colour *= (1.0 - 0.25 * np.exp(-np.maximum(-outside, 0.0) / 0.10))[:, None]  # darker below the rim
+    colour *= (1.0 - 0.25 * np.exp(-np.maximum(-outside, 0.0) / 0.10))[
+        :, None
+    ]  # darker below the rim
     deck = (
-        np.array(DECK, np.float32) * (0.7 + 0.3 * np.clip((outside - RIM) / 0.06, 0.0, 1.0))[:, None]
+        np.array(DECK, np.float32)
+        * (0.7 + 0.3 * np.clip((outside - RIM) / 0.06, 0.0, 1.0))[:, None]
     )  # in the rim's shadow
     return _blend(_blend(colour, TOP, outside / pixel), deck, (outside - RIM) / pixel)
 
 
 def _blend(colour: Array, other: ArrayLike, distance: Array) -> Array:
-    """other where distance (pixels beyond an edge) is positive, with one pixel of transition."""
+    """Other where distance (pixels beyond an edge) is positive, with one pixel of transition."""
     share = np.clip(distance + 0.5, 0.0, 1.0)[:, None]
     return colour * (1.0 - share) + np.asarray(other, np.float32) * share
 
@@ -129,9 +138,13 @@ def moving_light(
     Ripples are sums of travelling waves whose frequencies are multiples of 1 / period.
     """
     width, height = camera.size
-    pixels = np.stack(np.meshgrid(np.arange(0, width, COARSE), np.arange(0, height, COARSE)), axis=-1)
+    pixels = np.stack(
+        np.meshgrid(np.arange(0, width, COARSE), np.arange(0, height, COARSE)), axis=-1
+    )
     place = (
-        camera.unproject(pixels.reshape(-1, 2) + (COARSE - 1) / 2).reshape(*pixels.shape).astype(np.float32)
+        camera.unproject(pixels.reshape(-1, 2) + (COARSE - 1) / 2)
+        .reshape(*pixels.shape)
+        .astype(np.float32)
     )
     inside = np.all(np.abs(place) < np.array(POOL, np.float32) / 2, axis=-1)
     lamps: Array = sum(

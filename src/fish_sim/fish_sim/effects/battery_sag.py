@@ -6,7 +6,9 @@ from fish_sim.effects.effect import Effect, Followed, Values
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
 
-SOURCE = "first-order (Thevenin) battery, speed proportional to voltage; strengths are an assumption"
+SOURCE = (
+    "first-order (Thevenin) battery, speed proportional to voltage; strengths are an assumption"
+)
 REFERENCE_SPEED = 100.0  # rad/s, load 1
 
 
@@ -20,7 +22,9 @@ class BatterySag(Effect):
 
     name = "battery_sag"
     kind = "actuator"
-    equation = "speed = command (1 - sag load), load' = ((command/100 rad/s)^2 - load)/time_constant"
+    equation = (
+        "speed = command (1 - sag load), load' = ((command/100 rad/s)^2 - load)/time_constant"
+    )
     source = SOURCE
     parameters = {
         "sag": Parameter(0.0, "1", 0.0, 2.0, SOURCE, typical=0.2),

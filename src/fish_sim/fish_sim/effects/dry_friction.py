@@ -21,9 +21,7 @@ class DryFriction(Effect):
 
     name = "dry_friction"
     kind = "physics"
-    equation = (
-        "F = -force V/|V| (smooth below 5 mm/s), N = -moment sign(w) (smooth below 0.05 rad/s) on the head"
-    )
+    equation = "F = -force V/|V| (smooth below 5 mm/s), N = -moment sign(w) (smooth below 0.05 rad/s) on the head"
     source = SOURCE
     parameters = {
         "force": Parameter(0.0, "N", 0.0, 1.0, SOURCE, typical=0.02),

@@ -69,10 +69,14 @@ class Effect:
     equation: ClassVar[str]
     source: ClassVar[str]
     parameters: ClassVar[Mapping[str, Parameter]]
-    strength: ClassVar[tuple[str, ...]]  # parameters whose default (zero or neutral) value means: effect off
+    strength: ClassVar[
+        tuple[str, ...]
+    ]  # parameters whose default (zero or neutral) value means: effect off
     states: ClassVar[tuple[str, ...]] = ()  # continuous, integrated with the motion; start at 0
     memory: ClassVar[tuple[str, ...]] = ()  # discrete, updated once per command; start at 0
-    has_linkage: ClassVar[bool] = False  # servo and rudder differ: the servo's position is remembered too
+    has_linkage: ClassVar[bool] = (
+        False  # servo and rudder differ: the servo's position is remembered too
+    )
     dissipative: ClassVar[bool] = False  # its wrench never adds energy in still water
 
     @staticmethod

@@ -62,13 +62,20 @@ class NonuniformCurrent(Effect):
         across = harmonics(xp.sin(ky * y + math.pi / 2), xp.cos(ky * y + math.pi / 2), len(WIDE))
         # V_x, V_y, dV_x/dx, dV_x/dy, dV_y/dx, dV_y/dy
         total = (
-            p.mean_x + p.strain * x + p.shear_x * y, p.mean_y + p.shear_y * x - p.strain * y,
-            p.strain, p.shear_x, p.shear_y, -p.strain,
-        )  # fmt: skip
+            p.mean_x + p.strain * x + p.shear_x * y,
+            p.mean_y + p.shear_y * x - p.strain * y,
+            p.strain,
+            p.shear_x,
+            p.shear_y,
+            -p.strain,
+        )
         for n, (sy, cy) in enumerate(across, 1):
             gyres = [(m * kx, getattr(p, f"gyre_{m}{n}"), *along[m - 1]) for m in LONG]
             f, q = sum(g * sx for _, g, sx, _ in gyres), n * ky
-            df, ddf = sum(k * g * cx for k, g, _, cx in gyres), sum(-(k**2) * g * sx for k, g, sx, _ in gyres)
+            df, ddf = (
+                sum(k * g * cx for k, g, _, cx in gyres),
+                sum(-(k**2) * g * sx for k, g, sx, _ in gyres),
+            )
             modes = (f * cy, -df * sy / q, df * cy, -q * f * sy, -ddf * sy / q, -df * cy)
             total = tuple(t + part for t, part in zip(total, modes, strict=True))
         return total[:2], (total[2:4], total[4:])

@@ -19,7 +19,9 @@ class RotorSaturation(Effect):
     kind = "actuator"
     equation = "speed = clip(command, -limit, limit)"
     source = SOURCE
-    parameters = {"limit": Parameter(NO_LIMIT, "rad/s", 0.0, NO_LIMIT, SOURCE, typical=70.0, tries=LIMITS)}
+    parameters = {
+        "limit": Parameter(NO_LIMIT, "rad/s", 0.0, NO_LIMIT, SOURCE, typical=70.0, tries=LIMITS)
+    }
     strength = ("limit",)
 
     @staticmethod

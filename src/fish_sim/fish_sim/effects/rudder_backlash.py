@@ -30,5 +30,7 @@ class RudderBacklash(Effect):
     @staticmethod
     def linkage(p: Values, m: Values, servo: Scalar, dt: float, xp: Any) -> Followed:
         ahead, behind = servo - p.play, servo + p.play
-        dragged = xp.where(m.dragged < ahead, ahead, xp.where(m.dragged > behind, behind, m.dragged))
+        dragged = xp.where(
+            m.dragged < ahead, ahead, xp.where(m.dragged > behind, behind, m.dragged)
+        )
         return dragged, {"dragged": dragged}

@@ -17,7 +17,9 @@ class RudderPlacement(Effect):
 
     name = "rudder_placement"
     kind = "actuator"
-    equation = "joint 1 rests at -(1 - tip_share) alpha, the fin points along theta_n - tip_share alpha"
+    equation = (
+        "joint 1 rests at -(1 - tip_share) alpha, the fin points along theta_n - tip_share alpha"
+    )
     source = SOURCE
     parameters = {"tip_share": Parameter(0.0, "1", 0.0, 1.0, SOURCE, typical=0.6)}
     strength = ("tip_share",)

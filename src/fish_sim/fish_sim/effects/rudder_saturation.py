@@ -22,7 +22,9 @@ class RudderSaturation(Effect):
     kind = "actuator"
     equation = "target = clip(command, -limit, limit)"
     source = SOURCE
-    parameters = {"limit": Parameter(NO_LIMIT, "rad", 0.0, NO_LIMIT, SOURCE, typical=0.25, tries=LIMITS)}
+    parameters = {
+        "limit": Parameter(NO_LIMIT, "rad", 0.0, NO_LIMIT, SOURCE, typical=0.25, tries=LIMITS)
+    }
     strength = ("limit",)
 
     @staticmethod

@@ -26,7 +26,9 @@ class Sloshing(Effect):
 
     name = "sloshing"
     kind = "physics"
-    equation = "F_x = (sine sin(2 pi f t) + cosine cos(2 pi f t)) cos(pi x/L) on the head, pool frame"
+    equation = (
+        "F_x = (sine sin(2 pi f t) + cosine cos(2 pi f t)) cos(pi x/L) on the head, pool frame"
+    )
     source = SOURCE
     parameters = {
         "sine": Parameter(0.0, "N", -1.0, 1.0, SOURCE, typical=0.02),

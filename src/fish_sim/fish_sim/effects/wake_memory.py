@@ -20,7 +20,9 @@ class WakeMemory(Effect):
 
     name = "wake_memory"
     kind = "physics"
-    equation = "tip force = -((1 - share) slip + share wake)/mobility, wake' = (slip - wake)/time_constant"
+    equation = (
+        "tip force = -((1 - share) slip + share wake)/mobility, wake' = (slip - wake)/time_constant"
+    )
     source = SOURCE
     parameters = {
         "mobility": Parameter(0.0, "m/(N s)", 0.0, 10.0, SOURCE, typical=1.0 / 8.0),

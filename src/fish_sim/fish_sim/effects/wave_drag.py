@@ -23,7 +23,9 @@ class WaveDrag(Effect):
     source = SOURCE
     parameters = {
         "amplitude": Parameter(0.0, "N", 0.0, 2.0, SOURCE, typical=0.02),
-        "speed": Parameter(0.22, "m/s", 0.02, 1.0, SOURCE, tries=(0.08, 0.12, 0.17, 0.22, 0.28, 0.35)),
+        "speed": Parameter(
+            0.22, "m/s", 0.02, 1.0, SOURCE, tries=(0.08, 0.12, 0.17, 0.22, 0.28, 0.35)
+        ),
         "width": Parameter(0.04, "m/s", 0.005, 0.5, SOURCE),
     }
     strength = ("amplitude",)

@@ -46,7 +46,9 @@ class CameraNode(Node):
     """Draws the fish where the simulation says it was and sends the picture as late as a camera would."""
 
     def __init__(self) -> None:
-        super().__init__("camera", namespace="fish", automatically_declare_parameters_from_overrides=True)
+        super().__init__(
+            "camera", namespace="fish", automatically_declare_parameters_from_overrides=True
+        )
         self._config = config = read_parameters(self, CameraConfig)
         self._renderer = PoolRenderer(config.model(), config.shape(), config.look())
         self._random = np.random.default_rng(config.seed + 1)
@@ -55,8 +57,12 @@ class CameraNode(Node):
         self._waiting: deque[Frame] = deque()
         self._sent = self._dropped = self._sent_before = 0
         self._clock_error = 0.0
-        self._compressed = self.create_publisher(CompressedImage, "camera/image_raw/compressed", QUEUE)
-        self._raw = self.create_publisher(Image, "camera/image_raw", QUEUE) if config.publish_raw else None
+        self._compressed = self.create_publisher(
+            CompressedImage, "camera/image_raw/compressed", QUEUE
+        )
+        self._raw = (
+            self.create_publisher(Image, "camera/image_raw", QUEUE) if config.publish_raw else None
+        )
         self._info = self.create_publisher(CameraInfo, "camera/camera_info", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
@@ -147,7 +153,9 @@ class CameraNode(Node):
     def _report(self) -> None:
         """Diagnostics, once a second."""
         rate, self._sent_before = self._sent - self._sent_before, self._sent
-        status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="simulated camera")
+        status = DiagnosticStatus(
+            name=self.get_fully_qualified_name(), hardware_id="simulated camera"
+        )
         status.level, status.message = DiagnosticStatus.OK, "running"
         if self._head.at(0.0) is None:
             status.level, status.message = DiagnosticStatus.WARN, "no sim/odometry yet"

@@ -32,7 +32,9 @@ class Lockstep:
     def may_advance(self, simulated: float, now: float) -> bool:
         """Whether the simulation at `simulated` [s] may go on at the real time `now` [s]."""
         late = [
-            who for who, stamp in self._answers.items() if stamp < simulated - self._ahead.get(who, AHEAD)
+            who
+            for who, stamp in self._answers.items()
+            if stamp < simulated - self._ahead.get(who, AHEAD)
         ]
         if not late or self._patience == 0.0:
             self._since = None

@@ -28,7 +28,9 @@ class Pacer:
         """Number of periods to run now; they count as run. Negative never."""
         if self._factor == 0.0:
             return 1
-        behind = math.floor((now - self._anchor) * self._factor / self._period + ROUNDING) - self._done
+        behind = (
+            math.floor((now - self._anchor) * self._factor / self._period + ROUNDING) - self._done
+        )
         if behind * self._period > MAX_LAG * max(1.0, self._factor):
             self.lost += behind * self._period / self._factor
             self.restart(now)

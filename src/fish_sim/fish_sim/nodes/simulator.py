@@ -46,7 +46,9 @@ class SimulatorNode(Node):
     """Messages in and out; physics and sensors are in Simulation, the pace in Pacer."""
 
     def __init__(self) -> None:
-        super().__init__("simulator", namespace="fish", automatically_declare_parameters_from_overrides=True)
+        super().__init__(
+            "simulator", namespace="fish", automatically_declare_parameters_from_overrides=True
+        )
         self._config = config = read_parameters(self, SimulatorConfig)
         robot = load_robot(config.robot_file) if config.robot_file else Robot()
         if idle := config.idle_sensors(robot.sensors):
@@ -67,7 +69,9 @@ class SimulatorNode(Node):
         self._reported = (time.monotonic(), self._simulation.time, 0.0)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(
-            DT / config.real_time_factor if config.real_time_factor else 0.0, self._tick, clock=steady
+            DT / config.real_time_factor if config.real_time_factor else 0.0,
+            self._tick,
+            clock=steady,
         )
         self.create_timer(1.0, self._report, clock=steady)
 
@@ -81,9 +85,13 @@ class SimulatorNode(Node):
         self._battery = self.create_publisher(BatteryState, "battery_state", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
-        self._rivals = Rivals(self._odometry.topic_name, self.count_publishers, self.get_logger().warning)
+        self._rivals = Rivals(
+            self._odometry.topic_name, self.count_publishers, self.get_logger().warning
+        )
         self._camera = (
-            self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE) if camera_pose else None
+            self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
+            if camera_pose
+            else None
         )
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
@@ -171,7 +179,9 @@ class SimulatorNode(Node):
         self._tail.publish(messages.tail(body, readings.truth))
         self._odometry.publish(messages.odometry(pool, readings.truth))
         self._joints.publish(messages.rotor(body, readings.rotor))
-        self._imu.publish(messages.imu(Header(stamp=stamp, frame_id="imu_link"), readings.imu, self._config))
+        self._imu.publish(
+            messages.imu(Header(stamp=stamp, frame_id="imu_link"), readings.imu, self._config)
+        )
         if readings.battery is not None:
             self._battery.publish(messages.battery(body, readings.battery))
         if self._camera is not None:
@@ -212,7 +222,10 @@ class SimulatorNode(Node):
         if self._paused:
             return DiagnosticStatus.OK, "paused"
         if lost > 0.0:
-            return DiagnosticStatus.WARN, f"behind real time, {lost:.2f} s skipped in the last second"
+            return (
+                DiagnosticStatus.WARN,
+                f"behind real time, {lost:.2f} s skipped in the last second",
+            )
         if pace < SLOW * self._config.real_time_factor:
             return DiagnosticStatus.WARN, f"behind real time, running at {pace:.2f}"
         if self._simulation.command_age > self._config.command_timeout:

@@ -18,7 +18,10 @@ from fish_sim.simulation import Truth
 def command(msg: JointState) -> tuple[float, float]:
     """(rotor speed [rad/s], rudder [rad]) of a joint_command; ValueError says what is missing."""
     names = list(msg.name)
-    for name, field, values in (("rotor", "velocity", msg.velocity), ("rudder", "position", msg.position)):
+    for name, field, values in (
+        ("rotor", "velocity", msg.velocity),
+        ("rudder", "position", msg.position),
+    ):
         if name not in names or names.index(name) >= len(values):
             raise ValueError(
                 f"got names {names} with {len(values)} {field} values; expected {name}'s {field}"
@@ -67,7 +70,9 @@ def imu(header: Header, sample: ImuSample, settings: SensorSettings) -> Imu:
     return msg
 
 
-def camera_pose(header: Header, sample: CameraPose, settings: SensorSettings) -> PoseWithCovarianceStamped:
+def camera_pose(
+    header: Header, sample: CameraPose, settings: SensorSettings
+) -> PoseWithCovarianceStamped:
     """Pose of the head as the tracker would give it."""
     msg = PoseWithCovarianceStamped(header=header)
     msg.pose.pose.position.x, msg.pose.pose.position.y = sample.x, sample.y
@@ -91,7 +96,9 @@ def battery(header: Header, voltage: float) -> BatteryState:
 def status(name: str, level: bytes, text: str, values: Mapping[str, str]) -> DiagnosticStatus:
     """One entry of /diagnostics."""
     pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-    return DiagnosticStatus(name=name, hardware_id="simulated fish", level=level, message=text, values=pairs)
+    return DiagnosticStatus(
+        name=name, hardware_id="simulated fish", level=level, message=text, values=pairs
+    )
 
 
 def _diagonal(std: tuple[float, ...]) -> list[float]:

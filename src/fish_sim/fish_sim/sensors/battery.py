@@ -6,7 +6,9 @@ from numpy.random import Generator
 
 from fish_sim.sensors.settings import SensorSettings
 
-BATTERY_DROP = 2.0  # V, fall of the open-circuit voltage from full to empty, three LiPo cells; assumption
+BATTERY_DROP = (
+    2.0  # V, fall of the open-circuit voltage from full to empty, three LiPo cells; assumption
+)
 IDLE_CURRENT = 0.6  # A, computer and sensors; assumption
 EFFICIENCY = 0.5  # electrical to mechanical power; assumption
 SMOOTHING = 1.0  # s, the voltage is averaged so that it does not show the rotor's stroke

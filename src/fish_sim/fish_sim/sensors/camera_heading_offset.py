@@ -20,5 +20,7 @@ class CameraHeadingOffset(SensorEffect):
     strength = ("offset",)
 
     @staticmethod
-    def pose(p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any) -> tuple[Scalar, ...]:
+    def pose(
+        p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any
+    ) -> tuple[Scalar, ...]:
         return x, y, heading + p.offset

@@ -20,5 +20,7 @@ class CameraScale(SensorEffect):
     strength = ("factor",)
 
     @staticmethod
-    def pose(p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any) -> tuple[Scalar, ...]:
+    def pose(
+        p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any
+    ) -> tuple[Scalar, ...]:
         return p.factor * x, p.factor * y, heading

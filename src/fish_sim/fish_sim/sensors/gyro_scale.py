@@ -20,5 +20,7 @@ class GyroScale(SensorEffect):
     strength = ("factor",)
 
     @staticmethod
-    def imu(p: SimpleNamespace, ahead: Scalar, left: Scalar, rate: Scalar, xp: Any) -> tuple[Scalar, ...]:
+    def imu(
+        p: SimpleNamespace, ahead: Scalar, left: Scalar, rate: Scalar, xp: Any
+    ) -> tuple[Scalar, ...]:
         return ahead, left, p.factor * rate

@@ -23,6 +23,8 @@ class ImuMisalignment(SensorEffect):
     strength = ("angle",)
 
     @staticmethod
-    def imu(p: SimpleNamespace, ahead: Scalar, left: Scalar, rate: Scalar, xp: Any) -> tuple[Scalar, ...]:
+    def imu(
+        p: SimpleNamespace, ahead: Scalar, left: Scalar, rate: Scalar, xp: Any
+    ) -> tuple[Scalar, ...]:
         cos, sin = xp.cos(p.angle), xp.sin(p.angle)
         return cos * ahead + sin * left, cos * left - sin * ahead, rate

@@ -28,7 +28,9 @@ class CameraPose:
 class OverheadCamera:
     """Exposes at camera_rate with jitter; a sample arrives camera_latency after its stamp or is lost."""
 
-    def __init__(self, settings: SensorSettings, distortion: SensorDistortion, random: Generator) -> None:
+    def __init__(
+        self, settings: SensorSettings, distortion: SensorDistortion, random: Generator
+    ) -> None:
         self._settings, self._distortion, self._random = settings, distortion, random
         self._truth: deque[tuple[float, float, float, float]] = deque()
         self._waiting: deque[CameraPose] = deque()
@@ -47,7 +49,9 @@ class OverheadCamera:
         while self._next <= time:
             self._expose(self._next)
             period = 1.0 / self._settings.camera_rate
-            self._next += max(0.1 * period, period + self._random.normal(0.0, self._settings.camera_jitter))
+            self._next += max(
+                0.1 * period, period + self._random.normal(0.0, self._settings.camera_jitter)
+            )
         arrived = []
         while self._waiting and self._waiting[0].arrival <= time + 1e-9:
             arrived.append(self._waiting.popleft())
@@ -61,6 +65,10 @@ class OverheadCamera:
         times, *columns = np.array(self._truth).T
         x, y, heading = (float(np.interp(seen, times, column)) for column in columns)
         x, y, heading = self._distortion.pose(x, y, heading)
-        noise = random.normal(0.0, (s.camera_position_noise, s.camera_position_noise, s.camera_heading_noise))
+        noise = random.normal(
+            0.0, (s.camera_position_noise, s.camera_position_noise, s.camera_heading_noise)
+        )
         arrival = stamp + s.camera_latency
-        self._waiting.append(CameraPose(stamp, arrival, x + noise[0], y + noise[1], heading + noise[2]))
+        self._waiting.append(
+            CameraPose(stamp, arrival, x + noise[0], y + noise[1], heading + noise[2])
+        )

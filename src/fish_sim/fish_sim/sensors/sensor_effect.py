@@ -21,7 +21,9 @@ class SensorEffect:
     equation: ClassVar[str]
     source: ClassVar[str]
     parameters: ClassVar[Mapping[str, Parameter]]
-    strength: ClassVar[tuple[str, ...]]  # parameters whose default (zero or neutral) value means: effect off
+    strength: ClassVar[
+        tuple[str, ...]
+    ]  # parameters whose default (zero or neutral) value means: effect off
 
     @staticmethod
     def pose_delay(p: SimpleNamespace) -> Scalar:
@@ -29,11 +31,15 @@ class SensorEffect:
         return 0.0
 
     @staticmethod
-    def pose(p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any) -> tuple[Scalar, ...]:
+    def pose(
+        p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any
+    ) -> tuple[Scalar, ...]:
         """Camera pose (x, y, heading) in the pool frame [m, m, rad]."""
         return x, y, heading
 
     @staticmethod
-    def imu(p: SimpleNamespace, ahead: Scalar, left: Scalar, rate: Scalar, xp: Any) -> tuple[Scalar, ...]:
+    def imu(
+        p: SimpleNamespace, ahead: Scalar, left: Scalar, rate: Scalar, xp: Any
+    ) -> tuple[Scalar, ...]:
         """Specific force along x and y of imu_link and rate about z [m/s^2, m/s^2, rad/s]."""
         return ahead, left, rate

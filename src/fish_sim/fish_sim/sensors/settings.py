@@ -15,7 +15,9 @@ class SensorSettings:
     accelerometer_noise: float = 0.05  # m/s^2, std per sample
     accelerometer_bias: float = 0.05  # m/s^2, std of the constant bias
     orientation_noise: float = 0.003  # rad, std per sample
-    orientation_drift: float = 0.001  # rad/sqrt(s), random walk of the yaw, which starts at an unknown angle
+    orientation_drift: float = (
+        0.001  # rad/sqrt(s), random walk of the yaw, which starts at an unknown angle
+    )
     encoder_angle_noise: float = 0.002  # rad, std per sample
     encoder_speed_noise: float = 0.2  # rad/s, std per sample
     camera_rate: float = 30.0  # Hz

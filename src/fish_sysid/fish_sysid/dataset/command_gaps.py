@@ -20,9 +20,13 @@ from fish_sim.model import DT
 Array = NDArray[np.float64]
 
 FEWEST = 10  # commands that make a beat
-ON_THE_BEAT = 0.1  # of the median interval; timers of a busy computer keep to it, answers to events do not
+ON_THE_BEAT = (
+    0.1  # of the median interval; timers of a busy computer keep to it, answers to events do not
+)
 REGULAR = 0.8  # share of intervals on the beat: one in ten messages may be lost, and each makes one long interval of two
-MISSED = 1.8  # medians; a message that was lost makes two of it, one that was merely late rarely so much
+MISSED = (
+    1.8  # medians; a message that was lost makes two of it, one that was merely late rarely so much
+)
 LONGEST = 0.1  # s between two commands; over more nobody knows what the rudder did
 AROUND = 2  # commands on each side that the curve runs through
 

@@ -22,7 +22,9 @@ from fish_sysid.dataset.rotor_coasting import driven
 Array = NDArray[np.float64]
 
 FEWEST_POSES = 3
-UNKNOWN = 1.0  # s from the first command on in which neither camera nor gyro say where the fish heads
+UNKNOWN = (
+    1.0  # s from the first command on in which neither camera nor gyro say where the fish heads
+)
 
 
 class ExperimentError(ValueError):
@@ -54,7 +56,9 @@ class Experiment:
         """Some of the trials."""
         index = np.array(which, dtype=int)
         longest = int(self.steps[index].max())
-        arrays = {k: getattr(self, k)[:longest, index] for k in ("commands", "gyro", "accel", "encoder")}
+        arrays = {
+            k: getattr(self, k)[:longest, index] for k in ("commands", "gyro", "accel", "encoder")
+        }
         names, frames = tuple(self.names[i] for i in which), tuple(self.frames[i] for i in which)
         return replace(self, names=names, frames=frames, steps=self.steps[index], **arrays)
 
@@ -100,10 +104,15 @@ def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None)
     arrays = {key: stack(key) for key in ("commands", "gyro", "accel", "encoder")}
     rest = start_at_rest
     if rest is None:
-        sensors = [[g[key] for key in ("gyro", "accel", "encoder", "frame_t", "frame_pose")] for g in gridded]
+        sensors = [
+            [g[key] for key in ("gyro", "accel", "encoder", "frame_t", "frame_pose")]
+            for g in gridded
+        ]
         rest = all(starts_at_rest(*own) for own in sensors)
     frames = tuple(Frames(g["frame_t"], g["frame_pose"]) for g in gridded)
-    return Experiment(tuple(t.name for t in trials), steps, **arrays, frames=frames, start_at_rest=rest)
+    return Experiment(
+        tuple(t.name for t in trials), steps, **arrays, frames=frames, start_at_rest=rest
+    )
 
 
 def _grid(trial: Trial) -> dict[str, Array]:

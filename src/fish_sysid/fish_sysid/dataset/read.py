@@ -20,12 +20,15 @@ def read_experiment(*paths: Path, topics: TopicMap | None = None) -> tuple[Exper
 
     Raises:
         UserError: no trial can be used, one is given twice, or the trials are not of one robot.
+
     """
     read, trials, left_out = [], [], []
     with user_errors():
         for path in paths:
             data = read_dataset(path, topics, progress=True)
-            left_out += [problem.text for problem in data.problems if problem.kind == "unreadable_trial"]
+            left_out += [
+                problem.text for problem in data.problems if problem.kind == "unreadable_trial"
+            ]
             read += list(data)
         read = told_apart(read)
     for problem in check_set(read):

@@ -59,5 +59,7 @@ def _curve(t: Array, values: Array, at: Array, period: float) -> Array:
     if len(t) == 1 or not len(at):
         return np.repeat(values[:1], len(at), axis=0)
     smooth = len(t) > DEGREE and np.diff(t).min() > CLOSE * period
-    curve: Array = make_interp_spline(t, values, k=DEGREE if smooth else 1)(np.clip(at, t[0], t[-1]))
+    curve: Array = make_interp_spline(t, values, k=DEGREE if smooth else 1)(
+        np.clip(at, t[0], t[-1])
+    )
     return curve

@@ -32,9 +32,13 @@ def starts_at_rest(gyro: Array, accel: Array, encoder: Array, t: Array, pose: Ar
     if turns or spins or early.sum() < FEWEST_POSES:
         return not (turns or spins)
     pushed = _pushed(gyro, accel, float(np.median(pose[early][:FEWEST_POSES, 2])))
-    moved = np.array([np.interp(t[early], DT * np.arange(len(pushed)), along) for along in pushed.T]).T
+    moved = np.array(
+        [np.interp(t[early], DT * np.arange(len(pushed)), along) for along in pushed.T]
+    ).T
     # an image that is older than its stamp does not show the strokes yet that the accelerometer felt: less of the two counts
-    return min(_glide(t[early], pose[early, :2]), _glide(t[early], pose[early, :2] - moved)) < GLIDES
+    return (
+        min(_glide(t[early], pose[early, :2]), _glide(t[early], pose[early, :2] - moved)) < GLIDES
+    )
 
 
 def _pushed(gyro: Array, accel: Array, heading: float) -> Array:

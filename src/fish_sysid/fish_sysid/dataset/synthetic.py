@@ -45,7 +45,9 @@ def program(kind: str, duration: float, random: np.random.Generator) -> Array:
         rudder = np.zeros_like(t)
         amplitude = amplitude * np.where(t < 0.6 * duration, 1.0, random.uniform(0.0, 0.6))
     elif kind == "steps":
-        rudder = random.uniform(0.2, 0.6) * np.sign(np.sin(2.0 * np.pi * t / random.uniform(3.0, 6.0)))
+        rudder = random.uniform(0.2, 0.6) * np.sign(
+            np.sin(2.0 * np.pi * t / random.uniform(3.0, 6.0))
+        )
     elif kind == "sines":
         rudder = random.uniform(0.3, 0.6) * np.sin(2.0 * np.pi * t * random.uniform(0.2, 0.6))
     elif kind == "turn":
@@ -58,7 +60,11 @@ def program(kind: str, duration: float, random: np.random.Generator) -> Array:
 
 
 def record(
-    robot: Robot, commands: Array, noise: Noise, random: np.random.Generator, camera_rate: float = CAMERA_RATE
+    robot: Robot,
+    commands: Array,
+    noise: Noise,
+    random: np.random.Generator,
+    camera_rate: float = CAMERA_RATE,
 ) -> tuple[Experiment, Truth]:
     """An experiment of the robot under commands (T, M, 2), from rest, with random wrench and sensor noise of `noise`."""
     pushed = robot.with_effect("disturbance")
@@ -69,10 +75,14 @@ def record(
     bias = random.standard_normal((M, 3)) * BIAS
     gyro = gyro + bias[:, 0] + noise.gyro * random.standard_normal((T, M))
     accel = accel + bias[:, 1:] + noise.accel * random.standard_normal((T, M, 2))
-    encoder = state[:, :, len(stepper.layout.motion) + 1] + noise.encoder * random.standard_normal((T, M))
+    encoder = state[:, :, len(stepper.layout.motion) + 1] + noise.encoder * random.standard_normal(
+        (T, M)
+    )
     frames = tuple(_camera(state[:, m, :3], noise, random, camera_rate) for m in range(M))
     names = tuple(f"synthetic_{m:02d}" for m in range(M))
-    return Experiment(names, np.full(M, T), commands, gyro, accel, encoder, frames, True), Truth(state, bias)
+    return Experiment(names, np.full(M, T), commands, gyro, accel, encoder, frames, True), Truth(
+        state, bias
+    )
 
 
 def _swim(
@@ -85,7 +95,9 @@ def _swim(
     wrench = np.empty((T, M, 3))
     wrench[0] = size * random.standard_normal((M, 3))
     for k in range(1, T):
-        wrench[k] = kept * wrench[k - 1] + np.sqrt(1.0 - kept**2) * size * random.standard_normal((M, 3))
+        wrench[k] = kept * wrench[k - 1] + np.sqrt(1.0 - kept**2) * size * random.standard_normal(
+            (M, 3)
+        )
     states = np.empty((T, M, len(stepper.layout.state)))
     states[0] = stepper.rest(parameters=p)
     p = np.tile(p, (M, 1))
@@ -95,7 +107,9 @@ def _swim(
     return states, wrench
 
 
-def _imu(stepper: Stepper, p: Array, state: Array, wrench: Array, commands: Array) -> tuple[Array, Array]:
+def _imu(
+    stepper: Stepper, p: Array, state: Array, wrench: Array, commands: Array
+) -> tuple[Array, Array]:
     """True yaw rate (T, M) and acceleration forward and left (T, M, 2) just after the grid points."""
     T, M = commands.shape[:2]
     layout = stepper.layout
@@ -104,7 +118,9 @@ def _imu(stepper: Stepper, p: Array, state: Array, wrench: Array, commands: Arra
     ahead = np.concatenate([state[1:, :, nx : nx + 2], state[-1:, :, nx : nx + 2]])
     here = state[:, :, nx : nx + 2]
     rate = (ahead - here) / DT
-    drive = np.stack([here[..., 0], rate[..., 0], here[..., 1], rate[..., 1]], axis=-1).reshape(T * M, 4)
+    drive = np.stack([here[..., 0], rate[..., 0], here[..., 1], rate[..., 1]], axis=-1).reshape(
+        T * M, 4
+    )
     all_p = np.tile(p, (T * M, 1))
     all_p[:, at] = wrench.reshape(T * M, 3)
     motion = state[..., :nx].reshape(T * M, nx)

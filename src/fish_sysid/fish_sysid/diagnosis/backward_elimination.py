@@ -33,7 +33,9 @@ def prune(
         progress(f"without {candidate.name}?")
         less = settle_base(without(final, candidate.name, training), training)
         samples = float(final.result.samples.sum())
-        if final.objective - less.objective < level.enough(samples, parameter_count(candidate.name), 1):
+        if final.objective - less.objective < level.enough(
+            samples, parameter_count(candidate.name), 1
+        ):
             final = less
             continue
         best = contested(candidate, final, training, level, progress)
@@ -62,7 +64,10 @@ def rivals(candidate: Accepted, final: Fit) -> list[str]:
         n
         for n, probability in plausible.items()
         if n != name
-        and (probability > PLAUSIBLE or (look_alike(n, name) and parameter_count(n) < parameter_count(name)))
+        and (
+            probability > PLAUSIBLE
+            or (look_alike(n, name) and parameter_count(n) < parameter_count(name))
+        )
     ]
 
 
@@ -72,7 +77,9 @@ def simplest(best: str, fits: Mapping[str, Fit], level: Level) -> str:
         extra = parameter_count(best) - parameter_count(name)
         if extra <= 0 or not look_alike(name, best):
             continue
-        if fits[best].objective - fit.objective < level.enough(float(fit.result.samples.sum()), extra, 1):
+        if fits[best].objective - fit.objective < level.enough(
+            float(fit.result.samples.sum()), extra, 1
+        ):
             best = name
     return best
 

@@ -57,7 +57,11 @@ def answer(d: Diagnosis) -> dict[str, Any]:
 
 def ranking_entry(ranked: Ranked) -> dict[str, Any]:
     """A candidate as the first quick ranking saw it, with the numbers it took: later versions may give it others."""
-    return {"name": ranked.name, "gain": ranked.gain, "free_parameters": parameter_count(ranked.name)}
+    return {
+        "name": ranked.name,
+        "gain": ranked.gain,
+        "free_parameters": parameter_count(ranked.name),
+    }
 
 
 def refitted_entry(d: Diagnosis, name: str, fit: Fit) -> dict[str, Any]:
@@ -90,7 +94,9 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         },
         "share": gains[name] / sum(gains.values()),
         "rivals": [
-            {"name": n, "probability": p} for n, p in probability.items() if n != name and p > PLAUSIBLE
+            {"name": n, "probability": p}
+            for n, p in probability.items()
+            if n != name and p > PLAUSIBLE
         ],
         "where": where_entry(d, name),
     }
@@ -105,7 +111,10 @@ def competition(accepted: Accepted, found: Sequence[Accepted]) -> dict[str, floa
 def rivals(d: Diagnosis) -> list[str]:
     """Names that the data cannot tell from what was found."""
     return [
-        n for a in named(d) for n, p in competition(a, d.accepted).items() if n != a.name and p > PLAUSIBLE
+        n
+        for a in named(d)
+        for n, p in competition(a, d.accepted).items()
+        if n != a.name and p > PLAUSIBLE
     ]
 
 
@@ -113,7 +122,11 @@ def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:
     """Values, standard errors and units of an effect's parameters."""
     values, errors = fit.values, fit.standard_errors
     return {
-        key: {"value": values[f"{name}.{key}"], "std": errors[f"{name}.{key}"], "unit": parameter.unit}
+        key: {
+            "value": values[f"{name}.{key}"],
+            "std": errors[f"{name}.{key}"],
+            "unit": parameter.unit,
+        }
         for key, parameter in specification(name).items()
     }
 
@@ -124,8 +137,12 @@ def where_entry(d: Diagnosis, name: str) -> dict[str, Any]:
     scale, push = np.array(d.final.noise.wrench), d.pushes.get(name)
     return {
         "dof": latent_force.dof_shares(without, d.final),
-        "covariates": latent_force.covariate_shares(missing, scale) if push is None else regimes(push, scale),
-        "time": latent_force.time_shares(missing, scale) if push is None else intervals(push, scale),
+        "covariates": latent_force.covariate_shares(missing, scale)
+        if push is None
+        else regimes(push, scale),
+        "time": latent_force.time_shares(missing, scale)
+        if push is None
+        else intervals(push, scale),
         "place": latent_force.place_shares(push or missing, scale),
     }
 
@@ -134,13 +151,21 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
     """What no name explains: size, place, and a law of few terms."""
     share = unexplained_share(d)
     if not much_is_left(d):
-        return {"share": share, "where": {}, "description": "the remaining force looks like water noise"}
+        return {
+            "share": share,
+            "where": {},
+            "description": "the remaining force looks like water noise",
+        }
     scale = np.array(d.final.noise.wrench)
     return {
         "share": share,
         "where": {
             "dof": dict(
-                zip(latent_force.DOFS, (excess(d.final) / excess(d.final).sum()).tolist(), strict=True)
+                zip(
+                    latent_force.DOFS,
+                    (excess(d.final) / excess(d.final).sum()).tolist(),
+                    strict=True,
+                )
             ),
             "covariates": latent_force.covariate_shares(d.remaining, scale),
             "time": latent_force.time_shares(d.remaining, scale),
@@ -162,15 +187,16 @@ def no_law(d: Diagnosis) -> str:
 def law(d: Diagnosis, dof: str) -> str:
     """The remaining force along one degree of freedom in few terms."""
     terms = " + ".join(f"({c:.3g}) {term}" for term, c in d.description.terms[dof].items())
-    return (
-        f"{dof} = {terms} (SI units; {d.description.gain[dof]:.0f} nats on trials that it was not fitted to)"
-    )
+    return f"{dof} = {terms} (SI units; {d.description.gain[dof]:.0f} nats on trials that it was not fitted to)"
 
 
 def fit_entry(d: Diagnosis) -> dict[str, Any]:
     """Prediction errors and log density on held-out trials (where there are none, training trials), before and after."""
-    robots = {"nominal": (d.robot, d.given_noise), "refitted": (d.nominal.robot, d.nominal.noise),
-              "with_effects": (d.final.robot, d.final.noise)}  # fmt: skip
+    robots = {
+        "nominal": (d.robot, d.given_noise),
+        "refitted": (d.nominal.robot, d.nominal.noise),
+        "with_effects": (d.final.robot, d.final.noise),
+    }
     outlook = d.outlook and {
         "effects": list(d.outlook.hypothesis.names),  # a description, no findings
         "rms": held_out_errors(d, d.outlook.robot, d.outlook.noise),
@@ -190,18 +216,23 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
         **entries,
         "model_yaml": outlook,  # where no name fits: the structure that predicts best over seconds
         "tail_links": {"given": d.robot.links, "used": d.final.robot.links},
-        "noise_floor": {"wrench_std": list(map(float, d.final.noise.wrench)), "unit": ["N", "N", "N m"],
-                        "correlation_time_s": float(d.final.noise.wrench_time)},
+        "noise_floor": {
+            "wrench_std": list(map(float, d.final.noise.wrench)),
+            "unit": ["N", "N", "N m"],
+            "correlation_time_s": float(d.final.noise.wrench_time),
+        },
         "improvement_ci95": mean_interval(gain if d.split.held_out else gain[:0]),
         "residual_whiteness_p": {"before": whiteness(d.nominal), "after": whiteness(d.final)},
-    }  # fmt: skip
+    }
 
 
 def held_out_errors(d: Diagnosis, robot: Robot, noise: Noise) -> dict[str, dict[str, float]]:
     """Prediction errors of a robot on `Diagnosis.unseen`: horizon -> position, heading, speed."""
     sizes = prediction_errors(predict(d.unseen, robot, noise, max(HORIZONS)), HORIZONS)
     return {
-        f"{h:g} s": dict(zip(("position_m", "heading_rad", "speed_m_s"), map(float, row), strict=True))
+        f"{h:g} s": dict(
+            zip(("position_m", "heading_rad", "speed_m_s"), map(float, row), strict=True)
+        )
         for h, row in zip(sizes.horizons, sizes.rms, strict=True)
     }
 

@@ -94,7 +94,11 @@ def evidence(fit: Fit, temper: float = 1.0) -> float:
     weight = 1.0 / Coordinates(fit.hypothesis).prior ** 2
     log_prior = 0.5 * float(np.log(weight).sum() - np.sum(weight * fit.theta**2))
     normal = (fit.normal - np.diag(weight)) / temper + np.diag(weight)
-    return float(fit.log_likelihood.sum()) / temper + log_prior - 0.5 * float(np.linalg.slogdet(normal)[1])
+    return (
+        float(fit.log_likelihood.sum()) / temper
+        + log_prior
+        - 0.5 * float(np.linalg.slogdet(normal)[1])
+    )
 
 
 def look_alike(first: str, second: str) -> bool:
@@ -127,7 +131,9 @@ def refit(base: Fit, experiment: Experiment, ranked: Ranked) -> Fit:
 
 def refit_led(base: Fit, experiment: Experiment, ranked: Ranked) -> Fit:
     """A candidate on whole trials with its own noise, led by the camera once more: the base is far off."""
-    return led_from_nominal(base.hypothesis.with_effect(ranked.name, SCALE), ranked.theta, experiment)
+    return led_from_nominal(
+        base.hypothesis.with_effect(ranked.name, SCALE), ranked.theta, experiment
+    )
 
 
 def worth_a_refit(ranked: Ranked, needed: float) -> bool:
@@ -138,7 +144,9 @@ def worth_a_refit(ranked: Ranked, needed: float) -> bool:
     return ranked.gain - 0.5 * parameter_count(ranked.name) > WORTH_A_REFIT * needed
 
 
-def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough: float) -> Fit | None:
+def refit_beside(
+    best: Fit, base: Fit, name: str, experiment: Experiment, enough: float
+) -> Fit | None:
     """A rival from the nominal parameters and the noise of the best, where what looks alike has its optimum.
 
     None where it stays more than `enough` behind on shortened trials.
@@ -153,7 +161,9 @@ def refit_beside(best: Fit, base: Fit, name: str, experiment: Experiment, enough
     return settle(evaluate(hypothesis, near.theta, experiment, best.noise), experiment)
 
 
-def search_round(base: Fit, needed: Mapping[str, float], experiment: Experiment, progress: Progress) -> Round:
+def search_round(
+    base: Fit, needed: Mapping[str, float], experiment: Experiment, progress: Progress
+) -> Round:
     """Rank all names on top of the base and refit the shortlist; nothing that gains far fewer nats than it needs.
 
     A base that leaves a force no pool has is ranked from afar first, and as any other where nothing is found so: 40 times
@@ -182,7 +192,12 @@ def with_look_alikes(
     """The round with every look-alike of the best that is not as good yet refitted from where the best led."""
     for name in names:
         best = found.best
-        if best is None or name == best or not look_alike(name, best) or found.near_best(name, enough):
+        if (
+            best is None
+            or name == best
+            or not look_alike(name, best)
+            or found.near_best(name, enough)
+        ):
             continue
         progress(f"refitting {name} from where {best} led")
         fit = refit_beside(found.refitted[best], found.base, name, experiment, enough)
@@ -209,7 +224,9 @@ def settled_round(
         progress("refitting without it, from where it led")
         restarted = restart_base(base, best, experiment)
         found = replace(found, base=restarted)
-        if restarted.objective - base.objective <= max(POOR_BASE * (best.objective - base.objective), enough):
+        if restarted.objective - base.objective <= max(
+            POOR_BASE * (best.objective - base.objective), enough
+        ):
             return found
         base = restarted
     return found

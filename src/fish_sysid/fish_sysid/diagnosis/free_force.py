@@ -66,7 +66,9 @@ class FreeForce(Effect):
         if body.name != "head":
             return None
         terms = list(regressors(body, z.time, drive, xp).values())
-        x, y, n = (sum(getattr(p, f"{dof}_{j}") * term for j, term in enumerate(terms)) for dof in DOFS)
+        x, y, n = (
+            sum(getattr(p, f"{dof}_{j}") * term for j, term in enumerate(terms)) for dof in DOFS
+        )
         return x, y, n
 
     @staticmethod

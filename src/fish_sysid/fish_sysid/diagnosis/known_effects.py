@@ -52,7 +52,9 @@ def told(normal: Array, prior: Array, own: range) -> list[int]:
     kept = list(range(len(prior)))
     while True:
         unsure = np.sqrt(np.diagonal(np.linalg.inv(normal[np.ix_(kept, kept)]))) / prior[kept]
-        asked = {i: u for i, u in zip(kept, unsure.tolist(), strict=True) if i in own and u > UNTOLD}
+        asked = {
+            i: u for i, u in zip(kept, unsure.tolist(), strict=True) if i in own and u > UNTOLD
+        }
         if not asked:
             return kept
         kept.remove(max(asked, key=lambda i: asked[i]))

@@ -68,7 +68,9 @@ def located(
         "yaw_rate": xi[..., nq + 2],
         "rudder": memory[: len(xi), :, 0],
         "rotor_speed": memory[: len(xi), :, 1],
-        "wall_distance": np.minimum(LENGTH / 2 - np.abs(xi[..., 0]), WIDTH / 2 - np.abs(xi[..., 1])),
+        "wall_distance": np.minimum(
+            LENGTH / 2 - np.abs(xi[..., 0]), WIDTH / 2 - np.abs(xi[..., 1])
+        ),
         "heading": np.arctan2(sin, cos),
         "time": np.where(valid, DT * np.arange(len(xi))[:, None], np.nan),
         "x": xi[..., 0],
@@ -85,9 +87,13 @@ def dof_shares(nominal: Fit, final: Fit) -> dict[str, float]:
     The intensities stay one per equation (Kristensen, Madsen and Jorgensen 2004); they are compared in units of the
     final model's, since N and N m do not add up.
     """
-    excess = np.maximum(np.square(np.array(nominal.noise.wrench) / np.array(final.noise.wrench)) - 1.0, 0.0)
+    excess = np.maximum(
+        np.square(np.array(nominal.noise.wrench) / np.array(final.noise.wrench)) - 1.0, 0.0
+    )
     total = excess.sum()
-    return {dof: float(e / total) if total > 0 else 0.0 for dof, e in zip(DOFS, excess, strict=True)}
+    return {
+        dof: float(e / total) if total > 0 else 0.0 for dof, e in zip(DOFS, excess, strict=True)
+    }
 
 
 def energy(force: MissingForce, scale: Array) -> Array:
@@ -101,16 +107,23 @@ def time_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
     e, step = energy(force, scale), int(WINDOW / DT)
     total, lengths = np.nansum(e), np.isfinite(e).sum(axis=0)
     rows: list[dict[str, Any]] = [
-        {"trial": name, "from": k * DT, "to": min(k + step, length) * DT, "share": float(np.nansum(e[k : k + step, m]) / total)}
+        {
+            "trial": name,
+            "from": k * DT,
+            "to": min(k + step, length) * DT,
+            "share": float(np.nansum(e[k : k + step, m]) / total),
+        }
         for m, (name, length) in enumerate(zip(force.names, lengths.tolist(), strict=True))
         for k in range(0, length, step)
-    ]  # fmt: skip
+    ]
     return sorted(rows, key=lambda r: -r["share"])[:STRONGEST]
 
 
 def place_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
     """The cells of the pool's map with most of the missing force."""
-    e, x, y = (a.ravel() for a in (energy(force, scale), force.covariates["x"], force.covariates["y"]))
+    e, x, y = (
+        a.ravel() for a in (energy(force, scale), force.covariates["x"], force.covariates["y"])
+    )
     good = np.isfinite(e)
     edges = [
         np.linspace(-LENGTH / 2, LENGTH / 2, CELLS[0] + 1),
@@ -118,11 +131,14 @@ def place_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
     ]
     total, _, _ = np.histogram2d(x[good], y[good], edges, weights=e[good])
     rows: list[dict[str, Any]] = [
-        {"x": [float(edges[0][i]), float(edges[0][i + 1])], "y": [float(edges[1][j]), float(edges[1][j + 1])],
-         "share": float(total[i, j] / total.sum())}
+        {
+            "x": [float(edges[0][i]), float(edges[0][i + 1])],
+            "y": [float(edges[1][j]), float(edges[1][j + 1])],
+            "share": float(total[i, j] / total.sum()),
+        }
         for i in range(CELLS[0])
         for j in range(CELLS[1])
-    ]  # fmt: skip
+    ]
     return sorted(rows, key=lambda r: -r["share"])[:STRONGEST]
 
 
@@ -151,6 +167,12 @@ def covariate_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
             low -= 1
         while high < bins - 1 and dense[high + 1] > 1.0:
             high += 1
-        rows.append({"name": name, "range": [float(edges[low]), float(edges[high + 1])],
-                     "share": float(share[low : high + 1].sum()), "contrast": float(dense.max())})  # fmt: skip
+        rows.append(
+            {
+                "name": name,
+                "range": [float(edges[low]), float(edges[high + 1])],
+                "share": float(share[low : high + 1].sum()),
+                "contrast": float(dense.max()),
+            }
+        )
     return sorted(rows, key=lambda r: -r["contrast"])[:STRONGEST]

@@ -40,7 +40,13 @@ def with_links(robot: Robot, links: int) -> Robot:
 
 
 def finer_tail(
-    nominal: Fit, best: Fit, law: Description, robot: Robot, trials: Trials, level: Level, progress: Progress
+    nominal: Fit,
+    best: Fit,
+    law: Description,
+    robot: Robot,
+    trials: Trials,
+    level: Level,
+    progress: Progress,
 ) -> Fit | None:
     """The nominal model with more tail links, where the best fit leaves more than water or a law and this explains more of it.
 
@@ -55,8 +61,14 @@ def finer_tail(
     ):
         return None
     short = shorten(experiment, FIRST_STEPS)
-    finer = max(finer_tails(robot, nominal, best, experiment, short, progress), key=evidence, default=None)
-    if finer is None or evidence(finer) < evidence(best) or excess(finer).max() > excess(best).max():
+    finer = max(
+        finer_tails(robot, nominal, best, experiment, short, progress), key=evidence, default=None
+    )
+    if (
+        finer is None
+        or evidence(finer) < evidence(best)
+        or excess(finer).max() > excess(best).max()
+    ):
         return None
     gain = finer.objective - nominal.objective
     if gain < level.enough(float(nominal.result.samples.sum()), 1, len(MORE)):
@@ -66,12 +78,19 @@ def finer_tail(
     on_training = on_all(nominal, trials.training), on_all(finer, trials.training)
     if trials.check and not gain_unseen(*on_training, trials.check)[0] > SMALLEST_CHECK:
         return None
-    progress(f"the tail needs {finer.robot.links} links: {finer.objective - nominal.objective:.0f} nats")
+    progress(
+        f"the tail needs {finer.robot.links} links: {finer.objective - nominal.objective:.0f} nats"
+    )
     return finer
 
 
 def finer_tails(
-    robot: Robot, nominal: Fit, best: Fit, experiment: Experiment, short: Experiment, progress: Progress
+    robot: Robot,
+    nominal: Fit,
+    best: Fit,
+    experiment: Experiment,
+    short: Experiment,
+    progress: Progress,
 ) -> list[Fit]:
     """Nominal models with more links, one after the other while they promise something.
 
@@ -91,7 +110,9 @@ def finer_tails(
         progress(f"fitting the nominal model with {links} tail links")
         hypothesis = nominal_hypothesis(with_links(robot, links), nominal.hypothesis.free)
         many = fit_multistart(hypothesis, short, noise, places=(nominal.theta,))
-        fit = carry_over(better(many, fit_tempered(hypothesis, short, noise, nominal.theta)), experiment)
+        fit = carry_over(
+            better(many, fit_tempered(hypothesis, short, noise, nominal.theta)), experiment
+        )
         if not promises_more(fit, best):
             held = fit_tempered(hypothesis, short, noise, held=TAIL_INERTIAS)
             fit = better(fit, carry_over(held, experiment))

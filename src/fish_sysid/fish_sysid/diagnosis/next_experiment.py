@@ -39,8 +39,18 @@ PLANS = {
     **dict.fromkeys(("quadratic_drag", "dry_friction", "wave_drag", "payload"), COAST),
     **dict.fromkeys(("current", "nonuniform_current", "hull_asymmetry", "tether"), CIRCLES),
     **dict.fromkeys(("camera_heading_offset", "camera_scale", "gyro_scale"), CIRCLES),
-    **dict.fromkeys(("tip_slip", "wake_memory", "tail_hardening", "tail_joint_damping", "rotor_imbalance", "rotor_lag"), STROKES),
-}  # fmt: skip
+    **dict.fromkeys(
+        (
+            "tip_slip",
+            "wake_memory",
+            "tail_hardening",
+            "tail_joint_damping",
+            "rotor_imbalance",
+            "rotor_lag",
+        ),
+        STROKES,
+    ),
+}
 
 
 # what shows best where a force without a name grows, by the covariate that it depends on most
@@ -51,7 +61,9 @@ UNEXPLAINED_PLANS = {
 }  # turning, heading and place: CIRCLES
 
 
-def next_experiment(found: list[str], rivals: list[str], grows_with: str | None = None) -> dict[str, Any]:
+def next_experiment(
+    found: list[str], rivals: list[str], grows_with: str | None = None
+) -> dict[str, Any]:
     """The manoeuvre that tells the found effects from their rivals; without rivals, one that tightens the estimate.
 
     grows_with: covariate of a force that no name explains, if there is one and no effect was found.
@@ -59,15 +71,28 @@ def next_experiment(found: list[str], rivals: list[str], grows_with: str | None 
     names = rivals or found
     if not names and grows_with is None:
         why, program = (
-            "nothing was found missing; to see more, swim faster than these data do: " + STRAIGHT_STEPS[0],
+            "nothing was found missing; to see more, swim faster than these data do: "
+            + STRAIGHT_STEPS[0],
             STRAIGHT_STEPS[1],
         )
     elif not names:
         plan = UNEXPLAINED_PLANS.get(str(grows_with), CIRCLES)
-        why, program = f"see on what the unexplained force depends besides {grows_with}: {plan[0]}", plan[1]
+        why, program = (
+            f"see on what the unexplained force depends besides {grows_with}: {plan[0]}",
+            plan[1],
+        )
     else:
-        plan = PLANS.get(names[0], RUDDER_STEPS if names[0].startswith("rudder") else STRAIGHT_STEPS)
-        aim = f"tell {', '.join(found)} from {', '.join(rivals)}" if rivals else f"tighten {', '.join(found)}"
+        plan = PLANS.get(
+            names[0], RUDDER_STEPS if names[0].startswith("rudder") else STRAIGHT_STEPS
+        )
+        aim = (
+            f"tell {', '.join(found)} from {', '.join(rivals)}"
+            if rivals
+            else f"tighten {', '.join(found)}"
+        )
         why, program = f"{aim}: {plan[0]}", plan[1]
     keys = ("t", "amplitude", "frequency", "rudder")
-    return {"why": why, "program": [dict(zip(keys, map(float, row), strict=True)) for row in program]}
+    return {
+        "why": why,
+        "program": [dict(zip(keys, map(float, row), strict=True)) for row in program],
+    }

@@ -40,9 +40,12 @@ def silent(_: str) -> None:
 
 
 def diagnose(
-    experiment: Experiment, robot: Robot, level: Level | None = None, progress: Progress = silent,
+    experiment: Experiment,
+    robot: Robot,
+    level: Level | None = None,
+    progress: Progress = silent,
     names: Sequence[str] | None = None,
-) -> Diagnosis:  # fmt: skip
+) -> Diagnosis:
     """Answer for one experiment; `progress` gets a line at every step.
 
     names: what competes, by default all of `candidates()`; an effect of your own is registered by
@@ -52,7 +55,9 @@ def diagnose(
     level, split = level or Level(), split_trials(experiment)
     names = known(names or candidates())
     trials = trials_of(experiment, split)
-    unreachable = {name: why for name, why in unjudged(trials.training, robot).items() if name in names}
+    unreachable = {
+        name: why for name, why in unjudged(trials.training, robot).items() if name in names
+    }
     names = tuple(name for name in names if name not in unreachable)
     if not names:
         reasons = "; ".join(f"{name}: {why}" for name, why in unreachable.items())
@@ -85,9 +90,23 @@ def diagnose(
     given_noise = suitable_noise(unseen, robot, nominal.noise)
     held = held_out_density(unseen, robot, given_noise, nominal, final)
     found = Diagnosis(
-        experiment, split, robot, nominal, final, tuple(rounds), tuple(accepted), unreachable, level,
-        force, parts, pushes, remaining, law, given_noise, held,
-    )  # fmt: skip
+        experiment,
+        split,
+        robot,
+        nominal,
+        final,
+        tuple(rounds),
+        tuple(accepted),
+        unreachable,
+        level,
+        force,
+        parts,
+        pushes,
+        remaining,
+        law,
+        given_noise,
+        held,
+    )
     if named(found) or not much_is_left(found):
         return found
     helpful = dict.fromkeys((*(a.name for a in accepted), *(n for n in STRUCTURAL if n in names)))

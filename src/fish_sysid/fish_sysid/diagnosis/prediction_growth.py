@@ -34,7 +34,7 @@ FAIR_SHARE = 0.5  # of the gain that a true effect shows on trials not fitted to
 
 def grow(
     base: Fit, trials: Trials, competing: Sequence[str], level: Level, progress: Progress
-) -> tuple[Fit, list[Round], list[Accepted]]:  # fmt: skip
+) -> tuple[Fit, list[Round], list[Accepted]]:
     """Add one effect at a time while one is significant."""
     rounds: list[Round] = []
     accepted: list[Accepted] = []
@@ -82,7 +82,9 @@ def overtaken(name: str, fit: Fit, rivals: Mapping[str, Fit], base: Fit, trials:
     """
     for other, rival in rivals.items():
         if evidence(rival) > evidence(fit):
-            foretold = [gain_unseen(base, on_all(f, trials.training), trials.check)[0] for f in (rival, fit)]
+            foretold = [
+                gain_unseen(base, on_all(f, trials.training), trials.check)[0] for f in (rival, fit)
+            ]
             if foretold[0] - foretold[1] > SMALLEST_CHECK:
                 name, fit = other, rival
     return name
@@ -127,7 +129,8 @@ def instead_of_a_law(
         return []
     base, tried = on_all(found.base, trials.training), len(found.ranking)
     needed = max(
-        sum(law.gain[dof] for dof in lawful) - SMALLEST_CHECK, level.enough_unseen(law.samples, tried)
+        sum(law.gain[dof] for dof in lawful) - SMALLEST_CHECK,
+        level.enough_unseen(law.samples, tried),
     )
     foretold = {}
     for name, fit in found.refitted.items():

@@ -25,7 +25,9 @@ class Quadratic:
         kept = [*range(self.fitted), *chosen]
         step = np.zeros(len(self.gradient))
         normal = self.normal[np.ix_(kept, kept)]
-        step[kept] = -np.linalg.solve(normal + RIDGE * np.diag(np.diag(normal)), self.gradient[kept])
+        step[kept] = -np.linalg.solve(
+            normal + RIDGE * np.diag(np.diag(normal)), self.gradient[kept]
+        )
         return step
 
     def cost(self, step: Array) -> float:

@@ -53,7 +53,11 @@ def led_from_nominal(hypothesis: Hypothesis, theta: Array, experiment: Experimen
 
 
 def led_by_the_camera(
-    hypothesis: Hypothesis, start: Array, short: Experiment, noise: Noise, held: tuple[str, ...] = ()
+    hypothesis: Hypothesis,
+    start: Array,
+    short: Experiment,
+    noise: Noise,
+    held: tuple[str, ...] = (),
 ) -> Fit:
     """`fit_tempered` from a start, the numbers of an effect that has very many held there: what they can absorb comes after."""
     crowded, theta = crowd(hypothesis), start.copy()
@@ -67,12 +71,16 @@ def better_of(fit: Fit, led: Fit, short: Experiment, experiment: Experiment) -> 
     """The fit or one led elsewhere on shortened trials, which goes on to whole ones if it is ahead of the fit settled there."""
     if led.objective - carry_over(fit, short).objective < SETTLED_GAIN:
         return fit
-    return better(fit, settle_base(evaluate(fit.hypothesis, led.theta, experiment, led.noise), experiment))
+    return better(
+        fit, settle_base(evaluate(fit.hypothesis, led.theta, experiment, led.noise), experiment)
+    )
 
 
 def settle_base(fit: Fit, experiment: Experiment) -> Fit:
     """`settle`, which a model that lacks something would drag on: its noise has taken in what it lacks."""
-    return settle(fit, experiment, ROUNDS_OF_A_WRONG_MODEL if excess(fit).max() > SUSPICIOUS else ROUNDS)
+    return settle(
+        fit, experiment, ROUNDS_OF_A_WRONG_MODEL if excess(fit).max() > SUSPICIOUS else ROUNDS
+    )
 
 
 def carry_over(fit: Fit, experiment: Experiment) -> Fit:
@@ -116,4 +124,8 @@ def look_again(fit: Fit, experiment: Experiment) -> Fit:
 def refine(fit: Fit, experiment: Experiment) -> Fit:
     """A fit carried over to other trials; where it leaves far more there, the camera leads it to a better optimum."""
     settled = carry_over(fit, experiment)
-    return anneal(settled, experiment) if excess(settled).max() > GROWN * excess(fit).max() else settled
+    return (
+        anneal(settled, experiment)
+        if excess(settled).max() > GROWN * excess(fit).max()
+        else settled
+    )

@@ -32,7 +32,9 @@ SMALLEST_TERM = 10.0
 class Description:
     """A sparse law of the missing wrench, judged on trials it has not seen."""
 
-    gain: dict[str, float]  # degree of freedom -> nats that the law gains as a force, cross-validated
+    gain: dict[
+        str, float
+    ]  # degree of freedom -> nats that the law gains as a force, cross-validated
     terms: dict[str, dict[str, float]]  # degree of freedom -> term -> coefficient (SI)
     samples: float  # scalar measurements
 
@@ -40,7 +42,8 @@ class Description:
         """Degrees of freedom, the most lawful first, on which the law gains on unseen trials what chance does not."""
         enough = level.enough_unseen(self.samples, len(self.gain))
         return sorted(
-            (dof for dof, gain in self.gain.items() if gain > enough), key=lambda dof: -self.gain[dof]
+            (dof for dof, gain in self.gain.items() if gain > enough),
+            key=lambda dof: -self.gain[dof],
         )
 
 
@@ -62,10 +65,13 @@ def describe(fit: Fit, experiment: Experiment) -> Description:
     return Description(gains, terms, float(fit.result.samples.sum()))
 
 
-def costs(hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise) -> tuple[Array, Array]:
+def costs(
+    hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise
+) -> tuple[Array, Array]:
     """Gradient (M, K) and Gauss-Newton matrix (M, K, K) of every trial's -log likelihood at theta (K,)."""
     results = (
-        evaluate(hypothesis, theta, experiment.select(part), noise).result for part in portions(experiment)
+        evaluate(hypothesis, theta, experiment.select(part), noise).result
+        for part in portions(experiment)
     )
     gradients, normals = zip(*((result.gradient, result.normal) for result in results), strict=True)
     return np.concatenate(gradients), np.concatenate(normals)

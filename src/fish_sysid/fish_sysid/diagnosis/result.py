@@ -25,7 +25,9 @@ class Accepted:
     round: Round
     # name -> fit, its own among them: of its round, or in its place of the final model
     contest: dict[str, Fit]
-    foretold: float | None = None  # nats on training trials left out in turn, where it stands on these
+    foretold: float | None = (
+        None  # nats on training trials left out in turn, where it stands on these
+    )
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,17 @@ class Diagnosis:
     parts: dict[
         str, tuple[Fit, MissingForce]
     ]  # of several effects: the final model less one, and what it then lacks
-    pushes: dict[str, MissingForce]  # of the accepted effects that push: what they do in the final model
+    pushes: dict[
+        str, MissingForce
+    ]  # of the accepted effects that push: what they do in the final model
     remaining: MissingForce  # that the final model lacks
     description: Description  # of the remaining force
-    given_noise: Noise  # that suits the robot as given: at the refitted noise its filter would lose the fish
-    held_out: dict[str, np.ndarray]  # log density per sample and held-out trial: given, nominal, final
+    given_noise: (
+        Noise  # that suits the robot as given: at the refitted noise its filter would lose the fish
+    )
+    held_out: dict[
+        str, np.ndarray
+    ]  # log density per sample and held-out trial: given, nominal, final
     outlook: Fit | None = (
         None  # where much is left and no name fits: the model that predicts best (`stand_in`)
     )
@@ -62,4 +70,8 @@ class Diagnosis:
     @property
     def unseen_are(self) -> str:
         """What the trials are on which predictions are shown."""
-        return "held-out trials" if self.split.held_out else "the training trials, too few to hold any out"
+        return (
+            "held-out trials"
+            if self.split.held_out
+            else "the training trials, too few to hold any out"
+        )

@@ -37,7 +37,10 @@ from fish_sysid.estimation.parametrization import (
 )
 
 STRENGTHS = (0.3, 1.0)  # in typical ones, from which a candidate is tried
-WEAK_STRENGTHS = (0.05, 0.3)  # where little is left: no step leads back from far too strong an effect
+WEAK_STRENGTHS = (
+    0.05,
+    0.3,
+)  # where little is left: no step leads back from far too strong an effect
 SCALE = 0.3  # strength at which the hypothesis is written down; sets the coordinates only
 IMU_DISTRUST = 10.0  # factor of the IMU's noise in the first part of the ranking
 RANK_ITERATIONS = 6
@@ -60,14 +63,18 @@ class Ranked:
     theta: np.ndarray
 
 
-def rank(base: Fit, names: Sequence[str], experiment: Experiment, progress: Progress) -> tuple[Ranked, ...]:
+def rank(
+    base: Fit, names: Sequence[str], experiment: Experiment, progress: Progress
+) -> tuple[Ranked, ...]:
     """All candidates added to the base one at a time, on short trials, the most promising polished.
 
     An effect of very many numbers in the base is held while the candidates are looked for beside it and moves with them from
     where they are found: what it can absorb of a candidate is in that candidate's promise.
     """
     short = shorten(experiment, FIRST_STEPS)
-    reference = climb(evaluate(base.hypothesis, base.theta, short, base.noise), short, POLISH_ITERATIONS)
+    reference = climb(
+        evaluate(base.hypothesis, base.theta, short, base.noise), short, POLISH_ITERATIONS
+    )
     near = excess(base).max() < SUSPICIOUS
     start, look = (reference, look_near) if near else (base, look_afar)
     found = look_for(names, look, start, short, progress)
@@ -112,7 +119,9 @@ def holding(base: Fit, experiment: Experiment) -> Fit:
     if not held:
         return base
     moving = np.array([free not in held for free in base.hypothesis.free])
-    return evaluate(base.hypothesis.fixing(held, base.theta), base.theta[moving], experiment, base.noise)
+    return evaluate(
+        base.hypothesis.fixing(held, base.theta), base.theta[moving], experiment, base.noise
+    )
 
 
 def releasing(fit: Fit, base: Fit, name: str, experiment: Experiment) -> Fit:
@@ -122,16 +131,23 @@ def releasing(fit: Fit, base: Fit, name: str, experiment: Experiment) -> Fit:
     hypothesis = base.hypothesis.with_effect(name, SCALE)
     theta = dict(zip(base.hypothesis.free, base.theta, strict=True))
     theta |= zip(fit.hypothesis.free, fit.theta, strict=True)
-    return evaluate(hypothesis, np.array([theta[free] for free in hypothesis.free]), experiment, fit.noise)
+    return evaluate(
+        hypothesis, np.array([theta[free] for free in hypothesis.free]), experiment, fit.noise
+    )
 
 
 def look_afar(base: Fit, name: str, short: Experiment) -> Fit:
     """A candidate where the base is far from the truth: from the best of all starts, the IMU believed little at first."""
     own, wide = base.noise, distrusting(base.noise, IMU_DISTRUST)
     hypothesis = base.hypothesis.with_effect(name, SCALE)
-    starts = [*warm_starts(base, name, short, wide), *warm_starts(from_nominal(base), name, short, wide)]
+    starts = [
+        *warm_starts(base, name, short, wide),
+        *warm_starts(from_nominal(base), name, short, wide),
+    ]
     start = max(starts, key=lambda theta: log_posterior(hypothesis, theta, short, wide))
-    fit = climb(in_strength(evaluate(hypothesis, start, short, wide), name, short), short, RANK_ITERATIONS)
+    fit = climb(
+        in_strength(evaluate(hypothesis, start, short, wide), name, short), short, RANK_ITERATIONS
+    )
     return evaluate(hypothesis, fit.theta, short, own)
 
 
@@ -149,7 +165,9 @@ def look_near(base: Fit, name: str, short: Experiment) -> Fit:
     """A candidate where the base leaves no more than water does: what is missing is small, so one step tells its gain."""
     hypothesis = base.hypothesis.with_effect(name, SCALE)
     starts = warm_starts(base, name, short, base.noise, WEAK_STRENGTHS)
-    fits = [in_strength(evaluate(hypothesis, theta, short, base.noise), name, short) for theta in starts]
+    fits = [
+        in_strength(evaluate(hypothesis, theta, short, base.noise), name, short) for theta in starts
+    ]
     return max(fits, key=promise)
 
 
@@ -169,9 +187,13 @@ def compile_all(base: Fit, names: Sequence[str], progress: Progress) -> None:
 
 
 def warm_starts(
-    base: Fit, name: str, experiment: Experiment, noise: Noise, strengths: Sequence[float] = STRENGTHS
+    base: Fit,
+    name: str,
+    experiment: Experiment,
+    noise: Noise,
+    strengths: Sequence[float] = STRENGTHS,
 ) -> list[np.ndarray]:
-    """theta of the base with a candidate at its best place, weak and strong where this leaves its strength open."""
+    """Theta of the base with a candidate at its best place, weak and strong where this leaves its strength open."""
     place = best_place(base, name, experiment, noise)
     if place.keys() >= set(effect_class(name).strength):  # how strong says the place itself
         strengths = strengths[:1]
@@ -179,7 +201,7 @@ def warm_starts(
 
 
 def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -> np.ndarray:
-    """theta of the base with a candidate of this strength, in typical ones, at this place."""
+    """Theta of the base with a candidate of this strength, in typical ones, at this place."""
     return extend(base.theta, base.hypothesis.with_effect(name, SCALE), name, strength, place)
 
 
@@ -190,7 +212,10 @@ def best_place(base: Fit, name: str, experiment: Experiment, noise: Noise) -> di
     does nothing is none: it would be as good as the base, and no step leads from there to a limit a little below.
     """
     keys = tried(name)
-    places = [dict(zip(keys, v, strict=True)) for v in product(*(specification(name)[k].tries for k in keys))]
+    places = [
+        dict(zip(keys, v, strict=True))
+        for v in product(*(specification(name)[k].tries for k in keys))
+    ]
     if len(places) == 1:
         return places[0]
     hypothesis = base.hypothesis.with_effect(name, SCALE)
@@ -213,7 +238,9 @@ def tried(name: str) -> list[str]:
 
 def strengths_of(hypothesis: Hypothesis, name: str) -> NDArray[np.bool_]:
     """(K,) all free parameters but those of the effect that say where or how fast."""
-    return np.array([free not in {f"{name}.{key}" for key in tried(name)} for free in hypothesis.free])
+    return np.array(
+        [free not in {f"{name}.{key}" for key in tried(name)} for free in hypothesis.free]
+    )
 
 
 def promise(fit: Fit) -> float:

@@ -62,7 +62,9 @@ def look_led(base: Fit, name: str, short: Experiment, noise: Noise) -> Fit:
     return lead(hypothesis, short, noise, start, STAGES[:1])
 
 
-def led(hypothesis: Hypothesis, theta: Array, short: Experiment, noise: Noise, stages: Stages) -> Fit:
+def led(
+    hypothesis: Hypothesis, theta: Array, short: Experiment, noise: Noise, stages: Stages
+) -> Fit:
     """From theta through these stages; at the last one's noise wherever the camera stopped, so that fits compare."""
     if stages:
         theta = lead(hypothesis, short, noise, theta, stages).theta

@@ -107,7 +107,9 @@ def _moving(names: Sequence[str]) -> list[str]:
     return [name for name in names if kind_of(name) != "sensor"]
 
 
-def _called_for(best: _Tried, names: Sequence[str], noise: Noise, experiment: Experiment) -> list[str]:
+def _called_for(
+    best: _Tried, names: Sequence[str], noise: Noise, experiment: Experiment
+) -> list[str]:
     """The CALLED effects of whose parameters each promises the largest fall of the cost, in a Gauss-Newton step from best."""
 
     def fall(name: str) -> float:
@@ -118,7 +120,9 @@ def _called_for(best: _Tried, names: Sequence[str], noise: Noise, experiment: Ex
         return (best.cost - outlook.promised(theta)) / (len(theta) - len(best.theta))
 
     falls = dict(zip(names, on_all_cores(fall, names), strict=True))
-    return sorted((name for name in names if falls[name] > 0.0), key=lambda name: -falls[name])[:CALLED]
+    return sorted((name for name in names if falls[name] > 0.0), key=lambda name: -falls[name])[
+        :CALLED
+    ]
 
 
 def _water(noise: Noise, times: float) -> Noise:
@@ -138,7 +142,9 @@ def _grown(best: _Tried, noise: Noise, experiment: Experiment, name: str) -> _Tr
     return _fitted(hypothesis, starts, noise, experiment)
 
 
-def _fitted(hypothesis: Hypothesis, starts: Sequence[Array], noise: Noise, experiment: Experiment) -> _Tried:
+def _fitted(
+    hypothesis: Hypothesis, starts: Sequence[Array], noise: Noise, experiment: Experiment
+) -> _Tried:
     """By predictions over longer and longer horizons, from the start that ends best."""
 
     def led(theta: Array) -> _Tried:

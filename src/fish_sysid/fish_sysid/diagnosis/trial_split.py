@@ -11,7 +11,9 @@ from fish_sysid.dataset.experiment import Experiment
 
 Array = NDArray[np.float64]
 
-SEARCH_TRIALS = 4  # the search's cost is proportional to them; the final fits use all training trials
+SEARCH_TRIALS = (
+    4  # the search's cost is proportional to them; the final fits use all training trials
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,9 @@ def split_trials(experiment: Experiment) -> Split:
     training = tuple(i for i in range(count) if i % 3 != 2)
     strength = dict(zip(training, excitation(experiment.select(training)).tolist(), strict=True))
     chosen = sorted(training, key=lambda i: -strength[i])[:SEARCH_TRIALS]
-    return Split(training, held, tuple(sorted(chosen)), tuple(i for i in training if i not in chosen))
+    return Split(
+        training, held, tuple(sorted(chosen)), tuple(i for i in training if i not in chosen)
+    )
 
 
 def excitation(experiment: Experiment) -> Array:

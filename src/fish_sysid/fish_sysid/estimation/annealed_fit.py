@@ -46,9 +46,13 @@ ROUNDS = 2  # of noise estimation and refits
 
 
 def fit_tempered(
-    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array | None = None,
-    report: Report = lambda _: None, held: tuple[str, ...] = (),
-) -> Fit:  # fmt: skip
+    hypothesis: Hypothesis,
+    experiment: Experiment,
+    noise: Noise,
+    theta: Array | None = None,
+    report: Report = lambda _: None,
+    held: tuple[str, ...] = (),
+) -> Fit:
     """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn.
 
     The parameters `held` are free only at the IMU's full weight; before, the camera leads the others with these at several
@@ -58,21 +62,29 @@ def fit_tempered(
     theta = Coordinates(hypothesis).origin() if theta is None else theta
     held = tuple(name for name in held if name in hypothesis.free)
     places = [_with(hypothesis, theta, held, value) for value in (HELD_AT if held else (0.0,))]
-    leads = on_all_cores(lambda place: lead(hypothesis, experiment, noise, place, held=held), places)
+    leads = on_all_cores(
+        lambda place: lead(hypothesis, experiment, noise, place, held=held), places
+    )
     return close(max(leads, key=lambda fit: fit.objective), experiment, noise, report, held)
 
 
 def lead(
-    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, theta: Array, stages: Stages = LEADING,
+    hypothesis: Hypothesis,
+    experiment: Experiment,
+    noise: Noise,
+    theta: Array,
+    stages: Stages = LEADING,
     held: tuple[str, ...] = (),
-) -> Fit:  # fmt: skip
+) -> Fit:
     """Where stages of falling IMU noise lead all but `held` from theta, gates open; it ends at what noise cannot explain."""
     theta = theta.copy()
     first = [i for i, name in enumerate(hypothesis.free) if name not in held]
     coarse = hypothesis.fixing(held, theta)
     for factor, iterations in stages:
         wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
-        fit = climb(evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN)
+        fit = climb(
+            evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN
+        )
         theta[first] = fit.theta
         if worst_row(fit) > STRANGE:
             break

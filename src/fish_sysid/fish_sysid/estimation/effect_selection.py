@@ -88,13 +88,17 @@ def choose_effects(
                 screened.append(tried)
                 report(f"effect {number + 1}: tried {tried.name} ({len(screened)} of {len(left)})")
             promising = sorted(screened, key=lambda t: t.cost)[:JUDGED]
-            report(f"effect {number + 1}: leaving trials out to judge {', '.join(t.name for t in promising)}")
+            report(
+                f"effect {number + 1}: leaving trials out to judge {', '.join(t.name for t in promising)}"
+            )
             for found in pool.map(partial(_judge, fit, experiment, without), promising):
                 judged.append(found)
                 report(f"{found.tried.name}: {step_text(found.step)}")
         good = [j for j in judged if j.step.gain > j.step.deviation]
         best = max(good, key=lambda j: j.step.gain, default=None)
-        steps += [replace(j.step, added=j is best) for j in sorted(judged, key=lambda j: -j.step.gain)]
+        steps += [
+            replace(j.step, added=j is best) for j in sorted(judged, key=lambda j: -j.step.gain)
+        ]
         if best is None:
             break
         fit = evaluate(best.tried.hypothesis, best.tried.theta, experiment, fit.noise)

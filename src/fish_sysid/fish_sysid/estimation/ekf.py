@@ -37,9 +37,13 @@ def run_filter(
     return run_filters(Problem(experiment, stepper, p, dp, sensors), [noise], keep)[0]
 
 
-def run_filters(problem: Problem, noises: Sequence[Noise], keep: bool = False) -> list[FilterResult]:
+def run_filters(
+    problem: Problem, noises: Sequence[Noise], keep: bool = False
+) -> list[FilterResult]:
     """`run_filter` with each noise: several at once leave no core without work."""
-    return compiled_passes(problem, noises, keep) or [Filter(problem, noise).run(keep) for noise in noises]
+    return compiled_passes(problem, noises, keep) or [
+        Filter(problem, noise).run(keep) for noise in noises
+    ]
 
 
 def filter_stepper(robot: Robot) -> Stepper:
@@ -48,7 +52,9 @@ def filter_stepper(robot: Robot) -> Stepper:
     On 4 trials of 10 s (n = 3) it changes the log likelihood by 0.3 nats and the fitted parameters by 0.01 standard errors.
     """
     scheme = default_scheme(robot.links)
-    return Stepper.of(robot, stable_scheme(robot, Scheme(scheme.method, (scheme.substeps + 1) // 2)))
+    return Stepper.of(
+        robot, stable_scheme(robot, Scheme(scheme.method, (scheme.substeps + 1) // 2))
+    )
 
 
 def prepare(robot: Robot) -> None:

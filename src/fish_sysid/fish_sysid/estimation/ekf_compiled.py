@@ -33,7 +33,13 @@ from fish_sysid.estimation.ekf_types import (
 from fish_sysid.estimation.encoder import encoder_terms
 
 ROTOR = 1  # of the memory: its speed
-SENSORS = ("camera_latency", "camera_heading_offset", "camera_scale", "gyro_scale", "imu_misalignment")
+SENSORS = (
+    "camera_latency",
+    "camera_heading_offset",
+    "camera_scale",
+    "gyro_scale",
+    "imu_misalignment",
+)
 
 
 class Settings(ctypes.Structure):
@@ -63,9 +69,16 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
         *(sensors.slope.get(name, 1.0) for name in SENSORS),
         *(sensors.free.get(name, -1) for name in SENSORS),
         (ctypes.c_long * 3)(*(stepper.layout.parameters.index(name) for name in WRENCH)),
-        stepper.scheme.substeps, decay, (ctypes.c_double * 3)(*variance),
-        noise.gyro, noise.accel, noise.camera_position, noise.camera_heading, noise.gate_imu, noise.gate_camera,
-    )  # fmt: skip
+        stepper.scheme.substeps,
+        decay,
+        (ctypes.c_double * 3)(*variance),
+        noise.gyro,
+        noise.accel,
+        noise.camera_position,
+        noise.camera_heading,
+        noise.gate_imu,
+        noise.gate_camera,
+    )
 
 
 @functools.lru_cache(maxsize=128)
@@ -75,7 +88,9 @@ def filter_library(structure: Structure, method: str) -> ctypes.CDLL | None:
     return library(filter_source(structure, method, lanes()) + text)
 
 
-def compiled_passes(problem: Problem, noises: Sequence[Noise], keep: bool) -> list[FilterResult] | None:
+def compiled_passes(
+    problem: Problem, noises: Sequence[Noise], keep: bool
+) -> list[FilterResult] | None:
     """The result of a pass with each noise, or None when it cannot be compiled here."""
     loaded = filter_library(problem.stepper.layout.structure, problem.stepper.scheme.method)
     if loaded is None:
@@ -107,7 +122,9 @@ def _follow_commands(problem: Problem, keep: bool) -> _Driven:
     trials = [slice(m, m + 1) for m in range(len(before))] if len(problem.dp) > 1 else [slice(None)]
     parts = [_follow(problem, before[some], commands[:, some], keep) for some in trials]
     memory = (
-        np.concatenate([part.memory for part in parts if part.memory is not None], axis=1) if keep else None
+        np.concatenate([part.memory for part in parts if part.memory is not None], axis=1)
+        if keep
+        else None
     )
     return _Driven(
         np.concatenate([part.start for part in parts]),
@@ -132,7 +149,9 @@ def _follow(problem: Problem, before: Array, commands: Array, keep: bool) -> _Dr
         for a in stepper.memory_jvp(*repeated, p, directions, d_start.reshape(-1, size))
     )
     rotor, d_rotor = memory[:-1, :, 0, ROTOR].copy(), d_memory[:-1, :, :K, ROTOR].copy()
-    return _Driven(start.copy(), d_start.copy(), rotor, d_rotor, memory[:, :, 0].copy() if keep else None)
+    return _Driven(
+        start.copy(), d_start.copy(), rotor, d_rotor, memory[:, :, 0].copy() if keep else None
+    )
 
 
 class _Job:
@@ -146,13 +165,22 @@ class _Job:
         self.settings = settings(stepper, sensors, noise)
         layout, T, M, K = stepper.layout, experiment.length, len(experiment.names), len(problem.dp)
         self.n, self.K = len(layout.motion) + 6, K
-        self.p, self.dp = np.ascontiguousarray(problem.p, float), np.ascontiguousarray(problem.dp, float)
+        self.p, self.dp = (
+            np.ascontiguousarray(problem.p, float),
+            np.ascontiguousarray(problem.dp, float),
+        )
         self.commands = _per_trial(experiment.commands)
-        self.imu = _per_trial(np.concatenate([experiment.gyro[..., None], experiment.accel], axis=2))
+        self.imu = _per_trial(
+            np.concatenate([experiment.gyro[..., None], experiment.accel], axis=2)
+        )
         offset, pose = place_frames(experiment, sensors)
         self.offset, self.pose = _per_trial(offset), _per_trial(pose)
         self.start, self.start_P = first_state(experiment, layout, sensors, noise)
-        self.sums, self.gradient, self.normal = np.zeros((M, 2)), np.zeros((M, K)), np.zeros((M, K, K))
+        self.sums, self.gradient, self.normal = (
+            np.zeros((M, 2)),
+            np.zeros((M, K)),
+            np.zeros((M, K, K)),
+        )
         self.whitened = np.full((M, T, 6), np.nan)
         row = 3 * self.n**2 + 2 * self.n + len(layout.memory)
         self.history = np.zeros((M, T, row)) if keep else None
@@ -163,10 +191,19 @@ class _Job:
         results = (self.sums, self.gradient, self.normal, self.whitened)
         history = None if self.history is None else _at(self.history[m])
         failed = self.loaded.filter_trial(
-            ctypes.c_long(int(self.experiment.steps[m])), ctypes.c_long(self.K), *(_at(a[m]) for a in arrays),
-            _at(self.p), _at(self.dp), ctypes.byref(self.settings), _at(self.start[m]), _at(self.start_P[m]),
-            _at(self.driven.start[m]), _at(self.driven.d_start[m]), *(_at(a[m]) for a in results), history,
-        )  # fmt: skip
+            ctypes.c_long(int(self.experiment.steps[m])),
+            ctypes.c_long(self.K),
+            *(_at(a[m]) for a in arrays),
+            _at(self.p),
+            _at(self.dp),
+            ctypes.byref(self.settings),
+            _at(self.start[m]),
+            _at(self.start_P[m]),
+            _at(self.driven.start[m]),
+            _at(self.driven.d_start[m]),
+            *(_at(a[m]) for a in results),
+            history,
+        )
         if failed:
             raise MemoryError(f"no memory for the derivatives along {self.K} free parameters")
 

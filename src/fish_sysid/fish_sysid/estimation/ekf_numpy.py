@@ -32,7 +32,11 @@ class Filter:
     """One pass over an experiment for given parameters."""
 
     def __init__(self, problem: Problem, noise: Noise) -> None:
-        self.experiment, self.stepper, self.sensors = problem.experiment, problem.stepper, problem.sensors
+        self.experiment, self.stepper, self.sensors = (
+            problem.experiment,
+            problem.stepper,
+            problem.sensors,
+        )
         self.p, self.dp, self.noise = problem.p, problem.dp, noise
         layout = self.stepper.layout
         self.trials, self.free = len(self.experiment.names), len(self.dp)
@@ -57,7 +61,9 @@ class Filter:
         Q = np.zeros((n, n))
         wrench = slice(self.nx, self.nx + 3)
         Q[wrench, wrench] = np.diag(np.square(self.noise.wrench) * (1.0 - decay**2))
-        Q[range(2 * self.nq), range(2 * self.nq)] = 1e-14  # keeps the covariance regular on the constraint
+        Q[range(2 * self.nq), range(2 * self.nq)] = (
+            1e-14  # keeps the covariance regular on the constraint
+        )
         for k in range(T):
             if history is not None:
                 history.predicted[k], history.predicted_P[k] = xi, P
@@ -85,11 +91,15 @@ class Filter:
     def _follow_commands(self) -> tuple[Array, Array]:
         """Memory (T + 1, M, NM) and its derivatives (T + 1, M, NM, K): they need no motion."""
         M, K, nm = self.trials, max(self.free, 1), len(self.stepper.layout.memory)
-        start, d_start = first_memory(first_commands(self.experiment), self.stepper, self.p, self.dp)
+        start, d_start = first_memory(
+            first_commands(self.experiment), self.stepper, self.p, self.dp
+        )
         d_start = d_start.reshape(-1, nm) if self.free else np.zeros((M, nm))
         commands = np.repeat(self.experiment.commands, K, axis=1)
         dp = np.tile(self.dp, (M, 1)) if self.free else np.zeros((M, len(self.p)))
-        memory, tangents = self.stepper.memory_jvp(np.repeat(start, K, axis=0), commands, self.p, dp, d_start)
+        memory, tangents = self.stepper.memory_jvp(
+            np.repeat(start, K, axis=0), commands, self.p, dp, d_start
+        )
         T = len(memory)
         memory = memory.reshape(T, M, K, nm)[:, :, 0]
         return memory, tangents.reshape(T, M, K, nm).transpose(0, 1, 3, 2)[..., : self.free]
@@ -123,7 +133,9 @@ class Filter:
         """
         M, nx, n, columns = self.trials, self.nx, self.n, self.nx + 3
         start = np.concatenate([xi[:, :nx], self.memory[k]], axis=1)
-        end = self.stepper.rollout(start, self.experiment.commands[k][None], self._parameters(xi))[1]
+        end = self.stepper.rollout(start, self.experiment.commands[k][None], self._parameters(xi))[
+            1
+        ]
         ends = [self._rates(k, x[:, :nx], xi, D, c)[0] for x, c in ((start, 0.0), (end, 1.0))]
 
         def own(fraction: float) -> Array:
@@ -173,7 +185,9 @@ class Filter:
             R = np.diag([position**2, position**2, heading**2])
             e = pose - h
             e[:, 2] = (e[:, 2] + np.pi) % (2 * np.pi) - np.pi
-            xi, P, D = _update(k, slice(3, 6), e, H, dh, R, camera, self.noise.gate_camera, (xi, P, D), sums)
+            xi, P, D = _update(
+                k, slice(3, 6), e, H, dh, R, camera, self.noise.gate_camera, (xi, P, D), sums
+            )
         return xi, P, D
 
     def _rates(
@@ -187,9 +201,13 @@ class Filter:
         before, after = (d.transpose(0, 2, 1) for d in self.d_memory[k : k + 2, :, :2])
         d_drive[:, nx + 3 :] = drive_at(before, after, fraction)
         rate, tangent = self.stepper.rates_jvp(
-            np.repeat(motion, R, axis=0), np.repeat(drive, R, axis=0), np.repeat(self._parameters(xi), R, axis=0),
-            ds.reshape(M * R, nx), d_drive.reshape(M * R, 4), dp.reshape(M * R, -1),
-        )  # fmt: skip
+            np.repeat(motion, R, axis=0),
+            np.repeat(drive, R, axis=0),
+            np.repeat(self._parameters(xi), R, axis=0),
+            ds.reshape(M * R, nx),
+            d_drive.reshape(M * R, 4),
+            dp.reshape(M * R, -1),
+        )
         return rate.reshape(M, R, nx)[:, 0], tangent.reshape(M, R, nx)
 
     def _imu(self, xi: Array, rate: Array, tangent: Array, D: Array) -> tuple[Array, Array, Array]:
@@ -224,7 +242,9 @@ class Filter:
             dh[:, 2, s.free["imu_misalignment"]] -= s.slope.get("imu_misalignment", 1.0) * forward
         return h, H, dh
 
-    def _camera(self, xi: Array, offset: Array, rate: Array, D: Array) -> tuple[Array, Array, Array]:
+    def _camera(
+        self, xi: Array, offset: Array, rate: Array, D: Array
+    ) -> tuple[Array, Array, Array]:
         """Predicted camera pose at the grid point + offset, its Jacobian and derivatives."""
         nq, s = self.nq, self.sensors
         gain = np.array([s.camera_scale, s.camera_scale, 1.0])
@@ -240,7 +260,9 @@ class Filter:
         H[:, range(3), range(nq, nq + 3)] = gain * offset[:, None]
         dh = H @ D
         if "camera_latency" in s.free:
-            dh[:, :, s.free["camera_latency"]] -= s.slope.get("camera_latency", 1.0) * gain * velocity
+            dh[:, :, s.free["camera_latency"]] -= (
+                s.slope.get("camera_latency", 1.0) * gain * velocity
+            )
         if "camera_scale" in s.free:
             dh[:, :2, s.free["camera_scale"]] += s.slope.get("camera_scale", 1.0) * here[:, :2]
         if "camera_heading_offset" in s.free:
@@ -250,7 +272,9 @@ class Filter:
     def _encoder(self, sums: _Sums) -> None:
         """The encoder reads the rotor's speed, which follows from the commands alone."""
         T = self.experiment.length
-        terms = encoder_terms(self.experiment, self.noise, self.memory[:T, :, 1], self.d_memory[:T, :, 1])
+        terms = encoder_terms(
+            self.experiment, self.noise, self.memory[:T, :, 1], self.d_memory[:T, :, 1]
+        )
         sums.log_likelihood += terms.log_likelihood
         sums.samples += terms.samples
         sums.gradient += terms.gradient
@@ -291,9 +315,17 @@ class _Sums:
 
 
 def _update(
-    k: int, rows: slice, e: Array, H: Array, dh: Array, R: Array, use: NDArray[np.bool_], gate: float,
-    state: tuple[Array, Array, Array], sums: _Sums,
-) -> tuple[Array, Array, Array]:  # fmt: skip
+    k: int,
+    rows: slice,
+    e: Array,
+    H: Array,
+    dh: Array,
+    R: Array,
+    use: NDArray[np.bool_],
+    gate: float,
+    state: tuple[Array, Array, Array],
+    sums: _Sums,
+) -> tuple[Array, Array, Array]:
     """Kalman update of the trials in `use`; innovations beyond `gate` (squared, normalised) are left out."""
     xi, P, D = state
     PHt = P @ H.transpose(0, 2, 1)
@@ -304,8 +336,12 @@ def _update(
     use = use & (np.sum(white**2, axis=1) < gate)
     e = np.where(use[:, None], e, 0.0)
     white = np.where(use[:, None], white, 0.0)
-    J = np.where(use[:, None, None], -np.linalg.solve(L, dh), 0.0)  # derivative of the whitened innovation
-    K = np.where(use[:, None, None], np.linalg.solve(S, PHt.transpose(0, 2, 1)).transpose(0, 2, 1), 0.0)
+    J = np.where(
+        use[:, None, None], -np.linalg.solve(L, dh), 0.0
+    )  # derivative of the whitened innovation
+    K = np.where(
+        use[:, None, None], np.linalg.solve(S, PHt.transpose(0, 2, 1)).transpose(0, 2, 1), 0.0
+    )
     xi = xi + (K @ e[..., None])[..., 0]
     D = D - K @ dh
     P = P - K @ PHt.transpose(0, 2, 1)
@@ -350,6 +386,10 @@ def _is_sound(S: Array) -> bool:
 
 def _empty_history(T: int, M: int, n: int, memory: Array) -> History:
     return History(
-        np.zeros((T, M, n)), np.zeros((T, M, n, n)), np.zeros((T, M, n)), np.zeros((T, M, n, n)),
-        np.zeros((T, M, n, n)), memory,
-    )  # fmt: skip
+        np.zeros((T, M, n)),
+        np.zeros((T, M, n, n)),
+        np.zeros((T, M, n)),
+        np.zeros((T, M, n, n)),
+        np.zeros((T, M, n, n)),
+        memory,
+    )

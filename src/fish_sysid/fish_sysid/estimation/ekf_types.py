@@ -64,7 +64,9 @@ class SensorModel:
     gyro_scale: float = 1.0  # measured over true
     imu_misalignment: float = 0.0  # rad, IMU axes counter-clockwise from base_link
     free: dict[str, int] = field(default_factory=dict)
-    slope: dict[str, float] = field(default_factory=dict)  # d field / d free parameter, 1 where not given
+    slope: dict[str, float] = field(
+        default_factory=dict
+    )  # d field / d free parameter, 1 where not given
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,9 @@ def place_frames(experiment: Experiment, sensors: SensorModel) -> tuple[Array, A
 
 def first_commands(experiment: Experiment) -> Array:
     """(M, 2) what servo and motor have followed at the first grid point: the first command, or none of a fish at rest."""
-    return np.zeros((len(experiment.names), 2)) if experiment.start_at_rest else experiment.commands[0]
+    return (
+        np.zeros((len(experiment.names), 2)) if experiment.start_at_rest else experiment.commands[0]
+    )
 
 
 def first_memory(commands: Array, stepper: Stepper, p: Array, dp: Array) -> tuple[Array, Array]:
@@ -151,7 +155,9 @@ def first_state(
         xi[m, :2] = frames.pose[0, :2] / sensors.camera_scale
         xi[m, 2:nq] = frames.pose[0, 2] - sensors.camera_heading_offset
         if (late := float(frames.t[0]) - sensors.camera_latency) > AT_ONCE:
-            turned, position, heading = _until_seen(experiment.gyro[: experiment.steps[m], m], late, noise)
+            turned, position, heading = _until_seen(
+                experiment.gyro[: experiment.steps[m], m], late, noise
+            )
             xi[m, 2:nq] -= turned
             P[m, range(2), range(2)] = position**2
             P[m, 2:nq, 2:nq] = heading**2

@@ -21,16 +21,22 @@ SMALLEST = 0.5  # of the usual noise
 class EncoderTerms:
     """What the encoder adds to a pass over M trials with K free parameters."""
 
-    log_likelihood: Array  # (M,) sum of -min(r^2, gate) / 2 - log(sd sqrt(2 pi)), r = (encoder - rotor) / sd
+    log_likelihood: (
+        Array  # (M,) sum of -min(r^2, gate) / 2 - log(sd sqrt(2 pi)), r = (encoder - rotor) / sd
+    )
     samples: Array  # (M,)
     gradient: Array  # (M, K) of -log likelihood
     normal: Array  # (M, K, K)
     whitened: Array  # (T, M) r, NaN without a sample
 
 
-def encoder_terms(experiment: Experiment, noise: Noise, rotor: Array, d_rotor: Array) -> EncoderTerms:
+def encoder_terms(
+    experiment: Experiment, noise: Noise, rotor: Array, d_rotor: Array
+) -> EncoderTerms:
     """Terms of the rotor's speed (T, M) [rad/s] as the model has it, and of its derivatives (T, M, K)."""
-    sampled = np.isfinite(experiment.encoder) & (np.arange(experiment.length)[:, None] < experiment.steps)
+    sampled = np.isfinite(experiment.encoder) & (
+        np.arange(experiment.length)[:, None] < experiment.steps
+    )
     r = np.where(sampled, (experiment.encoder - rotor) / noise.encoder, 0.0)
     inside = sampled & (r**2 < noise.gate_encoder)
     pull, J = np.where(inside, r, 0.0), -np.where(inside[..., None], d_rotor, 0.0) / noise.encoder

@@ -30,9 +30,16 @@ from fish_sysid.estimation.noise_estimation import settle
 from fish_sysid.estimation.parametrization import Coordinates, Hypothesis
 
 FIRST_STEPS = 800  # of 10 ms: eight seconds of every trial are enough to begin with, and to rank
-SPREAD, HOP = 0.2, 0.1  # how far a start and a hop are off: of the logarithms of the nominal parameters
-FEW_LINKS = 3  # of a tail with so few optima that one which leaves no more than water does is the best
-SUSPICIOUS = 3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
+SPREAD, HOP = (
+    0.2,
+    0.1,
+)  # how far a start and a hop are off: of the logarithms of the nominal parameters
+FEW_LINKS = (
+    3  # of a tail with so few optima that one which leaves no more than water does is the best
+)
+SUSPICIOUS = (
+    3.0  # times the density of usual water: the fit is a poor optimum, or something is missing
+)
 # rms of whitened innovations, 1 where all is right: a fit that needs no strong water and still leaves more is a poor optimum
 # (one 8000 nats below the truth: 1.46, at the truth: 1.05; docs/blind_studies.md, the eighteenth)
 UNWHITE = 1.2
@@ -41,26 +48,36 @@ TOO_STRONG = 30.0
 
 
 def fit_cold(
-    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, report: Report = lambda _: None,
+    hypothesis: Hypothesis,
+    experiment: Experiment,
+    noise: Noise,
+    report: Report = lambda _: None,
     places: Sequence[Array] = (),
-) -> Fit:  # fmt: skip
+) -> Fit:
     """The best of many optima; a fit that leaves much is looked at again. places: (K,) theta to begin at besides.
 
     Where much is missing, or the tail has many links, optima where the camera leads tell little of those at the IMU's full
     weight: there another way competes, the tail's inertias held at several values until then. Either has ended thousands
     of nats below the other, and one a thousand below that left no more than water does.
     """
-    fit = second_look(fit_multistart(hypothesis, experiment, noise, report, places), experiment, report)
+    fit = second_look(
+        fit_multistart(hypothesis, experiment, noise, report, places), experiment, report
+    )
     right = excess(fit).max() < SUSPICIOUS and worst_row(fit) <= UNWHITE
     if right and hypothesis.robot.links <= FEW_LINKS:
         return fit
-    return better(fit, fit_tempered(hypothesis, experiment, noise, report=report, held=TAIL_INERTIAS))
+    return better(
+        fit, fit_tempered(hypothesis, experiment, noise, report=report, held=TAIL_INERTIAS)
+    )
 
 
 def fit_multistart(
-    hypothesis: Hypothesis, experiment: Experiment, noise: Noise, report: Report = lambda _: None,
+    hypothesis: Hypothesis,
+    experiment: Experiment,
+    noise: Noise,
+    report: Report = lambda _: None,
     places: Sequence[Array] = (),
-) -> Fit:  # fmt: skip
+) -> Fit:
     """`fit_tempered` from the best of the optima that the camera leads to on the first seconds; the same at every call."""
     coordinates, pairs = Coordinates(hypothesis), comb(hypothesis.robot.links, 2)
     short = shorten(experiment, FIRST_STEPS)
@@ -74,7 +91,9 @@ def fit_multistart(
     best = reduce(better, on_all_cores(lambda start: lead(hypothesis, short, noise, start), starts))
     for step in somewhere(pairs):
         best = better(best, lead(hypothesis, short, noise, best.theta + HOP * step, LEADING[1:]))
-    return close(evaluate(hypothesis, best.theta, experiment, best.noise), experiment, noise, report)
+    return close(
+        evaluate(hypothesis, best.theta, experiment, best.noise), experiment, noise, report
+    )
 
 
 def second_look(fit: Fit, experiment: Experiment, report: Report = lambda _: None) -> Fit:
@@ -98,4 +117,6 @@ def excess(fit: Fit) -> np.ndarray:
 
 def better(first: Fit, second: Fit) -> Fit:
     """The one with the higher objective; one that has none is none."""
-    return second if second.objective > first.objective or not np.isfinite(first.objective) else first
+    return (
+        second if second.objective > first.objective or not np.isfinite(first.objective) else first
+    )

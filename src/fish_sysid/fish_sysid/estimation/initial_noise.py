@@ -15,8 +15,12 @@ from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 OPEN = 1e9  # gates: nothing is left out
 LADDER = (1.0, 4.0, 16.0, 64.0)  # of the wrench's standard deviations
-STRANGE = 4.0  # rms of whitened innovations that no wrench explains: the sensors are noisier than said
-SENSOR_ROWS = slice(0, 6)  # of the whitened innovations: all but the encoder's, which no free number moves
+STRANGE = (
+    4.0  # rms of whitened innovations that no wrench explains: the sensors are noisier than said
+)
+SENSOR_ROWS = slice(
+    0, 6
+)  # of the whitened innovations: all but the encoder's, which no free number moves
 
 
 def open_gates(noise: Noise) -> Noise:

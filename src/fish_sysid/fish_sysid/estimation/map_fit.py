@@ -62,16 +62,21 @@ def evaluate(
     coordinates = Coordinates(hypothesis)
     p, dp, sensors = coordinates.filter_inputs(theta)
     result = run_filter(experiment, coordinates.stepper, p, dp, sensors, noise, keep)
-    objective = float(result.log_likelihood.sum()) - 0.5 * float(np.sum((theta / coordinates.prior) ** 2))
+    objective = float(result.log_likelihood.sum()) - 0.5 * float(
+        np.sum((theta / coordinates.prior) ** 2)
+    )
     normal = result.normal.sum(0) + np.diag(1.0 / coordinates.prior**2)
     robot = coordinates.robot(theta)
     return Fit(hypothesis, theta, robot, noise, result.log_likelihood, objective, result, normal)
 
 
 def climb(
-    start: Fit, experiment: Experiment, iterations: int, small_gain: float = SMALL_GAIN,
+    start: Fit,
+    experiment: Experiment,
+    iterations: int,
+    small_gain: float = SMALL_GAIN,
     moving: NDArray[np.bool_] | None = None,
-) -> Fit:  # fmt: skip
+) -> Fit:
     """Levenberg-Marquardt with fixed noise from a fit that was evaluated on this experiment, until it gains little.
 
     moving: (K,) which parameters move, by default all.
@@ -115,7 +120,9 @@ def likelihoods(
     return np.where(np.isfinite(totals), totals, -np.inf)
 
 
-def log_posterior(hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise) -> float:
+def log_posterior(
+    hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise
+) -> float:
     """Log likelihood of all trials plus log prior of theta; -inf where the filter diverges."""
     total = float(likelihoods(hypothesis, theta, experiment, [noise])[0])
     return total - 0.5 * float(np.sum((theta / Coordinates(hypothesis).prior) ** 2))

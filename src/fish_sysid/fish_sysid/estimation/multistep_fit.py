@@ -44,7 +44,9 @@ POSITION = (0.008, 0.02)  # m, and m per s of horizon: what counts as one
 HEADING = (0.06, 0.04)  # rad, and rad per s
 SPEED = 0.02  # m/s
 ROBUST = 3.0  # beyond it an error counts linearly
-STEEPEST = 300.0  # of an error's derivative; beyond it the motion is unstable and its slope says nothing
+STEEPEST = (
+    300.0  # of an error's derivative; beyond it the motion is unstable and its slope says nothing
+)
 CALM = 5.0  # times usual water: an unexplained force that leaves slow motion to the parameters
 ROUNDS = 4  # of states and parameters
 ITERATIONS = 10
@@ -110,7 +112,10 @@ class Outlook:
             self.sensors, self.targets = sensors, self._targets(sensors)
         robot = self.coordinates.robot(theta)
         plain = {k: v for k, v in robot.effects.items() if k != "disturbance"}
-        self.estimates, self.noise = estimate(self.experiment, replace(robot, effects=plain), noise), noise
+        self.estimates, self.noise = (
+            estimate(self.experiment, replace(robot, effects=plain), noise),
+            noise,
+        )
 
     def cost(self, theta: Array) -> float:
         """What is made small."""
@@ -120,7 +125,10 @@ class Outlook:
         """(M,) cost per prediction of each trial, without the prior; NaN for a trial too short to predict."""
         p, dp, _ = self.coordinates.filter_inputs(theta)
         e = np.clip(np.nan_to_num(self._of_targets(p, dp[:0])[0], nan=LOST), -LOST, LOST)
-        cost, trial = _huber(e).sum(1), np.repeat(list(self.targets), [len(t) for t in self.targets.values()])
+        cost, trial = (
+            _huber(e).sum(1),
+            np.repeat(list(self.targets), [len(t) for t in self.targets.values()]),
+        )
         return np.array(
             [
                 cost[trial == m].mean() if m in self.targets else np.nan
@@ -163,7 +171,11 @@ class Outlook:
         return theta
 
     def improve(
-        self, theta: Array, noise: Noise, iterations: int = ITERATIONS, shares: tuple[float, ...] = SHARES
+        self,
+        theta: Array,
+        noise: Noise,
+        iterations: int = ITERATIONS,
+        shares: tuple[float, ...] = SHARES,
     ) -> tuple[float, Array]:
         """(cost, theta) of one round: parameters found with the states of theta, judged with states of their own.
 
@@ -268,7 +280,9 @@ def _target(row: int, t: Array, pose: Array, k: int, horizon: float, steps: int)
     if not np.isfinite(measured).all() or position[0] < 0.0:
         return None
     p, psi = (a + b * horizon for a, b in (POSITION, HEADING))
-    return Target(row, position, mean.value[0], mean.slope[0], measured, np.array([p, p, psi, SPEED]))
+    return Target(
+        row, position, mean.value[0], mean.slope[0], measured, np.array([p, p, psi, SPEED])
+    )
 
 
 def _error(target: Target, pose: Array, d_pose: Array) -> tuple[Array, Array]:
@@ -287,7 +301,9 @@ def _error(target: Target, pose: Array, d_pose: Array) -> tuple[Array, Array]:
     return e / target.scale, np.concatenate([d_mean, d_u[None]]) / target.scale[:, None]
 
 
-def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] = lambda _: None) -> Fit:
+def fit_outlook(
+    fit: Fit, experiment: Experiment, report: Callable[[str], None] = lambda _: None
+) -> Fit:
     """The fit that predicts best over seconds, from a fit's values or its hypothesis's start values: both go one round.
 
     The states come from its noise, or one with a calm unexplained force, whichever predicts better. Sensor errors keep the
@@ -306,14 +322,18 @@ def fit_outlook(fit: Fit, experiment: Experiment, report: Callable[[str], None] 
         return outlook.cost(theta)
 
     def better_noise(theta: Array) -> tuple[float, Array, Noise]:
-        return min(((judged(theta, noise), theta, noise) for noise in noises), key=lambda found: found[0])
+        return min(
+            ((judged(theta, noise), theta, noise) for noise in noises), key=lambda found: found[0]
+        )
 
     def one_round(theta: Array, noise: Noise) -> tuple[float, Array, Noise]:
         return *outlook.improve(theta, noise, shares=(1.0,)), noise
 
     report("fitting the outlook from two starts")
     starts = (np.where(outlook.moving, outlook.coordinates.origin(), fit.theta), fit.theta)
-    best, theta, noise = min((one_round(*better_noise(t)[1:]) for t in starts), key=lambda found: found[0])
+    best, theta, noise = min(
+        (one_round(*better_noise(t)[1:]) for t in starts), key=lambda found: found[0]
+    )
     for i in range(1, ROUNDS):
         report(f"fitting the outlook, round {i + 1} of {ROUNDS}, cost {best:.0f}")
         before = best

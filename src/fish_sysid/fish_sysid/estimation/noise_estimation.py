@@ -33,7 +33,9 @@ class Reach(Enum):
     """How far from a fit's noise a better one may lie."""
 
     NEAR = 0
-    FAR = 1  # a model that has just found its missing effect needs far less noise than the one before
+    FAR = (
+        1  # a model that has just found its missing effect needs far less noise than the one before
+    )
     COLD = 2  # nothing is known yet
 
 
@@ -124,7 +126,9 @@ def starts(fit: Fit, experiment: Experiment, reach: Reach) -> list[Noise]:
         return [own]
     usual = usual_noise(experiment)
     calm = replace(own, wrench=usual.wrench, wrench_time=usual.wrench_time)
-    sensors = replace(usual, encoder=own.encoder, gate_camera=own.gate_camera, gate_imu=own.gate_imu)
+    sensors = replace(
+        usual, encoder=own.encoder, gate_camera=own.gate_camera, gate_imu=own.gate_imu
+    )
     far = [own, sensors, calm, *(_stronger(own, f) for f in JUMPS)]
     if reach is Reach.FAR:
         return far

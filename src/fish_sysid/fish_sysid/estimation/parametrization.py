@@ -82,7 +82,9 @@ def start_values(name: str, fraction: float) -> dict[str, float]:
     for key, parameter in effect.parameters.items():
         typical = parameter.value if parameter.typical is None else parameter.typical
         strong = key in effect.strength
-        values[key] = parameter.value + fraction * (typical - parameter.value) if strong else typical
+        values[key] = (
+            parameter.value + fraction * (typical - parameter.value) if strong else typical
+        )
     return values
 
 
@@ -147,14 +149,20 @@ def zeros(robot: Robot) -> tuple[str, ...]:
 
 
 def extend(
-    theta: Array, hypothesis: Hypothesis, name: str, strength: float, place: Mapping[str, float] | None = None
+    theta: Array,
+    hypothesis: Hypothesis,
+    name: str,
+    strength: float,
+    place: Mapping[str, float] | None = None,
 ) -> Array:
-    """theta (K,) of a hypothesis whose last effect is `name`, from that of the one without it.
+    """Theta (K,) of a hypothesis whose last effect is `name`, from that of the one without it.
 
     strength: of the effect, in typical ones; place: values of its parameters that say where or how fast.
     """
     values = list({**start_values(name, strength), **(place or {})}.values())
-    own = Coordinates(hypothesis).encode(np.concatenate([np.ones(len(theta)), values]))[len(theta) :]
+    own = Coordinates(hypothesis).encode(np.concatenate([np.ones(len(theta)), values]))[
+        len(theta) :
+    ]
     return np.concatenate([theta, own])
 
 
@@ -170,26 +178,30 @@ class Coordinates:
         self.neutral, self.scale, self.prior, self.lowest, self.highest = rows.T
 
     def origin(self) -> Array:
-        """theta of the hypothesis's start values."""
+        """Theta of the hypothesis's start values."""
         return self.encode(self.start)
 
     def at_nominal(self, theta: Array) -> Array:
-        """theta with the nominal parameters at the robot's own values, the effects as they are."""
+        """Theta with the nominal parameters at the robot's own values, the effects as they are."""
         return np.where(self.is_log, 0.0, theta)
 
     def encode(self, values: Array) -> Array:
-        """theta of physical values."""
+        """Theta of physical values."""
         linear = (values - self.neutral) / self.scale
         return np.where(
-            self.is_log, np.log(np.maximum(values, 1e-300) / np.where(self.is_log, self.neutral, 1.0)), linear
+            self.is_log,
+            np.log(np.maximum(values, 1e-300) / np.where(self.is_log, self.neutral, 1.0)),
+            linear,
         )
 
     def decode(self, theta: Array) -> Array:
         """Physical values of theta."""
-        return np.where(self.is_log, self.neutral * np.exp(theta), self.neutral + self.scale * theta)
+        return np.where(
+            self.is_log, self.neutral * np.exp(theta), self.neutral + self.scale * theta
+        )
 
     def slope(self, theta: Array) -> Array:
-        """d value / d theta."""
+        """D value / d theta."""
         return np.where(self.is_log, self.decode(theta), self.scale)
 
     def clip(self, theta: Array) -> Array:
@@ -202,7 +214,9 @@ class Coordinates:
         robot = self.hypothesis.robot
         parameters, effects = dict(robot.parameters), {k: dict(v) for k, v in robot.effects.items()}
         sensors = {k: dict(v) for k, v in robot.sensors.items()}
-        values = np.clip(self.decode(theta), self.lowest, self.highest)  # rounding may leave a range's edge
+        values = np.clip(
+            self.decode(theta), self.lowest, self.highest
+        )  # rounding may leave a range's edge
         for name, value in zip(self.hypothesis.free, values, strict=True):
             if "." not in name:
                 parameters[name] = float(value)
@@ -242,4 +256,10 @@ class Coordinates:
             return value, 1.0, LOG_PRIOR.get(name, WIDE_PRIOR), value * 1e-3, value * 1e3
         effect, key = name.split(".")
         parameter = specification(effect)[key]
-        return parameter.value, scale_of(parameter), EFFECT_PRIOR, parameter.lowest, parameter.highest
+        return (
+            parameter.value,
+            scale_of(parameter),
+            EFFECT_PRIOR,
+            parameter.lowest,
+            parameter.highest,
+        )

@@ -21,7 +21,9 @@ from fish_sysid.estimation.encoder import (
     encoder_noise,
 )
 
-ORDER = 6  # of the differences: at 30 Hz they weaken a tail beat of 2 Hz 5000 times against white noise
+ORDER = (
+    6  # of the differences: at 30 Hz they weaken a tail beat of 2 Hz 5000 times against white noise
+)
 SLOWEST = 0.04  # s between samples; in the differences of slower ones the motion itself is left
 FEWEST = 50  # differences that an estimate needs
 

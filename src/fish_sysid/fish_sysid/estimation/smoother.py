@@ -17,7 +17,11 @@ def smooth(history: History) -> tuple[Array, Array]:
         # the covariance is close to singular along the constraint: scale before the pseudo-inverse
         scale = 1.0 / np.sqrt(np.maximum(np.diagonal(ahead, axis1=1, axis2=2), 1e-18))
         scaled = ahead * scale[:, :, None] * scale[:, None, :]
-        inverse = np.linalg.pinv(scaled, rcond=1e-10, hermitian=True) * scale[:, :, None] * scale[:, None, :]
+        inverse = (
+            np.linalg.pinv(scaled, rcond=1e-10, hermitian=True)
+            * scale[:, :, None]
+            * scale[:, None, :]
+        )
         G = P[k] @ F.transpose(0, 2, 1) @ inverse
         xi[k] += (G @ (xi[k + 1] - history.predicted[k + 1])[..., None])[..., 0]
         P[k] += G @ (P[k + 1] - ahead) @ G.transpose(0, 2, 1)

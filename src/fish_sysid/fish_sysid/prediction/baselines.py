@@ -25,7 +25,9 @@ from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
 
-FULL_ACCELERATION = 12.0 * (4.0 * np.pi) ** 2  # rad/s^2, of the rotor at full throttle: 12 rad at 2 Hz
+FULL_ACCELERATION = (
+    12.0 * (4.0 * np.pi) ** 2
+)  # rad/s^2, of the rotor at full throttle: 12 rad at 2 Hz
 STEP = 0.25  # s, period of the baselines
 STRIDE = round(STEP / DT)
 OUTLOOK = 3.0  # s, over which the bilinear model's surge is fitted
@@ -48,7 +50,9 @@ def inputs(experiment: Experiment) -> Array:
     rotor, rudder = experiment.commands[..., 0], experiment.commands[..., 1]
     acceleration = np.diff(rotor, axis=0, prepend=rotor[:1]) / DT
     power = _smooth(acceleration**2, experiment)
-    return np.stack([np.sqrt(2.0 * power) / FULL_ACCELERATION, _smooth(rudder, experiment)], axis=-1)
+    return np.stack(
+        [np.sqrt(2.0 * power) / FULL_ACCELERATION, _smooth(rudder, experiment)], axis=-1
+    )
 
 
 def _smooth(values: Array, experiment: Experiment) -> Array:
@@ -98,7 +102,10 @@ def constant() -> Advance:
 
 def fit_arx(data: list[Table]) -> Advance:
     """Second-order linear model."""
-    rows = [np.column_stack([d.y[1:-1], d.y[:-2], d.w[2:], d.w[1:-1], np.ones(len(d.y) - 2)]) for d in data]
+    rows = [
+        np.column_stack([d.y[1:-1], d.y[:-2], d.w[2:], d.w[1:-1], np.ones(len(d.y) - 2)])
+        for d in data
+    ]
     theta = _solve(rows, [d.y[2:] for d in data])
     return lambda y, y_before, w, w_before: (
         np.column_stack([y, y_before, w, w_before, np.ones(len(y))]) @ theta
@@ -131,10 +138,12 @@ def _surge(a: Array, u: Array, throttle: Array, throttle_before: Array) -> Array
 
 
 def _fit_surge(data: list[Table]) -> Array:
-    """a (3,) that predicts best over OUTLOOK: single differences would take the noise in u for damping."""
+    """A (3,) that predicts best over OUTLOOK: single differences would take the noise in u for damping."""
     n = round(OUTLOOK / STEP)
     windows = [
-        (d.y[k : k + n + 1, 0], d.w[k : k + n + 1, 0]) for d in data for k in range(0, len(d.y) - n, 2)
+        (d.y[k : k + n + 1, 0], d.w[k : k + n + 1, 0])
+        for d in data
+        for k in range(0, len(d.y) - n, 2)
     ]
     windows = [(u, w) for u, w in windows if np.isfinite(u).all()]
     if not windows:
@@ -148,7 +157,9 @@ def _fit_surge(data: list[Table]) -> Array:
             errors.append(now - u[k + 1])
         return np.concatenate(errors)
 
-    found: Array = least_squares(misfit, np.array([0.0, -0.5, 0.1]), bounds=([-1, -3, -3], [1, 0, 3])).x
+    found: Array = least_squares(
+        misfit, np.array([0.0, -0.5, 0.1]), bounds=([-1, -3, -3], [1, 0, 3])
+    ).x
     return found
 
 
@@ -192,7 +203,9 @@ def _travel(pose: Array, y: Array, y_next: Array) -> Array:
     turned = DT * np.cumsum(velocity[..., 2], axis=0)
     psi = pose[:, 2] + turned - 0.5 * DT * velocity[..., 2]
     u, v = velocity[..., 0], velocity[..., 1]
-    moved = np.stack([u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)], axis=-1)
+    moved = np.stack(
+        [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)], axis=-1
+    )
     return np.concatenate(
         [pose[:, :2] + DT * np.cumsum(moved, axis=0), (pose[:, 2] + turned)[..., None]], axis=-1
     )

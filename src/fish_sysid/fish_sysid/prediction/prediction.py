@@ -120,7 +120,9 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
         wrench[begin:end, part] = history.filtered[..., nx : nx + 3]
         last = (chosen.steps - 1, np.arange(len(part)))
         bias[part] = history.filtered[last][:, nx + 3 :]
-        bias_std[part] = np.sqrt(np.diagonal(history.filtered_P[last], axis1=1, axis2=2)[:, nx + 3 :])
+        bias_std[part] = np.sqrt(
+            np.diagonal(history.filtered_P[last], axis1=1, axis2=2)[:, nx + 3 :]
+        )
         within = np.arange(chosen.length)[:, None] < chosen.steps
         return within & ~np.isfinite(history.filtered).all(axis=2)
 
@@ -138,7 +140,9 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
                 column = fill(rest, [m], begin, open_gates(noise))[:, 0]
     beyond = np.arange(T)[:, None] >= experiment.steps
     state[beyond], wrench[beyond] = np.nan, np.nan
-    return Estimates(experiment, state, wrench, body_velocity(state, stepper.layout.links), bias, bias_std)
+    return Estimates(
+        experiment, state, wrench, body_velocity(state, stepper.layout.links), bias, bias_std
+    )
 
 
 def body_velocity(state: Array, links: int) -> Array:
@@ -165,7 +169,9 @@ def predict(
     """
     every = horizon if every is None else every
     if not (np.isfinite(horizon) and horizon >= DT and every >= DT):
-        raise ValueError(f"horizon {horizon} s, start points every {every} s: expected at least {DT} s")
+        raise ValueError(
+            f"horizon {horizon} s, start points every {every} s: expected at least {DT} s"
+        )
     estimates = estimate(experiment, robot, noise)
     starts = start_points(experiment, every, first)
     trial, start = starts[:, 0], starts[:, 1]
@@ -192,9 +198,14 @@ def start_points(experiment: Experiment, every: float, first: float) -> NDArray[
 
 
 def _simulate(
-    experiment: Experiment, robot: Robot, noise: Noise, starts: NDArray[np.int64], state: Array, wrench: Array,
+    experiment: Experiment,
+    robot: Robot,
+    noise: Noise,
+    starts: NDArray[np.int64],
+    state: Array,
+    wrench: Array,
     length: int,
-) -> Array:  # fmt: skip
+) -> Array:
     """(length + 1, S, 3) poses from state (S, NS) at the start points, NaN beyond the end of the trial.
 
     NaN throughout where the state is: the filter is lost there for good, and nothing can be predicted.

@@ -12,8 +12,21 @@ from fish_sim.model import DT
 from fish_sysid.prediction.prediction import Predictions
 from fish_sysid.prediction.stroke_average import stroke_mean
 
-STATE = ("x", "y", "heading", "u", "v", "r")  # m, m, rad in the pool's frame; m/s, m/s, rad/s in base_link
-COLUMNS = ("trial", "time", "start", *(f"predicted_{k}" for k in STATE), *(f"measured_{k}" for k in STATE))
+STATE = (
+    "x",
+    "y",
+    "heading",
+    "u",
+    "v",
+    "r",
+)  # m, m, rad in the pool's frame; m/s, m/s, rad/s in base_link
+COLUMNS = (
+    "trial",
+    "time",
+    "start",
+    *(f"predicted_{k}" for k in STATE),
+    *(f"measured_{k}" for k in STATE),
+)
 
 
 def write_predictions(path: Path, predictions: Predictions) -> int:
@@ -37,7 +50,9 @@ def _rows(predictions: Predictions) -> Iterator[list[str]]:
     for m, frames in enumerate(experiment.frames):
         seen, starts = predictions.seen(m), predictions.start[predictions.trial == m] * DT
         measured = stroke_mean(frames.t, frames.t)(frames.pose)
-        taken = frames.t - predictions.sensors.camera_latency  # earlier ones show the estimate, no prediction
+        taken = (
+            frames.t - predictions.sensors.camera_latency
+        )  # earlier ones show the estimate, no prediction
         for s, start in enumerate(starts):
             own = np.flatnonzero((taken >= start) & (taken < start + predictions.horizon))
             known = np.isfinite(seen[:, s].sum(axis=1))

@@ -47,4 +47,6 @@ def stroke_mean(frames: Array, centres: Array) -> StrokeMean:
     value = w / total[:, None] - shift[:, None] * slope
     covered = (w > 0).sum(1) >= max(4.0, LEAST_FRAMES * 2.0 * HALF_WINDOW / period)
     covered &= np.abs(shift) < LARGEST_SHIFT
-    return StrokeMean(np.where(covered[:, None], value, np.nan), np.where(covered[:, None], slope, np.nan))
+    return StrokeMean(
+        np.where(covered[:, None], value, np.nan), np.where(covered[:, None], slope, np.nan)
+    )

@@ -45,7 +45,9 @@ def before_after(d: Diagnosis) -> Figure:
     return Figure(title, styled(figure, 660, titled=True), NOTE)
 
 
-def _lines(figure: go.Figure, swim: Swim, measured: bool, label: str, colour: str, column: int) -> None:
+def _lines(
+    figure: go.Figure, swim: Swim, measured: bool, label: str, colour: str, column: int
+) -> None:
     """Path and speed of one trial in its column."""
     values, line = (swim.measured if measured else swim.simulated), {"color": colour, "width": 1.5}
     shared = {"name": label, "legendgroup": label, "line": line, "mode": "lines", "col": column}

@@ -25,7 +25,9 @@ from fish_sysid.diagnosis.result import Diagnosis
 COLOURS = {"surge": "#5b6bd6", "sway": "#1fa774", "yaw": "#e07b39"}
 SHOWN = 4000  # points of a scatter
 BINS = 15  # of a covariate, about equally full
-NOT_ALWAYS = 0.75  # share of the time: an effect that acts for longer may be said to act all the time
+NOT_ALWAYS = (
+    0.75  # share of the time: an effect that acts for longer may be said to act all the time
+)
 MISTAKEN = 1 / 3  # of what F1 lacks where an effect is said to act all the time
 Content = dict[str, Any]
 Array = NDArray[np.float64]
@@ -62,10 +64,20 @@ def force_over_time(d: Diagnosis) -> go.Figure:
     t = DT * np.arange(len(d.force.wrench))
     for i, dof in enumerate(DOFS):
         unit = "N m" if dof == "yaw" else "N"
-        figure.add_scatter(x=t, y=d.force.wrench[:, 0, i], name=f"{dof}, {unit}", line={"color": COLOURS[dof]},
-                           visible=True if i < 2 else "legendonly")  # fmt: skip
-        figure.add_scatter(x=t, y=d.remaining.wrench[:, 0, i], name=f"{dof} remaining", line={"color": "#999"},
-                           visible=True if i == 0 else "legendonly")  # fmt: skip
+        figure.add_scatter(
+            x=t,
+            y=d.force.wrench[:, 0, i],
+            name=f"{dof}, {unit}",
+            line={"color": COLOURS[dof]},
+            visible=True if i < 2 else "legendonly",
+        )
+        figure.add_scatter(
+            x=t,
+            y=d.remaining.wrench[:, 0, i],
+            name=f"{dof} remaining",
+            line={"color": "#999"},
+            visible=True if i == 0 else "legendonly",
+        )
     figure.update_xaxes(title="t, s")
     return styled(figure)
 
@@ -76,11 +88,19 @@ def force_against_covariates(d: Diagnosis) -> go.Figure:
     figure = make_subplots(rows=1, cols=len(names), subplot_titles=names)
     for column, name in enumerate(names, 1):
         for i, dof in enumerate(DOFS):
-            middle, mean = binned_means(d.force.covariates[name].ravel(), d.force.wrench[..., i].ravel())
+            middle, mean = binned_means(
+                d.force.covariates[name].ravel(), d.force.wrench[..., i].ravel()
+            )
             figure.add_scatter(
-                x=middle, y=mean / d.final.noise.wrench[i], name=dof, legendgroup=dof,
-                line={"color": COLOURS[dof]}, showlegend=column == 1, row=1, col=column,
-            )  # fmt: skip
+                x=middle,
+                y=mean / d.final.noise.wrench[i],
+                name=dof,
+                legendgroup=dof,
+                line={"color": COLOURS[dof]},
+                showlegend=column == 1,
+                row=1,
+                col=column,
+            )
     figure.update_yaxes(title="mean missing wrench / water noise", col=1)
     return styled(figure, 360, titled=True)
 
@@ -89,7 +109,9 @@ def binned_means(v: Array, w: Array) -> tuple[Array, Array]:
     """(middles, means of w) over up to BINS bins of v that hold about as many samples each; empty where v never changes."""
     good = np.isfinite(v) & np.isfinite(w)
     # a rudder at its stop has one value many times over, an edge of several bins, of which all but one would be empty
-    edges = np.unique(np.quantile(v[good], np.linspace(0, 1, BINS + 1))) if good.any() else np.zeros(0)
+    edges = (
+        np.unique(np.quantile(v[good], np.linspace(0, 1, BINS + 1))) if good.any() else np.zeros(0)
+    )
     if len(edges) < 2:
         return np.zeros(0), np.zeros(0)
     mean, edges, _ = binned_statistic(v[good], w[good], "mean", edges)
@@ -113,7 +135,13 @@ def water_over_the_pool(effect: Content, d: Diagnosis) -> Figure:
     fastest = float(np.hypot(u, v).max())
     step = x[0, 1] - x[0, 0]
     figure = create_quiver(
-        x, y, u, v, scale=0.9 * step / max(fastest, 1e-12), line={"color": COLOURS["surge"]}, name="water"
+        x,
+        y,
+        u,
+        v,
+        scale=0.9 * step / max(fastest, 1e-12),
+        line={"color": COLOURS["surge"]},
+        name="water",
     )
     swum = np.stack([d.force.covariates[k].T.ravel() for k in "xy"])[:, ::10]
     figure.add_scatter(
@@ -141,10 +169,13 @@ def when_it_acts(effect: Content) -> Figure:
     """The intervals in which an effect acts, a row per trial."""
     figure, times = go.Figure(), sorted(effect["where"]["time"], key=lambda row: row["trial"])
     figure.add_bar(
-        y=[row["trial"] for row in times], base=[row["from"] for row in times],
-        x=[row["to"] - row["from"] for row in times], orientation="h", marker={"color": COLOURS["surge"]},
+        y=[row["trial"] for row in times],
+        base=[row["from"] for row in times],
+        x=[row["to"] - row["from"] for row in times],
+        orientation="h",
+        marker={"color": COLOURS["surge"]},
         hovertext=[f"{row['share']:.0%} of its push" for row in times],
-    )  # fmt: skip
+    )
     figure.update_xaxes(title="t, s")
     tells = effect["where"]["covariates"][0]
     low, high = tells["range"]
@@ -153,7 +184,9 @@ def when_it_acts(effect: Content) -> Figure:
         f"{tells['name']} from {low:.3g} to {high:.3g} tells them best (F1 {tells['f1']:.2f})"
     )
     return Figure(
-        f"When {effect['name']} acts", styled(figure, 120 + 26 * len({r["trial"] for r in times})), note
+        f"When {effect['name']} acts",
+        styled(figure, 120 + 26 * len({r["trial"] for r in times})),
+        note,
     )
 
 

@@ -37,7 +37,9 @@ from fish_sysid.reports.verdict_sentence import sentence
 Content = dict[str, Any]
 
 DENSITY = "log_density_per_sample"
-NAT = "A nat is a unit of log-likelihood: by n nats more, what was measured is e^n times as probable."
+NAT = (
+    "A nat is a unit of log-likelihood: by n nats more, what was measured is e^n times as probable."
+)
 
 
 def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) -> None:
@@ -58,7 +60,11 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
             "first training trial; grey: what remains with the effects found",
         ),
         Figure("Missing force against covariates", force_against_covariates(d)),
-        *(water_over_the_pool(entry, d) for entry in content["effects"] if moves_water(entry["name"])),
+        *(
+            water_over_the_pool(entry, d)
+            for entry in content["effects"]
+            if moves_water(entry["name"])
+        ),
         *(when_it_acts(entry) for entry in content["effects"] if _acts_in_a_range(entry, d)),
         *_evidence(d),
         _whiteness(content),
@@ -79,14 +85,22 @@ def _acts_in_a_range(effect: Content, d: Diagnosis) -> bool:
 
 def _found(effect: Content) -> Table:
     """Equation, parameters, where it acts and what it could be mistaken for."""
-    rows = [[k, f"{p['value']:.4g}", f"{p['std']:.2g}", p["unit"]] for k, p in effect["parameters"].items()]
-    rivals = ", ".join(f"{r['name']} (probability {r['probability']:.2f})" for r in effect["rivals"])
+    rows = [
+        [k, f"{p['value']:.4g}", f"{p['std']:.2g}", p["unit"]]
+        for k, p in effect["parameters"].items()
+    ]
+    rivals = ", ".join(
+        f"{r['name']} (probability {r['probability']:.2f})" for r in effect["rivals"]
+    )
     note = (
         f"{effect['equation']}. {_explains(effect['where']['dof'])} "
         f"Could be mistaken for: {rivals or 'nothing else that was tried'}."
     )
     return Table(
-        f"What is missing: {effect['name']}", ["parameter", "value", "standard error", "unit"], rows, note
+        f"What is missing: {effect['name']}",
+        ["parameter", "value", "standard error", "unit"],
+        rows,
+        note,
     )
 
 
@@ -125,8 +139,14 @@ def _fit_table(content: Content, trials: str) -> Table:
     if fit["model_yaml"]:
         cells = [_errors(v) for v in fit["model_yaml"]["rms"].values()]
         helped = ", ".join(fit["model_yaml"]["effects"]) or "no effects"
-        rows.append([f"model.yaml: fitted to predict over seconds, described with {helped}", *cells, ""])
-    header = ["model", *(f"{h}: m / rad / m/s" for h in fit["nominal"]["rms"]), "log density per sample"]
+        rows.append(
+            [f"model.yaml: fitted to predict over seconds, described with {helped}", *cells, ""]
+        )
+    header = [
+        "model",
+        *(f"{h}: m / rad / m/s" for h in fit["nominal"]["rms"]),
+        "log density per sample",
+    ]
     low, high = fit["improvement_ci95"]
     gain = f"{fit['with_effects'][DENSITY] - fit['refitted'][DENSITY]:.3f} nats per sample"
     spread = f", 95 % interval {low:.3f} to {high:.3f}" if np.isfinite(low) else ""
@@ -165,7 +185,9 @@ def _evidence_row(found: Round, ranked: Ranked) -> list[str]:
     if fit is None:
         return [ranked.name, quick, "", ""]
     own = {k: v for k, v in fit.values.items() if k.startswith(ranked.name + ".")}
-    values = ", ".join(f"{k.split('.')[1]} {v:.4g} ± {fit.standard_errors[k]:.2g}" for k, v in own.items())
+    values = ", ".join(
+        f"{k.split('.')[1]} {v:.4g} ± {fit.standard_errors[k]:.2g}" for k, v in own.items()
+    )
     return [ranked.name, quick, f"{found.gain(ranked.name):.0f}", values]
 
 

@@ -29,7 +29,14 @@ LJUNG_BOX_LAG = 20
 TITLES = dict(
     zip(
         ROWS,
-        ("gyro", "accelerometer, forward", "accelerometer, left", "camera x", "camera y", "camera heading"),
+        (
+            "gyro",
+            "accelerometer, forward",
+            "accelerometer, left",
+            "camera x",
+            "camera y",
+            "camera heading",
+        ),
         strict=True,
     )
 )
@@ -54,7 +61,9 @@ def swims(result: Identification) -> list[Swim]:
 
 def whole_swims(experiment: Experiment, fit: Fit) -> list[Swim]:
     """Every trial simulated with a fitted robot from its first estimate to its end, without correction."""
-    first = 0.0 if experiment.start_at_rest else min(WARM_UP, 0.25 * DT * int(experiment.steps.min()))
+    first = (
+        0.0 if experiment.start_at_rest else min(WARM_UP, 0.25 * DT * int(experiment.steps.min()))
+    )
     whole = DT * int(experiment.steps.max())
     run = predict(experiment, fit.robot, fit.noise, whole, whole, first)
     return [_swim(run, m) for m in range(len(experiment.names))]
@@ -73,11 +82,19 @@ def motion_figures(result: Identification) -> list[Figure]:
     found = swims(result)
     note = "Simulated in one go from the first estimate, without correction by measurements. Averaged over strokes."
     return [
-        Figure("Path, measured and simulated", _grid(found, (0,), (1,), ("x (m)", "y (m)"), True), note),
         Figure(
-            "Surge speed, measured and simulated", _grid(found, None, (3,), ("time (s)", "u (m/s)")), note
+            "Path, measured and simulated", _grid(found, (0,), (1,), ("x (m)", "y (m)"), True), note
         ),
-        Figure("Yaw rate, measured and simulated", _grid(found, None, (5,), ("time (s)", "r (rad/s)")), note),
+        Figure(
+            "Surge speed, measured and simulated",
+            _grid(found, None, (3,), ("time (s)", "u (m/s)")),
+            note,
+        ),
+        Figure(
+            "Yaw rate, measured and simulated",
+            _grid(found, None, (5,), ("time (s)", "r (rad/s)")),
+            note,
+        ),
         Figure(
             "Phase portrait: yaw rate over surge speed",
             _grid(found, (3,), (5,), ("u (m/s)", "r (rad/s)")),
@@ -87,7 +104,11 @@ def motion_figures(result: Identification) -> list[Figure]:
 
 
 def _grid(
-    found: list[Swim], across: tuple[int] | None, up: tuple[int], titles: tuple[str, str], equal: bool = False
+    found: list[Swim],
+    across: tuple[int] | None,
+    up: tuple[int],
+    titles: tuple[str, str],
+    equal: bool = False,
 ) -> go.Figure:
     """One panel per trial; across None: time."""
     columns = min(3, len(found))
@@ -130,9 +151,16 @@ def residual_figures(result: Identification) -> list[Figure]:
         for m, name in enumerate(result.training.names[:MOST_TRIALS]):
             k = np.flatnonzero(np.isfinite(white[:, m, i]))[::4]
             over_time.add_scatter(
-                x=k * DT, y=white[k, m, i], mode="markers", marker={"size": 2}, name=name, legendgroup=name,
-                showlegend=row == 1, row=row, col=1,
-            )  # fmt: skip
+                x=k * DT,
+                y=white[k, m, i],
+                mode="markers",
+                marker={"size": 2},
+                name=name,
+                legendgroup=name,
+                showlegend=row == 1,
+                row=row,
+                col=1,
+            )
         over_time.update_yaxes(title=TITLES[ROWS[i]], row=row, col=1)
     over_time.update_xaxes(title="time (s)", row=len(present), col=1)
     return [
@@ -154,7 +182,9 @@ def _autocorrelation(result: Identification, present: list[int]) -> Figure:
         if not series:
             continue
         mean = np.mean([acf(s, nlags=LAGS, fft=True) for s in series], axis=0)
-        figure.add_scatter(x=np.arange(1, LAGS + 1), y=mean[1:], name=TITLES[ROWS[i]], mode="lines+markers")
+        figure.add_scatter(
+            x=np.arange(1, LAGS + 1), y=mean[1:], name=TITLES[ROWS[i]], mode="lines+markers"
+        )
         p = [float(acorr_ljungbox(s, lags=[LJUNG_BOX_LAG])["lb_pvalue"].iloc[0]) for s in series]
         notes.append(f"{TITLES[ROWS[i]]} {np.median(p):.2g}")
     figure.update_xaxes(title="lag (samples)")

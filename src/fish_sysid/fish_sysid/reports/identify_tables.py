@@ -28,7 +28,11 @@ NAMES = {
 def error_table(errors: Mapping[str, ErrorSizes], title: str = "Prediction error") -> Table:
     """Rms of position [mm], heading [mrad] and speed [mm/s] at each horizon."""
     horizons = next(iter(errors.values())).horizons
-    header = ["predictor", *(f"{q} {h:g} s" for h in horizons for q in ("mm", "mrad", "mm/s")), "predictions"]
+    header = [
+        "predictor",
+        *(f"{q} {h:g} s" for h in horizons for q in ("mm", "mrad", "mm/s")),
+        "predictions",
+    ]
     rows = [
         [
             _label(name),
@@ -79,7 +83,10 @@ def parameter_table(result: Identification) -> Table:
         rows.append([name, f"{value:.5g}", f"{error:.2g}", unit, ratio, relative, remark])
     header = ["parameter", "value", "standard error", "unit", "over start", "relative error", ""]
     return Table(
-        "Parameters", header, rows, "Standard errors from the likelihood's curvature, to first order."
+        "Parameters",
+        header,
+        rows,
+        "Standard errors from the likelihood's curvature, to first order.",
     )
 
 
@@ -97,7 +104,9 @@ def bias_table(result: Identification) -> Table:
             result.training.names, result.estimates.bias, result.estimates.bias_std, strict=True
         )
     ]
-    return Table("Sensor biases", ["trial", "gyro, rad/s", "accelerometer forward, m/s²", "left, m/s²"], rows)
+    return Table(
+        "Sensor biases", ["trial", "gyro, rad/s", "accelerometer forward, m/s²", "left, m/s²"], rows
+    )
 
 
 def noise_table(result: Identification) -> Table:

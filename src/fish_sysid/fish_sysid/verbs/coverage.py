@@ -29,17 +29,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--study", type=int, default=10, metavar="N", help="repetitions (default: %(default)s)"
     )
-    parser.add_argument("--trials", type=int, default=10, help="per repetition (default: %(default)s)")
-    parser.add_argument("--duration", type=float, default=10.0, help="s of each trial (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the first repetition (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("coverage.json"), help="file (default: %(default)s)")
+    parser.add_argument(
+        "--trials", type=int, default=10, help="per repetition (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--duration", type=float, default=10.0, help="s of each trial (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of the first repetition (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("coverage.json"), help="file (default: %(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Repeat, print, write."""
     from fish_sysid.coverage import study
 
-    if args.study < 1 or args.trials < 1 or args.seed < 0 or not 2.0 <= args.duration < float("inf"):
+    if (
+        args.study < 1
+        or args.trials < 1
+        or args.seed < 0
+        or not 2.0 <= args.duration < float("inf")
+    ):
         given = f"--study {args.study} --trials {args.trials} --duration {args.duration:g} --seed {args.seed}"
         raise UserError(f"{given}: expected at least 1, 1, 2 s and 0")
     out, console, began = writable_file(args.out), terminal(), time.monotonic()
@@ -55,14 +68,26 @@ def run(args: argparse.Namespace) -> int:
             study(args.study, args.trials, args.duration, args.seed, keep)
     except KeyboardInterrupt:
         if found:
-            tell(found, f"{len(found)} of {args.study}", args.trials, began, partial_file(out), console)
+            tell(
+                found,
+                f"{len(found)} of {args.study}",
+                args.trials,
+                began,
+                partial_file(out),
+                console,
+            )
         raise
     tell(found, str(args.study), args.trials, began, out, console)
     return 0
 
 
 def tell(
-    found: list[Repetition], repetitions: str, trials: int, began: float, out: Path, console: Console
+    found: list[Repetition],
+    repetitions: str,
+    trials: int,
+    began: float,
+    out: Path,
+    console: Console,
 ) -> None:
     """Print and write what the repetitions say; repetitions: how many they are."""
     from fish_report.page import Table
@@ -71,11 +96,20 @@ def tell(
 
     result = summarise(found)
     columns = zip(
-        result.names, result.inside95, result.within3, result.rms_score, result.median_error, strict=True
+        result.names,
+        result.inside95,
+        result.within3,
+        result.rms_score,
+        result.median_error,
+        strict=True,
     )
-    rows = [[n, f"{a:.2f}", f"{b:.2f}", f"{c:.2f}", f"{100 * d:.2g} %"] for n, a, b, c, d in columns]
+    rows = [
+        [n, f"{a:.2f}", f"{b:.2f}", f"{c:.2f}", f"{100 * d:.2g} %"] for n, a, b, c, d in columns
+    ]
     header = ["parameter", "in 95 %", "in 3 s.e.", "rms score", "median error"]
-    print_table(console, Table("Coverage", header, rows, f"{repetitions} repetitions of {trials} trials."))
+    print_table(
+        console, Table("Coverage", header, rows, f"{repetitions} repetitions of {trials} trials.")
+    )
     inside, within = result.overall
     spent = time.monotonic() - began
     console.print(

@@ -21,17 +21,25 @@ from fish_sysid.dataset.read import read_experiment
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "dataset", type=Path, nargs="+", help="recordings or folders of recordings of one robot and day"
+        "dataset",
+        type=Path,
+        nargs="+",
+        help="recordings or folders of recordings of one robot and day",
     )
     parser.add_argument("--robot", type=Path, help="robot.yaml (default: the nominal fish)")
     parser.add_argument(
         "--out", type=Path, required=True, help="folder for diagnosis.json, model.yaml, report.html"
     )
     parser.add_argument(
-        "--false-alarms", type=float, default=0.02, help="tolerated share of false alarms (default 0.02)"
+        "--false-alarms",
+        type=float,
+        default=0.02,
+        help="tolerated share of false alarms (default 0.02)",
     )
     parser.add_argument(
-        "--candidates", metavar="NAME,NAME", help="what competes (default: every name of the vocabulary)"
+        "--candidates",
+        metavar="NAME,NAME",
+        help="what competes (default: every name of the vocabulary)",
     )
     add_topic_arguments(parser)
 
@@ -68,9 +76,14 @@ def run(args: argparse.Namespace) -> int:
     write_json(args.out / "diagnosis.json", content)
     fit = corrected(result)
     save_robot(
-        without_wrench(fit.robot), args.out / "model.yaml", fit.standard_errors, notes=sentence(content)
+        without_wrench(fit.robot),
+        args.out / "model.yaml",
+        fit.standard_errors,
+        notes=sentence(content),
     )
-    write_diagnosis_page(args.out / "report.html", named_path(args.dataset[0]).name, content, result)
+    write_diagnosis_page(
+        args.out / "report.html", named_path(args.dataset[0]).name, content, result
+    )
     for text in left_out:
         print(f"left out: {text}")
     print(sentence(content))

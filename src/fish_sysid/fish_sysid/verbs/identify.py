@@ -22,10 +22,17 @@ from fish_sysid.dataset.read import read_experiment
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
     parser.add_argument(
-        "dataset", type=Path, nargs="+", help="folders of trials, or single recordings, of one robot"
+        "dataset",
+        type=Path,
+        nargs="+",
+        help="folders of trials, or single recordings, of one robot",
     )
-    parser.add_argument("--robot", type=Path, help="where the fit starts (default: the nominal robot)")
-    parser.add_argument("--out", type=Path, default=Path("identified"), help="folder (default: %(default)s)")
+    parser.add_argument(
+        "--robot", type=Path, help="where the fit starts (default: the nominal robot)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("identified"), help="folder (default: %(default)s)"
+    )
     parser.add_argument(
         "--hold-out",
         type=int,

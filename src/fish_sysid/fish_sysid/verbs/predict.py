@@ -48,12 +48,16 @@ def run(args: argparse.Namespace) -> int:
         predictions = predict(experiment, model, noise, args.horizon)
         rows = write_predictions(args.out, predictions)
         horizons = tuple(h for h in (1.0, 2.0, 5.0) if h <= args.horizon) or (args.horizon,)
-        errors = prediction_errors(predict(experiment, model, noise, args.horizon, 1.0, WARM_UP), horizons)
+        errors = prediction_errors(
+            predict(experiment, model, noise, args.horizon, 1.0, WARM_UP), horizons
+        )
     for text in left_out:
         console.print(f"left out: {text}", highlight=False, soft_wrap=True)
     if errors.counts.any():
         print_table(console, error_table({"model": errors}))
     else:
-        console.print(f"no trial lasts {WARM_UP + args.horizon:g} s: errors at the horizon cannot be stated")
+        console.print(
+            f"no trial lasts {WARM_UP + args.horizon:g} s: errors at the horizon cannot be stated"
+        )
     console.print(f"{rows} rows: {args.out}", highlight=False, soft_wrap=True)
     return 0

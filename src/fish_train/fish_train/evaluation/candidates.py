@@ -78,8 +78,12 @@ def constant_candidate(text: str) -> Candidate:
             f"constant gains {text!r}: expected six numbers, kp,ki,kd of steering and of speed"
         ) from None
     if len(values) != len(OUTPUTS):
-        raise UserError(f"constant gains {text!r}: got {len(values)} numbers; expected {len(OUTPUTS)}")
+        raise UserError(
+            f"constant gains {text!r}: got {len(values)} numbers; expected {len(OUTPUTS)}"
+        )
     for value, output in zip(values, OUTPUTS, strict=True):
         if not output.low <= value <= output.high:
-            raise UserError(f"{output.name}: got {value}; expected {output.low:g} to {output.high:g}")
+            raise UserError(
+                f"{output.name}: got {value}; expected {output.low:g} to {output.high:g}"
+            )
     return Candidate(name if equals else "constant", PolicyGains(Policy.constant(Gains(*values))))

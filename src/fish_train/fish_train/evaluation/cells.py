@@ -61,7 +61,9 @@ def make_cells(paths: Sequence[str], speeds: Sequence[float], seeds: Sequence[in
 def start_pose(path: ReferencePath, seed: int) -> tuple[float, float, float]:
     """At rest before the path's beginning, scattered by the seed."""
     random = np.random.default_rng([seed, 3])
-    offset, turn = random.standard_normal(2) * ([START_OFFSET, START_HEADING] if seed else [0.0, 0.0])
+    offset, turn = random.standard_normal(2) * (
+        [START_OFFSET, START_HEADING] if seed else [0.0, 0.0]
+    )
     (x, y), heading = path.point(0.0), float(path.heading_at(0.0))
     along, left = (np.cos(heading), np.sin(heading)), (-np.sin(heading), np.cos(heading))
     return (

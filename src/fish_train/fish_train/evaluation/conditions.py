@@ -14,12 +14,17 @@ ROBUST_CURRENT = 0.03  # m/s, across the pool's long side
 
 
 def make_condition(
-    robot: Robot, off: float = 0.0, current: float = 0.0, latency: float | None = None, perfect: bool = False
+    robot: Robot,
+    off: float = 0.0,
+    current: float = 0.0,
+    latency: float | None = None,
+    perfect: bool = False,
 ) -> Condition:
     """A named condition; what is not given stays as in the simulator node.
 
     Raises:
         ValueError: a value out of range; says what came and what was expected.
+
     """
     if not 0.0 <= off < 1.0:
         raise ValueError(f"off: got {off:g}; expected a share from 0 to below 1 (0.3 is 30 %)")

@@ -53,7 +53,9 @@ class SteadySwim:
 
 def law_of_robot(robot: Robot) -> Law:
     """The law with the feed-forward of this robot in still water far from walls. Raises DoesNotSwim."""
-    swimmer = replace(robot, effects={n: v for n, v in robot.effects.items() if n not in OF_A_PLACE})
+    swimmer = replace(
+        robot, effects={n: v for n, v in robot.effects.items() if n not in OF_A_PLACE}
+    )
     return law_of_plant(lambda count: FishSimPlant([swimmer] * count, range(count)))
 
 
@@ -61,11 +63,15 @@ def law_of_plant(make_plant: Callable[[int], Plant]) -> Law:
     """The law with the feed-forward of what swims; make_plant(count): so many equal robots. Raises DoesNotSwim."""
     law = Law()
     rows = [(s, 0.0) for s in THROTTLES]
-    rows += [(s, sign * alpha) for s in TURNING_THROTTLES for alpha in RUDDERS for sign in (1.0, -1.0)]
+    rows += [
+        (s, sign * alpha) for s in TURNING_THROTTLES for alpha in RUDDERS for sign in (1.0, -1.0)
+    ]
     return fitted_law(steady_swims(make_plant(2 * len(rows)), rows, law.limits), law)
 
 
-def steady_swims(plant: Plant, rows: Sequence[tuple[float, float]], limits: ControlLimits) -> SteadySwim:
+def steady_swims(
+    plant: Plant, rows: Sequence[tuple[float, float]], limits: ControlLimits
+) -> SteadySwim:
     """Swim (throttle, rudder [rad]) of each row on two opposite headings with a plant of twice as many robots."""
     throttle, alpha = np.array(rows).T
     plant.reset(np.column_stack([np.zeros((2 * len(rows), 2)), np.repeat([0.0, np.pi], len(rows))]))
@@ -87,7 +93,9 @@ def fitted_law(swims: SteadySwim, law: Law) -> Law:
     u, alpha = swims.surge, swims.alpha
     straight = alpha == 0.0
     if not (np.isfinite(u).all() and u[straight].max() > SLOWEST and u.min() > 0.0):
-        raise DoesNotSwim(f"mean surge speeds are {np.round(u, 3).tolist()} m/s; expected all above 0")
+        raise DoesNotSwim(
+            f"mean surge speeds are {np.round(u, 3).tolist()} m/s; expected all above 0"
+        )
     powers = np.column_stack([u, u * np.abs(u)])
     (a, b), _ = nnls(powers[straight], swims.throttle[straight])
     turns = ~straight
@@ -101,9 +109,15 @@ def fitted_law(swims: SteadySwim, law: Law) -> Law:
         )
     (a_0, a_1), _ = nnls(np.column_stack([kappa, u[turns] * kappa]), -swims.sway[turns] / u[turns])
     limits = replace(
-        law.limits, throttle_linear=float(a), throttle_quadratic=float(b), turn_linear=float(c), turn_quadratic=float(d),
+        law.limits,
+        throttle_linear=float(a),
+        throttle_quadratic=float(b),
+        turn_linear=float(c),
+        turn_quadratic=float(d),
         curvature_gain=gain,
-    )  # fmt: skip
+    )
     return replace(
-        law, limits=limits, guidance=replace(law.guidance, slip_arm=float(a_0), slip_time=float(a_1))
+        law,
+        limits=limits,
+        guidance=replace(law.guidance, slip_arm=float(a_0), slip_time=float(a_1)),
     )

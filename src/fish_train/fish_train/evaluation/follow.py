@@ -51,6 +51,7 @@ class Trace:
         time: (T,) [s]. motion: (T, B, 6) true motion. cross_track [m], course [rad] (of the path), progress [m]: of the
             true position, (T, B). alpha [rad], throttle: set-points (T, B). gains: (T, B, 6).
         speed: (B,) wanted [m/s]. finished: (B,) reached the end of an open path.
+
     """
 
     time: Array
@@ -68,7 +69,9 @@ class Trace:
 class Follower:
     """The laws' memory for a batch."""
 
-    def __init__(self, paths: Sequence[ReferencePath], speed: Array, gains: GainsSource, law: Law) -> None:
+    def __init__(
+        self, paths: Sequence[ReferencePath], speed: Array, gains: GainsSource, law: Law
+    ) -> None:
         self._law, self._gains, self._speed = law, gains, np.asarray(speed, dtype=float)
         self._paths = PathBatch(paths, law.tracker)
         zeros = np.zeros(len(paths))
@@ -99,7 +102,9 @@ class Follower:
         situation = (heading, motion.surge, self._speed, e_psi, errors.speed, errors.cross_track)
         gains = self._gains.gains(situation, self._speed, at.curvature)
         wanted = Errors(e_psi, errors.speed, water.curvature, water.speed, state.water.thrust)
-        control, setpoint = control_step(self._control, wanted, gains, CONTROL_PERIOD, self._law.limits, np)
+        control, setpoint = control_step(
+            self._control, wanted, gains, CONTROL_PERIOD, self._law.limits, np
+        )
         self._swims = self._swims | (known & has_listened(self._listened, motion, guidance, np))
         swims = known & self._swims
         self._control = ControlState(*_updated(swims, control, self._control))
@@ -108,7 +113,9 @@ class Follower:
 
     def command(self) -> Array:
         """Commands (B, 2) for the next 10 ms."""
-        self._actuator, rotor_speed = actuator_step(self._actuator, self.setpoint, DT, self._law.limits, np)
+        self._actuator, rotor_speed = actuator_step(
+            self._actuator, self.setpoint, DT, self._law.limits, np
+        )
         return np.column_stack([rotor_speed, self._actuator.alpha])
 
 
@@ -143,7 +150,14 @@ def follow(
             continue
         follower.decide(seen, known)
         at = judge.update(np.where(lost[:, None], 0.0, motion)[:, :2])
-        row = (motion, at.cross_track_error, at.heading, at.progress, *follower.setpoint, follower.gains)
+        row = (
+            motion,
+            at.cross_track_error,
+            at.heading,
+            at.progress,
+            *follower.setpoint,
+            follower.gains,
+        )
         rows.append([np.where(ended, np.nan, value.T).T for value in row])
         finished |= at.finished & ~ended
         ended |= at.finished | (time >= durations) | lost

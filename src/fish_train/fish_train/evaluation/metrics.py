@@ -48,7 +48,9 @@ class RunMetrics:
 def measure(trace: Trace, run: int, path: ReferencePath) -> RunMetrics:
     """Metrics of robot `run` of a trace."""
     rows = np.isfinite(trace.cross_track[:, run])  # up to the run's end
-    if not rows.any() or not np.all(np.isfinite(trace.motion[rows, run])):  # small as its errors were before
+    if not rows.any() or not np.all(
+        np.isfinite(trace.motion[rows, run])
+    ):  # small as its errors were before
         return RunMetrics(NO_SIZES, NO_SIZES, float("nan"), "the motion diverged")
     time, motion = trace.time[rows], trace.motion[rows, run]
     cross_track, progress = trace.cross_track[rows, run], trace.progress[rows, run]
@@ -85,7 +87,15 @@ def _sizes(errors: Array) -> ErrorSizes:
     rms = np.sqrt(np.mean(errors**2, axis=0))
     rate = np.diff(errors[:, 3]) / CONTROL_PERIOD
     values = (
-        rms[0], size[:, 0].mean(), np.percentile(size[:, 0], 95), size[:, 0].max(), rms[1], rms[2], size[:, 2].mean(),
-        np.percentile(size[:, 2], 95), np.sqrt(np.mean(rate**2)), errors[:, 4].mean(),
-    )  # fmt: skip
+        rms[0],
+        size[:, 0].mean(),
+        np.percentile(size[:, 0], 95),
+        size[:, 0].max(),
+        rms[1],
+        rms[2],
+        size[:, 2].mean(),
+        np.percentile(size[:, 2], 95),
+        np.sqrt(np.mean(rate**2)),
+        errors[:, 4].mean(),
+    )
     return ErrorSizes(*map(float, values))

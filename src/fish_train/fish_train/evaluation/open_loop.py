@@ -51,4 +51,6 @@ def speed_of_throttle(robot: Robot, throttle: Array, limits: ControlLimits) -> A
 def _swim(time: Array, states: Array, size: int) -> Swim:
     cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
     vx, vy, rate = states[:, size : size + 3].T
-    return Swim(time, states[:, :3], np.column_stack([cos * vx + sin * vy, cos * vy - sin * vx, rate]))
+    return Swim(
+        time, states[:, :3], np.column_stack([cos * vx + sin * vy, cos * vy - sin * vx, rate])
+    )

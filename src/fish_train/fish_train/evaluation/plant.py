@@ -38,10 +38,16 @@ class Plant(Protocol):
 class FishSimPlant:
     """Robots of one structure in the simulator, each with its own parameters; `disturbance` [N] stirs the water."""
 
-    def __init__(self, robots: Sequence[Robot], seeds: Sequence[int], disturbance: float = 0.0) -> None:
-        self._robots = [r.with_effect("disturbance", **r.effects.get("disturbance", {})) for r in robots]
+    def __init__(
+        self, robots: Sequence[Robot], seeds: Sequence[int], disturbance: float = 0.0
+    ) -> None:
+        self._robots = [
+            r.with_effect("disturbance", **r.effects.get("disturbance", {})) for r in robots
+        ]
         schemes = [stable_scheme(robot) for robot in self._robots]
-        self._stepper = Stepper.of(self._robots[0], max(schemes, key=lambda scheme: scheme.substeps))
+        self._stepper = Stepper.of(
+            self._robots[0], max(schemes, key=lambda scheme: scheme.substeps)
+        )
         self._still = np.array([self._stepper.parameters(robot) for robot in self._robots])
         names = self._stepper.layout.parameters
         self._pushed = [names.index(f"disturbance.{key}") for key in ("surge", "sway", "yaw")]

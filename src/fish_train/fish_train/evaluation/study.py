@@ -69,8 +69,12 @@ def detuned(robot: Robot, off: float, seed: int) -> Robot:
     if off == 0.0:
         return robot
     random = np.random.default_rng([seed, 4])
-    factors = {k: 1.0 + off * random.uniform(-1.0, 1.0) for k in robot.parameters if k not in CERTAIN}
-    return robot.with_parameters(**{k: robot.parameters[k] * factor for k, factor in factors.items()})
+    factors = {
+        k: 1.0 + off * random.uniform(-1.0, 1.0) for k in robot.parameters if k not in CERTAIN
+    }
+    return robot.with_parameters(
+        **{k: robot.parameters[k] * factor for k, factor in factors.items()}
+    )
 
 
 def swim(candidate: Candidate, condition: Condition, cells: Sequence[Cell]) -> Trace:
@@ -79,7 +83,9 @@ def swim(candidate: Candidate, condition: Condition, cells: Sequence[Cell]) -> T
     seeds = [cell.seed for cell in cells]
     robots = [detuned(condition.robot, condition.off, seed) for seed in seeds]
     plant = condition.plant(robots, seeds, condition.disturbance)
-    sensing: Sensing = FusedSensing(robots, seeds, condition.sensors) if condition.fused else PerfectSensing()
+    sensing: Sensing = (
+        FusedSensing(robots, seeds, condition.sensors) if condition.fused else PerfectSensing()
+    )
     speed = np.array([cell.speed for cell in cells])
     starts = np.array([start_pose(path, seed) for path, seed in zip(paths, seeds, strict=True)])
     durations = np.array([longest(path, v) for path, v in zip(paths, speed, strict=True)])
@@ -107,7 +113,9 @@ def run_study(
 
     keep: hears of each batch when it is finished, and of its place in the order.
     """
-    tasks = [(c, d, batch) for c in candidates for d in conditions for batch in _batches(cells, jobs)]
+    tasks = [
+        (c, d, batch) for c in candidates for d in conditions for batch in _batches(cells, jobs)
+    ]
     if jobs > 1:
         found = _in_processes(evaluate, tasks, jobs, report, keep)
         return [row for rows in found for row in rows]
@@ -156,7 +164,9 @@ def swim_all(
     tasks = [(candidate, condition, batch) for batch in batches]
     traces = [swim(*task) for task in tasks] if jobs == 1 else _in_processes(swim, tasks, jobs)
     swum = [
-        (cell, trace, k) for batch, trace in zip(batches, traces, strict=True) for k, cell in enumerate(batch)
+        (cell, trace, k)
+        for batch, trace in zip(batches, traces, strict=True)
+        for k, cell in enumerate(batch)
     ]
     rows = [
         Row(candidate.name, condition.name, cell, measure(trace, k, read_path(cell.path)))
@@ -167,7 +177,9 @@ def swim_all(
 
 def mean_sizes(sizes: Sequence[ErrorSizes]) -> ErrorSizes:
     """Field by field over runs; NaN runs count as NaN."""
-    return ErrorSizes(*(float(np.mean([getattr(s, f.name) for s in sizes])) for f in fields(ErrorSizes)))
+    return ErrorSizes(
+        *(float(np.mean([getattr(s, f.name) for s in sizes])) for f in fields(ErrorSizes))
+    )
 
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:

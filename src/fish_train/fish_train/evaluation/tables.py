@@ -35,14 +35,17 @@ def summary_table(rows: Sequence[Row], title: str) -> Table:
     """One line for each candidate under each condition, means over its runs."""
     header = ["gains", "condition", "runs", "failed"]
     header += [
-        f"{name}, {unit}" if unit else name for name, _, _, unit in (*SUMMARY_COLUMNS, *APPROACH_COLUMNS)
+        f"{name}, {unit}" if unit else name
+        for name, _, _, unit in (*SUMMARY_COLUMNS, *APPROACH_COLUMNS)
     ]
     lines = []
     for candidate in unique(rows, lambda r: r.candidate):
         for condition in unique(rows, lambda r: r.condition):
             runs = [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]
             if runs:
-                lines.append([candidate, condition, str(len(runs)), str(_failures(runs)), *_summary(runs)])
+                lines.append(
+                    [candidate, condition, str(len(runs)), str(_failures(runs)), *_summary(runs)]
+                )
     note = (
         "Means over the runs that did not fail, after the approach; * approach included. "
         "Speed: ripple of each stroke included."
@@ -52,15 +55,13 @@ def summary_table(rows: Sequence[Row], title: str) -> Table:
 
 def cell_table(rows: Sequence[Row], title: str) -> Table:
     """Cross-track and speed RMSE of every path and speed, averaged over seeds, for one candidate and condition."""
-    speeds = sorted(set(r.cell.speed for r in rows))
+    speeds = sorted({r.cell.speed for r in rows})
     header = ["path", *(f"{v:g} m/s" for v in speeds)]
     lines = []
     for path in unique(rows, lambda r: r.cell.path):
         cells = [[r for r in rows if r.cell.path == path and r.cell.speed == v] for v in speeds]
         lines.append([path, *(_cell(runs) for runs in cells)])
-    note = (
-        "Cross-track RMSE [mm] / speed RMSE [mm/s] after the approach, means over the runs that did not fail."
-    )
+    note = "Cross-track RMSE [mm] / speed RMSE [mm/s] after the approach, means over the runs that did not fail."
     return Table(title, header, lines, note)
 
 
@@ -72,11 +73,17 @@ def ratio_table(rows: Sequence[Row], nominal: str, title: str) -> Table:
             if condition == nominal:
                 continue
             ratios = cell_ratios(rows, candidate, condition, nominal)
-            failed = _failures([r for r in rows if (r.candidate, r.condition) == (candidate, condition)])
-            sizes = [_mean_and_worst({cell: pair[k] for cell, pair in ratios.items()}) for k in range(2)]
+            failed = _failures(
+                [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]
+            )
+            sizes = [
+                _mean_and_worst({cell: pair[k] for cell, pair in ratios.items()}) for k in range(2)
+            ]
             lost = len(lost_cells(rows, candidate, condition, nominal))
             over = lost + sum(max(pair) > 2.0 for pair in ratios.values())
-            lines.append([candidate, condition, str(failed), *sizes, f"{over} of {lost + len(ratios)}"])
+            lines.append(
+                [candidate, condition, str(failed), *sizes, f"{over} of {lost + len(ratios)}"]
+            )
     header = [
         "gains",
         "condition",
@@ -96,7 +103,6 @@ def cell_ratios(
     rows: Sequence[Row], candidate: str, condition: str, nominal: str
 ) -> dict[tuple[str, float], tuple[float, float]]:
     """Ratios of cross-track and of speed RMSE by path and speed, means over the runs that did not fail."""
-
     worse, base = (_cell_means(rows, candidate, name) for name in (condition, nominal))
     return {
         k: (
@@ -108,18 +114,28 @@ def cell_ratios(
     }
 
 
-def lost_cells(rows: Sequence[Row], candidate: str, condition: str, nominal: str) -> list[tuple[str, float]]:
+def lost_cells(
+    rows: Sequence[Row], candidate: str, condition: str, nominal: str
+) -> list[tuple[str, float]]:
     """Paths and speeds at which every run failed, and under the nominal condition not every one."""
     base, worse = (_cell_means(rows, candidate, name) for name in (nominal, condition))
     mine = [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]
     return [k for k in unique(mine, _path_and_speed) if k in base and k not in worse]
 
 
-def _cell_means(rows: Sequence[Row], candidate: str, condition: str) -> dict[tuple[str, float], ErrorSizes]:
+def _cell_means(
+    rows: Sequence[Row], candidate: str, condition: str
+) -> dict[tuple[str, float], ErrorSizes]:
     """Of each path and speed, over the runs that did not fail; without those of which none is left."""
-    mine = [r for r in rows if (r.candidate, r.condition) == (candidate, condition) and not r.metrics.failure]
+    mine = [
+        r
+        for r in rows
+        if (r.candidate, r.condition) == (candidate, condition) and not r.metrics.failure
+    ]
     keys = unique(mine, _path_and_speed)
-    return {k: mean_sizes([r.metrics.settled for r in mine if _path_and_speed(r) == k]) for k in keys}
+    return {
+        k: mean_sizes([r.metrics.settled for r in mine if _path_and_speed(r) == k]) for k in keys
+    }
 
 
 def _path_and_speed(row: Row) -> tuple[str, float]:

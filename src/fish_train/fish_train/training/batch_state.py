@@ -13,7 +13,9 @@ from fish_train.training.closed_loop_equations import PHYSICS_STEPS, SIZES
 Array = NDArray[np.float64]
 HISTORY = 32  # physics steps of 10 ms kept for delayed vision
 LONGEST_DELAY = HISTORY - PHYSICS_STEPS + 1
-START = GuidanceState().flat  # memory of the guidance before the first period; all else starts at zero
+START = (
+    GuidanceState().flat
+)  # memory of the guidance before the first period; all else starts at zero
 MEMORY_SIZE = SIZES["guidance"] + SIZES["control"] + SIZES["actuator"] + SIZES["last"]
 
 
@@ -28,6 +30,7 @@ class Fleet:
         history: (B, HISTORY, 6) past motions, newest last.
         parameters: (B, NP) of the robots. path: (B,) numbers in the bank. speed: (B,) wanted surge [m/s].
         delay: (B,) physics steps (10 ms) by which what is seen is old; at most LONGEST_DELAY.
+
     """
 
     plant: Array
@@ -41,9 +44,14 @@ class Fleet:
 
     @classmethod
     def at(
-        cls, plant: Array, parameters: Array, path: NDArray[np.int64], speed: Array, motion: Array,
+        cls,
+        plant: Array,
+        parameters: Array,
+        path: NDArray[np.int64],
+        speed: Array,
+        motion: Array,
         delay: NDArray[np.int64] | None = None,
-    ) -> Fleet:  # fmt: skip
+    ) -> Fleet:
         """Fish that start an episode: controllers reset, what they see now was true all the time (`motion` (B, 6))."""
         batch = len(plant)
         return cls(
@@ -56,7 +64,9 @@ class Fleet:
             ),
             path=np.asarray(path, dtype=np.int64),
             speed=np.asarray(speed, dtype=float),
-            delay=np.zeros(batch, dtype=np.int64) if delay is None else np.asarray(delay, dtype=np.int64),
+            delay=np.zeros(batch, dtype=np.int64)
+            if delay is None
+            else np.asarray(delay, dtype=np.int64),
         )
 
     def __len__(self) -> int:
@@ -81,6 +91,7 @@ class WindowResult:
         cost: mean stage cost over periods and fish. gradient: (W,) its derivative in the flat weights, or None.
         report: (T + 1, B, 3) true cross-track [m], heading [rad] and speed error [m/s] at the start of each period and
             at the end. applied: (T, B, 8) gains and set-point of each period.
+
     """
 
     cost: float

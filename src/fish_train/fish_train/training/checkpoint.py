@@ -31,7 +31,11 @@ def save_checkpoint(path: Path, trainer: Trainer) -> None:
     """Write the trainer's state; an older checkpoint is replaced in one step."""
     plain, arrays = trainer.state()
     content: dict[str, Any] = arrays
-    plain |= {"format": FORMAT, "config": trainer.config.to_plain(), "robot": trainer.robot.digest()}
+    plain |= {
+        "format": FORMAT,
+        "config": trainer.config.to_plain(),
+        "robot": trainer.robot.digest(),
+    }
     plain["law"] = law_constants(trainer.law)
     part = path.with_suffix(".part")
     with part.open("wb") as stream:
@@ -44,6 +48,7 @@ def load_checkpoint(path: Path, trainer: Trainer) -> None:
 
     Raises:
         UserError: not a checkpoint, or one of another form, recipe, robot, seed or law; says what differs.
+
     """
     try:
         with np.load(path, allow_pickle=False) as content:
@@ -71,8 +76,14 @@ def load_checkpoint(path: Path, trainer: Trainer) -> None:
 
 def law_constants(law: Law) -> dict[str, Any]:
     """The constants of a law by name; what its policy looks at is the form's."""
-    parts = {"limits": asdict(law.limits), "guidance": asdict(law.guidance), "tracker": asdict(law.tracker)}
-    return {f"{part}.{name}": value for part, values in parts.items() for name, value in values.items()}
+    parts = {
+        "limits": asdict(law.limits),
+        "guidance": asdict(law.guidance),
+        "tracker": asdict(law.tracker),
+    }
+    return {
+        f"{part}.{name}": value for part, values in parts.items() for name, value in values.items()
+    }
 
 
 def _check_law(path: Path, theirs: Mapping[str, Any] | None, ours: Mapping[str, Any]) -> None:

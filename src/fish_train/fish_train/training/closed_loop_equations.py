@@ -51,12 +51,24 @@ SETPOINT_NAMES = Setpoint._fields
 LAST_NAMES = (*Gains._fields, *SETPOINT_NAMES)  # of the period before
 GEOMETRY_NAMES = (
     # nearest of the searched points, where the foot of the perpendicular is linearised
-    "base_x", "base_y", "base_heading", "lowest", "highest",
+    "base_x",
+    "base_y",
+    "base_heading",
+    "lowest",
+    "highest",
     # table row at the progress, and the way from it to the base
-    "row_x", "row_y", "row_heading", "row_curvature", "row_chord", "shift",
+    "row_x",
+    "row_y",
+    "row_heading",
+    "row_curvature",
+    "row_chord",
+    "shift",
     # path segment on which the lookahead point lies
-    "from_x", "from_y", "to_x", "to_y",
-)  # fmt: skip
+    "from_x",
+    "from_y",
+    "to_x",
+    "to_y",
+)
 ERROR_NAMES = Errors._fields  # what the control law is told
 INPUT_COUNTS = {"policy": len(INPUTS), "schedule": 2, "none": 0}
 SPEED_MIDDLE, SPEED_SPAN = 0.2, 0.1  # m/s, of a schedule's first input
@@ -85,14 +97,31 @@ def motion(q: Sequence[Scalar], qd: Sequence[Scalar], xp: Any) -> list[Scalar]:
     return [q[0], q[1], q[2], cos * qd[0] + sin * qd[1], cos * qd[1] - sin * qd[0], qd[2]]
 
 
-def path_ahead(x: Scalar, y: Scalar, geometry: Sequence[Scalar], lookahead: float, xp: Any) -> PathAhead:
+def path_ahead(
+    x: Scalar, y: Scalar, geometry: Sequence[Scalar], lookahead: float, xp: Any
+) -> PathAhead:
     """What a path says at a position, given which of its samples are nearest and ahead (GEOMETRY_NAMES).
 
     Differentiable in the position: the foot of the perpendicular moves along the tangent, the lookahead point along
     its segment. The same numbers as `PathBatch.update`.
     """
-    (base_x, base_y, base_heading, lowest, highest, row_x, row_y, row_heading, row_curvature, chord, shift,
-     from_x, from_y, to_x, to_y) = geometry  # fmt: skip
+    (
+        base_x,
+        base_y,
+        base_heading,
+        lowest,
+        highest,
+        row_x,
+        row_y,
+        row_heading,
+        row_curvature,
+        chord,
+        shift,
+        from_x,
+        from_y,
+        to_x,
+        to_y,
+    ) = geometry
     along = xp.cos(base_heading) * (x - base_x) + xp.sin(base_heading) * (y - base_y)
     delta = shift + xp.fmin(xp.fmax(along, lowest), highest)
     mean = row_heading + 0.5 * row_curvature * delta
@@ -112,10 +141,17 @@ def path_ahead(x: Scalar, y: Scalar, geometry: Sequence[Scalar], lookahead: floa
 
 
 def sense(
-    seen: Sequence[Scalar], true: Sequence[Scalar], guidance: Sequence[Scalar], setpoint: Sequence[Scalar],
-    geometry_seen: Sequence[Scalar], geometry_true: Sequence[Scalar], speed: Scalar, weights: Sequence[Scalar],
-    law: Law, xp: Any,
-) -> dict[str, list[Scalar]]:  # fmt: skip
+    seen: Sequence[Scalar],
+    true: Sequence[Scalar],
+    guidance: Sequence[Scalar],
+    setpoint: Sequence[Scalar],
+    geometry_seen: Sequence[Scalar],
+    geometry_true: Sequence[Scalar],
+    speed: Scalar,
+    weights: Sequence[Scalar],
+    law: Law,
+    xp: Any,
+) -> dict[str, list[Scalar]]:
     """Policy inputs, errors and guidance memory from the motion that is seen; cost and report from the true one.
 
     seen: the motions of the last PHYSICS_STEPS, oldest first, one after the other; the nodes observe at that rate, too.
@@ -131,7 +167,11 @@ def sense(
     actual = Motion(*true)
     truth = path_ahead(actual.x, actual.y, geometry_true, lookahead, xp)
     real, missed = _wanted(state, actual, truth, speed, law, xp)
-    cost = weights[0] * real.heading**2 + weights[1] * real.speed**2 + weights[2] * missed.cross_track**2
+    cost = (
+        weights[0] * real.heading**2
+        + weights[1] * real.speed**2
+        + weights[2] * missed.cross_track**2
+    )
     return {
         "inputs": _inputs(moved, state, told, errors.cross_track, path.curvature, speed, law, xp),
         "errors": list(told),
@@ -178,21 +218,31 @@ def schedule_inputs(speed: Scalar, curvature: Scalar, xp: Any) -> list[Scalar]:
 def gains_of(raw: Sequence[Scalar], xp: Any) -> Gains:
     """Last layer's outputs to gains: tanh and affine scaling to the ranges."""
     return Gains(
-        *(o.low + 0.5 * (o.high - o.low) * (1.0 + xp.tanh(v)) for v, o in zip(raw, OUTPUTS, strict=True))
+        *(
+            o.low + 0.5 * (o.high - o.low) * (1.0 + xp.tanh(v))
+            for v, o in zip(raw, OUTPUTS, strict=True)
+        )
     )
 
 
 def act(
-    errors: Sequence[Scalar], control: Sequence[Scalar], last: Sequence[Scalar], raw: Sequence[Scalar],
-    weights: Sequence[Scalar], law: Law, xp: Any,
-) -> dict[str, list[Scalar]]:  # fmt: skip
+    errors: Sequence[Scalar],
+    control: Sequence[Scalar],
+    last: Sequence[Scalar],
+    raw: Sequence[Scalar],
+    weights: Sequence[Scalar],
+    law: Law,
+    xp: Any,
+) -> dict[str, list[Scalar]]:
     """Gains, set-point and their cost; the changes of an episode's first period are free."""
     gains, before = gains_of(raw, xp), ControlState(*control)
     after, setpoint = control_step(before, Errors(*errors), gains, CONTROL_PERIOD, law.limits, xp)
     spans = [o.high - o.low for o in OUTPUTS]
     size = sum(((g - o.low) / s) ** 2 for g, o, s in zip(gains, OUTPUTS, spans, strict=True))
     change = sum(((g - old) / s) ** 2 for g, old, s in zip(gains, last[:6], spans, strict=True))
-    moved = ((setpoint.alpha - last[6]) / law.limits.rudder_range) ** 2 + (setpoint.throttle - last[7]) ** 2
+    moved = ((setpoint.alpha - last[6]) / law.limits.rudder_range) ** 2 + (
+        setpoint.throttle - last[7]
+    ) ** 2
     cost = weights[4] * size + before.primed * (weights[3] * moved + weights[5] * change)
     return {"control": list(after), "last": [*gains, *setpoint], "cost": [cost]}
 
@@ -201,7 +251,9 @@ def drive(
     actuator: Sequence[Scalar], setpoint: Sequence[Scalar], law: Law, xp: Any
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Actuator memory after 10 ms, and the simulator's command (rotor speed, rudder)."""
-    state, rotor_speed = actuator_step(ActuatorState(*actuator), Setpoint(*setpoint), DT, law.limits, xp)
+    state, rotor_speed = actuator_step(
+        ActuatorState(*actuator), Setpoint(*setpoint), DT, law.limits, xp
+    )
     return list(state), [rotor_speed, state.alpha]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 from importlib.resources import files
 
 import numpy as np
@@ -40,39 +41,68 @@ class _Network(ctypes.Structure):
         ("layers", ctypes.c_long),
         ("columns", ctypes.c_long),
         ("size", ctypes.c_long * (MAX_LAYERS + 1)),
-        *((name, POINTER * MAX_LAYERS) for name in ("panels", "transposed", "activation", "adjoint", "bias")),
+        *(
+            (name, POINTER * MAX_LAYERS)
+            for name in ("panels", "transposed", "activation", "adjoint", "bias")
+        ),
     ]
 
 
 class _Window(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_long) for name in ("batch", "steps", "hold", "gradient")),
-        *((name, POINTER) for name in (
-            "p", "speed", "cost", "noise", "delay", "path", "plant", "memory", "place", "history",
-            "report", "gains", "value",
-        )),
-    ]  # fmt: skip
+        *(
+            (name, POINTER)
+            for name in (
+                "p",
+                "speed",
+                "cost",
+                "noise",
+                "delay",
+                "path",
+                "plant",
+                "memory",
+                "place",
+                "history",
+                "report",
+                "gains",
+                "value",
+            )
+        ),
+    ]
 
 
 class _Path(ctypes.Structure):
     _fields_ = [
-        ("table", POINTER), ("spacing", ctypes.c_double), ("lap_end", ctypes.c_double), ("count", ctypes.c_long),
-        ("last", ctypes.c_long), ("closed", ctypes.c_int), ("restarts", ctypes.c_int),
-    ]  # fmt: skip
+        ("table", POINTER),
+        ("spacing", ctypes.c_double),
+        ("lap_end", ctypes.c_double),
+        ("count", ctypes.c_long),
+        ("last", ctypes.c_long),
+        ("closed", ctypes.c_int),
+        ("restarts", ctypes.c_int),
+    ]
 
 
 class _Search(ctypes.Structure):
     _fields_ = [
-        (k, ctypes.c_double) for k in ("search_window", "lookahead", "lookahead_search", "capture_distance")
+        (k, ctypes.c_double)
+        for k in ("search_window", "lookahead", "lookahead_search", "capture_distance")
     ]
 
 
 def loop_source(stepper: Stepper, law: Law, width: int) -> str:
     """Complete C text of the kernel for a robot's structure, an integration scheme and a law."""
     names = {
-        "NO": "motion", "NU": "guidance", "NK": "control", "NA": "actuator", "NL": "last", "NE": "errors",
-        "NR": "report", "NGAIN": "gains",
-    }  # fmt: skip
+        "NO": "motion",
+        "NU": "guidance",
+        "NK": "control",
+        "NA": "actuator",
+        "NL": "last",
+        "NE": "errors",
+        "NR": "report",
+        "NGAIN": "gains",
+    }
     sizes = {short: SIZES[name] for short, name in names.items()} | {"NI": INPUT_COUNTS[law.inputs]}
     sizes |= {
         "NQ": stepper.layout.links + 3,
@@ -81,12 +111,14 @@ def loop_source(stepper: Stepper, law: Law, width: int) -> str:
         "NCOST": len(COST_NAMES),
     }
     c = files("fish_train.training") / "c"
-    return "\n".join([
-        kernel_source(stepper.layout.structure, stepper.scheme, width, "adjoints"),
-        *(f"#define {name} {value}" for name, value in sizes.items()),
-        *(emit(function) for function in expressions(law)),
-        *((c / name).read_text() for name in ("mlp.h", "path_search.h", "closed_loop.c")),
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            kernel_source(stepper.layout.structure, stepper.scheme, width, "adjoints"),
+            *(f"#define {name} {value}" for name, value in sizes.items()),
+            *(emit(function) for function in expressions(law)),
+            *((c / name).read_text() for name in ("mlp.h", "path_search.h", "closed_loop.c")),
+        ]
+    )
 
 
 class CompiledLoop:
@@ -130,10 +162,20 @@ class CompiledLoop:
         self.bank = bank
         tables = [np.ascontiguousarray(t.rows) for t in bank.tables]
         self._tables = tables  # the kernel holds pointers into them
-        self._paths = (_Path * len(tables))(*(
-            _Path(rows.ctypes.data, t.spacing, t.lap_end, t.count, len(rows) - 1, t.closed, t.restarts)
-            for rows, t in zip(tables, bank.tables, strict=True)
-        ))  # fmt: skip
+        self._paths = (_Path * len(tables))(
+            *(
+                _Path(
+                    rows.ctypes.data,
+                    t.spacing,
+                    t.lap_end,
+                    t.count,
+                    len(rows) - 1,
+                    t.closed,
+                    t.restarts,
+                )
+                for rows, t in zip(tables, bank.tables, strict=True)
+            )
+        )
 
     def window(
         self,
@@ -162,9 +204,20 @@ class CompiledLoop:
         report = np.empty((steps + 1, batch, SIZES["report"]))
         applied, value = np.empty((steps, batch, SIZES["last"])), np.empty(batch)
         arrays = (
-            fleet.parameters, fleet.speed, cost, noise, fleet.delay, fleet.path, fleet.plant, fleet.memory,
-            fleet.place, fleet.history, report, applied, value,
-        )  # fmt: skip
+            fleet.parameters,
+            fleet.speed,
+            cost,
+            noise,
+            fleet.delay,
+            fleet.path,
+            fleet.plant,
+            fleet.memory,
+            fleet.place,
+            fleet.history,
+            report,
+            applied,
+            value,
+        )
         window = _Window(batch, steps, hold, int(gradient), *(a.ctypes.data for a in arrays))
         total = self._run_blocks(window, weights, gradient)
         return WindowResult(float(value.sum() / (batch * steps)), total, report, applied)
@@ -202,7 +255,7 @@ class CompiledLoop:
             return
         self._room = (steps, hold)
         layers, columns = self.layers, self._width * steps // hold
-        pairs = list(zip(layers[:-1], layers[1:], strict=True))
+        pairs = list(itertools.pairwise(layers))
         self._block_gradient = np.empty(weight_count(layers))
         self._activation = [_aligned(i, columns) for i, _ in pairs]
         self._adjoint = [_aligned(o, columns) for _, o in pairs]
@@ -213,7 +266,9 @@ class CompiledLoop:
             matrices = getattr(self, f"_{name}")
             setattr(network, name, (POINTER * MAX_LAYERS)(*(m.ctypes.data for m in matrices)))
         self._network = network
-        size = self._library.scratch_size(ctypes.c_long(steps), ctypes.c_long(sum(map(_padded, layers))))
+        size = self._library.scratch_size(
+            ctypes.c_long(steps), ctypes.c_long(sum(map(_padded, layers)))
+        )
         self._scratch = _aligned(1, size // 8 + 1)
 
 

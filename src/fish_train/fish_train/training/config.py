@@ -28,7 +28,9 @@ class TrainConfig:
     learning_rate: float = 1e-3  # of Adam
     clip: float = 1.0  # largest norm of the gradient
     max_updates: int = 20_000  # stop here if the curriculum is not finished
-    polish_updates: int = 2_000  # after the last level: all levels at once, learning rate falling to a tenth
+    polish_updates: int = (
+        2_000  # after the last level: all levels at once, learning rate falling to a tenth
+    )
     # stage cost: weights of heading [1/rad^2], speed [s^2/m^2], cross-track [1/m^2], change of the set-points in
     # a control period, gains and change of gains as shares of their ranges
     cost_heading: float = 0.5
@@ -54,9 +56,13 @@ class TrainConfig:
     approach: float = 6.0  # s at the start of an episode that the criterion leaves out
     start_offset: float = 0.03  # m, std of the start's distance from the path
     start_heading: float = 0.1  # rad, std of the start's heading error
-    start_rest: float = 0.05  # share of fish that start at rest; the others at 0.5 to 1 of the wanted speed
+    start_rest: float = (
+        0.05  # share of fish that start at rest; the others at 0.5 to 1 of the wanted speed
+    )
     # robustness, all off in the default recipe
-    randomise: float = 0.0  # relative half-width of drags, stiffness, inertias, added masses; effects stay
+    randomise: float = (
+        0.0  # relative half-width of drags, stiffness, inertias, added masses; effects stay
+    )
     noise_position: float = 0.0  # m, std of what the loop sees
     noise_heading: float = 0.0  # rad
     noise_speed: float = 0.0  # m/s
@@ -83,20 +89,34 @@ class TrainConfig:
 
     def _check_numbers(self) -> None:
         counts = (
-            ("batch", 1, 4096), ("unroll", 1, 1000), ("hold", 1, 100), ("max_updates", 1, 10**9),
-            ("polish_updates", 0, 10**9), ("criterion_episodes", 1, 1000),
-        )  # fmt: skip
+            ("batch", 1, 4096),
+            ("unroll", 1, 1000),
+            ("hold", 1, 100),
+            ("max_updates", 1, 10**9),
+            ("polish_updates", 0, 10**9),
+            ("criterion_episodes", 1, 1000),
+        )
         for name, least, most in counts:
             if not isinstance(getattr(self, name), int) or isinstance(getattr(self, name), bool):
                 raise UserError(f"{name}: got {getattr(self, name)!r}; expected a whole number")
             self._within(name, least, most)
         for name, low, high in (
-            ("learning_rate", 1e-8, 1.0), ("clip", 1e-6, 1e6), ("episode", 1.0, 600.0), ("approach", 0.0, 600.0),
-            ("start_offset", 0.0, 0.2), ("start_heading", 0.0, 1.0), ("start_rest", 0.0, 1.0), ("randomise", 0.0, 0.9),
-            ("noise_position", 0.0, 0.5), ("noise_heading", 0.0, 1.0), ("noise_speed", 0.0, 0.5),
-            ("noise_rate", 0.0, 5.0), ("noise_time", 0.0, 10.0), ("latency", 0.0, LONGEST_DELAY * DT),
+            ("learning_rate", 1e-8, 1.0),
+            ("clip", 1e-6, 1e6),
+            ("episode", 1.0, 600.0),
+            ("approach", 0.0, 600.0),
+            ("start_offset", 0.0, 0.2),
+            ("start_heading", 0.0, 1.0),
+            ("start_rest", 0.0, 1.0),
+            ("randomise", 0.0, 0.9),
+            ("noise_position", 0.0, 0.5),
+            ("noise_heading", 0.0, 1.0),
+            ("noise_speed", 0.0, 0.5),
+            ("noise_rate", 0.0, 5.0),
+            ("noise_time", 0.0, 10.0),
+            ("latency", 0.0, LONGEST_DELAY * DT),
             *((f"cost_{name}", 0.0, 1e6) for name in COST_NAMES),
-        ):  # fmt: skip
+        ):
             self._within(name, low, high)
         if self.approach >= self.episode:
             raise UserError(
@@ -105,21 +125,28 @@ class TrainConfig:
 
     def _check_curriculum(self) -> None:
         for name, low, high in (
-            ("amplitudes", 0.01, 5.0), ("cycles", 0.1, 10.0), ("radii", 0.2, 10.0), ("thresholds", 1e-4, 0.5)
-        ):  # fmt: skip
+            ("amplitudes", 0.01, 5.0),
+            ("cycles", 0.1, 10.0),
+            ("radii", 0.2, 10.0),
+            ("thresholds", 1e-4, 0.5),
+        ):
             values = getattr(self, name)
             if not isinstance(values, tuple) or not values:
                 raise UserError(f"{name}: got {values!r}; expected a list of numbers")
             for value in values:
                 if not _is_number(value) or not low <= value <= high:
-                    raise UserError(f"{name}: got {value!r}; expected numbers in [{low:g}, {high:g}]")
+                    raise UserError(
+                        f"{name}: got {value!r}; expected numbers in [{low:g}, {high:g}]"
+                    )
         if list(self.thresholds) != sorted(self.thresholds, reverse=True):
             raise UserError(f"thresholds: got {self.thresholds}; expected falling numbers")
         self._within("slowest", 0.05, 0.5)
         self._within("fastest", 0.05, 0.5)
         self._within("sinusoid_length", 0.5, 50.0)
         if self.slowest > self.fastest:
-            raise UserError(f"slowest: got {self.slowest} m/s; expected at most fastest, {self.fastest} m/s")
+            raise UserError(
+                f"slowest: got {self.slowest} m/s; expected at most fastest, {self.fastest} m/s"
+            )
         self._check_turns()
 
     def _check_turns(self) -> None:
@@ -176,7 +203,10 @@ def load_config(path: str | Path) -> dict[str, Any]:
     path = Path(path)
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
+    except (
+        yaml.YAMLError,
+        ValueError,
+    ) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
         raise UserError(f"{path}: cannot be read as YAML: {error}") from error
     if not isinstance(content, dict):
         raise UserError(f"{path}: got {type(content).__name__}; expected a table of name: value")

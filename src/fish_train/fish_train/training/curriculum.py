@@ -31,7 +31,9 @@ class Level:
     ) -> list[ReferencePath]:
         """The paths of this level: sinusoids of random phase, circles in both directions."""
         if self.family == "circle":
-            return [make_path("circle", radius=self.size, direction=direction) for direction in (1, -1)]
+            return [
+                make_path("circle", radius=self.size, direction=direction) for direction in (1, -1)
+            ]
         turns = (np.arange(phases) + rng.uniform()) / phases
         return [
             make_path(
@@ -64,7 +66,9 @@ def make_levels(config: TrainConfig) -> list[Level]:
             Level(f"circle {radius:g} m, {threshold:g} m", "circle", radius, 0.0, threshold)
             for radius in config.radii
         ]
-        levels += [level for pair in zip_longest(sinusoids, circles) for level in pair if level is not None]
+        levels += [
+            level for pair in zip_longest(sinusoids, circles) for level in pair if level is not None
+        ]
     return levels
 
 

@@ -31,7 +31,9 @@ class Display:
         elif status.state != "training" or self._due(status.seed):
             self._console.print(line(status), soft_wrap=True, highlight=False)
         if status.message:
-            self._console.print(f"seed {status.seed}: {status.message}", soft_wrap=True, highlight=False)
+            self._console.print(
+                f"seed {status.seed}: {status.message}", soft_wrap=True, highlight=False
+            )
 
     def _due(self, seed: int) -> bool:
         now = time.monotonic()
@@ -42,9 +44,23 @@ class Display:
 
     def _table(self) -> Table:
         table = Table(box=None, pad_edge=False)
-        for name in ("seed", "level", "", "update", "steps/s", "time", "cost", "cross-track", "window", "heading",
-                     "speed", "state"):  # fmt: skip
-            table.add_column(name, justify="left" if name in ("", "state") else "right", no_wrap=True)
+        for name in (
+            "seed",
+            "level",
+            "",
+            "update",
+            "steps/s",
+            "time",
+            "cost",
+            "cross-track",
+            "window",
+            "heading",
+            "speed",
+            "state",
+        ):
+            table.add_column(
+                name, justify="left" if name in ("", "state") else "right", no_wrap=True
+            )
         for _, status in sorted(self._statuses.items()):
             table.add_row(*cells(status))
         return table
@@ -55,7 +71,10 @@ class Display:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         if self._live is not None:
             self._live.stop()
@@ -65,7 +84,20 @@ def cells(status: Status) -> list[str]:
     """The row of a run; errors in mm, mrad and mm/s."""
     p = status.progress
     if p is None:
-        return [str(status.seed), "", "", "", "", f"{status.seconds:.0f} s", "", "", "", "", "", status.state]
+        return [
+            str(status.seed),
+            "",
+            "",
+            "",
+            "",
+            f"{status.seconds:.0f} s",
+            "",
+            "",
+            "",
+            "",
+            "",
+            status.state,
+        ]
     full = round(BAR * p.level / status.levels)
     return [
         str(status.seed),

@@ -16,19 +16,31 @@ from fish_train.training.path_bank import PathBank
 
 Array = NDArray[np.float64]
 # what is weighed or measured with a ruler stays as it is
-CERTAIN = ("head_mass", "hinge_offset", "link_length", "link_mass", "fin_length", "fin_mass", "servo_rate_limit",
-           "rudder_range")  # fmt: skip
+CERTAIN = (
+    "head_mass",
+    "hinge_offset",
+    "link_length",
+    "link_mass",
+    "fin_length",
+    "fin_mass",
+    "servo_rate_limit",
+    "rudder_range",
+)
 RUN_OUT = 0.5  # m of an open path that must be left at the end of an episode
 
 
 class Episodes:
     """Draws the start of an episode for a bank of paths."""
 
-    def __init__(self, config: TrainConfig, robot: Robot, stepper: Stepper, tracker: TrackerConfig) -> None:
+    def __init__(
+        self, config: TrainConfig, robot: Robot, stepper: Stepper, tracker: TrackerConfig
+    ) -> None:
         self._config, self._stepper, self._tracker = config, stepper, tracker
         self._parameters = stepper.parameters(robot)
         # parameters of effects (`effect.parameter`) have ranges of their own, and places in the pool are no shares
-        self._uncertain = np.array([n not in CERTAIN and "." not in n for n in stepper.layout.parameters])
+        self._uncertain = np.array(
+            [n not in CERTAIN and "." not in n for n in stepper.layout.parameters]
+        )
 
     def start(self, bank: PathBank, rng: np.random.Generator) -> Fleet:
         """A batch, some at rest, most near the wanted speed, scattered about random places on random paths."""
@@ -36,10 +48,14 @@ class Episodes:
         path = rng.integers(len(bank), size=batch)
         share = (rng.permutation(batch) + rng.uniform(size=batch)) / batch
         speed = c.slowest + (c.fastest - c.slowest) * share
-        progress = np.array([
-            rng.uniform(0.0, bank.tables[k].length if bank.tables[k].closed else self._room(bank, k, v))
-            for k, v in zip(path, speed, strict=True)
-        ])  # fmt: skip
+        progress = np.array(
+            [
+                rng.uniform(
+                    0.0, bank.tables[k].length if bank.tables[k].closed else self._room(bank, k, v)
+                )
+                for k, v in zip(path, speed, strict=True)
+            ]
+        )
         poses = self._poses(bank, path, progress, rng)
         moving = rng.uniform(size=batch) >= c.start_rest
         surge = speed * moving * rng.uniform(0.5, 1.0, batch)
@@ -60,7 +76,9 @@ class Episodes:
     ) -> Array:
         """Poses (B, 3) beside the path."""
         points = np.array([bank.paths[k].point(s) for k, s in zip(path, progress, strict=True)])
-        heading = np.array([float(bank.paths[k].heading_at(s)) for k, s in zip(path, progress, strict=True)])
+        heading = np.array(
+            [float(bank.paths[k].heading_at(s)) for k, s in zip(path, progress, strict=True)]
+        )
         # beyond the capture distance progress would not start
         limit = 0.8 * self._tracker.capture_distance
         offset = np.clip(self._config.start_offset * rng.standard_normal(len(path)), -limit, limit)
@@ -104,7 +122,9 @@ class SeenNoise:
         for t in range(steps + 1):
             rows[t] = self.state
             if t < steps:
-                fresh = np.sqrt(1.0 - self._kept**2) * self._std * rng.standard_normal(self.state.shape)
+                fresh = (
+                    np.sqrt(1.0 - self._kept**2) * self._std * rng.standard_normal(self.state.shape)
+                )
                 self.state = self._kept * self.state + fresh
         return rows
 

@@ -49,14 +49,20 @@ def _sense(law: Law) -> tuple[casadi.Function, casadi.Function]:
     arguments = _symbols(sizes)
     seen, true, guidance, setpoint, near, real, speed, weights = map(casadi.vertsplit, arguments)
     values = sense(seen, true, guidance, setpoint, near, real, speed[0], weights, law, CASADI)
-    return _with_adjoint("sense", arguments, [v for k in SENSE_OUTPUTS for v in values[k]], (0, 1, 2, 3))
+    return _with_adjoint(
+        "sense", arguments, [v for k in SENSE_OUTPUTS for v in values[k]], (0, 1, 2, 3)
+    )
 
 
 def _act(law: Law) -> tuple[casadi.Function, casadi.Function]:
-    arguments = _symbols([*(SIZES[k] for k in ("errors", "control", "last", "gains")), len(COST_NAMES)])
+    arguments = _symbols(
+        [*(SIZES[k] for k in ("errors", "control", "last", "gains")), len(COST_NAMES)]
+    )
     errors, control, last, raw, weights = map(casadi.vertsplit, arguments)
     values = act(errors, control, last, raw, weights, law, CASADI)
-    return _with_adjoint("act", arguments, [v for k in ACT_OUTPUTS for v in values[k]], (0, 1, 2, 3))
+    return _with_adjoint(
+        "act", arguments, [v for k in ACT_OUTPUTS for v in values[k]], (0, 1, 2, 3)
+    )
 
 
 def _drive(law: Law) -> tuple[casadi.Function, casadi.Function]:
@@ -89,5 +95,7 @@ def _with_adjoint(
         cuts.append(cuts[-1] + argument.shape[0])
     return (
         casadi.Function(name, arguments, casadi.cse([value])),
-        casadi.Function(f"{name}_vjp", [*arguments, g], casadi.cse(casadi.vertsplit(reverse, cuts))),
+        casadi.Function(
+            f"{name}_vjp", [*arguments, g], casadi.cse(casadi.vertsplit(reverse, cuts))
+        ),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -32,13 +33,13 @@ FORMS = {
 
 def weight_count(layers: tuple[int, ...] = LAYERS) -> int:
     """Numbers in the flat vector: W (out, in) row-major, then b, layer after layer."""
-    return sum(n_out * (n_in + 1) for n_in, n_out in zip(layers[:-1], layers[1:], strict=True))
+    return sum(n_out * (n_in + 1) for n_in, n_out in itertools.pairwise(layers))
 
 
 def split(flat: Any, layers: tuple[int, ...] = LAYERS) -> list[tuple[Any, Any]]:
     """Views (W, b) of every layer of a flat NumPy array or torch tensor."""
     views, at = [], 0
-    for n_in, n_out in zip(layers[:-1], layers[1:], strict=True):
+    for n_in, n_out in itertools.pairwise(layers):
         W = flat[at : at + n_out * n_in].reshape(n_out, n_in)
         b = flat[at + n_out * n_in : at + n_out * (n_in + 1)]
         views.append((W, b))

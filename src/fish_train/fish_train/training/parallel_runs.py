@@ -33,7 +33,9 @@ def run_all(jobs: Sequence[Job], parallel: int, report: Callable[[Status], None]
         return [future.result() for future in futures]
 
 
-def _forward(messages: Any, futures: Sequence[Future[Status]], report: Callable[[Status], None]) -> None:
+def _forward(
+    messages: Any, futures: Sequence[Future[Status]], report: Callable[[Status], None]
+) -> None:
     """Hand on what the workers say until all are done; the first error ends the waiting."""
     while True:
         done = wait(futures, timeout=0.0).done

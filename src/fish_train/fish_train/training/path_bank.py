@@ -23,6 +23,7 @@ class PathTable:
         spacing: arc length between rows [m]. count: rows of one lap. length: of the path [m].
         lap_end: arc length at which progress stops [m], infinite on a path that goes round.
         closed, restarts: what happens after the last row: go round, or begin anew.
+
     """
 
     rows: Array
@@ -44,7 +45,9 @@ class PathTable:
         rows = len(path.points) + (0 if path.closed else int(EXTENSION / path.spacing))
         s = path.spacing * np.arange(rows + window)
         points, heading = path.point(s), path.heading_at(s[:rows])
-        view = np.lib.stride_tricks.sliding_window_view(points, window, axis=0)[:rows].swapaxes(1, 2)
+        view = np.lib.stride_tricks.sliding_window_view(points, window, axis=0)[:rows].swapaxes(
+            1, 2
+        )
         ahead = leave_circle(view, points[:rows], tracker.lookahead) - points[:rows]
         chord = np.angle(np.exp(1j * (np.arctan2(ahead[:, 1], ahead[:, 0]) - heading)))
         loops = path.end == "loop"

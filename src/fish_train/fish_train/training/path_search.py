@@ -20,7 +20,9 @@ def locate(table: PathTable, tracker: TrackerConfig, place: Array, position: Arr
     ds, start = table.spacing, place[0]
     if table.restarts and start >= table.lap_end - 1e-6:
         start, place[1] = 0.0, 0.0
-    s = np.minimum(start + ds * np.arange(int(np.ceil(tracker.search_window / ds)) + 1), table.lap_end)
+    s = np.minimum(
+        start + ds * np.arange(int(np.ceil(tracker.search_window / ds)) + 1), table.lap_end
+    )
     squared = np.sum((_rows(table, s)[:, :2] - position) ** 2, axis=1)
     base = s[np.argmin(squared)]
     if squared.min() <= tracker.capture_distance**2:
@@ -50,9 +52,13 @@ def _point(table: PathTable, s: float) -> tuple[tuple[float, float], float]:
     return (x + delta * np.cos(mean), y + delta * np.sin(mean)), heading + curvature * delta
 
 
-def _lookahead_segment(table: PathTable, lookahead: float, s: float, position: Array) -> tuple[Array, Array]:
+def _lookahead_segment(
+    table: PathTable, lookahead: float, s: float, position: Array
+) -> tuple[Array, Array]:
     """Ends of the segment that crosses the circle about the fish; at the farthest point of a path that stays inside."""
-    ahead = s + table.spacing * np.arange(int(np.ceil(LOOKAHEAD_SEARCH * lookahead / table.spacing)) + 1)
+    ahead = s + table.spacing * np.arange(
+        int(np.ceil(LOOKAHEAD_SEARCH * lookahead / table.spacing)) + 1
+    )
     points = _rows(table, ahead)[:, :2]
     distance = np.linalg.norm(points - position, axis=1)
     leaves = distance >= lookahead

@@ -117,7 +117,9 @@ def _search(job: Job, trainer: Trainer, report: Callable[[Status], None]) -> Sta
     began = time.monotonic()
 
     def status(state: State, message: str) -> Status:
-        return Status(job.seed, state, len(trainer.levels), time.monotonic() - began, 0.0, None, message)
+        return Status(
+            job.seed, state, len(trainer.levels), time.monotonic() - began, 0.0, None, message
+        )
 
     cost, weights = search(trainer, lambda text: report(status("training", text)))
     trainer.set_weights(weights)
@@ -132,7 +134,9 @@ def _search(job: Job, trainer: Trainer, report: Callable[[Status], None]) -> Sta
 class _Session:
     """The loop of one start of a run."""
 
-    def __init__(self, job: Job, trainer: Trainer, log: RunLog, report: Callable[[Status], None]) -> None:
+    def __init__(
+        self, job: Job, trainer: Trainer, log: RunLog, report: Callable[[Status], None]
+    ) -> None:
         self._job, self._trainer, self._log, self._report = job, trainer, log, report
         self._began, self._first = time.monotonic(), trainer.update
         self.progress: Progress | None = None
@@ -163,7 +167,11 @@ class _Session:
         """The limit that the run has reached, as the user gave it; empty: none."""
         if self._trainer.update >= self._job.config.max_updates:
             return f"max_updates {self._job.config.max_updates}"
-        return f"--max-seconds {self._job.max_seconds:g}" if self.seconds >= self._job.max_seconds else ""
+        return (
+            f"--max-seconds {self._job.max_seconds:g}"
+            if self.seconds >= self._job.max_seconds
+            else ""
+        )
 
     def _episode(self) -> None:
         """Swim and tell one episode; the polish may end within it."""
@@ -205,7 +213,13 @@ class _Session:
         steps = (trainer.update - self._first) * c.batch * c.unroll
         spent = max(time.monotonic() - self._began, 1e-9)
         return Status(
-            self._job.seed, state, len(trainer.levels), self.seconds, steps / spent, self.progress, message
+            self._job.seed,
+            state,
+            len(trainer.levels),
+            self.seconds,
+            steps / spent,
+            self.progress,
+            message,
         )
 
 
@@ -217,9 +231,11 @@ def check_job(job: Job) -> Array | None:
             f"{job.folder}: holds a training run; continue it with --resume or replace it with --overwrite"
         )
     if (
-        there and job.overwrite and job.warm_start is not None
+        there
+        and job.overwrite
+        and job.warm_start is not None
         and job.warm_start.resolve().is_relative_to(job.folder.resolve())
-    ):  # fmt: skip
+    ):
         raise UserError(
             f"--warm-start {job.warm_start}: is of the run that --overwrite deletes; copy it to another folder first"
         )

@@ -53,7 +53,15 @@ class RunLog:
         values = {f.name: getattr(progress, f.name) for f in fields(progress) if f.name != "gains"}
         gains = dict(zip(GAIN_COLUMNS, progress.gains, strict=True))
         self._table.writerow({"seconds": f"{seconds:.3f}", **values, **gains})
-        for name in ("cost", "cross_track", "heading", "speed", "criterion", "gradient_norm", "level"):
+        for name in (
+            "cost",
+            "cross_track",
+            "heading",
+            "speed",
+            "criterion",
+            "gradient_norm",
+            "level",
+        ):
             self._events.add_scalar(f"train/{name}", values[name], progress.update)
         for name, value in gains.items():
             self._events.add_scalar(f"gains/{name}", value, progress.update)
@@ -67,7 +75,10 @@ class RunLog:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self._close()
 
@@ -95,7 +106,9 @@ def read_curve(folder: Path) -> list[CurveRow]:
     """The curve of a run's folder."""
     path = folder / CURVE
     if not path.exists():
-        raise UserError(f"{path}: no training curve here; expected a folder written by robofish train")
+        raise UserError(
+            f"{path}: no training curve here; expected a folder written by robofish train"
+        )
     return [
         CurveRow(
             seconds=float(row["seconds"]),

@@ -30,16 +30,22 @@ def search(trainer: Trainer, report: Callable[[str], None]) -> tuple[float, Arra
     count = weight_count(trainer.form.layers)
 
     def cost(weights: Array) -> float:
-        value = float(np.mean([trainer.rollout_cost(weights, f.copy(), bank, noise) for f, noise in swims]))
+        value = float(
+            np.mean([trainer.rollout_cost(weights, f.copy(), bank, noise) for f, noise in swims])
+        )
         return value if np.isfinite(value) else 1e6
 
     def said(intermediate_result: OptimizeResult) -> None:
-        report(f"generation {intermediate_result.nit}: mean stage cost {intermediate_result.fun:.5f}")
+        report(
+            f"generation {intermediate_result.nit}: mean stage cost {intermediate_result.fun:.5f}"
+        )
 
     found = differential_evolution(
         cost,
         [(-REACH, REACH)] * count,
-        x0=np.clip(trainer.weights, -REACH, REACH),  # gains that start at an end of their range are beyond
+        x0=np.clip(
+            trainer.weights, -REACH, REACH
+        ),  # gains that start at an end of their range are beyond
         popsize=POPULATION,
         maxiter=GENERATIONS[count],
         tol=1e-4,

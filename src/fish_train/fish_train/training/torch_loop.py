@@ -39,7 +39,9 @@ XP = torch_ops()
 class TorchLoop:
     """Windows of the closed loop; the same calls and numbers as `CompiledLoop`."""
 
-    def __init__(self, stepper: Stepper, law: Law, bank: PathBank, layers: tuple[int, ...] = LAYERS) -> None:
+    def __init__(
+        self, stepper: Stepper, law: Law, bank: PathBank, layers: tuple[int, ...] = LAYERS
+    ) -> None:
         self._stepper, self._law, self.layers = stepper, law, layers
         self.set_bank(bank)
 
@@ -61,7 +63,9 @@ class TorchLoop:
         check_hold(steps, hold)
         flat = torch.tensor(weights, requires_grad=gradient)
         noise = np.zeros((steps + 1, len(fleet), SIZES["motion"])) if noise is None else noise
-        run = _Window(self, flat, fleet, torch.from_numpy(np.asarray(noise)), tuple(map(float, cost)))
+        run = _Window(
+            self, flat, fleet, torch.from_numpy(np.asarray(noise)), tuple(map(float, cost))
+        )
         with torch.set_grad_enabled(gradient):
             total, reports, applied = torch.zeros(()), [], []
             for t in range(steps):
@@ -108,7 +112,9 @@ class _Window:
         self._loop, self._fleet, self._noise, self._cost = loop, fleet, noise, cost
         self._weights = split(flat, loop.layers)
         self._plant = torch.from_numpy(fleet.plant.copy())
-        self._parameters, self._speed = (torch.from_numpy(a) for a in (fleet.parameters, fleet.speed))
+        self._parameters, self._speed = (
+            torch.from_numpy(a) for a in (fleet.parameters, fleet.speed)
+        )
         memory = list(torch.from_numpy(fleet.memory.copy()).unbind(-1))
         cuts = np.cumsum([SIZES[k] for k in ("guidance", "control", "actuator")])
         self._guidance, self._control = memory[: cuts[0]], memory[cuts[0] : cuts[1]]
@@ -124,27 +130,45 @@ class _Window:
         fleet, true = self._fleet, self._motions[-1]
         newest = HISTORY + PHYSICS_STEPS * t - fleet.delay
         seen = [
-            torch.stack([self._motions[at - back][b] for b, at in enumerate(newest)]) + self._noise[t]
+            torch.stack([self._motions[at - back][b] for b, at in enumerate(newest)])
+            + self._noise[t]
             for back in reversed(range(PHYSICS_STEPS))
         ]
         near, real = (self._loop.find(fleet, k, o[:, :2]) for k, o in enumerate((seen[-1], true)))
         setpoint = self.last[SIZES["gains"] :]
-        rows = (torch.cat(seen, dim=-1).unbind(-1), true.unbind(-1), self._guidance, setpoint, near, real)
+        rows = (
+            torch.cat(seen, dim=-1).unbind(-1),
+            true.unbind(-1),
+            self._guidance,
+            setpoint,
+            near,
+            real,
+        )
         return sense(*rows, self._speed, self._cost, self._loop.law, XP)
 
     def decide(self, sensed: dict[str, list[Tensor]]) -> None:
         """Ask the policy."""
-        inputs = _stack(sensed["inputs"]) if sensed["inputs"] else self._plant.new_zeros(len(self._plant), 0)
+        inputs = (
+            _stack(sensed["inputs"])
+            if sensed["inputs"]
+            else self._plant.new_zeros(len(self._plant), 0)
+        )
         self._raw = self._policy(inputs).unbind(-1)
 
     def advance(self, sensed: dict[str, list[Tensor]]) -> Tensor:
         """Control law and physics of one period; the summed cost of gains and set-points."""
         law = self._loop.law
         acted = act(sensed["errors"], self._control, self.last, self._raw, self._cost, law, XP)
-        self._guidance, self._control, self.last = sensed["guidance"], acted["control"], acted["last"]
+        self._guidance, self._control, self.last = (
+            sensed["guidance"],
+            acted["control"],
+            acted["last"],
+        )
         for _ in range(PHYSICS_STEPS):
             self._actuator, command = drive(self._actuator, self.last[SIZES["gains"] :], law, XP)
-            self._plant = torch_step.step(self._plant, _stack(command), self._parameters, self._loop.stepper)
+            self._plant = torch_step.step(
+                self._plant, _stack(command), self._parameters, self._loop.stepper
+            )
             self._motions.append(self._motion())
         cost: Tensor = acted["cost"][0].sum()
         return cost
@@ -164,7 +188,9 @@ class _Window:
         columns = [m if isinstance(m, Tensor) else torch.full_like(like, m) for m in memory]
         self._fleet.plant[:] = self._plant.detach().numpy()
         self._fleet.memory[:] = torch.stack(columns, dim=-1).detach().numpy()
-        self._fleet.history[:] = torch.stack(self._motions[-1 - HISTORY : -1], dim=1).detach().numpy()
+        self._fleet.history[:] = (
+            torch.stack(self._motions[-1 - HISTORY : -1], dim=1).detach().numpy()
+        )
 
 
 def _stack(values: list[Tensor]) -> Tensor:

@@ -100,10 +100,13 @@ class Trainer:
         rng = np.random.default_rng([self.seed, len(self.levels)])
         ladder = self.levels[: len(self.levels) // len(self.config.thresholds)]
         return PathBank(
-            [p for level in ladder for p in level.paths(self.config, rng, POLISH_PHASES)], self.law.tracker
+            [p for level in ladder for p in level.paths(self.config, rng, POLISH_PHASES)],
+            self.law.tracker,
         )
 
-    def rollout_cost(self, weights: Array, fleet: Fleet, bank: PathBank, noise: Array | None = None) -> float:
+    def rollout_cost(
+        self, weights: Array, fleet: Fleet, bank: PathBank, noise: Array | None = None
+    ) -> float:
         """Mean stage cost of an episode from a fleet's state on a bank's paths; the fleet is advanced."""
         self._loop.set_bank(bank)
         cost, hold = np.array(self.config.cost), self.config.hold
@@ -153,11 +156,14 @@ class Trainer:
 
         Raises:
             TrainingDiverged: the weights are those before the bad update.
+
         """
         c = self.config
         noise = self._noise.window(self._window, self.rng)
         weights = self._flat.detach().numpy()
-        result = self._loop.window(weights, self.fleet, self._window, np.array(c.cost), noise, hold=c.hold)
+        result = self._loop.window(
+            weights, self.fleet, self._window, np.array(c.cost), noise, hold=c.hold
+        )
         norm = self._descend(result)
         self.update += 1
         self.polished += self.passed_all
@@ -226,7 +232,9 @@ class Trainer:
     def state(self) -> tuple[dict[str, Any], dict[str, Array]]:
         """(plain values, arrays) from which `restore` continues exactly; between episodes only."""
         if self._rows:
-            raise RuntimeError(f"{len(self._rows)} windows into an episode; expected the start of one")
+            raise RuntimeError(
+                f"{len(self._rows)} windows into an episode; expected the start of one"
+            )
         moments = self._optimiser.state.get(self._flat, {})
         plain = {
             "seed": self.seed,
@@ -254,7 +262,10 @@ class Trainer:
             self._flat.copy_(torch.from_numpy(arrays["weights"]))
         if "exp_avg" in arrays:
             moments = {k: torch.from_numpy(np.array(arrays[k])) for k in ("exp_avg", "exp_avg_sq")}
-            self._optimiser.state[self._flat] = {"step": torch.tensor(plain["optimiser_step"]), **moments}
+            self._optimiser.state[self._flat] = {
+                "step": torch.tensor(plain["optimiser_step"]),
+                **moments,
+            }
         self._noise.state = np.array(arrays["noise"])
         self._loop.set_bank(self._make_bank())
         fleet: dict[str, Any] = {

@@ -81,7 +81,9 @@ def holds_weights(folder: Path, trainer: Trainer) -> bool:
     except (OSError, ValueError, KeyError, TypeError):
         return False
     ours = make_policy(trainer, "").tensors
-    return there.keys() == ours.keys() and all(np.array_equal(there[name], ours[name]) for name in ours)
+    return there.keys() == ours.keys() and all(
+        np.array_equal(there[name], ours[name]) for name in ours
+    )
 
 
 def write_card(
@@ -94,11 +96,15 @@ def write_card(
 def training_state(trainer: Trainer, diverged: bool = False) -> str:
     """How far training came; diverged: and that it went no further than this, rolled back."""
     how = "diverged, rolled back to" if diverged else "stopped at"
-    state = "finished" if trainer.finished else f"{how} level {trainer.level} of {len(trainer.levels)}"
+    state = (
+        "finished" if trainer.finished else f"{how} level {trainer.level} of {len(trainer.levels)}"
+    )
     return f"training {state} after {trainer.update} updates"
 
 
-def model_card(trainer: Trainer, made: str, last: Progress | None, seconds: float, command: str) -> str:
+def model_card(
+    trainer: Trainer, made: str, last: Progress | None, seconds: float, command: str
+) -> str:
     """Markdown: what it is, how it was made, what it is good for."""
     c, robot = trainer.config, trainer.robot
     effects = ", ".join(robot.effects) or "none"

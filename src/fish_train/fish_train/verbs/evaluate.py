@@ -39,11 +39,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="[NAME=]KP,KI,KD,KP,KI,KD",
         help="gains of steering and speed",
     )
-    parser.add_argument("--paths", nargs="+", default=["I", "R", "O", "S"], help="R, circle:radius=0.6, ...")
-    parser.add_argument("--speeds", nargs="+", type=float, default=[0.1, 0.15, 0.2, 0.25], help="m/s")
-    parser.add_argument("--seeds", type=int, default=3, help="runs of each cell (default: %(default)s)")
-    parser.add_argument("--first-seed", type=int, default=0, help="of these runs (default: %(default)s)")
-    parser.add_argument("--plant", type=Path, help="robot.yaml or model.yaml (default: the nominal robot)")
+    parser.add_argument(
+        "--paths", nargs="+", default=["I", "R", "O", "S"], help="R, circle:radius=0.6, ..."
+    )
+    parser.add_argument(
+        "--speeds", nargs="+", type=float, default=[0.1, 0.15, 0.2, 0.25], help="m/s"
+    )
+    parser.add_argument(
+        "--seeds", type=int, default=3, help="runs of each cell (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--first-seed", type=int, default=0, help="of these runs (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--plant", type=Path, help="robot.yaml or model.yaml (default: the nominal robot)"
+    )
     parser.add_argument(
         "--off", type=float, default=0.0, help="uncertain parameters wrong by up to this share"
     )
@@ -53,9 +63,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--perfect", action="store_true", help="perfect state and still water instead of sensors"
     )
     parser.add_argument(
-        "--robust", action="store_true", help="nominal, parameters off 30 %%, latency 0.3 s, current"
+        "--robust",
+        action="store_true",
+        help="nominal, parameters off 30 %%, latency 0.3 s, current",
     )
-    parser.add_argument("--out", type=Path, default=Path("evaluation"), help="folder (default: %(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("evaluation"), help="folder (default: %(default)s)"
+    )
     parser.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)"
     )
@@ -88,7 +102,9 @@ def run(args: argparse.Namespace) -> int:
             conditions = robust_conditions(robot)
         else:
             conditions = [make_condition(robot, args.off, args.current, args.latency, args.perfect)]
-    cells = make_cells(args.paths, args.speeds, range(args.first_seed, args.first_seed + args.seeds))
+    cells = make_cells(
+        args.paths, args.speeds, range(args.first_seed, args.first_seed + args.seeds)
+    )
     console, began = Console(), time.monotonic()
     if not console.is_terminal:
         console = Console(width=LOG_WIDTH)
@@ -105,13 +121,19 @@ def run(args: argparse.Namespace) -> int:
     _say_failures(failed, console)
     spent = time.monotonic() - began
     console.print(
-        f"{len(rows)} runs in {spent:.0f} s; {table.name} and {page.name} in {folder}", soft_wrap=True
+        f"{len(rows)} runs in {spent:.0f} s; {table.name} and {page.name} in {folder}",
+        soft_wrap=True,
     )
     return 1 if failed else 0
 
 
 def _swum(
-    swim: Callable[..., list[Row]], total: int, table: Path, page: Path, nominal: str, console: Console
+    swim: Callable[..., list[Row]],
+    total: int,
+    table: Path,
+    page: Path,
+    nominal: str,
+    console: Console,
 ) -> list[Row]:
     """All rows of a study, with progress; Ctrl-C writes those that are finished beside table and page, and goes on up."""
     finished: dict[int, list[Row]] = {}
@@ -129,7 +151,8 @@ def _swum(
             table, page = partial_file(table), partial_file(page)
             write_study(table, page, rows, nominal)
             console.print(
-                f"{len(rows)} of {total} runs; {table.name} and {page.name} in {table.parent}", soft_wrap=True
+                f"{len(rows)} of {total} runs; {table.name} and {page.name} in {table.parent}",
+                soft_wrap=True,
             )
         raise
 
@@ -139,7 +162,8 @@ def _say_failures(failed: list[Row], console: Console) -> None:
     for row in failed[:20]:
         cell = f"{row.cell.path} at {row.cell.speed:g} m/s, seed {row.cell.seed}"
         console.print(
-            f"failed: {row.candidate}, {row.condition}, {cell}: {row.metrics.failure}", soft_wrap=True
+            f"failed: {row.candidate}, {row.condition}, {cell}: {row.metrics.failure}",
+            soft_wrap=True,
         )
 
 

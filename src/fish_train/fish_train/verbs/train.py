@@ -31,10 +31,17 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
     parser.add_argument(
-        "--out", type=Path, default=Path("training"), help="folder of the runs (default: %(default)s)"
+        "--out",
+        type=Path,
+        default=Path("training"),
+        help="folder of the runs (default: %(default)s)",
     )
-    parser.add_argument("--config", type=Path, help="recipe, a YAML file; keys left out take their defaults")
-    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="values of the recipe")
+    parser.add_argument(
+        "--config", type=Path, help="recipe, a YAML file; keys left out take their defaults"
+    )
+    parser.add_argument(
+        "--set", nargs="+", default=[], metavar="KEY=VALUE", help="values of the recipe"
+    )
     parser.add_argument(
         "--robot", type=Path, help="robot.yaml or a model.yaml of the diagnosis (default: nominal)"
     )
@@ -51,9 +58,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--warm-start", type=Path, help="weights file to start from")
     parser.add_argument("--seed", type=int, default=1, help="first seed (default: %(default)s)")
-    parser.add_argument("--seeds", type=int, default=1, help="number of runs, with consecutive seeds")
     parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, help="runs side by side (default: %(default)s)"
+        "--seeds", type=int, default=1, help="number of runs, with consecutive seeds"
+    )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=os.cpu_count() or 1,
+        help="runs side by side (default: %(default)s)",
     )
     parser.add_argument(
         "--max-seconds",
@@ -81,7 +93,9 @@ def run(args: argparse.Namespace) -> int:
             f"--seed {args.seed} --seeds {args.seeds} --jobs {args.jobs}: expected counts of at least 1"
         )
     check_flags(args)
-    config = make_config({**(load_config(args.config) if args.config else {}), **parse_settings(args.set)})
+    config = make_config(
+        {**(load_config(args.config) if args.config else {}), **parse_settings(args.set)}
+    )
     console = Console()
     robot = read_model(args.robot)
     law = robot_law(robot, args.robot, console)
@@ -172,7 +186,9 @@ def parse_settings(settings: list[str]) -> dict[str, Any]:
             try:
                 value = float(value)
             except ValueError:
-                raise UserError(f"--set {setting}: expected a number or a list of numbers") from None
+                raise UserError(
+                    f"--set {setting}: expected a number or a list of numbers"
+                ) from None
         values[name] = value
     return values
 

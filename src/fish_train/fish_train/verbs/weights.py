@@ -51,7 +51,9 @@ def contract_table(policy: Policy, file: Path) -> Table:
     c = policy.contract
     table = Table("", "", title=str(file), title_justify="left", box=SIMPLE, show_header=False)
     numbers = sum(tensor.size for tensor in policy.tensors.values())
-    kind = "-".join(map(str, c.layers)) + f", {c.activation}, tanh" if c.layers else "constant gains"
+    kind = (
+        "-".join(map(str, c.layers)) + f", {c.activation}, tanh" if c.layers else "constant gains"
+    )
     rows = [
         ("network", f"{kind}; {numbers} numbers"),
         ("inputs", ", ".join(f"{i.name} / {i.scale:g} {i.unit}" for i in c.inputs)),

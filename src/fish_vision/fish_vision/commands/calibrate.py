@@ -28,11 +28,17 @@ def arguments() -> argparse.ArgumentParser:
         "--out", type=Path, default=Path("lens.yaml"), help="calibration_file of the camera node"
     )
     lens.set_defaults(run=calibrate_lens)
-    mount = verbs.add_parser("mount", help="position and tilt of the camera from known points of the pool")
-    mount.add_argument("points", type=Path, help="CSV with header x,y,u,v: pool frame, m, and pixels")
+    mount = verbs.add_parser(
+        "mount", help="position and tilt of the camera from known points of the pool"
+    )
+    mount.add_argument(
+        "points", type=Path, help="CSV with header x,y,u,v: pool frame, m, and pixels"
+    )
     mount.add_argument("--lens", required=True, type=Path, help="file written by `calibrate lens`")
     mount.add_argument("--height", type=float, default=0.0, help="of the points above the water, m")
-    mount.add_argument("--out", type=Path, default=Path("mount.yaml"), help="params file for the tracker")
+    mount.add_argument(
+        "--out", type=Path, default=Path("mount.yaml"), help="params file for the tracker"
+    )
     mount.set_defaults(run=calibrate_mount)
     return parser
 
@@ -40,7 +46,9 @@ def arguments() -> argparse.ArgumentParser:
 def new_file(path: Path) -> Path:
     """The path, where nothing is yet: a params file may hold keys of the user's own. Raises CalibrationError."""
     if path.exists():
-        raise CalibrationError(f"{path}: exists already; expected a new file, as calibrate overwrites none")
+        raise CalibrationError(
+            f"{path}: exists already; expected a new file, as calibrate overwrites none"
+        )
     return path
 
 
@@ -48,12 +56,20 @@ def calibrate_lens(args: argparse.Namespace) -> None:
     """Write a camera calibration file."""
     out = new_file(args.out)
     sides = args.corners.lower().split("x")
-    if len(sides) != 2 or not all(s.isdigit() and int(s) > 2 for s in sides) or not 0.0 < args.square < inf:
-        raise CalibrationError(f"--corners {args.corners} --square {args.square}: expected like 8x6 and 0.03")
+    if (
+        len(sides) != 2
+        or not all(s.isdigit() and int(s) > 2 for s in sides)
+        or not 0.0 < args.square < inf
+    ):
+        raise CalibrationError(
+            f"--corners {args.corners} --square {args.square}: expected like 8x6 and 0.03"
+        )
     pictures = [read_picture(path) for path in args.pictures]
     lens, rms, used = lens_from_chessboards(pictures, (int(sides[0]), int(sides[1])), args.square)
     out.write_text(yaml.safe_dump(lens_document(lens, "overhead"), sort_keys=False))
-    print(f"{args.out}: board found in {len(used)} of {len(pictures)} pictures, error {rms:.3f} pixels rms")
+    print(
+        f"{args.out}: board found in {len(used)} of {len(pictures)} pictures, error {rms:.3f} pixels rms"
+    )
 
 
 def calibrate_mount(args: argparse.Namespace) -> None:
@@ -86,12 +102,18 @@ def read_points(path: Path) -> np.ndarray:
     """(N, 4) x, y, u, v from a CSV file with a header."""
     try:
         with path.open(newline="") as file:
-            rows = [[float(row[key]) for key in ("x", "y", "u", "v")] for row in csv.DictReader(file)]
+            rows = [
+                [float(row[key]) for key in ("x", "y", "u", "v")] for row in csv.DictReader(file)
+            ]
     except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
-        raise CalibrationError(f"{path}: expected CSV with header x,y,u,v and numbers ({error})") from error
+        raise CalibrationError(
+            f"{path}: expected CSV with header x,y,u,v and numbers ({error})"
+        ) from error
     points = np.array(rows).reshape(-1, 4)
     if not np.isfinite(points).all():
-        line = int(np.argmin(np.isfinite(points).all(axis=1))) + 2  # after the header, counted from 1
+        line = (
+            int(np.argmin(np.isfinite(points).all(axis=1))) + 2
+        )  # after the header, counted from 1
         raise CalibrationError(f"{path}: line {line} has {rows[line - 2]}: expected finite numbers")
     return points
 

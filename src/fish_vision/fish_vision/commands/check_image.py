@@ -23,7 +23,9 @@ def arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="check_image", description=__doc__)
     parser.add_argument("picture", type=Path)
     parser.add_argument("--lens", required=True, type=Path, help="camera calibration file (YAML)")
-    parser.add_argument("--params", type=Path, help="params file of the tracker; defaults without it")
+    parser.add_argument(
+        "--params", type=Path, help="params file of the tracker; defaults without it"
+    )
     parser.add_argument("--out", type=Path, default=Path("checked.png"), help="annotated picture")
     return parser
 
@@ -33,7 +35,9 @@ def check(args: argparse.Namespace) -> int:
     config = config_from_file(args.params) if args.params else TrackerConfig()
     lens, picture = read_lens(args.lens), read_picture(args.picture)
     if picture.shape[1::-1] != lens.size:
-        raise ValueError(f"{args.picture} has size {picture.shape[1::-1]}, {args.lens} says {lens.size}")
+        raise ValueError(
+            f"{args.picture} has size {picture.shape[1::-1]}, {args.lens} says {lens.size}"
+        )
     calibration = Calibration(lens, config.mount(), config.marker_height)
     print_colours(picture, config, calibration)
     found = Tracker(config, calibration).track(picture, 0.0)
@@ -41,9 +45,13 @@ def check(args: argparse.Namespace) -> int:
         print(f"lost: {found.reason.value}")
     else:
         head, std = found.head, np.sqrt(np.diag(found.head.covariance))
-        print(f"head {head.x:+.4f} {head.y:+.4f} m, heading {head.heading:+.4f} rad, std {std.round(5)}")
+        print(
+            f"head {head.x:+.4f} {head.y:+.4f} m, heading {head.heading:+.4f} rad, std {std.round(5)}"
+        )
         print(f"spacing of the head markers {found.spacing:.4f} of the true one")
-        print(f"tail {'not seen' if found.tail is None else [round(angle, 3) for angle in found.tail]}")
+        print(
+            f"tail {'not seen' if found.tail is None else [round(angle, 3) for angle in found.tail]}"
+        )
     write_picture(args.out, annotated(picture, found, config, calibration))
     print(f"annotated picture: {args.out}")
     return 1 if isinstance(found, Lost) else 0
@@ -54,7 +62,9 @@ def write_picture(path: Path, picture: np.ndarray) -> None:
     try:
         written = cv2.imwrite(str(path), picture)
     except cv2.error as error:
-        raise ValueError(f"{path}: no name of a picture, expected like checked.png ({error.err})") from error
+        raise ValueError(
+            f"{path}: no name of a picture, expected like checked.png ({error.err})"
+        ) from error
     if not written:
         raise ValueError(f"{path}: cannot be written")
 
@@ -67,7 +77,9 @@ def print_colours(picture: np.ndarray, config: TrackerConfig, calibration: Calib
         inside = hsv[config.colour(marker).mask(hsv) > 0]
         middle = np.median(inside, axis=0).astype(int).tolist() if len(inside) else "none"
         spots = [np.round(spot.position, 3).tolist() for spot in finder.find(hsv, marker, (0, 0))]
-        print(f"{marker:9s} {len(inside):6d} pixels in range, middle HSV {middle}, spots at {spots}")
+        print(
+            f"{marker:9s} {len(inside):6d} pixels in range, middle HSV {middle}, spots at {spots}"
+        )
 
 
 def main() -> int:

@@ -42,8 +42,12 @@ class TrackerNode(Node):
     """Messages in and out; the work is in Tracker."""
 
     def __init__(self) -> None:
-        super().__init__("tracker", namespace="fish", automatically_declare_parameters_from_overrides=True)
-        cv2.setNumThreads(1)  # one small region per image: more threads only take time from other nodes
+        super().__init__(
+            "tracker", namespace="fish", automatically_declare_parameters_from_overrides=True
+        )
+        cv2.setNumThreads(
+            1
+        )  # one small region per image: more threads only take time from other nodes
         self._config = read_parameters(self, TrackerConfig)
         self._info: tuple[Any, ...] | None = None  # fields of the camera_info in use
         self._calibration: Calibration | None = None
@@ -58,11 +62,15 @@ class TrackerNode(Node):
             self._debug = self.create_publisher(CompressedImage, "camera/debug/compressed", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
-        self.create_subscription(CameraInfo, "camera/camera_info", self._on_info, qos_profile_sensor_data)
+        self.create_subscription(
+            CameraInfo, "camera/camera_info", self._on_info, qos_profile_sensor_data
+        )
         if self._config.use_raw:
             self.create_subscription(Image, "camera/image_raw", self._on_image, NEWEST_RAW)
         else:
-            self.create_subscription(CompressedImage, "camera/image_raw/compressed", self._on_image, NEWEST)
+            self.create_subscription(
+                CompressedImage, "camera/image_raw/compressed", self._on_image, NEWEST
+            )
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_info(self, msg: CameraInfo) -> None:
@@ -97,7 +105,9 @@ class TrackerNode(Node):
         self._statistics.add(found, perf_counter() - start, age)
         if self._debug is not None:
             drawn = annotated(picture, found, self._config, self._calibration)
-            self._debug.publish(CompressedImage(header=msg.header, format="jpeg", data=to_jpeg(drawn)))
+            self._debug.publish(
+                CompressedImage(header=msg.header, format="jpeg", data=to_jpeg(drawn))
+            )
 
     def _picture(self, msg: CompressedImage | Image, size: tuple[int, int]) -> np.ndarray:
         if isinstance(msg, CompressedImage):
@@ -123,16 +133,23 @@ class TrackerNode(Node):
         """Diagnostics, once a second."""
         level, message = self._state()
         self._log.say(level, message)
-        status = DiagnosticStatus(name=self.get_fully_qualified_name(), level=level, message=message)
+        status = DiagnosticStatus(
+            name=self.get_fully_qualified_name(), level=level, message=message
+        )
         status.hardware_id = "overhead camera"
-        status.values = [KeyValue(key=key, value=value) for key, value in self._statistics.values().items()]
+        status.values = [
+            KeyValue(key=key, value=value) for key, value in self._statistics.values().items()
+        ]
         stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
 
     def _state(self) -> tuple[bytes, str]:
         """Level and message for what came since the last report."""
         statistics = self._statistics
-        images, tracked = statistics.images - self._images_before, statistics.tracked - self._tracked_before
+        images, tracked = (
+            statistics.images - self._images_before,
+            statistics.tracked - self._tracked_before,
+        )
         self._images_before, self._tracked_before = statistics.images, statistics.tracked
         refused, statistics.last_error = statistics.last_error, ""
         if self._calibration is None:

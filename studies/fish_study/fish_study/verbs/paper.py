@@ -24,10 +24,18 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the verb."""
-    parser.add_argument("--out", type=Path, default=Path("paper"), help="folder (default: %(default)s)")
-    parser.add_argument("--weights", type=Path, help="weights file (default: of the first trained seed)")
-    parser.add_argument("--training", type=Path, help="folder of trained seeds (default: OUT/training)")
-    parser.add_argument("--training-seeds", type=int, default=paper.SEEDS, help="default: %(default)s")
+    parser.add_argument(
+        "--out", type=Path, default=Path("paper"), help="folder (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--weights", type=Path, help="weights file (default: of the first trained seed)"
+    )
+    parser.add_argument(
+        "--training", type=Path, help="folder of trained seeds (default: OUT/training)"
+    )
+    parser.add_argument(
+        "--training-seeds", type=int, default=paper.SEEDS, help="default: %(default)s"
+    )
     parser.add_argument(
         "--seeds", type=int, default=3, help="runs of each letter and speed (default: %(default)s)"
     )
@@ -60,19 +68,30 @@ def run(args: argparse.Namespace) -> int:
     folder = args.training or args.out / "training"
     args.out.mkdir(parents=True, exist_ok=True)
     curves, levels = trained(folder, args.training_seeds, robot, args.robot, args.jobs, console)
-    candidate = read_policy("trained gains", args.weights or folder / "seed_1" / "gains.safetensors")
+    candidate = read_policy(
+        "trained gains", args.weights or folder / "seed_1" / "gains.safetensors"
+    )
     condition = make_condition(robot)
     cells = make_cells(paper.LETTERS, paper.SPEEDS, range(args.seeds))
-    console.print(f"swimming {len(cells)} letters through camera, IMU and fusion ...", highlight=False)
+    console.print(
+        f"swimming {len(cells)} letters through camera, IMU and fusion ...", highlight=False
+    )
     traces, rows = swim_all(candidate, condition, cells, args.jobs)
     page = args.out / "paper.html"
-    write_paper_page(page, [
-        *open_loop_blocks(robot), *training_blocks(curves, levels), *simulation_blocks(candidate, condition),
-        error_table(rows), *letter_blocks(candidate, condition, traces),
-    ])  # fmt: skip
+    write_paper_page(
+        page,
+        [
+            *open_loop_blocks(robot),
+            *training_blocks(curves, levels),
+            *simulation_blocks(candidate, condition),
+            error_table(rows),
+            *letter_blocks(candidate, condition, traces),
+        ],
+    )
     total = len(paper.LETTERS) * len(paper.SPEEDS)
     console.print(
-        f"better than the paper's real robot in {better_cells(rows)} of {total} cells; {page}", soft_wrap=True
+        f"better than the paper's real robot in {better_cells(rows)} of {total} cells; {page}",
+        soft_wrap=True,
     )
     return 0
 

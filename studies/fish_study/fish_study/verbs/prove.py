@@ -50,14 +50,22 @@ DEFAULTS: dict[str, Any] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("--worlds", type=int, help=f"number of data sets (default: {DEFAULTS['worlds']})")
     parser.add_argument(
-        "--groups", nargs="+", metavar="GROUP",
+        "--worlds", type=int, help=f"number of data sets (default: {DEFAULTS['worlds']})"
+    )
+    parser.add_argument(
+        "--groups",
+        nargs="+",
+        metavar="GROUP",
         help=f"{', '.join(GROUPS)}, mujoco (needs mujoco); default: all but mujoco",
-    )  # fmt: skip
+    )
     parser.add_argument("--trials", type=int, help=f"per data set (default: {DEFAULTS['trials']})")
-    parser.add_argument("--duration", type=float, help=f"s of each trial (default: {DEFAULTS['duration']:g})")
-    parser.add_argument("--seed", type=int, help="of all worlds (default: drawn now); recorded in study.json")
+    parser.add_argument(
+        "--duration", type=float, help=f"s of each trial (default: {DEFAULTS['duration']:g})"
+    )
+    parser.add_argument(
+        "--seed", type=int, help="of all worlds (default: drawn now); recorded in study.json"
+    )
     parser.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)"
     )
@@ -65,13 +73,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--cluster", default="", metavar="ADDRESS", help="of a Dask scheduler with this file system"
     )
     parser.add_argument(
-        "--oracle", action="store_true", help="fit the true structure too: power and errors against it"
+        "--oracle",
+        action="store_true",
+        help="fit the true structure too: power and errors against it",
     )
     parser.add_argument(
-        "--search", type=int, default=40, help="runs of the search on the plant (default: %(default)s)"
+        "--search",
+        type=int,
+        default=40,
+        help="runs of the search on the plant (default: %(default)s)",
     )
     parser.add_argument(
-        "--trainings", type=int, default=3, help="of each model with --close-loop (default: %(default)s)"
+        "--trainings",
+        type=int,
+        default=3,
+        help="of each model with --close-loop (default: %(default)s)",
     )
     parser.add_argument("--keep", action="store_true", help="keep the recordings (15 MB a world)")
     parser.add_argument(
@@ -81,10 +97,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "plant with this concealed in it (nothing, wind, servo_filter, ballast, ...; needs mujoco)",
     )
     parser.add_argument(
-        "--pool", nargs="+", type=Path, default=[], metavar="STUDY",
+        "--pool",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="STUDY",
         help="instead: tables and page over these finished studies together, in OUT",
-    )  # fmt: skip
-    parser.add_argument("--out", type=Path, default=Path("prove"), help="folder (default: %(default)s)")
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("prove"), help="folder (default: %(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -98,7 +120,11 @@ def run(args: argparse.Namespace) -> int:
     from fish_study.truths import truths_of
 
     given = _given(args)
-    if min(args.jobs, args.search, args.trainings) < 1 or args.trials < 3 or not args.duration >= 4.0:
+    if (
+        min(args.jobs, args.search, args.trainings) < 1
+        or args.trials < 3
+        or not args.duration >= 4.0
+    ):
         raise UserError("expected at least one job, search and training, three trials and 4 s")
     _need("pysindy", "--oracle", args.oracle)
     _need("mujoco", "the second plant", bool(args.close_loop) or "mujoco" in args.groups)
@@ -128,7 +154,8 @@ def run(args: argparse.Namespace) -> int:
     write_prove_page(args.out / "report.html", about, scores, oracle, more)
     seeds = ", ".join(str(a["seed"]) for a in about)
     console.print(
-        f"{args.out}/report.html; seed {seeds}; labels.json, seals.json in each study", soft_wrap=True
+        f"{args.out}/report.html; seed {seeds}; labels.json, seals.json in each study",
+        soft_wrap=True,
     )
     return 0
 
@@ -208,8 +235,12 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
     from fish_train.evaluation.study import write_rows
 
     with user_errors():
-        world = loop_world(args.close_loop, 1 if args.seed is None else args.seed, args.trials, args.duration)
-        plan = Plan(world, args.out / "recordings", args.out, search=args.search, trainings=args.trainings)
+        world = loop_world(
+            args.close_loop, 1 if args.seed is None else args.seed, args.trials, args.duration
+        )
+        plan = Plan(
+            world, args.out / "recordings", args.out, search=args.search, trainings=args.trainings
+        )
         prepare(plan)
         rows = close_loop(plan, args.jobs, console.print)
     result = [loop_table(rows), speed_table(rows)]
@@ -245,7 +276,8 @@ def _progress(console: Console, what: str, total: int) -> Iterator[Callable[[str
             if not console.is_terminal:
                 left = (time.monotonic() - began) / count * (total - count)
                 console.print(
-                    f"{name}: {count} of {total} {what}, about {left / 60.0:.0f} min left", soft_wrap=True
+                    f"{name}: {count} of {total} {what}, about {left / 60.0:.0f} min left",
+                    soft_wrap=True,
                 )
 
         yield done
