@@ -83,7 +83,6 @@ def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
 
     Raises:
         RecordingError: nothing there, empty, truncated or not a recording; the text says what to do.
-
     """
     source = storage(path)
     ros1 = source.suffix == ".bag"

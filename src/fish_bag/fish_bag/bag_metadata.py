@@ -36,7 +36,6 @@ def write_metadata(
     Args:
         time_range: first and last arrival [ns], None without messages.
         custom: free key-value pairs stored with the recording.
-
     """
     first, last = time_range or (0, 0)
     count = sum(topic.count for topic in topics)

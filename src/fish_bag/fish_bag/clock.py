@@ -69,7 +69,6 @@ def estimate_clock(
 
     Args:
         stamp_ns, arrival_ns: (N,) int64, N >= 1, any order.
-
     """
     middle = int(np.mean([stamp_ns.min(), stamp_ns.max()], dtype=np.longdouble))
     delay_ns = arrival_ns - stamp_ns

@@ -26,7 +26,6 @@ def find_trials(path: Path) -> list[Path]:
 
     Raises:
         RecordingError: there is none.
-
     """
     if not path.exists():
         raise RecordingError(f"{path}: does not exist")
@@ -55,7 +54,6 @@ def read_dataset(
 
     Raises:
         RecordingError: no trial can be read. Single unreadable trials stand in DataSet.problems.
-
     """
     path = Path(path)
     paths = find_trials(path)
@@ -118,7 +116,6 @@ def told_apart(trials: Sequence[Trial]) -> list[Trial]:
 
     Raises:
         RecordingError: a recording is there twice.
-
     """
     namesakes: dict[str, list[tuple[str, ...]]] = {}
     for trial in trials:

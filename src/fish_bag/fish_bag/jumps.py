@@ -21,7 +21,6 @@ def find_jumps(t: np.ndarray, x: np.ndarray, y: np.ndarray, psi: np.ndarray) -> 
 
     Args:
         t, x, y, psi: (N,) in order of arrival [s, m, m, rad], NaN allowed (never a jump).
-
     """
     finite = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(psi))
     jumps = np.zeros(len(t), bool)

@@ -173,7 +173,6 @@ def decode_blocks(
     Returns:
         blocks, and the positions of messages in no block: their bytes do not fit the type, or MAX_LAYOUTS
         others came before their layout.
-
     """
     sizes = np.fromiter(map(len, raws), int, len(raws))
     left = np.ones(len(raws), bool)

@@ -89,7 +89,6 @@ class McapRecording:
             custom: stored with the recording ("robot" names the robot).
             chunk_s: age at which an open chunk is written [s], by the times given to `write`.
             compress: chunks are packed with zstandard; costs time while recording.
-
         """
         if directory.exists():
             raise RecordingError(f"{directory}: exists already; recordings are never overwritten")
@@ -132,7 +131,6 @@ class McapRecording:
 
         Raises:
             RecordingError: the type is unknown.
-
         """
         kind = message_type(msgtype) if isinstance(msgtype, str) else msgtype
         known = self.topics.get((name, kind.name))
@@ -164,7 +162,6 @@ class McapRecording:
 
         Raises:
             DiskFullError: the chunk could not be written; the recording has been closed.
-
         """
         chunk, channel = self._chunk, topic.channel.id
         chunk.index.setdefault(channel, []).append((time_ns, chunk.records.count))

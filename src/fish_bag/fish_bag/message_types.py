@@ -23,7 +23,7 @@ class MessageType:
 
 @lru_cache(maxsize=2)
 def typestore(ros1: bool = False) -> Typestore:
-    """Rosbags' types of ROS 2 Jazzy or ROS 1 Noetic."""
+    """rosbags' types of ROS 2 Jazzy or ROS 1 Noetic."""
     return get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_JAZZY)
 
 
@@ -33,7 +33,6 @@ def message_type(name: str) -> MessageType:
 
     Raises:
         RecordingError: not one of the common interfaces.
-
     """
     if name not in typestore().fielddefs:
         raise RecordingError(

@@ -24,7 +24,6 @@ def find_namespace(recorded: Iterable[str], topics: TopicMap) -> str:
 
     Raises:
         RecordingError: topics of more than one robot are in it.
-
     """
     roles: dict[str, set[str]] = {}
     for topic in recorded:

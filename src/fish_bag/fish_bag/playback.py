@@ -108,7 +108,6 @@ class Playback:
 
         Raises:
             RecordingError: the file is damaged from here on.
-
         """
         with damage_is_said(self._path):
             yield from self._reader.messages(self.connections)

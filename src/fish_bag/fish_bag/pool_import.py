@@ -81,7 +81,6 @@ def import_bag(path: Path, out: Path) -> ImportReport:
 
     Raises:
         RecordingError: not one of these bags, or a topic is missing.
-
     """
     bag = read_bag(path, lambda topic, _: topic in (*SOURCES.values(), PATH_SOURCE))
     if not (bag.ros1 and is_pool_bag(bag)):

@@ -52,7 +52,7 @@ class _Loops:
         self.knots = np.linspace(t[0], t[-1], max(2, round((t[-1] - t[0]) / KNOT_S) + 1))
 
     def phase(self, slip: np.ndarray) -> np.ndarray:
-        """Theta + delta on the grid."""
+        """theta + delta on the grid."""
         return np.asarray(self.theta[self.loop] + np.interp(self.grid, self.knots, slip))
 
     def speed(self, slip: np.ndarray, lag_s: float) -> np.ndarray:
@@ -77,7 +77,6 @@ def rebuild_rotor_command(
         t_loop, amplitude, frequency_hz: (L,) loops [s, rad, Hz].
         t_encoder, encoder_speed: (E,) samples [s, rad/s, REP 103 sign].
         end: until when commands are wanted [s]; after the last loop its speed is held.
-
     """
     loops = _Loops(t_loop, amplitude, frequency_hz, end)
     use = (t_encoder > t_loop[0] + 0.2) & (t_encoder < t_loop[-1])

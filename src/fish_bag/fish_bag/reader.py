@@ -49,7 +49,6 @@ def read_trial(path: Path | str, topics: TopicMap | None = None) -> Trial:
 
     Raises:
         RecordingError: nothing can be read; everything less stands in Trial.problems.
-
     """
     topics, path = topics or TopicMap(), Path(path)
     last_names = {rule.topic.rsplit("/", 1)[-1] for rule in topics.rules.values()}

@@ -23,7 +23,6 @@ class RecordFile:
 
         Raises:
             DiskFullError: there is no room for either.
-
         """
         self.path, self.size = path, 0
         self._reserve = path.parent / RESERVE_NAME
@@ -39,7 +38,6 @@ class RecordFile:
 
         Raises:
             DiskFullError: it could not be written; the file is as it was before.
-
         """
         view = memoryview(data)
         try:

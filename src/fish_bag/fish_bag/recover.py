@@ -40,7 +40,6 @@ def recover(path: Path, out: Path) -> Recovery:
 
     Raises:
         RecordingError: not MCAP, files of several recordings, or not one message is left.
-
     """
     walks = [walk_file(file) for file in _files(path)]
     if not any(walk.messages for walk in walks):

@@ -23,7 +23,6 @@ def topic_map(args: argparse.Namespace) -> TopicMap:
 
     Raises:
         UserError: the file is no topic map.
-
     """
     with user_errors():
         topics = load_topic_map(args.topics) if args.topics else TopicMap()

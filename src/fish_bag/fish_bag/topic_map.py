@@ -88,7 +88,6 @@ def load_topic_map(path: Path) -> TopicMap:
 
     Raises:
         RecordingError: the file or a rule is not as expected.
-
     """
     try:
         data = yaml.safe_load(path.read_text())

@@ -290,7 +290,7 @@ def test_pause_rate_and_loop(peer, tmp_path):
 
 
 def test_ctrl_c_does_not_tear_what_the_recorder_is_writing(monkeypatch):
-    """Rclpy ends the spinning; a KeyboardInterrupt in the middle of a record would leave half of it in the file."""
+    """rclpy ends the spinning; a KeyboardInterrupt in the middle of a record would leave half of it in the file."""
     from fish_bag.nodes import recorder
 
     written = []

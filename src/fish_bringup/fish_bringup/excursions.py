@@ -51,7 +51,6 @@ def next_excursion(program: Program, begin: float, robot: Robot, seed: int = 0) 
 
     Raises:
         ProgramError: not even SHORTEST of it does.
-
     """
     random = np.random.default_rng(seed)
     for end in np.arange(program.duration, begin + SHORTEST - 1e-9, -STEP):

@@ -31,7 +31,6 @@ class NodeSpec:
 
     Attributes:
         parameter_file: in config/ of the package's share directory.
-
     """
 
     package: str
@@ -77,7 +76,6 @@ def executable_path(spec: NodeSpec) -> Path:
 
     Raises:
         UserError: not built, or the workspace is not sourced.
-
     """
     try:
         path = Path(get_package_prefix(spec.package)) / "lib" / spec.package / spec.executable

@@ -50,7 +50,6 @@ class SwimEnd:
     Attributes:
         seconds: wall time from the first odometry to the end.
         cpu: share of one core each node used meanwhile.
-
     """
 
     reason: str
@@ -73,7 +72,6 @@ class Robot:
         Raises:
             UserError: a node ended, or it did not come in time.
             KeyboardInterrupt: the user does not want to wait.
-
         """
         deadline = time.monotonic() + START_TIMEOUT
         while not there():
@@ -138,7 +136,6 @@ class Patience:
 
         Raises:
             UserError: for a long time nothing new, though every node lives.
-
         """
         if sight is not None and sight.stamp != self._stamp:
             self._stamp, self._since = sight.stamp, time.monotonic()

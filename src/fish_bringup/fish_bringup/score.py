@@ -58,7 +58,6 @@ class RunScore:
         head_angle: heading error of the head as it swings [rad]. heading: of its mean over a stroke [rad].
         settled: first sample after the approach phase, N if the run never got there.
         finished: whether the end of an open path was reached, or the planner said that it was.
-
     """
 
     source: str
@@ -99,7 +98,6 @@ def score_trial(trial: Trial) -> RunScore:
 
     Raises:
         UserError: path, speed or odometry is missing.
-
     """
     trial = trial.clean()
     motion, source = (
@@ -158,7 +156,6 @@ def path_from_points(points: Array) -> ReferencePath:
 
     Raises:
         PathError: fewer than two points, or values that are not finite.
-
     """
     if len(points) < 2:
         raise PathError(f"got {len(points)} points; expected at least two")

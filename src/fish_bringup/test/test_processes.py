@@ -90,7 +90,7 @@ def test_cpu_time_is_that_of_the_process(nodes):
 
 
 def test_nothing_survives_the_starter(tmp_path):
-    """Kill -9 of the starter ends the node: the kernel sends it SIGTERM."""
+    """kill -9 of the starter ends the node: the kernel sends it SIGTERM."""
     starter = f"""
 import sys, time
 from pathlib import Path

@@ -78,7 +78,6 @@ def read_program(path: Path) -> Program:
     Raises:
         ProgramError: says what came and what was expected.
         OSError: the file cannot be read.
-
     """
     text = path.read_text(encoding="utf-8", errors="replace")
     try:

@@ -23,7 +23,6 @@ def write_gains_file(file: str | Path, policy: Policy) -> None:
 
     Raises:
         GainsFileError: the arrays do not fit the contract.
-
     """
     _check_tensors(policy, Path(file))
     metadata = {"contract": json.dumps(policy.contract.to_json(), allow_nan=False)}
@@ -41,7 +40,6 @@ def read_gains_file(file: str | Path) -> Policy:
 
     Raises:
         GainsFileError: missing, not safetensors, contract not understood, arrays that do not fit it.
-
     """
     file = Path(file)
     try:
@@ -77,7 +75,6 @@ def require_fit(
 
     Raises:
         GainsFileError: lists every difference.
-
     """
     differences = policy.contract.differences(control_period, lookahead, robot_hash)
     if differences:

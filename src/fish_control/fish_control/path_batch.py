@@ -60,7 +60,6 @@ class PathState:
         chord: (B,) direction of the lookahead point of a robot that is exactly on the path, relative to
             `heading` [rad]: what the path's own curvature contributes to the direction of `target`.
         finished: (B,) whether the end of a path that stops has been passed.
-
     """
 
     progress: Array
@@ -200,7 +199,6 @@ def leave_circle(ahead: Array, centre: Array, radius: float) -> Array:
 
     Returns:
         (B, 2) [m]; the first point where the polyline starts outside.
-
     """
     distance = np.linalg.norm(ahead - centre[:, None, :], axis=-1)
     leaves = distance >= radius

@@ -29,7 +29,6 @@ def policy_inputs(
     Args:
         head_angle: mean heading over the stroke [rad], any number of turns. Speeds [m/s], errors [rad, m/s,
             m].
-
     """
     wrapped = xp.arctan2(xp.sin(head_angle), xp.cos(head_angle))
     values = (wrapped, surge_speed, desired_speed, heading_error, speed_error, cross_track_error)

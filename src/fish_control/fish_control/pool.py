@@ -24,7 +24,6 @@ def check_inside_pool(path: ReferencePath, margin: float) -> None:
 
     Raises:
         PathOutsidePoolError: says where the path leaves, by how much, and what to change.
-
     """
     _check(path.points, "reaches", path, margin)
     if path.end == "stop":

@@ -38,7 +38,6 @@ class ReferencePath:
         closed: whether the last point joins the first.
         end: at the end of the path stop, or loop to its beginning (a closed path goes round, an open one
             starts anew).
-
     """
 
     name: str
@@ -166,7 +165,7 @@ def _tangent_heading(samples: Array, closed: bool) -> Array:
 
 
 def _curvature(heading: Array, spacing: float, closed: bool) -> Array:
-    """D chi / d s by central differences."""
+    """d chi / d s by central differences."""
     if not closed:
         return np.gradient(heading, spacing)
     ahead, behind = np.roll(heading, -1), np.roll(heading, 1)

@@ -97,7 +97,7 @@ class StrapdownFilter:
         self._filter.P = P
 
     def innovation(self, pose: Array, R: Array) -> tuple[Array, Array]:
-        """Z - h(x) of a camera pose (x, y, psi) and its covariance S."""
+        """z - h(x) of a camera pose (x, y, psi) and its covariance S."""
         return pose_residual(pose, self.x[POSE]), self.P[POSE, POSE] + R
 
     def correct(self, pose: Array, R: Array) -> None:
@@ -118,7 +118,7 @@ class StrapdownFilter:
 
 
 def _fill_jacobian(F: Array, dt: float, c: float, s: float, ax: float, ay: float) -> None:
-    """D x(t + dt) / d x(t) into an identity; (c, s): direction of the head, (ax, ay): acceleration in the pool.
+    """d x(t + dt) / d x(t) into an identity; (c, s): direction of the head, (ax, ay): acceleration in the pool.
 
     Element by element: this runs for every IMU sample of a replay.
     """

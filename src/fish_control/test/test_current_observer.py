@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_control import water
+from fish_control import current_observer
 from fish_control.control_law import ControlLimits, Setpoint, feedforward_throttle
 from fish_control.current_observer import SIZE, WaterState, bounded, see_across, see_ahead, swim
 
@@ -13,7 +13,7 @@ LIMITS, DT = ControlLimits(), 0.01
 def matrices(state):
     """Estimate (4,) and covariance (4, 4)."""
     P = np.zeros((SIZE, SIZE))
-    P[np.triu_indices(SIZE)] = state[SIZE + water.LAGGED :]
+    P[np.triu_indices(SIZE)] = state[SIZE + current_observer.LAGGED :]
     return np.array(state[:SIZE]), P + P.T - np.diag(np.diag(P))
 
 
@@ -41,21 +41,35 @@ def test_prediction_is_that_of_an_extended_kalman_filter(seed):
         F[:, k] = (moved(x + step) - moved(x - step)) / (2 * eps)
     F[1:3] = np.eye(SIZE)[1:3]  # the current was not handed over
     after = swim(state, setpoint, dt, LIMITS)
-    turn = (water.TURN_DRIFT * 0.2) ** 2 + (water.MOVE_DRIFT * (0.2 - 0.1)) ** 2
-    drift = (water.SPEED_DRIFT * after.throttle) ** 2 + turn
-    Q = np.diag([drift, water.CURRENT_DRIFT**2, water.CURRENT_DRIFT**2, water.THRUST_DRIFT**2])
+    turn = (current_observer.TURN_DRIFT * 0.2) ** 2 + (
+        current_observer.MOVE_DRIFT * (0.2 - 0.1)
+    ) ** 2
+    drift = (current_observer.SPEED_DRIFT * after.throttle) ** 2 + turn
+    Q = np.diag(
+        [
+            drift,
+            current_observer.CURRENT_DRIFT**2,
+            current_observer.CURRENT_DRIFT**2,
+            current_observer.THRUST_DRIFT**2,
+        ]
+    )
     np.testing.assert_allclose(matrices(after)[1], F @ P @ F.T + dt * Q, atol=1e-11)
     rate = 1.1 * after.throttle - feedforward_throttle(0.15, 0.2, LIMITS)
-    assert after.speed == pytest.approx(0.15 + dt * rate / water.LAG, abs=1e-10)
+    assert after.speed == pytest.approx(0.15 + dt * rate / current_observer.LAG, abs=1e-10)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_correction_is_that_of_a_kalman_filter(seed):
     state, psi = some_state(seed), 0.7
     cos, sin = np.cos(psi), np.sin(psi)
-    sway_variance = (water.SWAY_NOISE**2 + (water.MOVE_NOISE * 0.2) ** 2) / DT
+    sway_variance = (current_observer.SWAY_NOISE**2 + (current_observer.MOVE_NOISE * 0.2) ** 2) / DT
     for after, h, measured, variance in (
-        (see_ahead(state, 0.2, cos, sin, DT), [1.0, cos, sin, 0.0], 0.2, water.SURGE_NOISE**2 / DT),
+        (
+            see_ahead(state, 0.2, cos, sin, DT),
+            [1.0, cos, sin, 0.0],
+            0.2,
+            current_observer.SURGE_NOISE**2 / DT,
+        ),
         (see_across(state, 0.03, 0.3, cos, sin, DT), [0.0, -sin, cos, 0.0], 0.03, sway_variance),
     ):
         (x, P), h = matrices(state), np.array(h)
@@ -116,4 +130,8 @@ def test_a_fish_that_already_swims_is_not_taken_for_a_current():
 
 def test_the_estimate_stays_within_its_limits():
     state = bounded(WaterState(0.1, 0.5, -0.5, 2.0), 0.1, np)
-    assert (state.current_x, state.current_y, state.thrust) == (0.1, -0.1, water.THRUST_LIMIT)
+    assert (state.current_x, state.current_y, state.thrust) == (
+        0.1,
+        -0.1,
+        current_observer.THRUST_LIMIT,
+    )

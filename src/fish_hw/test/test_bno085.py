@@ -567,7 +567,7 @@ def up_in_sensor_axes(sample) -> tuple[float, float, float]:
 
 
 def test_rvc_attitude_and_acceleration_agree_in_the_datasheets_frame():
-    """Pitch -1.10 deg, roll 20.85 deg, acceleration -371, -20, 977 mg."""
+    """pitch -1.10 deg, roll 20.85 deg, acceleration -371, -20, 977 mg."""
     body = bytes.fromhex("01 00 92 FF 25 08 8D FE EC FF D1 03 00 00 00")
     frames = [
         b"\xaa\xaa" + bytes([i]) + body + bytes([(i + sum(body)) & 0xFF]) for i in (0xDE, 0xDF)

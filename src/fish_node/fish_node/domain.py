@@ -37,7 +37,6 @@ def choose_domain(asked: int | None = None) -> int:
 
     Raises:
         DomainError: the domain is out of range, in use, or all are.
-
     """
     if asked is None:
         for domain in random.sample(FREE_RANGE, len(FREE_RANGE)):

@@ -32,7 +32,6 @@ def read_settings(
 
     Raises:
         ValueError: as read_node_parameters, or a value of the wrong type or out of range; names the file.
-
     """
     parameters, defaults = read_node_parameters(path, node), asdict(kind())  # type: ignore[call-overload]
     if unknown := unknown_names(parameters, defaults):
@@ -58,7 +57,6 @@ def read_node_parameters(path: Path, node: str) -> dict[str, Any]:
 
     Raises:
         ValueError: unreadable, no parameter file, nothing for the node, or for several; names the file.
-
     """
     name = node.rpartition("/")[2]
     try:

@@ -13,11 +13,10 @@ ROS_NAMES = (
 
 
 def in_type_of(name: str, given: Any, like: Any) -> Any:
-    """Given in the type of like: whole numbers may stand for floats, lists for tuples, YAML 1.1's truth values for Y and N.
+    """given in the type of like: whole numbers may stand for floats, lists for tuples, YAML 1.1's truth values for Y and N.
 
     Raises:
         ValueError: another type; names the parameter, what came and what was expected.
-
     """
     if (
         isinstance(like, tuple)

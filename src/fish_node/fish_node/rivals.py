@@ -14,7 +14,6 @@ class Rivals:
         count: gives the publishers of a topic, the node's own among them.
         warn: is told once of each rival.
         now: clock [s].
-
     """
 
     def __init__(

@@ -58,7 +58,7 @@ def test_what_cannot_start_says_why(monkeypatch, capsys):
 
 
 def test_a_signal_that_shuts_the_context_down_at_the_same_moment_is_no_failure(monkeypatch):
-    """Rclpy looks whether it is still there, and then shuts it down."""
+    """rclpy looks whether it is still there, and then shuts it down."""
     tries = []
 
     def try_shutdown():

@@ -54,7 +54,7 @@ def test_what_comes_and_goes_fills_no_log_and_the_last_word_holds():
 
 
 def test_one_logger_takes_every_level(capfd):
-    """Rclpy refuses two levels from one line of code."""
+    """rclpy refuses two levels from one line of code."""
     log = StatusLog(get_logger("status_log"))
     for level in (OK, WARN, ERROR, OK):
         log.say(level, f"level {level!r}")

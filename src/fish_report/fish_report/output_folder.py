@@ -13,7 +13,6 @@ def new_folder(out: Path | None, name: str) -> Path:
 
     Raises:
         UserError: there is something in it.
-
     """
     folder = out or Path("out") / f"{name}_{datetime.now():%Y%m%d_%H%M%S}"
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

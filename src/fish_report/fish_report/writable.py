@@ -13,7 +13,6 @@ def writable_folder(folder: Path) -> Path:
 
     Raises:
         UserError: it is a file, or takes none.
-
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -32,7 +31,6 @@ def writable_file(file: Path) -> Path:
 
     Raises:
         UserError: it is a folder, or its folder takes no file.
-
     """
     if file.is_dir():
         raise UserError(f"--out {file}: is a folder; expected a file, choose another name")

@@ -53,7 +53,7 @@ def robot_of(comment: str) -> Robot:
 
 
 def simulate(comment: str, table: dict[str, np.ndarray], scheme: Scheme) -> np.ndarray:
-    """Q and q' under the file's inputs, one row for every row of the file."""
+    """q and q' under the file's inputs, one row for every row of the file."""
     robot = robot_of(comment)
     stepper = Stepper(robot.structure, scheme)
     start = stepper.rest(rudder=table["alpha"][0])
@@ -67,7 +67,7 @@ def simulate(comment: str, table: dict[str, np.ndarray], scheme: Scheme) -> np.n
 
 
 def motion(table: dict[str, np.ndarray], links: int) -> np.ndarray:
-    """Q and q' of the file, (rows, 2 n + 6)."""
+    """q and q' of the file, (rows, 2 n + 6)."""
     names = Layout((links, ())).motion
     return np.stack([table[name] for name in names], axis=-1)
 

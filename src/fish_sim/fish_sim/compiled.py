@@ -63,7 +63,7 @@ def lanes() -> int:
 
 @functools.cache
 def has_libmvec() -> bool:
-    """Glibc's vector mathematics can be linked (x86-64 with glibc)."""
+    """glibc's vector mathematics can be linked (x86-64 with glibc)."""
     try:
         ctypes.CDLL("libmvec.so.1")
     except OSError:

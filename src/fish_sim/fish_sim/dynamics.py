@@ -99,7 +99,7 @@ def inner(a: Pair, b: Pair) -> Scalar:
 
 
 def plus(a: Pair, b: Pair, factor: Scalar = 1.0) -> Pair:
-    """A + factor b."""
+    """a + factor b."""
     return a[0] + factor * b[0], a[1] + factor * b[1]
 
 

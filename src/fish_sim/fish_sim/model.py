@@ -210,7 +210,7 @@ class Expression:
     value: Any  # casadi.SX, one column
 
     def function(self) -> casadi.Function:
-        """Inputs -> value."""
+        """inputs -> value."""
         return casadi.Function(self.name, self.inputs, casadi.cse([self.value]))
 
     def jvp(self) -> casadi.Function:

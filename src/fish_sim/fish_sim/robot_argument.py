@@ -13,7 +13,6 @@ def read_model(path: Path | None) -> Robot:
 
     Raises:
         UserError: the file is not there or is no robot.
-
     """
     with user_errors():
         return Robot() if path is None else load_robot(path)

@@ -62,7 +62,6 @@ class Stepper:
 
         Raises:
             ValueError: the scheme's steps are too coarse for this robot.
-
         """
         if scheme is not None:
             check_scheme(scheme, robot)
@@ -117,7 +116,6 @@ class Stepper:
         Raises:
             ValueError: a wrong shape; a command, a parameter or the one start state is not finite. Of a batch of start
                 states the bad ones stay bad (`checks.diverged`) and leave the others alone.
-
         """
         start, commands, parameters, shape = self._arrange(start, commands, parameters)
         check_finite("command", commands, COMMAND_NAMES)

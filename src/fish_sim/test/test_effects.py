@@ -56,7 +56,7 @@ def servo(name, commands, **values):
 
 
 def test_quadratic_drag_stops_a_gliding_head_like_the_closed_form():
-    """M u' = -k u^2 from u_0: u = u_0 / (1 + k u_0 t / m), all bodies together, tail straight behind."""
+    """m u' = -k u^2 from u_0: u = u_0 / (1 + k u_0 t / m), all bodies together, tail straight behind."""
     zero = [k for k in Robot().parameters if "_drag_" in k]
     robot = (
         Robot().with_parameters(**dict.fromkeys(zero, 0.0)).with_effect("quadratic_drag", surge=0.6)
@@ -400,7 +400,7 @@ def test_rotor_saturation_clips():
 
 @pytest.mark.parametrize("command", [70.0, -70.0])
 def test_battery_sag_slows_the_rotor_as_its_load_builds_up(command):
-    """Load = (70 / 100)^2 (1 - exp(-t / T)) from rest; a load that takes all leaves the rotor standing."""
+    """load = (70 / 100)^2 (1 - exp(-t / T)) from rest; a load that takes all leaves the rotor standing."""
     speeds = servo("battery_sag", np.full(300, command), sag=0.4, time_constant=0.5)
     load = 0.7**2 * (1 - np.exp(-0.01 * np.arange(1, 301) / 0.5))
     np.testing.assert_allclose(speeds, command * (1 - 0.4 * load), rtol=1e-12)

@@ -59,7 +59,7 @@ def regression(x, y, used=(0, 1)):
 
 
 def exact(x, y, held):
-    """Log p(y of the trials held | y of the others) of jointly Gaussian measurements."""
+    """log p(y of the trials held | y of the others) of jointly Gaussian measurements."""
     others = [i for i in range(len(x)) if i not in held]
 
     def log_p(trials):

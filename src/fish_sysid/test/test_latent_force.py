@@ -216,7 +216,7 @@ def test_the_worst_trial_tells_whether_residuals_are_white() -> None:
 
 
 def test_p_values_are_of_the_tempered_ratio_times_the_names_tried() -> None:
-    """Chi square with two degrees of freedom is exponential."""
+    """chi square with two degrees of freedom is exponential."""
     assert p_value(5.0 * TEMPER, 2, 3) == pytest.approx(3.0 * np.exp(-5.0))
     assert p_value(-1.0, 1, 1) == 1.0
     assert p_value(0.1, 2, 30) == 1.0

@@ -34,7 +34,6 @@ def lens_from_chessboards(
     Raises:
         CalibrationError: pictures of different sizes, the board in fewer than BOARDS_MIN of them, or boards
             that leave the focal length open.
-
     """
     sizes = {picture.shape[1::-1] for picture in pictures}
     if len(sizes) > 1:
@@ -97,7 +96,6 @@ def mount_from_points(lens: Lens, points: ArrayLike, pixels: ArrayLike) -> tuple
     Raises:
         CalibrationError: fewer than POINTS_MIN points, points that fix no pose (not finite, on one line), or
             a camera that is not above all of them.
-
     """
     points = np.ascontiguousarray(points, float).reshape(-1, 3)
     pixels = np.ascontiguousarray(pixels, float).reshape(-1, 2)

@@ -42,7 +42,6 @@ class Lens:
 
         Raises:
             CalibrationError: sizes, model or numbers that no calibrated camera has.
-
         """
         if width <= 0 or height <= 0:
             raise CalibrationError(

@@ -95,7 +95,6 @@ def config_from_file(path: Path) -> TrackerConfig:
 
     Raises:
         ValueError: not such a file, an unknown parameter, or a value of the wrong type or out of range; names the file.
-
     """
     return read_settings(path, NODE, TrackerConfig, _refuse)
 

@@ -25,7 +25,6 @@ def from_compressed(data: bytes, size: tuple[int, int]) -> Image:
 
     Raises:
         PictureError: not an image, or not of the expected size (width, height).
-
     """
     packed = np.frombuffer(data, np.uint8)
     if packed[:2].tobytes() == JPEG_START and JPEG_END not in packed[-TRAILER:].tobytes():
@@ -46,7 +45,6 @@ def from_raw(
 
     Raises:
         PictureError: unknown encoding, too few bytes, or not of the expected size (width, height).
-
     """
     if encoding not in CONVERSIONS:
         raise PictureError(f"encoding {encoding!r}: expected one of {', '.join(CONVERSIONS)}")

@@ -104,7 +104,6 @@ def tail_angles(
     Returns:
         One angle per link, or None if a link's marker is missing (a chain with a hole has no angles after
         it).
-
     """
     hinge = np.array([head.x, head.y]) - layout.hinge_offset * np.array(
         [cos(head.heading), sin(head.heading)]

@@ -67,7 +67,6 @@ def find_blobs(hsv: Image, colour: ColourRange, area_range: tuple[float, float])
     Args:
         hsv: (h, w, 3) part of an image.
         area_range: least and greatest area, pixels.
-
     """
     mask = colour.mask(hsv)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)

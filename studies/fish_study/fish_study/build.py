@@ -58,7 +58,6 @@ def make_readings(world: World) -> list[Readings]:
     Raises:
         NoWorld: no program keeps the fish off the walls, or the engine became unstable.
         ValueError: the plant is not known.
-
     """
     random = np.random.default_rng(world.seed)
     if world.plant == "fish_sim":

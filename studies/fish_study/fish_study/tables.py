@@ -33,7 +33,7 @@ class Share:
 
     @property
     def value(self) -> float:
-        """K / n; NaN without any."""
+        """k / n; NaN without any."""
         return self.k / self.n if self.n else float("nan")
 
     @property

@@ -15,7 +15,6 @@ def message_class(msgtype: str) -> type:
 
     Raises:
         RecordingError: its package is not installed here.
-
     """
     package, _, name = msgtype.split("/")
     try:

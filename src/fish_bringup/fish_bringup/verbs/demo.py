@@ -115,7 +115,6 @@ def start_pose(name: str, path_args: str) -> Parameters:
 
     Raises:
         UserError: no such path.
-
     """
     try:
         path = make_path(name, **read_arguments(path_args, "path-args"))

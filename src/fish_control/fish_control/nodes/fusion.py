@@ -127,7 +127,7 @@ def to_odometry(estimate: Estimate) -> Odometry:
 
 
 def to_transform(odometry: Odometry) -> TransformStamped:
-    """Pool -> base_link."""
+    """pool -> base_link."""
     message = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
     position = odometry.pose.pose.position
     message.transform.translation.x, message.transform.translation.y = position.x, position.y

@@ -172,7 +172,7 @@ class PlannerNode(Node):
         return self.get_clock().now().nanoseconds * 1e-9, time.monotonic()
 
     def _silence(self) -> float:
-        """S since odometry came, on the clock that says less; 0 before the first.
+        """s since odometry came, on the clock that says less; 0 before the first.
 
         Neither a clock that was set ahead is a silence, nor simulated time that runs fast, nor that which waits for a busy
         computer.

@@ -15,7 +15,6 @@ class Reporter:
     Args:
         node: whose status it is.
         output: what no other node may publish.
-
     """
 
     def __init__(self, node: Node, output: Publisher) -> None:

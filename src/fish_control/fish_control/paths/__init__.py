@@ -31,7 +31,6 @@ def make_path(name: str, **arguments: object) -> ReferencePath:
 
     Raises:
         PathError: unknown family, unknown argument or bad value; lists what is known.
-
     """
     if len(name) == 1:
         name, arguments = "letter", {"letter": name, **arguments}

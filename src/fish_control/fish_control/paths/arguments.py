@@ -12,7 +12,6 @@ def read_arguments(text: str, name: str) -> dict[str, object]:
 
     Raises:
         PathError: no table of names and values.
-
     """
     try:
         arguments = yaml.safe_load(text)

@@ -32,7 +32,6 @@ def letter(
         height: [m]; by default up to TALLEST, lower and off the centre where the fish needs room to stop at the end.
         x, y: offset from there, or with a height of the letter's middle from the pool's centre [m].
         easing: arc length over which curvature builds up [m].
-
     """
     key = str(letter).upper()
     if key not in STROKES:

@@ -33,7 +33,6 @@ def polyline(
         radius: corners are rounded to this [m].
         closed: join the last point to the first; by default when they coincide, or when an SVG outline is
             closed.
-
     """
     if not file:
         raise PathError("polyline: no file given; set file to a .csv or .svg")

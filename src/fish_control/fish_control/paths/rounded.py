@@ -28,7 +28,6 @@ def round_corners(vertices: ArrayLike, radius: ArrayLike, closed: bool = False) 
 
     Returns:
         (M, 2) dense points [m]; the first is not repeated when closed.
-
     """
     corners = np.asarray(vertices, dtype=float)
     sides = np.roll(corners, -1, axis=0) - corners  # side i leads from corner i to the next
@@ -78,7 +77,6 @@ def ease(points: ArrayLike, width: float, closed: bool = False) -> Array:
 
     Returns:
         (N, 2) points every 2 mm.
-
     """
     vertices = np.asarray(points, dtype=float)
     if closed:

@@ -17,7 +17,7 @@ def sinusoid(
     y: float = 0.0,
     end: End | None = None,
 ) -> ReferencePath:
-    """Y = amplitude sin(2 pi cycles (x - x0) / length + phase), from x - length / 2 to x + length / 2 [m,
+    """y = amplitude sin(2 pi cycles (x - x0) / length + phase), from x - length / 2 to x + length / 2 [m,
     rad].
     """
     require_positive("sinusoid", amplitude=amplitude, length=length, cycles=cycles)

@@ -14,4 +14,4 @@ def straight(
     """Line of `length` [m] centred on (x, y) along `course` [rad]."""
     require_positive("straight", length=length)
     half = 0.5 * length * np.array([np.cos(course), np.sin(course)])
-    return ReferencePath.from_points([[x, y] - half, [x, y, *half]], name="straight", end=end)
+    return ReferencePath.from_points([[x, y] - half, [x, y] + half], name="straight", end=end)

@@ -29,7 +29,6 @@ def read_svg(file: Path) -> tuple[Array, bool]:
 
     Raises:
         PathError: not an SVG drawing, or one that cannot be swum in one stroke.
-
     """
     try:
         root = ElementTree.parse(file).getroot()

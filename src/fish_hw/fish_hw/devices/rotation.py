@@ -49,7 +49,7 @@ def norm(q: Quaternion) -> float:
 
 
 def normalised(q: Quaternion) -> Quaternion:
-    """Q / |q|."""
+    """q / |q|."""
     n = norm(q)
     x, y, z, w = q
     return (x / n, y / n, z / n, w / n)

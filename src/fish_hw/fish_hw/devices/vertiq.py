@@ -138,7 +138,6 @@ class Vertiq:
 
         Raises:
             DeviceError: the module does not answer, or refuses the timeout.
-
         """
         if self._verified(reg.TIMEOUT, timeout_s) is not True:
             raise DeviceError(

@@ -28,7 +28,6 @@ class VertiqEmulator:
     Args:
         module: module id it answers to.
         lag_s: time constant of the rotor.
-
     """
 
     def __init__(self, module: int = 0, lag_s: float = 0.01) -> None:

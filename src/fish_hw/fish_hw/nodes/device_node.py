@@ -58,7 +58,6 @@ class DeviceNode(Node):
     Args:
         name: of the node, relative to the namespace.
         settings_class: dataclass whose fields are the parameters.
-
     """
 
     def __init__(self, name: str, settings_class: type[Any]) -> None:

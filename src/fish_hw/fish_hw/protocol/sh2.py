@@ -123,7 +123,6 @@ def parse_reports(payload: bytes, read_time_s: float, drops: Drops) -> list[Repo
     Args:
         payload: cargo of the report channel, without packet header.
         read_time_s: when the hub announced it.
-
     """
     reports: list[Report] = []
     base_s: float | None = (

@@ -36,7 +36,6 @@ class InterruptLine:
     Args:
         chip: GPIO chip, /dev/gpiochip0.
         line: number of the line on that chip (on a Raspberry Pi the BCM number).
-
     """
 
     def __init__(self, chip: str, line: int) -> None:

@@ -23,7 +23,6 @@ class SysfsPwm:
 
     Raises:
         PortUnavailable: chip absent, channel refused or files not writable.
-
     """
 
     def __init__(

@@ -27,7 +27,6 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
     Raises:
         ValueError: an unknown name, or a value of the wrong type or out of range, naming parameter, value and
             what was expected.
-
     """
     defaults = asdict(kind())  # type: ignore[call-overload]
     if unknown := unknown_names(node.get_parameters_by_prefix(""), defaults):
@@ -57,7 +56,6 @@ def run(
         make_node: the node's class.
         name: for the line on stderr.
         at_end: is handed the node on the clean way out, not after an error.
-
     """
     try:
         rclpy.init()

@@ -19,7 +19,6 @@ class StatusLog:
     Args:
         logger: of the node.
         now: clock [s].
-
     """
 
     def __init__(self, logger: Any, now: Callable[[], float] = time.monotonic) -> None:

@@ -57,7 +57,6 @@ class PoolRenderer:
         Args:
             poses: the fish at equal parts of the exposure (one pose = no motion blur, none = empty pool).
             time: s, moves the light on the water.
-
         """
         picture = self._picture
         self._add_light(self._pool, self._caustics.at(time), picture)

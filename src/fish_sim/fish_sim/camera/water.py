@@ -99,7 +99,7 @@ def _colours(surface: Array, end: Array, pixel: float) -> Array:
 
 
 def _blend(colour: Array, other: ArrayLike, distance: Array) -> Array:
-    """Other where distance (pixels beyond an edge) is positive, with one pixel of transition."""
+    """other where distance (pixels beyond an edge) is positive, with one pixel of transition."""
     share = np.clip(distance + 0.5, 0.0, 1.0)[:, None]
     return colour * (1.0 - share) + np.asarray(other, np.float32) * share
 

@@ -20,7 +20,6 @@ def read_experiment(*paths: Path, topics: TopicMap | None = None) -> tuple[Exper
 
     Raises:
         UserError: no trial can be used, one is given twice, or the trials are not of one robot.
-
     """
     read, trials, left_out = [], [], []
     with user_errors():

@@ -36,7 +36,7 @@ def evidence_of(fit: Fit, trials: Sequence[int]) -> float:
 
 
 def predicted(fit: Fit, unseen: Sequence[int]) -> float:
-    """Log p(unseen | the other trials) of a fit to all."""
+    """log p(unseen | the other trials) of a fit to all."""
     everything = range(len(fit.log_likelihood))
     return evidence_of(fit, everything) - evidence_of(
         fit, [i for i in everything if i not in unseen]

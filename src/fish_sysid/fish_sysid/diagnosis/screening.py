@@ -193,7 +193,7 @@ def warm_starts(
     noise: Noise,
     strengths: Sequence[float] = STRENGTHS,
 ) -> list[np.ndarray]:
-    """Theta of the base with a candidate at its best place, weak and strong where this leaves its strength open."""
+    """theta of the base with a candidate at its best place, weak and strong where this leaves its strength open."""
     place = best_place(base, name, experiment, noise)
     if place.keys() >= set(effect_class(name).strength):  # how strong says the place itself
         strengths = strengths[:1]
@@ -201,7 +201,7 @@ def warm_starts(
 
 
 def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -> np.ndarray:
-    """Theta of the base with a candidate of this strength, in typical ones, at this place."""
+    """theta of the base with a candidate of this strength, in typical ones, at this place."""
     return extend(base.theta, base.hypothesis.with_effect(name, SCALE), name, strength, place)
 
 

@@ -155,7 +155,7 @@ def extend(
     strength: float,
     place: Mapping[str, float] | None = None,
 ) -> Array:
-    """Theta (K,) of a hypothesis whose last effect is `name`, from that of the one without it.
+    """theta (K,) of a hypothesis whose last effect is `name`, from that of the one without it.
 
     strength: of the effect, in typical ones; place: values of its parameters that say where or how fast.
     """
@@ -178,15 +178,15 @@ class Coordinates:
         self.neutral, self.scale, self.prior, self.lowest, self.highest = rows.T
 
     def origin(self) -> Array:
-        """Theta of the hypothesis's start values."""
+        """theta of the hypothesis's start values."""
         return self.encode(self.start)
 
     def at_nominal(self, theta: Array) -> Array:
-        """Theta with the nominal parameters at the robot's own values, the effects as they are."""
+        """theta with the nominal parameters at the robot's own values, the effects as they are."""
         return np.where(self.is_log, 0.0, theta)
 
     def encode(self, values: Array) -> Array:
-        """Theta of physical values."""
+        """theta of physical values."""
         linear = (values - self.neutral) / self.scale
         return np.where(
             self.is_log,
@@ -201,7 +201,7 @@ class Coordinates:
         )
 
     def slope(self, theta: Array) -> Array:
-        """D value / d theta."""
+        """d value / d theta."""
         return np.where(self.is_log, self.decode(theta), self.scale)
 
     def clip(self, theta: Array) -> Array:

@@ -138,7 +138,7 @@ def _surge(a: Array, u: Array, throttle: Array, throttle_before: Array) -> Array
 
 
 def _fit_surge(data: list[Table]) -> Array:
-    """A (3,) that predicts best over OUTLOOK: single differences would take the noise in u for damping."""
+    """a (3,) that predicts best over OUTLOOK: single differences would take the noise in u for damping."""
     n = round(OUTLOOK / STEP)
     windows = [
         (d.y[k : k + n + 1, 0], d.w[k : k + n + 1, 0])

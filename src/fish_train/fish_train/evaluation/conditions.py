@@ -24,7 +24,6 @@ def make_condition(
 
     Raises:
         ValueError: a value out of range; says what came and what was expected.
-
     """
     if not 0.0 <= off < 1.0:
         raise ValueError(f"off: got {off:g}; expected a share from 0 to below 1 (0.3 is 30 %)")

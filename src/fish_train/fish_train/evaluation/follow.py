@@ -51,7 +51,6 @@ class Trace:
         time: (T,) [s]. motion: (T, B, 6) true motion. cross_track [m], course [rad] (of the path), progress [m]: of the
             true position, (T, B). alpha [rad], throttle: set-points (T, B). gains: (T, B, 6).
         speed: (B,) wanted [m/s]. finished: (B,) reached the end of an open path.
-
     """
 
     time: Array

@@ -30,7 +30,6 @@ class Fleet:
         history: (B, HISTORY, 6) past motions, newest last.
         parameters: (B, NP) of the robots. path: (B,) numbers in the bank. speed: (B,) wanted surge [m/s].
         delay: (B,) physics steps (10 ms) by which what is seen is old; at most LONGEST_DELAY.
-
     """
 
     plant: Array
@@ -91,7 +90,6 @@ class WindowResult:
         cost: mean stage cost over periods and fish. gradient: (W,) its derivative in the flat weights, or None.
         report: (T + 1, B, 3) true cross-track [m], heading [rad] and speed error [m/s] at the start of each period and
             at the end. applied: (T, B, 8) gains and set-point of each period.
-
     """
 
     cost: float

@@ -48,7 +48,6 @@ def load_checkpoint(path: Path, trainer: Trainer) -> None:
 
     Raises:
         UserError: not a checkpoint, or one of another form, recipe, robot, seed or law; says what differs.
-
     """
     try:
         with np.load(path, allow_pickle=False) as content:

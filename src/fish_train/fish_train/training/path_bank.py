@@ -23,7 +23,6 @@ class PathTable:
         spacing: arc length between rows [m]. count: rows of one lap. length: of the path [m].
         lap_end: arc length at which progress stops [m], infinite on a path that goes round.
         closed, restarts: what happens after the last row: go round, or begin anew.
-
     """
 
     rows: Array

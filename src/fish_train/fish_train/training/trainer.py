@@ -156,7 +156,6 @@ class Trainer:
 
         Raises:
             TrainingDiverged: the weights are those before the bad update.
-
         """
         c = self.config
         noise = self._noise.window(self._window, self.rng)
