@@ -153,7 +153,9 @@ class _Assembly:
             self.problems.append(Problem("warning", "no_stamps", decoded.topic, text))
             return None
         clock = MASTER if self.simulated else rule.clock
-        return Stamps(decoded.topic, clock, decoded.stamp_ns, decoded.arrival_ns)
+        return Stamps(
+            decoded.topic, clock, decoded.stamp_ns, decoded.arrival_ns, steady=not self.simulated
+        )
 
     def stream(self, role: str, mapped: _Mapped, axis: TimeAxis) -> Stream:
         decoded, rule, stamps = mapped.decoded, mapped.rule, mapped.stamps

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from fish_bag.clock import ClockEstimate, estimate_clock, robust_line
 
@@ -12,6 +13,7 @@ MASTER = "robot"  # the clock that commands are stamped with: physics is simulat
 RECORDER = "recorder"
 FUTURE_S = 1e-3  # stamps may lie so far after the arrival before the clock is called another one
 OUTLIER_S = 5.0  # a stamp so far off the recording's trend is wrong
+NEIGHBOURS = 11  # messages that make the trend of a clock that may stand still
 
 
 @dataclass(frozen=True)
@@ -22,12 +24,18 @@ class Stamps:
     clock: str
     stamp_ns: np.ndarray
     arrival_ns: np.ndarray
+    steady: bool = True  # False: a simulator's clock, which waits for a busy computer
 
     @property
     def plausible(self) -> np.ndarray:
-        """(N,) bool: arrival minus stamp follows a line through the recording up to OUTLIER_S."""
+        """(N,) bool: arrival minus stamp follows the recording's trend up to OUTLIER_S.
+
+        The trend is a line, or, of a clock that is not steady, the median of the messages around.
+        """
         delay = self.arrival_ns - self.stamp_ns
         d = (delay - int(np.median(delay))) * 1e-9
+        if not self.steady:
+            return np.asarray(np.abs(d - median_filter(d, NEIGHBOURS, mode="nearest")) < OUTLIER_S)
         x = (self.arrival_ns - self.arrival_ns[0]) * 1e-9
         return np.asarray(np.abs(d - robust_line(x, d)) < OUTLIER_S)
 

@@ -5,6 +5,7 @@ import pytest
 
 from fish_bag import read_trial
 from fish_bag import sample_recordings as samples
+from fish_bag.trial import BAD_STAMP
 
 ROBOT_TOPICS = (
     "joint_command",
@@ -96,6 +97,37 @@ def test_a_simulation_has_one_clock_however_unsteady(tmp_path):
     np.testing.assert_allclose(
         trial.camera.t - trial.imu.t[0], np.arange(0.005, 10, 1 / 30), atol=1e-6
     )
+
+
+def test_a_simulation_that_stands_still_for_long_has_no_wrong_stamps_but_those_that_are(tmp_path):
+    """Time that waited 40 s for a busy computer within 10 s of simulation: far off every line."""
+    messages, truth = [], []
+    for arrival_ns, topic, message in samples.robot_messages(10.0):
+        late = 40 * 10**9 if arrival_ns - samples.START_NS > 7 * 10**9 else 0
+        messages.append((arrival_ns + late, topic, message))
+    messages = samples.changed(
+        messages,
+        "/fish/imu/data",
+        lambda i, t, m: (t, samples.shift_stamp(m, -30.0 if i == 500 else 0.0)),
+    )
+    truth = [
+        (
+            a,
+            "/fish/sim/odometry",
+            samples.build.odometry(samples.ns(0.01 * i), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        )
+        for i, a in enumerate(a for a, topic, _ in messages if topic == "/fish/joint_command")
+    ]
+    trial = read_trial(
+        samples.write_mcap(tmp_path / "a", sorted(messages + truth, key=lambda m: m[0]))
+    )
+    wrong = {
+        name: np.flatnonzero(stream.flags & BAD_STAMP).tolist()
+        for name, stream in trial.streams.items()
+    }
+    assert wrong.pop("imu") == [500]
+    assert {"commands", "camera", "truth"} <= wrong.keys()
+    assert not any(wrong.values())
 
 
 @pytest.mark.parametrize("factor", [0.5, 3.0])

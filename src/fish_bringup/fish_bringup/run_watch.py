@@ -1,4 +1,4 @@
-"""One run of the started robot, watched until it ends: progress, end of path or time, nodes that fail or hang."""
+"""One run of the started robot, watched until it ends: progress, end of path or time, what must end it before (RunWatch)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from rich.status import Status
 
 from fish_bringup.node_table import CONTROL, NodeSpec
 from fish_bringup.processes import NodeProcesses
+from fish_bringup.run_limits import RunWatch, Seen
 from fish_control.path_tracker import PathTracker
 from fish_report.errors import UserError
 from fish_report.interruption import Interruption
@@ -40,6 +41,7 @@ class Watch(Protocol):
     """What the watching node has heard last."""
 
     sight: Sight | None
+    seen: Seen | None  # by the camera
     tracker: PathTracker | None
 
 
@@ -93,14 +95,19 @@ class Robot:
         return SwimEnd(reason, seconds, {spec: cpu_s / seconds for spec, cpu_s in used.items()})
 
     def _follow(self, duration: float, line: Status) -> str:
-        """Until the end of the path, one lap of a closed one, the end of the time or Ctrl-C; the reason."""
+        """Until the end of the path, one lap of a closed one, the end of the time or Ctrl-C; the reason.
+
+        Raises:
+            UserError: the fish left the pool, the camera is silent, a node ended or hangs.
+        """
         sight, tracker = self._seen()
         first, lap_start = sight.stamp, tracker.progress
-        patience = Patience(self.nodes)
+        patience, run_watch = Patience(self.nodes), RunWatch(first)
         while (t := sight.stamp - first) < duration and not self.interruption.asked:
             self._look()
             sight, tracker = self._seen()
             patience.heed(sight)
+            end_where_told(run_watch, sight.stamp, self.watch.seen)
             on_path = tracker.update((sight.x, sight.y))
             line.update(
                 f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
@@ -144,6 +151,12 @@ class Patience:
                 f"no new odometry/filtered for {STILL_TIMEOUT:g} s: {FUSION.name}, or a node that it hears (simulator, camera, "
                 f"tracker), hangs; see {self._nodes.running[FUSION].log} and the logs beside it; what was recorded is kept"
             )
+
+
+def end_where_told(run_watch: RunWatch, now: float, seen: Seen | None) -> None:
+    """Raise UserError with the reason for which the run must end at `now` [s], the robot's time; seen: by the camera."""
+    if reason := run_watch.reason_to_end(now, seen):
+        raise UserError(f"{reason}; what was recorded is kept")
 
 
 def check_running(nodes: NodeProcesses) -> None:

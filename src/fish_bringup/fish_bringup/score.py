@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from fish_bag.trial import Odometry, ReferenceSpeed, Trial
 from fish_bag.trial import ReferencePath as RecordedPath
-from fish_control.approach import first_settled, stroke_mean
+from fish_control.approach import NEAR_HEADING, NEAR_PATH, NEAR_SPEED, first_settled, stroke_mean
 from fish_control.path_tracker import PathTracker
 from fish_control.reference_path import PathError, ReferencePath
 from fish_report.errors import UserError
@@ -93,12 +93,33 @@ class RunScore:
         return {name: Summary.of(error[first:]) for name, error in errors.items()}
 
 
+def what_is_missing(score: RunScore) -> str | None:
+    """Why a score's table would have holes, None where all its numbers are there."""
+    if score.settled >= len(score.t):
+        return (
+            f"the approach phase never ended: within {score.t[-1] - score.t[0]:.1f} s the fish was never within {NEAR_PATH:g} m "
+            f"and {NEAR_HEADING:g} rad of its path and {100 * NEAR_SPEED:.0f} % of its speed at once (nearest to the path: "
+            f"{np.abs(score.cross_track).min():.2f} m); no error without approach can be told"
+        )
+    for with_approach in (False, True):
+        for name, size in score.summaries(with_approach=with_approach).items():
+            if not np.isfinite([size.rmse, size.p95, size.maximum]).all():
+                return f"the {name.split(',')[0]} error is no number"
+    return None
+
+
 def score_trial(trial: Trial) -> RunScore:
     """Score a recording: against the simulator's truth where recorded, else the robot's own estimate.
 
     Raises:
-        UserError: path, speed or odometry is missing.
+        UserError: path, speed or odometry is missing, or no sample of it can be used.
     """
+    for recorded in (trial.truth, trial.odometry):
+        if recorded is not None and not np.any(recorded.flags == 0):
+            raise UserError(
+                f"{trial.name}: none of {len(recorded)} samples of {recorded.topic} can be used (`robofish inspect` says why); "
+                "nothing to score"
+            )
     trial = trial.clean()
     motion, source = (
         (trial.truth, "truth") if trial.truth is not None else (trial.odometry, "estimate")

@@ -19,4 +19,5 @@ def error_table(score: RunScore) -> Table:
 
 
 def _cells(summary: Summary) -> list[str]:
-    return [f"{value:.4f}" for value in (summary.rmse, summary.p95, summary.maximum)]
+    sizes = (summary.rmse, summary.p95, summary.maximum)
+    return [f"{value:.4f}" if np.isfinite(value) else "-" for value in sizes]

@@ -94,7 +94,7 @@ def test_nothing_survives_the_starter(tmp_path):
     starter = f"""
 import sys, time
 from pathlib import Path
-from fish_train import processes
+from fish_bringup import processes
 from fish_bringup.node_table import NodeSpec
 processes.command = lambda spec, _=None: [sys.executable, "-c", {POLITE!r}]
 nodes = processes.NodeProcesses(0, Path({str(tmp_path)!r}))

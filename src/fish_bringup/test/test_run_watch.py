@@ -6,17 +6,22 @@ import time
 from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from rich.console import Console
 
+from fish_bringup.excursions import Excursion
 from fish_bringup.node_table import ROBOTS, NodeSpec
+from fish_bringup.run_limits import LONGEST_WITHOUT_CAMERA, Seen
 from fish_bringup.run_watch import FUSION, Robot, Sight
 from fish_bringup.verbs import excite
 from fish_control.path_tracker import PathTracker
 from fish_control.paths import make_path
+from fish_control.pool import HALF_LENGTH
 from fish_report.errors import UserError
 from fish_report.interruption import Interruption
 
+SWIM = Excursion(0.0, 8.0, 0.0, 0.0, 0.0)
 NODE = NodeSpec("test", "node", "none.yaml")
 
 
@@ -31,6 +36,13 @@ class Fish:
     def sight(self):
         x, y = self.path.point(0.2 * self.time)
         return Sight(self.time, float(x), float(y), 0.0, 0.2)
+
+    @property
+    def seen(self):
+        """By a camera of 30 Hz, 50 ms late."""
+        stamp = np.floor(30.0 * max(self.time - 0.05, 0.0)) / 30.0
+        x, y = self.path.point(0.2 * stamp)
+        return Seen(stamp, float(x), float(y))
 
     def listen(self, seconds):
         self.time += seconds
@@ -149,8 +161,43 @@ def test_an_experiment_ends_when_nothing_new_is_heard_of_the_robot(tmp_path, mon
     monkeypatch.setattr(excite, "watching", lambda _: nullcontext((fish, fish.listen)))
     changed = {spec: {} for spec in excite.open_loop(ROBOTS["sim"])}
     with pytest.raises(UserError, match=r"no new odometry/filtered for 0.3 s: .*see fusion.log"):
-        excite._swim(7, changed, tmp_path, SimpleNamespace(asked=False), Console(quiet=True))
+        excite._swim(7, changed, SWIM, tmp_path, SimpleNamespace(asked=False), Console(quiet=True))
     assert ended == [7]
+
+
+class Outside(Fish):
+    """Its path leads through a wall, and nothing stops it."""
+
+    def __init__(self):
+        super().__init__(make_path("straight", length=6.0, x=1.5))
+
+
+def test_a_fish_that_leaves_the_pool_ends_the_run(nodes, interruption):
+    fish = Outside()
+    with pytest.raises(
+        UserError, match=r"the fish left the pool: .* now at \(2\.\d\d, 0\.00\) m; .* is kept"
+    ):
+        swim(fish, nodes, interruption)
+    assert float(fish.path.point(0.2 * fish.time)[0]) < HALF_LENGTH + 0.4
+
+
+class Blind(Fish):
+    """Its camera sees nothing from the second second on; fusion goes on."""
+
+    @property
+    def seen(self):
+        now, self.time = self.time, min(self.time, 2.0)
+        seen = super().seen
+        self.time = now
+        return seen
+
+
+def test_a_camera_that_is_silent_ends_the_run_although_fusion_goes_on(nodes, interruption):
+    fish = Blind(make_path("circle", radius=0.9))
+    fish.tracker = PathTracker(make_path("circle", radius=30.0))  # a lap that it never swims
+    with pytest.raises(UserError, match=r"no camera/pose for 30 s: .* is kept"):
+        swim(fish, nodes, interruption)
+    assert fish.time == pytest.approx(2.0 + LONGEST_WITHOUT_CAMERA, abs=0.5)
 
 
 def test_waiting_can_be_interrupted(nodes, interruption):

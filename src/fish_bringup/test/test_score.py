@@ -5,7 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fish_bag.trial import Odometry, ReferenceSpeed, Trial
+from fish_bag.trial import (
+    NOT_FINITE,
+    Odometry,
+    ReferenceSpeed,
+    Trial,
+)
 from fish_bag.trial import ReferencePath as RecordedPath
 from fish_bringup.run_page import write_run_page
 from fish_bringup.score import (
@@ -14,10 +19,13 @@ from fish_bringup.score import (
     path_from_points,
     score_motion,
     score_trial,
+    what_is_missing,
 )
+from fish_bringup.score_table import error_table
 from fish_control.approach import stroke_mean
 from fish_control.paths import make_path
 from fish_control.reference_path import ReferencePath
+from fish_report import robofish as command
 from fish_report.errors import UserError
 
 STRAIGHT = ReferencePath.from_points([[-1.0, 0.0], [1.0, 0.0]], name="straight")
@@ -161,6 +169,45 @@ def test_what_is_missing_is_named(tmp_path, missing, said):
     trial = recorded_run(tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]))
     with pytest.raises(UserError, match=f"^a: {said}"):
         score_trial(replace(trial, **missing))
+
+
+def test_samples_of_which_none_can_be_used_are_not_taken_for_absent(tmp_path):
+    t = np.arange(0.0, 3.0, 0.01)
+    trial = recorded_run(tmp_path, STRAIGHT.points, t, np.full((300, 2), np.nan))
+    useless = replace(trial.truth, flags=np.full(300, NOT_FINITE, np.uint8))
+    with pytest.raises(UserError, match="a: none of 300 samples of /fish/sim/odometry can be used"):
+        score_trial(replace(trial, truth=useless))
+
+
+def test_a_table_with_holes_is_told_by_what_is_missing(tmp_path):
+    t = np.arange(0.0, 9.0, 0.01)
+    aside = recorded_run(
+        tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t + 0.31]), end=9.0
+    )
+    said = what_is_missing(score_trial(aside))
+    assert "approach phase never ended: within 9.0 s" in said
+    assert "0.31 m" in said
+    assert not any("nan" in cell for row in error_table(score_trial(aside)).rows for cell in row)
+    on_path = recorded_run(
+        tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t]), end=9.0
+    )
+    assert what_is_missing(score_trial(on_path)) is None
+
+
+@pytest.mark.parametrize(("aside", "status"), [(0.0, 0), (0.31, 1)])
+def test_the_command_refuses_a_run_that_never_came_onto_its_path(
+    tmp_path, monkeypatch, capsys, aside, status
+):
+    t = np.arange(0.0, 9.0, 0.01)
+    trial = recorded_run(
+        tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t + aside]), end=9.0
+    )
+    monkeypatch.setattr("fish_bringup.verbs.score.read_trial", lambda _: trial)
+    assert command.main(["score", str(tmp_path), "--out", str(tmp_path / "page.html")]) == status
+    said = capsys.readouterr()
+    assert ("a: the approach phase never ended" in said.err) == bool(status)
+    assert ("RMSE" in said.out) == (tmp_path / "page.html").exists() == (not status)
+    assert "nan" not in said.out
 
 
 def test_a_run_without_a_wanted_speed_or_a_pose_on_its_path_is_refused(tmp_path):

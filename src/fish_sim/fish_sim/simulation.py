@@ -16,6 +16,7 @@ from fish_sim.sensors.imu import Imu, ImuSample
 from fish_sim.sensors.overhead_camera import CameraPose, OverheadCamera
 from fish_sim.simulation_config import SimulationConfig
 from fish_sim.step import Stepper
+from fish_sim.walls import Walls
 
 BATTERY_PERIOD = 1.0  # s
 DISTURBANCE_TIME = 0.5  # s, correlation time of the water's random push; assumption
@@ -45,7 +46,11 @@ class Readings:
 
 
 class Simulation:
-    """Follows the newest command; without a fresh one the rotor runs down and the rudder centres."""
+    """Follows the newest command; without a fresh one the rotor runs down and the rudder centres.
+
+    Attributes:
+        walls: the pool's walls and the contacts with them; without `config.walls` nothing asks them.
+    """
 
     def __init__(self, robot: Robot, config: SimulationConfig) -> None:
         self._config = config
@@ -57,6 +62,7 @@ class Simulation:
         self._constant_push = self._parameters[self._pushed].copy()
         self._periods = 0  # since the start; a reset does not turn time back
         self.resets = -1
+        self.walls = Walls()
         self.reset()
         after = self._stepper.step(self._state, np.zeros(2), self._parameters)
         self._acceleration(self._state, after)  # compiles the kernels now, not later
@@ -69,6 +75,7 @@ class Simulation:
         self._state = self._stepper.rest(
             (config.start_x, config.start_y, config.start_heading), parameters=self._parameters
         )
+        self.walls.leave()
         self._push = np.zeros(3)
         self._rotor_angle = 0.0
         self._command, self._command_time = (0.0, 0.0), -math.inf
@@ -119,8 +126,16 @@ class Simulation:
         if not np.all(np.isfinite(after)):
             self.reset()
             raise FloatingPointError("the motion diverged; the simulation starts again")
+        stopped = self._hold(after)
         self._state = after
-        return self._measure(before, after)
+        return self._measure(before, after, stopped)
+
+    def _hold(self, after: np.ndarray) -> np.ndarray:
+        """Stop the head at the walls, in place; which of x and y they stopped (2,)."""
+        if not self._config.walls:
+            return np.zeros(2, dtype=bool)
+        size = 3 + self._stepper.layout.links
+        return self.walls.hold(self.time, after[:2], after[size : size + 2])
 
     def _stir_water(self) -> None:
         """Ornstein-Uhlenbeck wrench on the head with standard deviation `disturbance`."""
@@ -149,13 +164,19 @@ class Simulation:
         rates, _ = self._stepper.rates_jvp(now, drive, self._parameters, *still)
         return float(rates[0, size]), float(rates[0, size + 1])
 
-    def _measure(self, before: np.ndarray, after: np.ndarray) -> Readings:
+    def _measure(self, before: np.ndarray, after: np.ndarray, stopped: np.ndarray) -> Readings:
+        """What is true and what the sensors say; stopped: which of x and y a wall stopped in this period (2,).
+
+        Along a wall's normal the accelerometer feels how the velocity changed in the period: the wall takes up the push.
+        """
         links = self._stepper.layout.links
         size, motion = 3 + links, len(self._stepper.layout.motion)
         x, y, heading = after[:3]
         cos, sin = math.cos(heading), math.sin(heading)
         vx, vy, rate = after[size : size + 3]
-        ax, ay = self._acceleration(before, after)
+        acceleration = np.array(self._acceleration(before, after))
+        acceleration[stopped] = (after - before)[size : size + 2][stopped] / DT
+        ax, ay = map(float, acceleration)
         speed_before, speed = before[motion + 1], after[motion + 1]
         self._rotor_angle += 0.5 * DT * (speed_before + speed)  # linear within the period
         inertia = self._robot.parameters["rotor_inertia"]

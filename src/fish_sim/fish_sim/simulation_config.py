@@ -20,6 +20,7 @@ class SimulationConfig(SensorSettings):
     start_y: float = 0.0  # m
     start_heading: float = 0.0  # rad
     seed: int = 1  # of all noise
+    walls: bool = True  # stop the head's centre at the pool's edge; false: the water has no end
     disturbance: float = 0.002  # N, std of the water's random push on the head; 0 = still water
     command_timeout: float = 0.25  # s, older commands are stale
     stop_time: float = 0.5  # s, in which the rotor of a stale command runs down

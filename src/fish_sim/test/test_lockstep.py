@@ -1,9 +1,7 @@
 """Waiting for the loop on made-up clocks."""
 
-import pytest
-
 from fish_sim.model import DT
-from fish_sim.nodes.lockstep import AHEAD, Lockstep
+from fish_sim.nodes.lockstep import LOOSEN, Lockstep
 
 
 def test_nobody_is_waited_for_before_the_first_word():
@@ -14,22 +12,63 @@ def test_time_stands_until_the_last_one_has_answered():
     lockstep = Lockstep(1.0)
     lockstep.answered("fusion", 1.0)
     lockstep.answered("controller", 1.0)
-    assert lockstep.may_advance(1.0 + 0.5 * AHEAD, 0.0)
-    assert not lockstep.may_advance(1.0 + 2.0 * AHEAD, 0.1)
-    lockstep.answered("fusion", 1.0 + 2.0 * AHEAD)
-    assert not lockstep.may_advance(1.0 + 2.0 * AHEAD, 0.2)
-    lockstep.answered("controller", 1.0 + 1.5 * AHEAD)
-    assert lockstep.may_advance(1.0 + 2.0 * AHEAD, 0.3)
+    assert lockstep.may_advance(1.0, 0.0)
+    assert not lockstep.may_advance(1.0 + DT, 0.1)
+    lockstep.answered("fusion", 1.0 + DT)
+    assert not lockstep.may_advance(1.0 + DT, 0.2)
+    lockstep.answered("controller", 1.0 + DT)
+    assert lockstep.may_advance(1.0 + DT, 0.3)
 
 
-@pytest.mark.parametrize("every", [1, 2])
-def test_who_answers_to_every_so_many_periods_is_waited_for_in_each_of_these(every):
-    lockstep = Lockstep(1.0)
+def test_who_answers_to_every_period_is_waited_for_in_every_period():
+    lockstep = Lockstep(60.0)
     lockstep.answered("exciter", 0.0)
-    for k in range(every, 20, every):
+    for k in range(1, 20):
+        assert not lockstep.may_advance(DT * k, 100.0 * k)
+        assert not lockstep.may_advance(DT * k, 100.0 * k + LOOSEN)
         lockstep.answered("exciter", DT * k)
-        assert all(lockstep.may_advance(DT * (k + ahead), 0.0) for ahead in range(every))
-        assert not lockstep.may_advance(DT * (k + every), 0.0)
+        assert lockstep.may_advance(DT * k, 100.0 * k + LOOSEN)
+
+
+def test_who_answers_to_every_second_period_shows_it_once():
+    lockstep = Lockstep(60.0)
+    lockstep.answered("fusion", 0.0)
+    assert not lockstep.may_advance(DT, 0.0)
+    assert lockstep.may_advance(DT, 1.1 * LOOSEN)
+    for k in range(2, 20, 2):
+        lockstep.answered("fusion", DT * k)
+        assert all(lockstep.may_advance(DT * (k + ahead), 10.0) for ahead in range(2))
+        assert not lockstep.may_advance(DT * (k + 2), 10.0)
+
+
+def test_an_answer_that_is_left_out_once_loosens_nothing():
+    """Who leaves out one period and is then slow would be left behind by a period each time."""
+    lockstep = Lockstep(60.0)
+    for k in (0, 1, 3):
+        lockstep.answered("exciter", DT * k)
+    assert lockstep.may_advance(DT * 3, 0.0)
+    assert not lockstep.may_advance(DT * 4, 0.0)
+
+
+def test_a_long_silence_is_forgiven_with_the_next_two_answers():
+    lockstep = Lockstep(60.0)
+    lockstep.answered("exciter", 0.0)
+    assert not lockstep.may_advance(DT, 0.0)
+    assert lockstep.may_advance(DT, 1.1 * LOOSEN)
+    for k in (2, 3):
+        lockstep.answered("exciter", DT * k)
+    assert not lockstep.may_advance(DT * 4, 10.0)
+
+
+def test_how_long_time_has_stood_is_known():
+    lockstep = Lockstep(5.0)
+    lockstep.answered("exciter", 0.0)
+    assert lockstep.waited(9.0) == 0.0
+    assert not lockstep.may_advance(1.0, 10.0)
+    assert lockstep.waited(12.5) == 2.5
+    lockstep.answered("exciter", 1.0)
+    assert lockstep.may_advance(1.0, 13.0)
+    assert lockstep.waited(13.0) == 0.0
 
 
 def test_the_silent_is_given_up_after_the_patience_until_heard_again():

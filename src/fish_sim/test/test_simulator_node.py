@@ -21,7 +21,9 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_srvs.srv import SetBool, Trigger
 
 from fish_node import rivals
+from fish_sim.nodes.lockstep import AHEAD
 from fish_sim.nodes.simulator import SimulatorNode
+from fish_sim.pool import LENGTH
 from fish_sim.robot import Robot, RobotError, save_robot
 from fish_sim.simulation_config import SimulatorConfig
 
@@ -160,15 +162,58 @@ def test_pause_stops_time_and_reset_brings_the_fish_back_without_turning_time_ba
 
 @pytest.mark.parametrize("bench", [{"lockstep": 60.0}], indirect=True)
 def test_in_lockstep_time_stands_until_the_command_is_answered(bench):
+    answered = bench.collect("sim/odometry", 1)[0].header.stamp
+    for _ in range(2):
+        bench.command(0.0, 0.0, answered)
+        bench.collect("/diagnostics", 2)  # seconds in which thousands of periods would have run
+        stands = bench.got["sim/odometry"][-1].header.stamp
+        assert seconds(stands) - seconds(answered) < AHEAD + 0.015
+        answered = stands
+    bench.command(0.0, 0.0, answered)
+    assert seconds(bench.collect("sim/odometry", 1)[0].header.stamp) > seconds(answered)
+
+
+@pytest.mark.parametrize("bench", [{"lockstep": 60.0}], indirect=True)
+def test_in_lockstep_the_newest_imu_sample_is_said_again_while_time_stands(bench):
+    """Fusion takes the IMU best-effort: a sample that it missed, it would wait for for ever."""
     bench.command(0.0, 0.0, bench.collect("sim/odometry", 1)[0].header.stamp)
-    bench.collect("/diagnostics", 2)  # seconds in which thousands of periods would have run
-    stands = bench.got["sim/odometry"][-1].header.stamp
-    bench.collect("/diagnostics", 1)
-    assert bench.got["sim/odometry"][-1].header.stamp == stands
-    bench.command(0.0, 0.0, stands)
-    assert len(bench.collect("sim/odometry", 3)) == 3
-    bench.collect("/diagnostics", 1)
-    assert 0.02 < seconds(bench.got["sim/odometry"][-1].header.stamp) - seconds(stands) < 0.05
+    again = bench.collect("imu/data", 8)[-2:]
+    assert again[0] == again[1]
+    assert seconds(again[1].header.stamp) == seconds(bench.got["sim/odometry"][-1].header.stamp)
+
+
+@pytest.mark.parametrize("bench", [{"lockstep": 60.0}], indirect=True)
+def test_in_lockstep_a_commander_that_is_late_loses_no_period(bench):
+    """Each answer comes only after many spins in which nothing else happens; every period still gets its command."""
+    answered = []
+    for _ in range(30):
+        newest = bench.collect("/clock", 4)[-1].clock
+        answered.append(newest)
+        bench.command(0.0, 0.0, newest)
+        bench.until(lambda now=newest: seconds(bench.got["/clock"][-1].clock) > seconds(now))
+    stamps = [seconds(stamp) for stamp in answered[4:]]
+    assert all(b - a == pytest.approx(0.01, abs=1e-6) for a, b in itertools.pairwise(stamps))
+
+
+@pytest.mark.parametrize("bench", [{"start_x": 2.1}], indirect=True)
+def test_a_fish_that_comes_to_a_wall_stops_there_and_is_said_once(bench, capfd):
+    bench.collect("sim/odometry", 1)
+    for _ in range(400):
+        phase = 4 * math.pi * seconds(bench.got["sim/odometry"][-1].header.stamp)
+        bench.command(100 * math.sin(phase), 0.0)
+        bench.collect("sim/odometry", 1)
+    assert max(m.pose.pose.position.x for m in bench.got["sim/odometry"]) == LENGTH / 2
+    bench.call(SetBool, "pause", SetBool.Request(data=True))
+    said = bench.collect("/diagnostics", 2)[-1]
+    contacts = int(dict_of(said)["wall_contacts"])
+    assert contacts >= 1
+    lines = [
+        line
+        for line in capfd.readouterr().err.splitlines()
+        if "came to the pool's wall at (2.1" in line
+    ]
+    assert len(lines) == contacts
+    assert "[WARN]" in lines[0]
 
 
 def test_bad_commands_are_refused_and_said_in_the_diagnostics(bench):

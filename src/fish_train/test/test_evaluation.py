@@ -1,5 +1,6 @@
 """Metrics of known errors, plants and sensing, studies over cells, and the pages."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -83,6 +84,7 @@ def straight_trace(
         gains,
         np.array([wanted]),
         np.array([True]),
+        np.array([False]),
     )
     return trace, path
 
@@ -194,6 +196,25 @@ def test_a_run_that_diverges_has_failed_however_small_its_errors_were(path: str)
             [*vars(row.metrics.settled).values(), *vars(row.metrics.whole).values()]
         ).all()
         assert np.isnan(row.metrics.approach)
+
+
+def drifting(path: str) -> Row:
+    """One run in a current of 0.4 m/s towards y."""
+    condition = make_condition(Robot().with_effect("current", x=0.0, y=0.4), perfect=True)
+    return evaluate(constant_candidate(GAINS), condition, make_cells([path], [0.1], [0]))[0]
+
+
+def test_a_robot_that_comes_to_a_wall_ends_its_run_and_has_failed() -> None:
+    (row,) = [drifting("straight:length=0.8,y=0.9")]
+    found = re.fullmatch(
+        r"came to the pool's wall at \((.*), 1\.0[67]\) m after (.*) s", row.metrics.failure
+    )
+    assert found
+    assert float(found[2]) < 3.0
+
+
+def test_a_path_beyond_the_pool_is_swum_in_water_without_an_end() -> None:
+    assert "wall" not in drifting("straight:length=0.8,y=3").metrics.failure
 
 
 def test_plant_and_sensors_are_those_of_the_simulation() -> None:

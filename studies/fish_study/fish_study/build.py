@@ -17,7 +17,14 @@ from fish_study.fish_sim_plant import FishSimPlant
 from fish_study.out_of_vocabulary import known_to_the_plant
 from fish_study.scenario import NoWorld, World
 from fish_study.sensor_models import Errors, Instruments
-from fish_study.swim import Plant, Readings, swim
+from fish_study.swim import (
+    SHORTEST,
+    Plant,
+    Readings,
+    ended_at_a_wall,
+    kept_trials,
+    swim,
+)
 from fish_study.trials import (
     CLOSED,
     MARGIN,
@@ -47,9 +54,18 @@ def true_robot(world: World) -> Robot:
     return robot
 
 
-def make_world(world: World, folder: Path) -> None:
-    """Write the recordings of a world into a new folder, one directory per trial."""
-    write_data_set(folder, make_readings(world), encoder=world.encoder)
+def make_world(world: World, folder: Path) -> dict[str, float]:
+    """Write the recordings of a world into a new folder, one directory per trial; which ended at a wall, after how long [s].
+
+    Raises:
+        NoWorld: as `make_readings`, or every trial came to a wall at once.
+    """
+    readings = make_readings(world)
+    at_wall = ended_at_a_wall(readings)
+    if not kept_trials(readings):
+        raise NoWorld(f"all {len(at_wall)} trials came to a wall of the pool within {SHORTEST:g} s")
+    write_data_set(folder, readings, encoder=world.encoder)
+    return at_wall
 
 
 def make_readings(world: World) -> list[Readings]:

@@ -13,7 +13,7 @@ from fish_bag import message_build as build
 from fish_bag.layout import find_layout
 from fish_bag.mcap_writer import McapRecording
 from fish_bag.message_types import typestore
-from fish_study.swim import Readings
+from fish_study.swim import Readings, kept_trials
 from fish_study.trials import PERIOD
 
 Array = NDArray[np.float64]
@@ -31,14 +31,10 @@ Batch = tuple[str, Array, list[bytes]]  # topic, stamps [s], raw messages
 
 
 def write_data_set(folder: Path, readings: Sequence[Readings], encoder: bool = True) -> None:
-    """One recording directory per trial, numbered over all readings."""
-    number = 0
-    for part in readings:
-        for m in range(part.commands.shape[1]):
-            write_trial(
-                folder / f"trial_{number:02d}", part, m, START_NS + number * SPACING_NS, encoder
-            )
-            number += 1
+    """One recording directory for each of `kept_trials`."""
+    for name, trial in kept_trials(readings).items():
+        number = int(name.removeprefix("trial_"))
+        write_trial(folder / name, trial, 0, START_NS + number * SPACING_NS, encoder)
 
 
 def write_trial(directory: Path, r: Readings, m: int, start_ns: int, encoder: bool) -> None:

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from fish_report.json_file import number
 from fish_sim.robot import Robot
 from fish_study.scenario import World
-from fish_study.swim import Readings
+from fish_study.swim import Readings, kept_trials
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import Fit, climb, evaluate
@@ -69,19 +69,21 @@ class Sight:
 
 def as_experiment(readings: Sequence[Readings], encoder: bool) -> Experiment:
     """Readings on the filter's grid, trials named as in the recordings."""
-    commands, gyro, accel, speed = (
-        np.concatenate([getattr(r, key) for r in readings], axis=1)
-        for key in ("commands", "gyro", "accel", "encoder")
-    )
-    count = commands.shape[1]
-    stamps = [t for r in readings for t in r.stamps]
-    poses = [p for r in readings for p in r.poses]
-    frames = tuple(Frames(t, p) for t, p in zip(stamps, poses, strict=True))
-    names = tuple(f"trial_{m:02d}" for m in range(count))
+    trials = kept_trials(readings)
+    steps = np.array([len(trial.commands) for trial in trials.values()])
+
+    def stack(key: str, filler: float) -> Array:
+        one = [getattr(trial, key)[:, 0] for trial in trials.values()]
+        table = np.full((steps.max(), len(one), *one[0].shape[1:]), filler)
+        for m, values in enumerate(one):
+            table[: steps[m], m] = values
+        return table
+
+    commands = stack("commands", 0.0)
+    gyro, accel, speed = (stack(key, np.nan) for key in ("gyro", "accel", "encoder"))
+    frames = tuple(Frames(trial.stamps[0], trial.poses[0]) for trial in trials.values())
     rotor = speed if encoder else np.full_like(speed, np.nan)
-    return Experiment(
-        names, np.full(count, len(commands)), commands, gyro, accel, rotor, frames, True
-    )
+    return Experiment(tuple(trials), steps, commands, gyro, accel, rotor, frames, True)
 
 
 def look(

@@ -54,8 +54,9 @@ def run_world(job: Job) -> str:
     job.place.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     error = ""
+    at_wall: dict[str, float] = {}
     try:
-        make_world(job.world, recordings)
+        at_wall = make_world(job.world, recordings)
     except NoWorld as problem:  # would happen again
         error = f"no world: {problem}"
     version = the_tool(job.version, job.name)
@@ -66,7 +67,10 @@ def run_world(job: Job) -> str:
     seconds = time.monotonic() - began
     if not job.keep:
         shutil.rmtree(recordings, ignore_errors=True)
-    write_json(job.place / "result.json", {"seconds": seconds, "tool": version, **answer})
+    write_json(
+        job.place / "result.json",
+        {"seconds": seconds, "tool": version, "ended_at_wall": at_wall, **answer},
+    )
     return job.name
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_control.pool import HALF_LENGTH, HALF_WIDTH
 from fish_study.sensor_models import TRANSPORT, Instruments
 from fish_study.trials import PERIOD, Pose
 
 Array = NDArray[np.float64]
+
+SHORTEST = 3.0  # s, a trial that ends earlier at a wall tells nothing
 
 
 class Inertial(NamedTuple):
@@ -53,7 +56,11 @@ class Driver(Protocol):
 
 @dataclass(frozen=True)
 class Readings:
-    """M trials on T grid points of 10 ms."""
+    """M trials on T grid points of 10 ms.
+
+    The plants' water has no end: from where the head comes to a wall of the pool on, a trial is no swim in it. `ends` says how
+    many grid points it lasts until then.
+    """
 
     commands: Array  # (T, M, 2) rad/s, rad
     phase: Array  # (T, M) rad
@@ -63,6 +70,42 @@ class Readings:
     stamps: tuple[Array, ...]  # (F,) s, of the camera's frames
     poses: tuple[Array, ...]  # (F, 3)
     truth: Array  # (T, M, 3) poses
+    ends: NDArray[
+        np.int64
+    ]  # (M,) grid points before the head comes to a wall; T where it never does
+
+    def trial(self, m: int) -> Readings:
+        """Trial m alone, up to its end."""
+        n = int(self.ends[m])
+        seen = self.stamps[m] <= PERIOD * (n - 1)
+        arrays = {
+            k: getattr(self, k)[:n, m : m + 1]
+            for k in ("commands", "phase", "gyro", "accel", "encoder", "truth")
+        }
+        stamps, poses = (self.stamps[m][seen],), (self.poses[m][seen],)
+        return replace(self, stamps=stamps, poses=poses, ends=self.ends[m : m + 1], **arrays)
+
+
+def until_a_wall(truth: Array) -> NDArray[np.int64]:
+    """(M,) grid points of poses (T, M, 3) before the first at a wall of the pool or beyond; T where there is none."""
+    outside = np.any(np.abs(truth[..., :2]) >= [HALF_LENGTH, HALF_WIDTH], axis=-1)
+    return np.where(outside.any(axis=0), np.argmax(outside, axis=0), len(truth))
+
+
+def kept_trials(readings: Sequence[Readings]) -> dict[str, Readings]:
+    """The trials of at least SHORTEST, each up to its end, by the names of their recordings: numbered over all."""
+    all_trials = [part.trial(m) for part in readings for m in range(len(part.ends))]
+    return {
+        f"trial_{k:02d}": trial
+        for k, trial in enumerate(all_trials)
+        if PERIOD * len(trial.commands) >= SHORTEST
+    }
+
+
+def ended_at_a_wall(readings: Sequence[Readings]) -> dict[str, float]:
+    """Names of the trials that came to a wall, and how long each lasted until then [s]."""
+    ends = [(int(end), len(part.commands)) for part in readings for end in part.ends]
+    return {f"trial_{k:02d}": PERIOD * end for k, (end, steps) in enumerate(ends) if end < steps}
 
 
 def swim(
@@ -103,4 +146,5 @@ def swim(
         tuple(instruments.stamps),
         everything,
         truth[:steps],
+        until_a_wall(truth[:steps]),
     )

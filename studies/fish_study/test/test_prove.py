@@ -257,7 +257,7 @@ def test_a_study_is_judged_by_its_own_tool(study: Study, monkeypatch: pytest.Mon
 @pytest.fixture
 def run_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, Any]]:
     """The result of a world whose recordings are an empty folder, and whose tool is a line of Python."""
-    monkeypatch.setattr(runner, "make_world", lambda world, folder: folder.mkdir())
+    monkeypatch.setattr(runner, "make_world", lambda world, folder: folder.mkdir() or {})
 
     def result(tool: str, **changes: Any) -> dict[str, Any]:
         command = (sys.executable, "-c", f"import os, pathlib, signal, sys, time; {tool}")

@@ -13,6 +13,7 @@ import pytest
 from prove_samples import small
 
 from fish_bag import read_dataset
+from fish_control.pool import HALF_LENGTH
 from fish_report.errors import UserError
 from fish_sim.effects import EFFECTS
 from fish_sim.ops import NUMPY
@@ -21,6 +22,7 @@ from fish_sim.scheme import default_scheme
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_study import build, scenario_groups
 from fish_study.build import make_readings, make_world
+from fish_study.data_set import write_data_set
 from fish_study.fish_sim_plant import FishSimPlant
 from fish_study.mujoco_effects import CONCEALED
 from fish_study.mujoco_plant import MujocoPlant, model_text
@@ -31,7 +33,14 @@ from fish_study.runner import Job, run_world
 from fish_study.scenario import NoWorld, World
 from fish_study.sensor_models import TRANSPORT, Errors, Instruments
 from fish_study.study import read_json
-from fish_study.swim import Inertial, Readings, swim
+from fish_study.swim import (
+    Inertial,
+    Readings,
+    ended_at_a_wall,
+    kept_trials,
+    swim,
+)
+from fish_study.trials import OpenLoop
 from fish_study.truths import truths_of
 from fish_sysid.dataset.experiment import build_experiment
 from fish_sysid.dataset.synthetic import FULL_SPEED
@@ -312,6 +321,72 @@ def test_a_fish_that_fits_nowhere_into_the_pool_is_no_world(tmp_path: Path, monk
         make_readings(small("null"))
     run_world(Job("a", small("null"), tmp_path, ("false",)))
     assert read_json(tmp_path / "result.json")["error"].startswith("no world: 2 of 2 trials")
+
+
+class Passing:
+    """A plant whose first fish goes along x at 0.2 m/s, through the wall; the others stay where they are."""
+
+    def reset(self, poses: np.ndarray) -> None:
+        self.pose = np.array(poses, dtype=float)
+
+    def step(self, commands: np.ndarray) -> Inertial:
+        self.pose = self.pose.copy()
+        self.pose[0, 0] += 0.002
+        return Inertial(*np.zeros((3, len(self.pose))))
+
+    @property
+    def rotor_speed(self) -> np.ndarray:
+        return np.zeros(len(self.pose))
+
+
+def passed(*starts: float) -> Readings:
+    """20 s from places (x, 0) [m]."""
+    instruments = Instruments(2000, len(starts), 1.0, Errors(), np.random.default_rng(0))
+    driver = OpenLoop(np.zeros((2000, len(starts), 2)))
+    return swim(Passing(), np.array([[x, 0.0, 0.0] for x in starts]), driver, instruments, 2000)
+
+
+def test_a_trial_ends_where_its_fish_comes_to_a_wall(tmp_path: Path) -> None:
+    """At 0.2 m/s from 0.999 m before the wall that is after 5 s. The other one is what it would be without the first."""
+    readings = passed(HALF_LENGTH - 0.999, 0.5)
+    assert readings.ends.tolist() == [500, 2000]
+    assert ended_at_a_wall([readings]) == {"trial_00": pytest.approx(5.0)}
+    write_data_set(tmp_path / "set", [readings])
+    cut, whole = read_dataset(tmp_path / "set").trials
+    assert len(cut.commands) == len(cut.imu) == len(cut.encoder) == 500
+    assert len(whole.commands) == 2000
+    assert cut.camera.t.max() - cut.commands.t[0] < 5.0
+    assert cut.camera.x.max() < HALF_LENGTH + 0.02
+    experiment = as_experiment([readings], True)
+    assert experiment.steps.tolist() == [500, 2000]
+    assert experiment.names == ("trial_00", "trial_01")
+    assert np.isnan(experiment.gyro[500:, 0]).all()
+    assert np.isfinite(experiment.gyro[:, 1]).all()
+    assert np.array_equal(experiment.frames[1].t, readings.stamps[1])
+
+
+def test_a_trial_that_comes_to_a_wall_at_once_is_no_recording(tmp_path: Path) -> None:
+    readings = passed(HALF_LENGTH - 0.5, 0.5)
+    assert list(kept_trials([readings])) == ["trial_01"]
+    assert list(ended_at_a_wall([readings])) == ["trial_00"]
+    write_data_set(tmp_path / "set", [readings])
+    assert [trial.name for trial in read_dataset(tmp_path / "set")] == ["trial_01"]
+
+
+def test_a_world_says_which_trials_ended_at_a_wall(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "make_readings", lambda _: [passed(HALF_LENGTH - 0.999, 0.5)])
+    run_world(Job("a", small("null"), tmp_path / "a", ("false",)))
+    assert read_json(tmp_path / "a" / "result.json")["ended_at_wall"] == {
+        "trial_00": pytest.approx(5.0)
+    }
+    monkeypatch.setattr(build, "make_readings", lambda _: [passed(HALF_LENGTH - 0.1)])
+    run_world(Job("b", small("null"), tmp_path / "b", ("false",)))
+    assert (
+        "no world: all 1 trials came to a wall"
+        in read_json(tmp_path / "b" / "result.json")["error"]
+    )
 
 
 def test_recordings_are_as_noisy_as_the_filter_takes_them_to_be() -> None:

@@ -1,6 +1,6 @@
 """Watches a run from outside, for progress lines and tests: where the robot is, what the nodes say.
 
-In: odometry/filtered, reference/path, /diagnostics. Out: nothing. Not a process of its own: it lives in
+In: odometry/filtered, camera/pose, reference/path, /diagnostics. Out: nothing. Not a process of its own: it lives in
 the command that starts the robot.
 """
 
@@ -15,14 +15,17 @@ from math import atan2
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Header
 
 from fish_bringup.node_table import NAMESPACE, middleware
+from fish_bringup.run_limits import Seen
 from fish_bringup.run_watch import Sight
 from fish_bringup.score import path_from_points
 from fish_control.path_tracker import PathTracker
@@ -36,11 +39,13 @@ class WatchNode(Node):
     def __init__(self, context: Context) -> None:
         super().__init__("watch", namespace=NAMESPACE, context=context)
         self.sight: Sight | None = None
+        self.seen: Seen | None = None
         self.diagnostics: dict[str, dict[str, str]] = {}
         self.levels: dict[str, tuple[int, str]] = {}
         self.tracker: PathTracker | None = None
         self.create_subscription(Path, "reference/path", self._on_path, LATCHED)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 1)
+        self.create_subscription(PoseWithCovarianceStamped, "camera/pose", self._on_camera, 1)
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 50)
 
     def sees(self, node: str) -> bool:
@@ -53,16 +58,26 @@ class WatchNode(Node):
             self.tracker = PathTracker(path_from_points(points))
 
     def _on_odometry(self, msg: Odometry) -> None:
-        stamp = msg.header.stamp.sec + 1e-9 * msg.header.stamp.nanosec
         position, q = msg.pose.pose.position, msg.pose.pose.orientation
         heading = 2.0 * atan2(q.z, q.w)  # rotation about z only
-        self.sight = Sight(stamp, position.x, position.y, heading, msg.twist.twist.linear.x)
+        self.sight = Sight(
+            seconds(msg.header), position.x, position.y, heading, msg.twist.twist.linear.x
+        )
+
+    def _on_camera(self, msg: PoseWithCovarianceStamped) -> None:
+        position = msg.pose.pose.position
+        self.seen = Seen(seconds(msg.header), position.x, position.y)
 
     def _on_diagnostics(self, msg: DiagnosticArray) -> None:
         for status in msg.status:
             name = status.name.lstrip("/")
             self.diagnostics[name] = {item.key: item.value for item in status.values}
             self.levels[name] = (int.from_bytes(status.level), status.message)
+
+
+def seconds(header: Header) -> float:
+    """The stamp [s]."""
+    return float(header.stamp.sec + 1e-9 * header.stamp.nanosec)
 
 
 @contextmanager

@@ -2,7 +2,8 @@
 
 Simulator, camera, tracker, fusion, planner, controller and recorder run as processes of their own, on
 their own ROS domain. The run ends at the end of the path (a closed one: after a lap), after --duration, or
-with Ctrl-C; what was recorded is then scored.
+with Ctrl-C; what was recorded is then scored. It ends with an error when the fish is at a wall of the pool or beyond for 1 s,
+when the camera is silent for 30 s, and when a node ends or hangs; the recording is kept. Times are the simulator's.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from fish_bringup.nodes.watch import watching
 from fish_bringup.processes import NodeProcesses
 from fish_bringup.run_page import write_run_page
 from fish_bringup.run_watch import Robot, SwimEnd
-from fish_bringup.score import score_trial
+from fish_bringup.score import score_trial, what_is_missing
 from fish_bringup.score_table import error_table
 from fish_control.paths import make_path, read_arguments
 from fish_control.reference_path import PathError
@@ -53,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=float,
         default=LONGEST,
-        help="s, the longest run; a lap ends a closed path",
+        help=f"s, the longest run ({LONGEST:g}); a lap ends a closed path",
     )
     parser.add_argument(
         "--weights", type=Path, help="weights file of the controller (the one it ships with)"
@@ -91,6 +92,8 @@ def run(args: argparse.Namespace) -> int:
     page = folder / "report.html"
     write_run_page(page, f"Path {args.letter} at {args.speed:g} m/s", trial, score, tables)
     console.print(f"recording: {folder / 'recording'}\npage: {page}", soft_wrap=True)
+    if missing := what_is_missing(score):
+        raise UserError(missing)
     return 0
 
 

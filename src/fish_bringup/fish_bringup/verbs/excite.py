@@ -2,6 +2,9 @@
 
 The program is a diagnosis.json, or rows {t: s, amplitude: rad, frequency: Hz, rudder: rad} in JSON or YAML. It is cut into
 swims that the pool has room for, each recorded from rest; the folder of recordings is ready for identify and diagnose.
+A swim ends with an error when the fish leaves the pool, when the camera is silent for 30 s, or when it lasts 10 s longer
+than its part of the program, all by the simulator's clock. Every recording is checked: what it lacks is said, and the exit
+status is then 1.
 On the real robot the same program runs with `ros2 launch fish_bringup fish.launch.py robot:=real program:=FILE begin:=S
 end:=S`, swim after swim as --plan lists them.
 """
@@ -14,6 +17,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from fish_bag import read_trial
+from fish_bringup.excite_check import incomplete
 from fish_bringup.excursions import (
     COAST,
     SHORTEST,
@@ -31,7 +36,13 @@ from fish_bringup.node_table import (
 )
 from fish_bringup.nodes.watch import watching
 from fish_bringup.processes import NodeProcesses
-from fish_bringup.run_watch import LOOK_PERIOD, Patience, check_running
+from fish_bringup.run_limits import RunWatch
+from fish_bringup.run_watch import (
+    LOOK_PERIOD,
+    Patience,
+    check_running,
+    end_where_told,
+)
 from fish_bringup.run_watch import Robot as Running
 from fish_control.excitation import LAST_ROW, Program, read_program
 from fish_node.domain import choose_domain
@@ -45,7 +56,8 @@ from fish_sim.robot_argument import read_model
 
 SIMULATOR, CAMERA = SIMULATED
 EXCITER_NAME = "fish/exciter"
-PATIENCE = 2.0  # s that simulated time waits for a node
+PATIENCE = 60.0  # s of real time that simulated time waits for a node; the run waits less for simulated time
+SLACK = 10.0  # s of the robot's time that a swim may last longer than its part of the program
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,8 +97,13 @@ def run(args: argparse.Namespace) -> int:
         domain = choose_domain(args.domain)
         console = Console(highlight=False)
         console.print(f"program of {program.duration:g} s, ROS domain {domain}, output in {folder}")
-        count = _swim_all(program, robot, args, domain, folder, console)
+        count, lacking = _swim_all(program, robot, args, domain, folder, console)
     recordings = folder / "recordings"
+    if lacking:
+        raise UserError(
+            f"{', '.join(lacking)} of {count} recordings in {recordings} lack what the lines above say: swim them again, or "
+            "leave them out"
+        )
     console.print(
         f"{count} recordings in {recordings}; next: robofish diagnose {recordings} --out {folder / 'diagnosis'}",
         soft_wrap=True,
@@ -117,18 +134,23 @@ def _swim_all(
     domain: int,
     folder: Path,
     console: Console,
-) -> int:
-    """Swim after swim until the program is through or Ctrl-C; how many were recorded."""
-    begin, count = args.begin, 0
+) -> tuple[int, list[str]]:
+    """Swim after swim until the program is through or Ctrl-C; how many were recorded, and which of them lack something."""
+    begin, count, lacking = args.begin, 0, []
     with Interruption() as interruption:
         while program.duration - begin >= SHORTEST and not interruption.asked:
             swim = next_excursion(program, begin, robot)
-            changed = parameters(args, swim, folder, f"trial_{count:02d}")
+            name = f"trial_{count:02d}"
+            changed = parameters(args, swim, folder, name)
             reached, said = _swim(
-                domain, changed, folder / "logs" / f"trial_{count:02d}", interruption, console
+                domain, changed, swim, folder / "logs" / name, interruption, console
             )
+            lacks = incomplete(read_trial(folder / "recordings" / name), program, begin, reached)
+            if lacks:
+                lacking.append(name)
+                said = f"incomplete: {'; '.join(lacks)}"
             console.print(
-                f"trial_{count:02d}: {begin:.1f} to {reached:.1f} s of {program.duration:g} s; {said}",
+                f"{name}: {begin:.1f} to {reached:.1f} s of {program.duration:g} s; {said}",
                 soft_wrap=True,
             )
             count += 1
@@ -137,7 +159,7 @@ def _swim_all(
                     f"the fish came no further than {reached:.1f} s; see the logs in {folder / 'logs'}"
                 )
             begin = reached
-    return count
+    return count, lacking
 
 
 def parameters(
@@ -168,11 +190,16 @@ def parameters(
 def _swim(
     domain: int,
     changed: dict[NodeSpec, dict[str, object]],
+    swim: Excursion,
     logs: Path,
     interruption: Interruption,
     console: Console,
 ) -> tuple[float, str]:
-    """Record one swim; the program's time that it reached, and how it ended."""
+    """Record one swim; the program's time that it reached, and how it ended.
+
+    Raises:
+        UserError: the fish left the pool, camera or exciter are silent, a node ended or hangs.
+    """
     with NodeProcesses(domain, logs) as nodes, watching(domain) as (watch, listen):
         running = Running(nodes, watch, listen, interruption)
         for spec in open_loop(ROBOTS["sim"]):
@@ -182,13 +209,16 @@ def _swim(
         running.wait_for(lambda: watch.sight is not None, "odometry/filtered")
         nodes.start(EXCITER, changed[EXCITER])
         running.wait_for(lambda: EXCITER_NAME in watch.diagnostics, "exciter")
-        patience = Patience(nodes)
+        patience, at = Patience(nodes), watch.sight
+        run_watch = RunWatch(0.0 if at is None else at.stamp, swim.end - swim.begin + SLACK)
         with console.status("") as line:
             while watch.diagnostics[EXCITER_NAME]["over"] != "true" and not interruption.asked:
                 listen(LOOK_PERIOD)
                 check_running(nodes)
                 at = watch.sight
                 patience.heed(at)
+                if at is not None:
+                    end_where_told(run_watch, at.stamp, watch.seen)
                 line.update(
                     f"{watch.diagnostics[EXCITER_NAME]['time_s']} s of the program   "
                     + (f"x {at.x:+.2f} m  y {at.y:+.2f} m   speed {at.speed:.2f} m/s" if at else "")

@@ -1,4 +1,8 @@
-"""Score a recorded run against its reference path: a table and a self-contained page."""
+"""Score a recorded run against its reference path: a table and a self-contained page.
+
+A run that never came onto its path, or a recording without odometry, path or speed, is refused with a line that says what is
+missing.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,9 @@ from rich.console import Console
 
 from fish_bag import read_trial
 from fish_bringup.run_page import write_run_page
-from fish_bringup.score import score_trial
+from fish_bringup.score import score_trial, what_is_missing
 from fish_bringup.score_table import error_table
+from fish_report.errors import UserError
 from fish_report.named_path import named_path
 from fish_report.terminal import print_table
 
@@ -28,6 +33,8 @@ def run(args: argparse.Namespace) -> int:
     recording = named_path(args.recording)
     trial = read_trial(recording)
     score = score_trial(trial)
+    if missing := what_is_missing(score):
+        raise UserError(f"{trial.name}: {missing}")
     table = error_table(score)
     print_table(Console(), table)
     # named after the recording: it replaces neither the page of the one beside it nor a demo's report.html

@@ -29,6 +29,7 @@ from fish_control.nodes.messages import (
 from fish_control.nodes.reporter import Reporter
 from fish_node.nodes.start import read_parameters, run
 
+RESENT = 1000  # commands kept for a recorder that lags on a busy computer: 10 s
 LEVELS: dict[State, bytes] = {
     "waiting": WARN,
     "before a wall": WARN,
@@ -57,7 +58,7 @@ class ExciterNode(Node):
         self._odometry: Odometry | None = None
         self._now = math.nan
         self._said: State | None = None
-        self._command = self.create_publisher(JointState, "joint_command", 10)
+        self._command = self.create_publisher(JointState, "joint_command", RESENT)
         self._reporter = Reporter(self, self._command)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_timer(1.0 / config.command_rate_hz, self._tick)

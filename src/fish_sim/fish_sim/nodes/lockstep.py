@@ -5,46 +5,57 @@ from __future__ import annotations
 from fish_sim.model import DT
 
 AHEAD = 0.03  # s of simulated time that the simulation may at most be ahead of those it waits for
+STRICT = 0.5 * DT  # s, of who answers to every period
+LOOSEN = 4.0  # s of real time; the middleware sends a lost message again after 3 s at most
 
 
 class Lockstep:
     """Holds simulated time until everybody who was heard before has answered to it.
 
-    A computer that is busy with other things then makes a run longer, not worse: who answers to every period is waited
-    for in every period, who answers to every second one in every second. Who stays silent for longer than `patience`
-    [s of real time] is not waited for until heard again; with patience 0 nobody is.
+    A computer that is busy with other things then makes a run longer, not worse: everybody is waited for in every period.
+    Who answers to every second one only shows it by silence (LOOSEN, or half the patience where that is less) and is
+    then waited for in every second. Who stays silent for longer than `patience` [s of real time] is not waited for until
+    heard again; with patience 0 nobody is.
     """
 
     def __init__(self, patience: float) -> None:
         self._patience = patience
+        self._loosen = min(LOOSEN, 0.5 * patience)
         self._answers: dict[str, float] = {}
-        self._ahead: dict[
-            str, float
-        ] = {}  # s that each may be behind: the time between its answers, less half a period
+        self._ahead: dict[str, float] = {}  # s that each may be behind
         self._since: float | None = None
 
     def answered(self, who: str, stamp: float) -> None:
         """A message for this simulated time [s] came in."""
         if who in self._answers:
-            self._ahead[who] = min(max(stamp - self._answers[who], DT) - 0.5 * DT, AHEAD)
+            between = max(stamp - self._answers[who], DT)
+            self._ahead[who] = min(self._ahead[who], between - STRICT)
+        else:
+            self._ahead[who] = STRICT
         self._answers[who] = stamp
+
+    def waited(self, now: float) -> float:
+        """How long simulated time has stood at the real time `now` [s]."""
+        return 0.0 if self._since is None else now - self._since
 
     def may_advance(self, simulated: float, now: float) -> bool:
         """Whether the simulation at `simulated` [s] may go on at the real time `now` [s]."""
-        late = [
-            who
-            for who, stamp in self._answers.items()
-            if stamp < simulated - self._ahead.get(who, AHEAD)
-        ]
-        if not late or self._patience == 0.0:
-            self._since = None
-            return True
-        if self._since is None:
-            self._since = now
-        if now - self._since <= self._patience:
-            return False
-        for who in late:
-            del self._answers[who]
-            self._ahead.pop(who, None)
+        late = self._late(simulated)
+        if late and self._patience > 0.0:
+            if self._since is None:
+                self._since = now
+            if self.waited(now) <= self._loosen:
+                return False
+            for who in late:
+                self._ahead[who] = min(self._ahead[who] + DT, AHEAD)
+            late = self._late(simulated)
+            if late and self.waited(now) <= self._patience:
+                return False
+            for who in late:
+                del self._answers[who], self._ahead[who]
         self._since = None
         return True
+
+    def _late(self, simulated: float) -> list[str]:
+        """Who has not answered to the time [s]."""
+        return [who for who, stamp in self._answers.items() if stamp < simulated - self._ahead[who]]

@@ -6,6 +6,9 @@ pool -> base_link), sim/joint_states (tail_1 .. relative angles, rad), /clock; 1
 /diagnostics; with camera:=pose also camera/pose, on which alone the robot file's camera effects act. Services: pause
 (SetBool), reset (Trigger).
 
+With `walls` the head's centre stops at the pool's edge: one line on the console for each contact, and on /diagnostics
+wall_contacts.
+
 Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
 nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause, and after a step
 of the wall clock.
@@ -39,6 +42,8 @@ from fish_sim.simulation import Readings, Simulation
 from fish_sim.simulation_config import SimulatorConfig
 
 QUEUE = 10
+RESENT = 1000  # messages that lockstep keeps for a recorder that lags: 10 s
+SAY_AGAIN = 0.5  # s of real time that lockstep waits before it says the newest IMU sample again
 SLOW = 0.95  # share of the asked pace below which the node says that it lags
 
 
@@ -60,9 +65,11 @@ class SimulatorNode(Node):
             and not self.get_parameter("use_sim_time").value
         )
         self._paused = config.paused
-        self._refused = self._divergences = 0
+        self._refused = self._divergences = self._contacts = 0
         self._refusal = ""
         self._lockstep = Lockstep(config.lockstep)
+        self._felt: Imu | None = None  # newest sample
+        self._felt_said = 0.0
         self._create_interfaces(config.camera == "pose")
         self._start_ns = time.time_ns()
         self._pacer = Pacer(config.real_time_factor, DT, time.monotonic())
@@ -78,10 +85,11 @@ class SimulatorNode(Node):
     def _create_interfaces(self, camera_pose: bool) -> None:
         clock_qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._clock_publisher = self.create_publisher(ClockMessage, "/clock", clock_qos)
-        self._joints = self.create_publisher(JointState, "joint_states", QUEUE)
-        self._imu = self.create_publisher(Imu, "imu/data", QUEUE)
-        self._odometry = self.create_publisher(Odometry, "sim/odometry", QUEUE)
-        self._tail = self.create_publisher(JointState, "sim/joint_states", QUEUE)
+        kept = RESENT if self._config.lockstep else QUEUE
+        self._joints = self.create_publisher(JointState, "joint_states", kept)
+        self._imu = self.create_publisher(Imu, "imu/data", kept)
+        self._odometry = self.create_publisher(Odometry, "sim/odometry", kept)
+        self._tail = self.create_publisher(JointState, "sim/joint_states", kept)
         self._battery = self.create_publisher(BatteryState, "battery_state", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
@@ -132,8 +140,7 @@ class SimulatorNode(Node):
             return
         if not self._lockstep.may_advance(self._simulation.time, time.monotonic()):
             self._restart_pace()
-            # who missed the newest message, which nobody sends again, would wait for the time that waits for it
-            self._clock_publisher.publish(ClockMessage(clock=self._stamp(self._simulation.time)))
+            self._say_again()
             return
         lost = self._pacer.lost
         periods = self._pacer.due(time.monotonic())
@@ -150,6 +157,28 @@ class SimulatorNode(Node):
             except FloatingPointError as error:
                 self._divergences += 1
                 self.get_logger().error(str(error))
+            self._say_contact()
+
+    def _say_again(self) -> None:
+        """Who missed the newest message, which nobody sends again, would wait for the time that waits for it."""
+        self._clock_publisher.publish(ClockMessage(clock=self._stamp(self._simulation.time)))
+        now = time.monotonic()
+        if (
+            self._felt is not None
+            and min(self._lockstep.waited(now), now - self._felt_said) > SAY_AGAIN
+        ):
+            self._felt_said = now
+            self._imu.publish(self._felt)
+
+    def _say_contact(self) -> None:
+        """One line for each contact with a wall."""
+        walls = self._simulation.walls
+        if walls.contacts > self._contacts:
+            self._contacts = walls.contacts
+            x, y = walls.place
+            self.get_logger().warning(
+                f"the fish came to the pool's wall at ({x:.2f}, {y:.2f}) m and stops there: contact {walls.contacts}"
+            )
 
     def _wall_stepped(self, periods: int) -> bool:
         """Whether simulated time, once it has run `periods`, is not the wall clock's though it should be.
@@ -179,9 +208,11 @@ class SimulatorNode(Node):
         self._tail.publish(messages.tail(body, readings.truth))
         self._odometry.publish(messages.odometry(pool, readings.truth))
         self._joints.publish(messages.rotor(body, readings.rotor))
-        self._imu.publish(
-            messages.imu(Header(stamp=stamp, frame_id="imu_link"), readings.imu, self._config)
+        self._felt = messages.imu(
+            Header(stamp=stamp, frame_id="imu_link"), readings.imu, self._config
         )
+        self._felt_said = time.monotonic()
+        self._imu.publish(self._felt)
         if readings.battery is not None:
             self._battery.publish(messages.battery(body, readings.battery))
         if self._camera is not None:
@@ -199,6 +230,11 @@ class SimulatorNode(Node):
         self._log.say(level, text)
         if warning := self._rivals.warning():
             level, text = max(level, DiagnosticStatus.WARN), f"{text}; {warning}"
+        if self._simulation.walls.touches(simulated):
+            level, text = (
+                max(level, DiagnosticStatus.WARN),
+                f"{text}; the fish is at the pool's wall",
+            )
         values = {
             "real_time_factor": f"{pace:.3f}",
             "simulated_s": f"{simulated:.2f}",
@@ -207,6 +243,7 @@ class SimulatorNode(Node):
             "commands_refused": str(self._refused),
             "resets": str(self._simulation.resets),
             "divergences": str(self._divergences),
+            "wall_contacts": str(self._simulation.walls.contacts),
         }
         status = messages.status(self.get_fully_qualified_name(), level, text, values)
         header = Header(stamp=self._stamp(simulated))

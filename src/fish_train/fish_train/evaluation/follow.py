@@ -33,6 +33,7 @@ from fish_control.line_of_sight import (
     tracking_errors,
 )
 from fish_control.path_batch import PathBatch
+from fish_control.pool import HALF_LENGTH, HALF_WIDTH, wall_distance
 from fish_control.reference_path import ReferencePath
 from fish_sim.model import DT
 from fish_train.evaluation.gains_source import GainsSource
@@ -50,7 +51,7 @@ class Trace:
     Attributes:
         time: (T,) [s]. motion: (T, B, 6) true motion. cross_track [m], course [rad] (of the path), progress [m]: of the
             true position, (T, B). alpha [rad], throttle: set-points (T, B). gains: (T, B, 6).
-        speed: (B,) wanted [m/s]. finished: (B,) reached the end of an open path.
+        speed: (B,) wanted [m/s]. finished: (B,) reached the end of an open path. left: (B,) came to a wall of the pool.
     """
 
     time: Array
@@ -63,6 +64,7 @@ class Trace:
     gains: Array
     speed: Array
     finished: NDArray[np.bool_]
+    left: NDArray[np.bool_]
 
 
 class Follower:
@@ -133,11 +135,21 @@ def follow(
     durations: Array,
     law: Law,
 ) -> Trace:
-    """Swim from rest at `starts` (B, 3); a robot ends with its path, or after its duration [s] (B,)."""
+    """Swim from rest at `starts` (B, 3); a robot ends with its path, after its duration [s] (B,), or at a wall of the pool.
+
+    Walls count where path and start lie within them: paths of any size can be swum in water without an end.
+    """
     plant.reset(starts)
     follower, judge = Follower(paths, speed, gains, law), PathBatch(paths, law.tracker)
     durations = np.asarray(durations, dtype=float)
-    finished, ended = np.zeros(len(paths), dtype=bool), np.zeros(len(paths), dtype=bool)
+    finished, ended, left = (np.zeros(len(paths), dtype=bool) for _ in range(3))
+    starts = np.asarray(starts, dtype=float)
+    walled = np.array(
+        [
+            wall_distance(np.vstack([p.points, at[None, :2]])) > 0.0
+            for p, at in zip(paths, starts, strict=True)
+        ]
+    )
     rows: list[list[Array]] = []
     for k in range(1, PHYSICS_STEPS * int(np.ceil(durations.max() / CONTROL_PERIOD)) + 1):
         plant.step(follower.command())
@@ -159,11 +171,14 @@ def follow(
         )
         rows.append([np.where(ended, np.nan, value.T).T for value in row])
         finished |= at.finished & ~ended
-        ended |= at.finished | (time >= durations) | lost
+        left |= walled & np.any(np.abs(motion[:, :2]) >= [HALF_LENGTH, HALF_WIDTH], axis=1) & ~ended
+        ended |= at.finished | (time >= durations) | lost | left
         if ended.all():
             break
     time_axis = CONTROL_PERIOD * np.arange(1, len(rows) + 1, dtype=float)
     columns: list[Array] = [np.array(column) for column in zip(*rows, strict=True)]
     names = ("motion", "cross_track", "course", "progress", "alpha", "throttle", "gains")
     recorded: dict[str, Any] = dict(zip(names, columns, strict=True))
-    return Trace(time_axis, **recorded, speed=np.asarray(speed, dtype=float), finished=finished)
+    return Trace(
+        time_axis, **recorded, speed=np.asarray(speed, dtype=float), finished=finished, left=left
+    )

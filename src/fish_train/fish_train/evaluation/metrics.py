@@ -65,6 +65,8 @@ def measure(trace: Trace, run: int, path: ReferencePath) -> RunMetrics:
     approach = float(time[first] - time[0]) if first < len(time) else float("nan")
     arrived = bool(trace.finished[run] or (path.closed and progress[-1] >= path.length))
     failure = _failure(arrived, path, errors[first:, 0])
+    if trace.left[run]:
+        failure = f"came to the pool's wall at ({motion[-1, 0]:.2f}, {motion[-1, 1]:.2f}) m after {time[-1]:.1f} s"
     return RunMetrics(_sizes(errors[first:]), _sizes(errors), approach, failure)
 
 

@@ -1,7 +1,8 @@
 """How well gains follow paths: any weights on any paths, speeds, plants and seeds.
 
 Without --perfect every run goes through the camera model (noise, jitter, loss, latency), the IMU model and the
-robot's own fusion. Writes runs.csv and a page; prints the table. Ctrl-C ends the study; the runs that are finished are
+robot's own fusion. A run on a path within the pool ends, and has failed, when the robot comes to a wall; the exit status is
+1 where a run failed. Writes runs.csv and a page; prints the table. Ctrl-C ends the study; the runs that are finished are
 written to runs_partial.csv and evaluation_partial.html.
 """
 

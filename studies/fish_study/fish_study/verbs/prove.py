@@ -142,6 +142,7 @@ def run(args: argparse.Namespace) -> int:
         oracle: dict[int, bool] = {}
         for study in studies:
             results = study.results
+            say_ended_at_wall(results, console)
             scores += [score_world(w, results[n], truths_of(w)) for n, w in study.reveal().items()]
         more: list[Table] = []
         if args.oracle:
@@ -158,6 +159,18 @@ def run(args: argparse.Namespace) -> int:
         soft_wrap=True,
     )
     return 0
+
+
+def say_ended_at_wall(results: Mapping[str, Mapping[str, Any]], console: Console) -> None:
+    """One line where trials came to a wall of the pool: they end there and count as far as they go."""
+    ended = {name: r["ended_at_wall"] for name, r in results.items() if r.get("ended_at_wall")}
+    if ended:
+        count = sum(map(len, ended.values()))
+        console.print(
+            f"{count} trials in {len(ended)} of {len(results)} worlds came to a wall of the pool and end there: "
+            f"{', '.join(ended)} (ended_at_wall in result.json)",
+            soft_wrap=True,
+        )
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
