@@ -32,6 +32,7 @@ def program(page):
     return "\n".join(lines) + "\n"
 
 
+@pytest.mark.timeout(1800)  # half a minute of processor time, longer on a busy computer
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_pages_code_runs(page, tmp_path):
     """In a process of its own: a page may add an effect to the table."""
