@@ -68,8 +68,11 @@ class PlannerConfig:
     def tracker(self) -> TrackerConfig:
         """The part for the path tracker."""
         return TrackerConfig(
-            self.lookahead, self.lookahead_mode, self.search_window, self.capture_distance
-        )  # type: ignore[arg-type]
+            self.lookahead,
+            self.lookahead_mode,  # type: ignore[arg-type]
+            self.search_window,
+            self.capture_distance,
+        )
 
     def guidance(self) -> GuidanceConfig:
         """The part for the line of sight."""

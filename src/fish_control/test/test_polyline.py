@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 from fish_control.paths import make_path
-from fish_control.paths.svg import read_svg
 from fish_control.reference_path import PathError
-
-
-def svg(tmp_path, body):
-    file = tmp_path / "drawing.svg"
-    file.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{body}</svg>')
-    return file
 
 
 def test_csv_points_are_metres_where_they_are(tmp_path):
@@ -47,7 +40,9 @@ def test_bad_line_is_named(tmp_path):
 def test_a_csv_that_is_no_text_with_lines_is_refused(tmp_path, content):
     file = tmp_path / "bad.csv"
     file.write_bytes(content)
-    with pytest.raises(PathError, match=r"bad.csv' is not UTF-8 text with lines x,y"):
+    with pytest.raises(
+        PathError, match=r"bad.csv' is not UTF-8 text with lines x,y|line 1 is '0000"
+    ):
         make_path(str(file))
 
 
@@ -65,64 +60,74 @@ def test_corners_are_rounded_with_the_radius(tmp_path):
     assert path.curvature.max() == pytest.approx(1.0 / 0.3, rel=0.02)
 
 
-def test_svg_y_points_down_and_size_is_in_metres(tmp_path):
-    file = svg(tmp_path, '<polyline points="0,0 10,0 10,20"/>')
-    path = make_path("polyline", file=str(file), size=1.0, radius=0.0)
-    np.testing.assert_allclose(path.points[0], [-0.25, 0.5], atol=1e-9)
-    np.testing.assert_allclose(path.points[-1], [0.25, -0.5], atol=1e-9)
+DRAWN = '<svg xmlns="http://www.w3.org/2000/svg" width="300mm" height="200mm" viewBox="0 0 300 200">{}</svg>'
 
 
-def test_svg_commands_absolute_and_relative_draw_the_same(tmp_path):
-    absolute, _ = read_svg(
-        svg(tmp_path, '<path d="M1 2 L4 2 H6 V5 C7 6 8 6 9 5 S11 4 12 5 Q13 7 14 5 T16 5"/>')
-    )
-    relative, _ = read_svg(
-        svg(tmp_path, '<path d="m1,2 3,0 h2 v3 c1 1 2 1 3 0 s2-1 3 0 q1 2 2 0 t2 0"/>')
-    )
-    np.testing.assert_allclose(absolute, relative, atol=1e-12)
+@pytest.fixture
+def drawing(tmp_path):
+    file = tmp_path / "drawing.svg"
+    file.write_text(DRAWN.format('<path id="a" d="M 10,20 H 110 V 70"/>'))
+    return str(file)
 
 
-def test_svg_curve_is_the_bezier_polynomial(tmp_path):
-    points, _ = read_svg(svg(tmp_path, '<path d="M0 0 C0 3 3 3 3 0"/>'))
-    t = np.linspace(0.0, 1.0, 65)
-    y = 3.0 * t * (1.0 - t) ** 2 * 3.0 + 3.0 * t**2 * (1.0 - t) * 3.0
-    np.testing.assert_allclose(points[:, 1], -y, atol=1e-12)
-
-
-def test_svg_z_and_polygon_close_the_path(tmp_path):
-    assert len(read_svg(svg(tmp_path, '<path d="M0 0 L1 0 L1 1 z z"/>'))[0]) == 3
-    assert read_svg(svg(tmp_path, '<path d="M0 0 L1 0 L1 1 z"/>'))[1]
-    assert read_svg(svg(tmp_path, '<polygon points="0,0 1,0 1,1"/>'))[1]
+def test_a_drawing_has_its_true_size_and_its_middle_where_asked(drawing):
+    path = make_path(drawing, radius=0.0, x=0.5, y=-0.25)
+    assert path.length == pytest.approx(0.15)
+    np.testing.assert_allclose(path.points[0], [0.45, -0.225], atol=1e-9)
+    np.testing.assert_allclose(path.points[-1], [0.55, -0.275], atol=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("body", "said"),
+    ("arguments", "length"), [({"scale": 10.0}, 1.5), ({"width": 1.4}, 2.1), ({"size": 1.0}, 1.5)]
+)
+def test_a_drawing_is_scaled_only_when_asked(drawing, arguments, length):
+    assert make_path(drawing, radius=0.0, **arguments).length == pytest.approx(length)
+
+
+def test_the_pages_right_is_the_pools_x_and_its_top_the_pools_left(tmp_path):
+    file = tmp_path / "turn.svg"
+    file.write_text(DRAWN.format('<path d="M 0,100 H 100 V 0"/>'))  # to the right, then up the page
+    path = make_path(str(file), radius=0.0)
+    np.testing.assert_allclose(path.tangent([0.01, 0.19]), [[1, 0], [0, 1]], atol=1e-6)
+    assert path.curvature.max() > 1.0 > -path.curvature.min()  # a turn to the left, as on the page
+
+
+def test_a_file_of_points_is_scaled_about_the_pools_centre(tmp_path):
+    file = tmp_path / "l.csv"
+    file.write_text("100,200\n300,200\n")
+    np.testing.assert_allclose(make_path(str(file), scale=0.001).points[0], [0.1, 0.2], atol=1e-9)
+    np.testing.assert_allclose(make_path(str(file), width=1.0).points[0], [-0.5, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
     [
-        ('<path d="M0 0 A1 1 0 0 0 2 2"/>', "command 'A' is not supported"),
-        ('<path d="M0 0 L1"/>', "expected 2 numbers"),
-        ('<path d="M0 0 L1 1 M2 2 L3 3"/>', "several parts"),
-        ('<path d="M0 0 L1 0 L1 1 Z M5 5 L6 6"/>', "several parts"),
-        ('<path d="M0 0 L1 0 L1 1 z l2 2"/>', "several parts"),
-        ('<path d="M0 0 L1 0 L1 1 Z 5 5"/>', "'Z' is followed by 5, expected no numbers"),
-        ('<path d=""/>', "begins with '', expected M"),
-        ('<path d="Z"/>', "begins with 'Z', expected M"),
-        ('<path d="L1 1 L2 2"/>', "begins with 'L1 1 L2 2', expected M"),
-        ('<path d="M0 0 L10% 0"/>', "'%' in the outline, expected commands and numbers"),
-        ('<path d="M0 0 L1e999 0"/>', "coordinate 1e999 is not finite"),
-        ('<polyline points="0,0 10px,0"/>', "'p' among them, expected pairs of numbers"),
-        ('<polyline points="0,0 10,0 3"/>', "points have 5 numbers, expected pairs"),
-        ('<polyline points=""/>', "0 points; 2 are needed"),
-        ("<circle r='1'/>", "no path"),
+        ({"scale": 2.0, "width": 1.0}, "scale and width are given, expected one"),
+        ({"scale": 0.0}, "scale is 0.0, expected a positive"),
+        ({"radius": -0.1}, "radius is -0.1, expected a number from 0"),
+        ({"id": "b"}, "no visible part with id 'b'; visible: path 'a'"),
+        ({"scale": "big"}, "wrong type"),
     ],
 )
-def test_svg_that_cannot_be_swum_is_refused(tmp_path, body, said):
+def test_arguments_that_do_not_fit_are_refused(drawing, arguments, said):
     with pytest.raises(PathError, match=said):
-        make_path("polyline", file=str(svg(tmp_path, body)))
+        make_path(drawing, **arguments)
 
 
-@pytest.mark.parametrize("content", ["not xml", '<?xml version="1.0" encoding="mine"?><svg/>'])
-def test_file_that_is_no_svg_is_refused(tmp_path, content):
-    file = tmp_path / "x.svg"
-    file.write_text(content)
-    with pytest.raises(PathError, match="not an SVG drawing"):
-        make_path("polyline", file=str(file))
+def test_a_drawing_without_a_size_needs_one(tmp_path):
+    file = tmp_path / "web.svg"
+    file.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0H9V3"/></svg>'
+    )
+    with pytest.raises(PathError, match=r"states no size .* width: 1\.4"):
+        make_path(str(file))
+    assert make_path(str(file), width=0.9, radius=0.0).length == pytest.approx(1.2)
+
+
+def test_a_file_of_points_has_no_ids_and_a_vertical_line_no_width(tmp_path):
+    file = tmp_path / "l.csv"
+    file.write_text("0,0\n0,1\n")
+    with pytest.raises(PathError, match=r"a \.csv file has no parts"):
+        make_path(str(file), id="a")
+    with pytest.raises(PathError, match="no width"):
+        make_path(str(file), width=1.0)

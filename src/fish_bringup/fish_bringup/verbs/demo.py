@@ -47,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("--letter", default="R", help="letter, or a path family such as circle (R)")
     parser.add_argument(
-        "--path-args", default="", help="of the family, YAML: '{radius: 0.5}', '{file: my.svg}'"
+        "--path-args",
+        default="",
+        help="of the family, YAML: '{radius: 0.5}', '{file: my.svg, width: 1.4}'",
     )
     parser.add_argument("--speed", type=float, default=0.2, help="surge speed, m/s (0.2)")
     parser.add_argument(

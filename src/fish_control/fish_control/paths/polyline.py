@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import csv
-import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_control.paths.points_file import read_points
 from fish_control.paths.requirements import require_positive
 from fish_control.paths.rounded import round_corners
 from fish_control.paths.svg import read_svg
 from fish_control.reference_path import End, PathError, ReferencePath
 
+SUFFIXES = (".csv", ".svg")
+
 
 def polyline(
     file: str = "",
+    id: str | None = None,
+    scale: float | None = None,
+    width: float | None = None,
     size: float | None = None,
     radius: float = 0.2,
     closed: bool | None = None,
@@ -24,35 +28,37 @@ def polyline(
     y: float = 0.0,
     end: End | None = None,
 ) -> ReferencePath:
-    """Path through the points of a CSV file (columns x, y in metres) or the outline of an SVG drawing.
+    """Path through the points of a CSV file (columns x, y) or along the one visible line of an SVG drawing.
+
+    A drawing has its true size: a line of 300 mm on the page is 0.3 m long. Its middle is put at (x, y). The page's
+    right is the pool's x axis, the page's top its y axis. Points of a CSV file stay where they are, moved by (x, y).
 
     Args:
-        size: larger side of the drawing [m], which is then centred on (x, y). An SVG drawing has no metres
-            and takes 1.4 m unless told; without a size the points of a CSV file are used where they are,
-            moved by (x, y).
+        id: the element or group of the SVG drawing to swim; needed where several parts are visible.
+        scale: factor for all lengths, for points of a CSV file about the pool's centre.
+        width: how wide the path becomes along x [m]; it is then centred on (x, y).
+        size: the same for its larger side; only one of `scale`, `width` and `size` may be given.
         radius: corners are rounded to this [m].
-        closed: join the last point to the first; by default when they coincide, or when an SVG outline is
-            closed.
+        closed: join the last point to the first; by default when they coincide, or when an SVG outline is closed.
+
     """
+    path = Path(str(file))
     if not file:
         raise PathError("polyline: no file given; set file to a .csv or .svg")
-    path = Path(file)
-    readers = {".csv": _read_csv, ".svg": read_svg}
-    if path.suffix.lower() not in readers:
-        raise PathError(f"polyline: {file!r} ends in {path.suffix!r}; known: {', '.join(readers)}")
-    try:
-        points, joined = readers[path.suffix.lower()](path)
-    except OSError as error:
-        raise PathError(f"polyline: cannot read {file!r}: {error.strerror}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise PathError(f"polyline: {file!r} is not UTF-8 text with lines x,y ({error})") from error
+    if path.suffix.lower() not in SUFFIXES:
+        raise PathError(f"polyline: {file!r} ends in {path.suffix!r}; known: {', '.join(SUFFIXES)}")
+    given = {k: v for k, v in (("scale", scale), ("width", width), ("size", size)) if v is not None}
+    if len(given) > 1:
+        raise PathError(f"polyline: {' and '.join(given)} are given, expected one of them")
+    require_positive("polyline", **given)
+    if not 0.0 <= radius < np.inf:
+        raise PathError(f"polyline: radius is {radius!r}, expected a number from 0")
+    points, joined, fixed = _read(path, None if id is None else str(id), bool(given))
     if len(points) < 2:
         raise PathError(f"polyline: {file!r} has {len(points)} points; 2 are needed")
-    if size is None and path.suffix.lower() == ".svg":
-        size = 1.4
-    if size is not None:
-        points = _fit(points, size)
-    closed = joined if closed is None else bool(closed)
+    points = _scaled(points, fixed, given)
+    coincide = len(points) > 3 and bool(np.allclose(points[0], points[-1]))
+    closed = joined or coincide if closed is None else bool(closed)
     if closed and np.allclose(points[0], points[-1]):
         points = points[:-1]
     keep = np.r_[True, np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9]
@@ -60,34 +66,39 @@ def polyline(
     return ReferencePath.from_points(rounded, name=path.name, closed=closed, end=end)
 
 
-def _fit(points: NDArray[np.float64], size: float) -> NDArray[np.float64]:
-    """Scale to `size` [m] and centre on the origin."""
-    require_positive("polyline", size=size)
-    low, high = points.min(axis=0), points.max(axis=0)
-    extent = float(np.max(high - low))
-    if extent <= 0.0:
-        raise PathError("polyline: all points are the same")
-    fitted: NDArray[np.float64] = (points - 0.5 * (low + high)) * size / extent
-    return fitted
-
-
-def _read_csv(path: Path) -> tuple[NDArray[np.float64], bool]:
-    """Points and whether the last repeats the first; a heading line is allowed."""
-    points = []
-    with path.open(newline="", encoding="utf-8-sig") as stream:
-        for number, row in enumerate(csv.reader(stream), start=1):
-            if not row or row[0].lstrip().startswith("#"):
-                continue
-            try:
-                point = float(row[0]), float(row[1])
-            except (ValueError, IndexError):
-                if number == 1:
-                    continue
+def _read(path: Path, chosen: str | None, scaled: bool) -> tuple[NDArray[np.float64], bool, bool]:
+    """Points [m], whether an outline is closed, and whether the points have their place in the pool."""
+    try:
+        if path.suffix.lower() == ".csv":
+            if chosen is not None:
                 raise PathError(
-                    f"{path}: line {number} is {','.join(row)!r}, expected two numbers x,y"
-                ) from None
-            if not all(map(math.isfinite, point)):
-                raise PathError(f"{path}: line {number} has a coordinate that is not finite")
-            points.append(point)
-    array = np.array(points, dtype=float).reshape(-1, 2)
-    return array, len(array) > 3 and bool(np.allclose(array[0], array[-1]))
+                    f"polyline: id is {chosen!r}, but a .csv file has no parts with ids"
+                )
+            return read_points(path), False, True
+        drawing = read_svg(path, chosen)
+    except OSError as error:
+        raise PathError(f"polyline: cannot read {str(path)!r}: {error.strerror}") from error
+    if not drawing.has_size and not scaled:
+        raise PathError(
+            f"polyline: {str(path)!r} states no size (an <svg> with viewBox and without width and height); say how wide"
+            " the path is, for example width: 1.4 [m]"
+        )
+    return drawing.points, drawing.closed, False
+
+
+def _scaled(
+    points: NDArray[np.float64], fixed: bool, given: dict[str, float]
+) -> NDArray[np.float64]:
+    """Points of the wanted size; about the origin where they have no place of their own, or a size is given."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = np.zeros(2) if fixed and not {"width", "size"} & set(given) else 0.5 * (low + high)
+    factor = given.get("scale", 1.0)
+    if "scale" not in given and given:
+        extent = float((high - low)[0] if "width" in given else np.max(high - low))
+        if extent <= 0.0:
+            raise PathError(
+                "polyline: all points are the same, or one above the other, so that they have no width"
+            )
+        factor = next(iter(given.values())) / extent
+    scaled: NDArray[np.float64] = (points - middle) * factor
+    return scaled

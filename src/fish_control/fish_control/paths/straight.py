@@ -14,4 +14,5 @@ def straight(
     """Line of `length` [m] centred on (x, y) along `course` [rad]."""
     require_positive("straight", length=length)
     half = 0.5 * length * np.array([np.cos(course), np.sin(course)])
-    return ReferencePath.from_points([[x, y] - half, [x, y] + half], name="straight", end=end)
+    middle = np.array([x, y], dtype=float)
+    return ReferencePath.from_points([middle - half, middle + half], name="straight", end=end)
