@@ -8,16 +8,13 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.step import Stepper
+from fish_sim.water_push import WaterPush
 from fish_study.swim import Inertial
 from fish_study.trials import PERIOD
 
 Array = NDArray[np.float64]
 
 WRENCH = ("disturbance.surge", "disturbance.sway", "disturbance.yaw")
-WATER = np.array(
-    [0.003, 0.006, 1.5e-4]
-)  # N, N, N m: standard deviations of the water's random push
-WATER_TIME = 0.2  # s, its correlation time
 
 
 class FishSimPlant:
@@ -31,11 +28,11 @@ class FishSimPlant:
         self._p = np.tile(self._stepper.parameters(robot), (count, 1))
         layout = self._stepper.layout
         self._pushed = [layout.parameters.index(name) for name in WRENCH]
-        self._nx, self._nq, self._random, self._size = (
+        self._nx, self._nq, self._random, self._water = (
             len(layout.motion),
             layout.links + 3,
             random,
-            noise * WATER,
+            WaterPush.usual(noise),
         )
         self.reset(np.zeros((count, 3)))
 
@@ -44,16 +41,14 @@ class FishSimPlant:
         self.state = np.array(
             [self._stepper.rest(tuple(pose), parameters=self._p[0]) for pose in poses]
         )
-        self._push = self._size * self._random.standard_normal((len(poses), 3))
+        self._push = self._water.first(self._random.standard_normal((len(poses), 3)))
 
     def step(self, commands: Array) -> Inertial:
-        """One period; the water's push is an Ornstein-Uhlenbeck process."""
+        """One period under the water's push."""
         self._p[:, self._pushed] = self._push
         before, nx = self.state, self._nx
         self.state = self._stepper.step(before, commands, self._p)
-        kept = np.exp(-PERIOD / WATER_TIME)
-        fresh = self._random.standard_normal(self._push.shape)
-        self._push = kept * self._push + np.sqrt(1.0 - kept**2) * self._size * fresh
+        self._push = self._water.after(self._push, self._random.standard_normal(self._push.shape))
         drive = (
             before[:, nx : nx + 2],
             (self.state[:, nx : nx + 2] - before[:, nx : nx + 2]) / PERIOD,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
+from fish_sim.water_push import WaterPush
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.dataset.resample import apart
 from fish_sysid.estimation.ekf_types import WRENCH, Noise
@@ -91,13 +92,11 @@ def _swim(
     """States (T, M, NS) at the grid points and the wrench (T, M, 3) from each grid point to the next."""
     T, M = commands.shape[:2]
     at = [stepper.layout.parameters.index(name) for name in WRENCH]
-    kept, size = np.exp(-DT / noise.wrench_time), np.array(noise.wrench)
+    water = WaterPush(np.array(noise.wrench), noise.wrench_time)
     wrench = np.empty((T, M, 3))
-    wrench[0] = size * random.standard_normal((M, 3))
+    wrench[0] = water.first(random.standard_normal((M, 3)))
     for k in range(1, T):
-        wrench[k] = kept * wrench[k - 1] + np.sqrt(1.0 - kept**2) * size * random.standard_normal(
-            (M, 3)
-        )
+        wrench[k] = water.after(wrench[k - 1], random.standard_normal((M, 3)))
     states = np.empty((T, M, len(stepper.layout.state)))
     states[0] = stepper.rest(parameters=p)
     p = np.tile(p, (M, 1))
