@@ -9,7 +9,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_study.sensor_models import TRANSPORT, Instruments
+from fish_sim.sensors.noise_levels import CAMERA_LATENCY
+from fish_study.sensor_models import Instruments
 from fish_study.trials import PERIOD, Pose
 
 Array = NDArray[np.float64]
@@ -83,7 +84,9 @@ def swim(
         arrived = []
         for m in range(count):
             new = int(
-                np.searchsorted(instruments.stamps[m], PERIOD * (k + 1) - TRANSPORT, side="right")
+                np.searchsorted(
+                    instruments.stamps[m], PERIOD * (k + 1) - CAMERA_LATENCY, side="right"
+                )
             )
             frames = slice(shown[m], new)
             poses = instruments.poses(m, frames, truth[: k + 2, m]) if new > shown[m] else ()

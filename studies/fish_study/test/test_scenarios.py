@@ -19,6 +19,7 @@ from fish_sim.ops import NUMPY
 from fish_sim.robot import Robot
 from fish_sim.scheme import default_scheme
 from fish_sim.sensors import SENSOR_EFFECTS
+from fish_sim.sensors.noise_levels import CAMERA_LATENCY
 from fish_study import build, scenario_groups
 from fish_study.build import make_readings, make_world
 from fish_study.fish_sim_plant import FishSimPlant
@@ -29,7 +30,7 @@ from fish_study.other_forms import OTHER_FORMS
 from fish_study.out_of_vocabulary import OUTSIDE, known_to_the_plant
 from fish_study.runner import Job, run_world
 from fish_study.scenario import NoWorld, World
-from fish_study.sensor_models import TRANSPORT, Errors, Instruments
+from fish_study.sensor_models import Errors, Instruments
 from fish_study.study import read_json
 from fish_study.swim import Inertial, Readings, swim
 from fish_study.truths import truths_of
@@ -403,11 +404,11 @@ def test_a_driver_sees_an_image_when_it_has_arrived_and_the_recording_has_the_sa
     driver = Listener()
     readings = swim(Tram(), np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]), driver, quiet, 400)
     for k, _, stamp in driver.seen:
-        assert 0.01 * k < stamp + TRANSPORT + 1e-9
-        assert stamp + TRANSPORT <= 0.01 * (k + 1) + 1e-9
+        assert 0.01 * k < stamp + CAMERA_LATENCY + 1e-9
+        assert stamp + CAMERA_LATENCY <= 0.01 * (k + 1) + 1e-9
     for m in range(2):
         count = len(driver.poses[m])
-        assert count == (readings.stamps[m] <= 4.0 - TRANSPORT).sum()
+        assert count == (readings.stamps[m] <= 4.0 - CAMERA_LATENCY).sum()
         np.testing.assert_allclose(driver.poses[m], readings.poses[m][:count], atol=1e-12)
         taken = np.maximum(readings.stamps[m] - 0.05, 0.0)
         expected = readings.truth[0, m] + taken[:, None] * [0.1, 0.0, 0.3]

@@ -1,7 +1,7 @@
 """Recordings made by the model itself, for studies in which the truth is known.
 
-Sensor noise as in the supplied recordings: camera 30 Hz with jitter and 1 % of frames lost, 2 mm and 0.012 rad; gyro 0.006 rad/s,
-accelerometer 0.05 m/s^2, constant biases; a small random wrench of the water on the head.
+Sensor noise is that of `Noise`; frame times and constant biases are those of `fish_sim.sensors.noise_levels`; the water
+pushes the head as in `fish_sim.water_push`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
+from fish_sim.sensors.noise_levels import BIAS, CAMERA_RATE, exposure_times
 from fish_sim.step import Stepper
 from fish_sim.water_push import WaterPush
 from fish_sysid.dataset.experiment import Experiment, Frames
@@ -23,10 +24,6 @@ Array = NDArray[np.float64]
 
 STROKE = 2.0  # Hz
 FULL_SPEED = 12.0 * 2.0 * np.pi * STROKE  # rad/s, amplitude of the rotor's speed at full throttle
-CAMERA_RATE = 30.0  # Hz
-JITTER = 0.002  # s
-LOST = 0.01  # share of frames
-BIAS = (0.003, 0.03, 0.03)  # rad/s, m/s^2, m/s^2: standard deviations
 KINDS = ("straight", "steps", "sines", "turn", "random")
 
 
@@ -134,9 +131,7 @@ def _imu(
 def _camera(pose: Array, noise: Noise, random: np.random.Generator, rate: float) -> Frames:
     """Poses at jittered times, some lost, those of a fast camera thinned as those of recordings are."""
     end = DT * (len(pose) - 1)
-    t = np.arange(0.0, end, 1.0 / rate)
-    t = np.clip(t + JITTER * random.standard_normal(len(t)), 0.0, end)
-    t = np.sort(t[random.random(len(t)) > LOST])
+    t = exposure_times(end, random, rate)
     t = t[apart(t, DT)]
     seen = np.column_stack([np.interp(t, DT * np.arange(len(pose)), pose[:, i]) for i in range(3)])
     sd = np.array([noise.camera_position, noise.camera_position, noise.camera_heading])
