@@ -16,7 +16,6 @@ import contextlib
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 
 from fish_control.policy import Policy
 from fish_report.errors import UserError
+from fish_report.parallel import on_threads
 from fish_sim.robot import Robot
 from fish_study.gain_search import Say, search
 from fish_study.kept_swims import swim_each
@@ -172,11 +172,10 @@ def _trained(
     say(f"training on the models {', '.join(robots)}, {plan.trainings} times on each")
     runs = list(product(range(1, plan.trainings + 1), robots))
     gains = {}
-    with ThreadPoolExecutor(jobs) as pool:  # of threads that wait for processes
-        weights = pool.map(lambda run: _train(plan, run[1], robots[run[1]], run[0]), runs)
-        for (seed, name), file in zip(runs, weights, strict=True):
-            gains[f"{name}_{seed}"] = read_policy(name, file)
-            say(f"trained: {len(gains)} of {len(runs)}")
+    weights = on_threads(lambda run: _train(plan, run[1], robots[run[1]], run[0]), runs, jobs)
+    for (seed, name), file in zip(runs, weights, strict=True):
+        gains[f"{name}_{seed}"] = read_policy(name, file)
+        say(f"trained: {len(gains)} of {len(runs)}")
     return gains
 
 

@@ -186,9 +186,7 @@ class MujocoPlant:
         )
         felt = np.array([self._step_one(m, self._at[m], goal[m]) for m in range(len(self._data))])
         self._at = goal
-        self._push = self._water.after(
-            self._push, self._random.standard_normal(self._push.shape)
-        )
+        self._push = self._water.after(self._push, self._random.standard_normal(self._push.shape))
         if (self._unstable & ~before).any():
             raise MujocoError("the engine became unstable")
         return Inertial(*felt.T)

@@ -5,21 +5,20 @@ The tool's process gets the folder of recordings and an output folder, whose nam
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fish_report.json_file import write_json
+from fish_report.worker_pool import at_end_of_worker, worker_pool
 from fish_study.build import make_world
 from fish_study.scenario import NoWorld, World
 from fish_study.study import Study, StudyError, read_json
@@ -97,18 +96,8 @@ def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
     return {"diagnosis": read_json(out / "diagnosis.json"), "error": ""}
 
 
-def _end_with_the_study() -> None:
-    """A worker's watch: when the study's process is gone, even by a signal that it cannot catch, so are worker and tool."""
-    study = multiprocessing.parent_process()
-    assert study is not None  # this is a worker
-
-    def watch() -> None:
-        study.join()
-        for tool in _TOOLS:
-            tool.kill()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+def _tools_end_with_the_worker() -> None:
+    at_end_of_worker(lambda: [tool.kill() for tool in _TOOLS])
 
 
 def run_study(
@@ -142,13 +131,7 @@ def spread(
             for future in completed(client.map(work, tasks, pure=False)):
                 yield future.result()
         return
-    with ProcessPoolExecutor(
-        jobs, multiprocessing.get_context("spawn"), _end_with_the_study
-    ) as pool:
+    with worker_pool(jobs, _tools_end_with_the_worker) as pool:
         futures: list[Future[Any]] = [pool.submit(work, task) for task in tasks]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            for future in futures:
-                future.cancel()
+        for future in as_completed(futures):
+            yield future.result()
