@@ -28,7 +28,7 @@ help:
 	@echo "                LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder"
 	@echo "make test       build, the tests of every package, the tests across packages"
 	@echo "make identify, diagnose DATASET=folder   the model's parameters; the physics that it lacks"
-	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--worlds 300' for the long one"
+	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--scenarios 300' for the long one"
 	@echo "make train, evaluate, paper   learn the gains; how well they follow paths; the figures and the table of the paper"
 	@echo "                results in out/NAME or OUT=folder; ARGS='...' goes to the command, ARGS=--help says more"
 	@echo "make setup, build, lint, clean, distclean   the single steps"
@@ -78,9 +78,9 @@ demo: build
 	@$(ROBOFISH) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
 		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
 
-# A few small worlds; ARGS='--worlds 300 --oracle' is the study. The same OUT goes on where it was stopped.
+# A few small scenarios; ARGS='--scenarios 300 --oracle' is the study. The same OUT goes on where it was stopped.
 prove: build $(VENV)/.diagnose
-	@$(ROBOFISH) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--worlds 4 --groups single sensor outside null --trials 6 --duration 8)
+	@$(ROBOFISH) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--scenarios 4 --groups single sensor outside null --trials 6 --duration 8)
 
 identify diagnose: build $(VENV)/.diagnose
 	@$(ROBOFISH) $@ $(DATASET) --out '$(or $(OUT),out/$@)' $(ARGS)

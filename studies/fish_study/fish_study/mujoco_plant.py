@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.water_push import WaterPush
-from fish_study.scenario import NoWorld, World
-from fish_study.sensor_models import Errors
+from fish_study.scenario import Scenario, ScenarioError
+from fish_study.sensor_models import SensorErrors
 from fish_study.swim import Inertial
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ NOMINAL = {
 }
 
 
-class MujocoError(NoWorld):
+class MujocoError(ScenarioError):
     """The plant cannot be had or has become unstable; the message says which."""
 
 
@@ -148,13 +148,13 @@ class MujocoPlant:
         self.reset(np.zeros((count, 3)))
 
     @classmethod
-    def of(cls, world: World, count: int, random: np.random.Generator) -> MujocoPlant:
-        """The plant of a world."""
-        trim = world.effects.get("servo_trim", {"angle": 0.0})["angle"]
+    def of(cls, scenario: Scenario, count: int, random: np.random.Generator) -> MujocoPlant:
+        """The plant of a scenario."""
+        trim = scenario.effects.get("servo_trim", {"angle": 0.0})["angle"]
         return cls(
-            model_text(world.links, world.parameters, world.effects),
+            model_text(scenario.links, scenario.parameters, scenario.effects),
             count,
-            world.noise,
+            scenario.noise,
             random,
             trim,
         )
@@ -236,6 +236,6 @@ class MujocoPlant:
         return np.array([data.qvel[self._rotor] for data in self._data])
 
 
-def instrument_errors(world: World) -> Errors:
-    """Of the world's sensors."""
-    return Errors(latency=world.effects.get("image_age", {"delay": 0.0})["delay"])
+def sensor_errors(scenario: Scenario) -> SensorErrors:
+    """Of the scenario's sensors."""
+    return SensorErrors(latency=scenario.effects.get("image_age", {"delay": 0.0})["delay"])

@@ -1,4 +1,4 @@
-"""Make each world's recordings, run the tool on them as a process of its own, keep what it answers.
+"""Make each scenario's recordings, run the tool on them as a process of its own, keep what it answers.
 
 The tool's process gets the folder of recordings and an output folder, whose names tell nothing.
 """
@@ -19,10 +19,10 @@ from typing import Any
 
 from fish_report.json_file import write_json
 from fish_report.worker_pool import at_end_of_worker, worker_pool
-from fish_study.build import make_world
-from fish_study.scenario import NoWorld, World
+from fish_study.build import make_recordings
+from fish_study.scenario import Scenario, ScenarioError
 from fish_study.study import Study, StudyError, read_json
-from fish_study.tool_version import the_tool
+from fish_study.tool_version import checked_version
 
 DIAGNOSE = (sys.executable, "-m", "fish_report.robofish", "diagnose")
 LONGEST = 3600.0  # s, one diagnosis
@@ -34,30 +34,30 @@ Done = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Job:
-    """One world to be run."""
+    """One scenario to be run."""
 
     name: str
-    world: World
-    place: Path
+    scenario: Scenario
+    folder: Path
     tool: tuple[str, ...] = DIAGNOSE
     keep: bool = False  # the recordings
     threads: int = 1  # of the tool
     version: str = ""  # of the tool that the study examines; "": any
 
 
-def run_world(job: Job) -> str:
-    """Make, diagnose, write result.json; returns the world's name. A tool that fails is a result too."""
-    recordings, out = job.place / "recordings", job.place / "tool"
+def run_scenario(job: Job) -> str:
+    """Make, diagnose, write result.json; returns the scenario's name. A tool that fails is a result too."""
+    recordings, out = job.folder / "recordings", job.folder / "tool"
     for left in (recordings, out):  # of a run that was killed
         shutil.rmtree(left, ignore_errors=True)
-    job.place.mkdir(parents=True, exist_ok=True)
+    job.folder.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     error = ""
     try:
-        make_world(job.world, recordings)
-    except NoWorld as problem:  # would happen again
-        error = f"no world: {problem}"
-    version = the_tool(job.version, job.name)
+        make_recordings(job.scenario, recordings)
+    except ScenarioError as problem:  # would happen again
+        error = f"no scenario: {problem}"
+    version = checked_version(job.version, job.name)
     answer: dict[str, Any] = {"diagnosis": None, "error": error}
     if not error:
         began = time.monotonic()
@@ -65,7 +65,7 @@ def run_world(job: Job) -> str:
     seconds = time.monotonic() - began
     if not job.keep:
         shutil.rmtree(recordings, ignore_errors=True)
-    write_json(job.place / "result.json", {"seconds": seconds, "tool": version, **answer})
+    write_json(job.folder / "result.json", {"seconds": seconds, "tool": version, **answer})
     return job.name
 
 
@@ -97,7 +97,11 @@ def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
 
 
 def _tools_end_with_the_worker() -> None:
-    at_end_of_worker(lambda: [tool.kill() for tool in _TOOLS])
+    def kill() -> None:
+        for tool in _TOOLS:
+            tool.kill()
+
+    at_end_of_worker(kill)
 
 
 def run_study(
@@ -108,14 +112,14 @@ def run_study(
     keep: bool = False,
     cluster: str = "",
 ) -> None:
-    """Run every world without a result; `done` hears each name. cluster: address of a Dask scheduler."""
+    """Run every scenario without a result; `done` hears each name. cluster: address of a Dask scheduler."""
     threads = max(1, len(os.sched_getaffinity(0)) // max(jobs, 1))
-    worlds, version = study.worlds, study.about.get("tool", "")
+    scenarios, version = study.scenarios, study.about.get("tool", "")
     tasks = [
-        Job(n, worlds[n], study.place(n).resolve(), tuple(tool), keep, threads, version)
-        for n in study.open_worlds
+        Job(n, scenarios[n], study.folder_of(n).resolve(), tuple(tool), keep, threads, version)
+        for n in study.pending
     ]
-    for name in spread(run_world, tasks, jobs, cluster):
+    for name in spread(run_scenario, tasks, jobs, cluster):
         done(name)
 
 

@@ -1,4 +1,4 @@
-"""The instruments of a recorded trial: overhead camera, IMU, encoder, with their noise and their errors.
+"""The sensors of a recorded trial: overhead camera, IMU, encoder, with their noise and their errors.
 
 Noise as in `fish_sim.sensors.noise_levels`, times a factor. Knows nothing of the fish, so that the second plant can use it.
 """
@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Errors:
-    """What the instruments do to the truth."""
+class SensorErrors:
+    """What the sensors do to the truth."""
 
     latency: float = 0.0  # s, the image is older than its stamp
     scale: float = 1.0  # of the camera's metres
@@ -36,7 +36,7 @@ class Errors:
     misalignment: float = 0.0  # rad, of the IMU's axes
 
     @classmethod
-    def of(cls, sensors: Mapping[str, Mapping[str, float]]) -> Errors:
+    def of(cls, sensors: Mapping[str, Mapping[str, float]]) -> SensorErrors:
         """From the vocabulary's names."""
         fields = {
             "camera_latency": "latency",
@@ -50,11 +50,16 @@ class Errors:
         )
 
 
-class Instruments:
+class SensorModels:
     """Of M fish over T grid points; all noise is drawn at once, so that a sample is the same whenever it is asked for."""
 
     def __init__(
-        self, steps: int, count: int, noise: float, errors: Errors, random: np.random.Generator
+        self,
+        steps: int,
+        count: int,
+        noise: float,
+        errors: SensorErrors,
+        random: np.random.Generator,
     ) -> None:
         self.errors = errors
         self._bias = random.standard_normal((count, 3)) * BIAS
