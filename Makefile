@@ -110,7 +110,7 @@ test: setup install/.studies
 		wait $$! || status=1; colcon test-result --all --verbose || status=1; exit $$status
 
 lint: setup
-	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_* studies/*/fish_*
+	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_* studies/*/fish_* studies/*.py
 
 clean:
 	rm -rf build install log
