@@ -15,7 +15,10 @@ PIP := $(VENV)/bin/python -m pip --disable-pip-version-check install --quiet --q
 ACTIVATE := source $(VENV)/bin/activate
 WORKSPACE := $(ACTIVATE); source install/setup.bash
 ROBOFISH := $(WORKSPACE); exec install/fish_report/lib/fish_report/robofish
-SOURCES := $(shell find src studies -not -path '*/test*' -not -path '*/__pycache__*' -not -name '* *')
+SOURCES := $(shell find src -not -path '*/test*' -not -path '*/__pycache__*' -not -name '* *')
+STUDIES := $(shell find studies/fish_study -not -path '*/test*' -not -path '*/__pycache__*' -not -name '* *')
+# studies/COLCON_IGNORE keeps them out of a plain `colcon build`
+WITH_STUDIES := --base-paths src studies/fish_study
 
 # The first interpreter that really is 3.11 or 3.12 (a pyenv shim may exist and still not run).
 PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
@@ -28,7 +31,7 @@ help:
 	@echo "                LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder"
 	@echo "make test       build, the tests of every package, the tests across packages"
 	@echo "make identify, diagnose DATASET=folder   the model's parameters; the physics that it lacks"
-	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--worlds 300' for the long one"
+	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--scenarios 300' for the long one"
 	@echo "make train, evaluate, paper   learn the gains; how well they follow paths; the figures and the table of the paper"
 	@echo "                results in out/NAME or OUT=folder; ARGS='...' goes to the command, ARGS=--help says more"
 	@echo "make setup, build, lint, clean, distclean   the single steps"
@@ -73,35 +76,41 @@ install/.built: $(VENV)/.run colcon.meta $(SOURCES)
 
 build: install/.built
 
+# What is needed to check the robot's software, and not to run the robot.
+install/.studies: install/.built $(STUDIES)
+	@$(ACTIVATE); colcon build $(WITH_STUDIES) --packages-select fish_study
+	@touch $@
+
 # --- the robot and the tools ----------------------------------------------------------------------------------------------
 demo: build
 	@$(ROBOFISH) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
 		$(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
 
-# A few small worlds; ARGS='--worlds 300 --oracle' is the study. The same OUT goes on where it was stopped.
-prove: build $(VENV)/.diagnose
-	@$(ROBOFISH) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--worlds 4 --groups single sensor outside null --trials 6 --duration 8)
+# A few small scenarios; ARGS='--scenarios 300 --oracle' is the study. The same OUT goes on where it was stopped.
+prove: install/.studies $(VENV)/.diagnose
+	@$(ROBOFISH) prove --out '$(or $(OUT),out/prove)' $(or $(ARGS),--scenarios 4 --groups single sensor outside null --trials 6 --duration 8)
 
 identify diagnose: build $(VENV)/.diagnose
 	@$(ROBOFISH) $@ $(DATASET) --out '$(or $(OUT),out/$@)' $(ARGS)
 
 evaluate: build $(VENV)/.diagnose
-train paper: build $(VENV)/.train
+train: build $(VENV)/.train
+paper: install/.studies $(VENV)/.train
 train evaluate paper:
 	@$(ROBOFISH) $@ --out '$(or $(OUT),out/$@)' $(ARGS)
 
 # --- tests ----------------------------------------------------------------------------------------------------------------
 # The longest tests, those of fish_sysid and fish_study, run beside all the others: both cores stay busy.
 LONGEST := fish_sysid fish_study
-test: setup build
+test: setup install/.studies
 	@$(WORKSPACE); status=0; \
-		colcon --log-base log/longest test --packages-select $(LONGEST) --executor sequential --return-code-on-test-failure & \
-		colcon test --packages-skip $(LONGEST) --executor sequential --return-code-on-test-failure || status=1; \
+		colcon --log-base log/longest test $(WITH_STUDIES) --packages-select $(LONGEST) --executor sequential --return-code-on-test-failure & \
+		colcon test $(WITH_STUDIES) --packages-skip $(LONGEST) --executor sequential --return-code-on-test-failure || status=1; \
 		python -m pytest test || status=1; \
 		wait $$! || status=1; colcon test-result --all --verbose || status=1; exit $$status
 
 lint: setup
-	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_* studies/*/fish_*
+	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_* studies/*/fish_* studies/*.py
 
 clean:
 	rm -rf build install log

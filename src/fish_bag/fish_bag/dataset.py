@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +15,7 @@ from fish_bag.problem import Problem, RecordingError
 from fish_bag.reader import read_trial
 from fish_bag.topic_map import TopicMap
 from fish_bag.trial import DataSet, Trial
+from fish_report.worker_pool import worker_pool
 
 PARALLEL_FROM = 16  # trials; below this starting processes costs more than it saves
 
@@ -85,9 +84,8 @@ def _read_all(
     if processes == 1:
         yield from zip(paths, _shown(map(_read_one, jobs), len(paths), progress), strict=True)
         return
-    # fork: a caller's script needs no "if __name__" guard; started before the bar, which brings a thread. An executor's workers
-    # end by themselves, a Pool's by SIGTERM, which a caller with a ROS node catches: it waited for ever
-    with ProcessPoolExecutor(processes, get_context("fork")) as pool:
+    # fork: a caller's script needs no "if __name__" guard; started before the bar, which brings a thread
+    with worker_pool(processes, method="fork") as pool:
         results = pool.map(_read_one, jobs, chunksize=2)
         yield from zip(paths, _shown(results, len(paths), progress), strict=True)
 

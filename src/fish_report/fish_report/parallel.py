@@ -1,9 +1,9 @@
-"""Several fits at once: the passes of one alone leave a core idle at the end of each."""
+"""Work on several threads: for what runs outside Python's lock, or waits for other processes."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
@@ -18,5 +18,12 @@ def cores() -> int:
 
 def on_all_cores(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """`work` of every item, in their order; the passes of the filter run outside Python's lock."""
-    with ThreadPoolExecutor(cores()) as pool:
-        return list(pool.map(work, items))
+    return list(on_threads(work, items, cores()))
+
+
+def on_threads(
+    work: Callable[[Item], Result], items: Iterable[Item], threads: int
+) -> Iterator[Result]:
+    """`work` of every item on so many threads; results in the order of the items, each as soon as it is there."""
+    with ThreadPoolExecutor(threads) as pool:
+        yield from pool.map(work, items)

@@ -17,10 +17,9 @@ from fish_sim.sensors.overhead_camera import CameraPose, OverheadCamera
 from fish_sim.simulation_config import SimulationConfig
 from fish_sim.step import Stepper
 from fish_sim.walls import Walls
+from fish_sim.water_push import WaterPush
 
 BATTERY_PERIOD = 1.0  # s
-DISTURBANCE_TIME = 0.5  # s, correlation time of the water's random push; assumption
-DISTURBANCE_ARM = 0.03  # m, its moment about the head per force; assumption
 MAX_ROTOR_SPEED = 1000.0  # rad/s; a faster command is a mistake
 
 
@@ -54,6 +53,7 @@ class Simulation:
 
     def __init__(self, robot: Robot, config: SimulationConfig) -> None:
         self._config = config
+        self._water = WaterPush.of_force(config.disturbance)
         self._robot = robot.with_effect("disturbance", **robot.effects.get("disturbance", {}))
         self._stepper = Stepper.of(self._robot)
         self._parameters = self._stepper.parameters(self._robot)
@@ -138,13 +138,8 @@ class Simulation:
         return self.walls.hold(self.time, after[:2], after[size : size + 2])
 
     def _stir_water(self) -> None:
-        """Ornstein-Uhlenbeck wrench on the head with standard deviation `disturbance`."""
-        level = self._config.disturbance
-        kept = math.exp(-DT / DISTURBANCE_TIME)
-        size = level * np.array([1.0, 1.0, DISTURBANCE_ARM])
-        self._push = kept * self._push + math.sqrt(
-            1 - kept**2
-        ) * size * self._random.standard_normal(3)
+        """The water's next random push, with the standard deviation `disturbance`."""
+        self._push = self._water.after(self._push, self._random.standard_normal(3))
         self._parameters[self._pushed] = self._constant_push + self._push
 
     def _acceleration(self, before: np.ndarray, after: np.ndarray) -> tuple[float, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
+from fish_sim.water_push import USUAL_SIZE
 from fish_sysid.dataset.synthetic import KINDS, program, record
 from fish_sysid.estimation.annealed_fit import TAIL_INERTIAS, fit_tempered
 from fish_sysid.estimation.ekf_types import Noise
@@ -25,7 +26,6 @@ from fish_sysid.estimation.sensor_noise import usual_noise
 Array = NDArray[np.float64]
 
 SPREAD = 0.3  # of the truth around the nominal values
-WRENCH = (0.003, 0.006, 1.5e-4)  # N, N, N m: the water's random push
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def repeat(seed: int, trials: int, duration: float) -> Repetition:
     commands = np.stack(
         [program(KINDS[m % len(KINDS)], duration, random) for m in range(trials)], axis=1
     )
-    experiment, _ = record(truth, commands, Noise(wrench=WRENCH), random)
+    experiment, _ = record(truth, commands, Noise(wrench=USUAL_SIZE), random)
     hypothesis = nominal_hypothesis(Robot())
     # as `identify` does
     fit = fit_tempered(hypothesis, experiment, usual_noise(experiment), held=TAIL_INERTIAS)

@@ -1,4 +1,4 @@
-"""From a world to its recordings."""
+"""From a scenario to its recordings."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_study.data_set import write_data_set
-from fish_study.fish_sim_plant import FishSimPlant
+from fish_study.fish_sim_with_imu import FishSimWithImu
 from fish_study.out_of_vocabulary import known_to_the_plant
-from fish_study.scenario import NoWorld, World
-from fish_study.sensor_models import Errors, Instruments
+from fish_study.scenario import Scenario, ScenarioError
+from fish_study.sensor_models import SensorErrors, SensorModels
 from fish_study.swim import (
     SHORTEST,
-    Plant,
+    PlantWithImu,
     Readings,
     ended_at_a_wall,
     kept_trials,
@@ -38,103 +38,111 @@ from fish_study.trials import (
 )
 
 Array = NDArray[np.float64]
-MakePlant = Callable[[int], Plant]  # number of fish -> plant
+MakePlant = Callable[[int], PlantWithImu]  # number of fish -> plant
 
 TRIES = 12  # to find programs that keep the fish off the walls
 SLOWER = 0.85  # factor on the rotor's speed at every new try
 
 
-def true_robot(world: World) -> Robot:
-    """The fish of a fish_sim world, with what is concealed in it."""
-    robot = Robot(links=world.links)
-    values = {name: robot.parameters[name] * factor for name, factor in world.parameters.items()}
+def true_robot(scenario: Scenario) -> Robot:
+    """The fish of a fish_sim scenario, with what is concealed in it."""
+    robot = Robot(links=scenario.links)
+    values = {name: robot.parameters[name] * factor for name, factor in scenario.parameters.items()}
     robot = robot.with_parameters(**values)
-    for name, effect in world.effects.items():
+    for name, effect in scenario.effects.items():
         robot = robot.with_effect(name, **effect)
     return robot
 
 
-def make_world(world: World, folder: Path) -> dict[str, float]:
-    """Write the recordings of a world into a new folder, one directory per trial; which ended at a wall, after how long [s].
+def make_recordings(scenario: Scenario, folder: Path) -> dict[str, float]:
+    """Write the recordings of a scenario into a new folder, one directory per trial.
+
+    Returns:
+        The trials that ended at a wall of the pool, and how long each lasted until then [s].
 
     Raises:
-        NoWorld: as `make_readings`, or every trial came to a wall at once.
+        ScenarioError: as `make_readings`, or every trial came to a wall at once.
     """
-    readings = make_readings(world)
+    readings = make_readings(scenario)
     at_wall = ended_at_a_wall(readings)
     if not kept_trials(readings):
-        raise NoWorld(f"all {len(at_wall)} trials came to a wall of the pool within {SHORTEST:g} s")
-    write_data_set(folder, readings, encoder=world.encoder)
+        raise ScenarioError(
+            f"all {len(at_wall)} trials came to a wall of the pool within {SHORTEST:g} s"
+        )
+    write_data_set(folder, readings, encoder=scenario.encoder)
     return at_wall
 
 
-def make_readings(world: World) -> list[Readings]:
-    """The trials of a world: open loop first, then under feedback.
+def make_readings(scenario: Scenario) -> list[Readings]:
+    """The trials of a scenario: open loop first, then under feedback.
 
     Raises:
-        NoWorld: no program keeps the fish off the walls, or the engine became unstable.
+        ScenarioError: no program keeps the fish off the walls, or the engine became unstable.
         ValueError: the plant is not known.
+
     """
-    random = np.random.default_rng(world.seed)
-    if world.plant == "fish_sim":
+    random = np.random.default_rng(scenario.seed)
+    if scenario.plant == "fish_sim":
         with known_to_the_plant():
-            robot = true_robot(world)
-            scheme = Scheme(world.method, world.substeps)
-            errors = Errors.of({n: v for n, v in world.effects.items() if n in SENSOR_EFFECTS})
+            robot = true_robot(scenario)
+            scheme = Scheme(scenario.method, scenario.substeps)
+            errors = SensorErrors.of(
+                {n: v for n, v in scenario.effects.items() if n in SENSOR_EFFECTS}
+            )
 
-            def make(count: int) -> Plant:
-                return FishSimPlant(robot, scheme, count, world.noise, random)
+            def make(count: int) -> PlantWithImu:
+                return FishSimWithImu(robot, scheme, count, scenario.noise, random)
 
-            return _trials(world, make, errors, random)
-    if world.plant == "mujoco":
-        from fish_study.mujoco_plant import MujocoPlant, instrument_errors
+            return _trials(scenario, make, errors, random)
+    if scenario.plant == "mujoco":
+        from fish_study.mujoco_plant import MujocoPlant, sensor_errors
 
         return _trials(
-            world,
-            lambda count: MujocoPlant.of(world, count, random),
-            instrument_errors(world),
+            scenario,
+            lambda count: MujocoPlant.of(scenario, count, random),
+            sensor_errors(scenario),
             random,
         )
-    raise ValueError(f"plant: got {world.plant!r}; expected fish_sim or mujoco")
+    raise ValueError(f"plant: got {scenario.plant!r}; expected fish_sim or mujoco")
 
 
 def _trials(
-    world: World, make: MakePlant, errors: Errors, random: np.random.Generator
+    scenario: Scenario, make: MakePlant, errors: SensorErrors, random: np.random.Generator
 ) -> list[Readings]:
-    steps = round(world.duration / PERIOD)
+    steps = round(scenario.duration / PERIOD)
     closed = (
-        world.count
-        if world.trials == "closed"
+        scenario.count
+        if scenario.trials == "closed"
         else 0
-        if world.trials == "one_speed"
-        else world.count // 3
+        if scenario.trials == "one_speed"
+        else scenario.count // 3
     )
     readings = []
-    if world.count > closed:
-        readings.append(_open(world, make, errors, random, world.count - closed, steps))
+    if scenario.count > closed:
+        readings.append(_open(scenario, make, errors, random, scenario.count - closed, steps))
     if closed:
         kinds = [CLOSED[i % len(CLOSED)] for i in range(closed)]
         paths, speeds, starts = feedback_paths(kinds, random)
-        instruments = Instruments(steps, closed, world.noise, errors, random)
-        readings.append(swim(make(closed), starts, Feedback(paths, speeds), instruments, steps))
+        sensors = SensorModels(steps, closed, scenario.noise, errors, random)
+        readings.append(swim(make(closed), starts, Feedback(paths, speeds), sensors, steps))
     return readings
 
 
 def _open(
-    world: World,
+    scenario: Scenario,
     make: MakePlant,
-    errors: Errors,
+    errors: SensorErrors,
     random: np.random.Generator,
     count: int,
     steps: int,
 ) -> Readings:
-    """A program whose way fits nowhere into the pool is drawn again, a little slower. Raises NoWorld after TRIES."""
+    """A program whose way fits nowhere into the pool is drawn again, a little slower. Raises ScenarioError after TRIES."""
     kinds = np.array([OPEN[i % len(OPEN)] for i in range(count)])
     calm, lost = np.ones(count), np.ones(count, dtype=bool)
     table, starts = np.zeros((steps, count, 2)), np.zeros((count, 3))
     for _ in range(TRIES):
-        table[:, lost] = open_loop(kinds[lost], world.duration, random, calm[lost])
-        if world.trials == "one_speed":
+        table[:, lost] = open_loop(kinds[lost], scenario.duration, random, calm[lost])
+        if scenario.trials == "one_speed":
             table = at_one_speed(table, calm)
         which = np.flatnonzero(lost)
         ways = _way(make, table[:, which])
@@ -146,12 +154,12 @@ def _open(
             break
         calm[lost] *= SLOWER
     else:
-        raise NoWorld(
-            f"{lost.sum()} of {count} trials of {world.duration:g} s fit nowhere into the pool, {TRIES} programs tried for each,"
-            " every one slower: ask for shorter trials"
+        raise ScenarioError(
+            f"{lost.sum()} of {count} trials of {scenario.duration:g} s fit nowhere into the pool, {TRIES} programs tried for"
+            " each, every one slower: ask for shorter trials"
         )
-    instruments = Instruments(steps, count, world.noise, errors, random)
-    return swim(make(count), starts, OpenLoop(table), instruments, steps)
+    sensors = SensorModels(steps, count, scenario.noise, errors, random)
+    return swim(make(count), starts, OpenLoop(table), sensors, steps)
 
 
 def _way(make: MakePlant, table: Array) -> Array:

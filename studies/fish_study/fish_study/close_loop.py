@@ -16,7 +16,6 @@ import contextlib
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -26,12 +25,13 @@ from numpy.typing import NDArray
 
 from fish_control.policy import Policy
 from fish_report.errors import UserError
+from fish_report.parallel import on_threads
 from fish_sim.robot import Robot
 from fish_study.gain_search import Say, search
-from fish_study.kept_swims import swim_each
 from fish_study.mujoco_effects import CONCEALED
 from fish_study.mujoco_plant import MujocoError, MujocoPlant
-from fish_study.scenario import World
+from fish_study.scenario import Scenario
+from fish_study.swim_cache import swim_each
 from fish_train.evaluation.candidates import read_policy
 from fish_train.evaluation.cells import make_cells
 from fish_train.evaluation.feed_forward import law_of_plant
@@ -47,7 +47,7 @@ PATHS, SPEEDS = (
     (0.1, 0.15),
 )  # speeds in m/s
 # those between were seen when recipe and plant were chosen
-SEARCH_SEEDS, JUDGE_SEEDS = (1,), (22, 23, 24, 25)
+SEARCH_SEEDS, EVALUATION_SEEDS = (1,), (22, 23, 24, 25)
 LINKS = 5
 # of every training: runs are judged through camera, IMU and fusion, on a robot that no model is exactly; with such noise a
 # level of 0.01 m is not passed. What is judged is the path: a fish that holds its speed in a bend leaves it
@@ -65,22 +65,22 @@ TRAINING = (
 )
 
 
-def loop_world(concealed: str, seed: int, trials: int, duration: float) -> World:
-    """A world of the second plant with its own parameters as they are; "nothing" conceals nothing. Raises ValueError."""
+def loop_scenario(concealed: str, seed: int, trials: int, duration: float) -> Scenario:
+    """A scenario of the second plant with its own parameters as they are; "nothing" conceals nothing. Raises ValueError."""
     known = {"nothing": {}, **{name: dict(c.typical) for name, c in CONCEALED.items()}}
     if concealed not in known:
         raise ValueError(f"concealed: got {concealed!r}; expected one of {', '.join(known)}")
     effects = {concealed: known[concealed]} if known[concealed] else {}
-    return World(
+    return Scenario(
         "mujoco", seed, effects, count=trials, duration=duration, plant="mujoco", links=LINKS
     )
 
 
 @dataclass(frozen=True)
 class SecondPlant:
-    """`MakePlant` of the evaluation: the world's MuJoCo fish, whatever robot the evaluation believes in."""
+    """`MakePlant` of the evaluation: the scenario's MuJoCo fish, whatever robot the evaluation believes in."""
 
-    world: World
+    scenario: Scenario
 
     def __call__(
         self,
@@ -88,8 +88,10 @@ class SecondPlant:
         seeds: Sequence[int],
         disturbance: float = 0.0,  # noqa: ARG002
     ) -> Plant:
-        """One fish for each robot; `disturbance` is the world's own."""
-        return Swimmer(MujocoPlant.of(self.world, len(robots), np.random.default_rng([*seeds, 5])))
+        """One fish for each robot; `disturbance` is the scenario's own."""
+        return Swimmer(
+            MujocoPlant.of(self.scenario, len(robots), np.random.default_rng([*seeds, 5]))
+        )
 
 
 class Swimmer:
@@ -115,7 +117,7 @@ class Swimmer:
 class Plan:
     """What is compared, and on what."""
 
-    world: World
+    scenario: Scenario
     recordings: Path  # of the plant
     out: Path
     nominal: Path | None = None  # robot.yaml; None: the nominal fish
@@ -133,21 +135,25 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
     """
     robots = {"nominal": plan.nominal, **_models(plan, say)}
     gains = _trained(plan, robots, jobs, say)
-    condition = Condition(name="second plant", plant=SecondPlant(plan.world))
+    condition = Condition(name="second plant", plant=SecondPlant(plan.scenario))
     say("searching gains on the plant itself")
     cells = make_cells(plan.paths, plan.speeds, SEARCH_SEEDS)
-    law = _plant_law(plan.world)
+    law = _plant_law(plan.scenario)
     best = search(condition, cells, plan.search, jobs, plan.out / "search" / "tries.json", say, law)
     gains["true"] = Candidate("true", PolicyGains(Policy.constant(best)), law)
-    judged = make_cells(plan.paths, plan.speeds, JUDGE_SEEDS)
+    judged = make_cells(plan.paths, plan.speeds, EVALUATION_SEEDS)
     return swim_each(gains, condition, judged, jobs, plan.out / "swims", say)
 
 
-def _plant_law(world: World) -> Law:
+def _plant_law(scenario: Scenario) -> Law:
     """The law with the feed-forward of the plant, which is no matter of the wind."""
-    still = replace(world, effects={name: v for name, v in world.effects.items() if name != "wind"})
+    still = replace(
+        scenario, effects={name: v for name, v in scenario.effects.items() if name != "wind"}
+    )
     return law_of_plant(
-        lambda count: Swimmer(MujocoPlant.of(still, count, np.random.default_rng([world.seed, 6])))
+        lambda count: Swimmer(
+            MujocoPlant.of(still, count, np.random.default_rng([scenario.seed, 6]))
+        )
     )
 
 
@@ -172,11 +178,10 @@ def _trained(
     say(f"training on the models {', '.join(robots)}, {plan.trainings} times on each")
     runs = list(product(range(1, plan.trainings + 1), robots))
     gains = {}
-    with ThreadPoolExecutor(jobs) as pool:  # of threads that wait for processes
-        weights = pool.map(lambda run: _train(plan, run[1], robots[run[1]], run[0]), runs)
-        for (seed, name), file in zip(runs, weights, strict=True):
-            gains[f"{name}_{seed}"] = read_policy(name, file)
-            say(f"trained: {len(gains)} of {len(runs)}")
+    weights = on_threads(lambda run: _train(plan, run[1], robots[run[1]], run[0]), runs, jobs)
+    for (seed, name), file in zip(runs, weights, strict=True):
+        gains[f"{name}_{seed}"] = read_policy(name, file)
+        say(f"trained: {len(gains)} of {len(runs)}")
     return gains
 
 

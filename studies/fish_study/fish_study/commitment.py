@@ -1,4 +1,4 @@
-"""Labels sealed before the run and opened after it: SHA-256 of a random salt and the label's JSON."""
+"""Commitments to labels: SHA-256 of a random salt and the label's JSON, published before the run and checked after it."""
 
 from __future__ import annotations
 
@@ -11,25 +11,29 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Sealed:
-    """A label and the salt that keeps its hash from being guessed."""
+class Opening:
+    """What opens a commitment: the label and the salt that keeps its hash from being guessed."""
 
     salt: str
     label: Mapping[str, Any]
 
     @property
-    def seal(self) -> str:
+    def commitment(self) -> str:
         """What is published before the run."""
         text = json.dumps(self.label, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(f"{self.salt}:{text}".encode()).hexdigest()
 
 
-def seal_label(label: Mapping[str, Any]) -> Sealed:
+def commit(label: Mapping[str, Any]) -> Opening:
     """A label with a fresh salt."""
-    return Sealed(secrets.token_hex(16), label)
+    return Opening(secrets.token_hex(16), label)
 
 
-def broken_seals(seals: Mapping[str, str], opened: Mapping[str, Sealed]) -> list[str]:
-    """Names whose opened label is not the one that was sealed, or is missing, or was never sealed."""
-    names = {*seals, *opened}
-    return sorted(n for n in names if n not in opened or seals.get(n) != opened[n].seal)
+def broken_commitments(
+    commitments: Mapping[str, str], openings: Mapping[str, Opening]
+) -> list[str]:
+    """Names whose label is not the one that was committed to, is missing, or has no commitment."""
+    names = {*commitments, *openings}
+    return sorted(
+        n for n in names if n not in openings or commitments.get(n) != openings[n].commitment
+    )

@@ -40,8 +40,8 @@ SEEN = ("surge_speed", "sway_speed", "yaw_rate", "rudder", "rotor_speed", "wall_
 
 
 @dataclass(frozen=True)
-class Rivals:
-    """What the competitors say about one world."""
+class CompetitorScores:
+    """What the competitors say about one scenario."""
 
     sindy: (
         str | None
@@ -50,11 +50,11 @@ class Rivals:
     neural_r2: float
 
 
-def compete(nominal: Fit, training: Experiment, held_out: Experiment) -> Rivals:
+def compete(nominal: Fit, training: Experiment, held_out: Experiment) -> CompetitorScores:
     """Both competitors on the residual force of a fit."""
     fitted, unseen = (missing_force(nominal, part) for part in (training, held_out))
     name, sindy_r2 = _sparse(fitted, unseen)
-    return Rivals(name, sindy_r2, _neural(fitted, unseen))
+    return CompetitorScores(name, sindy_r2, _neural(fitted, unseen))
 
 
 def terms(force: MissingForce) -> dict[str, Array]:

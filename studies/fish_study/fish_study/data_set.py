@@ -18,7 +18,7 @@ from fish_study.trials import PERIOD
 
 Array = NDArray[np.float64]
 
-START_NS = 1_750_000_000_000_000_000  # a made-up day: the worlds have none
+START_NS = 1_750_000_000_000_000_000  # a made-up day: the scenarios have none
 SPACING_NS = 60_000_000_000  # between the starts of trials
 GRAVITY = 9.81  # m/s^2
 LATENCY = {

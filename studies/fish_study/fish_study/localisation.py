@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_study.oracle import with_truth
-from fish_study.scenario import World
+from fish_study.scenario import Scenario
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.effect_wrench import own_force
 from fish_sysid.diagnosis.latent_force import MissingForce
@@ -20,14 +20,14 @@ from fish_sysid.estimation.map_fit import evaluate
 LOCALISED = ("wall_effect", "wave_drag", "tether")  # they act here and not there
 
 
-def true_push(world: World, experiment: Experiment) -> MissingForce | None:
-    """What a world's only effect does on these trials if it is localised: the true robot along the motion it smooths."""
-    if len(world.effects) != 1 or world.plant != "fish_sim" or world.links != 3:
+def true_wrench(scenario: Scenario, experiment: Experiment) -> MissingForce | None:
+    """What a scenario's only effect does on these trials if it is localised: the true robot along the motion it smooths."""
+    if len(scenario.effects) != 1 or scenario.plant != "fish_sim" or scenario.links != 3:
         return None
-    name = next(iter(world.effects))
+    name = next(iter(scenario.effects))
     if name not in LOCALISED:
         return None
-    hypothesis, theta = with_truth(world, (name,))
+    hypothesis, theta = with_truth(scenario, (name,))
     return own_force(evaluate(hypothesis, theta, experiment, Noise()), name, experiment)
 
 

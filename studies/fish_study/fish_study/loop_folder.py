@@ -1,6 +1,6 @@
-"""The folder of a closed loop: for which world it was made, so that nothing in it is taken for another world's.
+"""The folder of a closed loop: for which scenario it was made, so that nothing in it is taken for another scenario's.
 
-loop.json    the world and the arguments on which what is kept depends
+loop.json    the scenario and the arguments on which what is kept depends
 recordings   of the second plant, all trials or none
 """
 
@@ -10,7 +10,7 @@ import shutil
 from typing import Any
 
 from fish_report.json_file import plain, write_json
-from fish_study.build import make_world
+from fish_study.build import make_recordings
 from fish_study.close_loop import SEARCH_SEEDS, Plan
 from fish_study.study import StudyError, read_json
 
@@ -22,7 +22,7 @@ def prepare(plan: Plan) -> None:
         return
     part = plan.recordings.with_suffix(".part")  # half a set must not pass for a whole one
     shutil.rmtree(part, ignore_errors=True)
-    make_world(plan.world, part)
+    make_recordings(plan.scenario, part)
     part.rename(plan.recordings)
 
 
@@ -31,7 +31,7 @@ def _claim(plan: Plan) -> None:
     if not path.exists():
         if plan.out.exists() and any(plan.out.iterdir()):
             raise StudyError(
-                f"{plan.out}: has no loop.json, so nothing says for which world its files were made; expected a new or empty"
+                f"{plan.out}: has no loop.json, so nothing says for which scenario its files were made; expected a new or empty"
                 " folder: choose another --out, or move these files away"
             )
         plan.out.mkdir(parents=True, exist_ok=True)
@@ -50,7 +50,7 @@ def _asked(plan: Plan) -> dict[str, Any]:
     return dict(
         plain(
             {
-                **plan.world.label(),
+                **plan.scenario.label(),
                 "robot": None if plan.nominal is None else str(plan.nominal.resolve()),
                 "paths": plan.paths,
                 "speeds": plan.speeds,

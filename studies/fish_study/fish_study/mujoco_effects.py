@@ -42,7 +42,7 @@ ORDER = ("", *CONCEALED)  # "" conceals nothing
 
 
 def draw(number: int, random: np.random.Generator) -> tuple[str, dict[str, float]]:
-    """(name or "", values) of world `number`."""
+    """(name or "", values) of scenario `number`."""
     name = ORDER[number % len(ORDER)]
     if not name:
         return name, {}

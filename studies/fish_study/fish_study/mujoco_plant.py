@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_study.scenario import NoWorld, World
-from fish_study.sensor_models import Errors
+from fish_sim.water_push import WaterPush
+from fish_study.scenario import Scenario, ScenarioError
+from fish_study.sensor_models import SensorErrors
 from fish_study.swim import Inertial
 
 Array = NDArray[np.float64]
@@ -24,10 +25,6 @@ Array = NDArray[np.float64]
 PERIOD, HOLDS, STEPS = 0.01, 4, 5  # s; set-points in it, steps of the engine for each of them
 TAIL_LENGTH, FIN_LENGTH, HALF_HEIGHT = 0.07, 0.03, 0.0375  # m
 SERVO_RATE, SERVO_RANGE = 6.0, 0.8  # rad/s, rad
-WATER, WATER_TIME = (
-    np.array([0.003, 0.006, 1.5e-4]),
-    0.2,
-)  # N, N, N m and s: random push of the water on the head
 VISCOSITY = 9e-4  # Pa s
 # blunt, slender, angular drag, Kutta lift, Magnus force. The engine's drag opposes the velocity, whatever the direction of a
 # body, and drives nothing; thrust is the fin's lift. Chosen so that the fish swims at 0.05 to 0.25 m/s.
@@ -43,7 +40,7 @@ NOMINAL = {
 }
 
 
-class MujocoError(NoWorld):
+class MujocoError(ScenarioError):
     """The plant cannot be had or has become unstable; the message says which."""
 
 
@@ -144,20 +141,20 @@ class MujocoPlant:
         self._engine = _mujoco()
         self._model = self._engine.MjModel.from_xml_string(text)
         self._data = [self._engine.MjData(self._model) for _ in range(count)]
-        self._random, self._size, self._trim = random, noise * WATER, trim
+        self._random, self._water, self._trim = random, WaterPush.usual(noise), trim
         joints = [self._model.joint(name) for name in ("rotor", "rudder")]
         self._rotor, self._rudder = (int(j.qposadr[0]) for j in joints)
         self._head = self._model.body("head").id
         self.reset(np.zeros((count, 3)))
 
     @classmethod
-    def of(cls, world: World, count: int, random: np.random.Generator) -> MujocoPlant:
-        """The plant of a world."""
-        trim = world.effects.get("servo_trim", {"angle": 0.0})["angle"]
+    def of(cls, scenario: Scenario, count: int, random: np.random.Generator) -> MujocoPlant:
+        """The plant of a scenario."""
+        trim = scenario.effects.get("servo_trim", {"angle": 0.0})["angle"]
         return cls(
-            model_text(world.links, world.parameters, world.effects),
+            model_text(scenario.links, scenario.parameters, scenario.effects),
             count,
-            world.noise,
+            scenario.noise,
             random,
             trim,
         )
@@ -173,7 +170,7 @@ class MujocoPlant:
             data.qpos[:3], data.qvel[:2] = pose, self._model.opt.wind[:2]
         self._unstable = np.zeros(len(poses), dtype=bool)
         self._at = np.zeros((len(poses), 2))  # rotor speed, rudder that the drivers ask for
-        self._push = self._size * self._random.standard_normal((len(poses), 3))
+        self._push = self._water.first(self._random.standard_normal((len(poses), 3)))
 
     def step(self, commands: Array) -> Inertial:
         """One period: the drivers' set-points move linearly to the commands, the rudder's at most at the servo's rate.
@@ -189,9 +186,7 @@ class MujocoPlant:
         )
         felt = np.array([self._step_one(m, self._at[m], goal[m]) for m in range(len(self._data))])
         self._at = goal
-        kept = np.exp(-PERIOD / WATER_TIME)
-        fresh = self._random.standard_normal(self._push.shape)
-        self._push = kept * self._push + np.sqrt(1.0 - kept**2) * self._size * fresh
+        self._push = self._water.after(self._push, self._random.standard_normal(self._push.shape))
         if (self._unstable & ~before).any():
             raise MujocoError("the engine became unstable")
         return Inertial(*felt.T)
@@ -241,6 +236,6 @@ class MujocoPlant:
         return np.array([data.qvel[self._rotor] for data in self._data])
 
 
-def instrument_errors(world: World) -> Errors:
-    """Of the world's sensors."""
-    return Errors(latency=world.effects.get("image_age", {"delay": 0.0})["delay"])
+def sensor_errors(scenario: Scenario) -> SensorErrors:
+    """Of the scenario's sensors."""
+    return SensorErrors(latency=scenario.effects.get("image_age", {"delay": 0.0})["delay"])

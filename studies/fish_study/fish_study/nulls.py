@@ -13,16 +13,16 @@ from fish_sysid.diagnosis.significance import TEMPER, Level
 
 
 def null_table(scores: Sequence[Score]) -> Table | None:
-    """Best quick gain of any name by tail links and noise of the null worlds; None without one."""
-    nulls = [s for s in scores if s.world.group == "null" and s.ranking]
+    """Best quick gain of any name by tail links and noise of the null scenarios; None without one."""
+    nulls = [s for s in scores if s.scenario.group == "null" and s.ranking]
     if not nulls:
         return None
     rows = []
-    for links, noise in sorted({(s.world.links, s.world.noise) for s in nulls}):
+    for links, noise in sorted({(s.scenario.links, s.scenario.noise) for s in nulls}):
         gains = [
             max(s.ranking.values())
             for s in nulls
-            if (s.world.links, s.world.noise) == (links, noise)
+            if (s.scenario.links, s.scenario.noise) == (links, noise)
         ]
         rows.append(
             [
@@ -43,7 +43,7 @@ def null_table(scores: Sequence[Score]) -> Table | None:
     )
     return Table(
         "What names gain where nothing is hidden",
-        ["tail links", "noise", "worlds", "median", "largest"],
+        ["tail links", "noise", "scenarios", "median", "largest"],
         rows,
         note,
     )

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from fish_report.json_file import number
 from fish_sim.robot import Robot
-from fish_study.scenario import World
+from fish_study.scenario import Scenario
 from fish_study.swim import Readings, kept_trials
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.estimation.ekf_types import Noise
@@ -30,8 +30,8 @@ LEVEL = 0.02  # false alarms of the oracle's test
 
 
 @dataclass(frozen=True)
-class Looked:
-    """The oracle's fits and the trials they were made and judged on."""
+class OracleFits:
+    """The oracle's fits, the trials that they were made on and those held out."""
 
     nominal: Fit
     true: Fit
@@ -39,16 +39,18 @@ class Looked:
     held_out: Experiment
 
     @property
-    def sight(self) -> Sight:
-        """What is kept of it."""
+    def result(self) -> OracleResult:
+        """What is kept of them."""
         extra = len(self.true.hypothesis.free) - len(self.nominal.hypothesis.free)
         gain = self.true.objective - self.nominal.objective
-        return Sight(gain, extra, _rms(self.held_out, self.nominal), _rms(self.held_out, self.true))
+        return OracleResult(
+            gain, extra, _rms(self.held_out, self.nominal), _rms(self.held_out, self.true)
+        )
 
 
 @dataclass(frozen=True)
-class Sight:
-    """What the oracle sees in one world."""
+class OracleResult:
+    """What the oracle finds in one scenario."""
 
     gain: float  # nats of the true structure over the nominal one, both fitted
     parameters: int  # of the true structure beyond the nominal one
@@ -58,7 +60,7 @@ class Sight:
     rms_true: list[list[float]]  # true structure fitted
 
     @classmethod
-    def read(cls, content: Mapping[str, Any]) -> Sight:
+    def read(cls, content: Mapping[str, Any]) -> OracleResult:
         """From JSON, in which what is not finite is null."""
         tables = (
             [[number(v) for v in row] for row in content[key]]
@@ -86,47 +88,47 @@ def as_experiment(readings: Sequence[Readings], encoder: bool) -> Experiment:
     return Experiment(tuple(trials), steps, commands, gyro, accel, rotor, frames, True)
 
 
-def look(
-    world: World,
+def fit_oracle(
+    scenario: Scenario,
     experiment: Experiment,
     held_out: Sequence[str],
     names: Sequence[str] | None = None,
-) -> Looked:
+) -> OracleFits:
     """Fit the structure with `names` (default: what is hidden) and the nominal one, from the true values."""
-    looked_for = tuple(world.names if names is None else names)
+    searched = tuple(scenario.names if names is None else names)
     held = [i for i, name in enumerate(experiment.names) if name in held_out]
     training = [i for i in range(len(experiment.names)) if i not in held]
-    data, unseen = experiment.select(training), experiment.select(held or training)
+    data, held_data = experiment.select(training), experiment.select(held or training)
     noise = usual_noise(data)
-    surge, sway, yaw = (world.noise * w for w in noise.wrench)
+    surge, sway, yaw = (scenario.noise * w for w in noise.wrench)
     noise = replace(noise, wrench=(surge, sway, yaw))
-    nominal = _fit(*with_truth(world, ()), data, noise)
-    true = _fit(*with_truth(world, looked_for), data, noise)
+    nominal = _fit(*with_truth(scenario, ()), data, noise)
+    true = _fit(*with_truth(scenario, searched), data, noise)
     again = _from(nominal, true, data)
     nominal = max(nominal, again, key=lambda f: f.objective)
-    return Looked(nominal, true, data, unseen)
+    return OracleFits(nominal, true, data, held_data)
 
 
-def detects(sight: Sight, nulls: Sequence[Sight]) -> bool:
+def detects(result: OracleResult, nulls: Sequence[OracleResult]) -> bool:
     """Likelihood-ratio test at LEVEL; where nulls show a heavier tail than chi square, theirs counts."""
-    threshold = 0.5 * float(chi2.isf(LEVEL, max(sight.parameters, 1)))
+    threshold = 0.5 * float(chi2.isf(LEVEL, max(result.parameters, 1)))
     if len(nulls) >= 1.0 / LEVEL / 2.0:
-        threshold = max(threshold, float(np.quantile([s.gain for s in nulls], 1.0 - LEVEL)))
-    return sight.gain > threshold
+        threshold = max(threshold, float(np.quantile([null.gain for null in nulls], 1.0 - LEVEL)))
+    return result.gain > threshold
 
 
-def with_truth(world: World, names: Sequence[str]) -> tuple[Hypothesis, Array]:
+def with_truth(scenario: Scenario, names: Sequence[str]) -> tuple[Hypothesis, Array]:
     """The nominal robot with these effects free, and theta at the true values of all that is hidden."""
     hypothesis = nominal_hypothesis(Robot())
     for name in names:
         hypothesis = hypothesis.with_effect(name, 1.0)
-        if name in world.effects:
-            robot = hypothesis.robot.with_effect(name, **world.effects[name])
+        if name in scenario.effects:
+            robot = hypothesis.robot.with_effect(name, **scenario.effects[name])
             hypothesis = replace(hypothesis, robot=robot)
     theta = Coordinates(hypothesis).origin().copy()
     for i, name in enumerate(hypothesis.free):
-        if name in world.parameters:
-            theta[i] = np.log(world.parameters[name])
+        if name in scenario.parameters:
+            theta[i] = np.log(scenario.parameters[name])
     return hypothesis, theta
 
 
@@ -141,6 +143,6 @@ def _from(base: Fit, rival: Fit, data: Experiment) -> Fit:
     return climb(evaluate(base.hypothesis, theta, data, base.noise), data, ITERATIONS)
 
 
-def _rms(unseen: Experiment, fit: Fit) -> list[list[float]]:
-    sizes = prediction_errors(predict(unseen, fit.robot, fit.noise, max(HORIZONS)), HORIZONS)
+def _rms(held_out: Experiment, fit: Fit) -> list[list[float]]:
+    sizes = prediction_errors(predict(held_out, fit.robot, fit.noise, max(HORIZONS)), HORIZONS)
     return [[float(v) for v in row] for row in sizes.rms]

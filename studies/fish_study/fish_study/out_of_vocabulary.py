@@ -1,4 +1,4 @@
-"""Effects that the vocabulary has no name for. Never registered in EFFECTS except while a world is being made.
+"""Effects that the vocabulary has no name for. Never registered in EFFECTS except while a scenario is being made.
 
 The right answer to each is `unexplained`, or `no_mismatch` where too weak to see; any name is a wrong name.
 """

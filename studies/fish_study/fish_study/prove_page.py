@@ -17,29 +17,19 @@ from fish_report.page import (
     styled,
     write_page,
 )
+from fish_study.asked_table import asked_table
+from fish_study.calibration import Bin, calibration, calibration_table
+from fish_study.group_tables import failure_table, group_table, name_table
+from fish_study.information_criteria import criterion_table
 from fish_study.nulls import null_table
+from fish_study.oracle_tables import OracleScores, competitor_table, oracle_table
+from fish_study.power import Power, power, power_table
 from fish_study.score import Score
-from fish_study.tables import (
-    Bin,
-    Power,
-    asked_table,
-    calibration,
-    calibration_table,
-    criterion_table,
-    failure_table,
-    group_table,
-    name_table,
-    power,
-    power_table,
-)
 
 
-def tables(
-    scores: Sequence[Score], oracle: dict[int, bool] | None = None, more: Sequence[Table] = ()
-) -> list[Table]:
+def tables(scores: Sequence[Score], oracle: OracleScores | None = None) -> list[Table]:
     """Everything that is printed as well."""
-    steps = power(scores, oracle)
-    failed = [failure_table(scores)] if any(not s.has_answer for s in scores) else []
+    steps = power(scores, oracle.detected if oracle else None)
     nulls = null_table(scores)
     shown = [
         asked_table(scores),
@@ -48,24 +38,26 @@ def tables(
         criterion_table(scores),
     ]
     shown += [power_table(steps)] if steps else []
-    return [*shown, *more, *([nulls] if nulls else []), name_table(scores), *failed]
+    shown += [oracle_table(scores, oracle), competitor_table(scores, oracle)] if oracle else []
+    shown += [nulls] if nulls else []
+    shown.append(name_table(scores))
+    return shown + ([failure_table(scores)] if any(not s.has_answer for s in scores) else [])
 
 
 def write_prove_page(
     path: Path,
     about: Sequence[Mapping[str, Any]],
     scores: Sequence[Score],
-    oracle: dict[int, bool] | None = None,
-    more: Sequence[Table] = (),
+    oracle: OracleScores | None = None,
 ) -> None:
     """Write report.html; about: what was asked for, of each study."""
     which = "; ".join(f"seed {a['seed']}, {a['began']}" for a in about)
     lead = (
-        f"{len(scores)} worlds, {sum(bool(s.truth) or s.unnamed for s in scores)} of them with something hidden; "
-        f"{which}. Labels were sealed before the run, and the opened ones fit their seals."
+        f"{len(scores)} scenarios, {sum(bool(s.truth) or s.unnamed for s in scores)} of them with something hidden; "
+        f"{which}. Labels were sealed before the run, and the opened ones fit their commitments."
     )
-    blocks: list[Block] = list(tables(scores, oracle, more))
-    steps = power(scores, oracle)
+    blocks: list[Block] = list(tables(scores, oracle))
+    steps = power(scores, oracle.detected if oracle else None)
     if steps:
         blocks.append(Figure("Power over strength", _power(steps), "bars: exact 95 % intervals"))
     blocks.append(
@@ -79,7 +71,7 @@ def write_prove_page(
         Figure(
             "Hidden against answered",
             _confusion(scores),
-            "worlds with one hidden thing or none; first name or verdict",
+            "scenarios with one hidden thing or none; first name or verdict",
         )
     )
     blocks.append(
@@ -92,7 +84,7 @@ def write_prove_page(
 
 
 HOW = (
-    "Each world is a fish whose parameters differ from the nominal ones by up to 25 %, with something hidden in it, in its "
+    "Each scenario is a fish whose parameters differ from the nominal ones by up to 25 %, with something hidden in it, in its "
     "water, its actuators or its sensors. Its recordings were given to the tool as a process of its own, which gets nothing but "
     "the folder."
 )
@@ -116,7 +108,7 @@ def _power(steps: Sequence[Power]) -> go.Figure:
     if all(p.oracle for p in steps):
         _points(figure, x, [p.oracle for p in steps], "oracle")
     figure.update_xaxes(type="log", title="strength, typical ones")
-    figure.update_yaxes(range=[0, 1.05], title="share of worlds")
+    figure.update_yaxes(range=[0, 1.05], title="share of scenarios")
     return styled(figure)
 
 
@@ -138,8 +130,10 @@ def _reliability(bins: Sequence[Bin]) -> go.Figure:
 
 
 def _confusion(scores: Sequence[Score]) -> go.Figure:
-    own = [s for s in scores if len(s.world.names) < 2]
-    hidden = [s.world.names[0] if s.world.names else f"nothing ({s.world.plant})" for s in own]
+    own = [s for s in scores if len(s.scenario.names) < 2]
+    hidden = [
+        s.scenario.names[0] if s.scenario.names else f"nothing ({s.scenario.plant})" for s in own
+    ]
     answered = [s.named[0] if s.named else s.verdict for s in own]
     rows, columns = sorted(set(hidden)), sorted(set(answered))
     counts = np.zeros((len(rows), len(columns)), dtype=int)

@@ -1,29 +1,28 @@
-"""Make each world's recordings, run the tool on them as a process of its own, keep what it answers.
+"""Make each scenario's recordings, run the tool on them as a process of its own, keep what it answers.
 
 The tool's process gets the folder of recordings and an output folder, whose names tell nothing.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fish_report.json_file import write_json
-from fish_study.build import make_world
-from fish_study.scenario import NoWorld, World
+from fish_report.worker_pool import at_end_of_worker, worker_pool
+from fish_study.build import make_recordings
+from fish_study.scenario import Scenario, ScenarioError
 from fish_study.study import Study, StudyError, read_json
-from fish_study.tool_version import the_tool
+from fish_study.tool_version import checked_version
 
 DIAGNOSE = (sys.executable, "-m", "fish_report.robofish", "diagnose")
 LONGEST = 3600.0  # s, one diagnosis
@@ -35,31 +34,31 @@ Done = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Job:
-    """One world to be run."""
+    """One scenario to be run."""
 
     name: str
-    world: World
-    place: Path
+    scenario: Scenario
+    folder: Path
     tool: tuple[str, ...] = DIAGNOSE
     keep: bool = False  # the recordings
     threads: int = 1  # of the tool
     version: str = ""  # of the tool that the study examines; "": any
 
 
-def run_world(job: Job) -> str:
-    """Make, diagnose, write result.json; returns the world's name. A tool that fails is a result too."""
-    recordings, out = job.place / "recordings", job.place / "tool"
+def run_scenario(job: Job) -> str:
+    """Make, diagnose, write result.json; returns the scenario's name. A tool that fails is a result too."""
+    recordings, out = job.folder / "recordings", job.folder / "tool"
     for left in (recordings, out):  # of a run that was killed
         shutil.rmtree(left, ignore_errors=True)
-    job.place.mkdir(parents=True, exist_ok=True)
+    job.folder.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     error = ""
     at_wall: dict[str, float] = {}
     try:
-        at_wall = make_world(job.world, recordings)
-    except NoWorld as problem:  # would happen again
-        error = f"no world: {problem}"
-    version = the_tool(job.version, job.name)
+        at_wall = make_recordings(job.scenario, recordings)
+    except ScenarioError as problem:  # would happen again
+        error = f"no scenario: {problem}"
+    version = checked_version(job.version, job.name)
     answer: dict[str, Any] = {"diagnosis": None, "error": error}
     if not error:
         began = time.monotonic()
@@ -68,7 +67,7 @@ def run_world(job: Job) -> str:
     if not job.keep:
         shutil.rmtree(recordings, ignore_errors=True)
     write_json(
-        job.place / "result.json",
+        job.folder / "result.json",
         {"seconds": seconds, "tool": version, "ended_at_wall": at_wall, **answer},
     )
     return job.name
@@ -101,18 +100,12 @@ def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
     return {"diagnosis": read_json(out / "diagnosis.json"), "error": ""}
 
 
-def _end_with_the_study() -> None:
-    """A worker's watch: when the study's process is gone, even by a signal that it cannot catch, so are worker and tool."""
-    study = multiprocessing.parent_process()
-    assert study is not None  # this is a worker
-
-    def watch() -> None:
-        study.join()
+def _tools_end_with_the_worker() -> None:
+    def kill() -> None:
         for tool in _TOOLS:
             tool.kill()
-        os._exit(1)
 
-    threading.Thread(target=watch, daemon=True).start()
+    at_end_of_worker(kill)
 
 
 def run_study(
@@ -123,14 +116,14 @@ def run_study(
     keep: bool = False,
     cluster: str = "",
 ) -> None:
-    """Run every world without a result; `done` hears each name. cluster: address of a Dask scheduler."""
+    """Run every scenario without a result; `done` hears each name. cluster: address of a Dask scheduler."""
     threads = max(1, len(os.sched_getaffinity(0)) // max(jobs, 1))
-    worlds, version = study.worlds, study.about.get("tool", "")
+    scenarios, version = study.scenarios, study.about.get("tool", "")
     tasks = [
-        Job(n, worlds[n], study.place(n).resolve(), tuple(tool), keep, threads, version)
-        for n in study.open_worlds
+        Job(n, scenarios[n], study.folder_of(n).resolve(), tuple(tool), keep, threads, version)
+        for n in study.pending
     ]
-    for name in spread(run_world, tasks, jobs, cluster):
+    for name in spread(run_scenario, tasks, jobs, cluster):
         done(name)
 
 
@@ -146,13 +139,7 @@ def spread(
             for future in completed(client.map(work, tasks, pure=False)):
                 yield future.result()
         return
-    with ProcessPoolExecutor(
-        jobs, multiprocessing.get_context("spawn"), _end_with_the_study
-    ) as pool:
+    with worker_pool(jobs, _tools_end_with_the_worker) as pool:
         futures: list[Future[Any]] = [pool.submit(work, task) for task in tasks]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            for future in futures:
-                future.cancel()
+        for future in as_completed(futures):
+            yield future.result()

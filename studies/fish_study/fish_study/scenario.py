@@ -1,4 +1,4 @@
-"""A world: what is hidden in one data set. Its JSON is the label that is sealed."""
+"""A scenario: what is hidden in one data set. Its JSON is the label that is sealed."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 Values = Mapping[str, Mapping[str, float]]  # name -> parameter -> value
 
 
-class NoWorld(ValueError):
-    """A world that cannot be made, now or again; the message says why."""
+class ScenarioError(ValueError):
+    """A scenario that cannot be made, now or again; the message says why."""
 
 
 @dataclass(frozen=True)
-class World:
+class Scenario:
     """Everything a data set is made from, numbers drawn; `seed` draws the rest (programs, noise)."""
 
     group: str
@@ -44,6 +44,6 @@ class World:
         return asdict(self)
 
     @classmethod
-    def of(cls, label: Mapping[str, Any]) -> World:
-        """The world of a label."""
+    def of(cls, label: Mapping[str, Any]) -> Scenario:
+        """The scenario of a label."""
         return cls(**label)

@@ -1,4 +1,4 @@
-"""The groups of the study: who hides what from whom. Each is a row of the table and a function (random, number) -> World."""
+"""The groups of the study: who hides what from whom. Each is a row of the table and a function (random, number) -> Scenario."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fish_sim.sensors import SENSOR_EFFECTS
 from fish_sim.sensors.sensor_effect import SensorEffect
 from fish_study.other_forms import OTHER_FORMS
 from fish_study.out_of_vocabulary import OUTSIDE
-from fish_study.scenario import World
+from fish_study.scenario import Scenario
 from fish_sysid.diagnosis.vocabulary import candidates
 
 Random = np.random.Generator
@@ -33,7 +33,7 @@ MEASURED = (
     "servo_rate_limit",
 )
 VALUE_SPREAD = 0.15  # of strengths about the typical one
-ELSEWHERE = {  # parameters that say where or when; drawn afresh in every world
+ELSEWHERE = {  # parameters that say where or when; drawn afresh in every scenario
     "tether": {"x": (-0.6, 0.6), "y": (-0.4, 0.4), "length": (0.3, 0.6)},
     "payload": {"forward": (-0.05, 0.05), "left": (-0.03, 0.03)},
     "wave_drag": {"speed": (0.10, 0.20), "width": (0.025, 0.04)},
@@ -117,7 +117,7 @@ def _strong(parameter: Parameter, strength: float, sign: float) -> float:
     return float(np.clip(value, parameter.lowest, parameter.highest))
 
 
-def _world(group: str, random: Random, names: tuple[str, ...], strength: float = 1.0) -> World:
+def _world(group: str, random: Random, names: tuple[str, ...], strength: float = 1.0) -> Scenario:
     """A fish that is not the nominal one, with these effects."""
     from fish_sim.robot import nominal_parameters
 
@@ -126,57 +126,57 @@ def _world(group: str, random: Random, names: tuple[str, ...], strength: float =
     encoder = not set(names) & set(HIDDEN_BY_THE_ENCODER) and bool(random.random() > 0.15)
     effects = {name: draw_effect(name, strength, random) for name in names}
     seed = int(random.integers(2**62))
-    return World(group, seed, effects, strength, encoder=encoder, parameters=factors)
+    return Scenario(group, seed, effects, strength, encoder=encoder, parameters=factors)
 
 
 def _turn(items: Sequence[Item], number: int) -> Item:
     return items[number % len(items)]
 
 
-def single(random: Random, number: int) -> World:
+def single(random: Random, number: int) -> Scenario:
     """One effect of the vocabulary (or another form of it) after the other at the strengths of the known sets, mixed trials."""
     return _world("single", random, (_turn((*candidates(), *OTHER_FORMS), number),))
 
 
-def absorbed(random: Random, number: int) -> World:
+def absorbed(random: Random, number: int) -> Scenario:
     """Effects that look like a nominal parameter as long as the fish keeps to one speed."""
     return replace(_world("absorbed", random, (_turn(ABSORBED, number),)), trials="one_speed")
 
 
-def feedback(random: Random, number: int) -> World:
+def feedback(random: Random, number: int) -> Scenario:
     """The same effects, every trial under feedback control."""
     return replace(_world("feedback", random, (_turn(candidates(), number),)), trials="closed")
 
 
-def noise(random: Random, number: int) -> World:
+def noise(random: Random, number: int) -> Scenario:
     """A ladder of noise: water and sensors."""
-    world = _world("noise", random, (str(random.choice(candidates())),))
-    return replace(world, noise=_turn(NOISES, number))
+    scenario = _world("noise", random, (str(random.choice(candidates())),))
+    return replace(scenario, noise=_turn(NOISES, number))
 
 
-def ladder(random: Random, number: int) -> World:
+def ladder(random: Random, number: int) -> Scenario:
     """A ladder of strengths, for power curves. A weak limit is one that no command reaches: nothing would be hidden."""
     strength = _turn(STRENGTHS, number)
     names = [name for name in candidates() if strength >= 1.0 or name not in LIMITS]
     return _world("ladder", random, (str(random.choice(names)),), strength)
 
 
-def two(random: Random, number: int) -> World:
+def two(random: Random, number: int) -> Scenario:
     """Two effects at once."""
     return _world("two", random, _turn(PAIRS, number))
 
 
-def sensor(random: Random, number: int) -> World:
+def sensor(random: Random, number: int) -> Scenario:
     """The sensor is wrong, not the fish."""
     return _world("sensor", random, (_turn(tuple(SENSOR_EFFECTS), number),))
 
 
-def outside(random: Random, number: int) -> World:
+def outside(random: Random, number: int) -> Scenario:
     """Something that the vocabulary has no name for."""
     return _world("outside", random, (_turn(tuple(OUTSIDE), number),))
 
 
-def null(random: Random, number: int) -> World:
+def null(random: Random, number: int) -> Scenario:
     """Nothing is hidden; other noise, more tail links than the tool's model, other integrators."""
     links, method, substeps = _turn(OTHER_PLANTS, number)
     level = float(random.choice((0.5, 1.0, 2.0)))
@@ -185,7 +185,7 @@ def null(random: Random, number: int) -> World:
     )
 
 
-def mujoco(random: Random, number: int) -> World:
+def mujoco(random: Random, number: int) -> Scenario:
     """The second plant: another engine, its own water, and one of its own things concealed."""
     from fish_study.mujoco_effects import draw
 
@@ -196,11 +196,11 @@ def mujoco(random: Random, number: int) -> World:
     )
 
 
-GROUPS: dict[str, Callable[[Random, int], World]] = {
+GROUPS: dict[str, Callable[[Random, int], Scenario]] = {
     f.__name__: f
     for f in (single, absorbed, feedback, noise, ladder, two, sensor, outside, null, mujoco)
 }
-# share of a study's worlds
+# share of a study's scenarios
 SHARES = {
     "single": 0.22,
     "absorbed": 0.06,
@@ -215,23 +215,23 @@ SHARES = {
 }
 
 
-def draw_worlds(count: int, groups: list[str], seed: int) -> list[World]:
-    """`count` worlds over the groups in proportion to SHARES, in an order that tells nothing. Raises ValueError."""
+def draw_scenarios(count: int, groups: list[str], seed: int) -> list[Scenario]:
+    """`count` scenarios over the groups in proportion to SHARES, in an order that tells nothing. Raises ValueError."""
     unknown = [g for g in groups if g not in GROUPS]
     if unknown:
         raise ValueError(f"group {unknown[0]!r}: unknown; known: {', '.join(GROUPS)}")
     if count < 1:
-        raise ValueError(f"worlds: got {count}; expected at least 1")
+        raise ValueError(f"scenarios: got {count}; expected at least 1")
     random = np.random.default_rng(seed)
     wanted = np.array([SHARES[g] for g in groups]) / sum(SHARES[g] for g in groups) * count
     numbers = np.floor(wanted).astype(int)
     for k in np.argsort(numbers - wanted)[: count - numbers.sum()]:
         numbers[k] += 1
-    worlds = []
+    scenarios = []
     for group, number in zip(groups, numbers, strict=True):
         first = int(random.integers(1000))
-        worlds += [
+        scenarios += [
             GROUPS[group](np.random.default_rng(random.integers(2**62)), first + i)
             for i in range(number)
         ]
-    return [worlds[i] for i in random.permutation(len(worlds))]
+    return [scenarios[i] for i in random.permutation(len(scenarios))]

@@ -11,7 +11,8 @@ import numpy as np
 from fish_report.json_file import number
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
-from fish_study.scenario import World
+from fish_study.scenario import Scenario
+from fish_study.study import Study
 
 CONFIDENT = 0.9  # stated probability from which a wrong name counts as given with confidence; fixed before any run
 NOTHING = "no_mismatch"
@@ -36,9 +37,9 @@ class ParameterError:
 
 @dataclass(frozen=True)
 class Score:
-    """One world. Truth: names of the vocabulary that are hidden; unnamed: something without a name is hidden."""
+    """One scenario. Truth: names of the vocabulary that are hidden; unnamed: something without a name is hidden."""
 
-    world: World
+    scenario: Scenario
     truth: tuple[str, ...]
     unnamed: bool
     verdict: str  # of the tool; "failed" if it gave none
@@ -103,17 +104,17 @@ def vocabulary() -> frozenset[str]:
     return frozenset({*EFFECTS, *SENSOR_EFFECTS} - {"disturbance"})
 
 
-def score_world(
-    world: World, result: Mapping[str, Any], truth: tuple[str, ...] | None = None
+def score_scenario(
+    scenario: Scenario, result: Mapping[str, Any], truth: tuple[str, ...] | None = None
 ) -> Score:
     """Score a result. truth: names that count as right, for a plant whose effects have other names (default: its own)."""
     known = vocabulary()
-    names = tuple(n for n in world.names if n in known) if truth is None else truth
-    unnamed = bool(world.names) and not names
+    names = tuple(n for n in scenario.names if n in known) if truth is None else truth
+    unnamed = bool(scenario.names) and not names
     d = result.get("diagnosis")
     if d is None:
         return Score(
-            world=world,
+            scenario=scenario,
             truth=names,
             unnamed=unnamed,
             verdict=FAILED,
@@ -132,7 +133,7 @@ def score_world(
     rivals = {rival["name"] for e in effects for rival in e["rivals"]}
     fit = d["fit"]
     return Score(
-        world=world,
+        scenario=scenario,
         truth=names,
         unnamed=unnamed,
         verdict=d["verdict"],
@@ -140,7 +141,7 @@ def score_world(
         answered=frozenset({e["name"] for e in effects} | rivals),
         probability=effects[0]["evidence"]["probability"] if effects else float("nan"),
         kinds=tuple(e["kind"] for e in effects),
-        parameters=tuple(p for e in effects for p in _parameter_errors(world, e)),
+        parameters=tuple(p for e in effects for p in _parameter_errors(scenario, e)),
         rms={k: fit[k]["rms"] for k in ("nominal", "refitted", "with_effects") if k in fit},
         ranking={r["name"]: number(r["gain"], -np.inf) for r in d.get("ranking", ())},
         free={
@@ -156,10 +157,21 @@ def _position(rms: Mapping[str, Any]) -> float:
     return number(rms.get("2 s", {}).get("position_m"), np.inf)
 
 
-def _parameter_errors(world: World, effect: Mapping[str, Any]) -> list[ParameterError]:
-    hidden = world.effects.get(effect["name"], {})
+def _parameter_errors(scenario: Scenario, effect: Mapping[str, Any]) -> list[ParameterError]:
+    hidden = scenario.effects.get(effect["name"], {})
     return [
         ParameterError(f"{effect['name']}.{key}", hidden[key], number(p["value"]), number(p["std"]))
         for key, p in effect["parameters"].items()
         if key in hidden
+    ]
+
+
+def study_scores(study: Study) -> list[Score]:
+    """Scores of every scenario of a study. Opens its labels; raises StudyError where that is too early."""
+    from fish_study.true_names import true_names
+
+    results = study.results
+    return [
+        score_scenario(scenario, results[name], true_names(scenario))
+        for name, scenario in study.open_labels().items()
     ]

@@ -1,6 +1,6 @@
-"""The instruments of a recorded trial: overhead camera, IMU, encoder, with their noise and their errors.
+"""The sensors of a recorded trial: overhead camera, IMU, encoder, with their noise and their errors.
 
-Noise as in the supplied recordings, times a factor. Shares nothing with fish_sim, so that the second plant can use it.
+Noise as in `fish_sim.sensors.noise_levels`, times a factor. Knows nothing of the fish, so that the second plant can use it.
 """
 
 from __future__ import annotations
@@ -11,29 +11,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_sim.sensors.noise_levels import (
+    ACCELEROMETER,
+    BIAS,
+    CAMERA_HEADING,
+    CAMERA_POSITION,
+    ENCODER_SPEED,
+    GYRO,
+    exposure_times,
+)
 from fish_study.trials import PERIOD
 
 Array = NDArray[np.float64]
 
-GYRO, ACCEL, CAMERA, HEADING, ENCODER = (
-    0.006,
-    0.05,
-    0.002,
-    0.012,
-    0.15,
-)  # rad/s, m/s^2, m, rad, rad/s
-BIAS = (0.003, 0.03, 0.03)  # rad/s, m/s^2, m/s^2
-RATE, JITTER, LOST, TRANSPORT = (
-    30.0,
-    0.002,
-    0.01,
-    0.05,
-)  # Hz, s, share of frames, s from exposure to arrival
-
 
 @dataclass(frozen=True)
-class Errors:
-    """What the instruments do to the truth."""
+class SensorErrors:
+    """What the sensors do to the truth."""
 
     latency: float = 0.0  # s, the image is older than its stamp
     scale: float = 1.0  # of the camera's metres
@@ -42,7 +36,7 @@ class Errors:
     misalignment: float = 0.0  # rad, of the IMU's axes
 
     @classmethod
-    def of(cls, sensors: Mapping[str, Mapping[str, float]]) -> Errors:
+    def of(cls, sensors: Mapping[str, Mapping[str, float]]) -> SensorErrors:
         """From the vocabulary's names."""
         fields = {
             "camera_latency": "latency",
@@ -56,19 +50,24 @@ class Errors:
         )
 
 
-class Instruments:
+class SensorModels:
     """Of M fish over T grid points; all noise is drawn at once, so that a sample is the same whenever it is asked for."""
 
     def __init__(
-        self, steps: int, count: int, noise: float, errors: Errors, random: np.random.Generator
+        self,
+        steps: int,
+        count: int,
+        noise: float,
+        errors: SensorErrors,
+        random: np.random.Generator,
     ) -> None:
         self.errors = errors
         self._bias = random.standard_normal((count, 3)) * BIAS
         self._gyro = noise * GYRO * random.standard_normal((steps, count))
-        self._accel = noise * ACCEL * random.standard_normal((steps, count, 2))
-        self._encoder = noise * ENCODER * random.standard_normal((steps, count))
-        self.stamps = [self._exposures(PERIOD * (steps - 1), random) for _ in range(count)]
-        sd = noise * np.array([CAMERA, CAMERA, HEADING])
+        self._accel = noise * ACCELEROMETER * random.standard_normal((steps, count, 2))
+        self._encoder = noise * ENCODER_SPEED * random.standard_normal((steps, count))
+        self.stamps = [exposure_times(PERIOD * (steps - 1), random) for _ in range(count)]
+        sd = noise * np.array([CAMERA_POSITION, CAMERA_POSITION, CAMERA_HEADING])
         self._camera = [sd * random.standard_normal((len(t), 3)) for t in self.stamps]
 
     def imu(self, k: int, rate: Array, forward: Array, left: Array) -> tuple[Array, Array]:
@@ -90,9 +89,3 @@ class Instruments:
         pose[:, :2] *= self.errors.scale
         pose[:, 2] += self.errors.heading_offset
         return pose + self._camera[m][frames]
-
-    @staticmethod
-    def _exposures(end: float, random: np.random.Generator) -> Array:
-        t = np.arange(0.0, end, 1.0 / RATE)
-        t = np.clip(t + JITTER * random.standard_normal(len(t)), 0.0, end)
-        return np.sort(t[random.random(len(t)) > LOST])

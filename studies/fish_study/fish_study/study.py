@@ -1,11 +1,11 @@
-"""A study on disk: sealed labels, one result per world, everything there to go on after a kill.
+"""A study on disk: commitments to labels, one result per scenario, everything there to go on after a kill.
 
-study.json   what was asked for, and of which version of the tool
-seals.json   world -> SHA-256 of salt and label; written before any run
-sealed.json  salts and labels (mode 0600); nothing passes it to the tool
-worlds/world_0001/{recordings, tool, result.json}
-             result.json has the version that answered, and so has judged.json beside it
-labels.json  the opened labels; written when every world has a result
+study.json        what was asked for, and of which version of the tool
+commitments.json  scenario -> SHA-256 of salt and label; written before any run
+openings.json     salts and labels (mode 0600); nothing passes it to the tool
+scenarios/scenario_0001/{recordings, tool, result.json}
+                  result.json has the version that answered, and so has oracle.json beside it
+labels.json       the opened labels; written when every scenario has a result
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from fish_report.json_file import write_json
-from fish_study.commitment import Sealed, broken_seals, seal_label
-from fish_study.scenario import World
+from fish_study.commitment import Opening, broken_commitments, commit
+from fish_study.scenario import Scenario
 
 
 class StudyError(ValueError):
@@ -32,17 +32,23 @@ class Study:
     folder: Path
 
     @classmethod
-    def create(cls, folder: Path, worlds: Sequence[World], about: Mapping[str, Any]) -> Study:
-        """Seal the labels of new worlds; seals are on disk when this returns. Raises StudyError if a study is there."""
+    def create(cls, folder: Path, scenarios: Sequence[Scenario], about: Mapping[str, Any]) -> Study:
+        """Commit to the labels of new scenarios; the commitments are on disk when this returns.
+
+        Raises StudyError if a study is there.
+        """
         if (folder / "study.json").exists():
             raise StudyError(f"{folder}: holds a study already")
         folder.mkdir(parents=True, exist_ok=True)
-        names = [f"world_{i:04d}" for i in range(len(worlds))]
-        sealed = {
-            name: seal_label(world.label()) for name, world in zip(names, worlds, strict=True)
+        names = [f"scenario_{i:04d}" for i in range(len(scenarios))]
+        openings = {
+            name: commit(scenario.label()) for name, scenario in zip(names, scenarios, strict=True)
         }
-        write_json(folder / "sealed.json", {k: asdict(s) for k, s in sealed.items()}, private=True)
-        write_json(folder / "seals.json", {name: s.seal for name, s in sealed.items()})
+        content = {name: asdict(opening) for name, opening in openings.items()}
+        write_json(folder / "openings.json", content, private=True)
+        write_json(
+            folder / "commitments.json", {name: o.commitment for name, o in openings.items()}
+        )
         write_json(folder / "study.json", about)
         return cls(folder)
 
@@ -57,7 +63,7 @@ class Study:
         own = self.about.get("tool", "")
         if own != digest:
             raise StudyError(
-                f"{self.folder}: got version {own or 'unknown'} of the tool, expected {digest or 'unknown'}; worlds of"
+                f"{self.folder}: got version {own or 'unknown'} of the tool, expected {digest or 'unknown'}; scenarios of"
                 " two versions make no table: begin another study, or go back to the version that this one began with"
             )
 
@@ -76,9 +82,9 @@ class Study:
             )
 
     def check_files(self, kind: str, files: Mapping[str, Mapping[str, Any]]) -> None:
-        """Raise StudyError if a world's file (name -> content) was made by another version of the tool than the study's.
+        """Raise StudyError if a scenario's file (name -> content) was made by another version of the tool than the study's.
 
-        Files from before they told it are taken for the study's.
+        A file without a version counts as the study's.
         """
         own = self.about.get("tool", "")
         odd = [f"{name} of {f['tool']}" for name, f in files.items() if f.get("tool", own) != own]
@@ -90,60 +96,60 @@ class Study:
             )
 
     @property
-    def worlds(self) -> dict[str, World]:
-        """Every world, from the sealed labels. For the runner and for the judge, never for the tool."""
-        return {name: World.of(s.label) for name, s in self._sealed().items()}
+    def scenarios(self) -> dict[str, Scenario]:
+        """Every scenario, from the labels. For the runner and the oracle, never for the tool."""
+        return {name: Scenario.of(o.label) for name, o in self._openings().items()}
 
-    def place(self, name: str) -> Path:
-        """Folder of a world."""
-        return self.folder / "worlds" / name
+    def folder_of(self, name: str) -> Path:
+        """Folder of a scenario."""
+        return self.folder / "scenarios" / name
 
     @property
-    def open_worlds(self) -> list[str]:
+    def pending(self) -> list[str]:
         """Names without a result."""
-        return [name for name in self.worlds if not (self.place(name) / "result.json").exists()]
+        return [n for n in self.scenarios if not (self.folder_of(n) / "result.json").exists()]
 
     @property
     def results(self) -> dict[str, dict[str, Any]]:
-        """What the tool answered, for worlds that have a result. Raises StudyError if not one version answered all."""
-        found = {name: self.place(name) / "result.json" for name in self.worlds}
+        """What the tool answered, for scenarios that have a result. Raises StudyError if not one version answered all."""
+        found = {name: self.folder_of(name) / "result.json" for name in self.scenarios}
         results = {name: read_json(path) for name, path in found.items() if path.exists()}
         self.check_files("result.json", results)
         return results
 
-    def reveal(self) -> dict[str, World]:
-        """Open the labels and check every seal. Raises StudyError if a world has no result or a seal is broken."""
-        if self.open_worlds:
+    def open_labels(self) -> dict[str, Scenario]:
+        """Open the labels and check every commitment. Raises StudyError if a result is missing or a commitment is broken."""
+        if self.pending:
             raise StudyError(
-                f"{self.folder}: {len(self.open_worlds)} worlds have no result yet; labels stay sealed"
+                f"{self.folder}: {len(self.pending)} scenarios have no result yet; labels stay sealed"
             )
-        opened, seals = self._sealed(), read_json(self.folder / "seals.json")
-        broken = broken_seals(seals, opened)
+        openings, commitments = self._openings(), read_json(self.folder / "commitments.json")
+        broken = broken_commitments(commitments, openings)
         if broken:
             raise StudyError(
-                f"{self.folder}: labels that are not what was sealed: {', '.join(broken)}"
+                f"{self.folder}: labels that are not those committed to: {', '.join(broken)}"
             )
-        write_json(self.folder / "labels.json", {k: asdict(s) for k, s in opened.items()})
-        return {name: World.of(s.label) for name, s in opened.items()}
+        write_json(self.folder / "labels.json", {k: asdict(o) for k, o in openings.items()})
+        return {name: Scenario.of(o.label) for name, o in openings.items()}
 
-    def _sealed(self) -> dict[str, Sealed]:
+    def _openings(self) -> dict[str, Opening]:
         return {
-            name: Sealed(**content)
-            for name, content in read_json(self.folder / "sealed.json").items()
+            name: Opening(**content)
+            for name, content in read_json(self.folder / "openings.json").items()
         }
 
 
 def check_apart(studies: Sequence[Study]) -> None:
-    """Raise StudyError if a world is in these studies twice, as it would count twice. Its seed tells it."""
+    """Raise StudyError if a scenario is in these studies twice, as it would count twice. Its seed identifies it."""
     seen: dict[int, Path] = {}
     for study in studies:
-        for name, world in study.worlds.items():
-            if world.seed in seen:
+        for name, scenario in study.scenarios.items():
+            if scenario.seed in seen:
                 raise StudyError(
-                    f"got the world of seed {world.seed} twice, as {seen[world.seed]} and {study.place(name)}; expected every"
-                    " world once: leave one of these studies out"
+                    f"got the scenario of seed {scenario.seed} twice, as {seen[scenario.seed]} and {study.folder_of(name)};"
+                    " expected every scenario once: leave one of these studies out"
                 )
-            seen[world.seed] = study.place(name)
+            seen[scenario.seed] = study.folder_of(name)
 
 
 def read_json(path: Path) -> Any:

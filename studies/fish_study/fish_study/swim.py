@@ -1,4 +1,4 @@
-"""Let a plant swim under a driver and write down what its instruments say."""
+"""Let a plant swim under a driver and write down what its sensors say."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.pool import HALF_LENGTH, HALF_WIDTH
-from fish_study.sensor_models import TRANSPORT, Instruments
+from fish_sim.sensors.noise_levels import CAMERA_LATENCY
+from fish_study.sensor_models import SensorModels
 from fish_study.trials import PERIOD, Pose
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ class Inertial(NamedTuple):
     left: Array  # m/s^2
 
 
-class Plant(Protocol):
+class PlantWithImu(Protocol):
     """M fish in the water."""
 
     def reset(self, poses: Array) -> None:
@@ -44,13 +45,13 @@ class Plant(Protocol):
         """(M,) rad/s."""
 
 
-class Driver(Protocol):
+class CommandSource(Protocol):
     """Who commands."""
 
     def command(self, k: int) -> tuple[Array, Array]:
         """Commands (M, 2) and rotor phases (M,) at grid point k."""
 
-    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
+    def observe(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
         """IMU samples of grid point k and camera poses (stamp, x, y, heading) that arrived in the period after it."""
 
 
@@ -58,8 +59,8 @@ class Driver(Protocol):
 class Readings:
     """M trials on T grid points of 10 ms.
 
-    The plants' water has no end: from where the head comes to a wall of the pool on, a trial is no swim in it. `ends` says how
-    many grid points it lasts until then.
+    The plants' water has no end: a trial is a swim in the pool until the head comes to a wall. `ends` says how many grid
+    points that are.
     """
 
     commands: Array  # (T, M, 2) rad/s, rad
@@ -109,7 +110,7 @@ def ended_at_a_wall(readings: Sequence[Readings]) -> dict[str, float]:
 
 
 def swim(
-    plant: Plant, starts: Array, driver: Driver, instruments: Instruments, steps: int
+    plant: PlantWithImu, starts: Array, driver: CommandSource, sensors: SensorModels, steps: int
 ) -> Readings:
     """`steps` grid points from rest at `starts` (M, 3)."""
     plant.reset(starts)
@@ -121,29 +122,29 @@ def swim(
     for k in range(steps):
         commands[k], phase[k] = driver.command(k)
         speed[k] = plant.rotor_speed
-        gyro[k], accel[k] = instruments.imu(k, *plant.step(commands[k]))
+        gyro[k], accel[k] = sensors.imu(k, *plant.step(commands[k]))
         truth[k + 1] = plant.pose
         arrived = []
         for m in range(count):
             new = int(
-                np.searchsorted(instruments.stamps[m], PERIOD * (k + 1) - TRANSPORT, side="right")
+                np.searchsorted(sensors.stamps[m], PERIOD * (k + 1) - CAMERA_LATENCY, side="right")
             )
             frames = slice(shown[m], new)
-            poses = instruments.poses(m, frames, truth[: k + 2, m]) if new > shown[m] else ()
-            stamps = instruments.stamps[m][frames]
+            poses = sensors.poses(m, frames, truth[: k + 2, m]) if new > shown[m] else ()
+            stamps = sensors.stamps[m][frames]
             arrived.append(
                 [(float(t), x, y, psi) for t, (x, y, psi) in zip(stamps, poses, strict=True)]
             )
             shown[m] = new
-        driver.see(k, gyro[k], accel[k], arrived)
-    everything = tuple(instruments.poses(m, slice(None), truth[:steps, m]) for m in range(count))
+        driver.observe(k, gyro[k], accel[k], arrived)
+    everything = tuple(sensors.poses(m, slice(None), truth[:steps, m]) for m in range(count))
     return Readings(
         commands,
         phase,
         gyro,
         accel,
-        instruments.encoder(speed),
-        tuple(instruments.stamps),
+        sensors.encoder(speed),
+        tuple(sensors.stamps),
         everything,
         truth[:steps],
         until_a_wall(truth[:steps]),

@@ -25,7 +25,7 @@ def tool_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def the_tool(expected: str, who: str) -> str:
+def checked_version(expected: str, who: str) -> str:
     """The digest of the tool that is here now, for who is about to use it. Raises StudyError unless it is the expected one.
 
     A checkout may change while a study runs, and a cluster's workers may have another. "": any is good.

@@ -43,7 +43,7 @@ class OpenLoop:
         )
         return self.table[k], phase
 
-    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
+    def observe(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
         """Nothing is done with it."""
 
 
@@ -55,7 +55,7 @@ class Feedback:
     ) -> None:
         policy = policy or hand_tuned_policy()
         self._fish = [
-            _Captain(Planner(path, speed), Controller(policy))
+            _ClosedLoop(Planner(path, speed), Controller(policy))
             for path, speed in zip(paths, speeds, strict=True)
         ]
 
@@ -64,18 +64,18 @@ class Feedback:
         rows = np.array([fish.command(k) for fish in self._fish])
         return rows[:, 1:], rows[:, 0]
 
-    def see(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
+    def observe(self, k: int, gyro: Array, accel: Array, poses: Sequence[Sequence[Pose]]) -> None:
         """IMU samples of grid point k, and the camera poses (stamp, x, y, heading) that arrived until the next."""
         for m, fish in enumerate(self._fish):
-            fish.see(k * PERIOD, float(gyro[m]), accel[m], poses[m])
+            fish.observe(k * PERIOD, float(gyro[m]), accel[m], poses[m])
 
 
-class _Captain:
+class _ClosedLoop:
     def __init__(self, planner: Planner, controller: Controller) -> None:
         self._planner, self._controller, self._fusion = planner, controller, Fusion()
         self._motion: Motion | None = None
 
-    def see(self, time: float, gyro: float, accel: Array, poses: Sequence[Pose]) -> None:
+    def observe(self, time: float, gyro: float, accel: Array, poses: Sequence[Pose]) -> None:
         for stamp, *pose in poses:
             self._fusion.add_pose(stamp, pose)
         self._fusion.add_imu(time, gyro, float(accel[0]), float(accel[1]))

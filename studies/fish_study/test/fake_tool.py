@@ -7,10 +7,10 @@ from pathlib import Path
 
 def main() -> int:
     recordings, out = Path(sys.argv[1]), Path(sys.argv[sys.argv.index("--out") + 1])
-    if recordings.parent.name == "world_0001":
+    if recordings.parent.name == "scenario_0001":
         print("cannot", file=sys.stderr)
         return 3
-    if recordings.parent.name == "world_0002" and not (recordings.parent / "stopped").exists():
+    if recordings.parent.name == "scenario_0002" and not (recordings.parent / "stopped").exists():
         (recordings.parent / "stopped").touch()
         return 130
     trials = sorted(path.name for path in recordings.iterdir())

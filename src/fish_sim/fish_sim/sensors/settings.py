@@ -5,27 +5,31 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
+from fish_sim.sensors import noise_levels as levels
+
 
 @dataclass(frozen=True)
 class SensorSettings:
     """Standard deviations are those of the supplied recordings where these give them."""
 
-    gyro_noise: float = 0.006  # rad/s, std per sample
-    gyro_bias: float = 0.01  # rad/s, std of the constant bias
-    accelerometer_noise: float = 0.05  # m/s^2, std per sample
-    accelerometer_bias: float = 0.05  # m/s^2, std of the constant bias
+    gyro_noise: float = levels.GYRO  # rad/s, std per sample
+    gyro_bias: float = levels.SIMULATOR_GYRO_BIAS  # rad/s, std of the constant bias
+    accelerometer_noise: float = levels.ACCELEROMETER  # m/s^2, std per sample
+    accelerometer_bias: float = (
+        levels.SIMULATOR_ACCELEROMETER_BIAS
+    )  # m/s^2, std of the constant bias
     orientation_noise: float = 0.003  # rad, std per sample
     orientation_drift: float = (
         0.001  # rad/sqrt(s), random walk of the yaw, which starts at an unknown angle
     )
     encoder_angle_noise: float = 0.002  # rad, std per sample
-    encoder_speed_noise: float = 0.2  # rad/s, std per sample
-    camera_rate: float = 30.0  # Hz
-    camera_jitter: float = 0.0008  # s, std of the time between frames
-    camera_loss: float = 0.01  # share of frames that are lost
-    camera_latency: float = 0.05  # s, from exposure (the stamp) to arrival
-    camera_position_noise: float = 0.002  # m, std per axis
-    camera_heading_noise: float = 0.012  # rad, std
+    encoder_speed_noise: float = levels.SIMULATOR_ENCODER_SPEED  # rad/s, std per sample
+    camera_rate: float = levels.CAMERA_RATE  # Hz
+    camera_jitter: float = levels.SIMULATOR_CAMERA_JITTER  # s, std of the time between frames
+    camera_loss: float = levels.CAMERA_LOSS  # share of frames that are lost
+    camera_latency: float = levels.CAMERA_LATENCY  # s, from exposure (the stamp) to arrival
+    camera_position_noise: float = levels.CAMERA_POSITION  # m, std per axis
+    camera_heading_noise: float = levels.CAMERA_HEADING  # rad, std
     battery_voltage: float = 12.4  # V, full, without load
     battery_resistance: float = 0.08  # ohm
     battery_capacity: float = 1.3  # A h; the open-circuit voltage falls by BATTERY_DROP over it

@@ -1,7 +1,7 @@
 """Recordings made by the model itself, for studies in which the truth is known.
 
-Sensor noise as in the supplied recordings: camera 30 Hz with jitter and 1 % of frames lost, 2 mm and 0.012 rad; gyro 0.006 rad/s,
-accelerometer 0.05 m/s^2, constant biases; a small random wrench of the water on the head.
+Sensor noise is that of `Noise`; frame times and constant biases are those of `fish_sim.sensors.noise_levels`; the water
+pushes the head as in `fish_sim.water_push`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
+from fish_sim.sensors.noise_levels import BIAS, CAMERA_RATE, exposure_times
 from fish_sim.step import Stepper
+from fish_sim.water_push import WaterPush
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.dataset.resample import apart
 from fish_sysid.estimation.ekf_types import WRENCH, Noise
@@ -22,10 +24,6 @@ Array = NDArray[np.float64]
 
 STROKE = 2.0  # Hz
 FULL_SPEED = 12.0 * 2.0 * np.pi * STROKE  # rad/s, amplitude of the rotor's speed at full throttle
-CAMERA_RATE = 30.0  # Hz
-JITTER = 0.002  # s
-LOST = 0.01  # share of frames
-BIAS = (0.003, 0.03, 0.03)  # rad/s, m/s^2, m/s^2: standard deviations
 KINDS = ("straight", "steps", "sines", "turn", "random")
 
 
@@ -91,13 +89,11 @@ def _swim(
     """States (T, M, NS) at the grid points and the wrench (T, M, 3) from each grid point to the next."""
     T, M = commands.shape[:2]
     at = [stepper.layout.parameters.index(name) for name in WRENCH]
-    kept, size = np.exp(-DT / noise.wrench_time), np.array(noise.wrench)
+    water = WaterPush(np.array(noise.wrench), noise.wrench_time)
     wrench = np.empty((T, M, 3))
-    wrench[0] = size * random.standard_normal((M, 3))
+    wrench[0] = water.first(random.standard_normal((M, 3)))
     for k in range(1, T):
-        wrench[k] = kept * wrench[k - 1] + np.sqrt(1.0 - kept**2) * size * random.standard_normal(
-            (M, 3)
-        )
+        wrench[k] = water.after(wrench[k - 1], random.standard_normal((M, 3)))
     states = np.empty((T, M, len(stepper.layout.state)))
     states[0] = stepper.rest(parameters=p)
     p = np.tile(p, (M, 1))
@@ -135,9 +131,7 @@ def _imu(
 def _camera(pose: Array, noise: Noise, random: np.random.Generator, rate: float) -> Frames:
     """Poses at jittered times, some lost, those of a fast camera thinned as those of recordings are."""
     end = DT * (len(pose) - 1)
-    t = np.arange(0.0, end, 1.0 / rate)
-    t = np.clip(t + JITTER * random.standard_normal(len(t)), 0.0, end)
-    t = np.sort(t[random.random(len(t)) > LOST])
+    t = exposure_times(end, random, rate)
     t = t[apart(t, DT)]
     seen = np.column_stack([np.interp(t, DT * np.arange(len(pose)), pose[:, i]) for i in range(3)])
     sd = np.array([noise.camera_position, noise.camera_position, noise.camera_heading])

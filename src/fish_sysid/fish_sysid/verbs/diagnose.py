@@ -41,6 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME,NAME",
         help="what competes (default: every name of the vocabulary)",
     )
+    parser.add_argument(
+        "--without",
+        metavar="STAGE,STAGE",
+        help="stages of the search to leave out, for an ablation (`robofish prove --without`)",
+    )
     add_topic_arguments(parser)
 
 
@@ -69,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
                 console.print(f"{time.monotonic() - start:5.0f} s  {text}")
 
         try:
-            result = diagnose(experiment, robot, level, say, names)
+            result = diagnose(experiment, robot, level, say, names, **left_out_stages(args.without))
         except NoCandidateError as error:
             raise UserError(str(error)) from error
         content = {**answer(result), "left_out": left_out}
@@ -89,6 +94,11 @@ def run(args: argparse.Namespace) -> int:
     print(sentence(content))
     print(f"{args.out}/diagnosis.json, model.yaml, report.html ({time.monotonic() - start:.0f} s)")
     return 0
+
+
+def left_out_stages(given: str | None) -> dict[str, frozenset[str]]:
+    """The argument `without` of `diagnose`, where stages are named."""
+    return {"without": frozenset(given.split(","))} if given else {}
 
 
 def without_wrench(robot: Robot) -> Robot:

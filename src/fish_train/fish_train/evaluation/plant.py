@@ -5,18 +5,16 @@ The built-in plant is the project's simulator; another engine plugs in by offeri
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.scheme import stable_scheme
-from fish_sim.simulation import DISTURBANCE_ARM, DISTURBANCE_TIME
 from fish_sim.step import Stepper
+from fish_sim.water_push import WaterPush
 
 Array = NDArray[np.float64]
 
@@ -52,7 +50,7 @@ class FishSimPlant:
         names = self._stepper.layout.parameters
         self._pushed = [names.index(f"disturbance.{key}") for key in ("surge", "sway", "yaw")]
         self._random = [np.random.default_rng([seed, 1]) for seed in seeds]
-        self._size = disturbance * np.array([1.0, 1.0, DISTURBANCE_ARM])
+        self._water = WaterPush.of_force(disturbance)
         self.reset(np.zeros((len(robots), 3)))
 
     def reset(self, poses: Array) -> None:
@@ -67,9 +65,8 @@ class FishSimPlant:
 
     def step(self, commands: Array) -> None:
         """Advance all robots; the water pushes as in `fish_sim.simulation`."""
-        kept = math.exp(-DT / DISTURBANCE_TIME)
         fresh = np.array([random.standard_normal(3) for random in self._random])
-        self._push = kept * self._push + math.sqrt(1.0 - kept**2) * self._size * fresh
+        self._push = self._water.after(self._push, fresh)
         parameters = self._still.copy()
         parameters[:, self._pushed] += self._push
         self._state = self._stepper.step(self._state, commands, parameters)

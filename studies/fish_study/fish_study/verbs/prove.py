@@ -1,20 +1,16 @@
-"""Blind study: worlds with something hidden, the whole tool on each without the label, labels opened afterwards.
+"""Blind study: scenarios with something hidden, the whole tool on each without the label, labels opened afterwards.
 
-Writes seals before the first run, results as they come, and at the end scores, opened labels and report.html. The same
-command on the same folder goes on where it was stopped; --pool puts finished studies of one version together.
+Writes commitments to the labels before the first run, results as they come, and at the end scores, opened labels and report.html.
+The same command on the same folder goes on where it was stopped; --pool puts finished studies of one version together.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import secrets
-import shlex
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,18 +25,18 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from fish_report.command_words import words_after
 from fish_report.errors import UserError
 
 if TYPE_CHECKING:
-    from fish_report.page import Table
+    from fish_study.new_study import Asked
+    from fish_study.oracle_tables import OracleScores
     from fish_study.score import Score
     from fish_study.study import Study
 
 GROUPS = ("single", "absorbed", "feedback", "noise", "ladder", "two", "sensor", "outside", "null")
 # of what makes a study; None until the command line is read, as a study that goes on must not be asked for other things
 DEFAULTS: dict[str, Any] = {
-    "worlds": 300,
+    "scenarios": 300,
     "groups": list(GROUPS),
     "trials": 12,
     "duration": 20.0,
@@ -50,191 +46,172 @@ DEFAULTS: dict[str, Any] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument(
-        "--worlds", type=int, help=f"number of data sets (default: {DEFAULTS['worlds']})"
-    )
-    parser.add_argument(
-        "--groups",
-        nargs="+",
-        metavar="GROUP",
-        help=f"{', '.join(GROUPS)}, mujoco (needs mujoco); default: all but mujoco",
-    )
-    parser.add_argument("--trials", type=int, help=f"per data set (default: {DEFAULTS['trials']})")
-    parser.add_argument(
-        "--duration", type=float, help=f"s of each trial (default: {DEFAULTS['duration']:g})"
-    )
-    parser.add_argument(
-        "--seed", type=int, help="of all worlds (default: drawn now); recorded in study.json"
-    )
-    parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)"
-    )
-    parser.add_argument(
+    add = parser.add_argument
+    number = f"number of data sets (default: {DEFAULTS['scenarios']})"
+    add("--scenarios", "--worlds", type=int, help=number)
+    groups = f"{', '.join(GROUPS)}, mujoco (needs mujoco); default: all but mujoco"
+    add("--groups", nargs="+", metavar="GROUP", help=groups)
+    add("--trials", type=int, help=f"per data set (default: {DEFAULTS['trials']})")
+    add("--duration", type=float, help=f"s of each trial (default: {DEFAULTS['duration']:g})")
+    add("--seed", type=int, help="of all scenarios (default: drawn now); recorded in study.json")
+    add("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: %(default)s)")
+    add(
         "--cluster", default="", metavar="ADDRESS", help="of a Dask scheduler with this file system"
     )
-    parser.add_argument(
-        "--oracle",
-        action="store_true",
-        help="fit the true structure too: power and errors against it",
+    oracle = "fit the true structure too: power and errors against it"
+    add("--oracle", action="store_true", help=oracle)
+    add("--keep", action="store_true", help="keep the recordings (15 MB a scenario)")
+    add("--out", type=Path, default=Path("prove"), help="folder (default: %(default)s)")
+    _add_other_ways(parser.add_argument_group("instead of one study").add_argument)
+
+
+def _add_other_ways(add: Callable[..., Any]) -> None:
+    pool = "tables and page over these finished studies together, folders or archives (.tar.xz), in OUT"
+    add("--pool", nargs="+", type=Path, default=[], metavar="STUDY", help=pool)
+    without = "an ablation: the same scenarios with each of these stages of the search left out in turn; one table"
+    add("--without", nargs="+", default=[], metavar="STAGE", help=without)
+    loop = (
+        "gains from the nominal, refitted, corrected model and from the plant itself, compared on the second "
+        "plant with this concealed in it (nothing, wind, servo_filter, ballast, ...; needs mujoco)"
     )
-    parser.add_argument(
-        "--search",
-        type=int,
-        default=40,
-        help="runs of the search on the plant (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--trainings",
-        type=int,
-        default=3,
-        help="of each model with --close-loop (default: %(default)s)",
-    )
-    parser.add_argument("--keep", action="store_true", help="keep the recordings (15 MB a world)")
-    parser.add_argument(
-        "--close-loop",
-        metavar="CONCEALED",
-        help="instead: gains from the nominal, refitted, corrected model and from the plant itself, judged on the second "
-        "plant with this concealed in it (nothing, wind, servo_filter, ballast, ...; needs mujoco)",
-    )
-    parser.add_argument(
-        "--pool",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="STUDY",
-        help="instead: tables and page over these finished studies together, in OUT",
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path("prove"), help="folder (default: %(default)s)"
-    )
+    add("--close-loop", metavar="CONCEALED", help=loop)
+    search = "runs of the search on the plant with --close-loop (default: %(default)s)"
+    add("--search", type=int, default=40, help=search)
+    trainings = "of each model with --close-loop (default: %(default)s)"
+    add("--trainings", type=int, default=3, help=trainings)
 
 
 def run(args: argparse.Namespace) -> int:
     """Create or go on, run, open, print, write."""
     from fish_report.errors import user_errors
-    from fish_report.terminal import print_table, terminal
-    from fish_study.oracle_scores import judge_studies
-    from fish_study.prove_page import tables, write_prove_page
-    from fish_study.score import score_world
-    from fish_study.study import Study, check_apart
-    from fish_study.truths import truths_of
+    from fish_report.terminal import terminal
 
-    given = _given(args)
-    if (
-        min(args.jobs, args.search, args.trainings) < 1
-        or args.trials < 3
-        or not args.duration >= 4.0
-    ):
-        raise UserError("expected at least one job, search and training, three trials and 4 s")
-    _need("pysindy", "--oracle", args.oracle)
-    _need("mujoco", "the second plant", bool(args.close_loop) or "mujoco" in args.groups)
-    _need("distributed", "--cluster", bool(args.cluster))
-    _need("torch", "--close-loop", bool(args.close_loop), "requirements-train.txt")
+    given = frozenset(name for name in DEFAULTS if getattr(args, name) is not None)
+    vars(args).update({name: value for name, value in DEFAULTS.items() if name not in given})
+    _check(args)
     console = terminal()
     if args.close_loop:
         return _close_loop(args, console)
     with user_errors():
-        studies = [Study(folder) for folder in args.pool] or [_ran(args, given, console)]
-        for study in studies[1:]:
-            study.check_tool(studies[0].about.get("tool", ""))
-        check_apart(studies)
-        scores: list[Score] = []
-        oracle: dict[int, bool] = {}
-        for study in studies:
-            results = study.results
-            say_ended_at_wall(results, console)
-            scores += [score_world(w, results[n], truths_of(w)) for n, w in study.reveal().items()]
-        more: list[Table] = []
-        if args.oracle:
-            with _progress(console, "true structures", len(scores)) as done:
-                oracle, more = judge_studies(studies, scores, args.jobs, done, args.cluster)
-    for table in tables(scores, oracle, more):
+        from fish_study.archive import opened_studies
+        from fish_study.new_study import Asked
+
+        asked = Asked(args.scenarios, args.groups, args.trials, args.duration, args.seed, given)
+        if args.without:
+            return _ablation(args, asked, console)
+        if not args.pool:
+            return _report(args, [_ran(args, asked, console)], console)
+        with opened_studies(args.pool) as studies:
+            return _report(args, studies, console)
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Of numbers and optional packages, before anything starts."""
+    few = min(args.jobs, args.search, args.trainings) < 1
+    if few or args.trials < 3 or not args.duration >= 4.0:
+        raise UserError("expected at least one job, search and training, three trials and 4 s")
+    _need("pysindy", "--oracle", args.oracle and not args.pool)
+    _need("mujoco", "the second plant", bool(args.close_loop) or "mujoco" in args.groups)
+    _need("distributed", "--cluster", bool(args.cluster))
+    _need("torch", "--close-loop", bool(args.close_loop), "requirements-train.txt")
+
+
+def _need(module: str, what: str, wanted: bool, file: str = "requirements-bench.txt") -> None:
+    if wanted and find_spec(module) is None:
+        raise UserError(f"{what} needs {module}: pip install -r {file} -c constraints.txt")
+
+
+def _ran(args: argparse.Namespace, asked: Asked, console: Console) -> Study:
+    """The study of these arguments, every scenario with a result."""
+    from fish_study.new_study import begin_or_go_on
+    from fish_study.runner import run_study
+
+    began, new = time.monotonic(), not (args.out / "study.json").exists()
+    study = begin_or_go_on(args.out, asked)
+    all_, left = len(study.scenarios), len(study.pending)
+    seconds = time.monotonic() - began
+    line = (
+        f"{all_} labels sealed, commitments in {args.out}/commitments.json ({seconds:.1f} s)"
+        if new
+        else f"going on with {args.out}: {left} of {all_} scenarios to go"
+    )
+    console.print(line, soft_wrap=True)
+    with _progress(console, "scenarios", left) as done:
+        run_study(study, args.jobs, done, keep=args.keep, cluster=args.cluster)
+    return study
+
+
+def _report(args: argparse.Namespace, studies: list[Study], console: Console) -> int:
+    """Open the labels, score, print the tables, write the page."""
+    from fish_report.terminal import print_table
+    from fish_study.prove_page import tables, write_prove_page
+    from fish_study.score import study_scores
+    from fish_study.study import check_apart
+
+    for study in studies[1:]:
+        study.check_tool(studies[0].about.get("tool", ""))
+    check_apart(studies)
+    for study in studies:
+        _say_ended_at_wall(study.results, console)
+    scores = [score for study in studies for score in study_scores(study)]
+    oracle = _oracle(args, studies, scores, console) if args.oracle else None
+    for table in tables(scores, oracle):
         print_table(console, table)
     args.out.mkdir(parents=True, exist_ok=True)
     about = [study.about for study in studies]
-    write_prove_page(args.out / "report.html", about, scores, oracle, more)
+    write_prove_page(args.out / "report.html", about, scores, oracle)
     seeds = ", ".join(str(a["seed"]) for a in about)
-    console.print(
-        f"{args.out}/report.html; seed {seeds}; labels.json, seals.json in each study",
-        soft_wrap=True,
-    )
+    files = "" if args.pool else "; labels.json, commitments.json beside it"
+    console.print(f"{args.out}/report.html; seed {seeds}{files}", soft_wrap=True)
     return 0
 
 
-def say_ended_at_wall(results: Mapping[str, Mapping[str, Any]], console: Console) -> None:
+def _say_ended_at_wall(results: Mapping[str, Mapping[str, Any]], console: Console) -> None:
     """One line where trials came to a wall of the pool: they end there and count as far as they go."""
     ended = {name: r["ended_at_wall"] for name, r in results.items() if r.get("ended_at_wall")}
     if ended:
         count = sum(map(len, ended.values()))
         console.print(
-            f"{count} trials in {len(ended)} of {len(results)} worlds came to a wall of the pool and end there: "
+            f"{count} trials in {len(ended)} of {len(results)} scenarios came to a wall of the pool and end there: "
             f"{', '.join(ended)} (ended_at_wall in result.json)",
             soft_wrap=True,
         )
 
 
-def _given(args: argparse.Namespace) -> dict[str, Any]:
-    """What of DEFAULTS the command line gives; the rest is filled in."""
-    given = {name: getattr(args, name) for name in DEFAULTS if getattr(args, name) is not None}
-    vars(args).update({name: value for name, value in DEFAULTS.items() if name not in given})
-    return given
+def _oracle(
+    args: argparse.Namespace, studies: list[Study], scores: list[Score], console: Console
+) -> OracleScores:
+    from fish_study.oracle_scores import score_studies
+    from fish_study.oracle_tables import OracleScores
+
+    with _progress(console, "true structures", len(scores)) as done:
+        return OracleScores.of(scores, score_studies(studies, args.jobs, done, args.cluster))
 
 
-def _need(module: str, what: str, wanted: bool, file: str = "requirements-bench.txt") -> None:
-    """Optional packages are asked for before anything starts."""
-    if wanted and find_spec(module) is None:
-        raise UserError(f"{what} needs {module}: pip install -r {file} -c constraints.txt")
-
-
-def _ran(args: argparse.Namespace, given: Mapping[str, Any], console: Console) -> Study:
-    """The study of these arguments, every world with a result."""
-    from fish_study.runner import run_study
-
-    study = _study(args, given, console)
-    with _progress(console, "worlds", len(study.open_worlds)) as done:
-        run_study(study, args.jobs, done, keep=args.keep, cluster=args.cluster)
-    return study
-
-
-def _study(args: argparse.Namespace, given: Mapping[str, Any], console: Console) -> Study:
-    """A new study, or the one in the folder, of which nothing else may be asked than what it is."""
-    from dataclasses import replace
-
-    from fish_study.scenario_groups import draw_worlds
-    from fish_study.study import Study
-    from fish_study.tool_version import tool_digest
-
-    if (args.out / "study.json").exists():
-        study = Study(args.out)
-        study.check_asked(given)
-        if study.open_worlds:
-            study.check_tool(tool_digest())
-        console.print(
-            f"going on with {args.out}: {len(study.open_worlds)} of {len(study.worlds)} worlds to go",
-            soft_wrap=True,
-        )
-        return study
-    seed = secrets.randbits(62) if args.seed is None else args.seed
-    worlds = draw_worlds(args.worlds, args.groups, seed)
-    worlds = [replace(w, count=args.trials, duration=args.duration) for w in worlds]
-    about = {
-        "seed": seed,
-        "drawn": args.seed is None,
-        "began": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": shlex.join(["robofish", "prove", *words_after("prove", sys.argv)]),
-        "worlds": args.worlds,
-        "groups": args.groups,
-        "trials": args.trials,
-        "duration": args.duration,
-        "tool": tool_digest(),
-    }
-    began = time.monotonic()
-    study = Study.create(args.out, worlds, about)
-    console.print(
-        f"{len(worlds)} labels sealed in {args.out}/seals.json ({time.monotonic() - began:.1f} s)",
-        soft_wrap=True,
+def _ablation(args: argparse.Namespace, asked: Asked, console: Console) -> int:
+    """The same scenarios with each stage left out in turn; table and page."""
+    from fish_report.page import write_page
+    from fish_report.terminal import print_table
+    from fish_study.ablation import (
+        ablation_studies,
+        ablation_table,
+        check_stages,
+        run_ablation,
     )
-    return study
+    from fish_study.score import study_scores
+
+    check_stages(args.without)
+    studies = ablation_studies(args.out, asked, args.without)
+    left = sum(len(study.pending) for study in studies.values())
+    with _progress(console, "diagnoses", left) as done:
+        run_ablation(studies, args.jobs, done, args.cluster)
+    table = ablation_table({name: study_scores(study) for name, study in studies.items()})
+    print_table(console, table)
+    (first, *_) = studies.values()
+    lead = f"{len(first.scenarios)} scenarios of seed {first.about['seed']}."
+    write_page(args.out / "ablation.html", "Which stages of the search pay", lead, [table])
+    console.print(f"{args.out}/ablation.html", soft_wrap=True)
+    return 0
 
 
 def _close_loop(args: argparse.Namespace, console: Console) -> int:
@@ -242,25 +219,24 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
     from fish_report.errors import user_errors
     from fish_report.page import Block, Figure, write_page
     from fish_report.terminal import print_table
-    from fish_study.close_loop import Plan, close_loop, loop_world
+    from fish_study.close_loop import Plan, close_loop, loop_scenario
     from fish_study.loop_folder import prepare
     from fish_study.loop_page import loop_figure, loop_table, speed_table
     from fish_train.evaluation.study import write_rows
 
     with user_errors():
-        world = loop_world(
+        scenario = loop_scenario(
             args.close_loop, 1 if args.seed is None else args.seed, args.trials, args.duration
         )
-        plan = Plan(
-            world, args.out / "recordings", args.out, search=args.search, trainings=args.trainings
-        )
+        recordings = args.out / "recordings"
+        plan = Plan(scenario, recordings, args.out, search=args.search, trainings=args.trainings)
         prepare(plan)
         rows = close_loop(plan, args.jobs, console.print)
     result = [loop_table(rows), speed_table(rows)]
     for table in result:
         print_table(console, table)
     write_rows(args.out / "runs.csv", rows)
-    lead = f"The second plant with {args.close_loop} concealed in it, seed {world.seed}."
+    lead = f"The second plant with {args.close_loop} concealed in it, seed {scenario.seed}."
     blocks: list[Block] = [*result, Figure("Every run", loop_figure(rows))]
     write_page(args.out / "loop.html", "Does a better model make better gains?", lead, blocks)
     console.print(f"{args.out}/loop.html, runs.csv", soft_wrap=True)

@@ -1,0 +1,96 @@
+"""Which stages of the diagnosis pay: the same scenarios diagnosed with each stage of the search left out in turn.
+
+OUT/complete and OUT/without_STAGE are studies of their own, all of one seed: each goes on where it was stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fish_report.page import Table
+from fish_study.asked_table import ASKED
+from fish_study.new_study import Asked, begin_or_go_on
+from fish_study.runner import DIAGNOSE, run_study
+from fish_study.score import Score
+from fish_study.share import Share
+from fish_study.study import Study, StudyError
+
+COMPLETE = "complete"
+HEADER = [
+    "stage left out",
+    "right name first",
+    "truth in the set",
+    "false alarms",
+    "both of two",
+    "unexplained right",
+    "s, median",
+]
+
+
+def search_stages() -> tuple[str, ...]:
+    """Names of the stages that `diagnose(..., without=...)` can leave out."""
+    from fish_sysid.diagnosis import pipeline
+
+    return tuple(getattr(pipeline, "STAGES", ()))
+
+
+def check_stages(stages: Sequence[str]) -> None:
+    """Raise StudyError for a stage that the diagnosis does not have."""
+    known = search_stages()
+    unknown = [stage for stage in stages if stage not in known]
+    if unknown:
+        raise StudyError(
+            f"--without: got {', '.join(unknown)}; expected stages of the diagnosis: {', '.join(known) or 'this one has none'}"
+        )
+
+
+def ablation_studies(out: Path, asked: Asked, stages: Sequence[str]) -> dict[str, Study]:
+    """The complete diagnosis and one study for each stage left out, name -> study, all with the same scenarios."""
+    complete = begin_or_go_on(out / COMPLETE, asked, {"without": ""})
+    about = complete.about
+    same = replace(asked, **{k: about[k] for k in asked.values()}, given=frozenset(asked.values()))
+    return {COMPLETE: complete} | {
+        stage: begin_or_go_on(out / f"without_{stage}", same, {"without": stage})
+        for stage in stages
+    }
+
+
+def run_ablation(
+    studies: Mapping[str, Study], jobs: int, done: Callable[[str], None], cluster: str = ""
+) -> None:
+    """Run every scenario of every study that has no result yet."""
+    for name, study in studies.items():
+        tool = DIAGNOSE if name == COMPLETE else (*DIAGNOSE, "--without", name)
+        run_study(study, jobs, done, tool, cluster=cluster)
+
+
+def ablation_table(scores: Mapping[str, Sequence[Score]]) -> Table:
+    """One row for each stage left out, the complete diagnosis first."""
+    asked = {row.what: row for row in ASKED}
+
+    def count(own: Sequence[Score], what: str) -> str:
+        return Share.of(filter(asked[what].among, own), asked[what].is_so).short
+
+    rows = []
+    for name, own in scores.items():
+        named = [s for s in own if len(s.truth) == 1]
+        rows.append(
+            [
+                "nothing" if name == COMPLETE else name,
+                Share.of(named, lambda s: s.top1).short,
+                Share.of(named, lambda s: s.in_set).short,
+                count(own, "false alarms, nothing hidden"),
+                count(own, "both of two effects"),
+                count(own, "no name exists: called unexplained"),
+                f"{np.median([s.seconds for s in own]):.0f}",
+            ]
+        )
+    note = (
+        "Every row is of the same scenarios. Right name first and truth in the set: scenarios of all groups with one hidden "
+        "name. False alarms: nothing hidden. Unexplained right: something hidden that has no name."
+    )
+    return Table("Each stage of the search left out in turn", HEADER, rows, note)
