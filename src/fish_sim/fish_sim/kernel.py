@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Part = Literal["values", "tangents", "adjoints", "memory"]  # what is compiled by itself
 
 
 class CompiledKernel:

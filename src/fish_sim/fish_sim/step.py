@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 from importlib.resources import files
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +16,14 @@ from fish_sim.compiled import compiler, has_libmvec, lanes, library
 from fish_sim.emit import emit
 from fish_sim.finite import check_finite
 from fish_sim.interpreted import InterpretedKernel
-from fish_sim.kernel import CompiledKernel
+from fish_sim.kernel import CompiledKernel, Part
 from fish_sim.methods import METHODS, Method
 from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, Structure, functions
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme, check_scheme, default_scheme, stable_scheme
+from fish_sim.self_check import kernel_errors
 
 Array = NDArray[np.float64]
-Part = Literal["values", "tangents", "adjoints", "memory"]
 
 # what each part of a kernel consists of: functions of `model.Functions`, then texts in c/; compiled when first asked for
 PARTS: dict[Part, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -295,8 +294,11 @@ class Stepper:
 def kernel(
     structure: Structure, scheme: Scheme, width: int, compiled: bool, part: Part
 ) -> CompiledKernel | InterpretedKernel:
-    """One part of a structure's kernel: compiled for `width` lanes, or interpreted."""
-    loaded = library(kernel_source(structure, scheme, width, part)) if compiled else None
+    """One part of a structure's kernel: compiled for `width` lanes and checked, or interpreted."""
+    loaded = None
+    if compiled:
+        check = functools.partial(kernel_errors, structure, scheme, width, part)
+        loaded = library(kernel_source(structure, scheme, width, part), check, width)
     if loaded is None:
         return InterpretedKernel(structure, METHODS[scheme.method], scheme.substeps)
     return CompiledKernel(loaded)

@@ -73,6 +73,20 @@ def test_compiled_and_numpy_passes_agree(stiffness, width, monkeypatch):
     )
 
 
+@pytest.mark.parametrize(
+    "edit",
+    [
+        "s/(3.0 - 2.0 \\* c)/(3.0 - 2.0001 * c)/",  # where in the step its slopes are taken
+        "s/d->gradient += v_constant(r\\[a\\])/d->gradient += v_constant(1.000001 * r[a])/",
+    ],
+)
+def test_a_filter_that_the_compiler_gets_wrong_is_not_used(edit, wrong_compiler, caplog):
+    wrong_compiler(edit)
+    assert ekf_compiled.filter_library.__wrapped__((1, ("disturbance",)), "cfmr7") is None
+    (record,) = caplog.records
+    assert "the slower interpreted form is used" in record.message
+
+
 def test_the_memory_of_all_trials_is_never_held_at_once():
     """A delay's memory times trials times free parameters would be gigabytes of a day in the pool."""
     data, _ = experiment(Robot(), 2.0, ("sines", "steps") * 4)

@@ -5,7 +5,7 @@ import pytest
 from training_setup import COST, make_bank, make_fleet, make_stepper, make_weights
 
 from fish_train.training.closed_loop_equations import Law
-from fish_train.training.compiled_loop import CompiledLoop
+from fish_train.training.compiled_loop import CompiledLoop, fastest_loop
 from fish_train.training.network import FORMS, weight_count
 from fish_train.training.torch_loop import TorchLoop
 
@@ -113,6 +113,16 @@ def test_without_a_compiler_the_numbers_are_the_same(monkeypatch: pytest.MonkeyP
         assert relative(slow.gradient, fast.gradient) < 1e-10
     monkeypatch.setenv("FISH_SIM_NO_COMPILER", "1")
     assert not CompiledLoop.available()
+
+
+@compiled
+def test_a_loop_that_the_compiler_gets_wrong_is_that_of_torch(wrong_compiler, caplog) -> None:
+    """Wrong is the gradient alone: what travels back through the actuators."""
+    law = Law(inputs="none")
+    wrong_compiler("s/copy(g_actuator, NA, g->actuator)/zero(g->actuator, NA)/")
+    loop = fastest_loop(make_stepper(), law, make_bank(law), FORMS["constant"].layers)
+    assert isinstance(loop, TorchLoop)
+    assert "the slower interpreted form is used" in caplog.text
 
 
 @compiled

@@ -25,8 +25,10 @@ static inline V v_constant(double a) { return a - (V){0.0}; }
 
 #if LANES == 1
 typedef long long VI;
+typedef unsigned long long VU;
 #else
 typedef long long VI __attribute__((vector_size(8 * LANES)));
+typedef unsigned long long VU __attribute__((vector_size(8 * LANES)));
 #endif
 static inline VI v_bits(V a) { union { V v; VI i; } u; u.v = a; return u.i; }
 static inline V v_of_bits(VI a) { union { V v; VI i; } u; u.i = a; return u.v; }
@@ -67,7 +69,7 @@ static inline V v_quadrant(VI k, V even, V odd)
 {
   VI swap = -(k & 1);
   VI value = (v_bits(even) & ~swap) | (v_bits(odd) & swap);
-  return v_of_bits(value ^ ((k & 2) << 62));
+  return v_of_bits(value ^ (VI)((VU)(k & 2) << 62)); /* the sign bit, which a signed shift may not reach */
 }
 static inline V v_sin(V a)
 {

@@ -12,9 +12,11 @@ from importlib.resources import files
 import numpy as np
 
 from fish_report.parallel import on_all_cores
-from fish_sim.compiled import lanes, library
+from fish_sim.compiled import Check, lanes, library
 from fish_sim.model import DT, Structure
 from fish_sim.step import Stepper, filter_source
+from fish_sysid.estimation.ekf_check import SENSORS, filter_errors
+from fish_sysid.estimation.ekf_numpy import Filter
 from fish_sysid.estimation.ekf_types import (
     ENCODER_ROW,
     ROWS,
@@ -33,13 +35,6 @@ from fish_sysid.estimation.ekf_types import (
 from fish_sysid.estimation.encoder import encoder_terms
 
 ROTOR = 1  # of the memory: its speed
-SENSORS = (
-    "camera_latency",
-    "camera_heading_offset",
-    "camera_scale",
-    "gyro_scale",
-    "imu_misalignment",
-)
 
 
 class Settings(ctypes.Structure):
@@ -83,9 +78,35 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
 
 @functools.lru_cache(maxsize=128)
 def filter_library(structure: Structure, method: str) -> ctypes.CDLL | None:
-    """The compiled filter of a structure under an integrator, or None without a compiler."""
-    text = (files("fish_sysid.estimation") / "c" / "ekf.c").read_text()
-    return library(filter_source(structure, method, lanes()) + text)
+    """The compiled and checked filter of a structure under an integrator, or None where it is that of NumPy."""
+    width = lanes()
+    return library(
+        filter_text(structure, method, width), filter_check(structure, method, width), width
+    )
+
+
+def filter_text(structure: Structure, method: str, width: int) -> str:
+    """Complete C text of the filter."""
+    own = (files("fish_sysid.estimation") / "c" / "ekf.c").read_text()
+    return filter_source(structure, method, width) + own
+
+
+def filter_check(structure: Structure, method: str, width: int) -> Check:
+    """What compares a library of `filter_text` with the filter in NumPy."""
+    return lambda loaded: filter_errors(structure, method, width, partial(_passed, loaded))
+
+
+def _passed(loaded: ctypes.CDLL, numpy_filter: Filter) -> FilterResult:
+    """One pass of a library with the problem, the noise and the memory of a filter in NumPy."""
+    problem, memory = numpy_filter.problem, numpy_filter.memory
+    d_memory = np.ascontiguousarray(numpy_filter.d_memory.transpose(0, 1, 3, 2))
+    driven = _Driven(
+        memory[0].copy(), d_memory[0], memory[:-1, :, ROTOR], d_memory[:-1, :, :, ROTOR], memory
+    )
+    job = _Job(loaded, problem, driven, numpy_filter.noise, True)
+    for m in range(len(problem.experiment.names)):
+        job.run(m)
+    return job.result()
 
 
 def compiled_passes(

@@ -32,6 +32,7 @@ class Filter:
     """One pass over an experiment for given parameters."""
 
     def __init__(self, problem: Problem, noise: Noise) -> None:
+        self.problem = problem
         self.experiment, self.stepper, self.sensors = (
             problem.experiment,
             problem.stepper,

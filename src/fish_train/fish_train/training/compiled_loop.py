@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.path_batch import LOOKAHEAD_SEARCH
-from fish_sim.compiled import lanes, library
+from fish_sim.compiled import Check, lanes, library
 from fish_sim.emit import emit
 from fish_sim.step import Stepper, kernel_source
 from fish_train.training.batch_state import (
@@ -27,8 +27,10 @@ from fish_train.training.closed_loop_equations import (
     Law,
 )
 from fish_train.training.expressions import expressions
+from fish_train.training.loop_check import loop_errors
 from fish_train.training.network import LAYERS, split, weight_count
 from fish_train.training.path_bank import PathBank
+from fish_train.training.torch_loop import TorchLoop
 
 Array = NDArray[np.float64]
 MAX_LAYERS = 8
@@ -121,6 +123,21 @@ def loop_source(stepper: Stepper, law: Law, width: int) -> str:
     )
 
 
+def loop_check(stepper: Stepper, law: Law, width: int) -> Check:
+    """What compares a library of `loop_source` with the loop in torch."""
+    return lambda loaded: loop_errors(
+        stepper,
+        law,
+        width,
+        lambda bank, layers: CompiledLoop(stepper, law, bank, layers, width, loaded),
+    )
+
+
+def loop_library(stepper: Stepper, law: Law, width: int) -> ctypes.CDLL | None:
+    """The compiled and checked kernel of a loop, or None where it is `TorchLoop`."""
+    return library(loop_source(stepper, law, width), loop_check(stepper, law, width), width)
+
+
 class CompiledLoop:
     """Windows of the closed loop with one law, one structure of robot, one bank of paths and one network."""
 
@@ -131,11 +148,15 @@ class CompiledLoop:
         bank: PathBank,
         layers: tuple[int, ...] = LAYERS,
         width: int | None = None,
+        loaded: ctypes.CDLL | None = None,
     ) -> None:
+        """`loaded` is a library of `loop_source` for this width, by default the one of `loop_library`."""
         self._width = width or lanes()
-        loaded = library(loop_source(stepper, law, self._width))
+        loaded = loaded or loop_library(stepper, law, self._width)
         if loaded is None:
-            raise RuntimeError("no C compiler: use TorchLoop")
+            raise RuntimeError(
+                "the closed loop could not be compiled here; use fastest_loop or TorchLoop"
+            )
         self._library = loaded
         self._library.scratch_size.restype = ctypes.c_long
         if layers[0] != INPUT_COUNTS[law.inputs]:
@@ -281,3 +302,13 @@ def _aligned(rows: int, columns: int, boundary: int = 64) -> Array:
     raw = np.zeros(rows * columns + boundary // 8)
     offset = -(raw.ctypes.data % boundary) % boundary // 8
     return raw[offset : offset + rows * columns].reshape(rows, columns)
+
+
+def fastest_loop(
+    stepper: Stepper, law: Law, bank: PathBank, layers: tuple[int, ...] = LAYERS
+) -> CompiledLoop | TorchLoop:
+    """The compiled loop where a compiler makes a right one, else the one of torch."""
+    loaded = loop_library(stepper, law, lanes())
+    if loaded is None:
+        return TorchLoop(stepper, law, bank, layers)
+    return CompiledLoop(stepper, law, bank, layers, lanes(), loaded)

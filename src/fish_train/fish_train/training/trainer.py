@@ -14,13 +14,12 @@ from fish_sim.scheme import Scheme
 from fish_sim.step import Stepper
 from fish_train.training.batch_state import Fleet, WindowResult
 from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law
-from fish_train.training.compiled_loop import CompiledLoop
+from fish_train.training.compiled_loop import fastest_loop
 from fish_train.training.config import TrainConfig
 from fish_train.training.curriculum import SlidingCriterion, make_levels
 from fish_train.training.episodes import Episodes, SeenNoise
 from fish_train.training.network import FORMS, Form, initial_weights
 from fish_train.training.path_bank import PathBank
-from fish_train.training.torch_loop import TorchLoop
 
 Array = NDArray[np.float64]
 POLISH_PHASES = 2  # sinusoids of each level while polishing
@@ -78,12 +77,8 @@ class Trainer:
         self._window = config.unroll * config.hold  # control periods
         self._episode_windows = max(1, round(config.episode / (CONTROL_PERIOD * self._window)))
         self._approach = round(config.approach / CONTROL_PERIOD)
-        self._loop = self._make_loop(self._make_bank())
+        self._loop = fastest_loop(self._stepper, self.law, self._make_bank(), form.layers)
         self._begin_episode()
-
-    def _make_loop(self, bank: PathBank) -> CompiledLoop | TorchLoop:
-        kind = CompiledLoop if CompiledLoop.available() else TorchLoop
-        return kind(self._stepper, self.law, bank, self.form.layers)
 
     @property
     def weights(self) -> Array:

@@ -1,0 +1,28 @@
+"""Fixtures that the tests of several packages use."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture
+def wrong_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[str], None]:
+    """wrong_compiler(edit): from then on gcc edits every text by this command of sed; the cache of kernels is empty."""
+
+    def install(edit: str) -> None:
+        gcc = shutil.which("gcc")
+        if gcc is None:
+            pytest.skip("no gcc on this computer")
+        script = tmp_path / "wrong_cc"
+        change = f"for a; do case $a in *.c) sed -i '{edit}' \"$a\";; esac; done"
+        script.write_text(f'#!/bin/sh\n{change}\nexec {gcc} "$@"\n')
+        script.chmod(0o755)
+        monkeypatch.setenv("CC", str(script))
+        monkeypatch.setenv("FISH_SIM_CACHE", str(tmp_path / "cache"))
+        monkeypatch.delenv("FISH_SIM_NO_COMPILER", raising=False)
+
+    return install
