@@ -21,7 +21,7 @@ SOURCES := $(shell find src studies -not -path '*/test*' -not -path '*/__pycache
 PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help setup build demo test lint identify diagnose prove train evaluate paper clean distclean
+.PHONY: help setup build demo test lint docs identify diagnose prove train evaluate paper clean distclean
 
 help:
 	@echo "make demo       the whole robot swims the letter R, is recorded, scored and shown; options:"
@@ -31,6 +31,7 @@ help:
 	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--worlds 300' for the long one"
 	@echo "make train, evaluate, paper   learn the gains; how well they follow paths; the figures and the table of the paper"
 	@echo "                results in out/NAME or OUT=folder; ARGS='...' goes to the command, ARGS=--help says more"
+	@echo "make docs       the documentation as a site, docs/_build/html/index.html"
 	@echo "make setup, build, lint, clean, distclean   the single steps"
 
 # --- set-up: virtual environment and wheels -----------------------------------------------------------------------------
@@ -60,6 +61,11 @@ $(VENV)/.train: requirements-train.txt constraints.txt $(VENV)/.diagnose
 $(VENV)/.dev: requirements-dev.txt constraints.txt $(VENV)/.train
 	@echo "setup: wheels of requirements-dev.txt"
 	@$(PIP) -r requirements-dev.txt
+	@touch $@
+
+$(VENV)/.docs: requirements-docs.txt constraints.txt $(VENV)/.diagnose
+	@echo "setup: wheels of requirements-docs.txt"
+	@$(PIP) -r requirements-docs.txt
 	@touch $@
 
 setup: $(VENV)/.dev
@@ -103,8 +109,14 @@ test: setup build
 lint: setup
 	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_* studies/*/fish_*
 
+# --- documentation --------------------------------------------------------------------------------------------------------
+# The generated pages of docs/reference are written again first; a warning is an error.
+docs: build $(VENV)/.docs
+	@$(WORKSPACE); python docs/generate_reference.py; python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@echo "site: docs/_build/html/index.html"
+
 clean:
-	rm -rf build install log
+	rm -rf docs/_build build install log
 
 distclean: clean
 	rm -rf $(VENV)
