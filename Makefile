@@ -38,7 +38,7 @@ help:
 $(VENV)/.created:
 	@[ -n "$(PYTHON)" ] || { echo "error: no Python 3.11 or 3.12 found; install one (apt install python3 python3-venv) or say make PYTHON=/path/to/python3.12" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if v in ((3, 11), (3, 12)) else f"error: $(PYTHON) is Python {v[0]}.{v[1]}; this project needs 3.11 or 3.12")'
-	@[ "$$(uname -sm)" = "Linux x86_64" ] || { echo "error: the ROS 2 wheels exist for Linux x86_64 only, this is $$(uname -sm); use the full ROS 2 Jazzy here (README)" >&2; exit 1; }
+	@[ "$$(uname -sm)" = "Linux x86_64" ] || { echo "error: the ROS 2 wheels exist for Linux x86_64 only, this is $$(uname -sm); use the full ROS 2 Jazzy here (docs/how_to/full_ros.md)" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "error: $(PYTHON) has no venv module; install it: apt install python3-venv" >&2; exit 1; }
 	@$(VENV)/bin/python -c '' 2>/dev/null || $(PYTHON) -m venv --clear $(VENV)
 	@touch $@

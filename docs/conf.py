@@ -8,6 +8,9 @@ author = copyright = "Robot fish maintainers"
 release = version = "0.1.0"
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+suppress_warnings = [
+    "toc.empty_glob"
+]  # index.md lists pages by name first, then whatever else is there
 exclude_patterns = ["_build", "studies", "blind_studies.md"]
 html_theme = "furo"
 html_title = "Robot fish"

@@ -40,7 +40,8 @@ def declared_by(verb: str) -> tuple[str, list[argparse.Action]]:
 def page() -> str:
     """All verbs."""
     summaries = (
-        (f"[`{verb}`](#{verb})", cell(declared_by(verb)[0].partition("\n")[0])) for verb in BROUGHT_BY
+        (f"[`{verb}`](#{verb})", cell(declared_by(verb)[0].partition("\n")[0]))
+        for verb in BROUGHT_BY
     )
     sections = [section(verb) for verb in BROUGHT_BY]
     return "\n".join([HEADER, INTRODUCTION, table(("verb", "what it does"), summaries), *sections])
