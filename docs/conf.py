@@ -8,10 +8,8 @@ author = copyright = "Robot fish maintainers"
 release = version = "0.1.0"
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-suppress_warnings = [
-    "toc.empty_glob"
-]  # index.md lists pages by name first, then whatever else is there
 exclude_patterns = ["_build", "studies", "blind_studies.md"]
+highlight_language = "none"  # of blocks that name no language
 html_theme = "furo"
 html_title = "Robot fish"
 html_static_path = ["_static"]

@@ -129,5 +129,5 @@ def allowed(kind: type[Any], name: str) -> str:
             message = str(error)
             said = re.search(r"(?:expected|known:) (?:one of )?(.+)$", message)
             if said and message.startswith(name):
-                return said[1]
+                return said[1].replace("a finite number, ", "")
     return ""
