@@ -24,7 +24,7 @@ WITH_STUDIES := --base-paths src studies/fish_study
 PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help setup build demo test lint identify diagnose prove train evaluate paper clean distclean
+.PHONY: help setup build demo test lint docs identify diagnose prove train evaluate paper clean distclean
 
 help:
 	@echo "make demo       the whole robot swims the letter R, is recorded, scored and shown; options:"
@@ -34,13 +34,14 @@ help:
 	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--scenarios 300' for the long one"
 	@echo "make train, evaluate, paper   learn the gains; how well they follow paths; the figures and the table of the paper"
 	@echo "                results in out/NAME or OUT=folder; ARGS='...' goes to the command, ARGS=--help says more"
+	@echo "make docs       the documentation as a site, docs/_build/html/index.html"
 	@echo "make setup, build, lint, clean, distclean   the single steps"
 
 # --- set-up: virtual environment and wheels -----------------------------------------------------------------------------
 $(VENV)/.created:
 	@[ -n "$(PYTHON)" ] || { echo "error: no Python 3.11 or 3.12 found; install one (apt install python3 python3-venv) or say make PYTHON=/path/to/python3.12" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if v in ((3, 11), (3, 12)) else f"error: $(PYTHON) is Python {v[0]}.{v[1]}; this project needs 3.11 or 3.12")'
-	@[ "$$(uname -sm)" = "Linux x86_64" ] || { echo "error: the ROS 2 wheels exist for Linux x86_64 only, this is $$(uname -sm); use the full ROS 2 Jazzy here (README)" >&2; exit 1; }
+	@[ "$$(uname -sm)" = "Linux x86_64" ] || { echo "error: the ROS 2 wheels exist for Linux x86_64 only, this is $$(uname -sm); use the full ROS 2 Jazzy here (docs/how_to/full_ros.md)" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "error: $(PYTHON) has no venv module; install it: apt install python3-venv" >&2; exit 1; }
 	@$(VENV)/bin/python -c '' 2>/dev/null || $(PYTHON) -m venv --clear $(VENV)
 	@touch $@
@@ -63,6 +64,11 @@ $(VENV)/.train: requirements-train.txt constraints.txt $(VENV)/.diagnose
 $(VENV)/.dev: requirements-dev.txt constraints.txt $(VENV)/.train
 	@echo "setup: wheels of requirements-dev.txt"
 	@$(PIP) -r requirements-dev.txt
+	@touch $@
+
+$(VENV)/.docs: requirements-docs.txt constraints.txt $(VENV)/.diagnose
+	@echo "setup: wheels of requirements-docs.txt"
+	@$(PIP) -r requirements-docs.txt
 	@touch $@
 
 setup: $(VENV)/.dev
@@ -112,8 +118,14 @@ test: setup install/.studies
 lint: setup
 	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_* studies/*/fish_* studies/*.py
 
+# --- documentation --------------------------------------------------------------------------------------------------------
+# The generated pages of docs/reference are written again first; a warning is an error.
+docs: build $(VENV)/.docs
+	@$(WORKSPACE); python docs/generate_reference.py; python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@echo "site: docs/_build/html/index.html"
+
 clean:
-	rm -rf build install log
+	rm -rf docs/_build build install log
 
 distclean: clean
 	rm -rf $(VENV)

@@ -1,6 +1,6 @@
 """How old the camera's images are: its heading against the gyro's, for every delay and trial; prints, and draws an SVG.
 
-python benchmarks/camera_delay.py DATASET --out docs/camera_delay.svg
+python benchmarks/camera_delay.py DATASET --out docs/results/camera_delay.svg
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What the overhead camera saw of a recorded swim: the fish at several moments, the path it was to follow, the path it swam.
 
-python examples/swim_picture.py out/demo_.../recording --out docs/letter_R.jpg      (a recording of the simulator)
+python examples/swim_picture.py out/demo_.../recording --out docs/_static/letter_R.jpg      (a recording of the simulator)
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Diagnose the recordings of this example and draw what was found: docs/hidden_drag.svg.
+"""Diagnose the recordings of this example and draw what was found: docs/_static/hidden_drag.svg.
 
-python examples/hidden_drag/picture.py [--out docs/hidden_drag.svg]      (half a minute; needs requirements-bench.txt)
+python examples/hidden_drag/picture.py [--out docs/_static/hidden_drag.svg]      (half a minute; needs requirements-bench.txt)
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def main() -> None:
     """Read, diagnose, draw."""
     parser = argparse.ArgumentParser(description="draw the diagnosis of this example")
     parser.add_argument(
-        "--out", type=Path, default=Path("docs/hidden_drag.svg"), help="picture to write"
+        "--out", type=Path, default=Path("docs/_static/hidden_drag.svg"), help="picture to write"
     )
     out = parser.parse_args().out
     trials = list(read_dataset(Path(__file__).parent / "recordings"))

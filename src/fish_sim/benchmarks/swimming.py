@@ -4,7 +4,7 @@
 
 Prints the steady surge speed against A^2 w^4 for several amplitudes and frequencies with a straight-line fit over
 0.1 to 0.3 m/s (the paper found it nearly linear there), and how well the stroke repeats; draws both.
-The picture in the README, src/fish_sim/docs/swimming.svg, was drawn by it.
+The picture of docs/results/simulator.md, src/fish_sim/docs/swimming.svg, was drawn by it.
 """
 
 from __future__ import annotations

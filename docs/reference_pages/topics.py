@@ -1,0 +1,140 @@
+"""The page of topics and services: who publishes and takes what, read from the nodes' source."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+from collections import defaultdict
+from pathlib import Path
+
+from fish_bringup.node_table import CONTROL, EXCITER, REAL, RECORDER, REPLAYER, SIMULATED
+from reference_pages.markdown import HEADER, cell, table
+
+SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER)
+CREATORS = {
+    "create_publisher": "publishes",
+    "create_subscription": "takes",
+    "create_service": "serves",
+}
+MEANING = {
+    "joint_command": "rotor: phase [rad] and speed [rad/s]; rudder: angle [rad]; 100 Hz",
+    "joint_states": "encoder of the rotor: angle [rad], speed [rad/s]; 100 Hz",
+    "imu/data": "turn rate [rad/s], specific force [m/s^2], orientation, in imu_link; 100 Hz",
+    "camera/image_raw/compressed": "the pool from above, JPEG; 30 Hz",
+    "camera/image_raw": "the same without compression, where publish_raw is set",
+    "camera/camera_info": "lens and size of the picture; 30 Hz",
+    "camera/pose": "head in the pool [m, rad] with covariance; 30 Hz",
+    "camera/tail": "angles of the tail's links [rad]; 30 Hz",
+    "camera/debug/compressed": "the picture with what the tracker found, where debug_image is set",
+    "odometry/filtered": "estimated pose in pool [m, rad] and velocity in base_link [m/s, rad/s]; 100 Hz",
+    "reference/path": "the wanted path in pool [m]; on change, transient local",
+    "reference/speed": "the wanted surge speed [m/s]; on change, transient local",
+    "control/target": "lookahead point [m] and course [rad] in pool; 50 Hz",
+    "control/twist": "wanted speed [m/s] and turn rate [rad/s]; 50 Hz",
+    "control/gains": "Kp, Ki, Kd of steering, then of speed; 50 Hz",
+    "tracking/error": "cross-track [m], heading [rad], speed [m/s]; 50 Hz",
+    "battery_state": "voltage [V], current [A]; 1 Hz",
+    "sim/odometry": "the simulator's true pose and velocity; 100 Hz",
+    "sim/joint_states": "the simulator's true rudder and tail angles [rad]; 100 Hz",
+    "/tf": "pool to base_link, where tf2_msgs is installed; 100 Hz",
+    "/diagnostics": "state of every node; 1 Hz and on change",
+    "/clock": "simulated time",
+    "pause": "stops and continues simulated time",
+    "reset": "puts the simulated fish back to its start",
+    "resume": "lets the controller go on after its watchdog stopped the fish",
+    "~/enable": "lets the rotor go or stops it",
+    "~/clear_faults": "erases the rotor module's faults",
+    "~/pause": "stops and continues a replay",
+}
+INTRODUCTION = """# Topics, services, frames
+
+Topics are relative to the robot's namespace, `/fish` by default; a leading `/` is absolute. All are of common
+interfaces, in SI units and radians. The simulator and the drivers publish and take the same topics, so that vision and
+control cannot tell them apart.
+
+Frames follow REP 103. `pool` has its origin in the middle of the 4.27 m x 2.13 m pool, x along the long side, y along
+the short side, z up. `base_link` is at the head's centre of mass, x forward, y left. Angles are counter-clockwise
+positive. A positive rudder angle steers left.
+"""
+
+
+def page() -> str:
+    """Topics, then services."""
+    found: dict[str, dict[tuple[str, str], set[str]]] = defaultdict(lambda: defaultdict(set))
+    for spec in SPECS:
+        for role, message, topic in interfaces(spec.package, spec.executable):
+            found[role][topic, message].add(spec.name)
+    topics = sorted({*found["publishes"], *found["takes"]}, key=lambda key: key[0].lstrip("/"))
+    rows = (
+        (
+            f"`{topic}`",
+            cell(message),
+            cell(MEANING[topic]),
+            nodes(found["publishes"][topic, message]),
+            nodes(found["takes"][topic, message]),
+        )
+        for topic, message in topics
+    )
+    services = (
+        (f"`{name}`", cell(kind), cell(MEANING[name]), nodes(servers))
+        for (name, kind), servers in sorted(found["serves"].items())
+    )
+    return "\n".join(
+        [
+            HEADER,
+            INTRODUCTION,
+            "## Topics\n",
+            table(("topic", "type", "what, rate", "published by", "taken by"), rows),
+            "The recorder takes the topics that its parameter `topics` names. The replayer publishes those of a recording.\n",
+            "## Services\n",
+            table(("service", "type", "what", "node"), services),
+        ]
+    )
+
+
+def nodes(names: set[str]) -> str:
+    """Node names in a cell."""
+    every = len(names) > 8
+    return "every node" if every else ", ".join(sorted(name.replace("/", " ") for name in names))
+
+
+def interfaces(package: str, executable: str) -> list[tuple[str, str, str]]:
+    """(role, type, name) of a node: of its own module and of those of the same folder that it imports."""
+    folder = Path(str(importlib.util.find_spec(f"{package}.nodes").origin)).parent  # type: ignore[union-attr]
+    todo, done = [f"{executable}"], set()
+    found = []
+    while todo:
+        module = todo.pop()
+        done.add(module)
+        tree = ast.parse((folder / f"{module}.py").read_text(encoding="utf-8"))
+        types = imported_types(tree)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                found += interface(node, node.func.attr, types)
+            if isinstance(node, ast.ImportFrom) and node.module:
+                near, _, name = node.module.rpartition(".")
+                if near == f"{package}.nodes" and name not in done:
+                    todo.append(name)
+    return found
+
+
+def imported_types(tree: ast.AST) -> dict[str, str]:
+    """Name in the module -> package/Type of the message or service."""
+    return {
+        alias.asname or alias.name: f"{node.module.partition('.')[0]}/{alias.name}"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        and node.module
+        and node.module.endswith((".msg", ".srv"))
+        for alias in node.names
+    }
+
+
+def interface(call: ast.Call, creator: str, types: dict[str, str]) -> list[tuple[str, str, str]]:
+    """What a call creates, where type and name stand in it."""
+    if creator not in CREATORS or len(call.args) < 2:
+        return []
+    kind, name = call.args[:2]
+    if not (isinstance(kind, ast.Name) and isinstance(name, ast.Constant) and kind.id in types):
+        return []
+    return [(CREATORS[creator], types[kind.id], str(name.value))]

@@ -1,0 +1,78 @@
+"""The page of the command `robofish`: every verb with the arguments that its parser declares."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import re
+
+from fish_report.robofish import BROUGHT_BY
+from reference_pages.markdown import HEADER, cell, escaped, table
+
+INTRODUCTION = """# The command `robofish`
+
+`robofish VERB` runs one tool. Every verb is also an executable of its package: `ros2 run PACKAGE VERB`. A package of
+your own adds verbs through the entry-point group `robofish.verbs`. Exit status: 0 done, 1 an input cannot be used
+(one line says why), 2 the command line cannot be understood, 130 ended by Ctrl-C.
+"""
+
+
+class ArgumentList(argparse.ArgumentParser):
+    """A parser that keeps what it declares."""
+
+    def __init__(self) -> None:
+        self.declared: list[argparse.Action] = []
+        super().__init__(add_help=False)
+
+    def _add_action(self, action: argparse.Action) -> argparse.Action:
+        self.declared.append(action)
+        return super()._add_action(action)
+
+
+def declared_by(verb: str) -> tuple[str, list[argparse.Action]]:
+    """The module docstring of a verb and the arguments that it declares."""
+    module = importlib.import_module(f"{BROUGHT_BY[verb]}.verbs.{verb}")
+    parser = ArgumentList()
+    module.add_arguments(parser)
+    return module.__doc__ or "", parser.declared
+
+
+def page() -> str:
+    """All verbs."""
+    summaries = (
+        (f"[`{verb}`](#{verb})", cell(declared_by(verb)[0].partition("\n")[0]))
+        for verb in BROUGHT_BY
+    )
+    sections = [section(verb) for verb in BROUGHT_BY]
+    return "\n".join([HEADER, INTRODUCTION, table(("verb", "what it does"), summaries), *sections])
+
+
+def section(verb: str) -> str:
+    """One verb."""
+    text, arguments = declared_by(verb)
+    rows = [row(action) for action in arguments]
+    body = table(("argument", "meaning", "default"), rows)
+    return f"## {verb}\n\nPackage `{BROUGHT_BY[verb]}`. {escaped(text.strip())}\n\n{body}"
+
+
+def row(action: argparse.Action) -> tuple[str, str, str]:
+    """Name, meaning and default of one argument."""
+    value = action.metavar or (
+        "{" + ",".join(map(str, action.choices)) + "}" if action.choices else action.dest.upper()
+    )
+    value = value if isinstance(value, str) else " ".join(value)
+    many = {"+": f"{value} ...", "*": f"[{value} ...]", "?": f"[{value}]"}
+    value = many.get(str(action.nargs), value)
+    takes_value = action.nargs != 0
+    if action.option_strings:
+        name = f"{', '.join(action.option_strings)} {value if takes_value else ''}".strip()
+    else:
+        name = value
+    default = "" if action.default in (None, False, [], "", argparse.SUPPRESS) else action.default
+    if action.dest == "jobs":  # the number of processors of the computer that makes this page
+        default = "all processors"
+    if isinstance(default, list):
+        default = " ".join(map(str, default))
+    help_text = re.sub(r"[;,]? ?\(?default:? %\(default\)s\)?", "", action.help or "")
+    help_text = help_text.replace("%(default)s", str(default)).replace("%%", "%")
+    return f"`{name}`".replace("|", "\\|"), cell(help_text), cell(str(default))
