@@ -29,10 +29,10 @@ def test_a_study_goes_on_where_it_was_stopped(ran: SimpleNamespace) -> None:
 
 
 def test_the_tool_is_given_the_recordings_and_no_more(ran: SimpleNamespace) -> None:
-    told = ran.study.results["scenario_0000"]["diagnosis"]["seen"]
-    assert told["trials"] == ["trial_00", "trial_01", "trial_02"]
+    seen = ran.study.results["scenario_0000"]["diagnosis"]["seen"]
+    assert seen["trials"] == ["trial_00", "trial_01", "trial_02"]
     place = ran.study.folder_of("scenario_0000").resolve()
-    assert told["arguments"] == [str(place / "recordings"), "--out", str(place / "tool")]
+    assert seen["arguments"] == [str(place / "recordings"), "--out", str(place / "tool")]
     assert not (place / "recordings").exists()
 
 
