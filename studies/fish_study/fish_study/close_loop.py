@@ -1,4 +1,4 @@
-"""Does a better model make better gains? Gains trained on three models and searched on the second plant, judged there.
+"""Does a better model make better gains? Gains trained on three models and searched on the second plant, compared there.
 
 nominal     the robot file as it is
 refitted    `identify` on recordings of the plant
@@ -6,8 +6,8 @@ corrected   `diagnose` on the same recordings
 true        gains searched on the plant itself (`gain_search`)
 
 Each with the feed-forward of what its gains were made on (`feed_forward`), the plant's from swims in still water. All
-trainings are alike (TRAINING), several of each model, as one says little: all of them are judged. The search sees other seeds
-(start and water) than the runs that are judged.
+trainings are alike (TRAINING), several of each model, as one says little: all of them are compared. The search has other
+seeds (start and water) than the runs that are compared.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ PATHS, SPEEDS = (
 # those between were seen when recipe and plant were chosen
 SEARCH_SEEDS, EVALUATION_SEEDS = (1,), (22, 23, 24, 25)
 LINKS = 5
-# of every training: runs are judged through camera, IMU and fusion, on a robot that no model is exactly; with such noise a
-# level of 0.01 m is not passed. What is judged is the path: a fish that holds its speed in a bend leaves it
+# of every training: runs are compared through camera, IMU and fusion, on a robot that no model is exactly; with such noise a
+# level of 0.01 m is not passed. What is compared is the path: a fish that holds its speed in a bend leaves it
 TRAINING = (
     "--set",
     "randomise=0.2",
@@ -141,8 +141,8 @@ def close_loop(plan: Plan, jobs: int, say: Say) -> list[Row]:
     law = _plant_law(plan.scenario)
     best = search(condition, cells, plan.search, jobs, plan.out / "search" / "tries.json", say, law)
     gains["true"] = Candidate("true", PolicyGains(Policy.constant(best)), law)
-    judged = make_cells(plan.paths, plan.speeds, EVALUATION_SEEDS)
-    return swim_each(gains, condition, judged, jobs, plan.out / "swims", say)
+    compared = make_cells(plan.paths, plan.speeds, EVALUATION_SEEDS)
+    return swim_each(gains, condition, compared, jobs, plan.out / "swims", say)
 
 
 def _plant_law(scenario: Scenario) -> Law:

@@ -63,17 +63,17 @@ def open_loop_blocks(robot: Robot) -> list[Block]:
 
 def training_blocks(curves: Sequence[Sequence[CurveRow]], levels: int) -> list[Block]:
     """The curve over seeds and how many came to the end; a seed rolled back to its beginning has no row to show."""
-    title, told = f"Training, {len(curves)} seeds", [curve for curve in curves if curve]
-    without = f"{len(curves) - len(told)} of {len(curves)} seeds diverged before their first checkpoint and have no curve."
-    if not told:
+    title, drawn = f"Training, {len(curves)} seeds", [curve for curve in curves if curve]
+    without = f"{len(curves) - len(drawn)} of {len(curves)} seeds diverged before their first checkpoint and have no curve."
+    if not drawn:
         return [Text(title, without)]
-    done = sum(curve[-1].level >= levels for curve in told)
-    seconds = [curve[-1].seconds for curve in told]
+    done = sum(curve[-1].level >= levels for curve in drawn)
+    seconds = [curve[-1].seconds for curve in drawn]
     note = (
         f"{done} of {len(curves)} seeds passed all {levels} levels; {np.mean(seconds):.0f} s each on average "
-        f"(longest {max(seconds):.0f} s)." + (f" {without}" if len(told) < len(curves) else "")
+        f"(longest {max(seconds):.0f} s)." + (f" {without}" if len(drawn) < len(curves) else "")
     )
-    return [Figure(title, training_figure(told), note)]
+    return [Figure(title, training_figure(drawn), note)]
 
 
 def simulation_blocks(candidate: Candidate, condition: Condition) -> list[Block]:

@@ -93,12 +93,12 @@ HOW = (
 def seeds_sentence(about: Sequence[Mapping[str, Any]]) -> str:
     """Whether anybody could know the labels before the run; of older studies the command tells whether a seed was given."""
     given = [str(a["seed"]) for a in about if not a.get("drawn", "--seed" not in a["command"])]
-    sealed = "salted hashes of all labels were on disk before the first run."
+    committed = "salted hashes of all labels were on disk before the first run."
     if not given:
-        return f"The seeds were drawn at run time; {sealed}"
+        return f"The seeds were drawn at run time; {committed}"
     others = "" if len(given) == len(about) else " The other seeds were drawn at run time."
     which = f"Seed {given[0]} was" if len(given) == 1 else f"Seeds {', '.join(given)} were"
-    return f"{which} given, and whoever knows a seed can know its labels; {sealed}{others}"
+    return f"{which} given, and whoever knows a seed can know its labels; {committed}{others}"
 
 
 def _power(steps: Sequence[Power]) -> go.Figure:

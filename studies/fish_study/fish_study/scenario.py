@@ -1,4 +1,4 @@
-"""A scenario: what is hidden in one data set. Its JSON is the label that is sealed."""
+"""A scenario: what is hidden in one data set. Its JSON is the label that is committed to."""
 
 from __future__ import annotations
 

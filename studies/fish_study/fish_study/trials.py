@@ -1,4 +1,4 @@
-"""What the fish is told to do in the trials of a data set: open-loop programs, and paths under feedback."""
+"""Commands of the trials of a data set: open-loop programs, and paths under feedback."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def test_the_page_says_of_every_seed_whether_it_was_drawn() -> None:
     )
     old = [
         {key: about[key] for key in ("seed", "command")} for about in (drawn, given)
-    ]  # of before studies told it
+    ]  # a study.json without the entry
     for a, b in ((drawn, given), old):
         assert seeds_sentence([a, a]).startswith("The seeds were drawn at run time; salted hashes")
         assert seeds_sentence([b]).startswith("Seed 5 was given")
