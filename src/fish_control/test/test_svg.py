@@ -157,6 +157,7 @@ def test_what_a_viewer_shows_is_swum(tmp_path, shown):
             f"<style>g > path{{display:none}}</style><path {LINE}/>",
             "selector 'g > path' is not supported",
         ),
+        (f"<style>g path{{stroke:none;fill:none}}</style><path {LINE}/>", "selector 'g path'"),
         (f"<style>@media print{{path{{display:none}}}}</style><path {LINE}/>", "@ rules"),
         (f'<style>.a{{d:path("M0 0")}}</style><path class="a" {LINE}/>', "'d' is not supported"),
         ('<use href="#none"/>', "'#none', which is not in the drawing"),

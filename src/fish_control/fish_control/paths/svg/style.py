@@ -83,9 +83,8 @@ def read_rules(root: Element, where: str) -> list[Rule]:
 
 def _rule(selector: str, declared: Style, order: int, where: str) -> list[Rule]:
     match = _SELECTOR.fullmatch(selector)
-    relevant = set(declared) & {*INHERITED, *OWN, *UNREAD}
     if not match or not selector:
-        if relevant - {"fill", "stroke", "color", "stroke-width"}:
+        if set(declared) & {*INHERITED, *OWN, *UNREAD}:
             raise PathError(
                 f"{where}: style sheet selector {selector!r} is not supported; use style attributes or classes"
             )
