@@ -157,7 +157,7 @@ def test_bad_parameters_are_one_line(peer, node, parameters, text):
 
 FULL_DISK = '''
 import errno, sys
-from fish_train.nodes import recorder
+from fish_bag.nodes import recorder
 from fish_bag.record_file import RecordFile
 
 class Full:
