@@ -120,7 +120,7 @@ lint: setup
 
 # --- documentation --------------------------------------------------------------------------------------------------------
 # The generated pages of docs/reference are written again first; a warning is an error.
-docs: build $(VENV)/.docs
+docs: install/.studies $(VENV)/.docs
 	@$(WORKSPACE); python docs/generate_reference.py; python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 	@echo "site: docs/_build/html/index.html"
 

@@ -9,6 +9,7 @@ release = version = "0.1.0"
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["_build", "studies", "blind_studies.md"]
+smartquotes = False  # x' is a derivative
 highlight_language = "none"  # of blocks that name no language
 html_theme = "furo"
 html_title = "Robot fish"
@@ -32,9 +33,13 @@ SECTION = re.compile(r"^(Args|Arguments|Attributes|Returns|Raises|Yields|Example
 
 
 def plain_text(
-    _app: Any, _what: str, _name: str, _obj: Any, _options: Any, lines: list[str]
+    _app: Any, what: str, _name: str, _obj: Any, _options: Any, lines: list[str]
 ) -> None:
     """Make a docstring valid reStructuredText: bars and stars are plain text, an indented equation is a literal block."""
+    if (
+        what in ("property", "attribute") and lines
+    ):  # napoleon takes what stands before a colon for a type
+        lines[0] = lines[0].replace(": ", " – ", 1)
     out: list[str] = []
     literal = section = False
     for line in lines:

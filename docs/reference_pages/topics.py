@@ -50,7 +50,7 @@ INTRODUCTION = """# Topics, services, frames
 
 Topics are relative to the robot's namespace, `/fish` by default; a leading `/` is absolute. All are of common
 interfaces, in SI units and radians. The simulator and the drivers publish and take the same topics, so that vision and
-control cannot tell them apart.
+control cannot tell them apart. "camera" below is the node of `fish_sim` or of `fish_hw`.
 
 Frames follow REP 103. `pool` has its origin in the middle of the 4.27 m x 2.13 m pool, x along the long side, y along
 the short side, z up. `base_link` is at the head's centre of mass, x forward, y left. Angles are counter-clockwise
@@ -68,8 +68,7 @@ def page() -> str:
     rows = (
         (
             f"`{topic}`",
-            cell(message),
-            cell(MEANING[topic]),
+            cell(f"{message}: {MEANING[topic]}"),
             nodes(found["publishes"][topic, message]),
             nodes(found["takes"][topic, message]),
         )
@@ -84,7 +83,7 @@ def page() -> str:
             HEADER,
             INTRODUCTION,
             "## Topics\n",
-            table(("topic", "type", "what, rate", "published by", "taken by"), rows),
+            table(("topic", "type: content, rate", "published by", "taken by"), rows),
             "The recorder takes the topics that its parameter `topics` names. The replayer publishes those of a recording.\n",
             "## Services\n",
             table(("service", "type", "what", "node"), services),
@@ -93,9 +92,9 @@ def page() -> str:
 
 
 def nodes(names: set[str]) -> str:
-    """Node names in a cell."""
+    """Executables in a cell; the camera is that of fish_sim or of fish_hw."""
     every = len(names) > 8
-    return "every node" if every else ", ".join(sorted(name.replace("/", " ") for name in names))
+    return "every node" if every else ", ".join(sorted({name.split("/")[1] for name in names}))
 
 
 def interfaces(package: str, executable: str) -> list[tuple[str, str, str]]:
