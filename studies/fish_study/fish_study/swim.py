@@ -94,12 +94,15 @@ def until_a_wall(truth: Array) -> NDArray[np.int64]:
 
 
 def kept_trials(readings: Sequence[Readings]) -> dict[str, Readings]:
-    """The trials of at least SHORTEST, each up to its end, by the names of their recordings: numbered over all."""
-    all_trials = [part.trial(m) for part in readings for m in range(len(part.ends))]
+    """Every trial up to its end, by the name of its recording, numbered over all.
+
+    Those that end at a wall before SHORTEST are left out.
+    """
+    numbered = enumerate((part, m) for part in readings for m in range(len(part.ends)))
     return {
-        f"trial_{k:02d}": trial
-        for k, trial in enumerate(all_trials)
-        if PERIOD * len(trial.commands) >= SHORTEST
+        f"trial_{k:02d}": part.trial(m)
+        for k, (part, m) in numbered
+        if part.ends[m] == len(part.commands) or PERIOD * part.ends[m] >= SHORTEST
     }
 
 

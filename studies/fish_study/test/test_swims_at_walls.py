@@ -34,11 +34,17 @@ class Passing:
         return np.zeros(len(self.pose))
 
 
-def passed(*starts: float) -> Readings:
-    """20 s from places (x, 0) [m]."""
-    instruments = SensorModels(2000, len(starts), 1.0, SensorErrors(), np.random.default_rng(0))
-    driver = OpenLoop(np.zeros((2000, len(starts), 2)))
-    return swim(Passing(), np.array([[x, 0.0, 0.0] for x in starts]), driver, instruments, 2000)
+def passed(*starts: float, steps: int = 2000) -> Readings:
+    """From places (x, 0) [m]."""
+    sensors = SensorModels(steps, len(starts), 1.0, SensorErrors(), np.random.default_rng(0))
+    driver = OpenLoop(np.zeros((steps, len(starts), 2)))
+    return swim(Passing(), np.array([[x, 0.0, 0.0] for x in starts]), driver, sensors, steps)
+
+
+def test_a_short_trial_that_no_wall_ends_is_kept() -> None:
+    readings = passed(HALF_LENGTH - 0.2, 0.0, steps=200)
+    assert list(kept_trials([readings])) == ["trial_01"]
+    assert list(ended_at_a_wall([readings])) == ["trial_00"]
 
 
 def test_a_trial_ends_where_its_fish_comes_to_a_wall(tmp_path: Path) -> None:
