@@ -72,7 +72,7 @@ class Stepper:
         """The robot's parameter vector (NP,)."""
         if robot.structure != self.layout.structure:
             raise ValueError(
-                f"robot: got structure {robot.structure}; this stepper is for {self.layout.structure}"
+                f"robot: got {Layout(robot.structure)}; this stepper is for {self.layout}"
             )
         return np.array(robot.vector())
 
@@ -285,7 +285,7 @@ class Stepper:
     def _check_width(self, name: str, array: Array, width: int) -> None:
         if array.ndim == 0 or array.shape[-1] != width:
             raise ValueError(
-                f"{name}: got shape {array.shape}; expected (..., {width}) for {self.layout.structure}"
+                f"{name}: got shape {array.shape}; expected (..., {width}) for {self.layout}"
             )
 
     def _kernel(self, batch: int, part: Part = "values") -> CompiledKernel | InterpretedKernel:
