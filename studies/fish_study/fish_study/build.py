@@ -14,7 +14,7 @@ from fish_sim.scheme import Scheme
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_study.data_set import write_data_set
 from fish_study.fish_sim_plant import FishSimPlant
-from fish_study.out_of_vocabulary import known_to_the_plant
+from fish_study.out_of_vocabulary import PLANT_EFFECTS
 from fish_study.scenario import NoWorld, World
 from fish_study.sensor_models import Errors, Instruments
 from fish_study.swim import Plant, Readings, swim
@@ -39,7 +39,7 @@ SLOWER = 0.85  # factor on the rotor's speed at every new try
 
 def true_robot(world: World) -> Robot:
     """The fish of a fish_sim world, with what is concealed in it."""
-    robot = Robot(links=world.links)
+    robot = Robot(links=world.links, table=PLANT_EFFECTS)
     values = {name: robot.parameters[name] * factor for name, factor in world.parameters.items()}
     robot = robot.with_parameters(**values)
     for name, effect in world.effects.items():
@@ -62,15 +62,13 @@ def make_readings(world: World) -> list[Readings]:
     """
     random = np.random.default_rng(world.seed)
     if world.plant == "fish_sim":
-        with known_to_the_plant():
-            robot = true_robot(world)
-            scheme = Scheme(world.method, world.substeps)
-            errors = Errors.of({n: v for n, v in world.effects.items() if n in SENSOR_EFFECTS})
+        robot, scheme = true_robot(world), Scheme(world.method, world.substeps)
+        errors = Errors.of({n: v for n, v in world.effects.items() if n in SENSOR_EFFECTS})
 
-            def make(count: int) -> Plant:
-                return FishSimPlant(robot, scheme, count, world.noise, random)
+        def make(count: int) -> Plant:
+            return FishSimPlant(robot, scheme, count, world.noise, random)
 
-            return _trials(world, make, errors, random)
+        return _trials(world, make, errors, random)
     if world.plant == "mujoco":
         from fish_study.mujoco_plant import MujocoPlant, instrument_errors
 

@@ -26,7 +26,7 @@ from fish_study.oracle import (
     detects,
     look,
 )
-from fish_study.out_of_vocabulary import OUTSIDE, known_to_the_plant
+from fish_study.out_of_vocabulary import OUTSIDE
 from fish_study.runner import spread
 from fish_study.scenario import NoWorld, World
 from fish_study.score import Score, vocabulary
@@ -96,9 +96,8 @@ def judge(world: World, diagnosis: Mapping[str, Any] | None) -> dict[str, Any]:
     answered = [] if diagnosis is None else diagnosis["effects"]
     effects = [e for e in answered if e["name"] in world.names] or answered
     if names:
-        with known_to_the_plant():  # an oracle knows what has no name as well
-            looked = look(world, experiment, held, names)
-            content["sight"] = asdict(looked.sight)
+        looked = look(world, experiment, held, names)
+        content["sight"] = asdict(looked.sight)
         shares = dof_shares(looked.nominal, looked.true)
         content["dof"] = dof_overlap(effects[0]["where"]["dof"], shares) if effects else None
         content["rivals"] = asdict(compete(looked.nominal, looked.training, looked.held_out))

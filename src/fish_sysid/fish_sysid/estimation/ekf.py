@@ -1,23 +1,17 @@
-"""One pass of the filter over an experiment: compiled where possible, else in NumPy."""
+"""One pass of the extended Kalman filter over an experiment."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fish_report.errors import UserError
 from fish_sim.compiled import compiler, lanes
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme, default_scheme, stable_scheme
 from fish_sim.step import Stepper, kernel
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_compiled import compiled_passes, filter_library
-from fish_sysid.estimation.ekf_numpy import Filter
-from fish_sysid.estimation.ekf_types import (
-    Array,
-    FilterResult,
-    Noise,
-    Problem,
-    SensorModel,
-)
+from fish_sysid.estimation.ekf_types import Array, FilterResult, Noise, Problem, SensorModel
 
 
 def run_filter(
@@ -32,7 +26,7 @@ def run_filter(
     """Innovations, likelihood, score and Gauss-Newton matrix of all trials.
 
     p (NP,): parameters of the stepper, which must have the effect `disturbance`; dp (K, NP): their derivatives with
-    respect to the free parameters; keep: store what the smoother needs.
+    respect to the free parameters; keep: store what the smoother needs. Raises UserError without a C compiler.
     """
     return run_filters(Problem(experiment, stepper, p, dp, sensors), [noise], keep)[0]
 
@@ -41,9 +35,12 @@ def run_filters(
     problem: Problem, noises: Sequence[Noise], keep: bool = False
 ) -> list[FilterResult]:
     """`run_filter` with each noise: several at once leave no core without work."""
-    return compiled_passes(problem, noises, keep) or [
-        Filter(problem, noise).run(keep) for noise in noises
-    ]
+    results = compiled_passes(problem, noises, keep)
+    if results is None:
+        raise UserError(
+            "no C compiler was found; identification and diagnosis need one: install gcc"
+        )
+    return results
 
 
 def filter_stepper(robot: Robot) -> Stepper:
