@@ -35,7 +35,7 @@ SANITIZED = (
     "-fno-sanitize-recover=all",
     "-fno-omit-frame-pointer",
 )
-STRUCTURES: tuple[Structure, ...] = ((1, ()), (3, ()), (1, tuple(EFFECTS)))
+STRUCTURES: tuple[Structure, ...] = ((1, ()), (3, ()), (1, tuple(EFFECTS.values())))
 METHODS = ("euler", "dop853")  # of one link, beside the default
 
 Case = tuple[str, str, Check]  # name, C text, its check
@@ -58,7 +58,11 @@ def filters() -> Iterator[Case]:
     """The filter, with the default integrator."""
     from fish_sysid.estimation.ekf_compiled import filter_check, filter_text
 
-    for structure in ((1, ("disturbance",)), (3, ("disturbance",)), (1, tuple(EFFECTS))):
+    for structure in (
+        (1, (EFFECTS["disturbance"],)),
+        (3, (EFFECTS["disturbance"],)),
+        (1, tuple(EFFECTS.values())),
+    ):
         kind = (structure, default_scheme(structure[0]).method, lanes())
         yield (
             f"n = {structure[0]}, {len(structure[1])} effects, width {lanes()}: filter",

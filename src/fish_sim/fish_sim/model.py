@@ -17,16 +17,13 @@ from typing import Any
 import casadi
 
 from fish_sim.dynamics import EnabledEffect, Solution, solve
-from fish_sim.effects import EFFECTS
-from fish_sim.effects.effect import Drive
+from fish_sim.effects.effect import Drive, Effect
 from fish_sim.ops import CASADI, Scalar
-from fish_sim.robot import nominal_parameters, parameter_names
+from fish_sim.robot import Structure, nominal_parameters, parameter_names
 
 DT = 0.01  # s, period of the commands
 COMMAND_NAMES = ("rotor_speed", "rudder")  # rad/s, rad
 DRIVE_NAMES = ("alpha", "alpha_dot", "rotor_speed", "rotor_acceleration")
-
-Structure = tuple[int, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -35,12 +32,16 @@ class Layout:
 
     structure: Structure
 
+    def __str__(self) -> str:
+        names = ", ".join(effect.name for effect in self.effects) or "no effects"
+        return f"structure ({self.links} links; {names})"
+
     @property
     def links(self) -> int:
         return self.structure[0]
 
     @property
-    def effects(self) -> tuple[str, ...]:
+    def effects(self) -> tuple[type[Effect], ...]:
         return self.structure[1]
 
     @cached_property
@@ -62,7 +63,7 @@ class Layout:
     @cached_property
     def has_linkage(self) -> bool:
         """Something between servo and rudder makes the two angles differ."""
-        return any(EFFECTS[name].has_linkage for name in self.effects)
+        return any(effect.has_linkage for effect in self.effects)
 
     @cached_property
     def state(self) -> tuple[str, ...]:
@@ -73,9 +74,7 @@ class Layout:
         return parameter_names(self.structure)
 
     def _own(self, kind: str) -> tuple[str, ...]:
-        return tuple(
-            f"{name}.{key}" for name in self.effects for key in getattr(EFFECTS[name], kind)
-        )
+        return tuple(f"{e.name}.{key}" for e in self.effects for key in getattr(e, kind))
 
 
 def unpack_effects(
@@ -85,8 +84,7 @@ def unpack_effects(
     nominal = list(nominal_parameters(layout.links))
     r = SimpleNamespace(**dict(zip(nominal, p, strict=False)))
     at_p, at_z, enabled = len(nominal), 0, []
-    for name in layout.effects:
-        effect = EFFECTS[name]
+    for effect in layout.effects:
         keys, own = list(effect.parameters), list(getattr(effect, kind))
         values = SimpleNamespace(**dict(zip(keys, p[at_p : at_p + len(keys)], strict=True)))
         z = SimpleNamespace(**dict(zip(own, states[at_z : at_z + len(own)], strict=True)))

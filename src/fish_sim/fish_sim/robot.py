@@ -17,8 +17,12 @@ from typing import Any
 import yaml
 
 from fish_sim.effects import EFFECTS
+from fish_sim.effects.effect import Effect
 from fish_sim.parameter import Parameter
 from fish_sim.sensors import SENSOR_EFFECTS
+
+# number of tail links, and the enabled effects in the order in which they act
+Structure = tuple[int, tuple[type[Effect], ...]]
 
 FORMAT = 1
 STRIP_ADDED_MASS = (
@@ -99,26 +103,26 @@ class Robot:
         default_factory=dict
     )  # SENSOR_EFFECTS name -> ...
     name: str = "fish"
+    table: Mapping[str, type[Effect]] = field(
+        default_factory=lambda: EFFECTS, repr=False, compare=False
+    )  # effects that it may have, by name, in the order in which they act
 
     def __post_init__(self) -> None:
         nominal = nominal_parameters(self.links)
         values = _check_table("parameters", nominal, self.parameters)
         object.__setattr__(self, "parameters", values)
-        object.__setattr__(self, "effects", _check_effects("effects", EFFECTS, self.effects))
+        object.__setattr__(self, "effects", _check_effects("effects", self.table, self.effects))
         object.__setattr__(self, "sensors", _check_effects("sensors", SENSOR_EFFECTS, self.sensors))
 
     @property
-    def structure(self) -> tuple[int, tuple[str, ...]]:
-        """What decides the compiled kernel: number of links and names of the effects, in table order."""
-        return self.links, tuple(name for name in EFFECTS if name in self.effects)
+    def structure(self) -> Structure:
+        """What decides the compiled kernel: number of links and the enabled effects, in table order."""
+        return self.links, tuple(kind for name, kind in self.table.items() if name in self.effects)
 
     def vector(self) -> list[float]:
         """All parameter values in the order of `parameter_names(self.structure)`."""
-        names = self.structure[1]
-        return [
-            *self.parameters.values(),
-            *(v for name in names for v in self.effects[name].values()),
-        ]
+        enabled = (values for name in self.table if (values := self.effects.get(name)) is not None)
+        return [*self.parameters.values(), *(v for values in enabled for v in values.values())]
 
     def with_parameters(self, **values: float) -> Robot:
         """The same robot with some parameters changed."""
@@ -140,10 +144,10 @@ class Robot:
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def parameter_names(structure: tuple[int, tuple[str, ...]]) -> tuple[str, ...]:
+def parameter_names(structure: Structure) -> tuple[str, ...]:
     """Names in a kernel's parameter vector: robot parameters, then `effect.parameter`."""
     links, effects = structure
-    own = [f"{name}.{key}" for name in effects for key in EFFECTS[name].parameters]
+    own = [f"{effect.name}.{key}" for effect in effects for key in effect.parameters]
     return (*nominal_parameters(links), *own)
 
 

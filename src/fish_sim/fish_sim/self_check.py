@@ -12,13 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.effects import EFFECTS
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel, Part
 from fish_sim.methods import METHODS
-from fish_sim.model import DRIVE_NAMES, Layout, Structure
+from fish_sim.model import DRIVE_NAMES, Layout
 from fish_sim.parameter import Parameter
-from fish_sim.robot import nominal_parameters
+from fish_sim.robot import Structure, nominal_parameters
 from fish_sim.scheme import Scheme
 
 Array = NDArray[np.float64]
@@ -115,7 +114,7 @@ def random_states(layout: Layout, shape: tuple[int, ...], random: np.random.Gene
 def random_parameters(layout: Layout, batch: int, random: np.random.Generator) -> Array:
     """Parameters (B, NP) within SPREAD of typical ones, inside their ranges."""
     table = list(nominal_parameters(layout.links).values())
-    table += [p for name in layout.effects for p in EFFECTS[name].parameters.values()]
+    table += [p for effect in layout.effects for p in effect.parameters.values()]
     factor = 1.0 + SPREAD * random.uniform(-1.0, 1.0, (batch, len(table)))
     ranges = np.array([(p.lowest, p.highest) for p in table]).T
     parameters: Array = np.clip(np.array([_typical(p) for p in table]) * factor, *ranges)

@@ -18,8 +18,8 @@ from fish_sim.finite import check_finite
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel, Part
 from fish_sim.methods import METHODS, Method
-from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, Structure, functions
-from fish_sim.robot import Robot
+from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, functions
+from fish_sim.robot import Robot, Structure
 from fish_sim.scheme import Scheme, check_scheme, default_scheme, stable_scheme
 from fish_sim.self_check import kernel_errors
 
@@ -70,7 +70,7 @@ class Stepper:
         """The robot's parameter vector (NP,)."""
         if robot.structure != self.layout.structure:
             raise ValueError(
-                f"robot: got structure {robot.structure}; this stepper is for {self.layout.structure}"
+                f"robot: got {Layout(robot.structure)}; this stepper is for {self.layout}"
             )
         return np.array(robot.vector())
 
@@ -282,7 +282,7 @@ class Stepper:
     def _check_width(self, name: str, array: Array, width: int) -> None:
         if array.ndim == 0 or array.shape[-1] != width:
             raise ValueError(
-                f"{name}: got shape {array.shape}; expected (..., {width}) for {self.layout.structure}"
+                f"{name}: got shape {array.shape}; expected (..., {width}) for {self.layout}"
             )
 
     def _kernel(self, batch: int, part: Part = "values") -> CompiledKernel | InterpretedKernel:

@@ -53,6 +53,7 @@ def swim(effects, commands, poses=NEAR_WALL, links=1):
 
 def test_every_physics_and_actuator_name_of_the_vocabulary_exists():
     assert {n: EFFECTS[n].kind for n in PHYSICS} == dict.fromkeys(PHYSICS, "physics")
+    assert [effect.name for effect in EFFECTS.values()] == list(EFFECTS)
     assert {n: EFFECTS[n].kind for n in ACTUATORS} == dict.fromkeys(ACTUATORS, "actuator")
 
 
@@ -147,7 +148,7 @@ def test_dissipative_effects_never_give_energy_to_the_fish(name):
 
 
 def test_states_and_memory_start_at_rest_and_parameters_are_named_once():
-    structure = (3, tuple(EFFECTS))
+    structure = (3, tuple(EFFECTS.values()))
     stepper = Stepper(structure, compiled=False)
     assert not stepper.rest()[3:].any()
     assert len(set(stepper.layout.state)) == len(stepper.layout.state)

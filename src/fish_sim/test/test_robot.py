@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from fish_sim.effects import EFFECTS
+from fish_sim.effects.quadratic_drag import QuadraticDrag
 from fish_sim.robot import (
     Robot,
     RobotError,
@@ -66,10 +67,19 @@ def test_vector_follows_the_parameter_names():
     )
     names = parameter_names(robot.structure)
     assert dict(zip(names, robot.vector(), strict=True))["tip_slip.mobility"] == 0.2
-    assert robot.structure == (
-        3,
-        ("tip_slip", "rudder_lag"),
-    )  # table order, not the order of adding
+    own = EFFECTS["tip_slip"], EFFECTS["rudder_lag"]
+    assert robot.structure == (3, own)  # table order, not the order of adding
+
+
+def test_a_table_of_ones_own_adds_an_effect_to_one_robot_alone():
+    class Mine(QuadraticDrag):
+        name = "mine"
+
+    robot = Robot(table={**EFFECTS, "mine": Mine}).with_effect("mine", surge=0.6)
+    assert robot.structure == (3, (Mine,))
+    assert "mine.surge" in parameter_names(robot.structure)
+    with pytest.raises(RobotError, match="unknown effect 'mine'"):
+        Robot().with_effect("mine")
 
 
 @pytest.mark.parametrize(

@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sim.water_push import USUAL_SIZE
 from fish_sysid.dataset.synthetic import KINDS, program, record
-from fish_sysid.estimation.annealed_fit import TAIL_INERTIAS, fit_tempered
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.global_fit import second_look
+from fish_sysid.estimation.global_fit import refit_if_suspect
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import (
     LOG_PRIOR,
     NOMINAL_FREE,
-    Coordinates,
     nominal_hypothesis,
 )
+from fish_sysid.estimation.refit import ANNEAL_HELD, refit
 from fish_sysid.estimation.sensor_noise import usual_noise
 
 Array = NDArray[np.float64]
@@ -77,13 +76,14 @@ def repeat(seed: int, trials: int, duration: float) -> Repetition:
     experiment, _ = record(truth, commands, Noise(wrench=USUAL_SIZE), random)
     hypothesis = nominal_hypothesis(Robot())
     # as `identify` does
-    fit = fit_tempered(hypothesis, experiment, usual_noise(experiment), held=TAIL_INERTIAS)
-    return scored(seed, truth, second_look(fit, experiment))
+    origin = hypothesis.parametrization.origin()
+    fit = refit(hypothesis, origin, experiment, usual_noise(experiment), ANNEAL_HELD)
+    return scored(seed, truth, refit_if_suspect(fit, experiment))
 
 
 def scored(seed: int, truth: Robot, fit: Fit) -> Repetition:
     """Errors of a fit over their standard errors, in theta."""
-    coordinates = Coordinates(fit.hypothesis)
+    coordinates = fit.hypothesis.parametrization
     names = fit.hypothesis.free
     true_theta = coordinates.encode(np.array([truth.parameters[name] for name in names]))
     error = fit.theta - true_theta

@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sysid.dataset.camera_time_offset import Alignment, align, moved_back
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.estimation.annealed_fit import TAIL_INERTIAS, fit_tempered
 from fish_sysid.estimation.effect_selection import Step, choose_effects, step_text
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.global_fit import TOO_STRONG, excess, second_look
-from fish_sysid.estimation.initial_noise import STRANGE, suitable_noise, worst_row
+from fish_sysid.estimation.global_fit import refit_if_suspect
+from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.multistep_fit import fit_outlook
+from fish_sysid.estimation.multistep_fit import fit_multistep
 from fish_sysid.estimation.parametrization import (
     NOMINAL_FREE,
-    Coordinates,
     nominal_hypothesis,
     zeros,
 )
+from fish_sysid.estimation.refit import ANNEAL_HELD, refit
 from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.thresholds import INNOVATION_RMS_REJECT, RATIO_REJECT
 from fish_sysid.prediction.baselines import fit_baselines, predict_baseline
 from fish_sysid.prediction.prediction import (
     EVERY,
@@ -142,13 +142,14 @@ def identify(
     for name in effects:
         hypothesis = hypothesis.with_effect(name, EFFECT_START)
     # not from many places: of a wrong model's optima the likelihood does not tell which predicts, and this way is measured
-    fit = fit_tempered(hypothesis, training, noise, report=report, held=TAIL_INERTIAS)
+    origin = hypothesis.parametrization.origin()
+    fit = refit(hypothesis, origin, training, noise, ANNEAL_HELD, report)
     wrong = is_wrong(fit, noise)
-    fit = fit_outlook(fit, training, report) if wrong else second_look(fit, training, report)
+    fit = fit_multistep(fit, training, report) if wrong else refit_if_suspect(fit, training, report)
     steps: tuple[Step, ...] = ()
     if wrong and choose_from:
         fit, steps = choose_effects(fit, training, choose_from, report)
-        fit = fit_outlook(fit, training, report) if any(step.added for step in steps) else fit
+        fit = fit_multistep(fit, training, report) if any(step.added for step in steps) else fit
     report("predicting trials left out")
     judged, errors, lacking = judge(training, held_out, robot, fit)
     estimates = estimate(training, fit.robot, fit.noise)
@@ -187,8 +188,8 @@ def is_wrong(fit: Fit, noise: Noise) -> bool:
         (getattr(fit.noise, key), getattr(noise, key))
         for key in ("gyro", "camera_position", "camera_heading")
     ]
-    return any(needed > STRANGE * said for needed, said in told) or bool(
-        excess(fit).max() > TOO_STRONG
+    return any(needed > INNOVATION_RMS_REJECT * said for needed, said in told) or bool(
+        fit.process_noise_ratio.max() > RATIO_REJECT
     )
 
 
@@ -228,7 +229,7 @@ def judge(
     judged = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP)
     peeking = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP, PEEK)
     before = predict(
-        unseen, start, suitable_noise(unseen, start, fit.noise), longest, EVERY, WARM_UP
+        unseen, start, initial_noise(unseen, start, fit.noise), longest, EVERY, WARM_UP
     )
     errors = {"start": prediction_errors(before), "identified": prediction_errors(judged)}
     try:
@@ -245,7 +246,7 @@ def judge(
 
 def undetermined(fit: Fit) -> tuple[str, ...]:
     """Free parameters whose posterior standard deviation is above UNDETERMINED times the prior's."""
-    deviation, prior = np.sqrt(np.diag(fit.covariance)), Coordinates(fit.hypothesis).prior
+    deviation, prior = np.sqrt(np.diag(fit.covariance)), fit.hypothesis.parametrization.prior
     return tuple(
         n
         for n, d, p in zip(fit.hypothesis.free, deviation, prior, strict=True)
@@ -314,7 +315,7 @@ def fit_statements(fit: Fit) -> list[str]:
         )
     for first, second, value in entangled(fit):
         out.append(f"{first} and {second} are hardly told apart (correlation {value:+.3f})")
-    if (worst := worst_row(fit)) > 1.5:
+    if (worst := fit.max_innovation_rms) > 1.5:
         out.append(
             f"innovations are {worst:.1f} times as large as the noise explains: standard errors are too small"
         )

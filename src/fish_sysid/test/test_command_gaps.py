@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.command_gaps import LostCommandsError, holes, told_on_grid
+from fish_sysid.dataset.command_gaps import LostCommandsError, commands_on_grid, holes
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
@@ -35,12 +35,12 @@ def swum() -> Experiment:
 
 def losing(swum: Experiment, first: int, count: int, measured: bool) -> Experiment:
     """The experiment with `count` commands lost in its first trial, and the encoder's samples of then if it does not measure."""
-    told, encoder, grid = swum.commands.copy(), swum.encoder.copy(), DT * np.arange(swum.length)
+    given, encoder, grid = swum.commands.copy(), swum.encoder.copy(), DT * np.arange(swum.length)
     if not measured:
         encoder[first : first + count + 1, 0] = np.nan
     kept = np.delete(np.arange(swum.length), np.arange(first, first + count))
-    told[:, 0], encoder[:, 0] = told_on_grid(grid[kept], told[kept, 0], grid, encoder[:, 0])
-    return replace(swum, commands=told, encoder=encoder)
+    given[:, 0], encoder[:, 0] = commands_on_grid(grid[kept], given[kept, 0], grid, encoder[:, 0])
+    return replace(swum, commands=given, encoder=encoder)
 
 
 @pytest.mark.parametrize("measured", [True, False])
@@ -54,12 +54,15 @@ def test_lost_commands_cost_next_to_nothing(
     lost = losing(swum, first, count, measured)
     seen = np.isfinite(lost.encoder)  # what takes the command's place is no measurement
     whole = replace(swum, encoder=np.where(seen, swum.encoder, np.nan))
-    full, found = (evaluate(hypothesis, np.zeros(0), e, Noise()).objective for e in (whole, lost))
+    full, found = (
+        evaluate(hypothesis, np.zeros(0), e, Noise()).log_posterior for e in (whole, lost)
+    )
     assert abs(full - found) < 8.0
     held = whole.commands.copy()
     held[first : first + count, 0] = held[first - 1, 0]
     cost = (
-        full - evaluate(hypothesis, np.zeros(0), replace(whole, commands=held), Noise()).objective
+        full
+        - evaluate(hypothesis, np.zeros(0), replace(whole, commands=held), Noise()).log_posterior
     )
     assert count == 1 or cost > 200.0
 
@@ -67,22 +70,22 @@ def test_lost_commands_cost_next_to_nothing(
 def test_without_the_encoder_a_curve_follows_the_strokes() -> None:
     for count, off in ((1, 0.05), (3, 0.1), (9, 1.0)):
         kept = without(PEAK - count // 2, count)
-        told, encoder = told_on_grid(GRID[kept], TOLD[kept], GRID, SILENT)
-        assert np.abs(told[:, 0] - TOLD[:, 0]).max() < off
-        assert np.abs(told[:, 1] - TOLD[:, 1]).max() < 0.004
+        given, encoder = commands_on_grid(GRID[kept], TOLD[kept], GRID, SILENT)
+        assert np.abs(given[:, 0] - TOLD[:, 0]).max() < off
+        assert np.abs(given[:, 1] - TOLD[:, 1]).max() < 0.004
         assert np.isnan(encoder).all()
-        np.testing.assert_array_equal(told[kept], TOLD[kept])
+        np.testing.assert_array_equal(given[kept], TOLD[kept])
 
 
 def test_the_encoder_counts_where_it_measured_and_a_rudder_that_jumped_gets_a_line() -> None:
     kept, encoder = without(100, 6), np.full(len(GRID), 7.0)
     encoder[103] = np.nan  # tells of the command before it
-    told = TOLD.copy()
-    told[103:, 1] = 0.9
-    found, left = told_on_grid(GRID[kept], told[kept], GRID, encoder)
+    given = TOLD.copy()
+    given[103:, 1] = 0.9
+    found, left = commands_on_grid(GRID[kept], given[kept], GRID, encoder)
     assert found[[100, 101, 103, 104, 105], 0].tolist() == [7.0] * 5
     assert found[102, 0] == pytest.approx(TOLD[102, 0], abs=0.5)
-    np.testing.assert_allclose(np.diff(found[99:107, 1]), (0.9 - told[99, 1]) / 7, atol=1e-12)
+    np.testing.assert_allclose(np.diff(found[99:107, 1]), (0.9 - given[99, 1]) / 7, atol=1e-12)
     assert np.isnan(left[101:107]).all()
     assert (left[[100, 107]] == 7.0).all()
 
@@ -90,18 +93,18 @@ def test_the_encoder_counts_where_it_measured_and_a_rudder_that_jumped_gets_a_li
 def test_a_hole_at_either_end_has_fewer_commands_to_run_through() -> None:
     for first in (1, len(GRID) - 4):
         kept = without(first, 3)
-        told, _ = told_on_grid(GRID[kept], TOLD[kept], GRID, SILENT)
-        assert np.abs(told[:, 0] - TOLD[:, 0]).max() < 2.0
+        given, _ = commands_on_grid(GRID[kept], TOLD[kept], GRID, SILENT)
+        assert np.abs(given[:, 0] - TOLD[:, 0]).max() < 2.0
 
 
 def test_a_hole_that_is_too_long_is_said() -> None:
-    told_on_grid(GRID[(kept := without(200, 9))], TOLD[kept], GRID, SILENT)
+    commands_on_grid(GRID[(kept := without(200, 9))], TOLD[kept], GRID, SILENT)
     kept = without(200, 10)
     with pytest.raises(
         LostCommandsError,
         match=r"from 1\.99 to 2\.10 s, where one comes every 10 ms; .* cut .* or record",
     ):
-        told_on_grid(GRID[kept], TOLD[kept], GRID, SILENT)
+        commands_on_grid(GRID[kept], TOLD[kept], GRID, SILENT)
 
 
 def random_stamps(spread: float) -> np.ndarray:
@@ -129,6 +132,6 @@ def test_the_beat_may_be_another_than_the_grids_and_many_may_be_lost() -> None:
     lost = np.arange(20, 380, 10)
     t = np.delete(GRID + 0.0003 * np.random.default_rng(0).standard_normal(len(GRID)), lost)
     assert len(holes(t)) == len(lost)
-    told = np.delete(TOLD, lost, axis=0)
-    found, _ = told_on_grid(t, told, t[0] + DT * np.arange(len(GRID)), SILENT)
+    given = np.delete(TOLD, lost, axis=0)
+    found, _ = commands_on_grid(t, given, t[0] + DT * np.arange(len(GRID)), SILENT)
     np.testing.assert_allclose(found[lost, 0], TOLD[lost, 0], atol=2.0)

@@ -213,8 +213,8 @@ def test_errors_are_said_to_be_of_held_out_trials_only_where_some_were(held, int
         name: {"rms": {}, "log_density_per_sample": value} for name, value in density.items()
     }
     fit = {**entries, "model_yaml": None, "held_out_trials": held, "improvement_ci95": interval}
-    split = SimpleNamespace(held_out=held)
-    table = _fit_table({"fit": fit}, Diagnosis.unseen_are.fget(SimpleNamespace(split=split)))
+    found = SimpleNamespace(task=SimpleNamespace(split=SimpleNamespace(held_out=held)))
+    table = _fit_table({"fit": fit}, Diagnosis.unseen_are.fget(found))
     assert title in table.title
     assert ("held-out" in table.title) is bool(held)
     assert table.note.endswith(gain)

@@ -24,7 +24,7 @@ from fish_sysid.estimation.ekf_types import (
 )
 from fish_sysid.estimation.fixed_lag import smoothed
 from fish_sysid.estimation.map_fit import evaluate
-from fish_sysid.estimation.parametrization import NOMINAL_FREE, Coordinates, nominal_hypothesis
+from fish_sysid.estimation.parametrization import NOMINAL_FREE, nominal_hypothesis
 from fish_sysid.estimation.smoother import smooth
 
 SENSORS = (
@@ -58,7 +58,7 @@ def test_compiled_and_numpy_passes_agree(stiffness, width, monkeypatch):
     monkeypatch.setattr(ekf_compiled, "filter_library", ekf_compiled.filter_library.__wrapped__)
     data, _ = experiment(Robot(), 1.5, ("sines", "steps"))
     robot = Robot() if stiffness is None else Robot().with_parameters(tail_stiffness=stiffness)
-    coordinates = Coordinates(with_sensors(robot))
+    coordinates = with_sensors(robot).parametrization
     problem = Problem(data, coordinates.stepper, *coordinates.filter_inputs(coordinates.origin()))
     slow = Filter(problem, Noise()).run(keep=True)
     passes = compiled_passes(problem, [Noise(gyro=0.1), Noise()], keep=True)
@@ -90,7 +90,7 @@ def test_a_filter_that_the_compiler_gets_wrong_is_not_used(edit, wrong_compiler,
 def test_the_memory_of_all_trials_is_never_held_at_once():
     """A delay's memory times trials times free parameters would be gigabytes of a day in the pool."""
     data, _ = experiment(Robot(), 2.0, ("sines", "steps") * 4)
-    coordinates = Coordinates(nominal_hypothesis(Robot()).with_effect("rudder_delay"))
+    coordinates = nominal_hypothesis(Robot()).with_effect("rudder_delay").parametrization
     problem = Problem(data, coordinates.stepper, *coordinates.filter_inputs(coordinates.origin()))
     if compiled_passes(problem, [Noise()], keep=False) is None:
         pytest.skip("no C compiler here")
@@ -107,7 +107,7 @@ def test_the_memory_of_all_trials_is_never_held_at_once():
 
 def test_innovations_are_white_with_unit_variance_at_the_truth():
     data, _ = experiment(Robot(), 10.0, ("sines", "steps", "random"))
-    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    coordinates = nominal_hypothesis(Robot(), ()).parametrization
     result = run_filter(data, coordinates.stepper, *coordinates.filter_inputs(np.zeros(0)), Noise())
     w = result.whitened[:, :, :3]
     np.testing.assert_allclose(
@@ -120,7 +120,7 @@ def test_innovations_are_white_with_unit_variance_at_the_truth():
 def test_the_transition_is_the_derivative_of_the_simulators_step():
     """Linearised in the middle of a step against the integrator's own derivative; both motions swim."""
     data, _ = experiment(Robot(), 3.0, ("sines", "steps"))
-    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    coordinates = nominal_hypothesis(Robot(), ()).parametrization
     stepper, (p, dp, sensors) = coordinates.stepper, coordinates.filter_inputs(np.zeros(0))
     history = run_filter(data, stepper, p, dp, sensors, Noise(), keep=True).history
     nx = len(stepper.layout.motion)
@@ -169,7 +169,7 @@ def test_a_missing_sensor_costs_nothing_but_its_samples():
         data, accel=np.full_like(data.accel, np.nan), gyro=np.full_like(data.gyro, np.nan)
     )
     fit = evaluate(nominal_hypothesis(Robot()), np.zeros(len(NOMINAL_FREE)), blind, Noise())
-    assert np.isfinite(fit.objective)
+    assert np.isfinite(fit.log_posterior)
     seeing = evaluate(fit.hypothesis, fit.theta, data, Noise())
     assert fit.result.samples[0] == seeing.result.samples[0] - 3 * data.length
 
@@ -217,7 +217,7 @@ def record_pushed(robot: Robot):
 def test_near_a_trials_end_the_fixed_lag_smoother_is_that_of_the_whole_trial():
     data, _ = experiment(Robot(), 2.0, ("sines",))
     starts = np.array([[0, data.length - back] for back in (60, 30, 5, 1)])
-    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    coordinates = nominal_hypothesis(Robot(), ()).parametrization
     inputs = coordinates.filter_inputs(np.zeros(0))
     history = run_filter(data, coordinates.stepper, *inputs, Noise(), keep=True).history
     whole, deviation = smooth(history)
@@ -255,7 +255,7 @@ def test_a_smoothed_state_is_as_sure_as_it_says_and_surer_than_the_filtered_one(
 def test_a_short_trial_is_smoothed_beside_a_long_one_as_alone():
     data, _ = experiment(Robot(), 1.5, ("sines", "steps"))
     uneven = replace(data, steps=np.array([150, 90]))
-    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    coordinates = nominal_hypothesis(Robot(), ()).parametrization
     inputs = coordinates.filter_inputs(np.zeros(0))
 
     def smoothed(some):
@@ -271,7 +271,7 @@ def test_a_filter_that_diverges_says_from_where(compiled):
     data, _ = experiment(Robot(), 1.0, ("sines", "steps"))
     commands = data.commands.copy()
     commands[40:, 1, 0] = 1e9  # rad/s
-    coordinates = Coordinates(nominal_hypothesis(Robot(), ()))
+    coordinates = nominal_hypothesis(Robot(), ()).parametrization
     inputs = coordinates.filter_inputs(np.zeros(0))
     problem = Problem(replace(data, commands=commands), coordinates.stepper, *inputs)
     if compiled:

@@ -11,7 +11,7 @@ from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.encoder import commanded_residual, encoder_noise, encoder_terms
 from fish_sysid.estimation.map_fit import evaluate
-from fish_sysid.estimation.noise_estimation import adapt_noise
+from fish_sysid.estimation.noise_estimation import estimate_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 
@@ -54,4 +54,4 @@ def test_an_encoder_worse_than_said_is_noticed_by_the_fit(swum):
     random = np.random.default_rng(4)
     rough = replace(swum, encoder=swum.encoder + 1.5 * random.standard_normal(swum.encoder.shape))
     fit = evaluate(nominal_hypothesis(Robot(), ()), np.zeros(0), rough, Noise())
-    assert adapt_noise(fit, rough).encoder == pytest.approx(1.507, rel=0.1)  # with its own 0.15
+    assert estimate_noise(fit, rough).encoder == pytest.approx(1.507, rel=0.1)  # with its own 0.15

@@ -1,4 +1,4 @@
-"""Where and when force is missing or an effect acts, and how sure that is, from forces made by hand."""
+"""Where and when force is missing or an effect acts, from forces made by hand."""
 
 from __future__ import annotations
 
@@ -6,10 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
-from fish_sysid.diagnosis import corrected_model as verdicts
-from fish_sysid.diagnosis.diagnosis_json import mean_interval, whiteness
 from fish_sysid.diagnosis.effect_wrench import intervals, regimes, size
 from fish_sysid.diagnosis.latent_force import (
     MissingForce,
@@ -17,13 +14,6 @@ from fish_sysid.diagnosis.latent_force import (
     dof_shares,
     place_shares,
     time_shares,
-)
-from fish_sysid.diagnosis.significance import (
-    TEMPER,
-    Level,
-    p_value,
-    p_value_unseen,
-    strength_z,
 )
 from fish_sysid.estimation.ekf_types import Noise
 
@@ -60,7 +50,7 @@ def pushed() -> MissingForce:
     )
 
 
-def test_the_windows_that_hold_most_of_a_force_are_told_with_their_share(
+def test_the_windows_that_hold_most_of_a_force_have_their_share(
     pushed: MissingForce,
 ) -> None:
     rows = time_shares(pushed, UNIT)
@@ -74,7 +64,7 @@ def test_the_windows_that_hold_most_of_a_force_are_told_with_their_share(
     assert rows[3]["share"] == 0.0
 
 
-def test_the_cell_of_the_pool_in_which_a_force_acts_is_told(pushed: MissingForce) -> None:
+def test_the_cell_of_the_pool_in_which_a_force_acts_is_found(pushed: MissingForce) -> None:
     cell = place_shares(pushed, UNIT)[0]
     assert cell["share"] == pytest.approx(1.0)
     (left, right), (low, high) = cell["x"], cell["y"]
@@ -84,7 +74,7 @@ def test_the_cell_of_the_pool_in_which_a_force_acts_is_told(pushed: MissingForce
     assert right - left < 1.0
 
 
-def test_the_covariate_is_told_in_whose_range_a_force_acts(pushed: MissingForce) -> None:
+def test_the_covariate_is_found_in_whose_range_a_force_acts(pushed: MissingForce) -> None:
     rows = {row["name"]: row for row in covariate_shares(pushed, UNIT)}
     assert rows["rudder"]["range"] == pytest.approx([0.3, 0.5], abs=0.06)  # over two bins
     assert rows["rudder"]["share"] == pytest.approx(1.0)
@@ -172,80 +162,3 @@ def test_shares_of_the_degrees_of_freedom_are_of_the_variance_that_only_the_nomi
         "sway": 0.0,
         "yaw": 0.0,
     }
-
-
-def test_the_unexplained_share_is_what_is_left_of_the_density_beyond_usual_water() -> None:
-    """Usual water has one; ten and four in surge: three of nine are left, a third. Twice as long is twice as dense."""
-    usual = Noise().wrench
-    ten, four = (fit(f**0.5 * usual[0], *usual[1:]) for f in (10.0, 4.0))
-    assert verdicts.unexplained_share(SimpleNamespace(nominal=ten, final=four)) == pytest.approx(
-        3.0 / 9.0
-    )
-    calm = fit(*usual)
-    assert verdicts.unexplained_share(SimpleNamespace(nominal=calm, final=calm)) == 0.0
-    longer = fit(*usual, tau=0.4)
-    assert verdicts.unexplained_share(SimpleNamespace(nominal=longer, final=longer)) == 1.0
-
-
-def test_the_interval_of_a_mean_gain_is_that_of_the_normal_distribution_for_many_trials() -> None:
-    gain = np.random.default_rng(0).normal(0.3, 0.2, 400)
-    middle, half = gain.mean(), 1.96 * gain.std() / 20.0
-    assert mean_interval(gain) == pytest.approx([middle - half, middle + half], abs=0.1 * half)
-    assert np.isnan(
-        mean_interval(np.array([0.2]))
-    ).all()  # one trial does not tell how far trials differ
-
-
-@pytest.mark.parametrize("trials", [2, 3, 4, 6])
-def test_of_few_trials_the_interval_holds_the_mean_gain_in_95_of_100_cases(trials: int) -> None:
-    gains = np.random.default_rng(trials).normal(0.3, 1.0, (2000, trials))
-    inside = [low <= 0.3 <= high for low, high in map(mean_interval, gains)]
-    assert np.mean(inside) == pytest.approx(0.95, abs=0.015)
-
-
-def test_the_worst_trial_tells_whether_residuals_are_white() -> None:
-    random = np.random.default_rng(0)
-    white = random.standard_normal((600, 3, 7))
-    white[1:, 2, 1] += 0.5 * white[:-1, 2, 1]  # the accelerometer of one trial
-    white[:, :, 2] = np.nan  # a sensor that is not there
-    white[50:, :, 3:6] = np.nan  # too few images
-    p = whiteness(SimpleNamespace(result=SimpleNamespace(whitened=white)))
-    assert set(p) == {"gyro", "accel_forward"}
-    assert p["gyro"] > 0.05
-    assert p["accel_forward"] < 1e-10
-
-
-def test_p_values_are_of_the_tempered_ratio_times_the_names_tried() -> None:
-    """chi square with two degrees of freedom is exponential."""
-    assert p_value(5.0 * TEMPER, 2, 3) == pytest.approx(3.0 * np.exp(-5.0))
-    assert p_value(-1.0, 1, 1) == 1.0
-    assert p_value(0.1, 2, 30) == 1.0
-
-
-def test_what_is_just_enough_on_unseen_trials_has_the_p_value_of_the_level() -> None:
-    assert p_value_unseen(Level(0.01).enough_unseen(0.0, 30), 30) == pytest.approx(0.01)
-    assert p_value_unseen(-5.0, 30) == 1.0
-
-
-def test_a_strength_is_as_sure_as_at_its_own_place() -> None:
-    """Of a payload only mass times place may be known: its place does not blur it, another parameter does."""
-    free = ("head_drag_surge", "payload.mass", "payload.forward", "payload.left")
-    normal = np.diag([4.0, 100.0, 1.0, 1.0])
-    normal[1, 2] = normal[2, 1] = 9.999
-    theta = np.array([9.0, -0.5, 3.0, 0.0])
-    known = SimpleNamespace(hypothesis=SimpleNamespace(free=free), theta=theta, normal=normal)
-    assert strength_z(known, "payload") == pytest.approx(0.5 * 10.0)
-    normal[0, 1] = normal[1, 0] = 16.0  # correlated by 0.8 with the drag
-    assert strength_z(known, "payload") == pytest.approx(0.5 * 10.0 * 0.6)
-
-
-def test_strengths_that_are_unsure_alone_may_be_sure_together() -> None:
-    """Of two currents of which the data tell the sum alone each is open; p is that of chi square with two degrees."""
-    free = ("current.x", "current.y")
-    normal = np.array([[100.0, 99.0], [99.0, 100.0]])
-    theta = np.array([0.4, 0.4])
-    assert (theta / np.sqrt(np.diag(np.linalg.inv(normal)))).max() < 1.0
-    fit = SimpleNamespace(hypothesis=SimpleNamespace(free=free), theta=theta, normal=normal)
-    wald = theta @ normal @ theta  # exponential under the null: p = exp(-wald / 2)
-    assert 2.0 * norm.sf(strength_z(fit, "current")) == pytest.approx(np.exp(-0.5 * wald))
-    assert strength_z(fit, "current") > 7.0

@@ -12,8 +12,8 @@ from fish_sysid.dataset.experiment import Experiment, Frames, shorten
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import evaluate
-from fish_sysid.estimation.multistep_fit import Outlook, _huber, fit_outlook
-from fish_sysid.estimation.parametrization import Coordinates, nominal_hypothesis
+from fish_sysid.estimation.multistep_fit import MultistepError, _huber, fit_multistep
+from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.identification import is_wrong
 
 FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
@@ -22,17 +22,19 @@ TRUTH = Robot().with_parameters(head_drag_surge=0.26, head_drag_yaw=2.4e-3, tail
 
 
 @pytest.fixture(scope="module")
-def outlook() -> Outlook:
+def outlook() -> MultistepError:
     random = np.random.default_rng(4)
     commands = np.stack(
         [program(kind, 9.0, random) for kind in ("sines", "random", "steps")], axis=1
     )
-    made = Outlook(record(TRUTH, commands, NOISE, random)[0], nominal_hypothesis(Robot(), FREE))
+    made = MultistepError(
+        record(TRUTH, commands, NOISE, random)[0], nominal_hypothesis(Robot(), FREE)
+    )
     made.start_from(made.coordinates.origin(), NOISE)
     return made
 
 
-def test_slopes_equal_differences(outlook: Outlook) -> None:
+def test_slopes_equal_differences(outlook: MultistepError) -> None:
     theta = outlook.coordinates.origin() + 0.05
     _, J = outlook.errors(theta)
     for k in range(len(FREE)):
@@ -44,7 +46,7 @@ def test_slopes_equal_differences(outlook: Outlook) -> None:
         np.testing.assert_allclose(J[:, k], numeric, atol=1e-4 * np.abs(numeric).max())
 
 
-def test_what_a_step_promises_is_about_what_the_fit_brings(outlook: Outlook) -> None:
+def test_what_a_step_promises_is_about_what_the_fit_brings(outlook: MultistepError) -> None:
     start = outlook.coordinates.origin()
     lowest = outlook.minimise(start)
     least = outlook.cost(lowest)
@@ -55,23 +57,25 @@ def test_what_a_step_promises_is_about_what_the_fit_brings(outlook: Outlook) -> 
     assert outlook.promised(lowest) == pytest.approx(least, abs=1.0)
 
 
-def test_truth_comes_back(outlook: Outlook) -> None:
+def test_truth_comes_back(outlook: MultistepError) -> None:
     start = evaluate(
         nominal_hypothesis(Robot(), FREE), outlook.coordinates.origin(), outlook.experiment, NOISE
     )
-    found = fit_outlook(start, outlook.experiment)
+    found = fit_multistep(start, outlook.experiment)
     for name, value in found.values.items():
         assert value == pytest.approx(TRUTH.parameters[name], rel=0.1), name
 
 
-def test_a_sensor_error_keeps_the_value_and_the_covariance_of_the_fit(outlook: Outlook) -> None:
+def test_a_sensor_error_keeps_the_value_and_the_covariance_of_the_fit(
+    outlook: MultistepError,
+) -> None:
     """Predictions are of the fish: they say nothing of it, and the prior alone would draw it to nothing."""
     turned = tuple(Frames(f.t, f.pose + [0.0, 0.0, 0.3]) for f in outlook.experiment.frames)
     seen = replace(outlook.experiment, frames=turned)
     hypothesis = nominal_hypothesis(Robot(), FREE).with_effect("camera_heading_offset", 0.3)
-    theta = Coordinates(hypothesis).encode(np.array([*truths(), 0.3]))
+    theta = hypothesis.parametrization.encode(np.array([*truths(), 0.3]))
     start = evaluate(hypothesis, theta, seen, NOISE)
-    found = fit_outlook(start, seen)
+    found = fit_multistep(start, seen)
     name = "camera_heading_offset.offset"
     assert found.values[name] == pytest.approx(0.3, abs=1e-9)
     assert found.standard_errors[name] == pytest.approx(start.standard_errors[name], rel=0.3)
@@ -81,12 +85,12 @@ def test_a_sensor_error_keeps_the_value_and_the_covariance_of_the_fit(outlook: O
 
 
 def test_what_is_to_be_foretold_is_what_the_sensors_at_theta_saw_not_those_at_the_hypothesis_s_start(
-    outlook: Outlook,
+    outlook: MultistepError,
 ) -> None:
     turned = tuple(Frames(f.t, f.pose + [0.0, 0.0, 0.3]) for f in outlook.experiment.frames)
     hypothesis = nominal_hypothesis(Robot(), FREE).with_effect("camera_heading_offset", 0.3)
-    made = Outlook(replace(outlook.experiment, frames=turned), hypothesis)
-    theta = Coordinates(hypothesis).encode(np.array([*truths(), 0.3]))
+    made = MultistepError(replace(outlook.experiment, frames=turned), hypothesis)
+    theta = hypothesis.parametrization.encode(np.array([*truths(), 0.3]))
     size = {}
     for offset in (theta[-1], made.coordinates.origin()[-1], theta[-1]):
         made.start_from(np.array([*theta[:-1], offset]), NOISE)
@@ -104,7 +108,7 @@ def test_what_the_data_do_not_determine_is_as_unsure_as_the_prior() -> None:
     commands = np.stack([program("straight", 6.0, random) for _ in range(2)], axis=1)
     straight, _ = record(TRUTH, commands, NOISE, random)
     hypothesis = nominal_hypothesis(Robot(), ("head_drag_surge", "servo_rate_limit"))
-    made = Outlook(straight, hypothesis)
+    made = MultistepError(straight, hypothesis)
     made.start_from(made.coordinates.origin(), NOISE)
     deviation = np.sqrt(np.diag(np.linalg.inv(made.normal(made.coordinates.origin()))))
     assert deviation[1] == pytest.approx(made.coordinates.prior[1], rel=1e-6)
@@ -119,12 +123,14 @@ CAMERA_ERRORS = {
 
 
 @pytest.mark.parametrize("name", CAMERA_ERRORS)
-def test_a_camera_s_error_that_the_model_knows_costs_nothing(outlook: Outlook, name: str) -> None:
+def test_a_camera_s_error_that_the_model_knows_costs_nothing(
+    outlook: MultistepError, name: str
+) -> None:
     values, wrong = CAMERA_ERRORS[name]
     seen = replace(outlook.experiment, frames=tuple(map(wrong, outlook.experiment.frames)))
 
     def size(experiment: Experiment, robot: Robot) -> float:
-        judge = Outlook(experiment, nominal_hypothesis(robot, FREE))
+        judge = MultistepError(experiment, nominal_hypothesis(robot, FREE))
         judge.start_from(np.zeros(len(FREE)), NOISE)
         return float(np.sqrt(np.mean(np.square(judge.errors(np.zeros(len(FREE)), False)[0]))))
 
@@ -139,9 +145,9 @@ def test_far_errors_pull_no_harder_than_three() -> None:
     np.testing.assert_allclose(pull, np.clip(e, -3.0, 3.0), atol=0.011)
 
 
-def test_nothing_is_foretold_of_what_lies_beyond_a_trial_s_end(outlook: Outlook) -> None:
+def test_nothing_is_foretold_of_what_lies_beyond_a_trial_s_end(outlook: MultistepError) -> None:
     """Images may go on after the last command that is used."""
-    short = Outlook(shorten(outlook.experiment, 500), nominal_hypothesis(Robot(), FREE))
+    short = MultistepError(shorten(outlook.experiment, 500), nominal_hypothesis(Robot(), FREE))
     last = [
         short.starts[t.start, 1] + t.position.max()
         for found in short.targets.values()
@@ -150,8 +156,8 @@ def test_nothing_is_foretold_of_what_lies_beyond_a_trial_s_end(outlook: Outlook)
     assert 450 < max(last) <= 498
 
 
-def test_trials_too_short_to_be_foretold_have_no_errors(outlook: Outlook) -> None:
-    short = Outlook(shorten(outlook.experiment, 150), nominal_hypothesis(Robot(), FREE))
+def test_trials_too_short_to_be_foretold_have_no_errors(outlook: MultistepError) -> None:
+    short = MultistepError(shorten(outlook.experiment, 150), nominal_hypothesis(Robot(), FREE))
     short.start_from(np.zeros(len(FREE)), NOISE)
     e, J = short.errors(np.zeros(len(FREE)))
     assert e.shape == (0,)
@@ -159,7 +165,7 @@ def test_trials_too_short_to_be_foretold_have_no_errors(outlook: Outlook) -> Non
     assert short.cost(np.zeros(len(FREE))) == 0.0
 
 
-def test_sensors_far_noisier_than_said_tell_of_a_wrong_model(outlook: Outlook) -> None:
+def test_sensors_far_noisier_than_said_tell_of_a_wrong_model(outlook: MultistepError) -> None:
     fit = evaluate(
         nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE
     )
@@ -167,7 +173,7 @@ def test_sensors_far_noisier_than_said_tell_of_a_wrong_model(outlook: Outlook) -
     assert is_wrong(fit, Noise(gyro=NOISE.gyro / 10.0))
 
 
-def test_a_force_that_no_water_has_tells_of_a_wrong_model(outlook: Outlook) -> None:
+def test_a_force_that_no_water_has_tells_of_a_wrong_model(outlook: MultistepError) -> None:
     fit = evaluate(
         nominal_hypothesis(Robot(), FREE), np.zeros(len(FREE)), outlook.experiment, NOISE
     )

@@ -1,4 +1,4 @@
-"""What is free and in which coordinates: there and back, slopes against differences, standard errors to first order."""
+"""What is free and in which parametrization: there and back, slopes against differences, standard errors to first order."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import (
     NOMINAL_FREE,
-    Coordinates,
     Hypothesis,
+    Parametrization,
     effect_class,
     extend,
     nominal_hypothesis,
@@ -36,12 +36,12 @@ def several() -> Hypothesis:
 
 
 @pytest.fixture(scope="module")
-def coordinates(several: Hypothesis) -> Coordinates:
-    return Coordinates(several)
+def coordinates(several: Hypothesis) -> Parametrization:
+    return several.parametrization
 
 
 @pytest.fixture
-def theta(coordinates: Coordinates) -> np.ndarray:
+def theta(coordinates: Parametrization) -> np.ndarray:
     """Somewhere inside all ranges."""
     return coordinates.origin() + np.random.default_rng(0).uniform(
         -0.1, 0.1, len(coordinates.start)
@@ -49,7 +49,7 @@ def theta(coordinates: Coordinates) -> np.ndarray:
 
 
 def test_values_come_back_and_stand_in_the_robot(
-    coordinates: Coordinates, theta: np.ndarray
+    coordinates: Parametrization, theta: np.ndarray
 ) -> None:
     values = coordinates.decode(theta)
     np.testing.assert_allclose(coordinates.encode(values), theta, atol=1e-12)
@@ -64,16 +64,16 @@ def test_values_come_back_and_stand_in_the_robot(
 def test_nominal_parameters_are_free_in_their_logarithm_and_strengths_in_typical_ones(
     several: Hypothesis,
 ) -> None:
-    origin = dict(zip(several.free, Coordinates(several).origin(), strict=True))
+    origin = dict(zip(several.free, several.parametrization.origin(), strict=True))
     assert origin["head_drag_surge"] == origin["tail_stiffness"] == 0.0
     assert [origin[k] for k in ("current.x", "camera_latency.delay")] == pytest.approx([0.5, 0.5])
     assert abs(origin["current.y"]) == pytest.approx(0.5)
-    twice = Coordinates(several).decode(np.full(len(several.free), np.log(2.0)))[0]
+    twice = several.parametrization.decode(np.full(len(several.free), np.log(2.0)))[0]
     assert twice == pytest.approx(2.0 * Robot().parameters["head_drag_surge"])
 
 
 def test_slopes_are_the_derivatives_of_what_the_filter_gets(
-    coordinates: Coordinates, theta: np.ndarray
+    coordinates: Parametrization, theta: np.ndarray
 ) -> None:
     p, dp, sensors = coordinates.filter_inputs(theta)
     for j, name in enumerate(coordinates.hypothesis.free):
@@ -92,9 +92,9 @@ def test_slopes_are_the_derivatives_of_what_the_filter_gets(
 
 
 def test_standard_errors_are_those_of_theta_times_the_slope(
-    several: Hypothesis, coordinates: Coordinates, theta: np.ndarray
+    several: Hypothesis, coordinates: Parametrization, theta: np.ndarray
 ) -> None:
-    """Correlated errors, against many draws of theta put through the coordinates."""
+    """Correlated errors, against many draws of theta put through the parametrization."""
     random = np.random.default_rng(1)
     root = random.standard_normal((len(theta), len(theta)))
     covariance = 1e-6 * (root @ root.T + np.eye(len(theta)))
@@ -114,7 +114,9 @@ def test_standard_errors_are_those_of_theta_times_the_slope(
     assert list(fit.values) == list(fit.standard_errors) == list(several.free)
 
 
-def test_theta_is_kept_in_the_physical_ranges(coordinates: Coordinates, theta: np.ndarray) -> None:
+def test_theta_is_kept_in_the_physical_ranges(
+    coordinates: Parametrization, theta: np.ndarray
+) -> None:
     wild = coordinates.decode(
         coordinates.clip(theta + 500.0 * np.where(np.arange(len(theta)) % 2, 1.0, -1.0))
     )
@@ -128,7 +130,7 @@ def test_one_effect_more_leaves_the_others_where_they_are(
 ) -> None:
     more = several.with_effect("tether", 0.3)
     longer = extend(theta, more, "tether", 1.0, {"x": 0.4})
-    values = dict(zip(more.free, Coordinates(more).decode(longer), strict=True))
+    values = dict(zip(more.free, more.parametrization.decode(longer), strict=True))
     np.testing.assert_array_equal(longer[: len(theta)], theta)
     parameters = effect_class("tether").parameters
     assert values["tether.stiffness"] == pytest.approx(parameters["stiffness"].typical)
@@ -149,25 +151,25 @@ def test_one_effect_more_leaves_the_others_where_they_are(
 def test_numbers_that_are_held_stay_where_theta_has_them(
     several: Hypothesis, theta: np.ndarray
 ) -> None:
-    """Of the robot, of an effect and of a sensor; the others keep their coordinates."""
+    """Of the robot, of an effect and of a sensor; the others keep their parametrization."""
     held = [several.free[0], "wall_effect.k", "camera_latency.delay"]
     rest = several.fixing(held, theta)
     moving = np.array([name not in held for name in several.free])
     assert rest.free == tuple(name for name in several.free if name not in held)
-    assert Coordinates(rest).robot(theta[moving]) == Coordinates(several).robot(theta)
+    assert rest.parametrization.robot(theta[moving]) == several.parametrization.robot(theta)
     assert several.fixing((), theta) == several
 
 
 def test_only_strengths_start_at_a_fraction() -> None:
     wall = effect_class("wall_effect").parameters
-    assert start_values("wall_effect", 0.0)["k"] == wall["k"].value
-    half = start_values("wall_effect", 0.5)
+    assert start_values(effect_class("wall_effect"), 0.0)["k"] == wall["k"].value
+    half = start_values(effect_class("wall_effect"), 0.5)
     assert half["k"] == pytest.approx(0.5 * (wall["k"].value + wall["k"].typical))
     assert half["length"] == (
         wall["length"].value if wall["length"].typical is None else wall["length"].typical
     )
     with pytest.raises(ValueError, match="unknown effect 'magic'; known: "):
-        start_values("magic", 1.0)
+        effect_class("magic")
 
 
 def test_a_parameter_of_zero_stays_zero_and_the_others_are_free() -> None:
@@ -175,7 +177,7 @@ def test_a_parameter_of_zero_stays_zero_and_the_others_are_free() -> None:
     hypothesis = nominal_hypothesis(robot)
     left_out = {"fin_drag_surge", "link_drag_surge"}
     assert set(zeros(robot)) == left_out == set(NOMINAL_FREE) - set(hypothesis.free)
-    coordinates = Coordinates(hypothesis)
+    coordinates = hypothesis.parametrization
     with np.errstate(all="raise"):
         origin = coordinates.origin()
         moved = coordinates.robot(origin + 0.3)

@@ -1,5 +1,7 @@
 """A law of the remaining force: a hidden one is read off with its coefficient, and nothing where there is none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,12 +11,18 @@ from fish_sim.ops import NUMPY
 from fish_sim.pool import LENGTH, WIDTH
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import program, record
-from fish_sysid.diagnosis.free_force import TERMS, known_to_the_filter, regressors
-from fish_sysid.diagnosis.quadratic_cost import Quadratic
-from fish_sysid.diagnosis.residual_regression import cross_validated, describe, forward
+from fish_sysid.diagnosis.cross_validation import Quadratic
+from fish_sysid.diagnosis.residual_regression import (
+    TERMS,
+    FreeForce,
+    choose_terms,
+    cross_validated,
+    regressors,
+    residual_law,
+)
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import evaluate
-from fish_sysid.estimation.parametrization import Coordinates, nominal_hypothesis
+from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 MOMENT = 1e-3  # N m, of a magnet that turns the fish to the side
 
@@ -25,12 +33,12 @@ def left_by_the_nominal_model(**hidden: float):
     commands = np.stack(
         [program(k, 6.0, random) for k in ("sines", "steps", "random", "sines")], axis=1
     )
-    with known_to_the_filter() as name:
-        robot = Robot().with_effect(name, **hidden) if hidden else Robot()
-        fish = record(robot, commands, Noise(), random)[0]
-    hypothesis = nominal_hypothesis(Robot())
-    fit = evaluate(hypothesis, Coordinates(hypothesis).origin(), fish, Noise())
-    return describe(fit, fish)
+    robot = Robot(links=1, table={**EFFECTS, FreeForce.name: FreeForce})
+    robot = robot.with_effect(FreeForce.name, **hidden) if hidden else robot
+    fish = record(robot, commands, Noise(), random)[0]
+    hypothesis = nominal_hypothesis(Robot(links=1))
+    fit = evaluate(hypothesis, hypothesis.parametrization.origin(), fish, Noise())
+    return residual_law(fit, fish)
 
 
 def test_a_hidden_law_is_read_off_with_its_coefficient_on_its_degree_of_freedom():
@@ -55,12 +63,12 @@ def test_a_step_is_the_minimum_over_fitted_and_chosen_parameters():
         for h in (-1e-4, 1e-4):
             assert cost.cost(step) < cost.cost(step + h * np.eye(6)[j])
     first = min(range(2, 6), key=lambda j: cost.cost(cost.best_step([j])))
-    assert forward(cost, range(2, 6))[0] == first
+    assert choose_terms(cost, range(2, 6))[0] == first
 
 
 def test_a_term_that_gains_no_more_than_chance_is_not_chosen():
     weak, strong = -np.sqrt(2.0 * 9.0), -np.sqrt(2.0 * 11.0)  # gains of 9 and 11 nats
-    assert forward(Quadratic(np.array([0.0, weak, strong]), np.eye(3), 1), (1, 2)) == [2]
+    assert choose_terms(Quadratic(np.array([0.0, weak, strong]), np.eye(3), 1), (1, 2)) == [2]
 
 
 @pytest.mark.parametrize(
@@ -81,7 +89,7 @@ def test_terms_that_nothing_tells_apart_do_no_harm():
         [[2.0, 1.0, 1.0, 0.0], [1.0, 3.0, 3.0, 0.0], [1.0, 3.0, 3.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
     )
     cost = Quadratic(100.0 * np.array([0.1, 1.0, 1.0, 0.0]), normal, 1)
-    chosen = forward(cost, (1, 2, 3))
+    chosen = choose_terms(cost, (1, 2, 3))
     assert 3 not in chosen  # never excited
     assert cost.cost(cost.best_step(chosen)) == pytest.approx(
         cost.cost(cost.best_step([1])), rel=1e-6
@@ -100,6 +108,24 @@ def test_a_wall_is_felt_less_by_a_factor_e_two_decimetres_away(x, y):
 
 
 def test_the_free_force_is_no_candidate():
-    with known_to_the_filter() as name:
-        assert name in EFFECTS
-    assert name not in EFFECTS
+    assert FreeForce.name not in EFFECTS
+
+
+def test_a_law_is_the_same_in_batches_of_one_trial():
+    """A pass with a hundred derivatives holds kilobytes of every 10 ms."""
+    random = np.random.default_rng(2)
+    commands = np.stack([program(kind, 2.0, random) for kind in ("sines", "steps", "turn")], axis=1)
+    fish = record(Robot(links=1).with_effect("current", x=0.03), commands, Noise(), random)[0]
+    nominal = nominal_hypothesis(Robot(links=1))
+    fit = evaluate(nominal, np.zeros(len(nominal.free)), fish, Noise())
+    whole = residual_law(fit, fish)
+    more = ((0, 5000 - fish.length), (0, 0))
+    padded = {
+        key: np.pad(getattr(fish, key), more, constant_values=np.nan) for key in ("gyro", "encoder")
+    }
+    padded |= {key: np.pad(getattr(fish, key), (*more, (0, 0))) for key in ("commands", "accel")}
+    long = replace(fish, **padded)
+    assert (fish.batches(), long.batches()) == ([[0, 1, 2]], [[0], [1], [2]])
+    again = residual_law(fit, long)
+    assert again.terms.keys() == whole.terms.keys()
+    assert again.gain == pytest.approx(whole.gain, rel=1e-9)

@@ -33,9 +33,9 @@ HEADER = [
 
 def search_stages() -> tuple[str, ...]:
     """Names of the stages that `diagnose(..., without=...)` can leave out."""
-    from fish_sysid.diagnosis import pipeline
+    from fish_sysid.diagnosis.task import STAGES
 
-    return tuple(getattr(pipeline, "STAGES", ()))
+    return tuple(name for name, _ in STAGES)
 
 
 def check_stages(stages: Sequence[str]) -> None:
@@ -54,7 +54,7 @@ def ablation_studies(out: Path, asked: Asked, stages: Sequence[str]) -> dict[str
     about = complete.about
     same = replace(asked, **{k: about[k] for k in asked.values()}, given=frozenset(asked.values()))
     return {COMPLETE: complete} | {
-        stage: begin_or_go_on(out / f"without_{stage}", same, {"without": stage})
+        stage: begin_or_go_on(out / f"without_{stage.replace(' ', '_')}", same, {"without": stage})
         for stage in stages
     }
 

@@ -14,7 +14,7 @@ from fish_sim.scheme import Scheme
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_study.data_set import write_data_set
 from fish_study.fish_sim_with_imu import FishSimWithImu
-from fish_study.out_of_vocabulary import known_to_the_plant
+from fish_study.out_of_vocabulary import PLANT_EFFECTS
 from fish_study.scenario import Scenario, ScenarioError
 from fish_study.sensor_models import SensorErrors, SensorModels
 from fish_study.swim import (
@@ -46,7 +46,7 @@ SLOWER = 0.85  # factor on the rotor's speed at every new try
 
 def true_robot(scenario: Scenario) -> Robot:
     """The fish of a fish_sim scenario, with what is concealed in it."""
-    robot = Robot(links=scenario.links)
+    robot = Robot(links=scenario.links, table=PLANT_EFFECTS)
     values = {name: robot.parameters[name] * factor for name, factor in scenario.parameters.items()}
     robot = robot.with_parameters(**values)
     for name, effect in scenario.effects.items():
@@ -83,17 +83,13 @@ def make_readings(scenario: Scenario) -> list[Readings]:
     """
     random = np.random.default_rng(scenario.seed)
     if scenario.plant == "fish_sim":
-        with known_to_the_plant():
-            robot = true_robot(scenario)
-            scheme = Scheme(scenario.method, scenario.substeps)
-            errors = SensorErrors.of(
-                {n: v for n, v in scenario.effects.items() if n in SENSOR_EFFECTS}
-            )
+        robot, scheme = true_robot(scenario), Scheme(scenario.method, scenario.substeps)
+        errors = SensorErrors.of({n: v for n, v in scenario.effects.items() if n in SENSOR_EFFECTS})
 
-            def make(count: int) -> PlantWithImu:
-                return FishSimWithImu(robot, scheme, count, scenario.noise, random)
+        def make(count: int) -> PlantWithImu:
+            return FishSimWithImu(robot, scheme, count, scenario.noise, random)
 
-            return _trials(scenario, make, errors, random)
+        return _trials(scenario, make, errors, random)
     if scenario.plant == "mujoco":
         from fish_study.mujoco_plant import MujocoPlant, sensor_errors
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from fish_sim.effects.effect import BodyMotion, Drive
 from fish_sim.ops import NUMPY
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.free_force import regressors
 from fish_sysid.diagnosis.latent_force import MissingForce, missing_force
+from fish_sysid.diagnosis.residual_regression import regressors
 from fish_sysid.estimation.map_fit import Fit
 
 Array = NDArray[np.float64]

@@ -73,8 +73,7 @@ def aic_cost(name: str, score: Score) -> float:
 
 def bic_cost(name: str, score: Score) -> float:
     """Nats: half the logarithm of the number of measurements that the ranking saw, for each parameter."""
-    from fish_sysid.diagnosis.trial_split import SEARCH_TRIALS
-    from fish_sysid.estimation.global_fit import FIRST_STEPS
+    from fish_sysid.estimation.thresholds import FIRST_STEPS, SEARCH_TRIALS
 
     scenario = score.scenario
     trials = min(SEARCH_TRIALS, scenario.count - scenario.count // 3)  # a third is held out
@@ -85,6 +84,6 @@ def bic_cost(name: str, score: Score) -> float:
 
 def _free(name: str, score: Score) -> int:
     """Numbers of a name as its answer tells; of answers that do not, as it has them now."""
-    from fish_sysid.diagnosis.significance import parameter_count
+    from fish_sysid.estimation.parametrization import effect_class
 
-    return score.free[name] if name in score.free else parameter_count(name)
+    return score.free[name] if name in score.free else len(effect_class(name).parameters)

@@ -12,7 +12,7 @@ from fish_sim.model import DT
 from fish_study.oracle import with_truth
 from fish_study.scenario import Scenario
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.effect_wrench import own_force
+from fish_sysid.diagnosis.effect_wrench import effect_wrench
 from fish_sysid.diagnosis.latent_force import MissingForce
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import evaluate
@@ -28,7 +28,7 @@ def true_wrench(scenario: Scenario, experiment: Experiment) -> MissingForce | No
     if name not in LOCALISED:
         return None
     hypothesis, theta = with_truth(scenario, (name,))
-    return own_force(evaluate(hypothesis, theta, experiment, Noise()), name, experiment)
+    return effect_wrench(evaluate(hypothesis, theta, experiment, Noise()), name, experiment)
 
 
 def dof_overlap(stated: Mapping[str, float], true: Mapping[str, float]) -> float:

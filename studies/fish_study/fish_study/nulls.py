@@ -9,7 +9,8 @@ from scipy.stats import chi2
 
 from fish_report.page import Table
 from fish_study.score import Score
-from fish_sysid.diagnosis.significance import TEMPER, Level
+from fish_sysid.diagnosis.significance import Level
+from fish_sysid.estimation.thresholds import TEMPER
 
 
 def null_table(scores: Sequence[Score]) -> Table | None:
@@ -38,7 +39,7 @@ def null_table(scores: Sequence[Score]) -> Table | None:
     exact = 0.5 * float(chi2.isf(1.0 - 0.5 ** (1.0 / names), 1))
     note = (
         f"Nats by which the best of {names} names beats the refitted nominal model. Were the model the fish, independent "
-        f"names of one parameter would have {exact:.1f} in the median. A name needs {level.enough(0.0, 1, names):.0f} or more: "
+        f"names of one parameter would have {exact:.1f} in the median. A name needs {level.needed(0.0, 1, names):.0f} or more: "
         f"the level of {level.false_alarms:.0%} false alarms times {TEMPER:g}, for tails and water that the model has not."
     )
     return Table(

@@ -12,13 +12,14 @@ from scipy.stats import chi2
 
 from fish_report.json_file import number
 from fish_sim.robot import Robot
+from fish_study.out_of_vocabulary import PLANT_EFFECTS
 from fish_study.scenario import Scenario
 from fish_study.swim import Readings, kept_trials
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import Fit, climb, evaluate
-from fish_sysid.estimation.noise_estimation import adapt_noise
-from fish_sysid.estimation.parametrization import Coordinates, Hypothesis, nominal_hypothesis
+from fish_sysid.estimation.noise_estimation import estimate_noise
+from fish_sysid.estimation.parametrization import Hypothesis, nominal_hypothesis
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.prediction.prediction import predict, prediction_errors
 
@@ -42,7 +43,7 @@ class OracleFits:
     def result(self) -> OracleResult:
         """What is kept of them."""
         extra = len(self.true.hypothesis.free) - len(self.nominal.hypothesis.free)
-        gain = self.true.objective - self.nominal.objective
+        gain = self.true.log_posterior - self.nominal.log_posterior
         return OracleResult(
             gain, extra, _rms(self.held_out, self.nominal), _rms(self.held_out, self.true)
         )
@@ -105,7 +106,7 @@ def fit_oracle(
     nominal = _fit(*with_truth(scenario, ()), data, noise)
     true = _fit(*with_truth(scenario, searched), data, noise)
     again = _from(nominal, true, data)
-    nominal = max(nominal, again, key=lambda f: f.objective)
+    nominal = max(nominal, again, key=lambda f: f.log_posterior)
     return OracleFits(nominal, true, data, held_data)
 
 
@@ -119,13 +120,13 @@ def detects(result: OracleResult, nulls: Sequence[OracleResult]) -> bool:
 
 def with_truth(scenario: Scenario, names: Sequence[str]) -> tuple[Hypothesis, Array]:
     """The nominal robot with these effects free, and theta at the true values of all that is hidden."""
-    hypothesis = nominal_hypothesis(Robot())
+    hypothesis = nominal_hypothesis(Robot(table=PLANT_EFFECTS))
     for name in names:
         hypothesis = hypothesis.with_effect(name, 1.0)
         if name in scenario.effects:
             robot = hypothesis.robot.with_effect(name, **scenario.effects[name])
             hypothesis = replace(hypothesis, robot=robot)
-    theta = Coordinates(hypothesis).origin().copy()
+    theta = hypothesis.parametrization.origin().copy()
     for i, name in enumerate(hypothesis.free):
         if name in scenario.parameters:
             theta[i] = np.log(scenario.parameters[name])
@@ -134,7 +135,7 @@ def with_truth(scenario: Scenario, names: Sequence[str]) -> tuple[Hypothesis, Ar
 
 def _fit(hypothesis: Hypothesis, theta: Array, data: Experiment, noise: Noise) -> Fit:
     fit = climb(evaluate(hypothesis, theta, data, noise), data, ITERATIONS)
-    return climb(evaluate(hypothesis, fit.theta, data, adapt_noise(fit, data)), data, ITERATIONS)
+    return climb(evaluate(hypothesis, fit.theta, data, estimate_noise(fit, data)), data, ITERATIONS)
 
 
 def _from(base: Fit, rival: Fit, data: Experiment) -> Fit:

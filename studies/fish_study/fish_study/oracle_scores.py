@@ -23,7 +23,7 @@ from fish_study.oracle import (
     as_experiment,
     fit_oracle,
 )
-from fish_study.out_of_vocabulary import OUTSIDE, known_to_the_plant
+from fish_study.out_of_vocabulary import OUTSIDE
 from fish_study.runner import spread
 from fish_study.scenario import Scenario, ScenarioError
 from fish_study.score import vocabulary
@@ -99,9 +99,8 @@ def oracle_scores(
     answered = [] if diagnosis is None else diagnosis["effects"]
     effects = [e for e in answered if e["name"] in scenario.names] or answered
     if names:
-        with known_to_the_plant():  # an oracle knows what has no name as well
-            fits = fit_oracle(scenario, experiment, held, names)
-            content["fits"] = asdict(fits.result)
+        fits = fit_oracle(scenario, experiment, held, names)
+        content["fits"] = asdict(fits.result)
         shares = dof_shares(fits.nominal, fits.true)
         content["dof"] = dof_overlap(effects[0]["where"]["dof"], shares) if effects else None
         content["competitors"] = asdict(competitors(fits.nominal, fits.training, fits.held_out))

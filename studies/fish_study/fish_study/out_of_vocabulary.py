@@ -1,12 +1,10 @@
-"""Effects that the vocabulary has no name for. Never registered in EFFECTS except while a scenario is being made.
+"""Effects that the vocabulary has no name for: a plant may have them, the tool's table EFFECTS does not hold them.
 
 The right answer to each is `unexplained`, or `no_mismatch` where too weak to see; any name is a wrong name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from fish_sim.effects import EFFECTS
@@ -176,14 +174,4 @@ OUTSIDE: dict[str, type[Effect]] = {
     )
 }
 
-
-@contextmanager
-def known_to_the_plant() -> Iterator[None]:
-    """EFFECTS with OUTSIDE and OTHER_FORMS added, so that a plant can have them; the tool's process never does this."""
-    added = {**OUTSIDE, **OTHER_FORMS}
-    EFFECTS.update(added)
-    try:
-        yield
-    finally:
-        for name in added:
-            EFFECTS.pop(name, None)
+PLANT_EFFECTS = {**EFFECTS, **OUTSIDE, **OTHER_FORMS}  # what a plant, but not the tool, may have

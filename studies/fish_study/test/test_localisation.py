@@ -20,8 +20,8 @@ from fish_study.oracle import (
 from fish_study.scenario import Scenario
 from fish_sysid.diagnosis.effect_wrench import (
     acting,
+    effect_wrench,
     f1,
-    own_force,
     regimes,
 )
 from fish_sysid.estimation.ekf_types import Noise
@@ -57,7 +57,7 @@ def test_a_localised_effect_is_seen_where_it_acts() -> None:
     assert true_wrench(Scenario("single", 1, {"current": {"x": 0.03}}), experiment) is None
 
 
-def test_the_own_force_of_a_drag_is_its_equation() -> None:
+def test_the_effect_wrench_of_a_drag_is_its_equation() -> None:
     """-k |u| u on the head, from the accelerations with and without it."""
     scenario = Scenario(
         "single",
@@ -68,13 +68,15 @@ def test_the_own_force_of_a_drag_is_its_equation() -> None:
     )
     experiment = as_experiment(make_readings(scenario), True)
     hypothesis, theta = with_truth(scenario, scenario.names)
-    push = own_force(evaluate(hypothesis, theta, experiment, Noise()), "quadratic_drag", experiment)
+    push = effect_wrench(
+        evaluate(hypothesis, theta, experiment, Noise()), "quadratic_drag", experiment
+    )
     u = push.covariates["surge_speed"]
     np.testing.assert_allclose(push.wrench[..., 0], -0.5 * np.abs(u) * u, atol=1e-6)
     np.testing.assert_allclose(push.wrench[..., 1:], 0.0, atol=1e-6)
 
 
-def test_the_own_force_of_a_flow_is_that_of_all_of_it() -> None:
+def test_the_effect_wrench_of_a_flow_is_that_of_all_of_it() -> None:
     """The mean of a flow that differs hardly from place to place pushes as the uniform current does."""
     push = {}
     for name, values in (
@@ -84,7 +86,7 @@ def test_the_own_force_of_a_flow_is_that_of_all_of_it() -> None:
         scenario = Scenario("single", 3, {name: values}, count=2, duration=2.0)
         experiment = as_experiment(make_readings(scenario), True)
         hypothesis, theta = with_truth(scenario, scenario.names)
-        push[name] = own_force(
+        push[name] = effect_wrench(
             evaluate(hypothesis, theta, experiment, Noise()), name, experiment
         ).wrench
     size = np.abs(push["current"]).max()

@@ -1,12 +1,11 @@
-"""Messages of `joint_command` that the recorder lost: what the fish was told meanwhile, as far as anybody knows.
+"""Gaps in `joint_command`: commands that the robot followed but the recorder lost.
 
-A command that is held over a hole in the recording drives the model with a rotor that stops turning faster or slower for a
-moment, which the fish's did not: 10 ms of it cost 400 nats, 50 ms 5000, and a diagnosis takes them for a force. The encoder
-measured what the rotor did. Where it is silent too a curve through two commands on each side follows the strokes. Of the rudder
-nothing is measured, and it may jump: it gets a straight line.
+A command held over a gap drives the model with a constant rotor speed, which the robot's was not: 10 ms of it cost 400 nats,
+50 ms 5000, which a diagnosis takes for a force. The encoder measured the rotor's speed. Where it is silent too, a curve through
+two commands on each side follows the strokes. The rudder, which is not measured and may jump, is interpolated linearly.
 
-Commands that come when something happens, or late, were held by the robot as well and are none of this: only where nearly
-all come on the beat is a missed beat a loss.
+Commands that come late or on events were held by the robot as well. Only where nearly all come at a regular interval is a
+missed one a loss.
 """
 
 from __future__ import annotations
@@ -20,19 +19,15 @@ from fish_sim.model import DT
 Array = NDArray[np.float64]
 
 FEWEST = 10  # commands that make a beat
-ON_THE_BEAT = (
-    0.1  # of the median interval; timers of a busy computer keep to it, answers to events do not
-)
-REGULAR = 0.8  # share of intervals on the beat: one in ten messages may be lost, and each makes one long interval of two
-MISSED = (
-    1.8  # medians; a message that was lost makes two of it, one that was merely late rarely so much
-)
-LONGEST = 0.1  # s between two commands; over more nobody knows what the rudder did
+ON_THE_BEAT = 0.1  # of the median interval; timers keep to it, answers to events do not
+REGULAR = 0.8  # share of intervals on the beat; one in ten messages may be lost
+MISSED = 1.8  # medians; a lost message makes two of it, a late one rarely so much
+LONGEST = 0.1  # s between two commands; over more the rudder is unknown
 AROUND = 2  # commands on each side that the curve runs through
 
 
 class LostCommandsError(ValueError):
-    """Nobody knows what the fish was told for too long; the message says when."""
+    """A gap is too long to fill; the message says when."""
 
 
 def holes(t: Array) -> list[int]:
@@ -45,14 +40,14 @@ def holes(t: Array) -> list[int]:
     return found if regular else []
 
 
-def told_on_grid(t: Array, told: Array, grid: Array, encoder: Array) -> tuple[Array, Array]:
+def commands_on_grid(t: Array, given: Array, grid: Array, encoder: Array) -> tuple[Array, Array]:
     """Commands (G, 2) and encoder (G,) less what was used for them, at times grid (G,) [s] from the first stamp on.
 
-    t (N,) [s]: stamps in order; told (N, 2) rotor speed [rad/s] and rudder [rad]; encoder (G,) [rad/s], NaN without a sample.
+    t (N,) [s]: stamps in order; given (N, 2) rotor speed [rad/s] and rudder [rad]; encoder (G,) [rad/s], NaN without a sample.
     Raises LostCommandsError where a hole is too long.
     """
     held = np.clip(np.searchsorted(t, grid + 0.5 * DT, side="right") - 1, 0, len(t) - 1)
-    commands, left = told[held], encoder.copy()
+    commands, left = given[held], encoder.copy()
     for last in holes(t):
         ends, beat = t[last : last + 2], _beat(t)
         if ends[1] - ends[0] > LONGEST + ON_THE_BEAT * beat:
@@ -63,9 +58,9 @@ def told_on_grid(t: Array, told: Array, grid: Array, encoder: Array) -> tuple[Ar
         lost = np.flatnonzero((held == last) & (grid + 0.5 * DT - ends[0] >= beat))
         read = encoder[lost + 1]  # the rotor has followed a command a step later
         near = slice(max(last + 1 - AROUND, 0), last + 1 + AROUND)
-        curve = KroghInterpolator(t[near] - ends[0], told[near, 0])(grid[lost] - ends[0])
+        curve = KroghInterpolator(t[near] - ends[0], given[near, 0])(grid[lost] - ends[0])
         commands[lost, 0] = np.where(np.isfinite(read), read, curve)
-        commands[lost, 1] = np.interp(grid[lost], ends, told[last : last + 2, 1])
+        commands[lost, 1] = np.interp(grid[lost], ends, given[last : last + 2, 1])
         left[lost + 1] = np.nan
     return commands, left
 

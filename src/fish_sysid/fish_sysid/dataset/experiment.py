@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fish_bag.trial import Commands, Trial
 from fish_sim.model import DT
-from fish_sysid.dataset.command_gaps import LostCommandsError, told_on_grid
+from fish_sysid.dataset.command_gaps import LostCommandsError, commands_on_grid
 from fish_sysid.dataset.imu_leveling import level
 from fish_sysid.dataset.resample import apart, on_grid
 from fish_sysid.dataset.rest_detection import starts_at_rest
@@ -22,9 +22,8 @@ from fish_sysid.dataset.rotor_coasting import driven
 Array = NDArray[np.float64]
 
 FEWEST_POSES = 3
-UNKNOWN = (
-    1.0  # s from the first command on in which neither camera nor gyro say where the fish heads
-)
+LONGEST_UNKNOWN = 1.0  # s after the first command without camera and gyro: the heading is unknown
+STEPS_AT_ONCE = 8000  # grid points of a pass that keeps its history or has many derivatives: memory
 
 
 class ExperimentError(ValueError):
@@ -70,6 +69,11 @@ class Experiment:
         frames = (Frames(one.frames[0].t[seen] - start, one.frames[0].pose[seen]),)
         return replace(one, steps=one.steps - first, frames=frames, start_at_rest=False, **arrays)
 
+    def batches(self) -> list[list[int]]:
+        """Indices of trials in groups of at most STEPS_AT_ONCE grid points, one trial at least."""
+        count, trials = max(1, STEPS_AT_ONCE // self.length), len(self.names)
+        return [list(range(first, min(first + count, trials))) for first in range(0, trials, count)]
+
     @property
     def length(self) -> int:
         return len(self.commands)
@@ -83,8 +87,8 @@ class Experiment:
 def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None) -> Experiment:
     """Put trials on the grid of their commands.
 
-    start_at_rest None: as `at_rest` finds, where all do.
-    What was measured before the first command or after the last one is left out: nobody knows what the rotor did then.
+    start_at_rest None: as `starts_at_rest` finds for all trials together.
+    Measurements before the first command or after the last one are left out: the rotor's speed is unknown then.
     Raises ExperimentError when commands or camera poses are missing.
     """
     if not trials:
@@ -129,7 +133,7 @@ def _grid(trial: Trial) -> dict[str, Array]:
         gyro, accel = (on_grid(imu.t, felt, t, DT) for felt in level(imu))
     _check_heading(trial.name, frames, gyro)
     measured = nothing if encoder is None else on_grid(encoder.t, encoder.speed, t, DT)
-    commands, measured = _told(trial.name, c, t, measured)
+    commands, measured = _commands(trial.name, c, t, measured)
     commands[:, 0], measured = driven(commands[:, 0], measured)
     return {
         "commands": commands,
@@ -157,19 +161,19 @@ def _seen(trial: Trial, start: float, end: float) -> Frames:
 
 
 def _check_heading(name: str, frames: Frames, gyro: Array) -> None:
-    """Refuse a trial in which the fish may have turned too far before anything tells where it heads."""
+    """Refuse a trial in which the fish may have turned too far before a sensor shows its heading."""
     first = float(frames.t[0])
-    if DT * np.isnan(gyro[: max(round(first / DT), 0)]).sum() > UNKNOWN:
+    if DT * np.isnan(gyro[: max(round(first / DT), 0)]).sum() > LONGEST_UNKNOWN:
         raise ExperimentError(
             f"{name}: the first camera pose comes {first:.1f} s after the first command and no gyro tells how the fish turned "
-            f"until then; expected it within {UNKNOWN:g} s; start the camera before the commands"
+            f"until then; expected it within {LONGEST_UNKNOWN:g} s; start the camera before the commands"
         )
 
 
-def _told(name: str, c: Commands, t: Array, encoder: Array) -> tuple[Array, Array]:
-    """`told_on_grid` of a trial's commands; raises ExperimentError where too many were lost."""
+def _commands(name: str, c: Commands, t: Array, encoder: Array) -> tuple[Array, Array]:
+    """`commands_on_grid` of a trial; raises ExperimentError where a gap is too long."""
     try:
-        return told_on_grid(c.t, np.column_stack([c.rotor_speed, c.rudder]), t, encoder)
+        return commands_on_grid(c.t, np.column_stack([c.rotor_speed, c.rudder]), t, encoder)
     except LostCommandsError as error:
         raise ExperimentError(f"{name}: {error}") from error
 

@@ -1,7 +1,7 @@
-"""Does a trial start with a fish at rest? The filter is then sure of its speed: of a fish that glides it would lose the poses.
+"""Whether a trial starts with the fish at rest, so that the filter may start with a small variance of its speed.
 
-The gyro tells at once whether it turns, the encoder whether the rotor does. Only the camera sees a straight glide, and it needs
-a while, in which the first strokes push a fish at rest 3 cm too: the accelerometer measured those.
+The first gyro sample shows whether the fish turns, the first encoder sample whether the rotor does. Only the camera sees a
+straight glide, over some frames in which the first strokes push a fish at rest 3 cm as well. The accelerometer measures these.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The rotor when nobody commands it any more: what its encoder measured takes the command's place.
+"""A coasting rotor: where a command is forgotten, the encoder's speed replaces it.
 
-A controller that has ended leaves its last command standing while the motor is off and the rotor runs down. The model must
-be driven by what the rotor did, and the encoder's distance from such a command says nothing about the robot.
+A controller that has ended leaves its last command standing while the motor is off and the rotor runs down. The model is
+driven by the measured speed there, and the encoder's distance from the forgotten command is no residual.
 """
 
 from __future__ import annotations

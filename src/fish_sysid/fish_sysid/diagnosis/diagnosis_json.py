@@ -10,7 +10,6 @@ from scipy.stats import t as student
 
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis import latent_force
-from fish_sysid.diagnosis.backward_elimination import odds
 from fish_sysid.diagnosis.corrected_model import (
     much_is_left,
     named,
@@ -20,18 +19,11 @@ from fish_sysid.diagnosis.corrected_model import (
 from fish_sysid.diagnosis.effect_wrench import intervals, regimes
 from fish_sysid.diagnosis.next_experiment import next_experiment
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
-from fish_sysid.diagnosis.screening import Ranked
-from fish_sysid.diagnosis.significance import (
-    PLAUSIBLE,
-    p_value,
-    p_value_unseen,
-    parameter_count,
-)
+from fish_sysid.diagnosis.significance import p_value, p_value_unseen, probabilities
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.ekf_types import ROWS, Noise
-from fish_sysid.estimation.global_fit import excess
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.parametrization import effect_class, specification
+from fish_sysid.estimation.thresholds import PLAUSIBLE
 from fish_sysid.prediction.prediction import predict, prediction_errors
 
 HORIZONS = (1.0, 2.0, 5.0)
@@ -49,18 +41,14 @@ def answer(d: Diagnosis) -> dict[str, Any]:
         "unexplained": unexplained,
         "fit": fit_entry(d),
         "next_experiment": next_experiment([a.name for a in named(d)], rivals(d), grows_with),
-        "out_of_reach": d.unreachable,
-        "ranking": [ranking_entry(ranked) for ranked in d.rounds[0].ranking],
-        "refitted": [refitted_entry(d, name, fit) for name, fit in d.rounds[0].refitted.items()],
-    }
-
-
-def ranking_entry(ranked: Ranked) -> dict[str, Any]:
-    """A candidate as the first quick ranking saw it, with the numbers it took: later versions may give it others."""
-    return {
-        "name": ranked.name,
-        "gain": ranked.gain,
-        "free_parameters": parameter_count(ranked.name),
+        "out_of_reach": d.task.not_judged,
+        "ranking": [
+            {"name": r.name, "gain": r.gain, "free_parameters": d.task.parameter_count(r.name)}
+            for r in d.state.rounds[0].ranking
+        ],
+        "refitted": [
+            refitted_entry(d, name, fit) for name, fit in d.state.rounds[0].refitted.items()
+        ],
     }
 
 
@@ -68,7 +56,7 @@ def refitted_entry(d: Diagnosis, name: str, fit: Fit) -> dict[str, Any]:
     """A candidate of the first round that was refitted on the search trials, whether it was chosen or not."""
     return {
         "name": name,
-        "gain": d.rounds[0].gain(name),
+        "gain": d.state.rounds[0].gain(name),
         "parameters": effect_parameters(fit, name),
         "held_out_rms": held_out_errors(d, fit.robot, fit.noise),
     }
@@ -80,16 +68,20 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     gains = {a.name: a.round.gain(a.name) for a in d.accepted}
     tried = len(found.ranking)
     probability = competition(accepted, d.accepted)
+    effect, left_out = d.final.hypothesis.effect(name), accepted.gain_left_out
+    sure = (
+        p_value(gains[name], len(effect.parameters), tried)
+        if left_out is None
+        else p_value_unseen(left_out, tried)
+    )
     return {
         "name": name,
-        "kind": kind_of(name),
-        "equation": effect_class(name).equation,
+        "kind": kind_of(name, d.task.robot.table),
+        "equation": effect.equation,
         "parameters": effect_parameters(d.final, name),
         "evidence": {
             "log_likelihood_gain": gains[name],
-            "p_value": p_value(gains[name], parameter_count(name), tried)
-            if accepted.foretold is None
-            else p_value_unseen(accepted.foretold, tried),
+            "p_value": sure,
             "probability": probability[name],
         },
         "share": gains[name] / sum(gains.values()),
@@ -105,11 +97,13 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
 def competition(accepted: Accepted, found: Sequence[Accepted]) -> dict[str, float]:
     """Probability of a name and of its rivals, most probable first; what was found as well explains something else."""
     others = {other.name for other in found} - {accepted.name}
-    return odds({name: fit for name, fit in accepted.contest.items() if name not in others})
+    return probabilities(
+        {name: fit for name, fit in accepted.contest.items() if name not in others}
+    )
 
 
 def rivals(d: Diagnosis) -> list[str]:
-    """Names that the data cannot tell from what was found."""
+    """Names that the data do not distinguish from what was found."""
     return [
         n
         for a in named(d)
@@ -127,12 +121,12 @@ def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:
             "std": errors[f"{name}.{key}"],
             "unit": parameter.unit,
         }
-        for key, parameter in specification(name).items()
+        for key, parameter in fit.hypothesis.effect(name).parameters.items()
     }
 
 
 def where_entry(d: Diagnosis, name: str) -> dict[str, Any]:
-    """Degrees of freedom, covariates, times and places of an effect: of what it does, or else of what is missing without."""
+    """Degrees of freedom, covariates, times and places of an effect: of its push, or of the force that is missing without it."""
     without, missing = d.parts.get(name, (d.nominal, d.force))
     scale, push = np.array(d.final.noise.wrench), d.pushes.get(name)
     return {
@@ -156,50 +150,44 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "where": {},
             "description": "the remaining force looks like water noise",
         }
-    scale = np.array(d.final.noise.wrench)
+    scale, ratio = np.array(d.final.noise.wrench), d.final.process_noise_ratio
     return {
         "share": share,
         "where": {
-            "dof": dict(
-                zip(
-                    latent_force.DOFS,
-                    (excess(d.final) / excess(d.final).sum()).tolist(),
-                    strict=True,
-                )
-            ),
+            "dof": dict(zip(latent_force.DOFS, (ratio / ratio.sum()).tolist(), strict=True)),
             "covariates": latent_force.covariate_shares(d.remaining, scale),
             "time": latent_force.time_shares(d.remaining, scale),
             "place": latent_force.place_shares(d.remaining, scale),
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
-        "description": "; ".join(law(d, dof) for dof in d.description.lawful(d.level))
-        or f"{STRONG.format(*excess(d.final))}; {no_law(d)}",
+        "description": "; ".join(law(d, dof) for dof in d.state.law.lawful(d.task.level))
+        or f"{STRONG.format(*ratio)}; {no_law(d)}",
     }
 
 
 def no_law(d: Diagnosis) -> str:
-    """Why no law of the remaining force is told."""
-    if len(d.split.training) < 2:
+    """Why no law of the remaining force is stated."""
+    if len(d.task.split.training) < 2:
         return "a single training trial: no law of it could be judged"
     return "no law in place, time, speed, rotor, rudder or heading was found for it"
 
 
 def law(d: Diagnosis, dof: str) -> str:
     """The remaining force along one degree of freedom in few terms."""
-    terms = " + ".join(f"({c:.3g}) {term}" for term, c in d.description.terms[dof].items())
-    return f"{dof} = {terms} (SI units; {d.description.gain[dof]:.0f} nats on trials that it was not fitted to)"
+    terms = " + ".join(f"({c:.3g}) {term}" for term, c in d.state.law.terms[dof].items())
+    return f"{dof} = {terms} (SI units; {d.state.law.gain[dof]:.0f} nats on trials that it was not fitted to)"
 
 
 def fit_entry(d: Diagnosis) -> dict[str, Any]:
     """Prediction errors and log density on held-out trials (where there are none, training trials), before and after."""
     robots = {
-        "nominal": (d.robot, d.given_noise),
+        "nominal": (d.task.robot, d.given_noise),
         "refitted": (d.nominal.robot, d.nominal.noise),
         "with_effects": (d.final.robot, d.final.noise),
     }
-    outlook = d.outlook and {
-        "effects": list(d.outlook.hypothesis.names),  # a description, no findings
-        "rms": held_out_errors(d, d.outlook.robot, d.outlook.noise),
+    surrogate = d.surrogate and {
+        "effects": list(d.surrogate.hypothesis.names),  # a description, no findings
+        "rms": held_out_errors(d, d.surrogate.robot, d.surrogate.noise),
     }
     entries = {
         name: {
@@ -210,18 +198,18 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
     }
     gain = d.held_out["with_effects"] - d.held_out["refitted"]
     return {
-        "held_out_trials": [d.experiment.names[i] for i in d.split.held_out],
-        # the trials of every rms and density here, `held_out_rms` of `refitted` included: too few hold none out
-        "errors_are_of": "held_out" if d.split.held_out else "training",
+        "held_out_trials": [d.task.experiment.names[i] for i in d.task.split.held_out],
+        # the trials of every rms and density, `held_out_rms` of `refitted` included: too few trials hold none out
+        "errors_are_of": "held_out" if d.task.split.held_out else "training",
         **entries,
-        "model_yaml": outlook,  # where no name fits: the structure that predicts best over seconds
-        "tail_links": {"given": d.robot.links, "used": d.final.robot.links},
+        "model_yaml": surrogate,  # where no name fits: the structure that predicts best over seconds
+        "tail_links": {"given": d.task.robot.links, "used": d.final.robot.links},
         "noise_floor": {
             "wrench_std": list(map(float, d.final.noise.wrench)),
             "unit": ["N", "N", "N m"],
             "correlation_time_s": float(d.final.noise.wrench_time),
         },
-        "improvement_ci95": mean_interval(gain if d.split.held_out else gain[:0]),
+        "improvement_ci95": mean_interval(gain if d.task.split.held_out else gain[:0]),
         "residual_whiteness_p": {"before": whiteness(d.nominal), "after": whiteness(d.final)},
     }
 
@@ -238,7 +226,7 @@ def held_out_errors(d: Diagnosis, robot: Robot, noise: Noise) -> dict[str, dict[
 
 
 def mean_interval(gain: np.ndarray) -> list[float]:
-    """95 % interval of the mean gain per trial (Student 1908: normally distributed); NaN of fewer than two, which tell no spread.
+    """95 % interval of the mean gain per trial (Student 1908: normally distributed); NaN of fewer than two.
 
     Of two to six trials resampled ones would hold the mean in 51 to 87 % of cases.
     """

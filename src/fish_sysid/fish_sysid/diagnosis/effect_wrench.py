@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import Effect
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
@@ -18,10 +17,9 @@ from fish_sysid.diagnosis.latent_force import (
     located,
     smoothed,
 )
-from fish_sysid.estimation.ekf_numpy import drive_at
-from fish_sysid.estimation.ekf_types import WRENCH, Array
+from fish_sysid.estimation.ekf_types import WRENCH, Array, drive_at
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.parametrization import Coordinates
+from fish_sysid.estimation.parametrization import AnyEffect
 
 STROKE = 50  # grid points of 10 ms: a force that swings with the tail acts all the while
 LARGE = 0.99  # quantile of the force that counts as its size
@@ -30,22 +28,22 @@ EDGES = 25  # of the quantile bins among which a range is sought
 COVARIATES = 5  # reported
 
 
-def has_own_force(name: str) -> bool:
+def pushes(effect: AnyEffect) -> bool:
     """Whether an effect pushes the fish: through a wrench on its bodies or the water's motion."""
-    effect = EFFECTS.get(name, Effect)
+    if not issubclass(effect, Effect):
+        return False
     return effect.wrench is not Effect.wrench or effect.water is not Effect.water
 
 
-def own_force(fit: Fit, name: str, experiment: Experiment) -> MissingForce:
-    """The push of an effect (see `has_own_force`) of a fit along the smoothed motion, as a wrench W on the head.
+def effect_wrench(fit: Fit, name: str, experiment: Experiment) -> MissingForce:
+    """The push of an effect (see `pushes`) of a fit along the smoothed motion, as a wrench W on the head.
 
     B W = q''(effect) - q''(no effect), rows of the head; B = d q'' / d wrench. Nothing of the water's noise is in it. Without
     the effect all its parameters are neutral: the mean of a flow, which is no strength of its own, pushes as well.
     """
     xi, _, memory = smoothed(fit, experiment)
-    stepper, nq = Coordinates(fit.hypothesis).stepper, fit.robot.links + 3
-    effect, values = EFFECTS[name], fit.robot.effects[name]
-    neutral = {key: effect.parameters[key].value for key in values}
+    stepper, nq = fit.hypothesis.parametrization.stepper, fit.robot.links + 3
+    neutral = {k: own.value for k, own in fit.hypothesis.effect(name).parameters.items()}
     p = stepper.parameters(fit.robot)
     p_without = stepper.parameters(fit.robot.with_effect(name, **neutral))
     motion = np.nan_to_num(xi[..., :-6].reshape(-1, xi.shape[2] - 6))
@@ -88,13 +86,13 @@ def intervals(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
 
 
 def regimes(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """Of every covariate the range that tells best when an effect acts, by its F1; the most telling covariate first."""
+    """Of every covariate the range that predicts best when an effect acts, by its F1; the best covariate first."""
     acts, s = acting(force, scale).ravel(), size(force, scale).ravel()
     rows: list[dict[str, Any]] = []
     for name, values in force.covariates.items():
         v = values.ravel()
         good = np.isfinite(s) & np.isfinite(v)
-        if name == "time" or np.ptp(v[good]) < 1e-6:  # of time, the intervals tell
+        if name == "time" or np.ptp(v[good]) < 1e-6:  # of time, see intervals
             continue
         edges = np.unique(np.quantile(v[good], np.linspace(0.0, 1.0, EDGES)))
         score, low, high = max(
@@ -108,6 +106,6 @@ def regimes(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda r: -r["f1"])[:COVARIATES]
 
 
-def f1(said: NDArray[np.bool_], true: NDArray[np.bool_]) -> float:
+def f1(stated: NDArray[np.bool_], true: NDArray[np.bool_]) -> float:
     """Harmonic mean of precision and recall."""
-    return 2.0 * float((said & true).sum()) / max(float(said.sum() + true.sum()), 1.0)
+    return 2.0 * float((stated & true).sum()) / max(float(stated.sum() + true.sum()), 1.0)

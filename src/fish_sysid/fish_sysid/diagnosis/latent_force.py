@@ -10,10 +10,8 @@ import numpy as np
 from fish_sim.model import DT
 from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.batches import portions
 from fish_sysid.estimation.ekf_types import Array
 from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.parametrization import Coordinates
 from fish_sysid.estimation.smoother import smooth
 
 DOFS = ("surge", "sway", "yaw")
@@ -42,11 +40,11 @@ def missing_force(fit: Fit, experiment: Experiment) -> MissingForce:
 
 def smoothed(fit: Fit, experiment: Experiment) -> tuple[Array, Array, Array]:
     """State (T, M, N), its standard deviations, and memory (T + 1, M, NM) given all measurements; 0 beyond a trial's end."""
-    layout = Coordinates(fit.hypothesis).stepper.layout
+    layout = fit.hypothesis.parametrization.stepper.layout
     T, M = experiment.length, len(experiment.names)
     xi, deviation = np.zeros((2, T, M, len(layout.motion) + 6))
     memory = np.zeros((T + 1, M, len(layout.memory)))
-    for part in portions(experiment):
+    for part in experiment.batches():
         some = experiment.select(part)
         history = evaluate(fit.hypothesis, fit.theta, some, fit.noise, keep=True).result.history
         assert history is not None  # kept
@@ -87,13 +85,10 @@ def dof_shares(nominal: Fit, final: Fit) -> dict[str, float]:
     The intensities stay one per equation (Kristensen, Madsen and Jorgensen 2004); they are compared in units of the
     final model's, since N and N m do not add up.
     """
-    excess = np.maximum(
-        np.square(np.array(nominal.noise.wrench) / np.array(final.noise.wrench)) - 1.0, 0.0
-    )
-    total = excess.sum()
-    return {
-        dof: float(e / total) if total > 0 else 0.0 for dof, e in zip(DOFS, excess, strict=True)
-    }
+    ratio = np.square(np.array(nominal.noise.wrench) / np.array(final.noise.wrench))
+    removed = np.maximum(ratio - 1.0, 0.0)
+    shares = removed / removed.sum() if removed.any() else removed
+    return dict(zip(DOFS, shares.tolist(), strict=True))
 
 
 def energy(force: MissingForce, scale: Array) -> Array:
@@ -151,7 +146,7 @@ def covariate_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
     e = energy(force, scale).ravel()
     rows: list[dict[str, Any]] = []
     for name, values in force.covariates.items():
-        if name == "time":  # time_shares tells
+        if name == "time":  # see time_shares
             continue
         v = values.ravel()
         good = np.isfinite(e) & np.isfinite(v)

@@ -1,20 +1,53 @@
-"""What a diagnosis found: all that the answer and the page are written from."""
+"""What a diagnosis finds: rounds of the search, its state between the stages, and the whole of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.forward_selection import Round
-from fish_sysid.diagnosis.latent_force import MissingForce
-from fish_sysid.diagnosis.residual_regression import Description
-from fish_sysid.diagnosis.significance import Level
-from fish_sysid.diagnosis.trial_split import Split
-from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.diagnosis.significance import evidence
+from fish_sysid.estimation.ekf_types import Array, Noise
 from fish_sysid.estimation.map_fit import Fit
+
+if TYPE_CHECKING:
+    from fish_sysid.diagnosis.latent_force import MissingForce
+    from fish_sysid.diagnosis.residual_regression import Law
+    from fish_sysid.diagnosis.task import Task
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A candidate after screening."""
+
+    name: str
+    gain: float  # nats over the base, both at the same noise
+    theta: Array
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of the search: what competed to be added to `base`."""
+
+    base: Fit
+    ranking: tuple[Screened, ...]
+    refitted: dict[str, Fit]  # shortlist, each with its own noise
+
+    @property
+    def best(self) -> str | None:
+        """Name of the best refitted candidate by evidence."""
+        return max(self.refitted, key=lambda name: evidence(self.refitted[name]), default=None)
+
+    def near_best(self, name: str, needed: float) -> bool:
+        """Whether a candidate was refitted and comes within `needed` nats of the best."""
+        best = max(fit.log_posterior for fit in self.refitted.values())
+        return name in self.refitted and best - self.refitted[name].log_posterior < needed
+
+    def gain(self, name: str) -> float:
+        """Nats over the base, both with their own noise."""
+        return self.refitted[name].log_posterior - self.base.log_posterior
 
 
 @dataclass(frozen=True)
@@ -23,55 +56,55 @@ class Accepted:
 
     name: str
     round: Round
-    # name -> fit, its own among them: of its round, or in its place of the final model
-    contest: dict[str, Fit]
-    foretold: float | None = (
-        None  # nats on training trials left out in turn, where it stands on these
-    )
+    contest: dict[str, Fit]  # name -> fit, its own among them: of its round, or of the final model
+    gain_left_out: float | None = None  # nats on trials left out in turn, where this decided
+
+
+@dataclass(frozen=True)
+class State:
+    """Where the method stands. Fits are on the training trials but for those of the rounds, on the searched ones."""
+
+    rounds: tuple[Round, ...]
+    accepted: tuple[Accepted, ...]
+    nominal: Fit  # without effects
+    final: Fit  # with those accepted
+    law: Law  # of the force that the final fit leaves
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything the answer and the page are written from. Fits are on the training trials unless said otherwise."""
+    """Everything the answer and the page are written from."""
 
-    experiment: Experiment
-    split: Split
-    robot: Robot  # as given
-    nominal: Fit
-    final: Fit
-    rounds: tuple[Round, ...]  # on the search trials, the last one found nothing more
-    accepted: tuple[Accepted, ...]
-    unreachable: dict[str, str]
-    level: Level
+    task: Task
+    state: State
     force: MissingForce  # that the nominal model lacks
-    parts: dict[
-        str, tuple[Fit, MissingForce]
-    ]  # of several effects: the final model less one, and what it then lacks
-    pushes: dict[
-        str, MissingForce
-    ]  # of the accepted effects that push: what they do in the final model
+    parts: dict[str, tuple[Fit, MissingForce]]  # of several effects: final model without it, lack
+    pushes: dict[str, MissingForce]  # of effects that push: what they do in the final model
     remaining: MissingForce  # that the final model lacks
-    description: Description  # of the remaining force
-    given_noise: (
-        Noise  # that suits the robot as given: at the refitted noise its filter would lose the fish
-    )
-    held_out: dict[
-        str, np.ndarray
-    ]  # log density per sample and held-out trial: given, nominal, final
-    outlook: Fit | None = (
-        None  # where much is left and no name fits: the model that predicts best (`stand_in`)
-    )
+    given_noise: Noise  # for the robot as given, whose filter would diverge at the refitted noise
+    held_out: dict[str, np.ndarray]  # log density per sample and trial: given, nominal, final
+    surrogate: Fit | None = None  # where no name fits: the model that predicts best
+
+    @property
+    def nominal(self) -> Fit:
+        return self.state.nominal
+
+    @property
+    def final(self) -> Fit:
+        return self.state.final
+
+    @property
+    def accepted(self) -> tuple[Accepted, ...]:
+        return self.state.accepted
 
     @property
     def unseen(self) -> Experiment:
         """The held-out trials, or where there are too few the training trials."""
-        return self.experiment.select(self.split.held_out or self.split.training)
+        split = self.task.split
+        return self.task.experiment.select(split.held_out or split.training)
 
     @property
     def unseen_are(self) -> str:
         """What the trials are on which predictions are shown."""
-        return (
-            "held-out trials"
-            if self.split.held_out
-            else "the training trials, too few to hold any out"
-        )
+        few = "the training trials, too few to hold any out"
+        return "held-out trials" if self.task.split.held_out else few

@@ -1,14 +1,13 @@
-"""Where no name fits: the robot to go on with, whose predictions over seconds are best.
+"""Surrogate model: where no name fits, the robot whose predictions over seconds are best.
 
-A likelihood misleads about a model that lacks something without a name: its parameters go where the next 50 ms are right. Here
-every structure is fitted by its predictions alone (`identify.outlook`), from the nominal values, short horizons first, as long
-ones have many optima. The filter's states follow what was measured (FOLLOWING), and no unexplained force acts on the
-predictions: it would stand in for what the model lacks.
+The likelihood misleads a model that lacks something without a name: its parameters go where the next 50 ms are right. Here
+every structure is fitted by its predictions alone (`estimation.multistep_fit`), from the nominal values, short horizons first,
+as long ones have many optima. The filter's states follow the measurements (FOLLOWING), and no latent wrench acts on the
+predictions: it would replace what the model lacks.
 
-The structure grows by one effect at a time, of those that the search found nearest, those that change every stroke
-(STRUCTURAL) and those that the predictions themselves call for (`_called_for`: a likelihood says little of what moves the
-fish slowly), while its cost falls and trials left out are foretold better. It describes, for simulation and training; no effect
-in it is a name of the answer. Where the nominal structure predicts better after all, that is taken.
+The structure grows by one effect at a time, of those that the search accepted, those that change every stroke (STRUCTURAL) and
+those that lower the predictions' cost most, while the cost falls and left-out trials are predicted better. It serves simulation
+and training; no effect in it is a name of the answer. Where the nominal structure predicts better, that is taken.
 """
 
 from __future__ import annotations
@@ -22,38 +21,30 @@ from numpy.typing import NDArray
 
 from fish_report.parallel import on_all_cores
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.effect_selection import left_out_costs
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.initial_noise import open_gates
 from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.multistep_fit import HORIZONS, Outlook, fit_outlook
-from fish_sysid.estimation.parametrization import (
-    Coordinates,
-    Hypothesis,
-    extend,
-    nominal_hypothesis,
-)
+from fish_sysid.estimation.multistep_fit import HORIZONS, MultistepError, fit_multistep
+from fish_sysid.estimation.parametrization import Hypothesis, extend, nominal_hypothesis
 
 Array = NDArray[np.float64]
 
-# change every stroke; a bad base's linear scores say nothing of them
-STRUCTURAL = ("tip_slip", "quadratic_drag")
+STRUCTURAL = ("tip_slip", "quadratic_drag")  # screening says little of them on a poor base
 MOST_EFFECTS = 3
-CALLED = 2  # effects for which the nominal structure's predictions call most
-FAINT = 0.1  # their strength, in typical ones, where that is asked: without any, where or how fast they act makes no difference
+CHOSEN = 2  # effects that the nominal structure's predictions ask for most
+FAINT = 0.1  # typical strengths at which that is asked: where an effect acts has no slope at none
 STAGES = ((0.5, 1.0), (0.5, 1.0, 2.0), HORIZONS)  # s
 EVERY = 2.0  # s between start points
-# times usual water: unexplained forces in the filter that gives the states, and in that of the predictions
+# times usual water: latent wrench of the filter that gives the states, and of the predictions
 FOLLOWING, CALM = 20.0, 5.0
-STRENGTH = 0.3  # of an effect, in typical ones, from which it is fitted
+STRENGTH = 0.3  # typical strengths from which an effect is fitted
 ROUNDS = 8  # of states and parameters, in each stage
 SETTLED = 0.005  # of the cost; a round that gains less is the last, and an effect no help
 FOLDS = 3
 
 
 @dataclass(frozen=True)
-class _Tried:
+class _Fitted:
     """A structure fitted by its predictions."""
 
     hypothesis: Hypothesis
@@ -61,16 +52,16 @@ class _Tried:
     cost: float
 
 
-class Unpushed(Outlook):
-    """Predictions on which no unexplained force acts."""
+class WithoutWrench(MultistepError):
+    """Prediction errors on which no latent wrench acts."""
 
     def start_from(self, theta: Array, noise: Noise) -> None:
-        """Take the start states from the filter with theta, the force that it needs left behind."""
+        """Take the start states from the filter with theta, without its wrench."""
         super().start_from(theta, noise)
         self.estimates = replace(self.estimates, wrench=np.zeros_like(self.estimates.wrench))
 
 
-def stand_in(
+def surrogate_model(
     nominal: Fit,
     names: Sequence[str],
     experiment: Experiment,
@@ -79,121 +70,124 @@ def stand_in(
 ) -> Fit:
     """The model that predicts best; nominal: the fit without effects; names: effects that may help.
 
-    candidates: effects of which those are tried, too, that the predictions call for. The nominal fit itself where no trial is
-    long enough to predict.
+    candidates: effects of which those are tried, too, that lower the predictions' cost most. The nominal fit itself where no
+    trial is long enough to predict.
     """
     plain = nominal_hypothesis(nominal.hypothesis.robot, nominal.hypothesis.free)
-    if not Unpushed(experiment, plain, EVERY).targets:
+    if not WithoutWrench(experiment, plain, EVERY).targets:
         return nominal
     noise = _water(nominal.noise, FOLLOWING)
     report("no name fits: fitting predictions over seconds")
-    best = _fitted(plain, [Coordinates(plain).origin(), nominal.theta], noise, experiment)
-    called = _called_for(best, _moving(candidates), noise, experiment)
-    helpful = dict.fromkeys((*_moving(names), *called))
+    starts = [plain.parametrization.origin(), nominal.theta]
+    best = _fitted(plain, starts, noise, experiment)
+    chosen = _most_promising(best, _moving(plain, candidates), noise, experiment)
+    helpful = dict.fromkeys((*_moving(plain, names), *chosen))
     for _ in range(MOST_EFFECTS):
         left = [name for name in helpful if name not in best.hypothesis.names]
         tried = on_all_cores(partial(_grown, best, noise, experiment), left)
         promising = min(tried, key=lambda one: one.cost, default=best)
         falls = best.cost - promising.cost >= SETTLED * best.cost
-        if not falls or not _foretells_better(best, promising, noise, experiment):
+        if not falls or not _predicts_better(best, promising, noise, experiment):
             break
         best = promising
         report(f"predictions are better with {', '.join(best.hypothesis.names)}")
-    return _best_of(best, (nominal, fit_outlook(nominal, experiment, report)), experiment)
+    return _best_of(best, (nominal, fit_multistep(nominal, experiment, report)), experiment)
 
 
-def _moving(names: Sequence[str]) -> list[str]:
+def _moving(hypothesis: Hypothesis, names: Sequence[str]) -> list[str]:
     """Those that move the fish: a sensor's error predicts no motion."""
-    return [name for name in names if kind_of(name) != "sensor"]
+    return [name for name in names if name in hypothesis.robot.table]
 
 
-def _called_for(
-    best: _Tried, names: Sequence[str], noise: Noise, experiment: Experiment
+def _most_promising(
+    best: _Fitted, names: Sequence[str], noise: Noise, experiment: Experiment
 ) -> list[str]:
-    """The CALLED effects of whose parameters each promises the largest fall of the cost, in a Gauss-Newton step from best."""
+    """The CHOSEN effects whose parameters promise the largest fall of the cost each, in a Gauss-Newton step from best."""
 
     def fall(name: str) -> float:
         hypothesis = best.hypothesis.with_effect(name, FAINT)
         theta = extend(best.theta, hypothesis, name, FAINT)
-        outlook = Unpushed(experiment, hypothesis, EVERY)
-        outlook.start_from(theta, noise)
-        return (best.cost - outlook.promised(theta)) / (len(theta) - len(best.theta))
+        error = WithoutWrench(experiment, hypothesis, EVERY)
+        error.start_from(theta, noise)
+        return (best.cost - error.promised(theta)) / (len(theta) - len(best.theta))
 
     falls = dict(zip(names, on_all_cores(fall, names), strict=True))
-    return sorted((name for name in names if falls[name] > 0.0), key=lambda name: -falls[name])[
-        :CALLED
-    ]
+    helpful = [name for name in names if falls[name] > 0.0]
+    return sorted(helpful, key=lambda name: -falls[name])[:CHOSEN]
 
 
 def _water(noise: Noise, times: float) -> Noise:
-    """The noise of these sensors in water that pushes so many times as strongly as it usually does.
+    """The noise of these sensors in water that pushes so many times as strongly as usual.
 
-    Without gates: a filter of a wrong model that leaves out what surprises it loses the fish, and its states teach nothing.
+    Without gates: a filter of a wrong model that leaves out what surprises it loses the fish.
     """
-    usual = Noise()
-    x, y, n = (times * size for size in usual.wrench)
-    return open_gates(replace(noise, wrench=(x, y, n), wrench_time=usual.wrench_time))
+    usual = Noise().with_wrench(times)
+    return replace(noise.ungated(), wrench=usual.wrench, wrench_time=usual.wrench_time)
 
 
-def _grown(best: _Tried, noise: Noise, experiment: Experiment, name: str) -> _Tried:
-    """The structure with one more effect, from the start values and from what it was without."""
+def _grown(best: _Fitted, noise: Noise, experiment: Experiment, name: str) -> _Fitted:
+    """The structure with one more effect, from the start values and from its own without the effect."""
     hypothesis = best.hypothesis.with_effect(name, STRENGTH)
-    starts = [Coordinates(hypothesis).origin(), extend(best.theta, hypothesis, name, STRENGTH)]
+    origin = hypothesis.parametrization.origin()
+    starts = [origin, extend(best.theta, hypothesis, name, STRENGTH)]
     return _fitted(hypothesis, starts, noise, experiment)
 
 
 def _fitted(
     hypothesis: Hypothesis, starts: Sequence[Array], noise: Noise, experiment: Experiment
-) -> _Tried:
+) -> _Fitted:
     """By predictions over longer and longer horizons, from the start that ends best."""
 
-    def led(theta: Array) -> _Tried:
+    def fit(theta: Array) -> _Fitted:
         for horizons in STAGES:
-            cost, theta = _rounds(Unpushed(experiment, hypothesis, EVERY, horizons), theta, noise)
-        return _Tried(hypothesis, theta, cost)
+            error = WithoutWrench(experiment, hypothesis, EVERY, horizons)
+            cost, theta = _rounds(error, theta, noise)
+        return _Fitted(hypothesis, theta, cost)
 
-    return min(on_all_cores(led, starts), key=lambda tried: tried.cost)
+    return min(on_all_cores(fit, starts), key=lambda one: one.cost)
 
 
-def _rounds(outlook: Outlook, theta: Array, noise: Noise) -> tuple[float, Array]:
+def _rounds(error: MultistepError, theta: Array, noise: Noise) -> tuple[float, Array]:
     """(cost, theta): states and parameters in turn while the cost falls."""
     before, cost = np.inf, np.inf
     for _ in range(ROUNDS):
-        cost, theta = outlook.improve(theta, noise, shares=(1.0,))
+        cost, theta = error.improve(theta, noise, shares=(1.0,))
         if before - cost < SETTLED * before:
             break
         before = cost
     return cost, theta
 
 
-def _foretells_better(before: _Tried, after: _Tried, noise: Noise, experiment: Experiment) -> bool:
-    """Trials left out cost less in the mean (of logarithms: no trial outweighs the others)."""
+def _predicts_better(before: _Fitted, after: _Fitted, noise: Noise, experiment: Experiment) -> bool:
+    """Left-out trials cost less in the mean (of logarithms: no trial outweighs the others)."""
 
-    def left_out(tried: _Tried) -> Array:
-        outlook_on = partial(Unpushed, hypothesis=tried.hypothesis, every=EVERY)
-        return left_out_costs(outlook_on, tried.theta, noise, experiment, FOLDS)
+    def left_out(one: _Fitted) -> Array:
+        error_on = partial(WithoutWrench, hypothesis=one.hypothesis, every=EVERY)
+        return left_out_costs(error_on, one.theta, noise, experiment, FOLDS)
 
     without, with_it = on_all_cores(left_out, [before, after])
     return bool(np.nanmean(np.log(without / with_it)) > 0.0)
 
 
-def _best_of(grown: _Tried, others: Sequence[Fit], experiment: Experiment) -> Fit:
-    """What predicts training trials best as `predict` makes predictions: the filter's force dies away in them.
+def _best_of(grown: _Fitted, others: Sequence[Fit], experiment: Experiment) -> Fit:
+    """The best predictor of training trials, with predictions made as `predict` makes them: the filter's wrench decays in them.
 
-    Where the model is right but for a force that comes and goes, a likelihood and that force predict better than any structure.
+    Where the model is right but for a force that comes and goes, a likelihood fit with that wrench predicts better than any
+    structure.
     """
 
-    def cost(fit: Fit | _Tried, noise: Noise) -> float:
-        outlook = Outlook(experiment, fit.hypothesis, EVERY)
-        outlook.start_from(fit.theta, noise)
-        return float(np.nanmean(outlook.mean_costs(fit.theta)))
+    def cost(fit: Fit | _Fitted, noise: Noise) -> float:
+        error = MultistepError(experiment, fit.hypothesis, EVERY)
+        error.start_from(fit.theta, noise)
+        return float(np.nanmean(error.mean_costs(fit.theta)))
 
     noises = (_water(others[0].noise, CALM), others[0].noise)
     noise = min(noises, key=lambda noise: cost(grown, noise))
     best = min(others, key=lambda fit: cost(fit, fit.noise))
     if cost(best, best.noise) < cost(grown, noise):
         return best
-    outlook = Unpushed(experiment, grown.hypothesis, EVERY)
-    outlook.start_from(grown.theta, noise)
-    normal = outlook.normal(grown.theta)
-    return replace(evaluate(grown.hypothesis, grown.theta, experiment, noise), normal=normal)
+    error = WithoutWrench(experiment, grown.hypothesis, EVERY)
+    error.start_from(grown.theta, noise)
+    information = error.information(grown.theta)
+    fit = evaluate(grown.hypothesis, grown.theta, experiment, noise)
+    return replace(fit, information=information)

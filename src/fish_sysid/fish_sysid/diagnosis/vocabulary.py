@@ -1,4 +1,4 @@
-"""The names a diagnosis may answer with, and which of them the data can speak about."""
+"""The names a diagnosis may answer with, and which of them the recordings can judge."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.estimation.parametrization import SENSOR_FIELDS
+from fish_sysid.estimation.parametrization import SENSOR_FIELDS, EffectTable
+from fish_sysid.estimation.thresholds import STILL
 
 NOT_A_NAME = ("disturbance",)  # the latent wrench itself
-STILL = 1e-3  # rad, rad/s: a command that varies less says nothing
-SEEN_STILL = ("rudder_offset",)  # acts on a rudder that is told to stay at zero
+SEEN_STILL = ("rudder_offset",)  # acts on a rudder whose command stays at zero
 SEEN_MOVING = ("rudder_lag", "rudder_delay", "rudder_backlash")  # act when the command changes
 
 
@@ -22,40 +22,41 @@ class NoCandidateError(ValueError):
     """Nothing that competes can be judged on the recordings; the text says why."""
 
 
-def candidates() -> tuple[str, ...]:
-    """All names: every registered effect, one of a user's own like the others, and the sensor errors that the filter knows."""
-    return (*(name for name in EFFECTS if name not in NOT_A_NAME), *SENSOR_FIELDS)
+def candidates(effects: EffectTable = EFFECTS) -> tuple[str, ...]:
+    """All names: every effect of the table, and the sensor errors that the filter models."""
+    return (*(name for name in effects if name not in NOT_A_NAME), *SENSOR_FIELDS)
 
 
-def known(names: Sequence[str]) -> tuple[str, ...]:
+def known(names: Sequence[str], effects: EffectTable = EFFECTS) -> tuple[str, ...]:
     """The names, each once. Raises ValueError for one that is no candidate."""
+    possible = candidates(effects)
     for name in names:
-        if name not in candidates():
-            raise ValueError(f"unknown candidate {name!r}; known: {', '.join(candidates())}")
+        if name not in possible:
+            raise ValueError(f"unknown candidate {name!r}; known: {', '.join(possible)}")
     return tuple(dict.fromkeys(names))
 
 
-def kind_of(name: str) -> str:
+def kind_of(name: str, effects: EffectTable = EFFECTS) -> str:
     """physics, actuator or sensor."""
-    return "sensor" if name in SENSOR_EFFECTS else EFFECTS[name].kind
+    return "sensor" if name in SENSOR_EFFECTS else effects[name].kind
 
 
-def unjudged(experiment: Experiment, robot: Robot) -> dict[str, str]:
-    """Candidates about which nothing can be said beside this robot and these recordings, with the reason."""
-    given = dict.fromkeys(
+def not_judged(experiment: Experiment, robot: Robot) -> dict[str, str]:
+    """Candidates about which this robot and these recordings say nothing, with the reason."""
+    own = dict.fromkeys(
         (*robot.effects, *robot.sensors), "the given robot has it, and its values are refitted"
     )
-    return out_of_reach(experiment) | given
+    return not_excited(experiment, robot.table) | own
 
 
-def out_of_reach(experiment: Experiment) -> dict[str, str]:
-    """Candidates on which these recordings say nothing, with the reason."""
+def not_excited(experiment: Experiment, effects: EffectTable = EFFECTS) -> dict[str, str]:
+    """Candidates that these recordings do not excite, with the reason."""
     reasons: dict[str, str] = {}
     if not np.isfinite(experiment.gyro).any():
         reasons |= dict.fromkeys(("gyro_scale", "imu_misalignment"), "no IMU was recorded")
     rotor, rudder = experiment.given_commands.T
     if np.abs(rudder).max() < STILL:
-        unseen = [name for name in EFFECTS if name.startswith("rudder_") and name not in SEEN_STILL]
+        unseen = [name for name in effects if name.startswith("rudder_") and name not in SEEN_STILL]
         reasons |= dict.fromkeys(unseen, "the rudder never moved")
     elif np.ptp(rudder) < STILL:
         reasons |= dict.fromkeys(SEEN_MOVING, "the rudder's command never changed")

@@ -1,142 +1,123 @@
-"""A cold fit that finds the right optimum: the IMU is believed little at first and more and more.
+"""Annealed fit: the IMU's noise is inflated at first, so that the camera decides, and lowered stage by stage.
 
-With the accelerometer's and gyro's full weight the likelihood has many optima, because a wrong phase of the tail's swing is
-as bad as no swing at all. With their standard deviations a hundred times as large the camera leads, and the nominal values
-lead to the optimum from 30 % away where the tail has few links; each further stage starts from the one before.
+With the full weight of accelerometer and gyro the likelihood has many optima, because a wrong phase of the tail's swing is as
+bad as no swing at all. With their standard deviations a hundred times as large, the nominal values lead to the optimum from
+30 % away where the tail has few links. Every stage starts from the one before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-
-import numpy as np
-from numpy.typing import NDArray
 
 from fish_report.parallel import on_all_cores
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.initial_noise import STRANGE, open_gates, worst_row
-from fish_sysid.estimation.map_fit import (
-    Fit,
-    climb,
-    evaluate,
-    log_posterior,
-)
+from fish_sysid.estimation.ekf_types import Array, Noise
+from fish_sysid.estimation.map_fit import Fit, climb, evaluate, log_posterior
 from fish_sysid.estimation.noise_estimation import (
     NOISE_MOVES,
     SENSOR_MOVES,
     Reach,
-    adapt_noise,
+    estimate_noise,
 )
-from fish_sysid.estimation.parametrization import Coordinates, Hypothesis
+from fish_sysid.estimation.parametrization import Hypothesis
+from fish_sysid.estimation.thresholds import (
+    COARSE_GAIN,
+    FINAL_ITERATIONS,
+    IMU_STAGES,
+    INNOVATION_RMS_REJECT,
+    NOISE_ROUND_ITERATIONS,
+    NOISE_ROUNDS,
+)
 
-Array = NDArray[np.float64]
 Report = Callable[[str], None]
-Stages = tuple[tuple[float, int], ...]
-
-# factor of the IMU's noise, iterations: first the camera leads
-LEADING: Stages = ((100.0, 25), (30.0, 25), (10.0, 15))
-CLOSING: Stages = ((3.0, 15), (1.0, 15))
-# the tail's: far from the optimum they imitate a wrong phase of its swing
-TAIL_INERTIAS = ("link_inertia_factor", "fin_inertia_factor")
-HELD_AT = (0.0, 0.25, -0.25)  # of theta
-FAR_GAIN = 3.0  # nats; an iteration of a stage that is not the last and gains less is its last
-ROUNDS = 2  # of noise estimation and refits
+Stages = tuple[tuple[float, int], ...]  # factor of the IMU's noise, most iterations
 
 
-def fit_tempered(
+def annealed_fit(
     hypothesis: Hypothesis,
+    starts: Sequence[Array],
     experiment: Experiment,
     noise: Noise,
-    theta: Array | None = None,
+    stages: Stages,
+    held: tuple[str, ...] = (),
     report: Report = lambda _: None,
-    held: tuple[str, ...] = (),
 ) -> Fit:
-    """Fit from `theta` (default: the hypothesis's start values), then estimate the process noise, in turn.
+    """From the start (K,) whose annealing ends best to the IMU's full weight, then process noise and parameters in turn.
 
-    The parameters `held` are free only at the IMU's full weight; before, the camera leads the others with these at several
-    values, and the best goes on.
+    held: parameters that stay at the start until the IMU's full weight.
     """
-    report("fitting, the camera leads")
-    theta = Coordinates(hypothesis).origin() if theta is None else theta
-    held = tuple(name for name in held if name in hypothesis.free)
-    places = [_with(hypothesis, theta, held, value) for value in (HELD_AT if held else (0.0,))]
-    leads = on_all_cores(
-        lambda place: lead(hypothesis, experiment, noise, place, held=held), places
+    report("fitting, the camera decides")
+    ends = on_all_cores(
+        lambda start: anneal(hypothesis, start, experiment, noise, stages, held), starts
     )
-    return close(max(leads, key=lambda fit: fit.objective), experiment, noise, report, held)
+    best = max(ends, key=lambda fit: fit.log_posterior)
+    return at_full_weight(best, experiment, noise, held, report)
 
 
-def lead(
+def anneal(
     hypothesis: Hypothesis,
+    theta: Array,
     experiment: Experiment,
     noise: Noise,
-    theta: Array,
-    stages: Stages = LEADING,
-    held: tuple[str, ...] = (),
+    stages: Stages,
+    held: Sequence[str] = (),
 ) -> Fit:
-    """Where stages of falling IMU noise lead all but `held` from theta, gates open; it ends at what noise cannot explain."""
+    """The optimum of the last stage, without gates; the stages end early where no noise of the sensors explains what is left."""
     theta = theta.copy()
-    first = [i for i, name in enumerate(hypothesis.free) if name not in held]
-    coarse = hypothesis.fixing(held, theta)
+    moving = [i for i, name in enumerate(hypothesis.free) if name not in held]
+    reduced = hypothesis.fixing(held, theta) if held else hypothesis
     for factor, iterations in stages:
-        wide = replace(open_gates(noise), gyro=factor * noise.gyro, accel=factor * noise.accel)
-        fit = climb(
-            evaluate(coarse, theta[first], experiment, wide), experiment, iterations, FAR_GAIN
-        )
-        theta[first] = fit.theta
-        if worst_row(fit) > STRANGE:
+        inflated = noise.with_imu(factor)
+        start = evaluate(reduced, theta[moving], experiment, inflated)
+        fit = climb(start, experiment, iterations, COARSE_GAIN)
+        theta[moving] = fit.theta
+        if fit.max_innovation_rms > INNOVATION_RMS_REJECT:
             break
-    return evaluate(hypothesis, theta, experiment, wide) if held else fit
+    return evaluate(hypothesis, theta, experiment, inflated) if held else fit
 
 
-def _with(hypothesis: Hypothesis, theta: Array, names: tuple[str, ...], value: float) -> Array:
-    """Theta with some of its entries moved by `value`."""
-    moved = theta.copy()
-    moved[[hypothesis.free.index(name) for name in names]] += value
-    return moved
-
-
-def close(
+def at_full_weight(
     fit: Fit,
     experiment: Experiment,
     noise: Noise,
-    report: Report = lambda _: None,
     held: tuple[str, ...] = (),
+    report: Report = lambda _: None,
 ) -> Fit:
-    """From where the camera led to the IMU's full weight, then process noise and parameters in turn.
+    """From the camera's optimum to the IMU's full weight, then process noise and parameters in turn.
 
-    Where a stage leaves innovations that the sensors' noise cannot explain, either it or the model is wrong: both are tried,
-    that noise estimated as well and left alone, and the likelier goes on. The last steps leave out outliers by the gates of
+    Where a stage leaves innovations that the sensors' noise does not explain, either this noise or the model is wrong: the
+    noise is estimated as well and kept, and the likelier of the two fits is returned. The last iterations use the gates of
     `noise`.
     """
     hypothesis = fit.hypothesis
-    if worst_row(fit) <= STRANGE:
-        report("fitting, the IMU is believed more and more")
-        fit = lead(hypothesis, experiment, noise, fit.theta, CLOSING, held)
-    found = [_fit_with_sensor_noise(fit, experiment, report)] if worst_row(fit) > STRANGE else []
-    fit = climb(evaluate(hypothesis, fit.theta, experiment, noise), experiment, CLOSING[-1][1])
-    for _ in range(ROUNDS):
+    if fit.max_innovation_rms <= INNOVATION_RMS_REJECT:
+        report("fitting, the IMU gains weight")
+        fit = anneal(hypothesis, fit.theta, experiment, noise, IMU_STAGES, held)
+    fits = []
+    if fit.max_innovation_rms > INNOVATION_RMS_REJECT:
+        fits = [_with_sensor_noise(fit, experiment, report)]
+    fit = climb(evaluate(hypothesis, fit.theta, experiment, noise), experiment, FINAL_ITERATIONS)
+    for _ in range(NOISE_ROUNDS):
         report("fitting, process noise")
-        adapted = replace(
-            adapt_noise(fit, experiment, reach=Reach.COLD),
-            gate_camera=noise.gate_camera,
-            gate_imu=noise.gate_imu,
-        )
-        fit = climb(evaluate(hypothesis, fit.theta, experiment, adapted), experiment, 8)
+        found = estimate_noise(fit, experiment, reach=Reach.ANYWHERE)
+        found = replace(found, gate_camera=noise.gate_camera, gate_imu=noise.gate_imu)
+        start = evaluate(hypothesis, fit.theta, experiment, found)
+        fit = climb(start, experiment, NOISE_ROUND_ITERATIONS)
 
-    def without_gates(way: Fit) -> float:
-        """Behind gates a filter that has lost the fish would leave most of the evidence against it out."""
-        return log_posterior(hypothesis, way.theta, experiment, open_gates(way.noise))
+    def without_gates(one: Fit) -> float:
+        """Gates would leave out what speaks against a filter that has lost the fish."""
+        return log_posterior(hypothesis, one.theta, experiment, one.noise.ungated())
 
-    return max((fit, *found), key=without_gates) if found else fit
+    return max((fit, *fits), key=without_gates) if fits else fit
 
 
-def _fit_with_sensor_noise(fit: Fit, experiment: Experiment, report: Report) -> Fit:
-    """Alternate between all noise and parameters, gates open."""
-    for _ in range(ROUNDS + 1):
+def _with_sensor_noise(fit: Fit, experiment: Experiment, report: Report) -> Fit:
+    """Noise of sensors and process, and parameters, in turn, without gates."""
+    for _ in range(NOISE_ROUNDS + 1):
         report("fitting, noise of sensors and process")
-        adapted = adapt_noise(fit, experiment, 2, (*SENSOR_MOVES, *NOISE_MOVES), Reach.COLD)
-        fit = climb(evaluate(fit.hypothesis, fit.theta, experiment, adapted), experiment, 8)
+        moves = (*SENSOR_MOVES, *NOISE_MOVES)
+        noise = estimate_noise(fit, experiment, 2, moves, Reach.ANYWHERE)
+        start = evaluate(fit.hypothesis, fit.theta, experiment, noise)
+        fit = climb(start, experiment, NOISE_ROUND_ITERATIONS)
     return fit

@@ -21,7 +21,7 @@ from fish_report.parallel import cores
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.multistep_fit import SETTLED, Outlook
+from fish_sysid.estimation.multistep_fit import SETTLED, MultistepError
 from fish_sysid.estimation.parametrization import Hypothesis, extend
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ def choose_effects(
 ) -> tuple[Fit, tuple[Step, ...]]:
     """(the fit with the effects added, not settled yet; every candidate that was cross-validated).
 
-    fit: of the model without them, for the outlook (`fit_outlook`).
+    fit: of the model without them, for the outlook (`fit_multistep`).
     """
     steps: list[Step] = []
     if len(experiment.names) < 2 * FOLDS:
@@ -109,7 +109,7 @@ def choose_effects(
 def _screen(fit: Fit, experiment: Experiment, name: str) -> _Tried:
     """A candidate fitted for the outlook on all trials, in a few steps."""
     hypothesis = fit.hypothesis.with_effect(name, SCALE)
-    outlook = Outlook(experiment, hypothesis, EVERY)
+    outlook = MultistepError(experiment, hypothesis, EVERY)
     starts = (extend(fit.theta, hypothesis, name, strength) for strength in STRENGTHS)
 
     def judged(theta: Array) -> tuple[float, Array]:
@@ -123,7 +123,11 @@ def _screen(fit: Fit, experiment: Experiment, name: str) -> _Tried:
 
 def _settled(tried: _Tried, noise: Noise, experiment: Experiment) -> _Tried:
     """The candidate's fit on all trials, to the end: what it gains shall not be what the next one gains by going on."""
-    outlook, cost, theta = Outlook(experiment, tried.hypothesis, EVERY), tried.cost, tried.theta
+    outlook, cost, theta = (
+        MultistepError(experiment, tried.hypothesis, EVERY),
+        tried.cost,
+        tried.theta,
+    )
     for _ in range(ROUNDS_TO_THE_END):
         before = cost
         cost, theta = outlook.improve(theta, noise)
@@ -143,12 +147,12 @@ def _judge(fit: Fit, experiment: Experiment, without: Array, tried: _Tried) -> _
     return _Judged(tried, costs, Step(tried.name, float(ratio.mean()), deviation, False))
 
 
-def _outlook(hypothesis: Hypothesis) -> Callable[[Experiment], Outlook]:
-    return partial(Outlook, hypothesis=hypothesis, every=EVERY)
+def _outlook(hypothesis: Hypothesis) -> Callable[[Experiment], MultistepError]:
+    return partial(MultistepError, hypothesis=hypothesis, every=EVERY)
 
 
 def left_out_costs(
-    outlook_on: Callable[[Experiment], Outlook],
+    outlook_on: Callable[[Experiment], MultistepError],
     theta: Array,
     noise: Noise,
     experiment: Experiment,

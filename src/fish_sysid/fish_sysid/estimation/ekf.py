@@ -1,4 +1,4 @@
-"""One pass of the filter over an experiment: compiled where possible, else in NumPy."""
+"""One pass of the extended Kalman filter over an experiment: compiled where possible, else in NumPy."""
 
 from __future__ import annotations
 
@@ -11,13 +11,7 @@ from fish_sim.step import Stepper, kernel
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_compiled import compiled_passes, filter_library
 from fish_sysid.estimation.ekf_numpy import Filter
-from fish_sysid.estimation.ekf_types import (
-    Array,
-    FilterResult,
-    Noise,
-    Problem,
-    SensorModel,
-)
+from fish_sysid.estimation.ekf_types import Array, FilterResult, Noise, Problem, SensorModel
 
 
 def run_filter(
@@ -41,9 +35,8 @@ def run_filters(
     problem: Problem, noises: Sequence[Noise], keep: bool = False
 ) -> list[FilterResult]:
     """`run_filter` with each noise: several at once leave no core without work."""
-    return compiled_passes(problem, noises, keep) or [
-        Filter(problem, noise).run(keep) for noise in noises
-    ]
+    compiled = compiled_passes(problem, noises, keep)
+    return compiled or [Filter(problem, noise).run(keep) for noise in noises]
 
 
 def filter_stepper(robot: Robot) -> Stepper:

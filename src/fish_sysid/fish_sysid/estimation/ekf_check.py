@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fish_sim.model import DT, Structure
+from fish_sim.model import DT
+from fish_sim.robot import Structure
 from fish_sim.scheme import Scheme, default_scheme
 from fish_sim.self_check import random_parameters, relative_error
 from fish_sim.step import Stepper

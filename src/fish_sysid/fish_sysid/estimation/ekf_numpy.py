@@ -1,7 +1,4 @@
-"""The filter's pass in NumPy, all trials at once: the readable form, and the one used without a C compiler.
-
-`filter_compiled` does the same per trial in C; a test holds them equal.
-"""
+"""The filter's pass in NumPy, all trials at once: what the compiled pass is compared with, and runs without a compiler."""
 
 from __future__ import annotations
 
@@ -18,6 +15,7 @@ from fish_sysid.estimation.ekf_types import (
     History,
     Noise,
     Problem,
+    drive_at,
     first_commands,
     first_memory,
     first_state,
@@ -25,7 +23,7 @@ from fish_sysid.estimation.ekf_types import (
 )
 from fish_sysid.estimation.encoder import encoder_terms
 
-SERIES = 8  # terms of the matrix exponential, as in c/filter.c
+SERIES = 8  # terms of the matrix exponential, as in c/ekf.c
 
 
 class Filter:
@@ -281,13 +279,6 @@ class Filter:
         sums.gradient += terms.gradient
         sums.normal += terms.normal
         sums.whitened[..., ENCODER_ROW] = terms.whitened
-
-
-def drive_at(start: Array, end: Array, fraction: float) -> Array:
-    """Rudder, its rate, rotor speed, its rate (..., 4) at a fraction of a period between two memories (..., 2)."""
-    rate = (end - start) / DT
-    now = start + fraction * (end - start)
-    return np.stack([now[..., 0], rate[..., 0], now[..., 1], rate[..., 1]], axis=-1)
 
 
 def between(x0: Array, x1: Array, rate0: Array, rate1: Array, c: float) -> Array:

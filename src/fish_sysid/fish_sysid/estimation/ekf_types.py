@@ -6,12 +6,12 @@ State xi = [motion (q, q', states of effects), wrench on the head (3), biases of
     gyro z = scale r + b_g;  accelerometer = R(-mu) R_body_pool q'' + b_a;  camera = pose(t - latency)
 One pass gives the innovations, their covariance and, with the filter's gains held fixed, the derivative of every
 innovation with respect to every free parameter (prediction-error method; Ljung 1999, ch. 7 and 10). Gauss-Newton,
-score tests and the ranking of candidates all come from the normal matrices that the pass adds up per trial.
+score tests and the screening of candidates all come from the normal matrices that the pass adds up per trial.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fish_sim.model import DT, Layout
 from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.estimation.thresholds import OPEN_GATE
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ FASTEST, FASTEST_TURN = 0.5, 2.0  # m/s and rad/s of a fish that nobody sees or 
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations. Sensors: per sample; wrench: stationary values of its random walk back to zero."""
+    """Standard deviations. Sensors: per sample; wrench: stationary values of a first-order Gauss-Markov process."""
 
     wrench: tuple[float, float, float] = (0.004, 0.008, 2e-4)  # N, N, N m
     wrench_time: float = 0.2  # s, tau
@@ -52,6 +53,19 @@ class Noise:
     gate_camera: float = 60.0  # poses whose squared normalised innovation exceeds this are left out
     gate_imu: float = 400.0  # likewise IMU samples
     gate_encoder: float = 25.0  # squared residual beyond which an encoder's sample costs no more
+
+    def ungated(self) -> Noise:
+        """The same noise without gates: a filter that leaves out what surprises it can lose the fish for good."""
+        return replace(self, gate_camera=OPEN_GATE, gate_imu=OPEN_GATE)
+
+    def with_imu(self, factor: float) -> Noise:
+        """The IMU's standard deviations times a factor, without gates: with a large one the camera decides."""
+        return replace(self.ungated(), gyro=factor * self.gyro, accel=factor * self.accel)
+
+    def with_wrench(self, factor: float) -> Noise:
+        """The wrench's standard deviations times a factor."""
+        x, y, n = self.wrench
+        return replace(self, wrench=(factor * x, factor * y, factor * n))
 
 
 @dataclass(frozen=True)
@@ -104,6 +118,13 @@ class History:
     memory: Array  # (T + 1, M, NM)
 
 
+def drive_at(start: Array, end: Array, fraction: float) -> Array:
+    """Rudder, its rate, rotor speed, its rate (..., 4) at a fraction of a period between two memories (..., 2)."""
+    rate = (end - start) / DT
+    now = start + fraction * (end - start)
+    return np.stack([now[..., 0], rate[..., 0], now[..., 1], rate[..., 1]], axis=-1)
+
+
 def place_frames(experiment: Experiment, sensors: SensorModel) -> tuple[Array, Array]:
     """(offset (T, M), pose (T, M, 3)): each camera pose at its nearest grid point, moved back by the latency.
 
@@ -132,7 +153,7 @@ def first_commands(experiment: Experiment) -> Array:
 def first_memory(commands: Array, stepper: Stepper, p: Array, dp: Array) -> tuple[Array, Array]:
     """Memory (M, NM) that such commands (M, 2) have left, and its derivatives (M, K, NM).
 
-    A centred command leaves something too: an offset horn stands askew from the start.
+    A centred command leaves something too: the rudder of an offset horn is deflected from the start.
     """
     M, K = len(commands), len(dp)
     repeated = np.repeat(commands, max(K, 1), axis=0)

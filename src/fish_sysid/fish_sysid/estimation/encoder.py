@@ -1,7 +1,7 @@
-"""The rotor's encoder: it reads a speed that follows from the commands alone, so that it stands beside the filter.
+"""The rotor's encoder, whose likelihood needs no filter: the rotor's speed follows from the commands alone.
 
-Single samples of a real one can be far off (the rotor is held, a stamp is wrong): what lies beyond the gate costs the same
-wherever it lies, and pulls at nothing.
+Single samples of a real encoder can be far off (a held rotor, a wrong stamp). A residual beyond the gate costs a constant and
+has no gradient.
 """
 
 from __future__ import annotations
@@ -21,9 +21,8 @@ SMALLEST = 0.5  # of the usual noise
 class EncoderTerms:
     """What the encoder adds to a pass over M trials with K free parameters."""
 
-    log_likelihood: (
-        Array  # (M,) sum of -min(r^2, gate) / 2 - log(sd sqrt(2 pi)), r = (encoder - rotor) / sd
-    )
+    # (M,) sum of -min(r^2, gate) / 2 - log(sd sqrt(2 pi)), r = (encoder - rotor) / sd
+    log_likelihood: Array
     samples: Array  # (M,)
     gradient: Array  # (M, K) of -log likelihood
     normal: Array  # (M, K, K)
@@ -33,7 +32,7 @@ class EncoderTerms:
 def encoder_terms(
     experiment: Experiment, noise: Noise, rotor: Array, d_rotor: Array
 ) -> EncoderTerms:
-    """Terms of the rotor's speed (T, M) [rad/s] as the model has it, and of its derivatives (T, M, K)."""
+    """Terms of the model's rotor speed (T, M) [rad/s] and of its derivatives (T, M, K)."""
     sampled = np.isfinite(experiment.encoder) & (
         np.arange(experiment.length)[:, None] < experiment.steps
     )
@@ -59,6 +58,6 @@ def encoder_noise(residual: Array, usual: float) -> float:
 
 
 def commanded_residual(experiment: Experiment) -> Array:
-    """(T, M) encoder less the speed that was commanded [rad/s], which a motor that does as it is told has a step later."""
-    told = np.concatenate([experiment.commands[:1, :, 0], experiment.commands[:-1, :, 0]])
-    return np.asarray(experiment.encoder - told)
+    """(T, M) encoder less the commanded speed [rad/s], which an ideal motor has one step later."""
+    commanded = np.concatenate([experiment.commands[:1, :, 0], experiment.commands[:-1, :, 0]])
+    return np.asarray(experiment.encoder - commanded)

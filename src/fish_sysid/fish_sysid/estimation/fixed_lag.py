@@ -12,7 +12,7 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import Array, History, Noise
-from fish_sysid.estimation.parametrization import Coordinates, nominal_hypothesis
+from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.smoother import smooth
 
 
@@ -23,7 +23,7 @@ def smoothed(
 
     NaN where the filter diverged. Trials are filtered one at a time, as histories are large.
     """
-    coordinates = Coordinates(nominal_hypothesis(robot, free=()))
+    coordinates = nominal_hypothesis(robot, free=()).parametrization
     p, dp, sensors = coordinates.filter_inputs(np.zeros(0))
     parts = {}
     for m in np.unique(starts[:, 0]).tolist():
@@ -42,8 +42,8 @@ def _at(history: History, starts: NDArray[np.int64], steps: int, ahead: float) -
     rows = starts + np.arange(round(ahead / DT) + 1)[:, None]
     beyond, rows = rows >= steps, np.minimum(rows, steps - 1)
     windows = {f.name: getattr(history, f.name)[rows, 0] for f in fields(History)}
-    # all windows are as long, and past a trial's end its last row stands in: there the smoother shall find nothing that was
-    # not foretold, or it would take in the last measurement once more at every step
+    # all windows have one length; past a trial's end its last row is repeated, where filtered equals predicted, so that the
+    # last measurement is used once
     for predicted, filtered in (("predicted", "filtered"), ("predicted_P", "filtered_P")):
         windows[predicted][beyond] = windows[filtered][beyond]
     good = np.isfinite(windows["filtered"]).all(axis=(0, 2))

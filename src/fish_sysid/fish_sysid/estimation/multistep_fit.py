@@ -27,7 +27,7 @@ from fish_sysid.dataset.camera_time_offset import moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_types import WRENCH, Noise, SensorModel
 from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.parametrization import Coordinates, Hypothesis
+from fish_sysid.estimation.parametrization import Hypothesis
 from fish_sysid.prediction.prediction import (
     CHUNK,
     EVERY,
@@ -69,7 +69,7 @@ class Target:
     scale: Array  # (4,)
 
 
-class Outlook:
+class MultistepError:
     """Prediction errors of a hypothesis on an experiment as functions of theta."""
 
     def __init__(
@@ -80,7 +80,7 @@ class Outlook:
         horizons: tuple[float, ...] = HORIZONS,
     ) -> None:
         """every: s between start points; horizons: s."""
-        self.coordinates = Coordinates(hypothesis)
+        self.coordinates = hypothesis.parametrization
         self.experiment, self.horizons = experiment, horizons
         self.starts = start_points(experiment, every, WARM_UP)
         self.sensors = self.coordinates.filter_inputs(self.coordinates.origin())[2]
@@ -207,7 +207,7 @@ class Outlook:
         gradient, normal = self._normal(e, J, theta)
         return self._cost(e, theta) - 0.5 * float(gradient @ np.linalg.solve(normal, gradient))
 
-    def normal(self, theta: Array) -> Array:
+    def information(self, theta: Array) -> Array:
         """(K, K) whose inverse is the covariance, J' W J / s^2 + diag(1 / prior^2)."""
         e, J = self.errors(theta)
         variance = max(float(np.mean(np.minimum(e**2, ROBUST**2))), 1e-12)
@@ -301,7 +301,7 @@ def _error(target: Target, pose: Array, d_pose: Array) -> tuple[Array, Array]:
     return e / target.scale, np.concatenate([d_mean, d_u[None]]) / target.scale[:, None]
 
 
-def fit_outlook(
+def fit_multistep(
     fit: Fit, experiment: Experiment, report: Callable[[str], None] = lambda _: None
 ) -> Fit:
     """The fit that predicts best over seconds, from a fit's values or its hypothesis's start values: both go one round.
@@ -309,7 +309,7 @@ def fit_outlook(
     The states come from its noise, or one with a calm unexplained force, whichever predicts better. Sensor errors keep the
     values and the covariance that they have in the fit.
     """
-    outlook = Outlook(experiment, fit.hypothesis)
+    outlook = MultistepError(experiment, fit.hypothesis)
     if not outlook.targets:
         return fit
     usual = Noise()
@@ -342,6 +342,6 @@ def fit_outlook(
             break
     best, theta, noise = better_noise(theta)
     outlook.start_from(theta, noise)
-    normal, kept = outlook.normal(theta), np.ix_(~outlook.moving, ~outlook.moving)
-    normal[kept] = np.linalg.inv(fit.covariance[kept])
-    return replace(evaluate(fit.hypothesis, theta, experiment, noise), normal=normal)
+    information, kept = outlook.information(theta), np.ix_(~outlook.moving, ~outlook.moving)
+    information[kept] = np.linalg.inv(fit.covariance[kept])
+    return replace(evaluate(fit.hypothesis, theta, experiment, noise), information=information)

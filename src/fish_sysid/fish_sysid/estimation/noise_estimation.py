@@ -1,4 +1,4 @@
-"""Noise that suits a fit, by maximum likelihood, and noise and parameters in turn."""
+"""Maximum-likelihood noise of a fit."""
 
 from __future__ import annotations
 
@@ -11,56 +11,30 @@ import numpy as np
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_types import ENCODER_ROW, Array, Noise
 from fish_sysid.estimation.encoder import encoder_noise
-from fish_sysid.estimation.map_fit import (
-    Fit,
-    climb,
-    evaluate,
-    likelihoods,
-)
+from fish_sysid.estimation.map_fit import Fit, likelihoods
 from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.thresholds import (
+    LONGEST_WRENCH,
+    SHORTEST_WRENCH,
+    WRENCH_JUMPS,
+    WRENCH_LADDER,
+    WRENCH_TIMES,
+)
 
 NoiseMove = Callable[[Noise, float], Noise]
-
-SETTLED_GAIN = 3.0  # nats; a round of noise and parameters that gains less is the last
-LARGE_GAIN = 100.0  # nats; a round that gains less leaves the noise near its best
-SHORTEST_WRENCH, LONGEST_WRENCH = 0.02, 5.0  # s; a step of the filter is 0.01 s
-JUMPS = (0.25, 4.0)  # of the wrench's standard deviations
-LADDER = (4.0, 16.0, 64.0)  # times usual water's: a missing force is strong,
-TIMES = (0.2, 2.0)  # and fast or slow, s
 
 
 class Reach(Enum):
     """How far from a fit's noise a better one may lie."""
 
     NEAR = 0
-    FAR = (
-        1  # a model that has just found its missing effect needs far less noise than the one before
-    )
-    COLD = 2  # nothing is known yet
-
-
-def settle(fit: Fit, experiment: Experiment, rounds: int = 5, iterations: int = 6) -> Fit:
-    """Parameters and process noise in turn, from a fit that was evaluated on this experiment, until neither helps."""
-    fit, gain = climb(fit, experiment, iterations), np.inf
-    for _ in range(rounds):
-        before = fit.objective
-        noise = adapt_noise(fit, experiment, reach=Reach.NEAR if gain < LARGE_GAIN else Reach.FAR)
-        fit = evaluate(fit.hypothesis, fit.theta, experiment, noise)
-        if fit.objective - before < SETTLED_GAIN:
-            break
-        fit = climb(fit, experiment, iterations)
-        gain = fit.objective - before
-    return fit
-
-
-def _stronger(noise: Noise, factor: float) -> Noise:
-    x, y, n = noise.wrench
-    return replace(noise, wrench=(factor * x, factor * y, factor * n))
+    FAR = 1  # after a new effect a model needs far less process noise
+    ANYWHERE = 2  # a first fit
 
 
 def _slower(noise: Noise, factor: float) -> Noise:
-    """Longer correlated at the same rate of change, sigma^2 / tau: data of a few seconds tell it far better than tau."""
-    return replace(_stronger(noise, factor**0.5), wrench_time=noise.wrench_time * factor)
+    """A longer correlation time at the same sigma^2 / tau, which a few seconds determine far better than tau."""
+    return replace(noise.with_wrench(factor**0.5), wrench_time=noise.wrench_time * factor)
 
 
 def _wrench(index: int) -> NoiseMove:
@@ -82,17 +56,17 @@ NOISE_MOVES = (*(_wrench(i) for i in range(3)), _slower)
 SENSOR_MOVES = tuple(map(_field, ("gyro", "accel", "camera_position", "camera_heading")))
 
 
-def adapt_noise(
+def estimate_noise(
     fit: Fit,
     experiment: Experiment,
     rounds: int = 1,
     moves: Sequence[NoiseMove] = NOISE_MOVES,
     reach: Reach = Reach.FAR,
 ) -> Noise:
-    """Maximum-likelihood wrench intensities and their time constant: parabola through three points each, in turn.
+    """Maximum-likelihood wrench intensities and their time constant: a parabola through three points each, in turn.
 
-    The encoder's noise is that of what the fit leaves of it. The start is the best of several within reach: between noises
-    far apart the parabola stops half-way.
+    The encoder's noise is that of the fit's residuals. The start is the best of several within reach: between noises far
+    apart the parabola stops half-way.
     """
 
     def values(noises: Sequence[Noise]) -> Array:
@@ -104,18 +78,24 @@ def adapt_noise(
     for _ in range(rounds):
         for change in moves:
             low, high = values([change(noise, 0.5), change(noise, 2.0)])
-            if np.isinf(low) and np.isinf(high):
-                continue
-            curvature, slope = low + high - 2.0 * best, 0.5 * (high - low)
-            parabola = np.isfinite(curvature) and curvature < 0
-            octaves = -slope / curvature if parabola else np.sign(np.nan_to_num(slope)) * 2.0
-            candidate = change(noise, 2.0 ** float(np.clip(octaves, -2.0, 2.0)))
-            if not SHORTEST_WRENCH <= candidate.wrench_time <= LONGEST_WRENCH:
+            candidate = change(noise, 2.0 ** octaves(low, best, high))
+            allowed = SHORTEST_WRENCH <= candidate.wrench_time <= LONGEST_WRENCH
+            if (np.isinf(low) and np.isinf(high)) or not allowed:
                 continue
             value = float(values([candidate])[0])
             if value > best:
                 noise, best = candidate, value
     return noise
+
+
+def octaves(low: float, middle: float, high: float) -> float:
+    """Where a parabola through values at -1, 0 and 1 octave has its top, at most 2 octaves away; uphill where it has none."""
+    if np.isinf(low) and np.isinf(high):
+        return 0.0
+    curvature, slope = low + high - 2.0 * middle, 0.5 * (high - low)
+    parabola = np.isfinite(curvature) and curvature < 0
+    top = -slope / curvature if parabola else np.sign(np.nan_to_num(slope)) * 2.0
+    return float(np.clip(top, -2.0, 2.0))
 
 
 def starts(fit: Fit, experiment: Experiment, reach: Reach) -> list[Noise]:
@@ -129,7 +109,8 @@ def starts(fit: Fit, experiment: Experiment, reach: Reach) -> list[Noise]:
     sensors = replace(
         usual, encoder=own.encoder, gate_camera=own.gate_camera, gate_imu=own.gate_imu
     )
-    far = [own, sensors, calm, *(_stronger(own, f) for f in JUMPS)]
+    far = [own, sensors, calm, *map(own.with_wrench, WRENCH_JUMPS)]
     if reach is Reach.FAR:
         return far
-    return far + [replace(_stronger(calm, f), wrench_time=t) for f in LADDER for t in TIMES]
+    strong = map(calm.with_wrench, WRENCH_LADDER)
+    return far + [replace(noise, wrench_time=t) for noise in strong for t in WRENCH_TIMES]

@@ -1,14 +1,15 @@
-"""A hypothesis: a robot with effects and sensor errors, and which of its numbers are free.
+"""A hypothesis: a robot with effects and sensor errors, and which of its parameters are free.
 
-Free numbers live in a vector theta: nominal parameters as logarithms of their ratio to the start (they are positive),
+Free parameters live in a vector theta: nominal parameters as logarithms of their ratio to the start (they are positive),
 effect and sensor parameters as (value - neutral) / scale. Both have a wide Gaussian prior, which only matters where the
-data say nothing.
+data do not determine them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +23,11 @@ from fish_sim.sensors import SENSOR_EFFECTS
 from fish_sim.sensors.sensor_effect import SensorEffect
 from fish_sysid.estimation.ekf import filter_stepper
 from fish_sysid.estimation.ekf_types import SensorModel
+from fish_sysid.estimation.thresholds import LARGE_EFFECT, START_STRENGTH
 
 Array = NDArray[np.float64]
 
-# What a ruler and scales do not give.
+# Free by default: what a ruler and scales do not measure.
 NOMINAL_FREE = (
     "head_added_mass_surge",
     "head_added_mass_sway",
@@ -63,22 +65,21 @@ SENSOR_FIELDS = {
 }
 
 
-def effect_class(name: str) -> type[Effect] | type[SensorEffect]:
+EffectTable = Mapping[str, type[Effect]]
+AnyEffect = type[Effect] | type[SensorEffect]
+
+
+def effect_class(name: str, effects: EffectTable = EFFECTS) -> AnyEffect:
     """The class of an effect, physics, actuator or sensor. Raises ValueError for an unknown name."""
-    table: dict[str, type[Effect] | type[SensorEffect]] = {**EFFECTS, **SENSOR_EFFECTS}
+    table: dict[str, AnyEffect] = {**effects, **SENSOR_EFFECTS}
     if name not in table:
         raise ValueError(f"unknown effect {name!r}; known: {', '.join(table)}")
     return table[name]
 
 
-def specification(name: str) -> Mapping[str, Parameter]:
-    """Parameters of an effect, physics, actuator or sensor."""
-    return effect_class(name).parameters
-
-
-def start_values(name: str, fraction: float) -> dict[str, float]:
+def start_values(effect: AnyEffect, fraction: float) -> dict[str, float]:
     """Every strength parameter at `fraction` of the way from neutral to typical, the others at plausible values."""
-    effect, values = effect_class(name), {}
+    values = {}
     for key, parameter in effect.parameters.items():
         typical = parameter.value if parameter.typical is None else parameter.typical
         strong = key in effect.strength
@@ -107,9 +108,26 @@ class Hypothesis:
         """Effects and sensor errors beyond the nominal model."""
         return (*(e for e in self.robot.effects if e != "disturbance"), *self.robot.sensors)
 
-    def with_effect(self, name: str, start: float = 0.1) -> Hypothesis:
+    @cached_property
+    def parametrization(self) -> Parametrization:
+        """Theta <-> robot, built once."""
+        return Parametrization(self)
+
+    def __reduce__(self) -> tuple[type[Hypothesis], tuple[Robot, tuple[str, ...]]]:
+        """Pickled without the parametrization, whose kernels belong to one process."""
+        return Hypothesis, (self.robot, self.free)
+
+    def effect(self, name: str) -> AnyEffect:
+        """The class of an effect that the robot may have. Raises ValueError for an unknown name."""
+        return effect_class(name, self.robot.table)
+
+    def own(self, name: str) -> NDArray[np.bool_]:
+        """(K,) which free parameters are those of an effect."""
+        return np.array([free.startswith(f"{name}.") for free in self.free], dtype=bool)
+
+    def with_effect(self, name: str, start: float = START_STRENGTH) -> Hypothesis:
         """One more effect, free, its strength at `start` times the typical one."""
-        values = start_values(name, start)
+        values = start_values(self.effect(name), start)
         free = tuple(f"{name}.{key}" for key in values)
         return Hypothesis(self.robot.with_effect(name, **values), self.free + free)
 
@@ -122,17 +140,23 @@ class Hypothesis:
 
     def fixing(self, held: Collection[str], theta: Array) -> Hypothesis:
         """The hypothesis with the free parameters `held` fixed at what they are at theta (K,)."""
-        coordinates = Coordinates(self)
         stays = np.array([name in held for name in self.free], dtype=bool)
-        robot = coordinates.robot(np.where(stays, theta, coordinates.origin()))
+        origin = self.parametrization.origin()
+        robot = self.parametrization.robot(np.where(stays, theta, origin))
         return Hypothesis(robot, tuple(name for name in self.free if name not in held))
+
+    @property
+    def large(self) -> tuple[str, ...]:
+        """Free parameters of effects with more than LARGE_EFFECT."""
+        owner = {free: free.split(".")[0] for free in self.free if "." in free}
+        return tuple(f for f, e in owner.items() if len(self.effect(e).parameters) > LARGE_EFFECT)
 
 
 def nominal_hypothesis(robot: Robot, free: tuple[str, ...] = NOMINAL_FREE) -> Hypothesis:
     """The robot as it is, its nominal parameters free, with the wrench that the filter drives.
 
-    Parameters that are 0 stay 0: no factor changes them. Raises UserError where the robot has a wrench of its own: the filter's
-    takes its place, and it would be dropped unsaid.
+    Parameters that are 0 stay 0: no factor changes them. Raises UserError where the robot has a wrench of its own, whose place
+    the filter's wrench takes.
     """
     if any(robot.effects.get("disturbance", {}).values()):
         raise UserError(
@@ -159,14 +183,13 @@ def extend(
 
     strength: of the effect, in typical ones; place: values of its parameters that say where or how fast.
     """
-    values = list({**start_values(name, strength), **(place or {})}.values())
-    own = Coordinates(hypothesis).encode(np.concatenate([np.ones(len(theta)), values]))[
-        len(theta) :
-    ]
+    values = {**start_values(hypothesis.effect(name), strength), **(place or {})}
+    everything = np.concatenate([np.ones(len(theta)), list(values.values())])
+    own = hypothesis.parametrization.encode(everything)[len(theta) :]
     return np.concatenate([theta, own])
 
 
-class Coordinates:
+class Parametrization:
     """theta <-> robot for one hypothesis."""
 
     def __init__(self, hypothesis: Hypothesis) -> None:
@@ -255,7 +278,7 @@ class Coordinates:
             value = self.hypothesis.robot.parameters[name]
             return value, 1.0, LOG_PRIOR.get(name, WIDE_PRIOR), value * 1e-3, value * 1e3
         effect, key = name.split(".")
-        parameter = specification(effect)[key]
+        parameter = self.hypothesis.effect(effect).parameters[key]
         return (
             parameter.value,
             scale_of(parameter),

@@ -1,6 +1,6 @@
-"""Noise to start from: of usual water, and of the sensors as their signals' roughness tells it before anything is fitted.
+"""Sensor noise estimated from the roughness of the signals, before anything is fitted, with the process noise of usual water.
 
-A fit that is told too small a sensor noise takes the rest for a rough force on the fish, and with it every parameter.
+Too small a sensor noise would be fitted as a rough force on the fish, which biases every parameter.
 """
 
 from __future__ import annotations
@@ -21,10 +21,8 @@ from fish_sysid.estimation.encoder import (
     encoder_noise,
 )
 
-ORDER = (
-    6  # of the differences: at 30 Hz they weaken a tail beat of 2 Hz 5000 times against white noise
-)
-SLOWEST = 0.04  # s between samples; in the differences of slower ones the motion itself is left
+ORDER = 6  # of the differences: at 30 Hz they weaken a tail beat of 2 Hz 5000 times
+SLOWEST = 0.04  # s between samples; in differences of slower ones motion is left
 FEWEST = 50  # differences that an estimate needs
 
 

@@ -19,8 +19,7 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import WRENCH, Noise, SensorModel
 from fish_sysid.estimation.fixed_lag import smoothed
-from fish_sysid.estimation.initial_noise import open_gates
-from fish_sysid.estimation.parametrization import Coordinates, nominal_hypothesis
+from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
@@ -103,7 +102,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
     A filter that diverges begins anew from the next image, as often as it has to, without gates: they would keep out
     what puts a wrong start right.
     """
-    coordinates = Coordinates(nominal_hypothesis(robot, free=()))
+    coordinates = nominal_hypothesis(robot, free=()).parametrization
     p, dp, sensors = coordinates.filter_inputs(np.zeros(0))
     stepper, nx = coordinates.stepper, len(coordinates.stepper.layout.motion)
     T, M = experiment.length, len(experiment.names)
@@ -137,7 +136,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
                     (rest := experiment.rest_of(m, begin)).frames[0].t
                 ):
                     break
-                column = fill(rest, [m], begin, open_gates(noise))[:, 0]
+                column = fill(rest, [m], begin, noise.ungated())[:, 0]
     beyond = np.arange(T)[:, None] >= experiment.steps
     state[beyond], wrench[beyond] = np.nan, np.nan
     return Estimates(
@@ -175,11 +174,11 @@ def predict(
     estimates = estimate(experiment, robot, noise)
     starts = start_points(experiment, every, first)
     trial, start = starts[:, 0], starts[:, 1]
-    sensors = Coordinates(nominal_hypothesis(robot, free=())).filter_inputs(np.zeros(0))[2]
+    sensors = nominal_hypothesis(robot, free=()).parametrization.filter_inputs(np.zeros(0))[2]
     length = int(np.ceil((horizon + HALF_WINDOW) / DT)) + 1
     state, wrench = estimates.state[start, trial], estimates.wrench[start, trial]
     if ahead and len(starts):
-        nx = len(Coordinates(nominal_hypothesis(robot, free=())).stepper.layout.motion)
+        nx = len(nominal_hypothesis(robot, free=()).parametrization.stepper.layout.motion)
         known = smoothed(experiment, robot, noise, starts, ahead)
         good = np.isfinite(known).all(axis=1)
         state[good, :nx], wrench[good] = known[good, :nx], known[good, nx : nx + 3]

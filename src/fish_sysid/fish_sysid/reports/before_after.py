@@ -1,4 +1,4 @@
-"""Held-out trials, measured and simulated in one go: the refitted nominal model beside the one with the effects found."""
+"""Held-out trials, measured and simulated without correction: the refitted nominal model and the one with the effects found."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ NOTE = (
 
 def before_after(d: Diagnosis) -> Figure:
     """Paths (upper row) and surge speeds (lower row) of up to MOST_TRIALS trials, held-out ones if there are any."""
-    which = (d.split.held_out or d.split.training)[:MOST_TRIALS]
-    experiment = d.experiment.select(which)
+    which = (d.task.split.held_out or d.task.split.training)[:MOST_TRIALS]
+    experiment = d.task.experiment.select(which)
     shown = {"refitted": (d.nominal, REFITTED)}
     if d.accepted:
         shown["with effects"] = (d.final, SIMULATED)

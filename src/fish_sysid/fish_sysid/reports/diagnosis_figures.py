@@ -21,6 +21,7 @@ from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.diagnosis.effect_wrench import ACTIVE
 from fish_sysid.diagnosis.latent_force import DOFS, MissingForce
 from fish_sysid.diagnosis.result import Diagnosis
+from fish_sysid.estimation.parametrization import EffectTable
 
 COLOURS = {"surge": "#5b6bd6", "sway": "#1fa774", "yaw": "#e07b39"}
 SHOWN = 4000  # points of a scatter
@@ -118,19 +119,19 @@ def binned_means(v: Array, w: Array) -> tuple[Array, Array]:
     return 0.5 * (edges[1:] + edges[:-1]), mean
 
 
-def moves_water(name: str) -> bool:
+def moves_water(name: str, effects: EffectTable = EFFECTS) -> bool:
     """Whether an effect lets the water flow, the same at all times."""
-    effect = EFFECTS.get(name)
+    effect = effects.get(name)
     return effect is not None and effect.water is not Effect.water and not effect.states
 
 
-def water_over_the_pool(effect: Content, d: Diagnosis) -> Figure:
+def water_over_the_pool(effect: Content, d: Diagnosis, effects: EffectTable = EFFECTS) -> Figure:
     """Arrows of the water's velocity on a grid over the pool, and where the fish was."""
     values = SimpleNamespace(**{k: p["value"] for k, p in effect["parameters"].items()})
     x, y = np.meshgrid(
         np.linspace(-0.47 * LENGTH, 0.47 * LENGTH, 25), np.linspace(-0.45 * WIDTH, 0.45 * WIDTH, 12)
     )
-    velocity, _ = cast(Flow, EFFECTS[effect["name"]].water(values, x, y, SimpleNamespace(), np))
+    velocity, _ = cast(Flow, effects[effect["name"]].water(values, x, y, SimpleNamespace(), np))
     u, v = (np.broadcast_to(component, x.shape) for component in velocity)
     fastest = float(np.hypot(u, v).max())
     step = x[0, 1] - x[0, 0]

@@ -15,12 +15,9 @@ from fish_report.page import (
     write_page,
 )
 from fish_sysid.diagnosis.diagnosis_json import LAGS
-from fish_sysid.diagnosis.forward_selection import Round
-from fish_sysid.diagnosis.known_effects import own_effects, own_parameters
-from fish_sysid.diagnosis.result import Diagnosis
-from fish_sysid.diagnosis.screening import Ranked
+from fish_sysid.diagnosis.known_effects import known_effects, known_parameters
+from fish_sysid.diagnosis.result import Diagnosis, Round, Screened
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.parametrization import specification
 from fish_sysid.reports.before_after import before_after
 from fish_sysid.reports.diagnosis_figures import (
     force_against_covariates,
@@ -61,9 +58,9 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
         ),
         Figure("Missing force against covariates", force_against_covariates(d)),
         *(
-            water_over_the_pool(entry, d)
+            water_over_the_pool(entry, d, d.task.robot.table)
             for entry in content["effects"]
-            if moves_water(entry["name"])
+            if moves_water(entry["name"], d.task.robot.table)
         ),
         *(when_it_acts(entry) for entry in content["effects"] if _acts_in_a_range(entry, d)),
         *_evidence(d),
@@ -78,7 +75,7 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
 
 
 def _acts_in_a_range(effect: Content, d: Diagnosis) -> bool:
-    """Whether an effect pushes, and by a range of a covariate can be told when."""
+    """Whether an effect pushes, and a range of a covariate predicts when."""
     push = d.pushes.get(effect["name"])
     return push is not None and tells_when(effect["where"], push)
 
@@ -105,9 +102,9 @@ def _found(effect: Content) -> Table:
 
 
 def _own_effects(d: Diagnosis) -> list[Table]:
-    """What became of the effects and sensor errors that the robot was given with."""
-    given = {**d.robot.effects, **d.robot.sensors}
-    rows = [_own_row(name, given, d.final) for name in own_parameters(d.robot)]
+    """The refitted effects and sensor errors of the given robot."""
+    given = {**d.task.robot.effects, **d.task.robot.sensors}
+    rows = [_own_row(name, given, d.final) for name in known_parameters(d.task.robot)]
     header = ["parameter", "given", "refitted", "standard error", "unit"]
     note = "Refitted together with the nominal parameters; these recordings say too little of the others to move them."
     return [Table("The given robot's own effects", header, rows, note)] if rows else []
@@ -115,7 +112,7 @@ def _own_effects(d: Diagnosis) -> list[Table]:
 
 def _own_row(name: str, given: Mapping[str, Mapping[str, float]], fit: Fit) -> list[str]:
     effect, key = name.split(".")
-    value, unit = f"{given[effect][key]:.4g}", specification(effect)[key].unit
+    value, unit = f"{given[effect][key]:.4g}", fit.hypothesis.effect(effect).parameters[key].unit
     if name not in fit.hypothesis.free:
         return [name, value, "", "", unit]
     return [name, value, f"{fit.values[name]:.4g}", f"{fit.standard_errors[name]:.2g}", unit]
@@ -169,8 +166,8 @@ EVIDENCE_NOTE = (
 
 def _evidence(d: Diagnosis) -> list[Table]:
     tables = []
-    for number, found in enumerate(d.rounds, 1):
-        given = own_effects(d.robot)
+    for number, found in enumerate(d.state.rounds, 1):
+        given = known_effects(d.task.robot)
         added = [name for name in found.base.hypothesis.names if name not in given]
         base = " + ".join(added) or ("the given model" if given else "the nominal model")
         rows = [_evidence_row(found, ranked) for ranked in found.ranking]
@@ -179,7 +176,7 @@ def _evidence(d: Diagnosis) -> list[Table]:
     return tables
 
 
-def _evidence_row(found: Round, ranked: Ranked) -> list[str]:
+def _evidence_row(found: Round, ranked: Screened) -> list[str]:
     fit = found.refitted.get(ranked.name)
     quick = f"{ranked.gain:.0f}" if np.isfinite(ranked.gain) else "diverged"
     if fit is None:
@@ -209,6 +206,6 @@ def _whiteness(content: Content) -> Table:
 
 def _unreachable(d: Diagnosis) -> str:
     return (
-        "; ".join(f"{name}: {why}" for name, why in d.unreachable.items())
+        "; ".join(f"{name}: {why}" for name, why in d.task.not_judged.items())
         or "All candidates could be judged."
     )

@@ -8,19 +8,21 @@ from fish_sysid.diagnosis.vocabulary import candidates
 
 Content = dict[str, Any]
 
-MOST_NUMBERS = 4  # of an effect, told one by one
+MOST_NUMBERS = 4  # of an effect, each stated
 
 
 def sentence(content: Content) -> str:
     """The verdict in one sentence, and in further ones whether trials were held out and the tail needed more links."""
-    links, told = content["fit"]["tail_links"], [_verdict(content)]
+    links, parts = content["fit"]["tail_links"], [_verdict(content)]
     if not content["fit"]["held_out_trials"]:
-        told.append(
+        parts.append(
             "With fewer than three trials nothing could be held out: errors are of the trials that were fitted."
         )
     if links["given"] != links["used"]:
-        told.append(f"The tail is modelled with {links['used']} links instead of {links['given']}.")
-    return " ".join(told)
+        parts.append(
+            f"The tail is modelled with {links['used']} links instead of {links['given']}."
+        )
+    return " ".join(parts)
 
 
 def _verdict(content: Content) -> str:
@@ -55,6 +57,6 @@ def _parameters(effect: Content) -> str:
     """All of them, or of many those that differ most surely from zero."""
     rows = [(k, p["value"], p["std"], p["unit"]) for k, p in effect["parameters"].items()]
     few = len(rows) <= MOST_NUMBERS
-    told = rows if few else sorted(rows, key=lambda row: -abs(row[1]) / row[2])[: MOST_NUMBERS - 1]
-    text = ", ".join(f"{k} {value:.4g} ± {std:.2g} {unit}" for k, value, std, unit in told)
+    parts = rows if few else sorted(rows, key=lambda row: -abs(row[1]) / row[2])[: MOST_NUMBERS - 1]
+    text = ", ".join(f"{k} {value:.4g} ± {std:.2g} {unit}" for k, value, std, unit in parts)
     return text if few else f"{len(rows)} numbers, surest {text}"

@@ -74,7 +74,9 @@ def run(args: argparse.Namespace) -> int:
                 console.print(f"{time.monotonic() - start:5.0f} s  {text}")
 
         try:
-            result = diagnose(experiment, robot, level, say, names, **left_out_stages(args.without))
+            result = diagnose(
+                experiment, robot, level, say, names, without=left_out_stages(args.without)
+            )
         except NoCandidateError as error:
             raise UserError(str(error)) from error
         content = {**answer(result), "left_out": left_out}
@@ -96,9 +98,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def left_out_stages(given: str | None) -> dict[str, frozenset[str]]:
-    """The argument `without` of `diagnose`, where stages are named."""
-    return {"without": frozenset(given.split(","))} if given else {}
+def left_out_stages(given: str | None) -> frozenset[str]:
+    """The stages that --without names, separated by commas."""
+    return frozenset(given.split(",")) if given else frozenset()
 
 
 def without_wrench(robot: Robot) -> Robot:

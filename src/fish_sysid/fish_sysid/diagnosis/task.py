@@ -1,0 +1,105 @@
+"""What a diagnosis is asked: trials, candidates, level, and the stages of the method that run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+from fish_sim.effects import EFFECTS
+from fish_sim.robot import Robot
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.significance import Level
+from fish_sysid.diagnosis.trial_split import Split, Trials, split_trials, trials_of
+from fish_sysid.diagnosis.vocabulary import NoCandidateError, candidates, known, not_judged
+from fish_sysid.estimation.map_fit import Fit
+from fish_sysid.estimation.parametrization import EffectTable, effect_class
+
+Progress = Callable[[str], None]
+
+# name and meaning of every stage that an ablation study may switch off
+STAGES = (
+    ("annealed screening", "candidates annealed from the nominal values where the base is far off"),
+    ("nominal start", "candidates screened from the nominal values as well as from the base"),
+    ("look-alike refits", "look-alikes of the best candidate refitted from its optimum"),
+    ("base restart", "the base refitted from the best candidate's optimum, and screened again"),
+    ("anneal", "a fit that needs more process noise than water annealed"),
+    ("anneal unexplained", "a candidate whose noise does not explain its innovations annealed"),
+    ("check on unseen trials", "a candidate must predict trials that the search has not used"),
+    ("overtaking", "a look-alike that predicts unseen trials better takes a candidate's place"),
+    (
+        "law replaced by a name",
+        "a candidate that predicts as well as a law of the residual is named",
+    ),
+    ("backward elimination", "every effect tested again with those that were added after it"),
+    ("model order", "more tail links tried where much is left"),
+    ("surrogate model", "a model fitted by its predictions where no name fits"),
+    ("surrogate's own choice", "effects in it that its predictions call for"),
+)
+STAGE_NAMES = frozenset(name for name, _ in STAGES)
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is asked, the same in every stage."""
+
+    experiment: Experiment
+    robot: Robot  # as given, with the table of effects
+    split: Split
+    trials: Trials
+    names: tuple[str, ...]  # that compete
+    not_judged: dict[str, str]  # name -> why these recordings say nothing about it
+    level: Level
+    progress: Progress
+    without: frozenset[str]  # stages that are switched off
+
+    def runs(self, stage: str) -> bool:
+        """Whether a stage of STAGES is on."""
+        if stage not in STAGE_NAMES:
+            raise ValueError(f"stage {stage!r}: expected one of {', '.join(sorted(STAGE_NAMES))}")
+        return stage not in self.without
+
+    def needed(self, base: Fit) -> dict[str, float]:
+        """Nats that each name which the base lacks must gain over it on the searched trials."""
+        names = [name for name in self.names if name not in base.hypothesis.names]
+        counts = {name: self.parameter_count(name) for name in names}
+        return {
+            n: self.level.needed(base.samples, count, len(names)) for n, count in counts.items()
+        }
+
+    def parameter_count(self, name: str) -> int:
+        """Parameters of an effect."""
+        return len(effect_class(name, self.robot.table).parameters)
+
+
+def make_task(
+    experiment: Experiment,
+    robot: Robot,
+    level: Level | None = None,
+    progress: Progress = lambda _: None,
+    names: Sequence[str] | None = None,
+    effects: EffectTable = EFFECTS,
+    without: Collection[str] = frozenset(),
+) -> Task:
+    """Raises ValueError for an unknown name or stage, NoCandidateError if none of the names can be judged."""
+    for stage in without:
+        if stage not in STAGE_NAMES:
+            raise ValueError(f"stage {stage!r}: expected one of {', '.join(sorted(STAGE_NAMES))}")
+    robot, split = replace(robot, table=effects), split_trials(experiment)
+    names = known(names or candidates(effects), effects)
+    trials = trials_of(experiment, split)
+    reasons = {n: why for n, why in not_judged(trials.training, robot).items() if n in names}
+    left = tuple(name for name in names if name not in reasons)
+    if not left:
+        texts = "; ".join(f"{name}: {why}" for name, why in reasons.items())
+        raise NoCandidateError(f"no candidate is left that could be judged ({texts})")
+    return Task(
+        experiment,
+        robot,
+        split,
+        trials,
+        left,
+        reasons,
+        level or Level(),
+        progress,
+        frozenset(without),
+    )

@@ -1,0 +1,149 @@
+"""One refit with a schedule: annealing, if any, then noise and parameters in turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fish_sysid.dataset.experiment import Experiment, shorten
+from fish_sysid.estimation.annealed_fit import Report, Stages, annealed_fit
+from fish_sysid.estimation.ekf_types import Array, Noise
+from fish_sysid.estimation.map_fit import Fit, better, climb, evaluate
+from fish_sysid.estimation.noise_estimation import Reach, estimate_noise
+from fish_sysid.estimation.parametrization import Hypothesis
+from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.thresholds import (
+    CAMERA_STAGES,
+    FAR_NOISE_GAIN,
+    FIRST_STEPS,
+    HELD_AT,
+    INNOVATION_RMS_SUSPECT,
+    NOISE_GAIN,
+    RATIO_GROWTH,
+    RATIO_SUSPECT,
+    ROUND_ITERATIONS,
+    ROUNDS,
+    ROUNDS_IF_SUSPECT,
+    TAIL_INERTIAS,
+)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How a refit goes from its start to an optimum."""
+
+    stages: Stages = ()  # of the annealing, () for none
+    held: tuple[str, ...] = ()  # parameters held while annealing, tried at HELD_AT
+    hold_large: bool = False  # effects of more than LARGE_EFFECT parameters held until the end
+    steps: int | None = None  # grid points of each trial; None: whole trials
+    rounds: int = 0  # of noise estimation and refit at the end
+    rounds_if_suspect: int = 0  # where the start needs the process noise of a wrong model
+
+
+REFIT = Schedule(rounds=ROUNDS, rounds_if_suspect=ROUNDS)
+CONTINUE = Schedule(rounds=ROUNDS, rounds_if_suspect=ROUNDS_IF_SUSPECT)
+ANNEAL = Schedule(CAMERA_STAGES)
+ANNEAL_HELD = Schedule(CAMERA_STAGES, TAIL_INERTIAS)
+ANNEAL_SHORT = Schedule(CAMERA_STAGES, (), True, FIRST_STEPS)
+ANNEAL_SHORT_HELD = Schedule(CAMERA_STAGES, TAIL_INERTIAS, True, FIRST_STEPS)
+ANNEAL_NEAR = Schedule(CAMERA_STAGES[-1:], rounds=ROUNDS, rounds_if_suspect=ROUNDS)
+
+
+def refit(
+    hypothesis: Hypothesis,
+    theta: Array,
+    experiment: Experiment,
+    noise: Noise,
+    schedule: Schedule = CONTINUE,
+    report: Report = lambda _: None,
+) -> Fit:
+    """The optimum that a schedule reaches from theta (K,) and noise."""
+    if schedule.steps is not None:
+        experiment = shorten(experiment, schedule.steps)
+    if not schedule.stages:
+        fit = evaluate(hypothesis, theta, experiment, noise)
+    else:
+        large = hypothesis.large if schedule.hold_large else ()
+        fit = _annealed(hypothesis, theta, experiment, noise, schedule, large, report)
+    suspect = fit.largest_ratio > RATIO_SUSPECT
+    rounds = schedule.rounds_if_suspect if suspect else schedule.rounds
+    return alternate(fit, experiment, rounds) if rounds else fit
+
+
+def _annealed(
+    hypothesis: Hypothesis,
+    theta: Array,
+    experiment: Experiment,
+    noise: Noise,
+    schedule: Schedule,
+    large: tuple[str, ...],
+    report: Report,
+) -> Fit:
+    """Annealed in all but the parameters of large effects, which keep their values."""
+    reduced = hypothesis.fixing(large, theta) if large else hypothesis
+    moving = np.array([free not in large for free in hypothesis.free], dtype=bool)
+    held = tuple(name for name in schedule.held if name in reduced.free)
+    index = np.isin(reduced.free, held) if held else np.zeros(int(moving.sum()), dtype=bool)
+    starts = [theta[moving] + value * index for value in (HELD_AT if held else HELD_AT[:1])]
+    fit = annealed_fit(reduced, starts, experiment, noise, schedule.stages, held, report)
+    if not large:
+        return fit
+    theta = theta.copy()
+    theta[moving] = fit.theta
+    return evaluate(hypothesis, theta, experiment, fit.noise)
+
+
+def alternate(fit: Fit, experiment: Experiment, rounds: int = ROUNDS) -> Fit:
+    """Parameters and process noise in turn, from a fit that was evaluated on this experiment, until neither helps."""
+    fit, gain = climb(fit, experiment, ROUND_ITERATIONS), np.inf
+    for _ in range(rounds):
+        before, reach = fit.log_posterior, Reach.NEAR if gain < FAR_NOISE_GAIN else Reach.FAR
+        noise = estimate_noise(fit, experiment, reach=reach)
+        fit = evaluate(fit.hypothesis, fit.theta, experiment, noise)
+        if fit.log_posterior - before < NOISE_GAIN:
+            break
+        fit = climb(fit, experiment, ROUND_ITERATIONS)
+        gain = fit.log_posterior - before
+    return fit
+
+
+def best_of_restart(
+    fit: Fit, theta: Array, experiment: Experiment, noise: Noise, schedule: Schedule
+) -> Fit:
+    """The fit, or the optimum that a schedule reaches from another theta.
+
+    The other one is refitted on whole trials only where it is ahead on shortened ones, on which both are refitted.
+    """
+    hypothesis, short = fit.hypothesis, shorten(experiment, FIRST_STEPS)
+    other = refit(hypothesis, theta, short, noise, schedule)
+    here = refit(hypothesis, fit.theta, short, fit.noise)
+    if other.log_posterior - here.log_posterior < NOISE_GAIN:
+        return fit
+    return better(fit, refit(hypothesis, other.theta, experiment, other.noise))
+
+
+def anneal_if_suspect(fit: Fit, experiment: Experiment) -> Fit:
+    """The fit, or where it needs far more process noise than water, a better optimum found by annealing."""
+    if fit.largest_ratio < RATIO_SUSPECT:
+        return fit
+    return best_of_restart(fit, fit.theta, experiment, usual_noise(experiment), ANNEAL_SHORT)
+
+
+def anneal_if_unexplained(fit: Fit, experiment: Experiment) -> Fit:
+    """The fit, or where its own noise does not explain its innovations, a better optimum found by annealing.
+
+    The tail's inertias start at their nominal values: in the poor optimum they imitate a wrong phase of the tail's swing.
+    """
+    if fit.largest_ratio >= RATIO_SUSPECT or fit.max_innovation_rms <= INNOVATION_RMS_SUSPECT:
+        return fit
+    theta = np.where(np.isin(fit.hypothesis.free, TAIL_INERTIAS), 0.0, fit.theta)
+    return best_of_restart(fit, theta, experiment, usual_noise(experiment), ANNEAL_SHORT_HELD)
+
+
+def refit_on(fit: Fit, experiment: Experiment, anneal: bool = True) -> Fit:
+    """A fit of some trials refitted on others; annealed, if wanted, where it needs far more process noise there."""
+    found = refit(fit.hypothesis, fit.theta, experiment, fit.noise)
+    if anneal and found.largest_ratio > RATIO_GROWTH * fit.largest_ratio:
+        return anneal_if_suspect(found, experiment)
+    return found
