@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fish_sim.compiled import lanes
+from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Frames
 from fish_sysid.dataset.synthetic import program, record
@@ -82,7 +83,7 @@ def test_compiled_and_numpy_passes_agree(stiffness, width, monkeypatch):
 )
 def test_a_filter_that_the_compiler_gets_wrong_is_not_used(edit, wrong_compiler, caplog):
     wrong_compiler(edit)
-    assert ekf_compiled.filter_library.__wrapped__((1, ("disturbance",)), "cfmr7") is None
+    assert ekf_compiled.filter_library.__wrapped__((1, (EFFECTS["disturbance"],)), "cfmr7") is None
     (record,) = caplog.records
     assert "the slower interpreted form is used" in record.message
 
