@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.methods import Method
-from fish_sim.model import DT, Layout, Structure, functions
+from fish_sim.model import DT, Layout, functions
+from fish_sim.robot import Structure
 
 Array = NDArray[np.float64]
 

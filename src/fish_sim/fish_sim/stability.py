@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.methods import Method
-from fish_sim.model import DT, Layout, Structure, functions
+from fish_sim.model import DT, Layout, functions
+from fish_sim.robot import Structure
 
 Modes = NDArray[np.complex128]
 

@@ -19,8 +19,8 @@ from fish_sim.finite import check_finite
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel
 from fish_sim.methods import METHODS, Method
-from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, Structure, functions
-from fish_sim.robot import Robot
+from fish_sim.model import COMMAND_NAMES, DRIVE_NAMES, DT, Layout, functions
+from fish_sim.robot import Robot, Structure
 from fish_sim.scheme import Scheme, check_scheme, default_scheme, stable_scheme
 
 Array = NDArray[np.float64]

@@ -13,7 +13,8 @@ import numpy as np
 
 from fish_report.parallel import on_all_cores
 from fish_sim.compiled import lanes, library
-from fish_sim.model import DT, Structure
+from fish_sim.model import DT
+from fish_sim.robot import Structure
 from fish_sim.step import Stepper, filter_source
 from fish_sysid.estimation.ekf_types import (
     ENCODER_ROW,
