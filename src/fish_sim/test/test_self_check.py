@@ -125,7 +125,9 @@ def test_every_part_is_checked(cache, bad_compiler, caplog, part):
         "s/g1\\[k\\] += gw\\[2 \\* k\\] \\* SET1(c)/g1[k] += 1.000001 * gw[2 * k] * SET1(c)/"
     )
     bad_compiler(edits[part], "-shared")
-    assert isinstance(step.kernel((1, (EFFECTS["rudder_lag"],)), SCHEME, 1, True, part), InterpretedKernel)
+    assert isinstance(
+        step.kernel((1, (EFFECTS["rudder_lag"],)), SCHEME, 1, True, part), InterpretedKernel
+    )
     (result,) = results(cache)
     assert not result["passed"]
     assert max(result["errors"].values()) > 1e-9
