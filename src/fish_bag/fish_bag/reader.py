@@ -16,6 +16,7 @@ from fish_bag.bag import (
     read_bag,
 )
 from fish_bag.decode import PATH_ROLE, PATH_TYPE, ROLES
+from fish_bag.definitions import types_of
 from fish_bag.namespace import find_namespace, full_name
 from fish_bag.problem import Problem, RecordingError
 from fish_bag.streams import (
@@ -38,6 +39,8 @@ from fish_bag.trial import (
     TopicSummary,
     Trial,
 )
+
+LONGEST_NS = 30 * 24 * 3600 * 10**9  # of a recording; arrivals farther from the median are wrong
 
 
 def read_trial(path: Path | str, topics: TopicMap | None = None) -> Trial:
@@ -71,7 +74,7 @@ class _Assembly:
 
     def __init__(self, bag: RawBag, topics: TopicMap) -> None:
         self.bag, self.topics = bag, topics
-        self.problems: list[Problem] = []
+        self.problems = [Problem("warning", "storage", "", note) for note in bag.notes]
         names = [raw.topic for raw in bag.topics]
         try:
             found = topics.namespace
@@ -89,7 +92,7 @@ class _Assembly:
             raise RecordingError(
                 f"{self.bag.path}: none of the robot's topics can be read; it holds {held}{advice}"
             )
-        arrivals = np.concatenate([raw.arrival_ns for raw in self.bag.topics])
+        arrivals = self.arrivals()
         stamps = [m.stamps for m in mapped.values() if m.stamps is not None]
         axis = build_axis(stamps, int(arrivals.min()), self.topics.max_latency_s)
         streams: dict[str, Any] = {role: self.stream(role, m, axis) for role, m in mapped.items()}
@@ -130,12 +133,21 @@ class _Assembly:
             self.problems += checks.missing(role, name, rule.required)
         return next((raw for raw in there if raw.type == expected), None)
 
+    def arrivals(self) -> np.ndarray:
+        """(N,) plausible times of arrival of the topics that have a role, or of all topics; int64 ns."""
+        names = {full_name(self.namespace, rule.topic) for rule in self.topics.rules.values()}
+        mapped = [raw.arrival_ns for raw in self.bag.topics if raw.topic in names and raw.raws]
+        arrivals = np.concatenate(mapped or [raw.arrival_ns for raw in self.bag.topics])
+        plausible = np.abs(arrivals - np.median(arrivals)) < LONGEST_NS
+        return np.asarray(arrivals[plausible] if plausible.any() else arrivals)
+
     def decode(self) -> dict[str, _Mapped]:
         mapped = {}
         for role, rule in self.topics.rules.items():
             raw = None if role == PATH_ROLE else self.topic_of(role)
             if raw is not None:
-                decoded = decode_topic(raw, ROLES[role], self.bag.types, self.bag.ros1)
+                self.check_definition(raw)
+                decoded = decode_topic(raw, ROLES[role])
                 if decoded.arrays:
                     mapped[role] = _Mapped(rule, decoded, self.stamps(rule, decoded))
                 else:
@@ -144,6 +156,16 @@ class _Assembly:
                         Problem("error", "unreadable", raw.topic, text, len(raw.raws))
                     )
         return mapped
+
+    def check_definition(self, raw: RawTopic) -> None:
+        """Say what is wrong with the recorded definition of a topic's type, or with its serialisation."""
+        wrong = types_of(raw.stored)[1]
+        if wrong:
+            text = f"{raw.type}: {wrong}; the usual definition of that name is used"
+            self.problems.append(Problem("warning", "definition", raw.topic, text))
+        if raw.stored.serialization not in ("cdr", "ros1"):
+            text = f"serialised as {raw.stored.serialization!r}; expected cdr"
+            self.problems.append(Problem("error", "serialization", raw.topic, text))
 
     def stamps(self, rule: TopicRule, decoded: Decoded) -> Stamps | None:
         """Stamps to go by; None where the map says arrival, there is no header, or stamps were never set."""
@@ -183,9 +205,7 @@ class _Assembly:
             return ()
         expected, times = self.topics.rules[PATH_ROLE].frame, axis.arrived(raw.arrival_ns)
         paths = []
-        for t, path in zip(
-            times.tolist(), decode_paths(raw, self.bag.types, self.bag.ros1), strict=True
-        ):
+        for t, path in zip(times.tolist(), decode_paths(raw), strict=True):
             if path is None:
                 text = f"a path cannot be decoded as {raw.type}"
                 self.problems.append(Problem("error", "unreadable", raw.topic, text, t=t))
@@ -203,7 +223,7 @@ class _Assembly:
         }
         role = roles.get(raw.topic, "")
         clock = self.topics.rules[role].clock if role else "robot"
-        stamp_ns = stamps_of_prefixes(raw, self.bag.types, self.bag.ros1)
+        stamp_ns = stamps_of_prefixes(raw)
         t_arrival = axis.arrived(raw.arrival_ns)
         t = t_arrival if stamp_ns is None else axis.measured(clock, stamp_ns)
         return summarise(raw, role, t, t_arrival, stamp_ns is not None)
