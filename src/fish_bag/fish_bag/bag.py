@@ -206,7 +206,7 @@ def _complete_metadata(bag: RawBag, found: RecordingFiles, contents: list[Conten
         if part.metadata:
             bag.metadata |= parse_metadata(part.metadata).custom
         bag.metadata |= part.custom
-    bag.notes = found.notes + bag.notes
+    bag.notes = (["; ".join(found.notes)] if found.notes else []) + bag.notes
     if found.stated is None:
         return
     bag.metadata |= found.stated.custom

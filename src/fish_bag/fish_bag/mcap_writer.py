@@ -107,22 +107,28 @@ class McapRecording:
 
         Raises:
             RecordingError: the type is unknown.
+            DiskFullError: the open chunk could not be written; the recording has been closed.
 
         """
         kind = message_type(msgtype) if isinstance(msgtype, str) else msgtype
         if (name, kind) in self.topics:
             return self.topics[name, kind]
-        if kind not in self._schema_ids:
-            self._schema_ids[kind] = self._writer.register_schema(
-                kind.name, kind.encoding, kind.definition
-            )
         qos = qos or Qos()
-        channel = self._writer.register_channel(
-            name,
-            kind.serialization,
-            self._schema_ids[kind],
-            {"offered_qos_profiles": yaml.safe_dump(qos.profiles(), sort_keys=False)},
-        )
+        profiles = yaml.safe_dump(qos.profiles(), sort_keys=False)
+        before = self._file.size
+        with self._closing_when_full():
+            if kind not in self._schema_ids:
+                self._schema_ids[kind] = self._writer.register_schema(
+                    kind.name, kind.encoding, kind.definition
+                )
+            channel = self._writer.register_channel(
+                name,
+                kind.serialization,
+                self._schema_ids[kind],
+                {"offered_qos_profiles": profiles},
+            )
+        if self._file.size != before:
+            self._chunk_is_written()
         topic = self.topics[name, kind] = Topic(name, channel, kind, qos)
         return topic
 

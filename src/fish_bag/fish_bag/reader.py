@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,13 @@ from fish_bag.bag import (
     is_pool_bag,
     read_bag,
 )
-from fish_bag.decode import PATH_ROLE, PATH_TYPE, ROLES
+from fish_bag.decode import NOT_MEASURED, PATH_ROLE, PATH_TYPE, ROLES
 from fish_bag.definitions import types_of
+from fish_bag.message_types import typestore
 from fish_bag.namespace import find_namespace, full_name
 from fish_bag.problem import Problem, RecordingError
+from fish_bag.publisher_checks import check_publishers
+from fish_bag.sensor_checks import check_sensors
 from fish_bag.streams import (
     Decoded,
     decode_paths,
@@ -40,6 +44,7 @@ from fish_bag.trial import (
     Trial,
 )
 
+MEASURED = ("commands", "encoder", "imu", "camera", "tail")  # roles with a steady rate
 LONGEST_NS = 30 * 24 * 3600 * 10**9  # of a recording; arrivals farther from the median are wrong
 
 
@@ -102,7 +107,7 @@ class _Assembly:
         self.problems += checks.check_excitation(streams.get("commands"))
         self.problems += checks.check_rotor_sign(streams.get("commands"), streams.get("encoder"))
         ends = axis.arrived(np.array([arrivals.min(), arrivals.max()]))
-        return Trial(
+        trial = Trial(
             name=self.bag.path.stem if self.bag.path.is_file() else self.bag.path.name,
             path=self.bag.path,
             origin_ns=axis.origin_ns,
@@ -112,10 +117,22 @@ class _Assembly:
             reference_paths=paths,
             clocks=tuple(axis.clocks.values()),
             topics=tuple(self.summary(raw, axis) for raw in self.bag.topics if raw.raws),
-            problems=tuple(sorted(self.problems, key=checks.by_severity)),
             metadata=self.bag.metadata,
             **streams,
         )
+        problems = [*self.problems, *self.foreign_topics(), *check_sensors(trial)]
+        return replace(trial, problems=tuple(sorted(problems, key=checks.by_severity)))
+
+    def foreign_topics(self) -> Iterator[Problem]:
+        """A note on every topic that cannot be decoded and need not be."""
+        known = {full_name(self.namespace, rule.topic) for rule in self.topics.rules.values()}
+        for raw in self.bag.topics:
+            usual = raw.stored.serialization in ("cdr", "ros1")
+            if raw.topic in known or (usual and raw.type in typestore(raw.ros1).fielddefs):
+                continue
+            kind = f"{raw.type or 'an unknown type'} ({raw.stored.serialization or 'no encoding'})"
+            text = f"{len(raw.raws)} messages of {kind} are counted, not decoded"
+            yield Problem("info", "foreign_topic", raw.topic, text, len(raw.raws))
 
     def topic_of(self, role: str) -> RawTopic | None:
         """The recorded topic of a role, None if it is missing or of another type (both are said)."""
@@ -185,7 +202,7 @@ class _Assembly:
         plausible = np.ones(len(t), bool) if stamps is None else stamps.plausible
         flags = checks.flag_samples(role, decoded, rule, t, plausible, stamps is not None)
         frame = "" if decoded.frames is None else str(decoded.frames[0])
-        values: dict[str, Any] = dict(decoded.arrays)
+        values: dict[str, Any] = {k: v for k, v in decoded.arrays.items() if k != NOT_MEASURED}
         if ROLES[role].names:
             values["names"] = decoded.names
         values |= {
@@ -197,6 +214,8 @@ class _Assembly:
         }
         stream = ROLES[role].stream(**values)
         self.problems += checks.check_stream(stream, rule, decoded.frames)
+        if role in MEASURED:
+            self.problems += check_publishers(stream)
         return stream
 
     def paths(self, axis: TimeAxis) -> tuple[ReferencePath, ...]:

@@ -111,7 +111,7 @@ def _stated_files(path: Path, stated: StatedMetadata) -> RecordingFiles:
     else:  # a recorder that was killed has not named its last part yet
         stems = {part_order(file)[0] for file in listed if part_order(file)[1] >= 0}
         taken = [f for f in others if part_order(f)[1] >= 0 and part_order(f)[0] in stems]
-    if taken:
+    if taken and stated.files:
         notes.append(f"{_names(taken)} read though {FILE_NAME} does not name it")
     left = [file for file in others if file not in taken]
     if left:

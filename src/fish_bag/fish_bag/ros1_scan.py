@@ -72,7 +72,7 @@ class _Scan:
             position = self.step(position)
         self.contents.drop_undefined()
         if not self.indexed:
-            self.lost.append("no whole message, but the bag was not closed and has no index")
+            self.lost.insert(0, "a ROS 1 bag without index, as it was not closed")
         elif not self.lost:
             self.contents.compare_counts(dict(self.counts), "its index")
 

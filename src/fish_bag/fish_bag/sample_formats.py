@@ -96,16 +96,19 @@ def write_by_library(
 
 def write_sqlite_with_log(directory: Path, messages: list[Message]) -> Path:
     """A sqlite3 recording whose recorder was killed: half of the messages stand in the write-ahead log."""
-    whole = write_rosbag2(directory, messages, StoragePlugin.SQLITE3)
+    half = len(messages) // 2
+    whole = write_rosbag2(directory, messages[:half], StoragePlugin.SQLITE3)
     file = whole / f"{whole.name}.db3"
     connection = sqlite3.connect(file)
     connection.execute("PRAGMA journal_mode=WAL")
-    half = connection.execute("SELECT max(id) / 2 FROM messages").fetchone()[0]
-    late = connection.execute("SELECT * FROM messages WHERE id > ?", (half,)).fetchall()
-    connection.execute("DELETE FROM messages WHERE id > ?", (half,))
-    connection.commit()
-    connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-    connection.executemany("INSERT INTO messages VALUES (?, ?, ?, ?)", late)
+    topics = dict(connection.execute("SELECT name, id FROM topics"))
+    late = [
+        (topics[topic], time_ns, bytes(typestore().serialize_cdr(message, message.__msgtype__)))
+        for time_ns, topic, message in messages[half:]
+    ]
+    connection.executemany(
+        "INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", late
+    )
     connection.commit()
     companion = Path(f"{file}-wal")
     kept = companion.read_bytes()

@@ -22,11 +22,14 @@ Value = int | str | bytes | None
 
 @dataclass(frozen=True)
 class Row:
-    """One row: its number, its columns, and the byte of the file after it."""
+    """One row: its number, its columns, the byte of the file after it, and whether zeros follow it in its page."""
 
     number: int
     values: tuple[Value, ...]
     end: int
+    zeros_follow: (
+        bool  # packed rows do not leave room, so that the row's end may be zeros by damage
+    )
 
 
 def rows(data: Buffer) -> Iterator[Row]:
@@ -71,7 +74,7 @@ def _row(data: Buffer, at: int, page_end: int, page_bytes: int, usable: int) -> 
         return None
     payload = bytes(data[at:end])
     following = int.from_bytes(data[end : end + 4], "big") if local < size else 0
-    last = end
+    zeros_follow = not any(data[end : end + 2])
     while len(payload) < size:
         page = (following - 1) * page_bytes
         take = min(size - len(payload), usable - 4)
@@ -82,7 +85,7 @@ def _row(data: Buffer, at: int, page_end: int, page_bytes: int, usable: int) -> 
         payload += bytes(data[page + 4 : last])
         end = max(end, last)
     values = _values(payload)
-    return None if values is None else Row(number, values, end)
+    return None if values is None else Row(number, values, end, zeros_follow)
 
 
 def _values(payload: bytes) -> tuple[Value, ...] | None:

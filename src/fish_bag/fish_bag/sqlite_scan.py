@@ -163,13 +163,13 @@ def _read_pages(data: bytes, contents: Contents) -> None:
 
 
 def _keep_whole(found: dict[int, Row], contents: Contents, content_end: int) -> None:
-    """Take the messages in order of their rows, but none that reaches into the zeros at the file's end."""
+    """Take the messages in order of their rows, but none that reaches into zeros that damage has left."""
     late: list[tuple[int, int, bytes]] = []
     for _, row in sorted(found.items()):
         _, topic, time_ns, raw = row.values
         if not (isinstance(topic, int) and isinstance(time_ns, int) and isinstance(raw, bytes)):
             continue
-        if row.end > content_end:
+        if row.end > content_end or row.zeros_follow:
             late.append((topic, time_ns, raw))
         else:
             contents.messages.setdefault(topic, Messages()).add(time_ns, raw)
@@ -177,4 +177,4 @@ def _keep_whole(found: dict[int, Row], contents: Contents, content_end: int) -> 
         if ends_like_others(raw, contents.messages.setdefault(topic, Messages()).raws):
             contents.messages[topic].add(time_ns, raw)
         else:
-            contents.lost.append("a message that reaches into the zeros at the file's end")
+            contents.lost.append("a message that reaches into zeros")

@@ -95,7 +95,12 @@ def end_of_content(data: Buffer) -> int:
 def ends_like_others(raw: bytes, others: list[bytes]) -> bool:
     """Whether a message that reaches into zeros ends in no more zero bytes than the others of its topic do.
 
-    Then its own bytes are zeros there as well, and it is whole. Without others nothing is known: False.
+    Then its own bytes are zeros there as well, and it is whole. False also where nothing is known: without others, or
+    where all of it is zeros.
     """
     own = len(raw) - len(raw.rstrip(b"\0"))
-    return bool(others) and own <= min(len(o) - len(o.rstrip(b"\0")) for o in others[-100:])
+    return (
+        bool(others)
+        and own < len(raw)
+        and own <= min(len(o) - len(o.rstrip(b"\0")) for o in others[-100:])
+    )
