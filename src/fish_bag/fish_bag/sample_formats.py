@@ -95,8 +95,9 @@ def write_by_library(
 
 
 def write_sqlite_with_log(directory: Path, messages: list[Message]) -> Path:
-    """A sqlite3 recording whose recorder was killed: half of the messages stand in the write-ahead log."""
-    half = len(messages) // 2
+    """A sqlite3 recording whose recorder was killed: at most half of the messages stand in the write-ahead log."""
+    topics_at = {topic: i for i, (_, topic, _) in reversed(list(enumerate(messages)))}
+    half = max(len(messages) // 2, *(i + 1 for i in topics_at.values()))  # with every topic
     whole = write_rosbag2(directory, messages[:half], StoragePlugin.SQLITE3)
     file = whole / f"{whole.name}.db3"
     connection = sqlite3.connect(file)

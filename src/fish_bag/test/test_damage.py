@@ -29,7 +29,7 @@ SOME = settings(
 @pytest.fixture(scope="module")
 def wholes(tmp_path_factory):
     """A small recording in every format."""
-    folder, messages = tmp_path_factory.mktemp("whole"), samples.robot_messages(0.1)
+    folder, messages = tmp_path_factory.mktemp("whole"), samples.robot_messages(0.15)
     return {
         name: make_sample(name, write(folder / name.replace(" ", "_"), messages))
         for name, write in WRITERS.items()
