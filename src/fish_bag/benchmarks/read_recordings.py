@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -21,9 +20,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from fish_bag import find_trials, read_dataset
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "test"))
-from recording_samples import robot_messages, write_mcap
+from fish_bag.sample_recordings import robot_messages, write_mcap
 
 TOPICS = ("joint_command", "joint_states", "imu/data", "camera/pose", "battery_state")
 

@@ -1,37 +1,50 @@
-"""Raw contents of a recording file or directory, through rosbags: bytes and arrival times per topic."""
+"""Raw contents of one recording, whatever its format: bytes and arrival times of every topic."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import tempfile
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import numpy as np
-from rosbags import rosbag1, rosbag2
-from rosbags.interfaces import Connection, MessageDefinitionFormat
-from rosbags.interfaces.typing import Typesdict
-from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
-from fish_bag.message_types import typestore
+from fish_bag.compression import DAMAGE as PACKING_DAMAGE
+from fish_bag.compression import name_by_magic, unpack, unpack_message
+from fish_bag.mcap_scan import scan_mcap
 from fish_bag.problem import RecordingError
+from fish_bag.recording_files import RecordingFiles, bare_name, file_kind, find_files
+from fish_bag.ros1_scan import scan_ros1
+from fish_bag.sqlite_scan import scan_sqlite
+from fish_bag.stated_metadata import parse_metadata
+from fish_bag.storage import Buffer, Contents, Keep, StoredTopic
 
 STAMP_PREFIX = 16  # bytes kept of messages nobody decodes: enough for the stamp of a header
-PARTS = (".mcap", ".db3")  # of files in a rosbag2 folder
-SUFFIXES = (*PARTS, ".bag")
+LATEST_NS = 2**63 - 1
 
 
 @dataclass
 class RawTopic:
     """Messages of one topic in order of arrival."""
 
-    topic: str
-    type: str
+    stored: StoredTopic
     arrival_ns: np.ndarray  # (N,) int64
     raws: list[bytes]  # whole messages, or the first STAMP_PREFIX bytes where `whole` is False
     whole: bool
+
+    @property
+    def topic(self) -> str:
+        return self.stored.name
+
+    @property
+    def type(self) -> str:
+        return self.stored.type
+
+    @property
+    def ros1(self) -> bool:
+        return self.stored.serialization == "ros1"
 
 
 @dataclass
@@ -39,34 +52,14 @@ class RawBag:
     """Everything the reader needs of one recording."""
 
     path: Path
-    ros1: bool
-    types: Typesdict
     topics: list[RawTopic]
     metadata: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)  # what is odd about files and counts
+    lost: list[str] = field(default_factory=list)  # what cannot be read
 
     @property
     def count(self) -> int:
         return sum(len(topic.raws) for topic in self.topics)
-
-
-def is_recording(path: Path) -> bool:
-    """Whether `path` looks like one recording (not: is readable)."""
-    if path.is_dir():
-        return (path / "metadata.yaml").exists() or bool(parts(path))
-    return path.suffix in SUFFIXES
-
-
-def parts(folder: Path) -> list[Path]:
-    """Storage files of the one recording in a folder without metadata.yaml; [] where they are recordings of their own.
-
-    rosbag2 splits a long recording into <folder>_0, <folder>_1 and so on.
-    """
-    inside = sorted(folder.iterdir())
-    files = [p for p in inside if p.suffix in PARTS]
-    split = re.compile(rf"{re.escape(folder.name)}_\d+")
-    own = len(files) == 1 or all(split.fullmatch(file.stem) for file in files)
-    beside = bool(files) and any(is_recording(p) for p in inside if p.is_dir())
-    return files if own and not beside else []
 
 
 def is_pool_bag(bag: RawBag) -> bool:
@@ -75,7 +68,7 @@ def is_pool_bag(bag: RawBag) -> bool:
 
 
 def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
-    """Read one recording.
+    """Read one recording that is whole.
 
     Args:
         path: rosbag2 directory, bare .mcap or .db3 file, or ROS 1 .bag file.
@@ -84,15 +77,11 @@ def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
     Raises:
         RecordingError: nothing there, empty, truncated or not a recording; the text says what to do.
     """
-    source = storage(path)
-    ros1 = source.suffix == ".bag"
-    with damage_is_said(path), (rosbag1.Reader if ros1 else rosbag2.Reader)(source) as reader:
-        topics = _collect(reader, wanted)
-        types = _types(reader.connections, ros1)
-        metadata = (
-            {} if isinstance(reader, rosbag1.Reader) else reader.storage.metadata.custom or {}
-        )
-    bag = RawBag(path, ros1, types, topics, {str(k): str(v) for k, v in metadata.items()})
+    bag = salvage_bag(path, wanted)
+    if bag.lost:
+        said = "; ".join(bag.lost)
+        advice = f"'robofish recover {path}' saves what is left" if bag.count else "nothing is left"
+        raise RecordingError(f"{path}: truncated or damaged ({said}); {advice}")
     if not bag.count:
         raise RecordingError(
             f"{path}: the recording holds no messages; was anything published while it ran?"
@@ -100,100 +89,133 @@ def read_bag(path: Path, wanted: Callable[[str, str], bool]) -> RawBag:
     return bag
 
 
-@contextmanager
-def damage_is_said(path: Path) -> Iterator[None]:
-    """Whatever rosbags stumbles into when it reads damaged bytes as a RecordingError that says what to do."""
+def salvage_bag(path: Path, wanted: Callable[[str, str], bool] = lambda *_: True) -> RawBag:
+    """Read what can be read of one recording; arguments and errors as those of `read_bag`."""
+
+    def keep(topic: StoredTopic) -> int | None:
+        return None if wanted(topic.name, topic.type) else STAMP_PREFIX
+
+    found = find_files(path)
+    contents = []
+    for file in found.files:
+        part = _scan_file(file, keep)
+        for said in (part.lost, part.notes):
+            said[:] = [f"{file.name}: {text}" for text in said]
+        contents.append(part)
+    bag = _joined(path, contents, wanted)
+    _complete_metadata(bag, found, contents)
+    return bag
+
+
+def _scan_file(path: Path, keep: Keep) -> Contents:
+    """Contents of one storage file."""
     try:
-        yield
+        size = path.stat().st_size
+        if not size:
+            return Contents(lost=["the file is empty (0 bytes)"])
+        with path.open("rb") as file:
+            data = mmap(file.fileno(), 0, access=ACCESS_READ)
+        return _scan_data(path, data, keep)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # of every kind, as damaged bytes lead anywhere
-        raise RecordingError(
-            f"{path}: {_advice(path, str(error) or type(error).__name__)}"
-        ) from error
 
 
-def storage(path: Path) -> Path:
-    """The path rosbags can open: the directory, or the only storage file of one without metadata.yaml."""
-    if not path.exists():
-        raise RecordingError(f"{path}: does not exist")
-    if path.is_file():
-        if path.suffix not in SUFFIXES:
-            raise RecordingError(
-                f"{path}: not a recording; expected a rosbag2 directory or a file {', '.join(SUFFIXES)}"
-            )
-        if not path.stat().st_size:
-            raise RecordingError(f"{path}: the file is empty (0 bytes)")
-        return path
-    if (path / "metadata.yaml").exists():
-        return path
-    files = sorted(p for p in path.iterdir() if p.suffix in SUFFIXES)
-    if len(files) == 1:
-        return files[0]
-    if parts(path):
-        advice = f"'robofish recover {path}' writes a new metadata.yaml"
-    else:
-        advice = "give one of the recordings in it" if files else "there is no recording in it"
-    raise RecordingError(
-        f"{path}: no metadata.yaml and {len(files)} storage files; expected a rosbag2 directory; {advice}"
-    )
+def _scan_data(path: Path, data: Buffer, keep: Keep) -> Contents:
+    kind = file_kind(path, data)
+    if kind == "mcap":
+        return scan_mcap(data, keep)
+    if kind == "ros1":
+        return scan_ros1(data, keep)
+    if kind == "sqlite3":
+        return scan_sqlite(path, keep)
+    try:
+        unpacked, whole = unpack(kind, bytes(data))
+    except PACKING_DAMAGE as error:
+        return Contents(lost=[f"its compression {kind} cannot be undone ({error})"])
+    with tempfile.TemporaryDirectory() as folder:
+        inner = Path(folder) / bare_name(path.name)
+        inner.write_bytes(unpacked)
+        contents = _scan_file(inner, keep) if unpacked else Contents()
+    if not whole:
+        contents.lost.insert(0, f"the end of what {kind} packed")
+    return contents
 
 
-def _collect(
-    reader: rosbag1.Reader | rosbag2.Reader, wanted: Callable[[str, str], bool]
-) -> list[RawTopic]:
-    """All messages by topic and type (a topic with two types gives two entries)."""
-    keep: dict[int, bool] = {}
-    raws: dict[tuple[str, str], list[bytes]] = {}
-    times: dict[tuple[str, str], list[int]] = {}
-    slots: dict[int, tuple[list[bytes], list[int]]] = {}
-    for c in reader.connections:
-        key = (c.topic, c.msgtype)
-        slots[c.id] = (raws.setdefault(key, []), times.setdefault(key, []))
-        keep[c.id] = wanted(*key)
-    for connection, arrival, raw in reader.messages():
-        bucket, stamps = slots[connection.id]
-        bucket.append(raw if keep[connection.id] else raw[:STAMP_PREFIX])
-        stamps.append(arrival)
-    return [
-        RawTopic(
-            topic, msgtype, np.array(times[topic, msgtype], np.int64), raw, wanted(topic, msgtype)
+def _joined(path: Path, contents: list[Contents], wanted: Callable[[str, str], bool]) -> RawBag:
+    """All channels of all files by topic, type and serialisation (two types on a topic give two entries)."""
+    stored: dict[tuple[str, str, str], StoredTopic] = {}
+    times: dict[tuple[str, str, str], list[int]] = {}
+    raws: dict[tuple[str, str, str], list[bytes]] = {}
+    for part in contents:
+        for channel, topic in part.topics.items():
+            key = (topic.name, topic.type, topic.serialization)
+            if not stored.setdefault(key, topic).definition and topic.definition:
+                stored[key] = topic
+            found = part.messages.get(channel)
+            times.setdefault(key, []).extend(found.times if found else ())
+            raws.setdefault(key, []).extend(found.raws if found else ())
+    bag = RawBag(path, [])
+    for key, topic in stored.items():
+        arrival_ns, out_of_range = _nanoseconds(times[key])
+        if out_of_range:
+            bag.notes.append(f"{topic.name}: {out_of_range} times of arrival are out of range")
+        order = np.argsort(arrival_ns, kind="stable")
+        if (np.diff(order) != 1).any():
+            arrival_ns, raws[key] = arrival_ns[order], [raws[key][i] for i in order]
+        whole = wanted(topic.name, topic.type)
+        raw = RawTopic(topic, arrival_ns, raws[key], whole)
+        _unpack_messages(raw, bag.lost)
+        bag.topics.append(raw)
+    bag.lost += [text for part in contents for text in part.lost]
+    bag.notes += [text for part in contents for text in part.notes]
+    return bag
+
+
+def _nanoseconds(times: list[int]) -> tuple[np.ndarray, int]:
+    """(N,) int64 of times, and how many do not fit into it (they are set to its limit)."""
+    try:
+        return np.array(times, np.int64), 0
+    except OverflowError:
+        fitting = [min(time, LATEST_NS) for time in times]
+        return np.array(fitting, np.int64), sum(time > LATEST_NS for time in times)
+
+
+def _unpack_messages(raw: RawTopic, lost: list[str]) -> None:
+    """Undo the compression of single messages (rosbag2's compression mode `message`)."""
+    if raw.stored.serialization not in ("cdr", "ros1") or not any(
+        map(name_by_magic, raw.raws[:1] + raw.raws[-1:])
+    ):
+        return
+    if not raw.whole:  # its beginning says nothing
+        raw.raws = [b""] * len(raw.raws)
+        return
+    unpacked = [unpack_message(message) for message in raw.raws]
+    good = [i for i, message in enumerate(unpacked) if message is not None]
+    if len(good) < len(unpacked):
+        lost.append(
+            f"{raw.topic}: {len(unpacked) - len(good)} messages whose compression cannot be undone"
         )
-        for (topic, msgtype), raw in raws.items()
-    ]
+    raw.arrival_ns = raw.arrival_ns[good]
+    raw.raws = [message for message in unpacked if message is not None]
 
 
-def _types(connections: list[Connection], ros1: bool) -> Typesdict:
-    """Definitions stored with the recording, on top of the usual ones."""
-    types: Typesdict = dict(typestore(ros1).fielddefs)
-    for connection in connections:
-        if connection.msgdef.format != MessageDefinitionFormat.NONE:
-            types.update(
-                _definition(connection.msgtype, connection.msgdef.format, connection.msgdef.data)
-            )
-    return types
-
-
-@lru_cache(maxsize=256)
-def _definition(msgtype: str, form: MessageDefinitionFormat, text: str) -> Typesdict:
-    """Parsed definition; the same texts come again with every trial of a data set."""
-    if form == MessageDefinitionFormat.MSG:
-        return get_types_from_msg(text, msgtype)
-    types: Typesdict = {}
-    for part in text.split("=" * 80 + "\n"):
-        idl = part.split("\n", 1)[1] if part.startswith("IDL: ") else part
-        if idl.strip():
-            types.update(get_types_from_idl(idl))
-    return types
-
-
-def _advice(path: Path, error: str) -> str:
-    """What the reader said, in one line, and what can be done about it."""
-    error = " ".join(error.split())
-    if "empty" in error:
-        return "the file is empty"
-    if path.suffix == ".bag":
-        return f"not a complete ROS 1 bag ({error.rstrip('.')}); mend it with 'rosbag reindex'"
-    return (
-        f"truncated or damaged ({error.rstrip('.')}); 'robofish recover {path}' saves what is left"
-    )
+def _complete_metadata(bag: RawBag, found: RecordingFiles, contents: list[Contents]) -> None:
+    """Custom data, notes on files, and the comparison of the stated counts with what was read."""
+    for part in contents:
+        if part.metadata:
+            bag.metadata |= parse_metadata(part.metadata).custom
+        bag.metadata |= part.custom
+    bag.notes = (["; ".join(found.notes)] if found.notes else []) + bag.notes
+    if found.stated is None:
+        return
+    bag.metadata |= found.stated.custom
+    read: Counter[tuple[str, str]] = Counter()
+    for raw in bag.topics:
+        read[raw.topic, raw.type] += len(raw.raws)
+    if found.stated.counts is not None:
+        for topic in sorted(set(found.stated.counts) | set(read)):
+            said, have = found.stated.counts.get(topic, 0), read[topic]
+            if said != have:
+                bag.notes.append(
+                    f"{topic[0]}: {have} messages were read, metadata.yaml says {said}"
+                )

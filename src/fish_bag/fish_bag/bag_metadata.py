@@ -16,12 +16,10 @@ from fish_bag.qos import Qos
 class RecordedTopic(Protocol):
     """What is said of a topic."""
 
+    name: str
     message_type: MessageType
     qos: Qos
     count: int
-
-    @property
-    def name(self) -> str: ...
 
 
 def write_metadata(
@@ -70,7 +68,7 @@ def _topic(topic: RecordedTopic) -> dict[str, Any]:
         "topic_metadata": {
             "name": topic.name,
             "type": topic.message_type.name,
-            "serialization_format": "cdr",
+            "serialization_format": topic.message_type.serialization,
             "offered_qos_profiles": topic.qos.profiles(),
             "type_description_hash": topic.message_type.hash,
         },

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fish_bag.clock import ClockEstimate
-from fish_bag.decode import ROLES
+from fish_bag.decode import ABSENT_COLUMNS, ROLES
+from fish_bag.decode import NOT_MEASURED as NOT_MEASURED_ARRAY
 from fish_bag.jumps import find_jumps
 from fish_bag.problem import SEVERITIES, Problem
 from fish_bag.streams import Decoded
@@ -17,6 +18,7 @@ from fish_bag.trial import (
     DUPLICATE,
     JUMP,
     NOT_FINITE,
+    NOT_MEASURED,
     TIME_BACK,
     UNREADABLE,
     WRONG_FRAME,
@@ -40,6 +42,11 @@ FLAG_TEXTS = {
     NOT_FINITE: ("warning", "nan", "messages carry NaN, infinity or lack a value"),
     JUMP: ("warning", "jump", "poses lie far from those before and after"),
     BAD_STAMP: ("warning", "bad_stamp", "stamps are zero or far from the rest"),
+    NOT_MEASURED: (
+        "warning",
+        "not_measured",
+        "messages say by a covariance of -1 that gyro or accelerometer are not measured; they are used nowhere",
+    ),
     UNREADABLE: ("error", "unreadable", "messages cannot be decoded"),
 }
 
@@ -65,7 +72,13 @@ def flag_samples(
     flags[plausible & (t < latest)] |= TIME_BACK
     for name, values in decoded.arrays.items():
         if name not in ROLES[role].optional:
-            flags[~np.isfinite(values).reshape(len(t), -1).all(axis=1)] |= NOT_FINITE
+            bad = ~np.isfinite(values).reshape(len(t), -1).all(axis=1)
+            if NOT_MEASURED_ARRAY in decoded.arrays and name in ABSENT_COLUMNS:
+                column = decoded.arrays[NOT_MEASURED_ARRAY][:, ABSENT_COLUMNS.index(name)]
+                absent = column == 1
+                flags[absent] |= NOT_MEASURED
+                bad &= ~absent
+            flags[bad] |= NOT_FINITE
     if rule.frame and decoded.frames is not None:
         flags[decoded.frames != rule.frame] |= WRONG_FRAME
     if ROLES[role].stream is Camera:

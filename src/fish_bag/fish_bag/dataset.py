@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from fish_bag.bag import is_recording
 from fish_bag.problem import Problem, RecordingError
 from fish_bag.reader import read_trial
+from fish_bag.recording_files import is_recording
 from fish_bag.topic_map import TopicMap
 from fish_bag.trial import DataSet, Trial
 from fish_report.worker_pool import worker_pool

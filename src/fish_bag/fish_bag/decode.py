@@ -24,6 +24,8 @@ from fish_bag.trial import (
 )
 
 POSE_ROWS = np.array([0, 1, 5])  # x, y, rotation about z in a 6x6 covariance (REP 103 order)
+NOT_MEASURED = "not_measured"  # array beside those of a stream: (n, 2) for ABSENT_COLUMNS
+ABSENT_COLUMNS = ("gyro", "accel")
 Arrays = dict[str, np.ndarray]
 
 
@@ -64,11 +66,22 @@ def imu(block: Block) -> Arrays:
     quaternion = np.column_stack([block.values[f"orientation.{k}"] for k in "xyzw"])
     absent = (block.values["orientation_covariance"][:, 0] == -1) | ~quaternion.any(axis=1)
     quaternion[absent] = np.nan
+    gyro, no_gyro = _measured(block, "angular_velocity")
+    accel, no_accel = _measured(block, "linear_acceleration")
     return {
-        "gyro": vector(block, "angular_velocity"),
-        "accel": vector(block, "linear_acceleration"),
+        "gyro": gyro,
+        "accel": accel,
         "orientation": quaternion,
+        NOT_MEASURED: np.column_stack([no_gyro, no_accel]),
     }
+
+
+def _measured(block: Block, path: str) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) of a vector, NaN where its covariance says that it is not measured; and (n,) where it says so."""
+    values = vector(block, path).astype(float)
+    absent = block.values[f"{path}_covariance"][:, 0] == -1
+    values[absent] = np.nan
+    return values, absent
 
 
 def camera(block: Block) -> Arrays:

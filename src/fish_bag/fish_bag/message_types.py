@@ -16,9 +16,10 @@ class MessageType:
     """A type as it stands in an MCAP schema and in metadata.yaml."""
 
     name: str  # "sensor_msgs/msg/Imu"
-    definition: str  # concatenated text of the type and those it uses
+    definition: bytes  # concatenated text of the type and those it uses
     hash: str = ""  # RIHS01, "" if not known
     encoding: str = "ros2msg"  # of the definition
+    serialization: str = "cdr"  # of the messages
 
 
 @lru_cache(maxsize=2)
@@ -39,4 +40,9 @@ def message_type(name: str) -> MessageType:
             f"message type {name!r} is not one of the common interfaces of ROS 2 Jazzy"
         )
     text, _ = typestore().generate_msgdef(name, ros_version=2)
-    return MessageType(name, text, typestore().hash_rihs01(name))
+    return MessageType(name, text.encode(), typestore().hash_rihs01(name))
+
+
+def ros2_type_name(name: str) -> str:
+    """ROS 2's spelling of a type name: "sensor_msgs/Imu" of ROS 1 becomes "sensor_msgs/msg/Imu"."""
+    return name.replace("/", "/msg/") if name.count("/") == 1 else name

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rosbags import rosbag2
-from rosbags.interfaces import Connection, ConnectionExtRosbag2, QosDurability, QosReliability
+import numpy as np
 
-from fish_bag.bag import damage_is_said, storage
+from fish_bag.bag import RawTopic, read_bag
 from fish_bag.problem import RecordingError
-from fish_bag.qos import Qos
 from fish_bag.recorder_config import is_selected
 
 
@@ -82,52 +80,37 @@ class Playback:
             raise RecordingError(
                 "parameter recording is empty: expected a rosbag2 folder or .mcap file"
             )
-        self._path = path = Path(config.recording).expanduser()
-        source = storage(path)
-        if source.suffix == ".bag":
+        path = Path(config.recording).expanduser()
+
+        def selected(topic: str, _: str = "") -> bool:
+            return is_selected(topic, config.topics, namespace) and not is_selected(
+                topic, config.exclude, namespace
+            )
+
+        bag = read_bag(path, selected)
+        if bag.topics and all(raw.ros1 for raw in bag.topics):
             raise RecordingError(
                 f"{path}: ROS 1 bags are not replayed; expected a rosbag2 folder or .mcap file"
             )
-        with damage_is_said(path):
-            self._reader = rosbag2.Reader(source)
-            self._reader.open()
-        self.connections = [
-            c
-            for c in self._reader.connections
-            if is_selected(c.topic, config.topics, namespace)
-            and not is_selected(c.topic, config.exclude, namespace)
-        ]
-        if not any(c.msgcount for c in self.connections):
-            held = ", ".join(sorted({c.topic for c in self._reader.connections})) or "nothing"
-            self.close()
+        self.notes = bag.notes
+        self.topics = [raw for raw in bag.topics if raw.raws and selected(raw.topic)]
+        if not self.topics:
+            held = ", ".join(sorted({raw.topic for raw in bag.topics})) or "nothing"
             raise RecordingError(f"{path}: no message on the selected topics; it holds {held}")
-        self.start_ns = self._reader.start_time
+        self.start_ns = min(int(raw.arrival_ns[0]) for raw in bag.topics if raw.raws)
 
-    def messages(self) -> Iterator[tuple[Connection, int, bytes]]:
-        """Connection, arrival [ns] and raw message; every call starts anew.
-
-        Raises:
-            RecordingError: the file is damaged from here on.
-        """
-        with damage_is_said(self._path):
-            yield from self._reader.messages(self.connections)
-
-    def close(self) -> None:
-        """Close the files."""
-        self._reader.close()
+    def messages(self) -> Iterator[tuple[RawTopic, int, bytes]]:
+        """Topic, arrival [ns] and raw message; every call starts anew."""
+        yield from in_order(self.topics)
 
 
-def offered_qos(connection: Connection) -> Qos:
-    """What the recorded publisher offered."""
-    profiles = (
-        connection.ext.offered_qos_profiles
-        if isinstance(connection.ext, ConnectionExtRosbag2)
-        else []
-    )
-    if not profiles:
-        return Qos()
-    return Qos(
-        reliable=profiles[0].reliability != QosReliability.BEST_EFFORT,
-        transient_local=profiles[0].durability == QosDurability.TRANSIENT_LOCAL,
-        depth=max(1, profiles[0].depth),
-    )
+def in_order(topics: Sequence[RawTopic]) -> Iterator[tuple[RawTopic, int, bytes]]:
+    """Topic, arrival [ns] and raw message of several topics in order of arrival."""
+    arrival_ns = np.concatenate([raw.arrival_ns for raw in topics])
+    which = np.repeat(np.arange(len(topics)), [len(raw.raws) for raw in topics])
+    places = np.concatenate([np.arange(len(raw.raws)) for raw in topics])
+    order = np.argsort(arrival_ns, kind="stable")
+    for time_ns, k, i in zip(
+        arrival_ns[order].tolist(), which[order].tolist(), places[order].tolist(), strict=True
+    ):
+        yield topics[k], time_ns, topics[k].raws[i]

@@ -17,12 +17,11 @@ import numpy as np
 
 from fish_bag import message_build as build
 from fish_bag.bag import RawBag, is_pool_bag, read_bag
-from fish_bag.layout import decode_blocks
 from fish_bag.mcap_writer import McapRecording
 from fish_bag.message_types import typestore
 from fish_bag.pool_rotor import RotorCommand, rebuild_rotor_command
 from fish_bag.problem import RecordingError
-from fish_bag.streams import NS_PER_S, decode_paths
+from fish_bag.streams import NS_PER_S, decode_paths, topic_blocks
 
 Message = tuple[int, str, Any]  # arrival [ns], topic, message
 
@@ -83,7 +82,7 @@ def import_bag(path: Path, out: Path) -> ImportReport:
         RecordingError: not one of these bags, or a topic is missing.
     """
     bag = read_bag(path, lambda topic, _: topic in (*SOURCES.values(), PATH_SOURCE))
-    if not (bag.ros1 and is_pool_bag(bag)):
+    if not (is_pool_bag(bag) and all(raw.ros1 for raw in bag.topics)):
         held = ", ".join(sorted(raw.topic for raw in bag.topics))
         raise RecordingError(f"{path}: not a recording of the paper's robot; it holds {held}")
     sources = {role: _source(bag, role, topic) for role, topic in SOURCES.items()}
@@ -116,7 +115,7 @@ def _source(bag: RawBag, role: str, topic: str) -> Source:
         raise RecordingError(
             f"{bag.path}: {topic} ({role}) is missing; nothing can be imported without it"
         )
-    blocks, unreadable = decode_blocks(raw.raws, raw.type, bag.types, ros1=True)
+    blocks, unreadable = topic_blocks(raw, raw.raws)
     if len(blocks) != 1 or len(unreadable):
         raise RecordingError(f"{bag.path}: {topic}: messages do not all fit {raw.type}")
     values = blocks[0].values
@@ -271,7 +270,7 @@ def _path(bag: RawBag) -> Iterator[Message]:
     """The reference polyline, on the pool's axes."""
     for raw in bag.topics:
         if raw.topic == PATH_SOURCE:
-            paths = decode_paths(raw, bag.types, ros1=True)
+            paths = decode_paths(raw)
             for arrival_ns, path in zip(raw.arrival_ns.tolist(), paths, strict=True):
                 if path is None:
                     raise RecordingError(

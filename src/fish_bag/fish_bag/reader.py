@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,13 @@ from fish_bag.bag import (
     is_pool_bag,
     read_bag,
 )
-from fish_bag.decode import PATH_ROLE, PATH_TYPE, ROLES
+from fish_bag.decode import NOT_MEASURED, PATH_ROLE, PATH_TYPE, ROLES
+from fish_bag.definitions import types_of
+from fish_bag.message_types import typestore
 from fish_bag.namespace import find_namespace, full_name
 from fish_bag.problem import Problem, RecordingError
+from fish_bag.publisher_checks import check_publishers
+from fish_bag.sensor_checks import check_sensors
 from fish_bag.streams import (
     Decoded,
     decode_paths,
@@ -38,6 +43,9 @@ from fish_bag.trial import (
     TopicSummary,
     Trial,
 )
+
+MEASURED = ("commands", "encoder", "imu", "camera", "tail")  # roles with a steady rate
+LONGEST_NS = 30 * 24 * 3600 * 10**9  # of a recording; arrivals farther from the median are wrong
 
 
 def read_trial(path: Path | str, topics: TopicMap | None = None) -> Trial:
@@ -70,7 +78,7 @@ class _Assembly:
 
     def __init__(self, bag: RawBag, topics: TopicMap) -> None:
         self.bag, self.topics = bag, topics
-        self.problems: list[Problem] = []
+        self.problems = [Problem("warning", "storage", "", note) for note in bag.notes]
         names = [raw.topic for raw in bag.topics]
         try:
             found = topics.namespace
@@ -88,7 +96,7 @@ class _Assembly:
             raise RecordingError(
                 f"{self.bag.path}: none of the robot's topics can be read; it holds {held}{advice}"
             )
-        arrivals = np.concatenate([raw.arrival_ns for raw in self.bag.topics])
+        arrivals = self.arrivals()
         stamps = [m.stamps for m in mapped.values() if m.stamps is not None]
         axis = build_axis(stamps, int(arrivals.min()), self.topics.max_latency_s)
         streams: dict[str, Any] = {role: self.stream(role, m, axis) for role, m in mapped.items()}
@@ -98,7 +106,7 @@ class _Assembly:
         self.problems += checks.check_excitation(streams.get("commands"))
         self.problems += checks.check_rotor_sign(streams.get("commands"), streams.get("encoder"))
         ends = axis.arrived(np.array([arrivals.min(), arrivals.max()]))
-        return Trial(
+        trial = Trial(
             name=self.bag.path.stem if self.bag.path.is_file() else self.bag.path.name,
             path=self.bag.path,
             origin_ns=axis.origin_ns,
@@ -108,10 +116,22 @@ class _Assembly:
             reference_paths=paths,
             clocks=tuple(axis.clocks.values()),
             topics=tuple(self.summary(raw, axis) for raw in self.bag.topics if raw.raws),
-            problems=tuple(sorted(self.problems, key=checks.by_severity)),
             metadata=self.bag.metadata,
             **streams,
         )
+        problems = [*self.problems, *self.foreign_topics(), *check_sensors(trial)]
+        return replace(trial, problems=tuple(sorted(problems, key=checks.by_severity)))
+
+    def foreign_topics(self) -> Iterator[Problem]:
+        """A note on every topic that cannot be decoded and need not be."""
+        known = {full_name(self.namespace, rule.topic) for rule in self.topics.rules.values()}
+        for raw in self.bag.topics:
+            usual = raw.stored.serialization in ("cdr", "ros1")
+            if raw.topic in known or (usual and raw.type in typestore(raw.ros1).fielddefs):
+                continue
+            kind = f"{raw.type or 'an unknown type'} ({raw.stored.serialization or 'no encoding'})"
+            text = f"{len(raw.raws)} messages of {kind} are counted, not decoded"
+            yield Problem("info", "foreign_topic", raw.topic, text, len(raw.raws))
 
     def topic_of(self, role: str) -> RawTopic | None:
         """The recorded topic of a role, None if it is missing or of another type (both are said)."""
@@ -129,12 +149,21 @@ class _Assembly:
             self.problems += checks.missing(role, name, rule.required)
         return next((raw for raw in there if raw.type == expected), None)
 
+    def arrivals(self) -> np.ndarray:
+        """(N,) plausible times of arrival of the topics that have a role, or of all topics; int64 ns."""
+        names = {full_name(self.namespace, rule.topic) for rule in self.topics.rules.values()}
+        mapped = [raw.arrival_ns for raw in self.bag.topics if raw.topic in names and raw.raws]
+        arrivals = np.concatenate(mapped or [raw.arrival_ns for raw in self.bag.topics])
+        plausible = np.abs(arrivals - np.median(arrivals)) < LONGEST_NS
+        return np.asarray(arrivals[plausible] if plausible.any() else arrivals)
+
     def decode(self) -> dict[str, _Mapped]:
         mapped = {}
         for role, rule in self.topics.rules.items():
             raw = None if role == PATH_ROLE else self.topic_of(role)
             if raw is not None:
-                decoded = decode_topic(raw, ROLES[role], self.bag.types, self.bag.ros1)
+                self.check_definition(raw)
+                decoded = decode_topic(raw, ROLES[role])
                 if decoded.arrays:
                     mapped[role] = _Mapped(rule, decoded, self.stamps(rule, decoded))
                 else:
@@ -143,6 +172,16 @@ class _Assembly:
                         Problem("error", "unreadable", raw.topic, text, len(raw.raws))
                     )
         return mapped
+
+    def check_definition(self, raw: RawTopic) -> None:
+        """Say what is wrong with the recorded definition of a topic's type, or with its serialisation."""
+        wrong = types_of(raw.stored)[1]
+        if wrong:
+            text = f"{raw.type}: {wrong}; the usual definition of that name is used"
+            self.problems.append(Problem("warning", "definition", raw.topic, text))
+        if raw.stored.serialization not in ("cdr", "ros1"):
+            text = f"serialised as {raw.stored.serialization!r}; expected cdr"
+            self.problems.append(Problem("error", "serialization", raw.topic, text))
 
     def stamps(self, rule: TopicRule, decoded: Decoded) -> Stamps | None:
         """Stamps to go by; None where the map says arrival, there is no header, or stamps were never set."""
@@ -164,7 +203,7 @@ class _Assembly:
         plausible = np.ones(len(t), bool) if stamps is None else stamps.plausible
         flags = checks.flag_samples(role, decoded, rule, t, plausible, stamps is not None)
         frame = "" if decoded.frames is None else str(decoded.frames[0])
-        values: dict[str, Any] = dict(decoded.arrays)
+        values: dict[str, Any] = {k: v for k, v in decoded.arrays.items() if k != NOT_MEASURED}
         if ROLES[role].names:
             values["names"] = decoded.names
         values |= {
@@ -176,6 +215,8 @@ class _Assembly:
         }
         stream = ROLES[role].stream(**values)
         self.problems += checks.check_stream(stream, rule, decoded.frames)
+        if role in MEASURED:
+            self.problems += check_publishers(stream)
         return stream
 
     def paths(self, axis: TimeAxis) -> tuple[ReferencePath, ...]:
@@ -184,9 +225,7 @@ class _Assembly:
             return ()
         expected, times = self.topics.rules[PATH_ROLE].frame, axis.arrived(raw.arrival_ns)
         paths = []
-        for t, path in zip(
-            times.tolist(), decode_paths(raw, self.bag.types, self.bag.ros1), strict=True
-        ):
+        for t, path in zip(times.tolist(), decode_paths(raw), strict=True):
             if path is None:
                 text = f"a path cannot be decoded as {raw.type}"
                 self.problems.append(Problem("error", "unreadable", raw.topic, text, t=t))
@@ -204,7 +243,7 @@ class _Assembly:
         }
         role = roles.get(raw.topic, "")
         clock = self.topics.rules[role].clock if role else "robot"
-        stamp_ns = stamps_of_prefixes(raw, self.bag.types, self.bag.ros1)
+        stamp_ns = stamps_of_prefixes(raw)
         t_arrival = axis.arrived(raw.arrival_ns)
         t = t_arrival if stamp_ns is None else axis.measured(clock, stamp_ns)
         return summarise(raw, role, t, t_arrival, stamp_ns is not None)

@@ -16,7 +16,7 @@ class DiskFullError(RecordingError):
 
 
 class RecordFile:
-    """Appends without a buffer of its own, so that a killed process loses nothing that was appended."""
+    """An output stream of the mcap package without a buffer: a killed process loses nothing that was written."""
 
     def __init__(self, path: Path) -> None:
         """Create the file, which must not exist yet, and a reserve beside it.
@@ -33,8 +33,8 @@ class RecordFile:
             self.release_reserve()
             raise DiskFullError(f"{path}: no room for a recording: {error.strerror}") from error
 
-    def append(self, data: bytes) -> None:
-        """Write all of `data`.
+    def write(self, data: bytes) -> int:
+        """Append all of `data` and return its length.
 
         Raises:
             DiskFullError: it could not be written; the file is as it was before.
@@ -44,11 +44,24 @@ class RecordFile:
             while view:
                 view = view[self._raw.write(view) :]
         except OSError as error:
-            self._raw.truncate(self.size)
-            self._raw.seek(self.size)
+            self.cut(self.size)
             kept = f"{self.size} bytes written before are kept"
             raise DiskFullError(f"{self.path}: writing failed: {error.strerror}; {kept}") from error
         self.size += len(data)
+        return len(data)
+
+    def cut(self, size: int) -> None:
+        """Drop everything after `size` bytes."""
+        self._raw.truncate(size)
+        self._raw.seek(size)
+        self.size = size
+
+    def tell(self) -> int:
+        """Bytes written so far."""
+        return self.size
+
+    def flush(self) -> None:
+        """Do nothing: every write goes to the operating system at once."""
 
     def release_reserve(self) -> None:
         """Give the reserve's room back to the disk."""

@@ -1,19 +1,19 @@
-"""Mend an MCAP recording that was cut off or damaged: save every whole message, say what is lost."""
+"""Mend a recording that was cut off or damaged: save every whole message, say what is lost."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-from mcap.records import Channel, Schema
+from rosbags.rosbag1 import Writer as BagWriter
 
-from fish_bag.bag import is_recording
-from fish_bag.mcap_walk import Walk, walk_file
+from fish_bag.bag import RawBag, RawTopic, salvage_bag
 from fish_bag.mcap_writer import McapRecording
 from fish_bag.message_types import MessageType, message_type
+from fish_bag.playback import in_order
 from fish_bag.problem import RecordingError
-from fish_bag.qos import Qos
+from fish_bag.qos import parse_qos
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Recovery:
     first_ns: int
     last_ns: int
     lost: tuple[str, ...]
+    notes: tuple[str, ...] = ()  # what is odd about the recording's files and counts
 
     @property
     def count(self) -> int:
@@ -32,77 +33,72 @@ class Recovery:
 
 
 def recover(path: Path, out: Path) -> Recovery:
-    """Write what is left of a recording to a new rosbag2 directory.
+    """Write what is left of a recording to a new directory.
+
+    A ROS 1 bag becomes a ROS 1 bag in that directory, any other recording MCAP. Compression is undone.
 
     Args:
-        path: .mcap file, or directory with the .mcap files of one recording.
+        path: storage file, or directory with the storage files of one recording.
         out: directory to be made.
 
     Raises:
-        RecordingError: not MCAP, files of several recordings, or not one message is left.
+        RecordingError: files of several recordings, not one message is left, or `out` exists.
     """
-    walks = [walk_file(file) for file in _files(path)]
-    if not any(walk.messages for walk in walks):
-        losses = "; ".join(loss for walk in walks for loss in walk.lost) or "it holds no message"
+    bag = salvage_bag(path)
+    topics = [raw for raw in bag.topics if raw.raws]
+    if not topics:
+        losses = "; ".join(bag.lost) or "it holds no message"
         raise RecordingError(f"{path}: nothing to save: {losses}")
-    custom = {key: value for walk in walks for key, value in walk.custom.items()}
-    with McapRecording(out, custom) as recording:
-        for walk in walks:
-            _copy(walk, recording)
-    times = [message.log_time for walk in walks for message in walk.messages]
-    saved = {topic.name: topic.count for topic in recording.topics.values()}
-    lost = tuple(loss for walk in walks for loss in walk.lost)
-    return Recovery(out, saved, min(times), max(times), lost)
+    if out.exists():
+        raise RecordingError(f"{out}: exists already; recordings are never overwritten")
+    if all(raw.ros1 for raw in topics):
+        _write_ros1(topics, out)
+    else:
+        _write_mcap(bag, topics, out)
+    saved: Counter[str] = Counter()
+    for raw in topics:
+        saved[raw.topic] += len(raw.raws)
+    first = min(int(raw.arrival_ns[0]) for raw in topics)
+    last = max(int(raw.arrival_ns[-1]) for raw in topics)
+    return Recovery(out, dict(saved), first, last, tuple(bag.lost), tuple(bag.notes))
 
 
-def _files(path: Path) -> list[Path]:
-    if not path.exists():
-        raise RecordingError(f"{path}: does not exist")
-    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
-    if len(files) > 1 and not is_recording(path):
-        raise RecordingError(
-            f"{path}: {len(files)} recordings, each complete in one file by their names; recover one of them at a time "
-            f"(the parts of one recording are {path.name}_0.mcap, {path.name}_1.mcap and so on, as rosbag2 names them)"
-        )
-    if not files or files[0].suffix != ".mcap":
-        raise RecordingError(
-            f"{path}: expected an .mcap file or a folder with one; a sqlite3 recording cut off is lost, "
-            "a ROS 1 bag is mended by 'rosbag reindex'"
-        )
-    return files
+def _write_mcap(bag: RawBag, topics: list[RawTopic], out: Path) -> None:
+    """Write the messages with their types and quality of service."""
+    with McapRecording(out, bag.metadata) as recording:
+        entries = {
+            id(raw): recording.add_topic(raw.topic, _kind(raw), parse_qos(raw.stored.qos))
+            for raw in topics
+        }
+        for topic, time_ns, message in in_order(topics):
+            recording.write(entries[id(topic)], max(0, time_ns), message)
 
 
-def _copy(walk: Walk, recording: McapRecording) -> None:
-    """Write the messages of one file, with their types and quality of service."""
-    topics = {}
-    for channel in walk.channels.values():
-        kind = _kind(walk.schemas[channel.schema_id])
-        topics[channel.id] = recording.add_topic(channel.topic, kind, _qos(channel))
-    for message in sorted(walk.messages, key=lambda m: m.log_time):
-        recording.write(topics[message.channel_id], message.log_time, message.data)
-
-
-def _kind(schema: Schema) -> MessageType:
-    try:
-        return message_type(schema.name)
-    except RecordingError:
-        return MessageType(
-            schema.name, schema.data.decode(errors="replace"), encoding=schema.encoding
-        )
-
-
-def _qos(channel: Channel) -> Qos:
-    """Reliability and durability as recorded, by name or by number (versions 9 and 8); the usual ones if damaged."""
-    try:
-        profiles = yaml.safe_load(channel.metadata.get("offered_qos_profiles") or "[]")
-    except yaml.YAMLError:
-        return Qos()
-    if not isinstance(profiles, list) or not profiles or not isinstance(profiles[0], dict):
-        return Qos()
-    first, usual = profiles[0], Qos().depth
-    depth = first.get("depth", usual)
-    return Qos(
-        reliable=first.get("reliability") not in ("best_effort", 2),
-        transient_local=first.get("durability") in ("transient_local", 1),
-        depth=max(1, depth) if isinstance(depth, int) else usual,
+def _kind(raw: RawTopic) -> MessageType:
+    """The type as recorded; as the common interfaces define it where the recording does not."""
+    stored = raw.stored
+    if not stored.definition and stored.serialization == "cdr":
+        try:
+            return message_type(stored.type)
+        except RecordingError:
+            pass
+    return MessageType(
+        stored.type, stored.definition, stored.hash, stored.encoding, stored.serialization
     )
+
+
+def _write_ros1(topics: list[RawTopic], out: Path) -> None:
+    """Write a bag with the same bytes."""
+    out.mkdir(parents=True)
+    with BagWriter(out / f"{out.name}.bag") as writer:
+        connections = {
+            id(raw): writer.add_connection(
+                raw.topic,
+                raw.type,
+                msgdef=raw.stored.definition.decode(errors="replace"),
+                md5sum=raw.stored.hash or "*",
+            )
+            for raw in topics
+        }
+        for topic, time_ns, message in in_order(topics):
+            writer.write(connections[id(topic)], time_ns, message)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from rosbags.interfaces.typing import Typesdict
 
 from fish_bag.bag import RawTopic
-from fish_bag.decode import PATH_TYPE, Role
+from fish_bag.decode import Role
+from fish_bag.definitions import types_of
 from fish_bag.layout import Block, decode_blocks
+from fish_bag.message_types import typestore
 
 NS_PER_S = 1_000_000_000
 
@@ -27,9 +28,9 @@ class Decoded:
     unreadable: np.ndarray  # positions of messages that cannot be decoded
 
 
-def decode_topic(raw: RawTopic, role: Role, types: Typesdict, ros1: bool) -> Decoded:
+def decode_topic(raw: RawTopic, role: Role) -> Decoded:
     """Decode all messages of one topic into the arrays of its role; values not there become NaN."""
-    blocks, unreadable = decode_blocks(raw.raws, raw.type, types, ros1)
+    blocks, unreadable = topic_blocks(raw, raw.raws)
     count = len(raw.raws)
     stamp_ns, frames = _headers(blocks, count, raw)
     names = _names(blocks, role)
@@ -42,27 +43,40 @@ def decode_topic(raw: RawTopic, role: Role, types: Typesdict, ros1: bool) -> Dec
     return Decoded(raw.topic, raw.arrival_ns, stamp_ns, frames, arrays, names, unreadable)
 
 
-def stamps_of_prefixes(raw: RawTopic, types: Typesdict, ros1: bool) -> np.ndarray | None:
-    """Header stamps of messages of which the first bytes were kept, (N,) int64 ns; None without a header."""
-    definition = types.get(raw.type)
-    if definition is None or not definition[1] or definition[1][0][1][1] != "std_msgs/msg/Header":
+def topic_blocks(raw: RawTopic, messages: list[bytes]) -> tuple[list[Block], np.ndarray]:
+    """Decode messages of a topic, as `decode_blocks` does; no other serialisation than CDR and ROS 1's is known."""
+    if raw.stored.serialization not in ("cdr", "ros1"):
+        return [], np.arange(len(messages))
+    return decode_blocks(messages, raw.type, types_of(raw.stored)[0], raw.ros1)
+
+
+def stamps_of_prefixes(raw: RawTopic) -> np.ndarray | None:
+    """Header stamps of messages of which the first bytes were kept, (N,) int64 ns; None without a header.
+
+    Only the common interfaces are known here: definitions of foreign topics are not parsed.
+    """
+    definition = typestore(raw.ros1).fielddefs.get(raw.type)
+    if (
+        raw.stored.serialization not in ("cdr", "ros1")
+        or definition is None
+        or not definition[1]
+        or definition[1][0][1][1] != "std_msgs/msg/Header"
+    ):
         return None
     start = 4  # CDR header in ROS 2, sequence number in ROS 1
     if any(len(m) < start + 8 for m in raw.raws):
         return None
     rows = np.frombuffer(b"".join(m[:12] for m in raw.raws), np.uint8).reshape(-1, 12)
-    order = "<" if ros1 or rows[0, 1] else ">"
+    order = "<" if raw.ros1 or rows[0, 1] else ">"
     pairs = np.ascontiguousarray(rows[:, start:]).view(f"{order}u4").astype(np.int64)
     return pairs[:, 0] * NS_PER_S + pairs[:, 1]
 
 
-def decode_paths(
-    raw: RawTopic, types: Typesdict, ros1: bool
-) -> list[tuple[np.ndarray, str] | None]:
+def decode_paths(raw: RawTopic) -> list[tuple[np.ndarray, str] | None]:
     """Points (P, 2) and frame of every nav_msgs/Path, None where one cannot be decoded; one by one, as lengths vary."""
     paths: list[tuple[np.ndarray, str] | None] = []
     for message in raw.raws:
-        blocks, _ = decode_blocks([message], PATH_TYPE, types, ros1)
+        blocks, _ = topic_blocks(raw, [message])
         paths += [_path(block) for block in blocks] or [None]
     return paths
 

@@ -30,6 +30,7 @@ TIME_BACK = 2  # the stamp is older than one that came before
 NOT_FINITE = 4  # a value that is used is NaN or infinite
 WRONG_FRAME = 8  # frame_id is not the expected one
 BAD_STAMP = 16  # the stamp is zero or far away from the rest of the recording
+NOT_MEASURED = 128  # the message says by a covariance of -1 that it does not measure this
 JUMP = 64  # a camera pose far from those before and after: lost or swapped markers
 UNREADABLE = 32  # the bytes cannot be decoded as the message type; values are NaN, t is the arrival
 

@@ -62,7 +62,7 @@ def test_a_folder_of_bare_files_is_a_folder_of_trials(tmp_path):
     assert [trial.name for trial in read_dataset(tmp_path)] == ["trial_0", "trial_1"]
     with pytest.raises(RecordingError, match=r"2 storage files.*give one of the recordings in it"):
         read_trial(tmp_path)
-    with pytest.raises(RecordingError, match=r"2 recordings.*recover one of them at a time"):
+    with pytest.raises(RecordingError, match=r"2 storage files.*give one of the recordings in it"):
         recover(tmp_path, tmp_path / "mended")
 
 

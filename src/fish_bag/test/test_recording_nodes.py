@@ -139,6 +139,26 @@ def test_killed_recorder_loses_at_most_a_second(peer, tmp_path):
     assert imu.raws == raws[: len(imu.raws)]
 
 
+def test_a_second_type_on_a_topic_leaves_the_recorder_alive(peer, tmp_path):
+    """A foreign node announces another type on a recorded topic, and one topic has a type that nobody knows here."""
+    recorder = peer.start("recorder", output=tmp_path, name="run")
+    other = Context()
+    rclpy.init(context=other, domain_id=peer.domain)
+    stranger = Node("stranger", context=other)
+    wrong = stranger.create_publisher(Float64, "/fish/imu/data", 10)
+    wrong.publish(Float64(data=1.0))
+    publish_all(peer, 100)
+    peer.spin_until(lambda: False, limit=0.3)
+    stranger.destroy_node()
+    rclpy.try_shutdown(context=other)
+    recorder.send_signal(signal.SIGTERM)
+    out, _ = recorder.communicate(timeout=30)
+    assert recorder.returncode == 0, out
+    recorded = {raw.topic: raw for raw in read_bag(tmp_path / "run", lambda *_: True).topics}
+    assert len(recorded["/fish/joint_command"].raws) == 100
+    assert "is not recorded" in out
+
+
 @pytest.mark.parametrize(
     ("node", "parameters", "text"),
     [

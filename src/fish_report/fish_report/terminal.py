@@ -1,14 +1,31 @@
-"""The terminal: its console, and tables in it."""
+"""The terminal: its console, tables in it, and texts of foreign origin.
+
+Texts from files and from other nodes are shown by `printable.plain` and never taken for rich's markup.
+"""
 
 from __future__ import annotations
 
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table as TerminalTable
+from rich.text import Text
 
 from fish_report.page import Table
+from fish_report.printable import LONGEST, plain
+
+__all__ = ["cell", "plain", "print_table", "say", "terminal"]
 
 FILE_WIDTH = 160  # columns when the output is not a terminal
+
+
+def cell(text: object, longest: int = LONGEST) -> Text:
+    """A text for rich, as `plain` shows it and never taken for markup."""
+    return Text(plain(text, longest))
+
+
+def say(console: Console, text: object, longest: int = LONGEST, style: str = "") -> None:
+    """Print one line of foreign text, unbroken, without markup and colours of its own."""
+    console.print(Text(plain(text, longest), style=style), soft_wrap=True, highlight=False)
 
 
 def terminal() -> Console:
@@ -21,12 +38,13 @@ def terminal() -> Console:
 
 def print_table(console: Console, table: Table) -> None:
     """Show a table in the terminal."""
-    shown = TerminalTable(title=table.title, title_justify="left", box=SIMPLE, pad_edge=False)
+    shown = TerminalTable(title=cell(table.title), title_justify="left", box=SIMPLE, pad_edge=False)
     for k, name in enumerate(table.header):
         numbers = any(row[k][-1:].isdigit() for row in table.rows)
-        shown.add_column(name, justify="right" if k and numbers else "left", overflow="fold")
+        shown.add_column(cell(name), justify="right" if k and numbers else "left", overflow="fold")
     for row in table.rows:
-        shown.add_row(*row)
+        shown.add_row(*map(cell, row))
     console.print(shown)
     if table.note:
-        console.print(table.note, style="dim")
+        for line in table.note.splitlines():
+            console.print(cell(line, 4 * LONGEST), style="dim")

@@ -16,10 +16,10 @@ def message_class(msgtype: str) -> type:
     Raises:
         RecordingError: its package is not installed here.
     """
-    package, _, name = msgtype.split("/")
     try:
-        found: type = getattr(import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError) as error:
+        package, folder, name = msgtype.split("/")
+        found: type = getattr(import_module(f"{package}.{folder}"), name)
+    except (ImportError, AttributeError, ValueError) as error:
         raise RecordingError(f"message type {msgtype} is not installed here: {error}") from error
     return found
 

@@ -19,12 +19,13 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from fish_bag.mcap_writer import McapRecording, Topic
+from fish_bag.message_types import message_type
 from fish_bag.nodes.raw_topics import from_profile, message_class, to_profile
 from fish_bag.qos import Qos
-from fish_bag.record_file import DiskFullError
 from fish_bag.recorder_config import RecorderConfig, common_qos, is_selected
 from fish_node.nodes.start import read_parameters, run
 from fish_report.errors import UserError
+from fish_report.terminal import plain
 
 
 class RecorderNode(Node):
@@ -70,24 +71,26 @@ class RecorderNode(Node):
             return
         if current is not None:
             self.destroy_subscription(current[0])
+            del self._subscriptions_of[key]
         try:
-            message = message_class(msgtype)
-            entry = self.recording.add_topic(topic, msgtype, offered[0])
-        except DiskFullError:
-            raise
-        except UserError as error:
+            message, kind = message_class(msgtype), message_type(msgtype)
+            target: list[Topic] = []  # announced once the subscription stands
+            subscription = self.create_subscription(
+                message, topic, partial(self._store, target), to_profile(wanted), raw=True
+            )
+        except (
+            Exception
+        ) as error:  # rclpy has errors of its own, for example for a second type on a topic
             self._refused.add(key)
-            self.get_logger().error(f"{topic} is not recorded: {error}")
+            said = " ".join(str(error).split())
+            self.get_logger().error(plain(f"{topic} ({msgtype}) is not recorded: {said}"))
             return
-        callback = partial(self._store, entry)
-        subscription = self.create_subscription(
-            message, topic, callback, to_profile(wanted), raw=True
-        )
         self._subscriptions_of[key] = (subscription, wanted)
-        self.get_logger().info(f"recording {topic} ({msgtype})")
+        target.append(self.recording.add_topic(topic, kind, offered[0]))
+        self.get_logger().info(plain(f"recording {topic} ({msgtype})"))
 
-    def _store(self, topic: Topic, data: bytes) -> None:
-        self.recording.write(topic, time.time_ns(), data)
+    def _store(self, topic: list[Topic], data: bytes) -> None:
+        self.recording.write(topic[0], time.time_ns(), data)
 
     def _flush(self) -> None:
         self.recording.flush_old(time.time_ns())
@@ -97,9 +100,8 @@ class RecorderNode(Node):
         status.level, status.message = DiagnosticStatus.OK, "recording"
         if self._refused:
             status.level = DiagnosticStatus.WARN
-            status.message = (
-                f"not recorded: {', '.join(sorted(topic for topic, _ in self._refused))}"
-            )
+            names = sorted(f"{topic} ({msgtype})" for topic, msgtype in self._refused)
+            status.message = plain(f"not recorded: {', '.join(names)}")
         elif not self.recording.message_count:
             status.level, status.message = DiagnosticStatus.WARN, "nothing received yet"
         values = {

@@ -18,19 +18,17 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.time import Time
-from rosbags.interfaces import Connection
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool
 
+from fish_bag.bag import RawTopic
 from fish_bag.nodes.raw_topics import message_class, to_profile
-from fish_bag.playback import (
-    Playback,
-    PlaybackClock,
-    ReplayerConfig,
-    offered_qos,
-)
+from fish_bag.playback import Playback, PlaybackClock, ReplayerConfig
+from fish_bag.problem import RecordingError
+from fish_bag.qos import parse_qos
 from fish_node.nodes.start import read_parameters, run
 from fish_report.errors import UserError
+from fish_report.terminal import plain
 
 LINGER = Duration(seconds=2)  # for the last messages to be received before the node ends
 
@@ -46,12 +44,10 @@ class ReplayerNode(Node):
         self._playback = Playback(config, self.get_namespace())
         self._loop, self._sent, self._rounds, self._latest_ns = config.loop, 0, 0, 0
         self._publishers_of: dict[tuple[str, str], Publisher] = {}
-        for c in self._playback.connections:
-            if (c.topic, c.msgtype) not in self._publishers_of:
-                publisher = self.create_publisher(
-                    message_class(c.msgtype), c.topic, to_profile(offered_qos(c))
-                )
-                self._publishers_of[c.topic, c.msgtype] = publisher
+        for raw in self._playback.topics:
+            self._announce(raw)
+        if not self._publishers_of:
+            raise RecordingError(f"{config.recording}: none of its topics can be published")
         recorded_clock = any(topic == "/clock" for topic, _ in self._publishers_of)
         self._tick_ns = 0 if recorded_clock or not config.clock_hz else round(1e9 / config.clock_hz)
         self._ticks = self.create_publisher(ClockMessage, "/clock", 10) if self._tick_ns else None
@@ -63,12 +59,23 @@ class ReplayerNode(Node):
             config.rate, start, time.monotonic_ns() + delay_ns, config.paused
         )
         self._messages = self._playback.messages()
-        self._next: tuple[Connection, int, bytes] | None = next(self._messages)
+        self._next: tuple[RawTopic, int, bytes] | None = next(self._messages)
         self._next_tick = start
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._due = self.create_timer(config.start_delay_s or 1e-3, self._publish_due, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
         self.get_logger().info(f"replaying {config.recording} at rate {config.rate:g}")
+
+    def _announce(self, raw: RawTopic) -> None:
+        """Create the publisher of a topic; a topic that cannot be published here is left out."""
+        try:
+            if raw.stored.serialization != "cdr":
+                raise RecordingError(f"it is serialised as {raw.stored.serialization!r}")
+            self._publishers_of[raw.topic, raw.type] = self.create_publisher(
+                message_class(raw.type), raw.topic, to_profile(parse_qos(raw.stored.qos))
+            )
+        except Exception as error:  # rclpy has errors of its own for names and types it refuses
+            self.get_logger().warning(plain(f"{raw.topic} is not replayed: {error}"))
 
     def _publish_due(self) -> None:
         """Publish what is due and arm the timer for what comes next."""
@@ -78,11 +85,13 @@ class ReplayerNode(Node):
         now = time.monotonic_ns()
         bag_now = self._time.bag_time(now)
         while self._next is not None and self._next[1] <= bag_now:
-            connection, due, raw = self._next
+            topic, due, raw = self._next
             self._tick(due)
-            self._publishers_of[connection.topic, connection.msgtype].publish(raw)
-            self._sent += 1
-            self._latest_ns = max(self._latest_ns, bag_now - due)
+            publisher = self._publishers_of.get((topic.topic, topic.type))
+            if publisher is not None:
+                publisher.publish(raw)
+                self._sent += 1
+                self._latest_ns = max(self._latest_ns, bag_now - due)
             self._next = next(self._messages, None)
         if self._next is None:
             self._end()
@@ -137,11 +146,6 @@ class ReplayerNode(Node):
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
-
-    def destroy_node(self) -> None:
-        """Close the files, then the node."""
-        self._playback.close()
-        super().destroy_node()
 
 
 def main() -> int:

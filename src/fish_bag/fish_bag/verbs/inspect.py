@@ -11,7 +11,7 @@ from rich.table import Table
 
 from fish_bag.topic_arguments import add_topic_arguments, topic_map
 from fish_report.named_path import named_path
-from fish_report.terminal import terminal
+from fish_report.terminal import cell, say, terminal
 
 if TYPE_CHECKING:
     from fish_report.page import Table as Sheet
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
         page = args.html or Path(f"inspect_{data.name}.html")
         write_recording_page(data, page)
-        console.print(f"page: {page}", highlight=False, soft_wrap=True)
+        say(console, f"page: {page}")
     return 0
 
 
@@ -55,9 +55,9 @@ def _print(console: Console, sheet: Sheet) -> None:
     """A table, coloured by severity; nothing if it has no rows."""
     if not sheet.rows:
         return
-    table = Table(title=sheet.title, title_justify="left")
+    table = Table(title=cell(sheet.title), title_justify="left")
     for name in sheet.header:
-        table.add_column(name, overflow="fold")  # on a narrow terminal names are broken, never cut
+        table.add_column(name, overflow="fold")  # on a narrow terminal names are broken, not cut
     for row in sheet.rows:
-        table.add_row(*row, style=COLOURS.get(row[0]))
+        table.add_row(*map(cell, row), style=COLOURS.get(row[0]))
     console.print(table)

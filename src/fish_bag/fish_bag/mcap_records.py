@@ -1,0 +1,123 @@
+"""Records of an MCAP file as the mcap package reads them, with the checks that it leaves out, and the file's summary.
+
+Source: MCAP specification (mcap.dev/spec).
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Footer, Schema, Statistics
+from mcap.writer import MCAP0_MAGIC
+
+from fish_bag.message_types import ros2_type_name
+from fish_bag.storage import Buffer, StoredTopic
+
+HEAD = struct.Struct("<BQ")  # opcode, length
+FOOTER_BYTES = HEAD.size + 20
+DAMAGE = (McapError, struct.error, ValueError)  # of parsing a damaged record
+
+
+@dataclass
+class Summary:
+    """The summary section of a file that was closed."""
+
+    start: int  # byte
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    counts: dict[int, int] | None = None  # channel -> messages; None: not said
+    sure: bool = False  # it has a checksum, which holds
+
+
+class _WholeReads(BytesIO):
+    """Bytes of which a read gives all that was asked for; the mcap package takes less without a word."""
+
+    def read(self, size: int | None = -1) -> bytes:
+        data = super().read(size)
+        if size is not None and len(data) < size:
+            raise ValueError(f"{size - len(data)} bytes are missing")
+        return data
+
+
+def topics_of(
+    channels: dict[int, Channel], schemas: dict[int, Schema]
+) -> Iterator[tuple[int, StoredTopic]]:
+    """The channels of which the type is known."""
+    for channel in channels.values():
+        schema = schemas.get(channel.schema_id)
+        if schema is None and channel.schema_id:
+            continue
+        name, encoding, definition = (
+            (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
+        )
+        qos = channel.metadata.get("offered_qos_profiles", "")
+        yield (
+            channel.id,
+            StoredTopic(
+                channel.topic,
+                ros2_type_name(name),
+                channel.message_encoding,
+                definition,
+                encoding,
+                qos,
+            ),
+        )
+
+
+def whole_record(kind: type[Any], body: bytes) -> Any:
+    """Parse a record that fills its body to the last byte."""
+    stream = ReadDataStream(_WholeReads(body))
+    record = kind.read(stream)
+    if stream.count != len(body):
+        raise ValueError(f"{len(body) - stream.count} bytes too many")
+    return record
+
+
+def read_summary(data: Buffer) -> Summary | None:
+    """The summary section; None where there is none or where it is damaged."""
+    footer_at = len(data) - len(MCAP0_MAGIC) - FOOTER_BYTES
+    if footer_at < len(MCAP0_MAGIC) or data[-len(MCAP0_MAGIC) :] != MCAP0_MAGIC:
+        return None
+    if HEAD.unpack_from(data, footer_at) != (Opcode.FOOTER, 20):
+        return None
+    footer = Footer.read(ReadDataStream(BytesIO(data[footer_at + HEAD.size :])))
+    start, checksum = footer.summary_start, footer.summary_crc
+    if not start:
+        return Summary(footer_at)
+    if not len(MCAP0_MAGIC) <= start <= footer_at:
+        return None
+    covered = bytes(data[start : footer_at + FOOTER_BYTES - 4])  # all but the checksum itself
+    if checksum and zlib.crc32(covered) != checksum:
+        return None
+    summary = Summary(start, sure=bool(checksum))
+    position = start
+    try:
+        while position < footer_at:
+            opcode, length = HEAD.unpack_from(data, position)
+            following = position + HEAD.size + length
+            _take_summary(summary, opcode, data[position + HEAD.size : following])
+            position = following
+    except DAMAGE:
+        return None  # only where the writer left out the checksum
+    return summary
+
+
+def _take_summary(summary: Summary, opcode: int, body: bytes) -> None:
+    if opcode == Opcode.SCHEMA:
+        schema = whole_record(Schema, body)
+        summary.schemas[schema.id] = schema
+    elif opcode == Opcode.CHANNEL:
+        channel = whole_record(Channel, body)
+        summary.channels[channel.id] = channel
+    elif opcode == Opcode.STATISTICS:
+        statistics = whole_record(Statistics, body)
+        if not statistics.message_count or statistics.channel_message_counts:
+            summary.counts = statistics.channel_message_counts

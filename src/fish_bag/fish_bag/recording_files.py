@@ -1,0 +1,155 @@
+"""Which files a recording consists of, and what kind each is: by its first bytes, not by its name."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fish_bag.compression import name_by_magic
+from fish_bag.problem import RecordingError
+from fish_bag.stated_metadata import FILE_NAME, StatedMetadata, read_metadata
+
+PARTS = (".mcap", ".db3")  # of files in a rosbag2 folder
+PACKED = (".zstd", ".zst", ".lz4")  # a whole file compressed, as rosbag2's mode `file` leaves it
+SUFFIXES = (*PARTS, ".bag", ".bag.active")
+MAGICS = {b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite3", b"#ROSBAG V": "ros1"}
+LFS_MAGIC = b"version https://git-lfs"
+KINDS = {".mcap": "mcap", ".db3": "sqlite3", ".bag": "ros1", ".active": "ros1"}  # by the name
+PART_NAME = re.compile(r"(?P<stem>.*?)_?(?P<number>\d+)")
+
+
+@dataclass
+class RecordingFiles:
+    """The storage files of one recording, in order."""
+
+    path: Path
+    files: list[Path]
+    stated: StatedMetadata | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def is_storage_file(path: Path) -> bool:
+    """Whether the name is one of a storage file."""
+    return bare_name(path.name).endswith(SUFFIXES)
+
+
+def bare_name(name: str) -> str:
+    """A file's name without the ending of a compression."""
+    for end in PACKED:
+        name = name.removesuffix(end)
+    return name
+
+
+def is_recording(path: Path) -> bool:
+    """Whether `path` looks like one recording (not: is readable)."""
+    if path.is_dir():
+        return (path / FILE_NAME).exists() or bool(parts(path))
+    return is_storage_file(path)
+
+
+def parts(folder: Path) -> list[Path]:
+    """Storage files of the one recording in a folder without metadata.yaml; [] where they are recordings of their own.
+
+    rosbag2 splits a long recording into <folder>_0, <folder>_1 and so on.
+    """
+    inside = list(folder.iterdir())
+    files = sorted((p for p in inside if p.is_file() and is_storage_file(p)), key=part_order)
+    split = re.compile(rf"{re.escape(folder.name)}_\d+\.(?:mcap|db3)")
+    one = len(files) == 1 or all(split.fullmatch(bare_name(file.name)) for file in files)
+    below = any(is_recording(p) for p in inside if p.is_dir())
+    return files if files and one and not below else []
+
+
+def part_order(path: Path) -> tuple[str, int, str]:
+    """Sort key: part 10 comes after part 9."""
+    found = PART_NAME.fullmatch(bare_name(path.name).split(".")[0])
+    return (found["stem"], int(found["number"]), path.name) if found else (path.stem, -1, path.name)
+
+
+def find_files(path: Path) -> RecordingFiles:
+    """The storage files of a recording.
+
+    Args:
+        path: a storage file, or the folder of one recording.
+
+    Raises:
+        RecordingError: there is none, or there are those of several recordings.
+    """
+    if not path.exists():
+        raise RecordingError(f"{path}: does not exist")
+    if path.is_file():
+        return RecordingFiles(path, [path])
+    stated = read_metadata(path)
+    if stated is not None:
+        return _stated_files(path, stated)
+    found = parts(path)
+    if not found:
+        files = [p for p in path.iterdir() if is_storage_file(p)]
+        advice = "give one of the recordings in it" if files else "there is no recording in it"
+        raise RecordingError(
+            f"{path}: no {FILE_NAME} and {len(files)} storage files, which are not the parts {path.name}_0, "
+            f"{path.name}_1 and so on of one recording; {advice}"
+        )
+    notes = [f"no {FILE_NAME}; {_names(found)} read in this order"] if len(found) > 1 else []
+    return RecordingFiles(path, found, None, notes)
+
+
+def _stated_files(path: Path, stated: StatedMetadata) -> RecordingFiles:
+    """The files that metadata.yaml names, and others where it names none or too few."""
+    there = {p.name: p for p in sorted(path.iterdir(), key=part_order) if is_storage_file(p)}
+    listed = [there[name] for name in stated.files if name in there]
+    missing = [name for name in stated.files if name not in there]
+    others = [file for name, file in there.items() if name not in stated.files]
+    notes = list(stated.notes)
+    if missing:
+        notes.append(f"{FILE_NAME} names {', '.join(missing)}, which is not there")
+    if missing or not listed:
+        taken = others
+    else:  # a recorder that was killed has not named its last part yet
+        stems = {part_order(file)[0] for file in listed if part_order(file)[1] >= 0}
+        taken = [f for f in others if part_order(f)[1] >= 0 and part_order(f)[0] in stems]
+    if taken and stated.files:
+        notes.append(f"{_names(taken)} read though {FILE_NAME} does not name it")
+    left = [file for file in others if file not in taken]
+    if left:
+        notes.append(f"{_names(left)} not read, as {FILE_NAME} does not name it")
+    files = listed + taken
+    if not files:
+        held = ", ".join(sorted(p.name for p in path.iterdir())) or "nothing"
+        raise RecordingError(f"{path}: no storage file ({', '.join(PARTS)}); it holds {held}")
+    return RecordingFiles(path, sorted(files, key=part_order) if taken else files, stated, notes)
+
+
+def _names(files: list[Path]) -> str:
+    return ", ".join(file.name for file in files)
+
+
+def file_kind(path: Path, data: Any) -> str:
+    """The format "mcap", "sqlite3" or "ros1", or the compression of a whole file.
+
+    Args:
+        path: for its name, where the first bytes are damaged.
+        data: the file's bytes.
+
+    Raises:
+        RecordingError: it is not a recording; the text says what it is.
+    """
+    head = bytes(data[:32])
+    if head.startswith(LFS_MAGIC):
+        raise RecordingError(
+            f"{path}: a Git LFS pointer, not the recording; 'git lfs pull' brings the recording"
+        )
+    for magic, kind in MAGICS.items():
+        if head.startswith(magic):
+            return kind
+    packed = name_by_magic(head)
+    if packed:
+        return packed
+    kind = KINDS.get(Path(bare_name(path.name)).suffix, "")
+    if not kind:
+        raise RecordingError(
+            f"{path}: not a recording; expected a rosbag2 directory or a file {', '.join(SUFFIXES)}"
+        )
+    return kind

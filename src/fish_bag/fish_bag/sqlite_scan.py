@@ -1,0 +1,179 @@
+"""Every message of a sqlite3 recording of rosbag2, also of one whose recorder was killed or whose file is damaged.
+
+The file is opened as sqlite3 asks for it: changes that still stand in its `-wal` or `-journal` file are taken in, in a copy.
+What sqlite3 cannot read is read from the pages of the file one by one.
+Source: rosbag2_storage_sqlite3, schema versions 1 to 4.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from fish_bag.message_types import ros2_type_name
+from fish_bag.sqlite_pages import Row, rows
+from fish_bag.storage import (
+    Contents,
+    Keep,
+    Messages,
+    StoredTopic,
+    end_of_content,
+    ends_like_others,
+    keep_whole,
+)
+
+MAGIC = b"SQLite format 3\0"
+COMPANIONS = (
+    "-wal",
+    "-journal",
+)  # files in which sqlite3 keeps what is not yet, or no more, in the database
+TOPIC_COLUMNS = ("serialization_format", "offered_qos_profiles", "type_description_hash")
+ENCODINGS = ("ros2msg", "ros2idl", "unknown", "")
+
+
+def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
+    """Collect every message that can be read.
+
+    Args:
+        path: the database; its companions lie beside it.
+        keep: how many bytes of the messages of a topic are kept.
+    """
+    with _settled(path) as (database, notes):
+        contents = Contents(notes=notes)
+        try:
+            _read(database, contents, keep)
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            contents = Contents(notes=notes)
+            contents.lost.append(
+                f"the database is damaged ({error}); its pages are read one by one"
+            )
+            _read_pages(database.read_bytes(), contents)
+    contents.drop_undefined()
+    return contents
+
+
+@contextmanager
+def _settled(path: Path) -> Iterator[tuple[Path, list[str]]]:
+    """The database with everything that its companions hold, and what is worth a note of that."""
+    companions = [Path(f"{path}{end}") for end in COMPANIONS]
+    companions = [file for file in companions if file.exists() and file.stat().st_size]
+    if not companions:
+        yield path, []
+        return
+    names = ", ".join(file.name for file in companions)
+    with TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        for file in (path, *companions):
+            target = Path(folder) / file.name
+            shutil.copyfile(file, target)
+        notes = [f"the recorder did not close it; what stands in {names} is read as well"]
+        try:
+            with closing(sqlite3.connect(copy)) as connection:
+                connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+        except sqlite3.Error as error:
+            notes = [f"{names} cannot be read ({error}); what stands in it is missing"]
+        yield copy, notes
+
+
+def _read(path: Path, contents: Contents, keep: Keep) -> None:
+    """Read a database that is whole; sqlite3.Error where it is not."""
+    address = path.absolute().as_uri() + "?mode=ro&immutable=1"
+    with closing(sqlite3.connect(address, uri=True)) as connection:
+        found = connection.execute("PRAGMA quick_check(1)").fetchone()
+        if found is None or found[0] != "ok":
+            raise sqlite3.DatabaseError(found[0] if found else "no answer")
+        definitions = {}
+        if _columns(connection, "message_definitions"):
+            query = (
+                "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+            )
+            definitions = {
+                name: (text.encode(), encoding)
+                for name, encoding, text in connection.execute(query)
+            }
+        optional = [c for c in TOPIC_COLUMNS if c in _columns(connection, "topics")]
+        kept = {}
+        for number, name, kind, *more in connection.execute(
+            f"SELECT id, name, type, {', '.join(optional)} FROM topics"
+        ):
+            values = dict(zip(optional, more, strict=True))
+            contents.topics[number] = _topic(name, kind, values, definitions)
+            kept[number] = keep(contents.topics[number])
+        _read_messages(connection, contents, kept)
+        if _columns(connection, "metadata"):
+            last = connection.execute("SELECT metadata FROM metadata ORDER BY id DESC").fetchone()
+            contents.metadata = str(last[0]) if last else ""
+
+
+def _read_messages(
+    connection: sqlite3.Connection, contents: Contents, kept: dict[int, int | None]
+) -> None:
+    messages = contents.messages
+    query = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
+    for topic, time_ns, raw in connection.execute(query):
+        if topic not in messages:
+            messages[topic] = Messages()
+        data = raw if isinstance(raw, bytes) else str(raw or "").encode()
+        messages[topic].add(time_ns, data[: kept.get(topic)])
+
+
+def _columns(connection: sqlite3.Connection, table: str) -> set[str]:
+    return {row[1] for row in connection.execute(f"PRAGMA table_info({table})")}
+
+
+def _topic(
+    name: str, kind: str, values: dict[str, str], definitions: dict[str, tuple[bytes, str]]
+) -> StoredTopic:
+    definition, encoding = definitions.get(kind, (b"", ""))
+    serialization = values.get("serialization_format") or "cdr"
+    qos = values.get("offered_qos_profiles") or ""
+    identity = values.get("type_description_hash") or ""
+    return StoredTopic(
+        name, ros2_type_name(kind), serialization, definition, encoding, qos, identity
+    )
+
+
+def _read_pages(data: bytes, contents: Contents) -> None:
+    """Sort the rows of all pages into topics, definitions and messages by the kinds of their columns."""
+    content_end = end_of_content(data)
+    topics: dict[int, list[str]] = {}
+    definitions: dict[str, tuple[bytes, str]] = {}
+    messages: dict[int, Row] = {}
+    for row in rows(data):
+        values = row.values[1:]
+        texts = [value for value in values if isinstance(value, str)]
+        if row.values[:1] != (None,) or (row.end > content_end and len(texts) == len(values)):
+            continue
+        if len(texts) == len(values) >= 3:
+            if texts[0].startswith("/"):
+                topics.setdefault(row.number, texts)
+            elif texts[1] in ENCODINGS:
+                definitions.setdefault(texts[0], (texts[2].encode(), texts[1]))
+        elif [type(value) for value in values] == [int, int, bytes]:
+            messages.setdefault(row.number, row)
+    for number, texts in topics.items():
+        named = dict(zip(TOPIC_COLUMNS, texts[2:], strict=False))
+        contents.topics[number] = _topic(texts[0], texts[1], named, definitions)
+    _keep_whole(messages, contents, content_end)
+
+
+def _keep_whole(found: dict[int, Row], contents: Contents, content_end: int) -> None:
+    """Take the messages in order of their rows, but none that reaches into zeros that damage has left."""
+    late: list[tuple[int, int, bytes]] = []
+    for _, row in sorted(found.items()):
+        _, topic, time_ns, raw = row.values
+        if not (isinstance(topic, int) and isinstance(time_ns, int) and isinstance(raw, bytes)):
+            continue
+        if row.end > content_end or row.zeros_follow:
+            late.append((topic, time_ns, raw))
+        else:
+            contents.messages.setdefault(topic, Messages()).add(time_ns, raw)
+    for topic, time_ns, raw in late:
+        if ends_like_others(raw, contents.messages.setdefault(topic, Messages()).raws):
+            contents.messages[topic].add(time_ns, raw)
+        else:
+            contents.lost.append("a message that reaches into zeros")

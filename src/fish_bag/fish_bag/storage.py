@@ -1,0 +1,106 @@
+"""What one storage file of a recording holds: topics, messages, and what is wrong with the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from mmap import mmap
+
+Buffer = bytes | mmap
+CUSTOM_NAMES = ("fish_bag", "fish_train")  # of MCAP metadata records with a recording's custom data
+ROSBAG2_NAME = "rosbag2"  # of the MCAP metadata record with a copy of metadata.yaml
+BLOCK = 1 << 16
+
+
+@dataclass(frozen=True)
+class StoredTopic:
+    """A topic as one storage file describes it."""
+
+    name: str
+    type: str  # "sensor_msgs/msg/Imu"
+    serialization: str = "cdr"  # of the messages: "cdr", "ros1", "protobuf" ...
+    definition: bytes = b""  # of the type
+    encoding: str = ""  # of the definition: "ros2msg", "ros2idl", "ros1msg" ...
+    qos: str = ""  # offered_qos_profiles as YAML
+    hash: str = ""  # of the type: RIHS01 in ROS 2, MD5 in ROS 1
+
+
+@dataclass
+class Messages:
+    """Messages of one channel in the order of the file."""
+
+    times: list[int] = field(default_factory=list)  # arrival [ns]
+    raws: list[bytes] = field(default_factory=list)
+
+    def add(self, time_ns: int, raw: bytes) -> None:
+        self.times.append(time_ns)
+        self.raws.append(raw)
+
+    def __len__(self) -> int:
+        return len(self.raws)
+
+
+@dataclass
+class Contents:
+    """Everything found in one file."""
+
+    topics: dict[int, StoredTopic] = field(default_factory=dict)  # by channel
+    messages: dict[int, Messages] = field(default_factory=dict)  # by channel
+    custom: dict[str, str] = field(default_factory=dict)
+    metadata: str = ""  # copy of metadata.yaml inside the file
+    lost: list[str] = field(default_factory=list)  # what cannot be read, one sentence each
+    notes: list[str] = field(default_factory=list)  # what is odd though nothing is lost
+
+    @property
+    def count(self) -> int:
+        return sum(map(len, self.messages.values()))
+
+    def drop_undefined(self) -> None:
+        """Take out messages of channels without a topic and type: they are only bytes."""
+        for channel in sorted(set(self.messages) - set(self.topics)):
+            gone = len(self.messages.pop(channel))
+            if gone:
+                self.lost.append(
+                    f"{gone} messages of channel {channel}, whose topic or type is lost"
+                )
+
+    def compare_counts(self, stated: dict[int, int], where: str) -> None:
+        """Note every channel of which the file states another number of messages than it holds."""
+        for channel in sorted(set(stated) | set(self.messages)):
+            found, said = len(self.messages.get(channel, ())), stated.get(channel, 0)
+            if found != said:
+                name = self.topics[channel].name if channel in self.topics else f"channel {channel}"
+                self.notes.append(f"{name}: {found} messages are in the file, {where} say {said}")
+
+
+Keep = Callable[[StoredTopic], int | None]  # bytes kept of every message, None: all
+
+
+def keep_whole(_: StoredTopic) -> None:
+    """Keep every message whole."""
+
+
+def end_of_content(data: Buffer) -> int:
+    """Position after the last byte that is not zero: a file system fills up a file with zeros after a power loss."""
+    end = len(data)
+    while end:
+        start = max(0, end - BLOCK)
+        kept = len(bytes(data[start:end]).rstrip(b"\0"))
+        if kept:
+            return start + kept
+        end = start
+    return 0
+
+
+def ends_like_others(raw: bytes, others: list[bytes]) -> bool:
+    """Whether a message that reaches into zeros ends in no more zero bytes than the others of its topic do.
+
+    Then its own bytes are zeros there as well, and it is whole. False also where nothing is known: without others, or
+    where all of it is zeros.
+    """
+    own = len(raw) - len(raw.rstrip(b"\0"))
+    return (
+        bool(others)
+        and own < len(raw)
+        and own <= min(len(o) - len(o.rstrip(b"\0")) for o in others[-100:])
+    )

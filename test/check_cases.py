@@ -1,0 +1,167 @@
+"""Recordings of a folder of cases against their right answers; the folder is not a part of the project.
+
+    python test/check_cases.py FOLDER
+
+A case is a folder in FOLDER whose name stands in CASES. Exit status: 0 all right, 1 one is wrong, 2 the folder is absent.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from fish_bag import RecordingError, Trial, read_trial
+from fish_bag.playback import Playback, ReplayerConfig
+from fish_bag.recover import recover
+
+ROBOT = {"joint_command": 60, "joint_states": 60, "imu/data": 60, "camera/pose": 18}
+SHORT = {"joint_command": 20, "joint_states": 20, "imu/data": 20, "camera/pose": 6}
+
+
+def holds(trial: Trial, counts: dict[str, int]) -> None:
+    found = {topic.topic.removeprefix("/fish/"): topic.count for topic in trial.topics}
+    assert {name: found.get(name) for name in counts} == counts, found
+
+
+def has(trial: Trial, severity: str, kind: str, words: str = "") -> None:
+    texts = [p.text for p in trial.problems if (p.severity, p.kind) == (severity, kind)]
+    assert any(words in text for text in texts), [str(p) for p in trial.problems]
+
+
+def recovered(path: Path) -> Trial:
+    with tempfile.TemporaryDirectory() as folder:
+        recover(path, Path(folder) / "out")
+        return read_trial(Path(folder) / "out")
+
+
+def refused(path: Path, *words: str) -> None:
+    said = ""
+    try:
+        read_trial(path)
+    except RecordingError as error:
+        said = str(error)
+    assert said, "it was read"
+    assert all(word in said for word in words), said
+
+
+def foreign_topic(folder: Path) -> None:
+    for file in sorted(folder.glob("*.mcap")):
+        for trial in (read_trial(file), recovered(file)):
+            holds(trial, ROBOT)
+            has(trial, "info", "foreign_topic", "counted, not decoded")
+
+
+def imu_not_measured(folder: Path) -> None:
+    trial = read_trial(folder / "no_gyro")
+    has(trial, "warning", "not_measured")
+    assert trial.imu is not None
+    assert np.isnan(trial.imu.gyro).all()
+
+
+def imu_units(folder: Path) -> None:
+    has(read_trial(folder / "deg_per_s"), "error", "gyro_unit", "57.")
+
+
+def lfs_pointer(folder: Path) -> None:
+    refused(folder / "trial.mcap", "Git LFS pointer", "git lfs pull")
+
+
+def mcap_index(folder: Path) -> None:
+    holds(read_trial(folder / "chunk_index_only.mcap"), ROBOT)
+
+
+def message_compression(folder: Path) -> None:
+    holds(read_trial(folder / "with_metadata"), ROBOT)
+    trial = recovered(folder / "with_metadata")
+    holds(trial, ROBOT)
+    assert trial.commands is not None
+    assert not trial.commands.flags.any()
+
+
+def metadata_only(folder: Path) -> None:
+    for name, words in (("empty", "metadata.yaml is empty"), ("renamed", "renamed.mcap")):
+        trial = read_trial(folder / name)
+        holds(trial, SHORT)
+        has(trial, "warning", "storage", words)
+
+
+def qos_differs(folder: Path) -> None:
+    path = folder / "all_topics"
+    holds(read_trial(path), ROBOT)
+    assert len(list(Playback(ReplayerConfig(str(path)), "/fish").messages())) == 198
+
+
+def recover_zero_tail(folder: Path) -> None:
+    path = folder / "half_message.mcap"
+    with tempfile.TemporaryDirectory() as temporary:
+        assert recover(path, Path(temporary) / "out").lost
+    trial = recovered(path)
+    assert trial.imu is not None
+    assert len(trial.imu) == 20, "the 21st sample reaches into the zeros"
+    true = np.column_stack([np.full(20, 1.0), 0.01 * np.arange(20), np.full(20, 9.81)])
+    np.testing.assert_allclose(trial.imu.accel, true)
+
+
+def ros1_active(folder: Path) -> None:
+    path = folder / "run.bag.active"
+    refused(path, "ROS 1 bag without index", "recover")
+    assert sum(topic.count for topic in recovered(path).topics) > 0
+
+
+def sqlite_parts(folder: Path) -> None:
+    holds(read_trial(folder), ROBOT)
+    holds(recovered(folder), ROBOT)
+
+
+def sqlite_wal(folder: Path) -> None:
+    trial = read_trial(folder / "killed")
+    holds(trial, ROBOT)
+    has(trial, "warning", "storage", "-wal")
+
+
+def two_publishers(folder: Path) -> None:
+    has(read_trial(folder / "interleaved"), "warning", "two_publishers", "200 Hz")
+
+
+CASES: tuple[Callable[[Path], None], ...] = (
+    foreign_topic,
+    imu_not_measured,
+    imu_units,
+    lfs_pointer,
+    mcap_index,
+    message_compression,
+    metadata_only,
+    qos_differs,
+    recover_zero_tail,
+    ros1_active,
+    sqlite_parts,
+    sqlite_wal,
+    two_publishers,
+)
+
+
+def main() -> int:
+    if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
+        given = sys.argv[1] if len(sys.argv) > 1 else "nothing"
+        print(f"check_cases: {given}: no such folder; expected the folder with the cases")
+        return 2
+    wrong = 0
+    for case in CASES:
+        folder = Path(sys.argv[1]) / case.__name__
+        try:
+            if not folder.is_dir():
+                raise AssertionError("the folder is absent")
+            case(folder)
+            print(f"right  {case.__name__}")
+        except (AssertionError, RecordingError) as error:
+            wrong += 1
+            print(f"WRONG  {case.__name__}: {' '.join(str(error).split())[:300]}")
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
