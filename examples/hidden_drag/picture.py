@@ -56,7 +56,7 @@ def draw_missing_force(axes: Axes, found: Diagnosis) -> None:
 
 def draw_evidence(axes: Axes, found: Diagnosis) -> None:
     """By how much the log-likelihood of each name's quick fit is behind that of the best."""
-    nearest = sorted(found.rounds[0].ranking, key=lambda ranked: -ranked.gain)[:SHOWN][::-1]
+    nearest = sorted(found.state.rounds[0].ranking, key=lambda ranked: -ranked.gain)[:SHOWN][::-1]
     best = nearest[-1].gain
     axes.plot(
         [best - ranked.gain for ranked in nearest],
@@ -70,7 +70,7 @@ def draw_evidence(axes: Axes, found: Diagnosis) -> None:
 
 def draw_held_out_trials(axes: Axes, found: Diagnosis) -> None:
     """Distance between measured and simulated position of every held-out trial, from its first estimate on, not corrected."""
-    trials = found.experiment.select(found.split.held_out)
+    trials = found.task.experiment.select(found.task.split.held_out)
     for fit, label, colour in (
         (found.nominal, "refitted model", BEFORE),
         (found.final, "with the effect", AFTER),

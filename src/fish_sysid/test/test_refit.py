@@ -86,7 +86,8 @@ ASIDE = {
 }
 
 
-def test_a_neighbouring_optimum_of_a_fine_tail_is_left_by_annealing_nearby_or_from_another_start():
+@pytest.mark.timeout(1200)  # of a loaded computer; a minute on a quiet one
+def test_a_neighbouring_optimum_of_a_fine_tail_is_left_by_annealing_nearby():
     """Its optima lie so close together that a fit ends in a neighbour of the best."""
     robot = with_links(Robot(), 5)
     calm = Noise(gyro=0.003, accel=0.025, camera_position=0.001, camera_heading=0.006)
@@ -99,5 +100,3 @@ def test_a_neighbouring_optimum_of_a_fine_tail_is_left_by_annealing_nearby_or_fr
     best = refit(hypothesis, truth, swum, found.noise, REFIT)
     assert best.log_posterior - stuck.log_posterior > 100.0
     assert abs(found.log_posterior - best.log_posterior) < 3.0
-    restarted = best_of_restart(stuck, truth, swum, noise, REFIT)
-    assert restarted.log_posterior - stuck.log_posterior > 100.0

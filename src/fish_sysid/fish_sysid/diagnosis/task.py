@@ -84,7 +84,8 @@ def make_task(
     for stage in without:
         if stage not in STAGE_NAMES:
             raise ValueError(f"stage {stage!r}: expected one of {', '.join(sorted(STAGE_NAMES))}")
-    robot, split = replace(robot, table=effects), split_trials(experiment)
+    robot = replace(robot, table={**robot.table, **effects})
+    split = split_trials(experiment)
     names = known(names or candidates(effects), effects)
     trials = trials_of(experiment, split)
     reasons = {n: why for n, why in not_judged(trials.training, robot).items() if n in names}
