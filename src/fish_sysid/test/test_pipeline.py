@@ -110,9 +110,7 @@ class Mine(QuadraticDrag):
 def test_an_effect_of_ones_own_is_found_without_touching_the_table():
     before, effects = dict(EFFECTS), {**EFFECTS, "mine": Mine}
     hidden = replace(fish(), table=effects).with_effect("mine", surge=0.6, sway=4.0, yaw=1.2e-3)
-    result = pipeline.diagnose(
-        swim(hidden, duration=5.0), GIVEN, names=("mine",), effects=effects
-    )
+    result = pipeline.diagnose(swim(hidden, duration=5.0), GIVEN, names=("mine",), effects=effects)
     assert [e["name"] for e in answer(result)["effects"]] == ["mine"]
     assert before == EFFECTS
 
