@@ -9,10 +9,10 @@ from pathlib import Path
 
 from fish_report.errors import UserError
 from fish_report.output_folder import new_folder
-from fish_study.build import make_world
-from fish_study.scenario import World
+from fish_study.build import make_recordings
+from fish_study.scenario import Scenario
 
-WORLD = World(
+SCENARIO = Scenario(
     group="example",
     seed=20261121,
     effects={"quadratic_drag": {"surge": 0.6, "sway": 4.0, "yaw": 1.2e-3}},
@@ -39,6 +39,6 @@ def folder_of(words: list[str]) -> Path:
 
 if __name__ == "__main__":
     try:
-        make_world(WORLD, folder_of(sys.argv[1:]))
+        make_recordings(SCENARIO, folder_of(sys.argv[1:]))
     except UserError as error:
         sys.exit(str(error))
