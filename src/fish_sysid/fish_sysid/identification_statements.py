@@ -1,0 +1,362 @@
+"""What an identification says in words: what the data lack, what they do not determine, and whether physics beats the baselines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fish_sysid.dataset.camera_time_offset import Alignment
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.estimation.initial_noise import worst_row
+from fish_sysid.estimation.map_fit import Fit
+from fish_sysid.estimation.parametrization import Coordinates, zeros
+from fish_sysid.estimation.shooting.coordinates import ShotCoordinates
+from fish_sysid.estimation.shooting.prediction_fit import RANGE, PredictionFit
+from fish_sysid.estimation.shooting.selection import Step, step_text
+from fish_sysid.prediction.held_out_errors import AHEAD, BASELINES, PEEK
+from fish_sysid.prediction.prediction import HORIZONS, WARM_UP, ErrorSizes
+
+UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data say little
+ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
+WORSE = (
+    1.1  # times the error of the robot it began with: more than two robots as good differ by chance
+)
+STILL = (
+    0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
+)
+NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"
+NO_ENCODER = "the rotor is taken to follow its commands"
+
+
+def step_statement(step: Step) -> str:
+    """What a candidate did to training trials left out in turn."""
+    family = f"; {', '.join(step.alike)} would do as well" if step.alike else ""
+    return f"{step.name}: {'added' if step.added else 'not added'}; {step_text(step)}{family}"
+
+
+def prediction_statements(found: PredictionFit) -> list[str]:
+    """How a robot was fitted to predictions, and what that says."""
+    links = ", ".join(f"{n}: {cost:.0f}" for n, cost in sorted(found.costs_by_links.items()))
+    clocks, deviation = found.sensors, found.sensor_errors
+    out = [
+        "no start state lets the model follow two seconds of swimming within the camera's noise: it lacks something, so that "
+        "it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors are clustered by trial; "
+        "`robofish diagnose` looks for what is missing",
+        f"cost of predictions by number of links of the tail, without effects: {links}; "
+        f"{found.robot.links} taken",
+    ]
+    out += [
+        f"{name}: {clocks[name]:+.3f} +- {deviation[name]:.3f} beyond what camera and gyro say, by predictions"
+        for name in clocks
+    ]
+    if RANGE in found.found.hypothesis.free:
+        out.append(
+            f"commands of the rudder go beyond rudder_range: the range is fitted ({found.robot.parameters[RANGE]:.2f} rad)"
+        )
+    return [*out, *map(step_statement, found.steps)]
+
+
+def lag_statements(lag: Alignment) -> list[str]:
+    """What camera and gyro say about each other's stamps."""
+    if not lag.delay:
+        return []
+    return [
+        f"images are {lag.delay:.2f} s older than their stamps: heading of camera and gyro then differ by {lag.rms:.3f} rad "
+        f"instead of {lag.rms_undelayed:.3f} (rms in 4 s); taken out of all trials, camera_latency in robot.yaml"
+    ]
+
+
+def undetermined(self) -> tuple[str, ...]:
+        """Parameters whose uncertainty is about the prior's: the data do not determine them."""
+        return undetermined(self.fit)
+
+    @property
+    def correlation(self) -> Array:
+        """(K, K) of the parameters' errors."""
+        deviation = np.sqrt(np.diag(self.fit.covariance))
+        matrix: Array = self.fit.covariance / np.outer(deviation, deviation)
+        return matrix
+
+
+def identify(
+    experiment: Experiment,
+    robot: Robot,
+    noise: Noise | None = None,
+    hold_out: int = 4,
+    free: tuple[str, ...] = NOMINAL_FREE,
+    report: Report = lambda _: None,
+    effects: tuple[str, ...] = (),
+    choose_from: tuple[str, ...] = (),
+) -> Identification:
+    """Fit the nominal parameters (and those of the robot's effects in `free`) and judge them on trials left out.
+
+    hold_out: every so-manieth trial takes no part in fitting; 0: none. Raises ValueError when it is negative or 1.
+    effects: names added to the robot's, their parameters free. choose_from: where the model is wrong beyond its noise, those
+    of these effects are added that let it predict training trials better when they are left out in turn.
+    A delay of the camera that the gyro shows is taken out of all trials first, so that horizons count from the moment an
+    image was taken, and goes into the robot that comes back.
+    """
+    began = time.monotonic()
+    train, held = split(len(experiment.names), hold_out)
+    lag = Alignment(0.0, np.nan, np.nan)
+    if "camera_latency" not in (*robot.sensors, *effects):
+        lag = align(experiment.select(train))
+        experiment = moved_back(experiment, lag.delay)
+    training, held_out = experiment.select(train), experiment.select(held) if held else None
+    noise = noise or usual_noise(
+        training
+    )  # what trials left out say of the sensors takes no part either
+    hypothesis = nominal_hypothesis(robot, free)
+    for name in effects:
+        hypothesis = hypothesis.with_effect(name, EFFECT_START)
+    # not from many places: of a wrong model's optima the likelihood does not tell which predicts, and this way is measured
+    fit = fit_tempered(hypothesis, training, noise, report=report, held=TAIL_INERTIAS)
+    wrong = is_wrong(fit, noise)
+    fit = fit_outlook(fit, training, report) if wrong else second_look(fit, training, report)
+    steps: tuple[Step, ...] = ()
+    if wrong and choose_from:
+        fit, steps = choose_effects(fit, training, choose_from, report)
+        fit = fit_outlook(fit, training, report) if any(step.added for step in steps) else fit
+    report("predicting trials left out")
+    judged, errors, lacking = judge(training, held_out, robot, fit)
+    estimates = estimate(training, fit.robot, fit.noise)
+    statements = [
+        *data_statements(experiment, held_out),
+        *lag_statements(lag),
+        *fit_statements(fit),
+    ]
+    statements += lost_statements(training, fit)
+    statements += [
+        *([FITTED_FOR_OUTLOOK] if wrong else []),
+        *([NOT_CHOSEN] if choose_from and not wrong else []),
+        *map(step_statement, steps),
+        *lacking,
+        *start_statements(errors),
+        *verdict(errors),
+    ]
+    seconds = time.monotonic() - began
+    return Identification(
+        fit,
+        robot,
+        training,
+        held_out,
+        judged,
+        estimates,
+        errors,
+        tuple(statements),
+        seconds,
+        lag.delay,
+    )
+
+
+def is_wrong(fit: Fit, noise: Noise) -> bool:
+    """The model needs sensors far noisier than they are said to be, or a force that no water has: the likelihood misleads."""
+    told = [
+        (getattr(fit.noise, key), getattr(noise, key))
+        for key in ("gyro", "camera_position", "camera_heading")
+    ]
+    return any(needed > STRANGE * said for needed, said in told) or bool(
+        excess(fit).max() > TOO_STRONG
+    )
+
+
+def step_statement(step: Step) -> str:
+    """What a candidate did to training trials left out in turn."""
+    return f"{step.name}: {'added' if step.added else 'not added'}; {step_text(step)}"
+
+
+def lag_statements(lag: Alignment) -> list[str]:
+    """What camera and gyro say about each other's stamps."""
+    if not lag.delay:
+        return []
+    return [
+        f"images are {lag.delay:.2f} s older than their stamps: heading of camera and gyro then differ by {lag.rms:.3f} rad "
+        f"instead of {lag.rms_undelayed:.3f} (rms in 4 s); taken out of all trials, camera_latency in robot.yaml"
+    ]
+
+
+def split(trials: int, hold_out: int) -> tuple[list[int], list[int]]:
+    """Indices of training and held-out trials: every `hold_out`-th, the last one of a small set, none of a single one."""
+    if hold_out < 0 or hold_out == 1:
+        raise ValueError(
+            f"hold-out {hold_out}: expected 0 (none) or at least 2 (every second trial)"
+        )
+    if hold_out == 0 or trials == 1:
+        return list(range(trials)), []
+    held = list(range(hold_out - 1, trials, hold_out)) or [trials - 1]
+    return [i for i in range(trials) if i not in held], held
+
+
+def judge(
+    training: Experiment, held_out: Experiment | None, start: Robot, fit: Fit
+) -> tuple[Predictions, dict[str, ErrorSizes], list[str]]:
+    """Predictions, errors of both robots and of the baselines, and what could not be had, on the held-out trials."""
+    unseen = held_out or training
+    longest = max(HORIZONS)
+    judged = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP)
+    peeking = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP, PEEK)
+    before = predict(
+        unseen, start, suitable_noise(unseen, start, fit.noise), longest, EVERY, WARM_UP
+    )
+    errors = {"start": prediction_errors(before), "identified": prediction_errors(judged)}
+    try:
+        baselines = fit_baselines(training)
+    except ValueError as error:
+        return judged, errors, [f"no baselines: {error}"]
+    for name, advance in baselines.items():
+        errors[name] = prediction_errors(predict_baseline(advance, judged, HALF_WINDOW))
+    errors["identified" + AHEAD] = prediction_errors(peeking)
+    for name, advance in baselines.items():
+        errors[name + AHEAD] = prediction_errors(predict_baseline(advance, judged))
+    return judged, errors, []
+
+
+def undetermined(fit: Fit, predicted: PredictionFit | None = None) -> tuple[str, ...]:
+    """Free parameters whose posterior standard deviation is above UNDETERMINED times the prior's."""
+    coordinates = ShotCoordinates if predicted else Coordinates
+    deviation, prior = np.sqrt(np.diag(fit.covariance)), coordinates(fit.hypothesis).prior
+    return tuple(
+        n
+        for n, d, p in zip(fit.hypothesis.free, deviation, prior, strict=True)
+        if d > UNDETERMINED * p
+    )
+
+
+def entangled(fit: Fit) -> list[tuple[str, str, float]]:
+    """Pairs of parameters with a correlation beyond ENTANGLED."""
+    deviation = np.sqrt(np.diag(fit.covariance))
+    correlation = fit.covariance / np.outer(deviation, deviation)
+    names = fit.hypothesis.free
+    pairs = [
+        (i, j) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > ENTANGLED
+    ]
+    return [(names[j], names[i], float(correlation[i, j])) for i, j in pairs]
+
+
+def data_statements(experiment: Experiment, held_out: Experiment | None) -> list[str]:
+    """What the recordings lack, and what that costs."""
+    out = []
+    if held_out is None:
+        out.append(
+            "no trial was held out: errors below are of trials that took part in the fit, unseen ones are worse"
+        )
+    for what, rows, cost in (
+        ("IMU", experiment.gyro, NO_IMU),
+        ("encoder", experiment.encoder, NO_ENCODER),
+    ):
+        missing = [
+            name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()
+        ]
+        if missing:
+            out.append(f"no {what} in {', '.join(missing)}: {cost}")
+    rotor, rudder = experiment.given_commands.T
+    if np.std(rudder) < STILL:
+        out.append(
+            "the rudder hardly moved: turning (yaw and sway drag, servo) is not excited; add rudder steps or sines"
+        )
+    if np.std(rotor) < STILL * 150.0:
+        out.append(
+            "the rotor's speed hardly changed: nothing drives the fish; add strokes of several amplitudes"
+        )
+    short = [
+        n
+        for n, k in zip(experiment.names, experiment.steps, strict=True)
+        if k * 0.01 < WARM_UP + max(HORIZONS)
+    ]
+    if short:
+        out.append(
+            f"shorter than {WARM_UP + max(HORIZONS):g} s, so without a say at the longest horizons: {', '.join(short)}"
+        )
+    return out
+
+
+def fit_statements(fit: Fit, predicted: PredictionFit | None = None) -> list[str]:
+    """What the data do not determine."""
+    out = []
+    if names := undetermined(fit, predicted):
+        out.append(
+            f"the data do not determine {', '.join(names)}: values and errors rest on the prior"
+        )
+    if names := zeros(fit.robot):
+        out.append(
+            f"{', '.join(names)}: 0 in the robot that the fit began with, so 0 in the one that came out"
+        )
+    for first, second, value in entangled(fit):
+        out.append(f"{first} and {second} are hardly told apart (correlation {value:+.3f})")
+    if not predicted and (worst := worst_row(fit)) > 1.5:
+        out.append(
+            f"innovations are {worst:.1f} times as large as the noise explains: standard errors are too small"
+        )
+    out.append("rigid masses and lengths are taken as measured; all else scales with them")
+    return out
+
+
+def lost_statements(training: Experiment, fit: Fit) -> list[str]:
+    """Trials on which the filter diverged with the fitted model."""
+    lost = [
+        n
+        for n, value in zip(training.names, fit.log_likelihood, strict=True)
+        if not np.isfinite(value)
+    ]
+    if not lost:
+        return []
+    return [
+        f"the filter loses the fish in {', '.join(lost)} with these values and begins anew there"
+    ]
+
+
+def start_statements(errors: dict[str, ErrorSizes]) -> list[str]:
+    """Where the positions that the fit predicts are further off than those of the robot it began with."""
+    start, fitted = errors["start"], errors["identified"]
+    pairs = zip(fitted.horizons, start.rms[:, 0], fitted.rms[:, 0], strict=True)
+    worse = [
+        f"{h:g} s ({mine:.3g} m against {before:.3g})"
+        for h, before, mine in pairs
+        if mine > WORSE * before
+    ]
+    if not worse:
+        return []
+    return [
+        f"the fit predicts positions worse than the robot it began with at {', '.join(worse)}: the model lacks something; "
+        "robofish diagnose looks for it and makes a model that predicts"
+    ]
+
+
+def verdict(errors: dict[str, ErrorSizes]) -> list[str]:
+    """Whether the physics beats the baselines, all knowing the past, and all knowing a little of what comes."""
+    if not any(name in errors for name in BASELINES):
+        return []
+    return [_against(errors, ""), _against(errors, AHEAD)]
+
+
+def _against(errors: dict[str, ErrorSizes], suffix: str) -> str:
+    """Each number against the best of the baselines, at the horizons that the trials are long enough for.
+
+    What the physics cannot predict because it diverges is lost: errors are those of the predictions that it ends.
+    """
+    names = [name + suffix for name in BASELINES if name + suffix in errors]
+    mine = errors["identified" + suffix]
+    terms = f" where all know {PEEK:g} s of what comes" if suffix else ""
+    ended, expected = (
+        mine.counts.sum(0),
+        np.max([errors[name].counts.sum(0) for name in names], axis=0),
+    )
+    compared = [(i, h) for i, h in enumerate(mine.horizons) if expected[i]]
+    if not compared:
+        return f"no trial is long enough to compare the physics model with the baselines{terms}"
+    lost = []
+    for i, h in compared:
+        if ended[i] < expected[i]:
+            lost.append(
+                f"{expected[i] - ended[i]} of {expected[i]} predictions at {h:g} s, which diverge"
+            )
+        for j, quantity in enumerate(("position", "heading", "speed")):
+            best = min(names, key=lambda name: np.nan_to_num(errors[name].rms[i, j], nan=np.inf))
+            if mine.rms[i, j] >= (theirs := errors[best].rms[i, j]):
+                by = best.removesuffix(suffix)
+                lost.append(
+                    f"{quantity} at {h:g} s ({mine.rms[i, j]:.3g} against {theirs:.3g}, {by})"
+                )
+    if lost:
+        return f"the physics model does NOT beat the baselines{terms} in {', '.join(lost)}"
+    at = " s, ".join(f"{h:g}" for _, h in compared)
+    return f"the physics model beats all baselines{terms} in position, heading and speed at {at} s"
