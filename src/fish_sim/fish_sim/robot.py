@@ -24,7 +24,11 @@ FORMAT = 1
 STRIP_ADDED_MASS = (
     1000.0 * math.pi / 4.0 * 0.075**2
 )  # kg/m, slender body strip rho pi/4 h^2, height h = 0.075 m
-KNOWLEDGE = ("measured", "estimated", "unknown")  # of a parameter: within 5 %, tens of per cent, a factor of three
+KNOWLEDGE = (
+    "measured",
+    "estimated",
+    "unknown",
+)  # of a parameter: within 5 %, tens of per cent, a factor of three
 STATES = ("filter", "shooting")  # ways to the state that a prediction starts from
 MAX_LINKS = 12  # beyond this the fastest tail mode needs steps far below 1 ms
 
@@ -269,7 +273,9 @@ def _check_prediction(given: Any) -> dict[str, Any]:
             f"prediction.states: got {given['states']!r}; expected one of {', '.join(STATES)}"
         )
     if not isinstance(given.get("noise", {}), dict):
-        raise RobotError(f"prediction.noise: got {given['noise']!r}; expected a table of name: number")
+        raise RobotError(
+            f"prediction.noise: got {given['noise']!r}; expected a table of name: number"
+        )
     return dict(given)
 
 

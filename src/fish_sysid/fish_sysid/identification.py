@@ -50,9 +50,7 @@ FITTED_FOR_OUTLOOK = (
     "it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors count every error as "
     "independent, which is too small; `robofish diagnose` looks for what is missing"
 )
-NOT_CHOSEN = (
-    "no effects looked for: the model follows the fish, and its likelihood can be believed; `robofish diagnose` asks it"
-)
+NOT_CHOSEN = "no effects looked for: the model follows the fish, and its likelihood can be believed; `robofish diagnose` asks it"
 Report = Callable[[str], None]  # told what is being done
 
 
@@ -194,7 +192,9 @@ def by_predictions(
     moving = tuple(name for name in effects if name in EFFECTS)
     found = fit_predictions(training, robot, free, moving, choose_from, report)
     aside = [name for name in effects if name not in moving]
-    not_fitted = [f"{', '.join(aside)}: not fitted; predictions fit the sensors' clocks and the camera's heading offset alone"]
+    not_fitted = [
+        f"{', '.join(aside)}: not fitted; predictions fit the sensors' clocks and the camera's heading offset alone"
+    ]
     clocks = found.sensors
     camera = max(lag.delay + clocks["camera_latency.delay"], 0.0)
     imu = max(clocks["imu_latency.delay"], 0.0)
@@ -204,7 +204,14 @@ def by_predictions(
     own = suitable_noise(moved.select(train), plain(hypothesis.robot), noise)
     fit = evaluate(hypothesis, theta, moved.select(train), own)
     fit = replace(fit, normal=np.linalg.inv(covariance))
-    return Fitted(fit, moved, camera, imu, (*prediction_statements(found), *(not_fitted if aside else [])), found)
+    return Fitted(
+        fit,
+        moved,
+        camera,
+        imu,
+        (*prediction_statements(found), *(not_fitted if aside else [])),
+        found,
+    )
 
 
 def concluded(

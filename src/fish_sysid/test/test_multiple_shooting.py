@@ -53,7 +53,11 @@ def recorded(
 
 def shooting_on(experiment: Experiment, length: float = 2.0) -> Shooting:
     coordinates = ShotCoordinates(nominal_hypothesis(NOMINAL, FREE))
-    return Shooting(experiment, coordinates, cut(experiment, regular_starts(experiment, length, length, 1.0), length))
+    return Shooting(
+        experiment,
+        coordinates,
+        cut(experiment, regular_starts(experiment, length, length, 1.0), length),
+    )
 
 
 def test_known_parameters_and_the_imu_s_clock_come_back() -> None:
@@ -92,8 +96,14 @@ def test_eliminated_start_states_give_the_dense_solution() -> None:
     J = random.normal(size=(W, 12, P + X))
     e = random.normal(size=(W, 12))
     blocks = Blocks(
-        *(np.einsum("wri,wrj->wij", J[..., :P], J[..., :P]), np.einsum("wri,wr->wi", J[..., :P], e)),
-        *(np.einsum("wri,wrj->wij", J[..., :P], J[..., P:]), np.einsum("wri,wrj->wij", J[..., P:], J[..., P:])),
+        *(
+            np.einsum("wri,wrj->wij", J[..., :P], J[..., :P]),
+            np.einsum("wri,wr->wi", J[..., :P], e),
+        ),
+        *(
+            np.einsum("wri,wrj->wij", J[..., :P], J[..., P:]),
+            np.einsum("wri,wrj->wij", J[..., P:], J[..., P:]),
+        ),
         np.einsum("wri,wr->wi", J[..., P:], e),
     )
     reduced = eliminate(blocks)
@@ -169,7 +179,9 @@ def test_predictions_have_the_slopes_of_finite_differences_and_improve() -> None
 
 
 def test_the_prior_is_as_wide_as_what_is_known() -> None:
-    robot = replace(NOMINAL, knowledge={"head_drag_surge": "measured", "head_drag_yaw": "estimated"})
+    robot = replace(
+        NOMINAL, knowledge={"head_drag_surge": "measured", "head_drag_yaw": "estimated"}
+    )
     coordinates = ShotCoordinates(nominal_hypothesis(robot, FREE))
     expected = [KNOWLEDGE[word] for word in ("measured", "estimated", "unknown")]
     assert coordinates.prior.tolist() == expected

@@ -30,9 +30,7 @@ class Imu:
     gyro = (0, 0, r) + b_g + n_g,   accelerometer = (a_x, a_y, g) + b_a + n_a,   yaw = psi + psi_0 + walk
     """
 
-    def __init__(
-        self, settings: SensorSettings, random: Generator, delay: float = 0.0
-    ) -> None:
+    def __init__(self, settings: SensorSettings, random: Generator, delay: float = 0.0) -> None:
         """delay: how much older a reading is than its stamp [s], to the nearest sample."""
         self._settings, self._random, self._delay = settings, random, delay
         self._felt: deque[tuple[tuple[float, float], float, float]] = deque()

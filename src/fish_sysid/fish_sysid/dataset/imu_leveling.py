@@ -32,7 +32,7 @@ def level(imu: Imu) -> tuple[Array, Array]:
 
 
 def heading(imu: Imu) -> tuple[Array, Array]:
-    """(stamps (Q,) [s], unwrapped headings (Q,) [rad]) of the readings with an orientation; an unknown constant is added to them."""
+    """(stamps (Q,) [s], headings (Q,) [rad]) of the readings with an orientation, unwrapped, an unknown constant added."""
     given = np.isfinite(imu.orientation).all(axis=1)
     given &= np.linalg.norm(np.nan_to_num(imu.orientation), axis=1) > 0.5
     R = rotation(imu.orientation[given])

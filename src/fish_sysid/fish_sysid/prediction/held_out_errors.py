@@ -1,4 +1,4 @@
-"""Errors of an identified robot on trials that it was not fitted to, beside those of the robot it began with and the baselines."""
+"""Errors of an identified robot on trials that it was not fitted to, beside its start's and the baselines'."""
 
 from __future__ import annotations
 
@@ -22,3 +22,23 @@ BASELINES = ("constant", "arx", "bilinear")
 AHEAD, PEEK = "_ahead", HALF_WINDOW  # suffix of predictors that know so many s of what comes
 
 
+def judge(
+    training: Experiment, held_out: Experiment | None, start: Robot, fitted: Robot, noise: Noise
+) -> tuple[Predictions, dict[str, ErrorSizes], list[str]]:
+    """Predictions, errors of both robots and of the baselines, and what could not be had, on the held-out trials."""
+    unseen = held_out or training
+    longest = max(HORIZONS)
+    judged = predict(unseen, fitted, noise, longest, EVERY, WARM_UP)
+    peeking = predict(unseen, fitted, noise, longest, EVERY, WARM_UP, PEEK)
+    before = predict(unseen, start, suitable_noise(unseen, start, noise), longest, EVERY, WARM_UP)
+    errors = {"start": prediction_errors(before), "identified": prediction_errors(judged)}
+    try:
+        baselines = fit_baselines(training)
+    except ValueError as error:
+        return judged, errors, [f"no baselines: {error}"]
+    for name, advance in baselines.items():
+        errors[name] = prediction_errors(predict_baseline(advance, judged, HALF_WINDOW))
+    errors["identified" + AHEAD] = prediction_errors(peeking)
+    for name, advance in baselines.items():
+        errors[name + AHEAD] = prediction_errors(predict_baseline(advance, judged))
+    return judged, errors, []

@@ -35,7 +35,9 @@ def kept_noise(robot: Robot) -> Noise | None:
                 f"prediction.noise.{name}: got {value!r}; expected positive numbers under the names "
                 f"{', '.join(f.name for f in fields(Noise))}; delete the entry to have the noise estimated anew"
             )
-    return replace(Noise(), **{k: tuple(v) if isinstance(v, list) else float(v) for k, v in table.items()})
+    return replace(
+        Noise(), **{k: tuple(v) if isinstance(v, list) else float(v) for k, v in table.items()}
+    )
 
 
 def uses_shooting(robot: Robot) -> bool:

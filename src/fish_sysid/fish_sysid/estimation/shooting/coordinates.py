@@ -20,6 +20,7 @@ QUICK = Scheme("rk4", 1)
 # standard deviation of the logarithm by what a robot.yaml says of a parameter: 5 %, tens of per cent, a factor of three
 KNOWLEDGE = {"measured": 0.05, "estimated": 0.3, "unknown": 1.1}
 UNSTATED = "unknown"
+ROUNDING = 1e-9  # of a logarithm and back: keeps a value at an end of its range inside it
 
 
 class ShotCoordinates(Coordinates):
@@ -33,8 +34,8 @@ class ShotCoordinates(Coordinates):
         table = nominal_parameters(hypothesis.robot.links)
         for i, name in enumerate(hypothesis.free):
             if name in table:
-                self.lowest[i] = max(self.lowest[i], table[name].lowest)
-                self.highest[i] = min(self.highest[i], table[name].highest)
+                self.lowest[i] = max(self.lowest[i], table[name].lowest * (1.0 + ROUNDING))
+                self.highest[i] = min(self.highest[i], table[name].highest * (1.0 - ROUNDING))
         self.stepper = quick_stepper(self, self.origin() if theta is None else theta)
 
 

@@ -149,9 +149,7 @@ class Shooting:
         memory = memories(stepper, self.experiment, self.windows, directions)
         pose, slope = poses_and_slopes(stepper, self.windows, directions, memory, guess.x)
         count = len(directions.p) - 1
-        return residuals(
-            self.windows, self.scale, pose, slope, count, guess.sensors, guess.zero
-        )
+        return residuals(self.windows, self.scale, pose, slope, count, guess.sensors, guess.zero)
 
     def errors(self, guess: Guess) -> Residuals:
         """Without slopes."""

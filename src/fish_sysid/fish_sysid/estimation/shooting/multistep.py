@@ -22,7 +22,7 @@ from fish_sysid.estimation.shooting.huber import huber, weight
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
 from fish_sysid.estimation.shooting.rollout import STEP
 from fish_sysid.estimation.shooting.start_states import PAST, shot_states
-from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, Targets, targets_of
+from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, targets_of
 from fish_sysid.prediction.stroke_average import HALF_WINDOW
 
 Array = NDArray[np.float64]

@@ -45,7 +45,7 @@ class PredictionFit:
 
     @property
     def theta(self) -> Array:
-        """(K,)"""
+        """The free parameters (K,)."""
         return self.found.z[: -len(SENSORS)]
 
     @property
@@ -53,7 +53,6 @@ class PredictionFit:
         """Ages of images and IMU samples beyond what was taken out before [s], and the camera's heading offset [rad]."""
         values = self.found.z[-len(SENSORS) :] * SENSOR_SCALE
         return dict(zip(SENSORS, values.tolist(), strict=True))
-
 
     @property
     def sensor_errors(self) -> dict[str, float]:

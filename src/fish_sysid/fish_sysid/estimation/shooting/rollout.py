@@ -76,7 +76,9 @@ def poses_and_slopes(
         )
         pose = states[..., :3].reshape(len(states), len(own), C, 3)
         slope = (pose[:, :, 1:] - pose[:, :, :1]) / STEP
-        return np.ascontiguousarray(pose[:, :, 0]), np.ascontiguousarray(slope.transpose(0, 1, 3, 2))
+        return np.ascontiguousarray(pose[:, :, 0]), np.ascontiguousarray(
+            slope.transpose(0, 1, 3, 2)
+        )
 
     parts = on_all_cores(
         share, np.array_split(np.arange(len(windows)), max(1, min(2 * cores(), len(windows))))

@@ -1,10 +1,10 @@
 """Normal equations of parameters and many start states, the start states eliminated by Schur's complement.
 
-    [A   B_1 .. B_W] [dz ]     [g  ]
-    [B_1' H_1      ] [dx_1]  = -[g_1]
-    [ ..       ..  ] [ .. ]     [ ..]
+[A   B_1 .. B_W] [dz ]     [g  ]
+[B_1' H_1      ] [dx_1]  = -[g_1]
+[ ..       ..  ] [ .. ]     [ ..]
 
-    S = A - sum of B_w H_w^-1 B_w',   s = g - sum of B_w H_w^-1 g_w,   S dz = -s,   H_w dx_w = -(g_w + B_w' dz)
+S = A - sum of B_w H_w^-1 B_w',   s = g - sum of B_w H_w^-1 g_w,   S dz = -s,   H_w dx_w = -(g_w + B_w' dz)
 """
 
 from __future__ import annotations

@@ -21,7 +21,6 @@ from fish_sysid.estimation.parametrization import (
     extend,
 )
 from fish_sysid.estimation.shooting.multistep import Multistep
-from fish_sysid.estimation.shooting.residuals import SENSORS
 from fish_sysid.estimation.shooting.schedule import Found, multistep, polished
 
 Array = NDArray[np.float64]
@@ -43,7 +42,9 @@ class Step:
     """What one candidate does to trials left out."""
 
     name: str
-    gain: float  # mean over trials left out of the logarithm of the control's cost over that with it
+    gain: (
+        float  # mean over trials left out of the logarithm of the control's cost over that with it
+    )
     deviation: float  # its standard error over trials
     added: bool
     alike: tuple[str, ...] = ()  # of its family, that gain as much within a standard error

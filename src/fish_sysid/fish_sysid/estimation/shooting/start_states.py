@@ -50,7 +50,8 @@ def shot_states(
 ) -> Array:
     """(S, NS) states at starts (S, 2) of trial and grid point by what was measured in the `past` [s] before each.
 
-    ahead: s after each start whose measurements may be known too. NaN where the camera hardly saw the fish or the motion diverged. sensors: (3,) in units of SENSOR_SCALE.
+    ahead: s after each start whose measurements may be known too; sensors: (3,) in units of SENSOR_SCALE. NaN where the camera
+    hardly saw the fish or the motion diverged.
     """
     coordinates = ShotCoordinates(nominal_hypothesis(robot, free=()))
     stepper, steps = coordinates.stepper, round(past / DT)

@@ -37,6 +37,11 @@ class Targets:
     measured: Array  # (R, 4) x, y [m], psi [rad], u [m/s]
     scale: Array  # (R, 4)
 
+    @property
+    def horizon(self) -> Array:
+        """Seconds after the start point (R,)."""
+        return np.round((self.scale[:, 0] - POSITION[0]) / POSITION[1], 6)
+
     def __len__(self) -> int:
         return len(self.start)
 
