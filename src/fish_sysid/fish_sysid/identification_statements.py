@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fish_sim.model import DT
 from fish_sysid.dataset.camera_time_offset import Alignment
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.initial_noise import worst_row
@@ -14,6 +15,7 @@ from fish_sysid.estimation.shooting.prediction_fit import RANGE, PredictionFit
 from fish_sysid.estimation.shooting.selection import Step, step_text
 from fish_sysid.prediction.held_out_errors import AHEAD, BASELINES, PEEK
 from fish_sysid.prediction.prediction import HORIZONS, WARM_UP, ErrorSizes
+from fish_sysid.prediction.stroke_average import stroke_mean
 
 UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data say little
 ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
@@ -23,6 +25,8 @@ WORSE = (
 STILL = (
     0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
 )
+LONG_GAP = 1.0  # s without a sample of IMU or camera
+NO_TURN = 0.3  # rad, between the leftmost and the rightmost stroke-mean heading of a trial
 NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"
 NO_ENCODER = "the rotor is taken to follow its commands"
 
@@ -103,6 +107,7 @@ def data_statements(experiment: Experiment, held_out: Experiment | None) -> list
         ]
         if missing:
             out.append(f"no {what} in {', '.join(missing)}: {cost}")
+    out += incomplete(experiment)
     rotor, rudder = experiment.given_commands.T
     if np.std(rudder) < STILL:
         out.append(
@@ -121,6 +126,37 @@ def data_statements(experiment: Experiment, held_out: Experiment | None) -> list
         out.append(
             f"shorter than {WARM_UP + max(HORIZONS):g} s, so without a say at the longest horizons: {', '.join(short)}"
         )
+    return out
+
+
+def incomplete(experiment: Experiment) -> list[str]:
+    """Trials in which a sensor starts late, has holes or sees no turn, and what is done about each."""
+    out = []
+    for m, name in enumerate(experiment.names):
+        steps, frames = int(experiment.steps[m]), experiment.frames[m]
+        for what, t, duty in (
+            (
+                "IMU",
+                np.flatnonzero(np.isfinite(experiment.gyro[:steps, m])) * DT,
+                "the camera alone tells how it moved",
+            ),
+            ("camera", frames.t, "no prediction is judged"),
+        ):
+            if len(t) < 2:
+                continue
+            gaps = np.diff(np.concatenate([[0.0], t, [(steps - 1) * DT]]))
+            longest = int(gaps.argmax())
+            if gaps[longest] > LONG_GAP:
+                begin = 0.0 if longest == 0 else float(t[longest - 1])
+                out.append(
+                    f"{name}: no {what} from {begin:.1f} to {begin + gaps[longest]:.1f} s; {duty} there, the rest is used"
+                )
+        mean = stroke_mean(frames.t, np.arange(0.5, steps * DT, 0.5))(frames.pose)[:, 2]
+        known = mean[np.isfinite(mean)]
+        if len(known) and (turned := float(np.ptp(known))) < NO_TURN:
+            out.append(
+                f"{name}: turns by {turned:.2f} rad in all, so that it says little of turning"
+            )
     return out
 
 

@@ -60,6 +60,13 @@ class PredictionFit:
         deviation = np.sqrt(np.diag(self.covariance))[-len(SENSORS) :] * SENSOR_SCALE
         return dict(zip(SENSORS, deviation.tolist(), strict=True))
 
+    @property
+    def parameter_spread(self) -> dict[str, float]:
+        """Spread over folds of the physical values, to first order."""
+        slope = np.abs(ShotCoordinates(self.found.hypothesis).slope(self.theta))
+        spread = self.spread[: len(slope)] * slope
+        return dict(zip(self.found.hypothesis.free, spread.tolist(), strict=True))
+
     def with_camera_offset(self) -> tuple[Hypothesis, Array, Array]:
         """(hypothesis, theta (K,), covariance (K, K)) with the camera's heading offset among the robot's sensors."""
         hypothesis, K = self.found.hypothesis, len(self.theta)
