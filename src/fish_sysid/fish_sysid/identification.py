@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.effects import EFFECTS
-from fish_sim.robot import Robot
+from fish_sim.robot import STATES, Robot
 from fish_sysid.dataset.camera_time_offset import Alignment, align, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.imu_time_offset import imu_moved_back
@@ -23,8 +23,7 @@ from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.global_fit import TOO_STRONG, excess, second_look
 from fish_sysid.estimation.initial_noise import STRANGE, suitable_noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.multistep_fit import fit_outlook
-from fish_sysid.estimation.parametrization import NOMINAL_FREE, nominal_hypothesis
+from fish_sysid.estimation.parametrization import NOMINAL_FREE, Coordinates, nominal_hypothesis
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
 from fish_sysid.estimation.shooting.prediction_fit import PredictionFit, fit_predictions
@@ -40,15 +39,32 @@ from fish_sysid.identification_statements import (
 )
 from fish_sysid.prediction.held_out_errors import judge
 from fish_sysid.prediction.kept_noise import with_noise
-from fish_sysid.prediction.prediction import ErrorSizes, Estimates, Predictions, estimate
+from fish_sysid.prediction.prediction import (
+    EVERY,
+    HORIZONS,
+    WARM_UP,
+    ErrorSizes,
+    Estimates,
+    Predictions,
+    estimate,
+    predict,
+    prediction_errors,
+)
 
 Array = NDArray[np.float64]
 
 EFFECT_START = 0.3  # typical strengths, at which the fit of an effect starts
+SO_FITTED = (
+    "it lacks something, so that it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors are "
+    "clustered by trial; `robofish diagnose` looks for what is missing"
+)
 FITTED_FOR_OUTLOOK = (
-    "the model needs sensors far noisier than they are, or water far stronger than in any pool: it lacks something, so that "
-    "it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors count every error as "
-    "independent, which is too small; `robofish diagnose` looks for what is missing"
+    "the model needs sensors far noisier than they are, or water far stronger than in any pool: "
+    + SO_FITTED
+)
+CANNOT_FOLLOW = (
+    "no start state lets the model follow two seconds of swimming within twice the camera's noise: "
+    + SO_FITTED
 )
 NOT_CHOSEN = "no effects looked for: the model follows the fish, and its likelihood can be believed; `robofish diagnose` asks it"
 Report = Callable[[str], None]  # told what is being done
@@ -72,6 +88,7 @@ class Identification:
     camera_delay: float = 0.0  # s, taken out of all trials above
     imu_delay: float = 0.0  # s, taken out of all trials above
     predicted: PredictionFit | None = None  # where the robot was fitted to predictions
+    states: str = "filter"  # how the states that predictions start from are estimated
 
     @property
     def robot(self) -> Robot:
@@ -81,7 +98,7 @@ class Identification:
             robot = robot.with_effect("camera_latency", delay=self.camera_delay)
         if self.imu_delay:
             robot = robot.with_effect("imu_latency", delay=self.imu_delay)
-        return with_noise(robot, self.fit.noise, "shooting" if self.predicted else "filter")
+        return with_noise(robot, self.fit.noise, self.states)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -112,6 +129,7 @@ class Fitted:
     imu_delay: float
     statements: tuple[str, ...]
     predicted: PredictionFit | None = None
+    states: str = "filter"  # how the states that predictions start from are estimated
 
 
 def identify(
@@ -143,37 +161,34 @@ def identify(
         training
     )  # what trials left out say of the sensors takes no part either
     report("can the model follow the fish?")
-    if misfit(training, robot, noise, free) > TOO_FAR:
+    why, fitted = CANNOT_FOLLOW, None
+    if misfit(training, robot, noise, free) <= TOO_FAR:
+        fit = by_likelihood(training, robot, noise, free, effects, report)
+        why, said = FITTED_FOR_OUTLOOK, (NOT_CHOSEN,) if choose_from else ()
+        fitted = Fitted(fit, moved, lag.delay, 0.0, said) if fit else None
+    if fitted is None:
         fitted = by_predictions(
             experiment, train, lag, robot, noise, free, effects, choose_from, report
         )
-    else:
-        fitted = by_likelihood(training, moved, lag, robot, noise, free, effects, report)
-        fitted = replace(
-            fitted, statements=(*fitted.statements, *([NOT_CHOSEN] if choose_from else []))
-        )
+        fitted = replace(fitted, statements=(why, *fitted.statements))
     return concluded(experiment, train, held, lag, robot, fitted, report, began)
 
 
 def by_likelihood(
     training: Experiment,
-    moved: Experiment,
-    lag: Alignment,
     robot: Robot,
     noise: Noise,
     free: tuple[str, ...],
     effects: tuple[str, ...],
     report: Report,
-) -> Fitted:
-    """The likeliest robot; one fitted to predictions by the filter's states where its noise is strange after all."""
+) -> Fit | None:
+    """The likeliest robot; None where its noise is no sensor's or its force no water's."""
     hypothesis = nominal_hypothesis(robot, free)
     for name in effects:
         hypothesis = hypothesis.with_effect(name, EFFECT_START)
     # not from many places: of a wrong model's optima the likelihood does not tell which predicts, and this way is measured
     fit = fit_tempered(hypothesis, training, noise, report=report, held=TAIL_INERTIAS)
-    wrong = is_wrong(fit, noise)
-    fit = fit_outlook(fit, training, report) if wrong else second_look(fit, training, report)
-    return Fitted(fit, moved, lag.delay, 0.0, (FITTED_FOR_OUTLOOK,) if wrong else ())
+    return None if is_wrong(fit, noise) else second_look(fit, training, report)
 
 
 def by_predictions(
@@ -201,9 +216,12 @@ def by_predictions(
     moved = imu_moved_back(moved_back(experiment, camera), imu)
     hypothesis, theta, covariance = found.with_camera_offset()
     report("noise")
-    own = suitable_noise(moved.select(train), plain(hypothesis.robot), noise)
+    found_robot = Coordinates(hypothesis).robot(theta)
+    own = suitable_noise(moved.select(train), plain(found_robot), noise)
     fit = evaluate(hypothesis, theta, moved.select(train), own)
     fit = replace(fit, normal=np.linalg.inv(covariance))
+    report("which states predict better")
+    states = better_states(moved.select(train), plain(fit.robot), own)
     return Fitted(
         fit,
         moved,
@@ -211,6 +229,7 @@ def by_predictions(
         imu,
         (*prediction_statements(found), *(not_fitted if aside else [])),
         found,
+        states,
     )
 
 
@@ -228,9 +247,8 @@ def concluded(
     fit, moved = fitted.fit, fitted.experiment
     training, held_out = moved.select(train), moved.select(held) if held else None
     report("predicting trials left out")
-    states = "shooting" if fitted.predicted else "filter"
     judged, errors, lacking = judge(
-        training, held_out, start, with_noise(plain(fit.robot), fit.noise, states), fit.noise
+        training, held_out, start, with_noise(plain(fit.robot), fit.noise, fitted.states), fit.noise
     )
     statements = (
         *data_statements(experiment, held_out),
@@ -255,7 +273,20 @@ def concluded(
         fitted.camera_delay,
         fitted.imu_delay,
         fitted.predicted,
+        fitted.states,
     )
+
+
+def better_states(training: Experiment, robot: Robot, noise: Noise) -> str:
+    """The way to start states, shooting or filter, with the smaller errors of predictions on training trials."""
+
+    def size(states: str) -> float:
+        made = predict(
+            training, with_noise(robot, noise, states), noise, max(HORIZONS), EVERY, WARM_UP
+        )
+        return float(np.nansum(np.log(prediction_errors(made).rms)))
+
+    return min(STATES, key=size)
 
 
 def is_wrong(fit: Fit, noise: Noise) -> bool:

@@ -42,9 +42,6 @@ def prediction_statements(found: PredictionFit) -> list[str]:
     links = ", ".join(f"{n}: {cost:.0f}" for n, cost in sorted(found.costs_by_links.items()))
     clocks, deviation = found.sensors, found.sensor_errors
     out = [
-        "no start state lets the model follow two seconds of swimming within the camera's noise: it lacks something, so that "
-        "it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors are clustered by trial; "
-        "`robofish diagnose` looks for what is missing",
         f"cost of predictions by number of links of the tail, without effects: {links}; "
         f"{found.robot.links} taken",
     ]
