@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CONTROLLER, FUSION, PATIENCE, PLANNER, RECORDER, Run, parameters, running
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from conftest import CONTROLLER, FUSION, PATIENCE, PLANNER, RECORDER, Run, parameters, running
 from fish_bag import read_trial
 from fish_bringup.node_table import REPLAYER, NodeSpec
 from fish_bringup.score import RunScore, score_trial

@@ -6,8 +6,8 @@ import time
 from contextlib import ExitStack
 
 import pytest
-from conftest import PATIENCE
 
+from conftest import PATIENCE
 from fish_bringup.node_table import EXCITER, RECORDER, ROBOTS
 from fish_bringup.nodes.watch import watching
 from fish_bringup.processes import NodeProcesses

@@ -28,6 +28,12 @@ FORMAT = 1
 STRIP_ADDED_MASS = (
     1000.0 * math.pi / 4.0 * 0.075**2
 )  # kg/m, slender body strip rho pi/4 h^2, height h = 0.075 m
+KNOWLEDGE = (
+    "measured",
+    "estimated",
+    "unknown",
+)  # of a parameter: within 5 %, tens of per cent, a factor of three
+STATES = ("filter", "shooting")  # ways to the state that a prediction starts from
 MAX_LINKS = 12  # beyond this the fastest tail mode needs steps far below 1 ms
 
 
@@ -106,11 +112,18 @@ class Robot:
     table: Mapping[str, type[Effect]] = field(
         default_factory=lambda: EFFECTS, repr=False, compare=False
     )  # effects that it may have, by name, in the order in which they act
+    knowledge: Mapping[str, str] = field(
+        default_factory=dict
+    )  # parameter -> one of KNOWLEDGE: how wide the prior of a fit is
+    prediction: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # how its states are best estimated, as identification found it; changes no motion
 
     def __post_init__(self) -> None:
         nominal = nominal_parameters(self.links)
         values = _check_table("parameters", nominal, self.parameters)
         object.__setattr__(self, "parameters", values)
+        _check_knowledge(self.knowledge, nominal)
         object.__setattr__(self, "effects", _check_effects("effects", self.table, self.effects))
         object.__setattr__(self, "sensors", _check_effects("sensors", SENSOR_EFFECTS, self.sensors))
 
@@ -149,6 +162,16 @@ def parameter_names(structure: Structure) -> tuple[str, ...]:
     links, effects = structure
     own = [f"{effect.name}.{key}" for effect in effects for key in effect.parameters]
     return (*nominal_parameters(links), *own)
+
+
+def _check_knowledge(given: Mapping[str, Any], specification: Mapping[str, Parameter]) -> None:
+    for name, word in given.items():
+        if name not in specification:
+            raise RobotError(f"knowledge.{name}: unknown name; known: {', '.join(specification)}")
+        if word not in KNOWLEDGE:
+            raise RobotError(
+                f"parameters.{name}.knowledge: got {word!r}; expected one of {', '.join(KNOWLEDGE)}"
+            )
 
 
 def _check_table(
@@ -218,7 +241,7 @@ def _from_content(content: Any) -> Robot:
         raise RobotError(
             f"got {type(content).__name__}; expected a table with format, links, parameters"
         )
-    known = {"format", "name", "links", "parameters", "effects", "sensors", "notes"}
+    known = {"format", "name", "links", "parameters", "effects", "sensors", "prediction", "notes"}
     if unknown := sorted(map(str, set(content) - known)):
         raise RobotError(f"{unknown[0]}: unknown field; known: {', '.join(sorted(known))}")
     if content.get("format") != FORMAT:
@@ -233,7 +256,31 @@ def _from_content(content: Any) -> Robot:
         effects=_effect_values("effects", content.get("effects") or {}, EFFECTS),
         sensors=_effect_values("sensors", content.get("sensors") or {}, SENSOR_EFFECTS),
         name=str(content.get("name", "fish")),
+        prediction=_check_prediction(content.get("prediction") or {}),
+        knowledge={
+            name: entry["knowledge"]
+            for name, entry in (content.get("parameters") or {}).items()
+            if isinstance(entry, dict) and "knowledge" in entry
+        },
     )
+
+
+def _check_prediction(given: Any) -> dict[str, Any]:
+    """{states: shooting or filter, noise: {name: number, ..}}; what the numbers mean is up to the estimator."""
+    if not isinstance(given, dict):
+        raise RobotError(f"prediction: got {given!r}; expected a table with states and noise")
+    for name in given:
+        if name not in ("states", "noise"):
+            raise RobotError(f"prediction.{name}: unknown field; known: states, noise")
+    if given.get("states", STATES[0]) not in STATES:
+        raise RobotError(
+            f"prediction.states: got {given['states']!r}; expected one of {', '.join(STATES)}"
+        )
+    if not isinstance(given.get("noise", {}), dict):
+        raise RobotError(
+            f"prediction.noise: got {given['noise']!r}; expected a table of name: number"
+        )
+    return dict(given)
 
 
 def _effect_values(where: str, given: Any, table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -283,6 +330,8 @@ def save_robot(
             row: dict[str, Any] = {"value": float(value), "unit": parameter.unit}
             if prefix + name in std:
                 row["std"] = float(std[prefix + name])
+            if not prefix and name in robot.knowledge:
+                row["knowledge"] = robot.knowledge[name]
             row["source"] = (
                 parameter.source if value == parameter.value else "identified or set by the user"
             )
@@ -296,6 +345,8 @@ def save_robot(
         content[key] = {
             name: rows(v, table[name].parameters, f"{name}.") for name, v in enabled.items()
         }
+    if robot.prediction:
+        content["prediction"] = dict(robot.prediction)
     if notes:
         content["notes"] = notes
     Path(path).write_text(yaml.safe_dump(content, sort_keys=False, width=110))

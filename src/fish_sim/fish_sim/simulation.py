@@ -81,7 +81,7 @@ class Simulation:
         self._command, self._command_time = (0.0, 0.0), -math.inf
         distortion = SensorDistortion(self._robot.sensors)
         self._distortion = distortion
-        self._imu = Imu(config, random)
+        self._imu = Imu(config, random, distortion.imu_delay())
         self._encoder = Encoder(config, random)
         self._camera = OverheadCamera(config, distortion, random)
         self._battery = Battery(config, random)

@@ -22,6 +22,7 @@ VOCABULARY = (
     "camera_scale",
     "gyro_scale",
     "imu_misalignment",
+    "imu_latency",
 )
 NONE = SensorDistortion({})
 

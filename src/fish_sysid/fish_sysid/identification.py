@@ -1,4 +1,8 @@
-"""Identify a robot from recordings: parameters with standard errors, and how well they predict unseen trials."""
+"""Identify a robot from recordings: parameters with standard errors, and how well they predict unseen trials.
+
+First windows of raw measurements ask whether the model can follow the fish at all. Where it can, its likelihood is right and
+says most. Where it cannot, the likelihood misleads, and the robot is fitted to predictions over seconds.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +13,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.robot import Robot
+from fish_sim.effects import EFFECTS
+from fish_sim.robot import STATES, Robot
 from fish_sysid.dataset.camera_time_offset import Alignment, align, moved_back
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.estimation.effect_selection import Step, choose_effects, step_text
+from fish_sysid.dataset.imu_time_offset import imu_moved_back
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.global_fit import refit_if_suspect
 from fish_sysid.estimation.initial_noise import initial_noise
-from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.multistep_fit import fit_multistep
-from fish_sysid.estimation.parametrization import (
-    NOMINAL_FREE,
-    nominal_hypothesis,
-    zeros,
-)
+from fish_sysid.estimation.map_fit import Fit, evaluate
+from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization, nominal_hypothesis
 from fish_sysid.estimation.refit import ANNEAL_HELD, refit
 from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
+from fish_sysid.estimation.shooting.prediction_fit import PredictionFit, fit_predictions
 from fish_sysid.estimation.thresholds import INNOVATION_RMS_REJECT, RATIO_REJECT
-from fish_sysid.prediction.baselines import fit_baselines, predict_baseline
+from fish_sysid.identification_statements import (
+    data_statements,
+    fit_statements,
+    lag_statements,
+    lost_statements,
+    prediction_statements,
+    start_statements,
+    undetermined,
+    verdict,
+)
+from fish_sysid.prediction.held_out_errors import judge
+from fish_sysid.prediction.kept_noise import with_noise
 from fish_sysid.prediction.prediction import (
     EVERY,
     HORIZONS,
@@ -38,32 +51,23 @@ from fish_sysid.prediction.prediction import (
     predict,
     prediction_errors,
 )
-from fish_sysid.prediction.stroke_average import HALF_WINDOW
 
 Array = NDArray[np.float64]
 
-UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data say little
-ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
-WORSE = (
-    1.1  # times the error of the robot it began with: more than two robots as good differ by chance
-)
-STILL = (
-    0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
-)
-BASELINES = ("constant", "arx", "bilinear")
-AHEAD, PEEK = "_ahead", HALF_WINDOW  # suffix of predictors that know so many s of what comes
 EFFECT_START = 0.3  # typical strengths, at which the fit of an effect starts
+SO_FITTED = (
+    "it lacks something, so that it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors are "
+    "clustered by trial; `robofish diagnose` looks for what is missing"
+)
 FITTED_FOR_OUTLOOK = (
-    "the model needs sensors far noisier than they are, or water far stronger than in any pool: it lacks something, so that "
-    "it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors count every error as "
-    "independent, which is too small; `robofish diagnose` looks for what is missing"
+    "the model needs sensors far noisier than they are, or water far stronger than in any pool: "
+    + SO_FITTED
 )
-NOT_CHOSEN = (
-    "no effects looked for: the model needs no noisier sensors than there are and no stronger water; `robofish diagnose` "
-    "asks the likelihood"
+CANNOT_FOLLOW = (
+    "no start state lets the model follow two seconds of swimming within twice the camera's noise: "
+    + SO_FITTED
 )
-NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"
-NO_ENCODER = "the rotor is taken to follow its commands"
+NOT_CHOSEN = "no effects looked for: the model follows the fish, and its likelihood can be believed; `robofish diagnose` asks it"
 Report = Callable[[str], None]  # told what is being done
 
 
@@ -83,24 +87,24 @@ class Identification:
     ]  # what is wrong with the data or the result, and what can still be said
     seconds: float
     camera_delay: float = 0.0  # s, taken out of all trials above
+    imu_delay: float = 0.0  # s, taken out of all trials above
+    predicted: PredictionFit | None = None  # where the robot was fitted to predictions
+    states: str = "filter"  # how the states that predictions start from are estimated
 
     @property
     def robot(self) -> Robot:
-        """The identified robot, with the delay that its camera has in the recordings as they are."""
-        effects = {
-            name: values for name, values in self.fit.robot.effects.items() if name != "disturbance"
-        }
-        plain = replace(self.fit.robot, effects=effects)
-        return (
-            plain.with_effect("camera_latency", delay=self.camera_delay)
-            if self.camera_delay
-            else plain
-        )
+        """The identified robot, with the delays that its sensors have in the recordings as they are."""
+        robot = plain(self.fit.robot)
+        if self.camera_delay:
+            robot = robot.with_effect("camera_latency", delay=self.camera_delay)
+        if self.imu_delay:
+            robot = robot.with_effect("imu_latency", delay=self.imu_delay)
+        return with_noise(robot, self.fit.noise, self.states)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Parameters whose uncertainty is about the prior's: the data do not determine them."""
-        return undetermined(self.fit)
+        return undetermined(self.fit, self.predicted)
 
     @property
     def correlation(self) -> Array:
@@ -108,6 +112,25 @@ class Identification:
         deviation = np.sqrt(np.diag(self.fit.covariance))
         matrix: Array = self.fit.covariance / np.outer(deviation, deviation)
         return matrix
+
+
+def plain(robot: Robot) -> Robot:
+    """The robot without the wrench that the filter drives."""
+    kept = {name: values for name, values in robot.effects.items() if name != "disturbance"}
+    return replace(robot, effects=kept)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fit, the trials as it sees them, and what it has to say."""
+
+    fit: Fit
+    experiment: Experiment  # all trials, delays taken out
+    camera_delay: float
+    imu_delay: float
+    statements: tuple[str, ...]
+    predicted: PredictionFit | None = None
+    states: str = "filter"  # how the states that predictions start from are estimated
 
 
 def identify(
@@ -133,53 +156,140 @@ def identify(
     lag = Alignment(0.0, np.nan, np.nan)
     if "camera_latency" not in (*robot.sensors, *effects):
         lag = align(experiment.select(train))
-        experiment = moved_back(experiment, lag.delay)
-    training, held_out = experiment.select(train), experiment.select(held) if held else None
+    moved = moved_back(experiment, lag.delay)
+    training = moved.select(train)
     noise = noise or usual_noise(
         training
     )  # what trials left out say of the sensors takes no part either
+    report("can the model follow the fish?")
+    why, fitted = CANNOT_FOLLOW, None
+    if misfit(training, robot, noise, free) <= TOO_FAR:
+        fit = by_likelihood(training, robot, noise, free, effects, report)
+        why, said = FITTED_FOR_OUTLOOK, (NOT_CHOSEN,) if choose_from else ()
+        fitted = Fitted(fit, moved, lag.delay, 0.0, said) if fit else None
+    if fitted is None:
+        fitted = by_predictions(
+            experiment, train, lag, robot, noise, free, effects, choose_from, report
+        )
+        fitted = replace(fitted, statements=(why, *fitted.statements))
+    return concluded(experiment, train, held, lag, robot, fitted, report, began)
+
+
+def by_likelihood(
+    training: Experiment,
+    robot: Robot,
+    noise: Noise,
+    free: tuple[str, ...],
+    effects: tuple[str, ...],
+    report: Report,
+) -> Fit | None:
+    """The likeliest robot; None where its noise is no sensor's or its force no water's."""
     hypothesis = nominal_hypothesis(robot, free)
     for name in effects:
         hypothesis = hypothesis.with_effect(name, EFFECT_START)
     # not from many places: of a wrong model's optima the likelihood does not tell which predicts, and this way is measured
-    origin = hypothesis.parametrization.origin()
-    fit = refit(hypothesis, origin, training, noise, ANNEAL_HELD, report)
-    wrong = is_wrong(fit, noise)
-    fit = fit_multistep(fit, training, report) if wrong else refit_if_suspect(fit, training, report)
-    steps: tuple[Step, ...] = ()
-    if wrong and choose_from:
-        fit, steps = choose_effects(fit, training, choose_from, report)
-        fit = fit_multistep(fit, training, report) if any(step.added for step in steps) else fit
+    fit = refit(
+        hypothesis, hypothesis.parametrization.origin(), training, noise, ANNEAL_HELD, report
+    )
+    return None if is_wrong(fit, noise) else refit_if_suspect(fit, training, report)
+
+
+def by_predictions(
+    experiment: Experiment,
+    train: list[int],
+    lag: Alignment,
+    robot: Robot,
+    noise: Noise,
+    free: tuple[str, ...],
+    effects: tuple[str, ...],
+    choose_from: tuple[str, ...],
+    report: Report,
+) -> Fitted:
+    """The robot that predicts best over seconds, and the clocks that it finds."""
+    training = moved_back(experiment, lag.delay).select(train)
+    moving = tuple(name for name in effects if name in EFFECTS)
+    found = fit_predictions(training, robot, free, moving, choose_from, report)
+    aside = [name for name in effects if name not in moving]
+    not_fitted = [
+        f"{', '.join(aside)}: not fitted; predictions fit the sensors' clocks and the camera's heading offset alone"
+    ]
+    clocks = found.sensors
+    camera = max(lag.delay + clocks["camera_latency.delay"], 0.0)
+    imu = max(clocks["imu_latency.delay"], 0.0)
+    moved = imu_moved_back(moved_back(experiment, camera), imu)
+    hypothesis, theta, covariance = found.with_camera_offset()
+    report("noise")
+    found_robot = Parametrization(hypothesis).robot(theta)
+    own = initial_noise(moved.select(train), plain(found_robot), noise)
+    fit = evaluate(hypothesis, theta, moved.select(train), own)
+    fit = replace(fit, information=np.asarray(np.linalg.inv(covariance), dtype=float))
+    report("which states predict better")
+    states = better_states(moved.select(train), plain(fit.robot), own)
+    return Fitted(
+        fit,
+        moved,
+        camera,
+        imu,
+        (*prediction_statements(found), *(not_fitted if aside else [])),
+        found,
+        states,
+    )
+
+
+def concluded(
+    experiment: Experiment,
+    train: list[int],
+    held: list[int],
+    lag: Alignment,
+    start: Robot,
+    fitted: Fitted,
+    report: Report,
+    began: float,
+) -> Identification:
+    """The fit judged on trials left out."""
+    fit, moved = fitted.fit, fitted.experiment
+    training, held_out = moved.select(train), moved.select(held) if held else None
     report("predicting trials left out")
-    judged, errors, lacking = judge(training, held_out, robot, fit)
-    estimates = estimate(training, fit.robot, fit.noise)
-    statements = [
+    judged, errors, lacking = judge(
+        training, held_out, start, with_noise(plain(fit.robot), fit.noise, fitted.states), fit.noise
+    )
+    statements = (
         *data_statements(experiment, held_out),
         *lag_statements(lag),
-        *fit_statements(fit),
-    ]
-    statements += lost_statements(training, fit)
-    statements += [
-        *([FITTED_FOR_OUTLOOK] if wrong else []),
-        *([NOT_CHOSEN] if choose_from and not wrong else []),
-        *map(step_statement, steps),
+        *fit_statements(fit, fitted.predicted),
+        *lost_statements(training, fit),
+        *fitted.statements,
         *lacking,
         *start_statements(errors),
         *verdict(errors),
-    ]
-    seconds = time.monotonic() - began
+    )
     return Identification(
         fit,
-        robot,
+        start,
         training,
         held_out,
         judged,
-        estimates,
+        estimate(training, plain(fit.robot), fit.noise),
         errors,
-        tuple(statements),
-        seconds,
-        lag.delay,
+        statements,
+        time.monotonic() - began,
+        fitted.camera_delay,
+        fitted.imu_delay,
+        fitted.predicted,
+        fitted.states,
     )
+
+
+def better_states(training: Experiment, robot: Robot, noise: Noise) -> str:
+    """The way to start states, shooting or filter, with the smaller errors of predictions on training trials."""
+
+    def size(states: str) -> float:
+        made = predict(
+            training, with_noise(robot, noise, states), noise, max(HORIZONS), EVERY, WARM_UP
+        )
+        return float(np.nansum(np.log(prediction_errors(made).rms)))
+
+    return min(STATES, key=size)
 
 
 def is_wrong(fit: Fit, noise: Noise) -> bool:
@@ -189,23 +299,8 @@ def is_wrong(fit: Fit, noise: Noise) -> bool:
         for key in ("gyro", "camera_position", "camera_heading")
     ]
     return any(needed > INNOVATION_RMS_REJECT * said for needed, said in told) or bool(
-        fit.process_noise_ratio.max() > RATIO_REJECT
+        fit.largest_ratio > RATIO_REJECT
     )
-
-
-def step_statement(step: Step) -> str:
-    """What a candidate did to training trials left out in turn."""
-    return f"{step.name}: {'added' if step.added else 'not added'}; {step_text(step)}"
-
-
-def lag_statements(lag: Alignment) -> list[str]:
-    """What camera and gyro say about each other's stamps."""
-    if not lag.delay:
-        return []
-    return [
-        f"images are {lag.delay:.2f} s older than their stamps: heading of camera and gyro then differ by {lag.rms:.3f} rad "
-        f"instead of {lag.rms_undelayed:.3f} (rms in 4 s); taken out of all trials, camera_latency in robot.yaml"
-    ]
 
 
 def split(trials: int, hold_out: int) -> tuple[list[int], list[int]]:
@@ -218,178 +313,3 @@ def split(trials: int, hold_out: int) -> tuple[list[int], list[int]]:
         return list(range(trials)), []
     held = list(range(hold_out - 1, trials, hold_out)) or [trials - 1]
     return [i for i in range(trials) if i not in held], held
-
-
-def judge(
-    training: Experiment, held_out: Experiment | None, start: Robot, fit: Fit
-) -> tuple[Predictions, dict[str, ErrorSizes], list[str]]:
-    """Predictions, errors of both robots and of the baselines, and what could not be had, on the held-out trials."""
-    unseen = held_out or training
-    longest = max(HORIZONS)
-    judged = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP)
-    peeking = predict(unseen, fit.robot, fit.noise, longest, EVERY, WARM_UP, PEEK)
-    before = predict(
-        unseen, start, initial_noise(unseen, start, fit.noise), longest, EVERY, WARM_UP
-    )
-    errors = {"start": prediction_errors(before), "identified": prediction_errors(judged)}
-    try:
-        baselines = fit_baselines(training)
-    except ValueError as error:
-        return judged, errors, [f"no baselines: {error}"]
-    for name, advance in baselines.items():
-        errors[name] = prediction_errors(predict_baseline(advance, judged, HALF_WINDOW))
-    errors["identified" + AHEAD] = prediction_errors(peeking)
-    for name, advance in baselines.items():
-        errors[name + AHEAD] = prediction_errors(predict_baseline(advance, judged))
-    return judged, errors, []
-
-
-def undetermined(fit: Fit) -> tuple[str, ...]:
-    """Free parameters whose posterior standard deviation is above UNDETERMINED times the prior's."""
-    deviation, prior = np.sqrt(np.diag(fit.covariance)), fit.hypothesis.parametrization.prior
-    return tuple(
-        n
-        for n, d, p in zip(fit.hypothesis.free, deviation, prior, strict=True)
-        if d > UNDETERMINED * p
-    )
-
-
-def entangled(fit: Fit) -> list[tuple[str, str, float]]:
-    """Pairs of parameters with a correlation beyond ENTANGLED."""
-    deviation = np.sqrt(np.diag(fit.covariance))
-    correlation = fit.covariance / np.outer(deviation, deviation)
-    names = fit.hypothesis.free
-    pairs = [
-        (i, j) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > ENTANGLED
-    ]
-    return [(names[j], names[i], float(correlation[i, j])) for i, j in pairs]
-
-
-def data_statements(experiment: Experiment, held_out: Experiment | None) -> list[str]:
-    """What the recordings lack, and what that costs."""
-    out = []
-    if held_out is None:
-        out.append(
-            "no trial was held out: errors below are of trials that took part in the fit, unseen ones are worse"
-        )
-    for what, rows, cost in (
-        ("IMU", experiment.gyro, NO_IMU),
-        ("encoder", experiment.encoder, NO_ENCODER),
-    ):
-        missing = [
-            name for m, name in enumerate(experiment.names) if not np.isfinite(rows[:, m]).any()
-        ]
-        if missing:
-            out.append(f"no {what} in {', '.join(missing)}: {cost}")
-    rotor, rudder = experiment.given_commands.T
-    if np.std(rudder) < STILL:
-        out.append(
-            "the rudder hardly moved: turning (yaw and sway drag, servo) is not excited; add rudder steps or sines"
-        )
-    if np.std(rotor) < STILL * 150.0:
-        out.append(
-            "the rotor's speed hardly changed: nothing drives the fish; add strokes of several amplitudes"
-        )
-    short = [
-        n
-        for n, k in zip(experiment.names, experiment.steps, strict=True)
-        if k * 0.01 < WARM_UP + max(HORIZONS)
-    ]
-    if short:
-        out.append(
-            f"shorter than {WARM_UP + max(HORIZONS):g} s, so without a say at the longest horizons: {', '.join(short)}"
-        )
-    return out
-
-
-def fit_statements(fit: Fit) -> list[str]:
-    """What the data do not determine."""
-    out = []
-    if names := undetermined(fit):
-        out.append(
-            f"the data do not determine {', '.join(names)}: values and errors rest on the prior"
-        )
-    if names := zeros(fit.robot):
-        out.append(
-            f"{', '.join(names)}: 0 in the robot that the fit began with, so 0 in the one that came out"
-        )
-    for first, second, value in entangled(fit):
-        out.append(f"{first} and {second} are hardly told apart (correlation {value:+.3f})")
-    if (worst := fit.max_innovation_rms) > 1.5:
-        out.append(
-            f"innovations are {worst:.1f} times as large as the noise explains: standard errors are too small"
-        )
-    out.append("rigid masses and lengths are taken as measured; all else scales with them")
-    return out
-
-
-def lost_statements(training: Experiment, fit: Fit) -> list[str]:
-    """Trials on which the filter diverged with the fitted model."""
-    lost = [
-        n
-        for n, value in zip(training.names, fit.log_likelihood, strict=True)
-        if not np.isfinite(value)
-    ]
-    if not lost:
-        return []
-    return [
-        f"the filter loses the fish in {', '.join(lost)} with these values and begins anew there"
-    ]
-
-
-def start_statements(errors: dict[str, ErrorSizes]) -> list[str]:
-    """Where the positions that the fit predicts are further off than those of the robot it began with."""
-    start, fitted = errors["start"], errors["identified"]
-    pairs = zip(fitted.horizons, start.rms[:, 0], fitted.rms[:, 0], strict=True)
-    worse = [
-        f"{h:g} s ({mine:.3g} m against {before:.3g})"
-        for h, before, mine in pairs
-        if mine > WORSE * before
-    ]
-    if not worse:
-        return []
-    return [
-        f"the fit predicts positions worse than the robot it began with at {', '.join(worse)}: the model lacks something; "
-        "robofish diagnose looks for it and makes a model that predicts"
-    ]
-
-
-def verdict(errors: dict[str, ErrorSizes]) -> list[str]:
-    """Whether the physics beats the baselines, all knowing the past, and all knowing a little of what comes."""
-    if not any(name in errors for name in BASELINES):
-        return []
-    return [_against(errors, ""), _against(errors, AHEAD)]
-
-
-def _against(errors: dict[str, ErrorSizes], suffix: str) -> str:
-    """Each number against the best of the baselines, at the horizons that the trials are long enough for.
-
-    What the physics cannot predict because it diverges is lost: errors are those of the predictions that it ends.
-    """
-    names = [name + suffix for name in BASELINES if name + suffix in errors]
-    mine = errors["identified" + suffix]
-    terms = f" where all know {PEEK:g} s of what comes" if suffix else ""
-    ended, expected = (
-        mine.counts.sum(0),
-        np.max([errors[name].counts.sum(0) for name in names], axis=0),
-    )
-    compared = [(i, h) for i, h in enumerate(mine.horizons) if expected[i]]
-    if not compared:
-        return f"no trial is long enough to compare the physics model with the baselines{terms}"
-    lost = []
-    for i, h in compared:
-        if ended[i] < expected[i]:
-            lost.append(
-                f"{expected[i] - ended[i]} of {expected[i]} predictions at {h:g} s, which diverge"
-            )
-        for j, quantity in enumerate(("position", "heading", "speed")):
-            best = min(names, key=lambda name: np.nan_to_num(errors[name].rms[i, j], nan=np.inf))
-            if mine.rms[i, j] >= (theirs := errors[best].rms[i, j]):
-                by = best.removesuffix(suffix)
-                lost.append(
-                    f"{quantity} at {h:g} s ({mine.rms[i, j]:.3g} against {theirs:.3g}, {by})"
-                )
-    if lost:
-        return f"the physics model does NOT beat the baselines{terms} in {', '.join(lost)}"
-    at = " s, ".join(f"{h:g}" for _, h in compared)
-    return f"the physics model beats all baselines{terms} in position, heading and speed at {at} s"

@@ -47,9 +47,38 @@ def as_record(result: Identification, left_out: Sequence[str]) -> dict[str, Any]
         "biases": {"order": ["gyro_z", "accel_forward", "accel_left"], "trials": biases},
         "noise": asdict(fit.noise),
         "camera_delay": result.camera_delay,
+        "imu_delay": result.imu_delay,
+        **_predicted(result),
         "log_likelihood": float(fit.log_likelihood.sum()),
         "samples": float(fit.result.samples.sum()),
         "errors": {name: sizes.as_table() for name, sizes in result.errors.items()},
         "statements": list(result.statements),
         "seconds": result.seconds,
+    }
+
+
+def _predicted(result: Identification) -> dict[str, Any]:
+    """What a fit to predictions says beyond its parameters."""
+    found = result.predicted
+    if found is None:
+        return {"fitted_to": "likelihood"}
+    steps = [
+        {
+            "name": step.name,
+            "gain": step.gain,
+            "std": step.deviation,
+            "added": step.added,
+            "alike": list(step.alike),
+        }
+        for step in found.steps
+    ]
+    return {
+        "fitted_to": "predictions",
+        "cost_by_links": {str(n): cost for n, cost in found.costs_by_links.items()},
+        "spread_over_folds": found.parameter_spread,
+        "sensors": {
+            name: {"value": value, "std": found.sensor_errors[name]}
+            for name, value in found.sensors.items()
+        },
+        "effects_judged": steps,
     }

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import align, moved_back
+from fish_sysid.dataset.camera_time_offset import DELAYS, align, misfits, moved_back
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.dataset.imu_leveling import level
 from fish_sysid.dataset.rotor_coasting import driven, standing
@@ -45,6 +45,21 @@ def test_without_a_gyro_no_delay_is_stated() -> None:
     late = experiment_with_delay(0.3)
     blind = Experiment(**{**vars(late), "gyro": np.full_like(late.gyro, np.nan)})
     assert align(blind).delay == 0.0
+
+
+def test_windows_in_which_the_gyro_says_nothing_are_left_out() -> None:
+    """The first sample held over a gyro's late start or a hole is a turn that the fish did not make."""
+    late = experiment_with_delay(0.3)
+    gyro = late.gyro.copy()
+    gyro[:130], gyro[130] = np.nan, 5.0
+    gyro[700:760, 1] = np.nan
+    holed = Experiment(**{**vars(late), "gyro": gyro})
+    whole, _ = misfits(late)
+    rest, count = misfits(holed)
+    best = DELAYS[np.nanargmin(np.nansum(rest * count[:, None], axis=0))]
+    assert best == pytest.approx(0.3, abs=0.011)
+    assert np.nanmin(rest) < 2.0 * whole.min()
+    assert count.tolist() == [1, 0]
 
 
 def test_images_move_back_and_those_before_the_start_go() -> None:

@@ -23,15 +23,17 @@ from fish_sysid.identification import (
     FITTED_FOR_OUTLOOK,
     NOT_CHOSEN,
     Identification,
+    identify,
+    split,
+)
+from fish_sysid.identification_json import write_identification
+from fish_sysid.identification_statements import (
     data_statements,
     entangled,
-    identify,
     lost_statements,
-    split,
     start_statements,
     verdict,
 )
-from fish_sysid.identification_json import write_identification
 from fish_sysid.prediction.prediction import ErrorSizes, predict, prediction_errors
 from fish_sysid.reports.identify_page import write_identify_page
 

@@ -21,6 +21,10 @@ class SensorDistortion:
         """Sum of the delays [s]."""
         return float(sum(effect.pose_delay(p) for effect, p in self._effects))
 
+    def imu_delay(self) -> float:
+        """Sum of the IMU's delays [s]."""
+        return float(sum(effect.imu_delay(p) for effect, p in self._effects))
+
     def pose(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
         """Camera pose from the true one."""
         for effect, p in self._effects:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,8 +30,10 @@ class Imu:
     gyro = (0, 0, r) + b_g + n_g,   accelerometer = (a_x, a_y, g) + b_a + n_a,   yaw = psi + psi_0 + walk
     """
 
-    def __init__(self, settings: SensorSettings, random: Generator) -> None:
-        self._settings, self._random = settings, random
+    def __init__(self, settings: SensorSettings, random: Generator, delay: float = 0.0) -> None:
+        """delay: how much older a reading is than its stamp [s], to the nearest sample."""
+        self._settings, self._random, self._delay = settings, random, delay
+        self._felt: deque[tuple[tuple[float, float], float, float]] = deque()
         self.gyro_bias = random.normal(0.0, settings.gyro_bias, 3)
         self.accelerometer_bias = random.normal(0.0, settings.accelerometer_bias, 3)
         self._offset = random.uniform(-math.pi, math.pi)
@@ -40,6 +43,10 @@ class Imu:
     ) -> ImuSample:
         """One sample, dt [s] after the last one; specific_force in base_link [m/s^2]."""
         s, random = self._settings, self._random
+        self._felt.append((specific_force, rate, heading))
+        while len(self._felt) > 1 + round(self._delay / dt):
+            self._felt.popleft()
+        specific_force, rate, heading = self._felt[0]
         self._offset += random.normal(0.0, s.orientation_drift * math.sqrt(dt))
         gyro = np.array([0.0, 0.0, rate]) + self.gyro_bias + random.normal(0.0, s.gyro_noise, 3)
         force = np.array([*specific_force, GRAVITY]) + self.accelerometer_bias

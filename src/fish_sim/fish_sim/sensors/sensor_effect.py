@@ -31,6 +31,11 @@ class SensorEffect:
         return 0.0
 
     @staticmethod
+    def imu_delay(p: SimpleNamespace) -> Scalar:
+        """How much older the IMU's reading is than its stamp [s]."""
+        return 0.0
+
+    @staticmethod
     def pose(
         p: SimpleNamespace, x: Scalar, y: Scalar, heading: Scalar, xp: Any
     ) -> tuple[Scalar, ...]:

@@ -27,6 +27,7 @@ STEP = 0.01  # s
 DELAYS = np.arange(0.0, LARGEST + 0.5 * STEP, STEP)
 CLIP = 0.5  # rad; windows in which the markers were swapped count no more than this
 CLEAR = 0.7  # rms at the best delay over rms at none, below which a delay is stated
+HOLE = 0.25  # s between gyro samples, beyond which nobody knows how the fish turned
 SMALLEST = 0.03  # s, about a frame; below it the filter's own parameter finds it
 
 
@@ -57,7 +58,7 @@ def misfits(experiment: Experiment) -> tuple[Array, NDArray[np.int64]]:
     count = np.zeros(len(squares), dtype=np.int64)
     for m, frames in enumerate(experiment.frames):
         turned = _turned(experiment, m)
-        picks = [] if turned is None else _windows(frames, experiment.steps[m] * DT)
+        picks = [] if turned is None else _windows(frames, turned)
         if turned is None or not picks:
             continue
         rows = [_misfit(frames.t[pick], frames.pose[pick, 2], turned, DELAYS) for pick in picks]
@@ -66,21 +67,30 @@ def misfits(experiment: Experiment) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _turned(experiment: Experiment, m: int) -> Array | None:
-    """Integral of the gyro (steps,) [rad] up to half a step after each grid point of trial m; None without a gyro."""
+    """Integral of the gyro (steps,) [rad] up to half a step after each grid point of trial m; None without a gyro.
+
+    NaN where the gyro says nothing: before its first sample, after its last one and in holes.
+    """
     gyro = experiment.gyro[: experiment.steps[m], m]
     known = np.flatnonzero(np.isfinite(gyro))
     if len(known) < 2:
         return None
-    angle: Array = DT * np.cumsum(np.interp(np.arange(len(gyro)), known, gyro[known]))
+    grid = np.arange(len(gyro))
+    angle: Array = DT * np.cumsum(np.interp(grid, known, gyro[known]))
+    after = np.searchsorted(known, grid)
+    before = known[np.maximum(np.searchsorted(known, grid, side="right") - 1, 0)]
+    gap = known[np.minimum(after, len(known) - 1)] - before
+    angle[(grid < known[0]) | (grid > known[-1]) | (gap * DT > HOLE)] = np.nan
     return angle
 
 
-def _windows(frames: Frames, duration: float) -> list[NDArray[np.int64]]:
-    """Indices of the frames of each window that starts late enough for every delay."""
+def _windows(frames: Frames, turned: Array) -> list[NDArray[np.int64]]:
+    """Indices of the frames of each window that starts late enough for every delay and in which the gyro never pauses."""
     out = []
-    for start in np.arange(LARGEST, duration - WINDOW, WINDOW):
+    for start in np.arange(LARGEST, len(turned) * DT - WINDOW, WINDOW):
         pick = np.flatnonzero((frames.t >= start) & (frames.t < start + WINDOW))
-        if len(pick) >= LEAST_FRAMES:
+        first, last = round((start - LARGEST) / DT), round((start + WINDOW) / DT)
+        if len(pick) >= LEAST_FRAMES and np.isfinite(turned[first : last + 1]).all():
             out.append(pick)
     return out
 

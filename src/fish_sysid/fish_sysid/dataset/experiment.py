@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_bag.trial import Commands, Trial
+from fish_bag.trial import Commands, Imu, Trial
 from fish_sim.model import DT
 from fish_sysid.dataset.command_gaps import LostCommandsError, commands_on_grid
-from fish_sysid.dataset.imu_leveling import level
+from fish_sysid.dataset.imu_leveling import heading, level
 from fish_sysid.dataset.resample import apart, on_grid
 from fish_sysid.dataset.rest_detection import starts_at_rest
-from fish_sysid.dataset.rotor_coasting import driven
+from fish_sysid.dataset.rotor_coasting import driven, held_rudder
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,17 @@ class Frames:
 
 
 @dataclass(frozen=True)
+class Headings:
+    """Headings of one trial by the IMU's own orientation, in order of stamps: an unknown constant is added to them."""
+
+    t: Array  # (Q,) s from the trial's grid start
+    psi: Array  # (Q,) rad, unwrapped
+
+
+NO_HEADINGS = Headings(np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True)
 class Experiment:
     """Trials on one grid of 10 ms; NaN where a sensor says nothing."""
 
@@ -50,6 +61,11 @@ class Experiment:
     encoder: Array  # (T, M) rad/s
     frames: tuple[Frames, ...]
     start_at_rest: bool  # fish and rotor still, rudder centred, at the first grid point
+    headings: tuple[Headings, ...] = ()  # by the IMU's orientation; empty: of no trial
+
+    def heading_of(self, m: int) -> Headings:
+        """Headings of trial m by the IMU's orientation; none where it gives no orientation."""
+        return self.headings[m] if self.headings else NO_HEADINGS
 
     def select(self, which: Sequence[int]) -> Experiment:
         """Some of the trials."""
@@ -59,7 +75,10 @@ class Experiment:
             k: getattr(self, k)[:longest, index] for k in ("commands", "gyro", "accel", "encoder")
         }
         names, frames = tuple(self.names[i] for i in which), tuple(self.frames[i] for i in which)
-        return replace(self, names=names, frames=frames, steps=self.steps[index], **arrays)
+        headings = tuple(self.headings[i] for i in which) if self.headings else ()
+        return replace(
+            self, names=names, frames=frames, headings=headings, steps=self.steps[index], **arrays
+        )
 
     def rest_of(self, trial: int, first: int) -> Experiment:
         """One trial from a grid point on, with the fish in motion."""
@@ -67,7 +86,17 @@ class Experiment:
         arrays = {k: getattr(one, k)[first:] for k in ("commands", "gyro", "accel", "encoder")}
         seen = one.frames[0].t >= start
         frames = (Frames(one.frames[0].t[seen] - start, one.frames[0].pose[seen]),)
-        return replace(one, steps=one.steps - first, frames=frames, start_at_rest=False, **arrays)
+        turned = one.heading_of(0)
+        felt = turned.t >= start
+        headings = (Headings(turned.t[felt] - start, turned.psi[felt]),)
+        return replace(
+            one,
+            steps=one.steps - first,
+            frames=frames,
+            headings=headings,
+            start_at_rest=False,
+            **arrays,
+        )
 
     def batches(self) -> list[list[int]]:
         """Indices of trials in groups of at most STEPS_AT_ONCE grid points, one trial at least."""
@@ -114,8 +143,14 @@ def build_experiment(trials: Sequence[Trial], start_at_rest: bool | None = None)
         ]
         rest = all(starts_at_rest(*own) for own in sensors)
     frames = tuple(Frames(g["frame_t"], g["frame_pose"]) for g in gridded)
+    headings = tuple(Headings(g["heading_t"], g["heading"]) for g in gridded)
     return Experiment(
-        tuple(t.name for t in trials), steps, **arrays, frames=frames, start_at_rest=rest
+        tuple(t.name for t in trials),
+        steps,
+        **arrays,
+        frames=frames,
+        start_at_rest=rest,
+        headings=headings,
     )
 
 
@@ -129,11 +164,14 @@ def _grid(trial: Trial) -> dict[str, Array]:
     frames = _seen(trial, start, end)
     nothing = np.full(count, np.nan)
     gyro, accel = nothing, np.full((count, 2), np.nan)
+    headings = NO_HEADINGS
     if imu is not None:
+        headings = _headings(imu, start, end)
         gyro, accel = (on_grid(imu.t, felt, t, DT) for felt in level(imu))
     _check_heading(trial.name, frames, gyro)
     measured = nothing if encoder is None else on_grid(encoder.t, encoder.speed, t, DT)
     commands, measured = _commands(trial.name, c, t, measured)
+    commands[:, 1] = held_rudder(commands[:, 0], commands[:, 1])
     commands[:, 0], measured = driven(commands[:, 0], measured)
     return {
         "commands": commands,
@@ -142,7 +180,16 @@ def _grid(trial: Trial) -> dict[str, Array]:
         "encoder": measured,
         "frame_t": frames.t,
         "frame_pose": frames.pose,
+        "heading_t": headings.t,
+        "heading": headings.psi,
     }
+
+
+def _headings(imu: Imu, start: float, end: float) -> Headings:
+    """What the IMU's orientation says while commands came."""
+    t, psi = heading(imu)
+    seen = (t >= start - 0.5 * DT) & (t <= end)
+    return Headings(t[seen] - start, psi[seen])
 
 
 def _seen(trial: Trial, start: float, end: float) -> Frames:

@@ -31,6 +31,14 @@ def level(imu: Imu) -> tuple[Array, Array]:
     return rate, np.column_stack([forward, left])
 
 
+def heading(imu: Imu) -> tuple[Array, Array]:
+    """(stamps (Q,) [s], headings (Q,) [rad]) of the readings with an orientation, unwrapped, an unknown constant added."""
+    given = np.isfinite(imu.orientation).all(axis=1)
+    given &= np.linalg.norm(np.nan_to_num(imu.orientation), axis=1) > 0.5
+    R = rotation(imu.orientation[given])
+    return imu.t[given], np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0]))
+
+
 def rotation(quaternion: Array) -> Array:
     """(N, 3, 3) matrices of quaternions (N, 4) x, y, z, w, which need not be normalised."""
     x, y, z, w = (quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)).T

@@ -1,7 +1,8 @@
 """A coasting rotor: where a command is forgotten, the encoder's speed replaces it.
 
 A controller that has ended leaves its last command standing while the motor is off and the rotor runs down. The model is
-driven by the measured speed there, and the encoder's distance from the forgotten command is no residual.
+driven by the measured speed there, and the encoder's distance from the forgotten command is no residual. A servo has no
+feedback: it keeps the last command that it was given.
 """
 
 from __future__ import annotations
@@ -30,6 +31,21 @@ def driven(command: Array, encoder: Array) -> tuple[Array, Array]:
         speed[first:last] = np.interp(np.arange(first, last), inside, encoder[inside])
         left[first:last] = np.nan
     return speed, left
+
+
+def held_rudder(rotor: Array, rudder: Array) -> Array:
+    """Rudder (T,) [rad] that a servo has which keeps its last command when the controller has ended.
+
+    rotor (T,) [rad/s], rudder (T,) [rad]: commands. Where the rotor's command stands until the end of the trial the controller
+    has ended; a rudder that is exactly 0 throughout that time was told nothing, and a servo told nothing stays where it is.
+    """
+    out = rudder.copy()
+    stretches = [(a, b) for a, b in standing(rotor) if b == len(rotor) and a > 0]
+    for first, _ in stretches:
+        told = np.flatnonzero(rudder[: first + 1])
+        if len(told) and not rudder[first:].any() and (first - told[-1]) * DT < STANDING:
+            out[told[-1] + 1 :] = rudder[told[-1]]
+    return out
 
 
 def standing(command: Array) -> list[tuple[int, int]]:

@@ -261,7 +261,11 @@ class Parametrization:
                 dp[j, index[name]] = slope[j]
             else:
                 sensor_free[SENSOR_FIELDS[name.split(".")[0]]] = j
-        values = {SENSOR_FIELDS[k]: next(iter(v.values())) for k, v in robot.sensors.items()}
+        values = {
+            SENSOR_FIELDS[k]: next(iter(v.values()))
+            for k, v in robot.sensors.items()
+            if k in SENSOR_FIELDS
+        }
         slopes = {field: float(slope[j]) for field, j in sensor_free.items()}
         return p, dp, SensorModel(**values, free=sensor_free, slope=slopes)
 

@@ -16,10 +16,13 @@ from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.imu_time_offset import imu_moved_back
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import WRENCH, Noise, SensorModel
 from fish_sysid.estimation.fixed_lag import smoothed
 from fish_sysid.estimation.parametrization import nominal_hypothesis
+from fish_sysid.estimation.shooting.start_states import shot_states, without_sensor_errors
+from fish_sysid.prediction.kept_noise import uses_shooting
 from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
@@ -171,6 +174,7 @@ def predict(
         raise ValueError(
             f"horizon {horizon} s, start points every {every} s: expected at least {DT} s"
         )
+    experiment = imu_moved_back(experiment, robot.sensors.get("imu_latency", {}).get("delay", 0.0))
     estimates = estimate(experiment, robot, noise)
     starts = start_points(experiment, every, first)
     trial, start = starts[:, 0], starts[:, 1]
@@ -182,6 +186,10 @@ def predict(
         known = smoothed(experiment, robot, noise, starts, ahead)
         good = np.isfinite(known).all(axis=1)
         state[good, :nx], wrench[good] = known[good, :nx], known[good, nx : nx + 3]
+    if uses_shooting(robot) and len(starts):
+        shot = shot_states(without_sensor_errors(experiment, sensors), robot, starts, ahead=ahead)
+        good = np.isfinite(shot).all(axis=1)
+        state[good], wrench[good] = shot[good], 0.0
     pose = _simulate(experiment, robot, noise, starts, state, wrench, length)
     return Predictions(estimates, sensors, trial, start, pose, horizon)
 

@@ -8,12 +8,10 @@ import numpy as np
 
 from fish_report.page import Table
 from fish_sim.robot import nominal_parameters
-from fish_sysid.identification import (
-    AHEAD,
-    PEEK,
-    Identification,
-    entangled,
-)
+from fish_sysid.estimation.shooting.prediction_fit import with_links
+from fish_sysid.identification import Identification
+from fish_sysid.identification_statements import entangled
+from fish_sysid.prediction.held_out_errors import AHEAD, PEEK
 from fish_sysid.prediction.prediction import ErrorSizes
 
 NAMES = {
@@ -71,23 +69,25 @@ def _cell(value: float) -> str:
 
 def parameter_table(result: Identification) -> Table:
     """Value, standard error and ratio to the start of each free parameter."""
-    fit, units = result.fit, nominal_parameters(result.start.links)
+    fit, units = result.fit, nominal_parameters(result.fit.robot.links)
     unknown, rows = set(result.undetermined), []
+    start = with_links(result.start, fit.robot.links)
+    spread = result.predicted.parameter_spread if result.predicted else {}
     for name, value in fit.values.items():
         unit = units[name].unit if name in units else ""
-        before = result.start.parameters.get(name)
+        before = start.parameters.get(name)
         ratio = "" if before is None else f"{value / before:.3f}"
         error = fit.standard_errors[name]
         remark = "not determined by these data" if name in unknown else ""
         relative = f"{100 * error / abs(value):.2g} %" if value else ""
-        rows.append([name, f"{value:.5g}", f"{error:.2g}", unit, ratio, relative, remark])
+        row = [name, f"{value:.5g}", f"{error:.2g}", unit, ratio, relative, remark]
+        rows.append([*row[:3], *([f"{spread[name]:.2g}"] if spread else []), *row[3:]])
     header = ["parameter", "value", "standard error", "unit", "over start", "relative error", ""]
-    return Table(
-        "Parameters",
-        header,
-        rows,
-        "Standard errors from the likelihood's curvature, to first order.",
-    )
+    note = "Standard errors from the likelihood's curvature, to first order."
+    if spread:
+        header.insert(3, "spread over folds")
+        note = "Standard errors clustered by trial; the spread is the jackknife's over fits without a fold of trials each."
+    return Table("Parameters", header, rows, note)
 
 
 def entangled_table(result: Identification) -> Table:

@@ -36,6 +36,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_report.terminal import print_table
     from fish_sysid.estimation.initial_noise import initial_noise
     from fish_sysid.estimation.sensor_noise import usual_noise
+    from fish_sysid.prediction.kept_noise import kept_noise
     from fish_sysid.prediction.prediction import WARM_UP, predict, prediction_errors
     from fish_sysid.prediction.prediction_table import write_predictions
     from fish_sysid.reports.identify_tables import error_table
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     model = read_model(args.model)
     experiment, left_out = read_experiment(args.recording, topics=topic_map(args))
     with user_errors():
-        noise = initial_noise(experiment, model, usual_noise(experiment))
+        noise = kept_noise(model) or initial_noise(experiment, model, usual_noise(experiment))
         predictions = predict(experiment, model, noise, args.horizon)
         rows = write_predictions(args.out, predictions)
         horizons = tuple(h for h in (1.0, 2.0, 5.0) if h <= args.horizon) or (args.horizon,)

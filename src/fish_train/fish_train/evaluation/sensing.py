@@ -59,7 +59,7 @@ class _SensedRobot:
     def __init__(self, robot: Robot, seed: int, settings: SensorSettings) -> None:
         random = np.random.default_rng([seed, 2])
         self._distortion = SensorDistortion(robot.sensors)
-        self._imu = Imu(settings, random)
+        self._imu = Imu(settings, random, self._distortion.imu_delay())
         self._camera = OverheadCamera(settings, self._distortion, random)
         self._fusion = Fusion()
         self._velocity: tuple[float, float] | None = None

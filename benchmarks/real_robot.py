@@ -1,0 +1,117 @@
+"""Runs left out of the fit, predicted: ratios to the bilinear baseline on the same windows, and seconds.
+
+python benchmarks/real_robot.py POOL [--leave-out 1] [--effects tip_slip,rudder_gain | choose] [--links 1]
+
+Every fold of runs is predicted by a robot fitted to the others, from nominal values, and by the baseline fitted to the same;
+all know what was measured before the start of a prediction. Intervals: 95 %, bootstrap over runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+
+from fish_sim.effects import EFFECTS
+from fish_sim.robot import Robot
+from fish_sysid.dataset.camera_time_offset import align, moved_back
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.imu_time_offset import imu_moved_back
+from fish_sysid.dataset.read import read_experiment
+from fish_sysid.diagnosis.vocabulary import NOT_A_NAME
+from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization
+from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
+from fish_sysid.identification import plain
+from fish_sysid.prediction.baselines import fit_baselines, predict_baseline
+from fish_sysid.prediction.kept_noise import with_noise
+from fish_sysid.prediction.prediction import EVERY, HORIZONS, WARM_UP, predict, prediction_errors
+from fish_sysid.prediction.stroke_average import HALF_WINDOW
+
+QUANTITIES = ("position", "heading", "speed")
+BOOTSTRAPS = 2000
+
+
+def main() -> None:
+    """Print a line per fold and the table; write everything as JSON if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("dataset", type=Path)
+    parser.add_argument("--leave-out", type=int, default=1, help="runs per fold")
+    parser.add_argument("--effects", default="", help="NAME,NAME or choose (anew in every fold)")
+    parser.add_argument("--links", default=",".join(map(str, LINKS)), help="candidates")
+    parser.add_argument("--only", default="", help="numbers of folds, from 0 (default: all)")
+    parser.add_argument("--out", type=Path, help="JSON file")
+    args = parser.parse_args()
+    experiment, _ = read_experiment(args.dataset)
+    count, chosen = len(experiment.names), args.effects == "choose"
+    effects = tuple(n for n in args.effects.split(",") if n and not chosen)
+    candidates = tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else ()
+    links = tuple(map(int, args.links.split(",")))
+    folds = -(-count // args.leave_out)
+    squares = np.zeros((2, count, len(HORIZONS), 3))
+    numbers, began, fits = np.zeros((2, count, len(HORIZONS))), time.process_time(), []
+    for fold in [int(n) for n in args.only.split(",") if n] or range(folds):
+        left_out = [m for m in range(count) if m % folds == fold]
+        rest = [m for m in range(count) if m % folds != fold]
+        lag = align(experiment.select(rest)).delay
+        training = moved_back(experiment, lag).select(rest)
+        fit = fit_predictions(training, Robot(), NOMINAL_FREE, effects, candidates, print, links)
+        fits.append(described(fit))
+        print(json.dumps(fits[-1]), flush=True)
+        squares[:, left_out], numbers[:, left_out] = judged(experiment, rest, left_out, lag, fit)
+        seconds = time.process_time() - began
+        print(f"without {[experiment.names[m] for m in left_out]}: {seconds:.0f} s of CPU so far")
+        report(squares, numbers)
+        if args.out:
+            content = {"squares": squares.tolist(), "numbers": numbers.tolist(), "fits": fits}
+            args.out.write_text(json.dumps(content))
+
+
+def described(fit: PredictionFit) -> dict[str, object]:
+    """A fit as plain data."""
+    names = fit.found.hypothesis.names
+    return {"links": fit.robot.links, "effects": names, "cost": fit.found.cost, **fit.sensors}
+
+
+def judged(
+    experiment: Experiment, rest: list[int], left_out: list[int], lag: float, fit: PredictionFit
+) -> tuple[np.ndarray, np.ndarray]:
+    """Squares (2, M, H, 3) and numbers (2, M, H) of predictions: physics, bilinear."""
+    camera = max(lag + fit.sensors["camera_latency.delay"], 0.0)
+    moved = imu_moved_back(
+        moved_back(experiment, camera), max(fit.sensors["imu_latency.delay"], 0.0)
+    )
+    hypothesis, theta, _ = fit.with_camera_offset()
+    noise = usual_noise(moved.select(rest))
+    robot = with_noise(plain(Parametrization(hypothesis).robot(theta)), noise, "shooting")
+    made = predict(moved.select(left_out), robot, noise, max(HORIZONS), EVERY, WARM_UP)
+    bilinear = fit_baselines(moved.select(rest))["bilinear"]
+    pair = [prediction_errors(p) for p in (made, predict_baseline(bilinear, made, HALF_WINDOW))]
+    return np.array([p.squares for p in pair]), np.array([p.counts for p in pair])
+
+
+def report(squares: np.ndarray, numbers: np.ndarray) -> None:
+    """Errors, ratios to the baseline and their intervals over the runs judged so far."""
+    random, done = np.random.default_rng(0), np.flatnonzero(numbers[0].any(axis=1))
+
+    def ratios(runs: np.ndarray) -> np.ndarray:
+        with np.errstate(invalid="ignore"):
+            rms = np.sqrt(squares[:, runs].sum(1) / numbers[:, runs].sum(1)[..., None])
+        return np.asarray(rms[0] / rms[1])
+
+    drawn = [ratios(random.choice(done, len(done))) for _ in range(BOOTSTRAPS)]
+    low, high = np.nanpercentile(drawn, [2.5, 97.5], axis=0)
+    rms, ratio = np.sqrt(squares[0].sum(0) / numbers[0].sum(0)[:, None]), ratios(done)
+    for i, h in enumerate(HORIZONS):
+        cells = [
+            f"{name} {rms[i, j]:.4f} ratio {ratio[i, j]:.2f} ({low[i, j]:.2f} to {high[i, j]:.2f})"
+            for j, name in enumerate(QUANTITIES)
+        ]
+        print(f"{h:g} s: {'; '.join(cells)}; {numbers[0, :, i].sum():.0f} predictions", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,177 @@
+"""Parameters that predict best over seconds, from states that know only what was before.
+
+    min over theta   sum of rho(e) + 1/2 |(theta, sensors) / prior|^2,   e: `stroke_targets` after 0.5 to 5 s
+
+(simulation error minimisation; Farina and Piroddi 2010). Start states come from `start_states` with the parameters as they
+are, and are held while Gauss-Newton moves the parameters; then they are found anew. The cost tells optima apart that
+windows with free start states do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_report.parallel import cores, on_all_cores
+from fish_sim.model import DT
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.estimation.parametrization import Parametrization
+from fish_sysid.estimation.shooting.huber import huber, weight
+from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
+from fish_sysid.estimation.shooting.rollout import STEP
+from fish_sysid.estimation.shooting.start_states import PAST, shot_states
+from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, targets_of
+from fish_sysid.prediction.stroke_average import HALF_WINDOW
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+LOST = 30.0  # a scaled error of a prediction that diverged
+STEEPEST = 300.0  # slope of an error beyond which the motion is unstable
+LARGEST_STEP = 0.5  # of theta and sensors
+SHARES = (1.0, 0.3, 0.1)  # of the way to what a round found
+SETTLED = 0.002  # of the cost
+
+
+class Multistep:
+    """Prediction errors of a hypothesis on an experiment as functions of z = (theta, sensors)."""
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        coordinates: Parametrization,
+        starts: Index,
+        prior: Array | None = None,
+        past: float = PAST,
+    ) -> None:
+        """starts: (S, 2) trial and grid point. prior: (K,) standard deviations of theta."""
+        self.experiment, self.coordinates, self.past = experiment, coordinates, past
+        own = coordinates.prior if prior is None else prior
+        self.prior = np.concatenate([own, np.ones(len(SENSORS))])
+        self.targets = targets_of(experiment, starts)
+        used = np.unique(self.targets.start)
+        self.starts = starts[used]
+        self.targets = replace(self.targets, start=np.searchsorted(used, self.targets.start))
+
+    def states(self, z: Array) -> Array:
+        """(S, NS) start states with z; NaN where none was found."""
+        K = len(self.prior) - len(SENSORS)
+        robot = self.coordinates.robot(z[:K])
+        return shot_states(self.experiment, robot, self.starts, z[K:], self.past)
+
+    def errors(self, z: Array, states: Array, slopes: bool = False) -> tuple[Array, Array]:
+        """Scaled errors (R, 4) and, if asked, slopes (R, 4, K + 3); those without a start state are 0."""
+        K = len(z) - len(SENSORS)
+        p, dp, _ = self.coordinates.filter_inputs(z[:K])
+        P = np.concatenate([p[None], p + STEP * dp]) if slopes else p[None]
+        pose = self._poses(P, states)
+        late, _, offset = z[K:] * SENSOR_SCALE
+        e = self.targets.errors(pose, late, offset)
+        value = self._cleaned(e[:, 0])
+        found = np.asarray(np.isfinite(states).all(axis=1))
+        missing = ~found[self.targets.start]
+        value[missing] = 0.0
+        if not slopes:
+            return value, np.zeros((*value.shape, 0))
+        J = np.zeros((*value.shape, len(z)))
+        J[..., :K] = ((e[:, 1:] - e[:, :1]) / STEP).transpose(0, 2, 1)
+        later = self.targets.errors(pose[:, :, :1], late + STEP, offset)[:, 0]
+        J[..., K] = (later - e[:, 0]) / STEP * SENSOR_SCALE[0]
+        J[:, 2, K + 2] = SENSOR_SCALE[2] / self.targets.scale[:, 2]
+        wild = ~np.isfinite(J).all(axis=2) | (np.abs(J) > STEEPEST).any(axis=2)
+        J[wild | missing[:, None]] = 0.0
+        return value, J
+
+    def _poses(self, P: Array, states: Array) -> Array:
+        """(T, S, C, 3) poses from states (S, NS) with parameters (C, NP)."""
+        T = int(np.ceil((max(HORIZONS) + HALF_WINDOW) / DT)) + 1
+        stepper, C = self.coordinates.stepper, len(P)
+        m, k = self.starts.T
+        rows = np.minimum(k + np.arange(T)[:, None], self.experiment.steps[m] - 1)
+        told, start = self.experiment.commands[rows, m], np.nan_to_num(states)
+
+        def share(own: Index) -> Array:
+            lanes = np.repeat(start[own], C, axis=0)
+            moved = stepper.rollout(
+                lanes, np.repeat(told[:, own], C, axis=1), np.tile(P, (len(own), 1))
+            )
+            return moved[..., :3].reshape(T + 1, len(own), C, 3)
+
+        shares = np.array_split(np.arange(len(start)), max(1, min(2 * cores(), len(start))))
+        return np.concatenate(on_all_cores(share, shares), axis=1)
+
+    def _cleaned(self, e: Array) -> Array:
+        return np.clip(np.nan_to_num(e, nan=LOST), -LOST, LOST)
+
+    def total(self, z: Array, e: Array, prior: Array | None = None) -> float:
+        """What is made small. prior: (P,) deviations of z; None: those of the hypothesis."""
+        prior = self.prior if prior is None else prior
+        return float(huber(e).sum() + 0.5 * np.sum((z / prior) ** 2))
+
+    def cost(self, z: Array) -> float:
+        """With states of its own."""
+        return self.total(z, self.errors(z, self.states(z))[0])
+
+    def costs_by_trial(self, z: Array) -> Array:
+        """(M,) mean cost per prediction of each trial, without the prior; NaN for a trial without a target."""
+        cost = huber(self.errors(z, self.states(z))[0]).sum(axis=1)
+        M = len(self.experiment.names)
+        count = np.bincount(self.targets.trial, minlength=M)
+        with np.errstate(invalid="ignore"):
+            mean: Array = np.bincount(self.targets.trial, cost, M) / count
+        return mean
+
+    def clip(self, z: Array) -> Array:
+        """Into the physical ranges."""
+        K = len(z) - len(SENSORS)
+        return np.concatenate([self.coordinates.clip(z[:K]) if K else z[:0], z[K:]])
+
+    def minimise(self, z: Array, states: Array, iterations: int) -> Array:
+        """Damped Gauss-Newton with the start states as they are."""
+        damping, best = 1e-2, self.total(z, self.errors(z, states)[0])
+        for _ in range(iterations):
+            e, J = self.errors(z, states, slopes=True)
+            gradient, normal = self.normal(z, e, J)
+            for _ in range(5):
+                damped = normal + damping * np.diag(np.diag(normal))
+                step = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
+                tried = self.clip(z + step)
+                cost = self.total(tried, self.errors(tried, states)[0])
+                if cost < best:
+                    break
+                damping *= 5.0
+            if not cost < best:
+                break
+            gain, best, z, damping = best - cost, cost, tried, max(damping / 5.0, 1e-6)
+            if gain < SETTLED * best:
+                break
+        return z
+
+    def normal(
+        self, z: Array, e: Array, J: Array, prior: Array | None = None
+    ) -> tuple[Array, Array]:
+        """(gradient (P,), Gauss-Newton matrix (P, P)) of the cost, with deviations prior (P,) of z as `total`."""
+        prior = self.prior if prior is None else prior
+        flat, rows = e.ravel(), J.reshape(e.size, -1)
+        weighted = weight(flat)
+        gradient = rows.T @ (weighted * flat) + z / prior**2
+        return gradient, (rows.T * weighted) @ rows + np.diag(1.0 / prior**2)
+
+    def improve(self, z: Array, rounds: int = 3, iterations: int = 5) -> tuple[float, Array]:
+        """(cost, z): rounds of parameters found with states of z, judged with states of their own."""
+        states = self.states(z)
+        best = self.total(z, self.errors(z, states)[0])
+        for _ in range(rounds):
+            before, moved = best, self.minimise(z, states, iterations)
+            for share in SHARES:
+                tried = self.clip(z + share * (moved - z))
+                own = self.states(tried)
+                cost = self.total(tried, self.errors(tried, own)[0])
+                if cost < best:
+                    best, z, states = cost, tried, own
+                    break
+            if before - best < SETTLED * before:
+                break
+        return best, z

@@ -1,0 +1,162 @@
+"""A robot fitted to what it shall predict: number of links, starts, effects, polish, and errors clustered by trial."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.robot import Robot, nominal_parameters
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.estimation.parametrization import Hypothesis, nominal_hypothesis
+from fish_sysid.estimation.shooting.clustered_errors import clustered_covariance, scores_by_trial
+from fish_sysid.estimation.shooting.coordinates import ShotParametrization
+from fish_sysid.estimation.shooting.huber import weight
+from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
+from fish_sysid.estimation.shooting.schedule import Found, best_start, multistep, polished
+from fish_sysid.estimation.shooting.selection import Step, choose
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+LINKS = (1, 2, 3)
+HELD = ("servo_rate_limit",)  # takes the place of any delay of the rudder
+RANGE = "rudder_range"  # free where commands go beyond it
+BEYOND = 0.95  # of the largest command: where the range starts, so that the data can move it
+FOLDS = 4
+
+
+@dataclass(frozen=True)
+class PredictionFit:
+    """What came out."""
+
+    found: Found
+    steps: tuple[Step, ...]  # every effect that was judged
+    covariance: Array  # (P, P) of z, clustered by trial
+    spread: Array  # (P,) standard deviation of z over fits without a fold each, times the jackknife's factor
+    costs_by_links: dict[int, float]  # of the model without effects
+
+    @property
+    def robot(self) -> Robot:
+        """The robot at the optimum, without the sensors' parameters."""
+        return ShotParametrization(self.found.hypothesis).robot(self.theta)
+
+    @property
+    def theta(self) -> Array:
+        """The free parameters (K,)."""
+        return self.found.z[: -len(SENSORS)]
+
+    @property
+    def sensors(self) -> dict[str, float]:
+        """Ages of images and IMU samples beyond what was taken out before [s], and the camera's heading offset [rad]."""
+        values = self.found.z[-len(SENSORS) :] * SENSOR_SCALE
+        return dict(zip(SENSORS, values.tolist(), strict=True))
+
+    @property
+    def sensor_errors(self) -> dict[str, float]:
+        """Standard errors of `sensors`."""
+        deviation = np.sqrt(np.diag(self.covariance))[-len(SENSORS) :] * SENSOR_SCALE
+        return dict(zip(SENSORS, deviation.tolist(), strict=True))
+
+    @property
+    def parameter_spread(self) -> dict[str, float]:
+        """Spread over folds of the physical values, to first order."""
+        slope = np.abs(ShotParametrization(self.found.hypothesis).slope(self.theta))
+        spread = self.spread[: len(slope)] * slope
+        return dict(zip(self.found.hypothesis.free, spread.tolist(), strict=True))
+
+    def with_camera_offset(self) -> tuple[Hypothesis, Array, Array]:
+        """(hypothesis, theta (K,), covariance (K, K)) with the camera's heading offset among the robot's sensors."""
+        hypothesis, K = self.found.hypothesis, len(self.theta)
+        robot = ShotParametrization(hypothesis).robot(self.theta)
+        offset = self.sensors["camera_heading_offset.offset"]
+        settled = replace(
+            hypothesis.robot,
+            sensors={**robot.sensors, "camera_heading_offset": {"offset": offset}},
+        )
+        return replace(hypothesis, robot=settled), self.theta, self.covariance[:K, :K]
+
+
+def with_links(robot: Robot, links: int) -> Robot:
+    """The robot with another number of links, each parameter as far from nominal as it is."""
+    if links == robot.links:
+        return robot
+    before, after = nominal_parameters(robot.links), nominal_parameters(links)
+    values = {
+        name: after[name].value * value / before[name].value
+        for name, value in robot.parameters.items()
+    }
+    return replace(robot, links=links, parameters=values)
+
+
+def prediction_hypothesis(
+    robot: Robot, experiment: Experiment, free: Sequence[str], effects: Sequence[str], start: float
+) -> Hypothesis:
+    """The robot with its parameters free but the servo's rate; its range too where commands go beyond it."""
+    moved = [name for name in free if name not in HELD]
+    largest = float(np.abs(experiment.given_commands[:, 1]).max())
+    if largest > robot.parameters[RANGE]:
+        robot = robot.with_parameters(**{RANGE: min(BEYOND * largest, np.pi / 2)})
+        moved.append(RANGE)
+    hypothesis = nominal_hypothesis(robot, tuple(moved))
+    for name in effects:
+        hypothesis = hypothesis.with_effect(name, start)
+    return hypothesis
+
+
+def fit_predictions(
+    experiment: Experiment,
+    robot: Robot,
+    free: Sequence[str],
+    effects: Sequence[str] = (),
+    choose_from: Sequence[str] = (),
+    report: Report = lambda _: None,
+    links: Sequence[int] = LINKS,
+    start: float = 0.3,
+) -> PredictionFit:
+    """The robot that predicts these trials best, with `effects` and those of `choose_from` that left-out trials ask for.
+
+    start: strength in typical ones, at which the fit of `effects` starts.
+    """
+    found, costs = None, {}
+    for count in links:
+        hypothesis = prediction_hypothesis(
+            with_links(robot, count), experiment, free, effects, start
+        )
+        tried = best_start(experiment, hypothesis, report)
+        costs[count] = tried.cost
+        if found is None or tried.cost < found.cost:
+            found = tried
+    assert found is not None
+    steps: tuple[Step, ...] = ()
+    if choose_from:
+        found, steps = choose(experiment, found, choose_from, report)
+    report("predictions over 0.5 to 5 s, last steps")
+    found = polished(experiment, found)
+    report("standard errors")
+    covariance, spread = uncertainty(experiment, found)
+    return PredictionFit(found, steps, covariance, spread, costs)
+
+
+def uncertainty(experiment: Experiment, found: Found) -> tuple[Array, Array]:
+    """(covariance (P, P) clustered by trial, spread (P,) over folds) of z.
+
+    The folds' fits are one Gauss-Newton step from the optimum, without a fold's trials each; the spread is the jackknife's.
+    """
+    cost = multistep(experiment, found.hypothesis, found.z)
+    e, J = cost.errors(found.z, cost.states(found.z), slopes=True)
+    _, normal = cost.normal(found.z, e, J)
+    flat, rows = e.ravel(), J.reshape(e.size, -1)
+    trial = np.repeat(cost.targets.trial, e.shape[1])
+    weighted = weight(flat)
+    scores = scores_by_trial(flat, weighted, rows, trial)
+    moved = []
+    for fold in range(min(FOLDS, len(scores))):
+        out = trial % FOLDS == fold
+        without = normal - (rows[out].T * weighted[out]) @ rows[out]
+        moved.append(np.linalg.solve(without, scores[fold::FOLDS].sum(axis=0)))
+    count = max(len(moved), 1)
+    spread = np.sqrt((count - 1) / count * np.sum((moved - np.mean(moved, axis=0)) ** 2, axis=0))
+    return clustered_covariance(scores, normal, cost.prior), spread

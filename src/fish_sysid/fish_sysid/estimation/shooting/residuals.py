@@ -1,0 +1,117 @@
+"""Residuals of windows of raw measurements, and their slopes.
+
+Of a window that starts with the motion x and whose IMU counts headings from an unknown zero b:
+
+    e = ((p(t - d_c) - p_camera) / s_p,  (psi(t - d_c) + h - psi_camera) / s_psi,  (psi(t - d_i) + b - psi_imu) / s_imu)
+
+d_c, d_i: ages of images and IMU samples beyond what was taken out before [s]; h: the camera's heading offset [rad]. The IMU's
+integrated orientation is used, not its gyro: the rate samples of real ones do not integrate to the turn that was made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_sysid.estimation.shooting.windows import Samples, Windows
+
+Array = NDArray[np.float64]
+
+# parameters of the sensors, and what counts as one: s, s, rad
+SENSORS = ("camera_latency.delay", "imu_latency.delay", "camera_heading_offset.offset")
+SENSOR_SCALE = np.array([0.02, 0.02, 0.03])
+LOST = 200.0  # a scaled error of motion that diverged
+STEEPEST = 3e4  # slope beyond which the motion is unstable and its slope says nothing
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What counts as one: noise of the sensors and what a wrong model misses within a window."""
+
+    position: float = 0.004  # m
+    heading: float = 0.03  # rad, by the camera
+    orientation: float = 0.015  # rad, by the IMU
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """R scaled errors with slopes; Jz along theta and sensors, Jx along start motion and heading zero; (R, 0) without."""
+
+    window: NDArray[np.int64]  # (R,)
+    e: Array  # (R,)
+    Jz: Array  # (R, P)
+    Jx: Array  # (R, NX + 1)
+
+
+def residuals(
+    windows: Windows,
+    scale: Scale,
+    pose: Array,
+    slope: Array | None,
+    theta_count: int,
+    sensors: Array,
+    zero: Array,
+) -> Residuals:
+    """Errors of simulated poses (steps + 1, W, 3) with slopes (steps + 1, W, 3, K + NX) or None.
+
+    sensors (3,) in units of SENSOR_SCALE; zero (W,) [rad].
+    """
+    late_camera, late_imu, offset = sensors * SENSOR_SCALE
+    seen, felt = windows.poses, windows.headings
+    at, rate = _interpolated(pose, seen, late_camera)
+    turned, turning = _interpolated(pose[..., 2:], felt, late_imu)
+    apart = at - seen.value
+    apart[:, 2] += offset
+    e = [
+        (apart[:, :2] / scale.position).ravel(),
+        apart[:, 2] / scale.heading,
+        (turned[:, 0] + zero[felt.window] - felt.value) / scale.orientation,
+    ]
+    window = np.concatenate([np.repeat(seen.window, 2), seen.window, felt.window])
+    joined = np.concatenate(e)
+    joined = np.where(np.isfinite(joined), np.clip(joined, -LOST, LOST), LOST)
+    if slope is None:
+        nothing = np.zeros((len(joined), 0))
+        return Residuals(window, joined, nothing, nothing)
+    d_pose, _ = _interpolated(slope, seen, late_camera)
+    d_turned, _ = _interpolated(slope[:, :, 2:], felt, late_imu)
+    J = np.concatenate(
+        [
+            d_pose[:, :2].reshape(-1, slope.shape[3]) / scale.position,
+            d_pose[:, 2] / scale.heading,
+            d_turned[:, 0] / scale.orientation,
+        ]
+    )
+    J = np.where(np.isfinite(J) & (np.abs(J) < STEEPEST), J, 0.0)
+    Js, zero_slope = _sensor_slopes(scale, rate, turning)
+    return Residuals(
+        window,
+        joined,
+        np.column_stack([J[:, :theta_count], Js]),
+        np.column_stack([J[:, theta_count:], zero_slope]),
+    )
+
+
+def _sensor_slopes(scale: Scale, rate: Array, turning: Array) -> tuple[Array, Array]:
+    """(R, 3) along the sensors' parameters and (R,) along the heading zero."""
+    F, Q = len(rate), len(turning)
+    Js = np.zeros((3 * F + Q, len(SENSORS)))
+    Js[: 2 * F, 0] = -rate[:, :2].ravel() / scale.position
+    Js[2 * F : 3 * F, 0] = -rate[:, 2] / scale.heading
+    Js[2 * F : 3 * F, 2] = 1.0 / scale.heading
+    Js[3 * F :, 1] = -turning[:, 0] / scale.orientation
+    zero_slope = np.zeros(3 * F + Q)
+    zero_slope[3 * F :] = 1.0 / scale.orientation
+    return np.nan_to_num(np.clip(Js * SENSOR_SCALE, -STEEPEST, STEEPEST)), zero_slope
+
+
+def _interpolated(values: Array, samples: Samples, late: float) -> tuple[Array, Array]:
+    """Values (T, W, ...) and their rates at samples that show what was `late` [s] before: (F, ...) each."""
+    position = np.clip((samples.t - late) / DT, 0.0, len(values) - 1.001)
+    low = position.astype(int)
+    share = (position - low).reshape(-1, *([1] * (values.ndim - 2)))
+    below, above = values[low, samples.window], values[low + 1, samples.window]
+    return below + share * (above - below), (above - below) / DT

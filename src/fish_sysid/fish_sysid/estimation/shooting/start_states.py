@@ -1,0 +1,73 @@
+"""The state at a moment from the second before it: a window that ends there, its start motion by least squares.
+
+Where a model is wrong a filter's gains are those of a force that the water never has. Shooting over a short past takes the
+model's errors of that time only, and the IMU's orientation as the heading it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_sim.robot import Robot
+from fish_sysid.dataset.camera_time_offset import moved_back
+from fish_sysid.dataset.experiment import Experiment, Frames
+from fish_sysid.estimation.ekf_types import SensorModel
+from fish_sysid.estimation.parametrization import nominal_hypothesis
+from fish_sysid.estimation.shooting.coordinates import ShotParametrization
+from fish_sysid.estimation.shooting.multiple_shooting import Shooting
+from fish_sysid.estimation.shooting.residuals import SENSORS, Scale
+from fish_sysid.estimation.shooting.rollout import Directions, memories
+from fish_sysid.estimation.shooting.windows import cut
+
+Array = NDArray[np.float64]
+
+PAST = 1.0  # s
+ITERATIONS = 6
+
+
+def without_sensor_errors(experiment: Experiment, sensors: SensorModel) -> Experiment:
+    """The experiment with its images as they would be without latency, heading offset and scale of the camera."""
+    moved = moved_back(experiment, sensors.camera_latency)
+    shown = np.array([sensors.camera_scale, sensors.camera_scale, 1.0])
+    offset = np.array([0.0, 0.0, sensors.camera_heading_offset])
+    return replace(
+        moved, frames=tuple(Frames(f.t, (f.pose - offset) / shown) for f in moved.frames)
+    )
+
+
+def shot_states(
+    experiment: Experiment,
+    robot: Robot,
+    starts: NDArray[np.int64],
+    sensors: Array | None = None,
+    past: float = PAST,
+    scale: Scale | None = None,
+    ahead: float = 0.0,
+) -> Array:
+    """(S, NS) states at starts (S, 2) of trial and grid point by what was measured in the `past` [s] before each.
+
+    ahead: s after each start whose measurements may be known too; sensors: (3,) in units of SENSOR_SCALE. NaN where the camera
+    hardly saw the fish or the motion diverged.
+    """
+    coordinates = ShotParametrization(nominal_hypothesis(robot, free=()))
+    stepper, steps = coordinates.stepper, round(past / DT)
+    out = np.full((len(starts), len(stepper.layout.state)), np.nan)
+    early = (starts - [0, steps]).astype(np.int64)
+    possible = np.flatnonzero(early[:, 1] >= 0)
+    windows = cut(experiment, early[possible], past + ahead, late=0.0)
+    if not len(windows):
+        return out
+    shooting = Shooting(experiment, coordinates, windows, scale)
+    sensors = np.zeros(len(SENSORS)) if sensors is None else sensors
+    guess = shooting.settle(shooting.first_guess(np.zeros(0), sensors), ITERATIONS)
+    p = coordinates.filter_inputs(np.zeros(0))[0]
+    memory = memories(stepper, experiment, windows, Directions(p[None]))[0]
+    end = stepper.rollout(np.concatenate([guess.x, memory], axis=1), windows.commands, p)[steps]
+    place = {row: i for i, row in enumerate(map(tuple, starts.tolist()))}
+    ends = np.column_stack([windows.trial, windows.start + steps]).tolist()
+    out[[place[tuple(row)] for row in ends]] = end
+    return out

@@ -1,0 +1,105 @@
+"""Stroke means that predictions are compared with: linear in the predicted poses, so that one product serves all.
+
+A target is the stroke mean of the camera's poses `h` seconds after a start point. Its errors, scaled by what counts as one,
+
+    e = (x / s_p(h), y / s_p(h), psi / s_psi(h), u / s_u),   s_p = a + b h
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+HORIZONS = (0.5, 1.0, 2.0, 3.5, 5.0)  # s
+POSITION = (0.008, 0.02)  # m, and m per s of horizon: what counts as one
+HEADING = (0.06, 0.04)  # rad, and rad per s
+SPEED = 0.02  # m/s
+
+
+@dataclass(frozen=True)
+class Targets:
+    """R targets; F is the most frames in a window, rows padded with weights of 0."""
+
+    start: Index  # (R,) row of the start points
+    trial: Index  # (R,)
+    position: Array  # (R, F) grid points after the start, of the frames
+    value: Array  # (R, F) weights of the mean
+    slope: Array  # (R, F) 1/s, weights of the rate
+    measured: Array  # (R, 4) x, y [m], psi [rad], u [m/s]
+    scale: Array  # (R, 4)
+
+    @property
+    def horizon(self) -> Array:
+        """Seconds after the start point (R,)."""
+        return np.round((self.scale[:, 0] - POSITION[0]) / POSITION[1], 6)
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def errors(self, pose: Array, late: float, offset: float) -> Array:
+        """(R, ..., 4) scaled errors of poses (T, S, ..., 3): images `late` [s], heading seen `offset` [rad] too large."""
+        position = np.clip(self.position - late / DT, 0.0, len(pose) - 1.001)
+        low = position.astype(int)
+        share = (position - low).reshape(*low.shape, *([1] * (pose.ndim - 2)))
+        rows = self.start[:, None]
+        below, above = pose[low, rows], pose[low + 1, rows]
+        q = below + share * (above - below)
+        mean, rate = (np.einsum("rf,rf...->r...", w, q) for w in (self.value, self.slope))
+        u = rate[..., 0] * np.cos(mean[..., 2]) + rate[..., 1] * np.sin(mean[..., 2])
+        shape = (len(self), *([1] * (pose.ndim - 3)), 4)
+        e = np.concatenate([mean, u[..., None]], axis=-1) - self.measured.reshape(shape)
+        e[..., 2] = (e[..., 2] + offset + np.pi) % (2.0 * np.pi) - np.pi
+        return e / self.scale.reshape(shape)
+
+
+def targets_of(
+    experiment: Experiment, starts: Index, horizons: tuple[float, ...] = HORIZONS
+) -> Targets:
+    """Targets of start points (S, 2) of trial and grid point, where the camera covers them."""
+    rows: list[tuple[int, int, Array, Array, Array, Array, Array]] = []
+    for m in np.unique(starts[:, 0]).tolist():
+        frames, end = experiment.frames[m], (int(experiment.steps[m]) - 2) * DT
+        own = np.flatnonzero(starts[:, 0] == m)
+        for h in horizons:
+            centres = starts[own, 1] * DT + h
+            mean = stroke_mean(frames.t, centres)
+            for i, row in enumerate(own.tolist()):
+                near = np.flatnonzero(np.abs(frames.t - centres[i]) < HALF_WINDOW)
+                if len(near) < 2 or frames.t[near[-1]] > end:
+                    continue
+                value, slope = mean.value[i, near], mean.slope[i, near]
+                if not np.isfinite(value).all() or frames.t[near[0]] < starts[row, 1] * DT:
+                    continue
+                seen, rate = value @ frames.pose[near], slope @ frames.pose[near]
+                u = rate[0] * np.cos(seen[2]) + rate[1] * np.sin(seen[2])
+                p, psi = (a + b * h for a, b in (POSITION, HEADING))
+                at = frames.t[near] / DT - starts[row, 1]
+                size = np.array([p, p, psi, SPEED])
+                rows.append((row, m, at, value, slope, np.append(seen, u), size))
+    return _padded(rows)
+
+
+def _padded(rows: list[tuple[int, int, Array, Array, Array, Array, Array]]) -> Targets:
+    most = max((len(row[2]) for row in rows), default=0)
+
+    def wide(i: int) -> Array:
+        out = np.zeros((len(rows), most))
+        for r, row in enumerate(rows):
+            values = np.atleast_1d(row[i])
+            out[r, : len(values)] = values
+        return out
+
+    def column(i: int) -> Index:
+        return np.array([row[i] for row in rows], dtype=np.int64)
+
+    measured, scale = (np.array([row[i] for row in rows]).reshape(-1, 4) for i in (5, 6))
+    return Targets(column(0), column(1), wide(2), wide(3), wide(4), measured, scale)

@@ -1,0 +1,46 @@
+"""The noise that an identification found, kept with the robot in robot.yaml, so that predictions use the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, fields, replace
+from typing import Any
+
+from fish_report.errors import UserError
+from fish_sim.robot import Robot
+from fish_sysid.estimation.ekf_types import Noise
+
+STATES, NOISE = "states", "noise"  # of Robot.prediction
+
+
+def with_noise(robot: Robot, noise: Noise, states: str) -> Robot:
+    """The robot with the noise of its filter, and how its states at start points are estimated: filter or shooting."""
+    table = {k: list(v) if isinstance(v, tuple) else float(v) for k, v in asdict(noise).items()}
+    return replace(robot, prediction={STATES: states, NOISE: table})
+
+
+def kept_noise(robot: Robot) -> Noise | None:
+    """The noise kept with a robot; None where there is none. Raises UserError for one that cannot be used."""
+    table: Mapping[str, Any] = robot.prediction.get(NOISE, {})
+    if not table:
+        return None
+    usual = asdict(Noise())
+    for name, value in table.items():
+        numbers = value if isinstance(value, list) else [value]
+        size = len(usual[name]) if isinstance(usual.get(name), tuple) else 1
+        good = all(isinstance(v, int | float) and math.isfinite(v) and v > 0.0 for v in numbers)
+        if name not in usual or len(numbers) != size or not good:
+            raise UserError(
+                f"prediction.noise.{name}: got {value!r}; expected positive numbers under the names "
+                f"{', '.join(f.name for f in fields(Noise))}; delete the entry to have the noise estimated anew"
+            )
+    kept: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else float(v) for k, v in table.items()
+    }
+    return replace(Noise(), **kept)
+
+
+def uses_shooting(robot: Robot) -> bool:
+    """Whether the robot's states at start points are estimated by shooting over the past second."""
+    return bool(robot.prediction.get(STATES) == "shooting")

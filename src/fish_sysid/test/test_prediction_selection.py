@@ -1,0 +1,76 @@
+"""Effects are chosen by trials left out against a control with as many iterations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_sim.model import DT
+from fish_sim.robot import Robot
+from fish_sysid.dataset.experiment import Experiment, Headings
+from fish_sysid.dataset.synthetic import program, record
+from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.estimation.parametrization import nominal_hypothesis
+from fish_sysid.estimation.shooting.prediction_fit import fit_predictions, prediction_hypothesis
+from fish_sysid.estimation.shooting.schedule import Found, polished
+from fish_sysid.estimation.shooting.selection import choose
+
+FREE = ("head_drag_surge", "head_drag_yaw")
+TRIALS = 8
+
+
+def swum(truth: Robot) -> Experiment:
+    random = np.random.default_rng(2)
+    kinds = ("steps", "sines", "random", "turn") * (TRIALS // 4)
+    commands = np.stack([program(kind, 10.0, random) for kind in kinds], axis=1)
+    made, true = record(truth, commands, Noise(wrench=(1e-3, 2e-3, 5e-5)), random)
+    t = DT * np.arange(made.length)
+    return replace(made, headings=tuple(Headings(t, true.state[:, m, 2]) for m in range(TRIALS)))
+
+
+def fitted(experiment: Experiment) -> Found:
+    hypothesis = nominal_hypothesis(Robot(links=1), FREE)
+    return polished(experiment, Found(hypothesis, np.zeros(len(FREE) + 3), np.inf), 4.0, 2)
+
+
+def test_a_concealed_effect_is_added() -> None:
+    experiment = swum(Robot(links=1).with_effect("rudder_gain", factor=0.6))
+    found, steps = choose(experiment, fitted(experiment), ("rudder_gain", "rotor_lag"), most=1)
+    assert found.hypothesis.names == ("rudder_gain",)
+    best = next(step for step in steps if step.added)
+    assert best.name == "rudder_gain"
+    assert best.gain > 2.0 * best.deviation
+
+
+def test_iterations_are_no_evidence_where_nothing_is_concealed() -> None:
+    """A fit that has not converged gains by going on; the control gains as much."""
+    experiment = swum(Robot(links=1).with_parameters(head_drag_surge=0.3))
+    hypothesis = nominal_hypothesis(Robot(links=1), FREE)
+    unfinished = Found(hypothesis, np.zeros(len(FREE) + 3), np.inf)
+    _, steps = choose(experiment, unfinished, ("rotor_lag", "rudder_gain"), most=1)
+    assert all(step.gain < 0.1 for step in steps)
+
+
+def test_the_servo_s_rate_is_held_and_its_range_follows_the_commands() -> None:
+    experiment = swum(Robot(links=1))
+    beyond = replace(experiment, commands=experiment.commands * [1.0, 2.0])
+    names = ("head_drag_surge", "servo_rate_limit")
+    hypothesis = prediction_hypothesis(Robot(links=1), beyond, names, (), 0.3)
+    assert hypothesis.free == ("head_drag_surge", "rudder_range")
+    assert hypothesis.robot.parameters["rudder_range"] > 0.8
+    within = prediction_hypothesis(Robot(links=1), experiment, names, (), 0.3)
+    assert within.free == ("head_drag_surge",)
+
+
+def test_a_fit_to_predictions_finds_the_robot_and_says_how_surely() -> None:
+    truth = Robot(links=1).with_parameters(head_drag_surge=0.3, head_drag_yaw=2.2e-3)
+    fit = fit_predictions(swum(truth), Robot(links=1), FREE, links=(1,))
+    errors = np.sqrt(np.diag(fit.covariance))[:2]
+    for name, error in zip(FREE, errors, strict=True):
+        ratio = fit.robot.parameters[name] / truth.parameters[name]
+        assert abs(np.log(ratio)) < 4.0 * error
+        assert error < 0.1
+    assert fit.sensors["camera_latency.delay"] == pytest.approx(0.0, abs=0.005)
+    assert set(fit.parameter_spread) == set(FREE)
