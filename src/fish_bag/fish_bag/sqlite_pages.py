@@ -74,7 +74,8 @@ def _row(data: Buffer, at: int, page_end: int, page_bytes: int, usable: int) -> 
         return None
     payload = bytes(data[at:end])
     following = int.from_bytes(data[end : end + 4], "big") if local < size else 0
-    zeros_follow = not any(data[end : end + 2])
+    # what follows the first part of a long row is the number of the page where it goes on
+    zeros_follow = local == size and not any(data[end : end + 2])
     while len(payload) < size:
         page = (following - 1) * page_bytes
         take = min(size - len(payload), usable - 4)
