@@ -83,6 +83,9 @@ def _read(path: Path, contents: Contents, keep: Keep) -> None:
     """Read a database that is whole; sqlite3.Error where it is not."""
     address = path.absolute().as_uri() + "?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as connection:
+        (page_bytes,) = connection.execute("PRAGMA page_size").fetchone()
+        if path.stat().st_size % page_bytes:  # sqlite3 takes zeros for the rest of the last page
+            raise sqlite3.DatabaseError("its last page is cut off")
         found = connection.execute("PRAGMA quick_check(1)").fetchone()
         if found is None or found[0] != "ok":
             raise sqlite3.DatabaseError(found[0] if found else "no answer")
