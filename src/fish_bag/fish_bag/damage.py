@@ -30,10 +30,12 @@ class Sample:
     name: str
     path: Path  # as it is given to the reader
     file: Path  # its storage file
-    data: bytes
-    messages: Counter[Message]
-    ends: list[tuple[int, Message]] = field(default_factory=list)  # byte after the message
-    chunk_ends: list[tuple[int, int]] = field(default_factory=list)  # first and last byte of chunks
+    data: bytes = field(repr=False)
+    messages: Counter[Message] = field(repr=False)
+    # byte after the message
+    ends: list[tuple[int, Message]] = field(default_factory=list, repr=False)
+    # first and last byte of chunks
+    chunk_ends: list[tuple[int, int]] = field(default_factory=list, repr=False)
 
 
 def make_sample(name: str, path: Path) -> Sample:
