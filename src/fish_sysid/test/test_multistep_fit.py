@@ -109,8 +109,10 @@ def test_what_the_data_do_not_determine_is_as_unsure_as_the_prior() -> None:
     straight, _ = record(TRUTH, commands, NOISE, random)
     hypothesis = nominal_hypothesis(Robot(), ("head_drag_surge", "servo_rate_limit"))
     made = MultistepError(straight, hypothesis)
-    made.start_from(made.coordinates.origin(), NOISE)
-    deviation = np.sqrt(np.diag(np.linalg.inv(made.normal(made.coordinates.origin()))))
+    origin = made.coordinates.origin()
+    made.start_from(origin, NOISE)
+    _, information = made._normal(*made.errors(origin), origin)
+    deviation = np.sqrt(np.diag(np.linalg.inv(information)))
     assert deviation[1] == pytest.approx(made.coordinates.prior[1], rel=1e-6)
     assert deviation[0] < 0.5 * made.coordinates.prior[0]
 
