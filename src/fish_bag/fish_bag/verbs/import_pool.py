@@ -5,9 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import track
-from rich.table import Table
+
+NOTE = "clock: recorder minus that clock; rotor residual: median of encoder minus rebuilt command"
+HEADER = [
+    "recording",
+    "messages",
+    "robot's clock (s)",
+    "camera's clock (s)",
+    "rotor residual (rad/s)",
+]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,19 +27,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from fish_bag.dataset import find_trials
     from fish_bag.pool_import import import_bag
+    from fish_report.page import Table
+    from fish_report.terminal import print_table, terminal
 
     bags = [bag for path in args.bags for bag in find_trials(path)]
-    console = Console()
-    table = Table(
-        "recording", "messages", "robot's clock (s)", "camera's clock (s)", "rotor residual (rad/s)"
-    )
+    console, rows = terminal(), []
     for bag in track(bags, "importing", console=console, transient=True):
         report = import_bag(bag, args.out / bag.stem)
         offsets = f"{report.robot_offset_s:.6f}", f"{report.camera_offset_s:.6f}"
-        table.add_row(bag.stem, str(report.messages), *offsets, f"{report.rotor_residual:.2f}")
-    console.print(table)
-    console.print(
-        "clock: recorder minus that clock; rotor residual: median of encoder minus rebuilt command",
-        highlight=False,
-    )
+        residual = f"{report.rotor_residual:.2f}"
+        rows.append([bag.stem, str(report.messages), *offsets, residual])
+    print_table(console, Table("Imported recordings", HEADER, rows, NOTE))
     return 0
