@@ -47,6 +47,8 @@ def main() -> int:
             if said:
                 wrong[sample.name] += 1
                 print(f"{sample.name}, {kind} at byte {at} of {len(sample.data)}: {said}")
+            if (i + 1) % 1000 == 0:
+                print(f"{i + 1} damages tried, {wrong.total()} wrong", flush=True)
     for name, count in tried.items():
         print(f"{name:20} {count:6} damages, {wrong[name]} wrong")
     print(f"{sum(tried.values())} damages, {wrong.total()} wrong")

@@ -10,6 +10,7 @@ Buffer = bytes | mmap
 CUSTOM_NAMES = ("fish_bag", "fish_train")  # of MCAP metadata records with a recording's custom data
 ROSBAG2_NAME = "rosbag2"  # of the MCAP metadata record with a copy of metadata.yaml
 BLOCK = 1 << 16
+ENOUGH_OTHERS = 8  # messages that show in how many zeros those of a topic end
 
 
 @dataclass(frozen=True)
@@ -95,12 +96,12 @@ def end_of_content(data: Buffer) -> int:
 def ends_like_others(raw: bytes, others: list[bytes]) -> bool:
     """Whether a message that reaches into zeros ends in no more zero bytes than the others of its topic do.
 
-    Then its own bytes are zeros there as well, and it is whole. False also where nothing is known: without others, or
+    Then its own bytes are zeros there as well, and it is whole. False also where too little is known: with few others, or
     where all of it is zeros.
     """
     own = len(raw) - len(raw.rstrip(b"\0"))
     return (
-        bool(others)
+        len(others) >= ENOUGH_OTHERS
         and own < len(raw)
         and own <= min(len(o) - len(o.rstrip(b"\0")) for o in others[-100:])
     )
