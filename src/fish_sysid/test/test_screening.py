@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from swims import fish, swim
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.diagnosis import screening
+from fish_sysid.diagnosis.pipeline import fit_nominal
 from fish_sysid.diagnosis.task import make_task
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import climb, evaluate
@@ -140,12 +142,8 @@ def test_a_large_effect_of_the_base_is_held_while_screening_and_free_at_the_end(
 
 def test_a_rudder_offset_is_found_in_straight_swims():
     """Nothing is steered, and the fish circles."""
-    robot = Robot(links=1)
-    random = np.random.default_rng(0)
-    commands = program("straight", 3.0, random)[:, None]
-    straight = record(robot.with_effect("rudder_offset", offset=0.08), commands, Noise(), random)[0]
-    nominal = nominal_hypothesis(robot)
-    base = alternate(evaluate(nominal, np.zeros(len(nominal.free)), straight, Noise()), straight)
+    data = swim(fish(3, rudder_offset={"offset": 0.08}), kinds=("straight",), duration=3.0)
     names = ("rudder_offset", "camera_scale")
-    gains = {s.name: s.gain for s in screening.screen(base, names, make_task(straight, robot))}
-    assert gains["rudder_offset"] > gains["camera_scale"] + 50.0
+    task = make_task(data, Robot(), names=names)
+    gains = {one.name: one.gain for one in screening.screen(fit_nominal(task), names, task)}
+    assert gains["rudder_offset"] > gains["camera_scale"] + 100.0
