@@ -52,12 +52,14 @@ def is_recording(path: Path) -> bool:
 def parts(folder: Path) -> list[Path]:
     """Storage files of the one recording in a folder without metadata.yaml; [] where they are recordings of their own.
 
-    rosbag2 splits a long recording into <folder>_0, <folder>_1 and so on.
+    rosbag2 splits a long recording into <folder>_0, <folder>_1 and so on. A file of ROS 1 is a recording of its own.
     """
     inside = list(folder.iterdir())
     files = sorted((p for p in inside if p.is_file() and is_storage_file(p)), key=part_order)
     split = re.compile(rf"{re.escape(folder.name)}_\d+\.(?:mcap|db3)")
-    one = len(files) == 1 or all(split.fullmatch(bare_name(file.name)) for file in files)
+    one = [f.suffix != ".bag" for f in files] == [True] or all(
+        split.fullmatch(bare_name(file.name)) for file in files
+    )
     below = any(is_recording(p) for p in inside if p.is_dir())
     return files if files and one and not below else []
 
