@@ -11,7 +11,7 @@ from fish_sysid.estimation.initial_noise import worst_row
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import Coordinates, zeros
 from fish_sysid.estimation.shooting.coordinates import ShotCoordinates
-from fish_sysid.estimation.shooting.prediction_fit import RANGE, PredictionFit
+from fish_sysid.estimation.shooting.prediction_fit import IMU_CLOCK, RANGE, PredictionFit
 from fish_sysid.estimation.shooting.selection import Step, step_text
 from fish_sysid.prediction.held_out_errors import AHEAD, BASELINES, PEEK
 from fish_sysid.prediction.prediction import HORIZONS, WARM_UP, ErrorSizes
@@ -48,6 +48,7 @@ def prediction_statements(found: PredictionFit) -> list[str]:
     out += [
         f"{name}: {clocks[name]:+.3f} +- {deviation[name]:.3f} beyond what camera and gyro say, by predictions"
         for name in clocks
+        if name != IMU_CLOCK
     ]
     if RANGE in found.found.hypothesis.free:
         out.append(
