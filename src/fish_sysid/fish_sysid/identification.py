@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.effects import EFFECTS
-from fish_sim.robot import STATES, Robot
+from fish_sim.robot import Robot
 from fish_sysid.dataset.camera_time_offset import Alignment, align, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.imu_time_offset import imu_moved_back
@@ -37,19 +37,10 @@ from fish_sysid.identification_statements import (
     undetermined,
     verdict,
 )
+from fish_sysid.prediction.better_states import better_states
 from fish_sysid.prediction.held_out_errors import judge
 from fish_sysid.prediction.kept_noise import with_noise
-from fish_sysid.prediction.prediction import (
-    EVERY,
-    HORIZONS,
-    WARM_UP,
-    ErrorSizes,
-    Estimates,
-    Predictions,
-    estimate,
-    predict,
-    prediction_errors,
-)
+from fish_sysid.prediction.prediction import ErrorSizes, Estimates, Predictions, estimate
 
 Array = NDArray[np.float64]
 
@@ -278,18 +269,6 @@ def concluded(
         fitted.predicted,
         fitted.states,
     )
-
-
-def better_states(training: Experiment, robot: Robot, noise: Noise) -> str:
-    """The way to start states, shooting or filter, with the smaller errors of predictions on training trials."""
-
-    def size(states: str) -> float:
-        made = predict(
-            training, with_noise(robot, noise, states), noise, max(HORIZONS), EVERY, WARM_UP
-        )
-        return float(np.nansum(np.log(prediction_errors(made).rms)))
-
-    return min(STATES, key=size)
 
 
 def is_wrong(fit: Fit, noise: Noise) -> bool:
