@@ -73,7 +73,15 @@ def main() -> None:
 def described(fit: PredictionFit) -> dict[str, object]:
     """A fit as plain data."""
     names = fit.found.hypothesis.names
-    return {"links": fit.robot.links, "effects": names, "cost": fit.found.cost, **fit.sensors}
+    values = Parametrization(fit.found.hypothesis).decode(fit.theta)
+    parameters = dict(zip(fit.found.hypothesis.free, values.tolist(), strict=True))
+    return {
+        "links": fit.robot.links,
+        "effects": names,
+        "cost": fit.found.cost,
+        **fit.sensors,
+        "parameters": parameters,
+    }
 
 
 def judged(

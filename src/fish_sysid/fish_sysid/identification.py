@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.effects import EFFECTS
-from fish_sim.robot import STATES, Robot
+from fish_sim.robot import Robot
 from fish_sysid.dataset.camera_time_offset import Alignment, align, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.imu_time_offset import imu_moved_back
@@ -26,7 +26,7 @@ from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization,
 from fish_sysid.estimation.refit import ANNEAL_HELD, refit
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
-from fish_sysid.estimation.shooting.prediction_fit import PredictionFit, fit_predictions
+from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
 from fish_sysid.estimation.thresholds import INNOVATION_RMS_REJECT, RATIO_REJECT
 from fish_sysid.identification_statements import (
     data_statements,
@@ -38,19 +38,10 @@ from fish_sysid.identification_statements import (
     undetermined,
     verdict,
 )
+from fish_sysid.prediction.better_states import better_states
 from fish_sysid.prediction.held_out_errors import judge
 from fish_sysid.prediction.kept_noise import with_noise
-from fish_sysid.prediction.prediction import (
-    EVERY,
-    HORIZONS,
-    WARM_UP,
-    ErrorSizes,
-    Estimates,
-    Predictions,
-    estimate,
-    predict,
-    prediction_errors,
-)
+from fish_sysid.prediction.prediction import ErrorSizes, Estimates, Predictions, estimate
 
 Array = NDArray[np.float64]
 
@@ -142,12 +133,14 @@ def identify(
     report: Report = lambda _: None,
     effects: tuple[str, ...] = (),
     choose_from: tuple[str, ...] = (),
+    links: tuple[int, ...] = LINKS,
 ) -> Identification:
     """Fit the nominal parameters (and those of the robot's effects in `free`) and judge them on trials left out.
 
     hold_out: every so-manieth trial takes no part in fitting; 0: none. Raises ValueError when it is negative or 1.
     effects: names added to the robot's, their parameters free. choose_from: where the model is wrong beyond its noise, those
-    of these effects are added that let it predict training trials better when they are left out in turn.
+    of these effects are added that let it predict training trials better when they are left out in turn. links: numbers of
+    links of the tail that a robot fitted to predictions may have.
     A delay of the camera that the gyro shows is taken out of all trials first, so that horizons count from the moment an
     image was taken, and goes into the robot that comes back.
     """
@@ -169,7 +162,7 @@ def identify(
         fitted = Fitted(fit, moved, lag.delay, 0.0, said) if fit else None
     if fitted is None:
         fitted = by_predictions(
-            experiment, train, lag, robot, noise, free, effects, choose_from, report
+            experiment, train, lag, robot, noise, free, effects, choose_from, links, report
         )
         fitted = replace(fitted, statements=(why, *fitted.statements))
     return concluded(experiment, train, held, lag, robot, fitted, report, began)
@@ -203,12 +196,13 @@ def by_predictions(
     free: tuple[str, ...],
     effects: tuple[str, ...],
     choose_from: tuple[str, ...],
+    links: tuple[int, ...],
     report: Report,
 ) -> Fitted:
     """The robot that predicts best over seconds, and the clocks that it finds."""
     training = moved_back(experiment, lag.delay).select(train)
     moving = tuple(name for name in effects if name in EFFECTS)
-    found = fit_predictions(training, robot, free, moving, choose_from, report)
+    found = fit_predictions(training, robot, free, moving, choose_from, report, links)
     aside = [name for name in effects if name not in moving]
     not_fitted = [
         f"{', '.join(aside)}: not fitted; predictions fit the sensors' clocks and the camera's heading offset alone"
@@ -278,18 +272,6 @@ def concluded(
         fitted.predicted,
         fitted.states,
     )
-
-
-def better_states(training: Experiment, robot: Robot, noise: Noise) -> str:
-    """The way to start states, shooting or filter, with the smaller errors of predictions on training trials."""
-
-    def size(states: str) -> float:
-        made = predict(
-            training, with_noise(robot, noise, states), noise, max(HORIZONS), EVERY, WARM_UP
-        )
-        return float(np.nansum(np.log(prediction_errors(made).rms)))
-
-    return min(STATES, key=size)
 
 
 def is_wrong(fit: Fit, noise: Noise) -> bool:

@@ -10,7 +10,7 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import Parametrization, zeros
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
-from fish_sysid.estimation.shooting.prediction_fit import RANGE, PredictionFit
+from fish_sysid.estimation.shooting.prediction_fit import IMU_CLOCK, RANGE, PredictionFit
 from fish_sysid.estimation.shooting.selection import Step, step_text
 from fish_sysid.prediction.held_out_errors import AHEAD, BASELINES, PEEK
 from fish_sysid.prediction.prediction import HORIZONS, WARM_UP, ErrorSizes
@@ -47,6 +47,7 @@ def prediction_statements(found: PredictionFit) -> list[str]:
     out += [
         f"{name}: {clocks[name]:+.3f} +- {deviation[name]:.3f} beyond what camera and gyro say, by predictions"
         for name in clocks
+        if name != IMU_CLOCK
     ]
     if RANGE in found.found.hypothesis.free:
         out.append(

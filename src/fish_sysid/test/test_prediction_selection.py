@@ -13,7 +13,11 @@ from fish_sysid.dataset.experiment import Experiment, Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
-from fish_sysid.estimation.shooting.prediction_fit import fit_predictions, prediction_hypothesis
+from fish_sysid.estimation.shooting.prediction_fit import (
+    fewest_links,
+    fit_predictions,
+    prediction_hypothesis,
+)
 from fish_sysid.estimation.shooting.schedule import Found, polished
 from fish_sysid.estimation.shooting.selection import choose
 
@@ -51,6 +55,12 @@ def test_iterations_are_no_evidence_where_nothing_is_concealed() -> None:
     unfinished = Found(hypothesis, np.zeros(len(FREE) + 3), np.inf)
     _, steps = choose(experiment, unfinished, ("rotor_lag", "rudder_gain"), most=1)
     assert all(step.gain < 0.1 for step in steps)
+
+
+def test_more_links_must_be_worth_it() -> None:
+    assert fewest_links({1: 103.0, 2: 110.0, 3: 100.0}) == 1
+    assert fewest_links({1: 120.0, 2: 104.0, 3: 100.0}) == 2
+    assert fewest_links({3: 100.0}) == 3
 
 
 def test_the_servo_s_rate_is_held_and_its_range_follows_the_commands() -> None:

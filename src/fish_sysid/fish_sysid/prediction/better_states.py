@@ -1,0 +1,23 @@
+"""Which way to the state at a start point predicts better: the filter, or shooting over the past second."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fish_sim.robot import STATES, Robot
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.prediction.kept_noise import with_noise
+from fish_sysid.prediction.prediction import EVERY, HORIZONS, WARM_UP, predict, prediction_errors
+
+
+def better_states(training: Experiment, robot: Robot, noise: Noise) -> str:
+    """The way to start states, shooting or filter, with the smaller errors of predictions on training trials."""
+
+    def size(states: str) -> float:
+        made = predict(
+            training, with_noise(robot, noise, states), noise, max(HORIZONS), EVERY, WARM_UP
+        )
+        return float(np.nansum(np.log(prediction_errors(made).rms)))
+
+    return min(STATES, key=size)
