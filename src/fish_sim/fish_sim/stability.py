@@ -11,7 +11,7 @@ from fish_sim.robot import Structure
 
 Modes = NDArray[np.complex128]
 
-MAX_SUBSTEPS = 100
+MAX_SUBSTEPS = 256
 GROWTH = 1e-6  # of an undamped mode per step that still counts as stable
 
 

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from fish_sim import torch_step
+from fish_sim.effects import EFFECTS
 from fish_sim.kernel import CompiledKernel
 from fish_sim.methods import METHODS
 from fish_sim.robot import Robot
@@ -15,7 +16,7 @@ from fish_sim.self_check import random_parameters, random_states
 from fish_sim.step import PARTS, Stepper, kernel
 
 PERIODS = 3
-EFFECTS = ("wake_memory", "rudder_lag")  # a state of the motion, a memory
+ACTING = (EFFECTS["wake_memory"], EFFECTS["rudder_lag"])  # a state of the motion, a memory
 COMPILERS = [
     pytest.param(
         name, marks=pytest.mark.skipif(not shutil.which(name), reason=f"no {name} on this computer")
@@ -65,7 +66,7 @@ def fish(layout, batch, random, shared):
 @pytest.mark.parametrize("compiler", COMPILERS, indirect=True)
 @pytest.mark.parametrize("method", METHODS)
 def test_compiled_and_interpreted_agree_at_every_batch(method, compiler):
-    compiled, interpreted = both((1, EFFECTS), Scheme(method))
+    compiled, interpreted = both((1, ACTING), Scheme(method))
     random = np.random.default_rng(7)
     for batch in range(1, 18):
         states, commands, p = fish(compiled.layout, batch, random, shared=batch % 3 == 0)

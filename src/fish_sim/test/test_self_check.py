@@ -168,7 +168,7 @@ def test_threads_that_build_the_same_kernel_all_get_a_checked_one(cache):
 @pytest.mark.parametrize("name", EFFECTS)
 def test_the_check_sees_every_parameter_of_an_effect_and_nothing_that_is_no_number(name):
     """Where an adjoint is 0 for all fish of the sample, a wrong one would pass."""
-    structure = (1, (name,))
+    structure = (1, (EFFECTS[name],))
     layout, kernel = Layout(structure), InterpretedKernel(structure, METHODS["euler"], 1)
     sample = Sample.draw(layout, 9)
     for part in PARTS:

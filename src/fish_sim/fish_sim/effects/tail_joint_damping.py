@@ -19,7 +19,7 @@ class TailJointDamping(Effect):
     kind = "physics"
     equation = "torque = c phi' at every tail joint"
     source = SOURCE
-    parameters = {"c": Parameter(0.0, "N m s/rad", 0.0, 0.1, SOURCE, typical=1e-3)}
+    parameters = {"c": Parameter(0.0, "N m s/rad", 0.0, 0.03, SOURCE, typical=1e-3)}
     strength = ("c",)
     dissipative = True
 
