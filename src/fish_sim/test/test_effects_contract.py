@@ -9,6 +9,7 @@ from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import BodyMotion, Drive
 from fish_sim.ops import NUMPY
 from fish_sim.robot import Robot, parameter_names
+from fish_sim.scheme import stable_scheme
 from fish_sim.step import Stepper
 
 NEAR_WALL = (0.3, 0.85, 0.1)
@@ -42,7 +43,7 @@ def strongest(name):
 def swim(effects, commands, poses=NEAR_WALL, links=1):
     """States of a fish with effects {name: parameters}, without a compiler; (T + 1, ..., NS)."""
     robot = Robot(links=links, effects=effects)
-    stepper = Stepper(robot.structure, compiled=False)
+    stepper = Stepper(robot.structure, stable_scheme(robot), compiled=False)
     start = (
         np.stack([stepper.rest(pose) for pose in poses])
         if np.ndim(poses) == 2
