@@ -70,11 +70,12 @@ def test_the_caption_of_predictions_speaks_of_nothing_that_is_not_there() -> Non
 
 def test_parameters_stand_beside_their_errors_their_start_and_whether_they_are_known() -> None:
     values = {"head_drag_surge": 0.3, "current.x": -0.02}
-    fit = SimpleNamespace(
-        values=values, standard_errors={"head_drag_surge": 0.006, "current.x": 0.001}
-    )
+    errors = {"head_drag_surge": 0.006, "current.x": 0.001}
+    fit = SimpleNamespace(values=values, standard_errors=errors, robot=Robot())
     start = Robot().with_parameters(head_drag_surge=0.2)
-    rows = parameter_table(SimpleNamespace(fit=fit, start=start, undetermined=("current.x",))).rows
+    rows = parameter_table(
+        SimpleNamespace(fit=fit, start=start, undetermined=("current.x",), predicted=None)
+    ).rows
     assert rows[0] == ["head_drag_surge", "0.3", "0.006", "N s/m", "1.500", "2 %", ""]
     assert rows[1] == ["current.x", "-0.02", "0.001", "", "", "5 %", "not determined by these data"]
 
