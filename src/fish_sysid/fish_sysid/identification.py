@@ -27,6 +27,7 @@ from fish_sysid.estimation.refit import ANNEAL_HELD, refit
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
+from fish_sysid.estimation.shooting.schedule import can_be_predicted
 from fish_sysid.estimation.thresholds import INNOVATION_RMS_REJECT, RATIO_REJECT
 from fish_sysid.identification_statements import (
     data_statements,
@@ -57,6 +58,10 @@ FITTED_FOR_OUTLOOK = (
 CANNOT_FOLLOW = (
     "no start state lets the model follow two seconds of swimming within twice the camera's noise: "
     + SO_FITTED
+)
+TOO_SHORT = (
+    "the model needs sensors far noisier than they are, or water far stronger than in any pool, and no trial is long enough to "
+    "fit predictions over seconds: values and standard errors are not to be trusted; record trials of 12 s and more"
 )
 NOT_CHOSEN = "no effects looked for: the model follows the fish, and its likelihood can be believed; `robofish diagnose` asks it"
 Report = Callable[[str], None]  # told what is being done
@@ -157,9 +162,11 @@ def identify(
     report("can the model follow the fish?")
     why, fitted = CANNOT_FOLLOW, None
     if misfit(training, robot, noise, free) <= TOO_FAR:
-        fit = by_likelihood(training, robot, noise, free, effects, report)
+        fit, wrong = by_likelihood(training, robot, noise, free, effects, report)
         why, said = FITTED_FOR_OUTLOOK, (NOT_CHOSEN,) if choose_from else ()
-        fitted = Fitted(fit, moved, lag.delay, 0.0, said) if fit else None
+        if wrong and not can_be_predicted(training):
+            wrong, said = False, (TOO_SHORT,)
+        fitted = None if wrong else Fitted(fit, moved, lag.delay, 0.0, said)
     if fitted is None:
         fitted = by_predictions(
             experiment, train, lag, robot, noise, free, effects, choose_from, links, report
@@ -175,8 +182,8 @@ def by_likelihood(
     free: tuple[str, ...],
     effects: tuple[str, ...],
     report: Report,
-) -> Fit | None:
-    """The likeliest robot; None where its noise is no sensor's or its force no water's."""
+) -> tuple[Fit, bool]:
+    """The likeliest robot, and whether its noise is no sensor's or its force no water's."""
     hypothesis = nominal_hypothesis(robot, free)
     for name in effects:
         hypothesis = hypothesis.with_effect(name, EFFECT_START)
@@ -184,7 +191,9 @@ def by_likelihood(
     fit = refit(
         hypothesis, hypothesis.parametrization.origin(), training, noise, ANNEAL_HELD, report
     )
-    return None if is_wrong(fit, noise) else refit_if_suspect(fit, training, report)
+    if is_wrong(fit, noise):
+        return fit, True
+    return refit_if_suspect(fit, training, report), False
 
 
 def by_predictions(

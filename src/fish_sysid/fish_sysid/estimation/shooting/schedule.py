@@ -69,6 +69,14 @@ def shoot(
     return cost, guess.z
 
 
+def can_be_predicted(experiment: Experiment) -> bool:
+    """Whether the trials are long enough for windows and for predictions."""
+    starts = regular_starts(experiment, LENGTH, COARSE * LENGTH, FIRST)
+    return bool(
+        len(cut(experiment, starts, LENGTH)) and len(start_points(experiment, FINE, WARM_UP))
+    )
+
+
 def multistep(
     experiment: Experiment, hypothesis: Hypothesis, z: Array, every: float = FINE
 ) -> Multistep:
