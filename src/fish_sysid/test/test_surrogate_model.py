@@ -20,9 +20,7 @@ from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
 WATER = Noise(wrench=(0.002, 0.004, 1e-4))
-SLIPPING = (
-    Robot(links=1).with_parameters(head_drag_surge=0.26).with_effect("tip_slip", mobility=0.3)
-)
+SLIPPING = Robot().with_parameters(head_drag_surge=0.26).with_effect("tip_slip", mobility=0.3)
 KINDS = ("sines", "random", "steps", "turn")
 
 
@@ -40,7 +38,7 @@ def slipping() -> Experiment:
 
 def nominal(experiment: Experiment) -> Fit:
     """Of a likelihood that was content with what it got."""
-    hypothesis = nominal_hypothesis(Robot(links=1), FREE)
+    hypothesis = nominal_hypothesis(Robot(), FREE)
     return evaluate(hypothesis, np.zeros(len(FREE)), experiment, Noise(wrench=(0.1, 0.2, 0.01)))
 
 
@@ -78,7 +76,7 @@ def test_an_effect_that_predictions_ask_for_is_tried_without_being_named() -> No
 
 def test_a_model_that_lacks_nothing_gets_nothing_much(slipping: Experiment) -> None:
     """Parameters come back; an effect that is tried is near neutral if it is taken at all."""
-    true = Robot(links=1).with_parameters(head_drag_surge=0.26, tail_stiffness=0.027)
+    true = Robot().with_parameters(head_drag_surge=0.26, tail_stiffness=0.08)
     experiment = recorded(true, 6)
     found = surrogate_model(nominal(experiment), ("tip_slip",), experiment, lambda _: None)
     for name in ("head_drag_surge", "tail_stiffness"):
@@ -132,7 +130,7 @@ def test_left_out_trials_are_predicted_by_parameters_that_have_not_seen_them(
             judged.append((set(self.experiment.names), fitted[-1]))
             return super().mean_costs(theta)
 
-    hypothesis = nominal_hypothesis(Robot(links=1), FREE)
+    hypothesis = nominal_hypothesis(Robot(), FREE)
     outlook_on = partial(Watched, hypothesis=hypothesis, every=module.EVERY)
     costs = left_out_costs(outlook_on, np.zeros(len(FREE)), WATER, slipping, module.FOLDS)
     assert np.isfinite(costs).all()
