@@ -27,7 +27,7 @@ def effect(name: str, parameters: dict[str, tuple[float, float]], rivals=()) -> 
         "parameters": {
             k: {"value": v, "std": s, "unit": "m/s"} for k, (v, s) in parameters.items()
         },
-        "evidence": {"probability": 0.84},
+        "evidence": {"basis": "likelihood", "probability": 0.84},
         "rivals": [{"name": n, "probability": p} for n, p in rivals],
     }
 

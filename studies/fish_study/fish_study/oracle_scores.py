@@ -96,7 +96,7 @@ def oracle_scores(
     names = [n for n in scenario.names if n in vocabulary() or n in OUTSIDE]
     if not scenario.names:  # what an oracle that looks for something finds where nothing is
         names = [str(np.random.default_rng(scenario.seed).choice(candidates()))]
-    answered = [] if diagnosis is None else diagnosis["effects"]
+    answered = [] if diagnosis is None else [e for e in diagnosis["effects"] if _acts(e)]
     effects = [e for e in answered if e["name"] in scenario.names] or answered
     if names:
         fits = fit_oracle(scenario, experiment, held, names)
@@ -112,6 +112,11 @@ def oracle_scores(
         content["overlap"], content["f1"] = overlap(stated, acts), f1(stated, acts)
         content["range_f1"] = f1(stated_range(where["covariates"], wrench.covariates), acts)
     return content
+
+
+def _acts(effect: Mapping[str, Any]) -> bool:
+    """Whether the answer says where an effect acts; a symmetry test does not."""
+    return bool(effect["where"]["dof"])
 
 
 def _held_out(experiment: Experiment) -> list[str]:

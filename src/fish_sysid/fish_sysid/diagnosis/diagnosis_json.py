@@ -20,6 +20,7 @@ from fish_sysid.diagnosis.effect_wrench import intervals, regimes
 from fish_sysid.diagnosis.next_experiment import next_experiment
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
 from fish_sysid.diagnosis.significance import p_value, p_value_unseen, probabilities
+from fish_sysid.diagnosis.symmetry.symmetry_json import symmetry_entry, with_symmetry
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.ekf_types import ROWS, Noise
 from fish_sysid.estimation.map_fit import Fit
@@ -37,7 +38,10 @@ def answer(d: Diagnosis) -> dict[str, Any]:
     grows_with = next((c["name"] for c in unexplained["where"].get("covariates", [])), None)
     return {
         "verdict": verdict(d),
-        "effects": [effect_entry(d, a) for a in named(d)],
+        "effects": with_symmetry(
+            [effect_entry(d, a) for a in named(d)], d.symmetry, d.task.robot.table
+        ),
+        "symmetry": symmetry_entry(d.symmetry),
         "unexplained": unexplained,
         "fit": fit_entry(d),
         "next_experiment": next_experiment([a.name for a in named(d)], rivals(d), grows_with),

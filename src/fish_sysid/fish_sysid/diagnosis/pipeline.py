@@ -1,4 +1,4 @@
-"""The method on one page: fit, select effects, choose the number of links, eliminate, say what is left."""
+"""The method on one page: symmetries, fit, select effects, choose the number of links, eliminate, say what is left."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from fish_sysid.diagnosis.model_order import better_order
 from fish_sysid.diagnosis.residual_regression import residual_law
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, State
 from fish_sysid.diagnosis.significance import Level
+from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.diagnosis.task import Progress, Task, make_task
 from fish_sysid.estimation.global_fit import global_fit
 from fish_sysid.estimation.map_fit import Fit
@@ -42,6 +43,8 @@ def diagnose(
     judged.
     """
     task = make_task(experiment, robot, level, progress, names, effects, without)
+    task.progress("testing symmetries")
+    symmetry = symmetry_findings(experiment, task.robot)
     task.progress("fitting the nominal model")
     selection = select_effects(fit_nominal(task), task)
     state = on_training(selection, task)
@@ -53,7 +56,7 @@ def diagnose(
     if task.runs("backward elimination"):
         final, accepted = eliminate(state.final, state.accepted, task)
         state = with_final(state, final, accepted, task)
-    return conclude(state, task)
+    return replace(conclude(state, task), symmetry=symmetry)
 
 
 def fit_nominal(task: Task) -> Fit:

@@ -15,6 +15,7 @@ from fish_sysid.estimation.map_fit import Fit
 if TYPE_CHECKING:
     from fish_sysid.diagnosis.latent_force import MissingForce
     from fish_sysid.diagnosis.residual_regression import Law
+    from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
     from fish_sysid.diagnosis.task import Task
 
 
@@ -84,6 +85,7 @@ class Diagnosis:
     given_noise: Noise  # for the robot as given, whose filter would diverge at the refitted noise
     held_out: dict[str, np.ndarray]  # log density per sample and trial: given, nominal, final
     surrogate: Fit | None = None  # where no name fits: the model that predicts best
+    symmetry: tuple[SymmetryFinding, ...] = ()  # every test's answer, without a model of the fish
 
     @property
     def nominal(self) -> Fit:

@@ -97,3 +97,25 @@ MOST_ITERATIONS, NEAR_GAIN = 20, 1.0  # to the optimum of all trials, far for a 
 RIDGE = 1e-9  # of the diagonal, for terms that the recordings do not excite
 MOST_TERMS = 4  # of a law
 SMALLEST_TERM = 10.0  # nats where a term is chosen: beyond chi square in 1e-3 for 90 terms
+
+# --- symmetry tests --------------------------------------------------------------------------------
+FEWEST_TRIALS = 3  # of fewer a jackknife says nothing
+NEARLY_COLLINEAR = 1e-3  # singular values of unit columns, relative; less is no direction
+SMALLEST_SQUARE = 1e-12  # mean square of a left-out trial; less is rounding
+SYMMETRY_LEVEL = 0.01  # p value of a left-out gain
+# log gain of left-out trials: hidden flows had 1.85 to 2.34 with a fish of another simulator and 0.7 on
+# a real one, data without a flow at most 0.06
+SYMMETRY_GAIN = 0.5
+SENSOR_GAIN = 0.1  # the same of scales and axes: 5 % of a rate are little beside its noise
+SMALLEST_SCALE = 0.01  # data sheets promise no better
+SMALLEST_ANGLE = 0.02  # rad; markers and boards are mounted no better
+SMALLEST_DEAD_TIME = 0.02  # s, two grid points
+LEAST_OWN_SHARE = (
+    0.1  # of a term that a black-box fish does not span; with less the data cannot tell
+)
+LEAST_TURNING = 0.05  # rad/s, spread of the stroke-mean yaw rate; a straight swim has 0.02
+LEAST_ACCELERATION = 0.03  # m/s^2, spread of windowed accelerations; an IMU's noise leaves 0.004
+LEAST_SPEED = 0.02  # m/s, mean; a fish that hardly swims has no course
+LEAST_SIDES = 0.05  # share of stroke means in which the rudder is left, and right
+LEAST_NEAR_WALL = 0.05  # share of stroke means near a wall
+LEAST_SPREAD = 0.3  # m, of places; a flow that varies needs several

@@ -29,7 +29,8 @@ from fish_sysid.reports.diagnosis_figures import (
     water_over_the_pool,
     when_it_acts,
 )
-from fish_sysid.reports.verdict_sentence import sentence
+from fish_sysid.reports.symmetry_table import symmetry_table
+from fish_sysid.reports.verdict_sentence import by_symmetry, sentence
 
 Content = dict[str, Any]
 
@@ -43,6 +44,7 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
     """Write report.html."""
     blocks: list[Text | Table | Figure] = [
         *(_found(entry) for entry in content["effects"]),
+        symmetry_table(content["symmetry"]),
         *_own_effects(d),
         _fit_table(content, d.unseen_are),
         before_after(d),
@@ -93,6 +95,8 @@ def _found(effect: Content) -> Table:
         f"{effect['equation']}. {_explains(effect['where']['dof'])} "
         f"Could be mistaken for: {rivals or 'nothing else that was tried'}."
     )
+    if by_symmetry(effect):
+        note = f"{effect['equation']}. By a symmetry test, without a model of the fish."
     return Table(
         f"What is missing: {effect['name']}",
         ["parameter", "value", "standard error", "unit"],

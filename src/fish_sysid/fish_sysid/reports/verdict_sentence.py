@@ -13,7 +13,10 @@ MOST_NUMBERS = 4  # of an effect, each stated
 
 def sentence(content: Content) -> str:
     """The verdict in one sentence, and in further ones whether trials were held out and the tail needed more links."""
-    links, parts = content["fit"]["tail_links"], [_verdict(content)]
+    links = content["fit"]["tail_links"]
+    symmetry = [e["statement"] for e in content["effects"] if by_symmetry(e)]
+    aside = f"{'; '.join(symmetry)}; beside that " if symmetry else ""
+    parts = [f"{aside[:1].upper()}{aside[1:]}{_verdict(content)}"]
     if not content["fit"]["held_out_trials"]:
         parts.append(
             "With fewer than three trials nothing could be held out: errors are of the trials that were fitted."
@@ -25,8 +28,13 @@ def sentence(content: Content) -> str:
     return " ".join(parts)
 
 
+def by_symmetry(effect: Content) -> bool:
+    """Whether only a symmetry test finds an effect, and no fit of a model."""
+    return bool(effect["evidence"].get("basis") == "symmetry")
+
+
 def _verdict(content: Content) -> str:
-    found = content["effects"]
+    found = [e for e in content["effects"] if not by_symmetry(e)]
     if found:
         return f"{content['verdict']}: the model lacks {' and '.join(_effect(e) for e in found)}."
     if content["verdict"] == "unexplained":

@@ -1,0 +1,47 @@
+"""What a symmetry test answers: found, not found, or why the recordings cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Status = Literal["found", "not found", "cannot tell"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter with its standard error, by the jackknife over trials."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How much better trials are predicted that took no part in the fit."""
+
+    gain: float  # mean over left-out trials of log(mean square without / mean square with)
+    std: float  # standard error of that mean
+    p_value: float  # one-sided Student test of a gain of zero or less
+
+
+@dataclass(frozen=True)
+class SymmetryFinding:
+    """The answer of one test.
+
+    `stands_alone` is False where the test rests on the fish's mirror symmetry, which a real hull may lack: such a finding is
+    shown and never stated as an effect.
+    """
+
+    name: str  # of the vocabulary, or a description in words
+    kind: str  # physics, actuator or sensor
+    status: Status
+    assumes: str
+    needs: str
+    reason: str = ""  # of "cannot tell"
+    statement: str = ""  # of "found", in words
+    parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    evidence: Evidence | None = None
+    stands_alone: bool = True

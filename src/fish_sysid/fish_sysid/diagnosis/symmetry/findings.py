@@ -1,0 +1,45 @@
+"""All symmetry tests of an experiment: seconds, without a model of the fish."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fish_sim.robot import Robot
+from fish_sysid.dataset.camera_time_offset import align, moved_back
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.symmetry.accelerometer import accelerations, marker_or_imu
+from fish_sysid.diagnosis.symmetry.clocks import camera_clock, encoder_clock, imu_clock
+from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
+from fish_sysid.diagnosis.symmetry.galilei import uniform_flow
+from fish_sysid.diagnosis.symmetry.mirror import mirror_symmetry
+from fish_sysid.diagnosis.symmetry.place import place_tests
+from fish_sysid.diagnosis.symmetry.scales import gyro_scale, heading_offset
+from fish_sysid.diagnosis.symmetry.stroke_means import stroke_means
+
+GIVEN = "the given robot has it, and its values are refitted"
+
+
+def symmetry_findings(experiment: Experiment, robot: Robot) -> tuple[SymmetryFinding, ...]:
+    """Every test's answer. Images are first moved back by the delay that camera and gyro show.
+
+    An effect or sensor error that the given robot already has is found as any other, with that as `reason`.
+    """
+    alignment = align(experiment)
+    timed = moved_back(experiment, alignment.delay)
+    trials = stroke_means(timed)
+    scale, axes = accelerations(timed)
+    findings = (
+        uniform_flow(trials),
+        camera_clock(experiment, alignment),
+        encoder_clock(experiment),
+        imu_clock(experiment),
+        gyro_scale(trials),
+        scale,
+        *marker_or_imu(heading_offset(trials), axes),
+        *place_tests(trials),
+        mirror_symmetry(trials),
+    )
+    own = {*robot.effects, *robot.sensors}
+    return tuple(
+        replace(f, reason=GIVEN) if f.status == "found" and f.name in own else f for f in findings
+    )

@@ -1,0 +1,206 @@
+"""Dependence on place: the regression of `galilei` with terms in the place.
+
+Translating the fish in the pool changes nothing of its swimming, unless the water or the walls differ from place to place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.effects.nonuniform_current import NonuniformCurrent
+from fish_sim.pool import LENGTH, WIDTH
+from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding
+from fish_sysid.diagnosis.symmetry.galilei import (
+    black_box,
+    carried,
+    ground_velocity,
+    in_body_frame,
+    too_few_headings,
+)
+from fish_sysid.diagnosis.symmetry.regression import Rows, judge
+from fish_sysid.diagnosis.symmetry.stroke_means import StrokeMeans
+from fish_sysid.estimation.thresholds import (
+    FEWEST_TRIALS,
+    LEAST_NEAR_WALL,
+    LEAST_OWN_SHARE,
+    LEAST_SPREAD,
+    SYMMETRY_GAIN,
+)
+
+Array = NDArray[np.float64]
+
+WALL_LENGTH = 0.2  # m over which a wall's influence fades
+NEAR_WALL = 0.3  # of the influence at the wall
+MEAN = ("mean_x", "mean_y")
+TERMS = ("strain", "shear_x", "shear_y", "gyre_11", "gyre_12", "gyre_21", "gyre_22")
+PATCHES = tuple((x, y) for x in (-0.33, 0.0, 0.33) for y in (-0.25, 0.25))  # of length and width
+PATCH_WIDTH = 0.35  # m, standard deviation
+
+FEW_TRIALS = "fewer than three usable trials"
+
+flow_finding = partial(
+    SymmetryFinding,
+    "nonuniform_current",
+    "physics",
+    assumes="the water's velocity is constant in time; commands alone drive the fish",
+    needs="three trials over the pool, several headings at each place",
+)
+wall_finding = partial(
+    SymmetryFinding,
+    "wall_effect",
+    "physics",
+    assumes="the walls are those of the pool, 4.27 m by 2.13 m about the origin",
+    needs="three trials, near the walls and away from them at the same commands",
+)
+patch_finding = partial(
+    SymmetryFinding,
+    "slower or faster in a part of the pool",
+    "physics",
+    assumes="commands alone drive the fish",
+    needs="three trials over the pool at the same commands",
+)
+
+
+def place_tests(trials: Sequence[StrokeMeans]) -> tuple[SymmetryFinding, ...]:
+    """The tests for `nonuniform_current`, `wall_effect` and for a patch."""
+    return varying_flow(trials), wall_effect(trials), patch(trials)
+
+
+def varying_flow(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
+    """Linear shear and the four largest gyres beside a uniform flow."""
+    if len(trials) < FEWEST_TRIALS:
+        return flow_finding("cannot tell", reason=FEW_TRIALS)
+    if (spread := _spread(trials)) < LEAST_SPREAD:
+        return flow_finding("cannot tell", reason=_one_place(spread))
+    judged = judge([Rows(_base(s), _flows(s), ground_velocity(s)) for s in trials])
+    if judged.term_share < LEAST_OWN_SHARE:
+        return flow_finding("cannot tell", reason=too_few_headings(judged.term_share))
+    names, first = (*MEAN, *TERMS), -len(MEAN) - len(TERMS)
+    parameters = {
+        name: judged.estimate(first + i, NonuniformCurrent.parameters[name].unit)
+        for i, name in enumerate(names)
+    }
+    found = judged.stands(SYMMETRY_GAIN, *range(-len(TERMS), 0))
+    text = "the water's velocity varies over the pool"
+    return _answer(flow_finding, found, text, parameters, judged.evidence)
+
+
+def wall_effect(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
+    """How much slower the fish is at a wall than the same commands make it elsewhere."""
+    if len(trials) < FEWEST_TRIALS:
+        return wall_finding("cannot tell", reason=FEW_TRIALS)
+    near = np.concatenate([nearness(s) > NEAR_WALL for s in trials]).mean()
+    if not LEAST_NEAR_WALL < near < 1.0 - LEAST_NEAR_WALL:
+        return wall_finding("cannot tell", reason=f"the fish is near a wall {near:.0%} of the time")
+    judged = judge([Rows(_base(s), _walls(s), ground_velocity(s)) for s in trials])
+    if judged.term_share < LEAST_OWN_SHARE:
+        return wall_finding("cannot tell", reason="near walls commands differ from elsewhere")
+    slower = _relative(trials, -judged.coefficients[-2], judged.std[-2])
+    found = judged.stands(SYMMETRY_GAIN, -2) and slower.value > 0.0
+    text = f"at a wall the fish is {slower.value:.0%} slower than elsewhere"
+    return _answer(wall_finding, found, text, {"slowdown": slower}, judged.evidence)
+
+
+def patch(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
+    """Whether the same commands make the fish slower or faster in one of six parts of the pool."""
+    if len(trials) < FEWEST_TRIALS:
+        return patch_finding("cannot tell", reason=FEW_TRIALS)
+    if (spread := _spread(trials)) < LEAST_SPREAD:
+        return patch_finding("cannot tell", reason=_one_place(spread))
+    judged = judge([Rows(_base(s), _patches(s), ground_velocity(s)) for s in trials])
+    if judged.term_share < LEAST_OWN_SHARE:
+        return patch_finding("cannot tell", reason="parts of the pool were swum by other commands")
+    count = len(PATCHES)
+    faster = [
+        _relative(trials, c, s)
+        for c, s in zip(judged.coefficients[-count:], judged.std[-count:], strict=True)
+    ]
+    best = int(np.argmax([abs(f.value) / max(f.std, 1e-9) for f in faster]))
+    x, y = PATCHES[best][0] * LENGTH, PATCHES[best][1] * WIDTH
+    parameters = {
+        "faster": faster[best],
+        "x": Estimate(x, PATCH_WIDTH, "m"),
+        "y": Estimate(y, PATCH_WIDTH, "m"),
+    }
+    found = judged.stands(SYMMETRY_GAIN, best - count)
+    text = f"about ({x:.1f}, {y:.1f}) m the fish is {faster[best].value:+.0%} faster than elsewhere"
+    return _answer(patch_finding, found, text, parameters, judged.evidence)
+
+
+def _answer(
+    finding: partial[SymmetryFinding], found: bool, text: str, parameters: object, told: object
+) -> SymmetryFinding:
+    return finding(
+        "found" if found else "not found",
+        statement=text if found else "",
+        parameters=parameters,
+        evidence=told,
+    )
+
+
+def nearness(trial: StrokeMeans) -> Array:
+    """A wall's influence (C,): 1 at the nearest wall, fading over WALL_LENGTH."""
+    x, y = np.abs(trial.pose[:, 0]), np.abs(trial.pose[:, 1])
+    gap = np.minimum(LENGTH / 2 - x, WIDTH / 2 - y)
+    return np.asarray(np.exp(-np.maximum(gap, 0.0) / WALL_LENGTH))
+
+
+def drive(trial: StrokeMeans) -> Array:
+    """Root of the mean squared rotor speed (C,) of the last two seconds: a speed is about proportional to it."""
+    return np.asarray(np.sqrt(np.maximum(trial.throttle.mean(axis=1), 0.0)))
+
+
+def _relative(trials: Sequence[StrokeMeans], coefficient: float, std: float) -> Estimate:
+    """A change of speed per unit of drive as a share of the mean speed."""
+    speed = np.concatenate([s.velocity[:, 0] for s in trials]).mean()
+    scale = float(np.concatenate([drive(s) for s in trials]).mean() / max(abs(speed), 1e-6))
+    return Estimate(float(coefficient) * scale, float(std) * scale, "1")
+
+
+def _base(trial: StrokeMeans) -> Array:
+    return np.hstack([black_box(trial), carried(trial)])
+
+
+def _flows(trial: StrokeMeans) -> Array:
+    """Columns (2C, 7): every term of the flow with coefficient one."""
+    x, y, _ = trial.pose.T
+    neutral = dict.fromkeys(NonuniformCurrent.parameters, 0.0)
+    columns = []
+    for name in TERMS:
+        values = SimpleNamespace(**{**neutral, name: 1.0})
+        (vx, vy), _gradient = NonuniformCurrent.water(values, x, y, SimpleNamespace(), np)
+        columns.append(in_body_frame(trial, np.column_stack(np.broadcast_arrays(vx, vy))))
+    return np.column_stack(columns)
+
+
+def _walls(trial: StrokeMeans) -> Array:
+    """Columns (2C, 2): surge in proportion to the drive, sway to the rudder, both near a wall."""
+    near, nothing = nearness(trial), np.zeros(len(trial.t))
+    surge = np.concatenate([near * drive(trial), nothing])
+    return np.column_stack([surge, np.concatenate([nothing, near * trial.rudder])])
+
+
+def _patches(trial: StrokeMeans) -> Array:
+    """Columns (2C, 6): surge in proportion to the drive in each part of the pool."""
+    x, y, _ = trial.pose.T
+    columns = []
+    for px, py in PATCHES:
+        distance = np.hypot(x - px * LENGTH, y - py * WIDTH)
+        inside = np.exp(-0.5 * (distance / PATCH_WIDTH) ** 2)
+        columns.append(np.concatenate([inside * drive(trial), np.zeros(len(x))]))
+    return np.column_stack(columns)
+
+
+def _spread(trials: Sequence[StrokeMeans]) -> float:
+    """Standard deviation of places in m, the smaller of both axes times the pool's shape."""
+    x, y, _ = np.concatenate([s.pose for s in trials]).T
+    return float(min(x.std(), y.std() * LENGTH / WIDTH))
+
+
+def _one_place(spread: float) -> str:
+    return f"one part of the pool: places vary by {spread:.2f} m along it"

@@ -1,0 +1,111 @@
+"""Symmetry findings in diagnosis.json: the table of all tests, and what they add to the effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from fish_sysid.diagnosis.symmetry.finding import Evidence, SymmetryFinding
+from fish_sysid.diagnosis.symmetry.findings import GIVEN
+from fish_sysid.diagnosis.vocabulary import candidates, kind_of
+from fish_sysid.estimation.parametrization import EffectTable, effect_class
+
+Entry = dict[str, Any]
+
+NOT_A_NUMBER = float("nan")
+CONTAINED_IN = {"current": "nonuniform_current"}  # a flow that varies has a mean
+
+
+def symmetry_entry(findings: Iterable[SymmetryFinding]) -> list[Entry]:
+    """Every test with what it assumes, needs and found."""
+    return [
+        {
+            "name": f.name,
+            "kind": f.kind,
+            "status": f.status,
+            "reason": f.reason,
+            "statement": f.statement,
+            "assumes": f.assumes,
+            "needs": f.needs,
+            "stands_alone": f.stands_alone,
+            "parameters": _parameters(f),
+            "evidence": f.evidence and _evidence(f.evidence),
+        }
+        for f in findings
+    ]
+
+
+def stated(findings: Sequence[SymmetryFinding]) -> list[SymmetryFinding]:
+    """Findings that are effects: names of the vocabulary that need no mirror symmetry and that the robot does not have."""
+    found = [
+        f
+        for f in findings
+        if f.status == "found" and f.stands_alone and f.reason != GIVEN and f.name in candidates()
+    ]
+    names = {f.name for f in found}
+    return [f for f in found if CONTAINED_IN.get(f.name) not in names]
+
+
+def with_symmetry(
+    effects: Sequence[Entry], findings: Sequence[SymmetryFinding], table: EffectTable
+) -> list[Entry]:
+    """The effects of the search with the symmetry's numbers beside, and those that only the symmetry finds.
+
+    Entries of the search keep their numbers and `basis` "likelihood".
+    """
+    entries = [
+        {**entry, "evidence": {**entry["evidence"], "basis": "likelihood"}} for entry in effects
+    ]
+    for finding in stated(findings):
+        names = (finding.name, CONTAINED_IN.get(finding.name))
+        same = [entry for entry in entries if entry["name"] in names]
+        if not same:
+            entries.append(_effect(finding, table))
+        for entry in same:
+            entry["evidence"]["symmetry"] = {
+                "name": finding.name,
+                "parameters": _parameters(finding),
+                **(_evidence(finding.evidence) if finding.evidence else {}),
+            }
+    return entries
+
+
+def _effect(finding: SymmetryFinding, table: EffectTable) -> Entry:
+    """An effect by symmetry alone; what only a model of the fish tells is absent."""
+    effect = effect_class(finding.name, table)
+    absent = {
+        key: {"value": p.value, "std": NOT_A_NUMBER, "unit": p.unit}
+        for key, p in effect.parameters.items()
+    }
+    told = finding.evidence or Evidence(NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER)
+    return {
+        "name": finding.name,
+        "kind": kind_of(finding.name, table),
+        "equation": effect.equation,
+        "statement": finding.statement,
+        "parameters": {**absent, **_parameters(finding)},
+        "evidence": {
+            "basis": "symmetry",
+            "log_likelihood_gain": NOT_A_NUMBER,
+            "probability": 1.0 - told.p_value,
+            **_evidence(told),
+        },
+        "share": NOT_A_NUMBER,
+        "rivals": [],
+        "where": {"dof": {}, "covariates": [], "time": [], "place": []},
+    }
+
+
+def _parameters(finding: SymmetryFinding) -> Entry:
+    return {
+        key: {"value": p.value, "std": p.std, "unit": p.unit}
+        for key, p in finding.parameters.items()
+    }
+
+
+def _evidence(told: Evidence) -> Entry:
+    return {
+        "left_out_log_gain": told.gain,
+        "left_out_log_gain_std": told.std,
+        "p_value": told.p_value,
+    }
