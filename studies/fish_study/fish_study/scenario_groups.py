@@ -17,6 +17,7 @@ from fish_study.other_forms import OTHER_FORMS
 from fish_study.out_of_vocabulary import OUTSIDE
 from fish_study.scenario import Scenario
 from fish_sysid.diagnosis.vocabulary import candidates
+from fish_sysid.estimation.parametrization import SENSOR_FIELDS
 
 Random = np.random.Generator
 Item = TypeVar("Item")
@@ -168,7 +169,7 @@ def two(random: Random, number: int) -> Scenario:
 
 def sensor(random: Random, number: int) -> Scenario:
     """The sensor is wrong, not the fish."""
-    return _world("sensor", random, (_turn(tuple(SENSOR_EFFECTS), number),))
+    return _world("sensor", random, (_turn(tuple(SENSOR_FIELDS), number),))
 
 
 def outside(random: Random, number: int) -> Scenario:

@@ -29,6 +29,7 @@ from fish_study.swim import Readings
 from fish_study.true_names import true_names
 from fish_sysid.dataset.synthetic import FULL_SPEED
 from fish_sysid.diagnosis.vocabulary import candidates
+from fish_sysid.estimation.parametrization import SENSOR_FIELDS
 
 
 def test_scenarios_are_drawn_from_the_seed_alone() -> None:
@@ -146,7 +147,7 @@ def test_scenarios_of_a_group_are_what_the_group_says() -> None:
     )  # no command reaches a weak limit
     assert all(len(w.names) == 2 for w in drawn("two"))
     assert not any(w.names for w in drawn("null"))
-    assert {w.names[0] for w in drawn("sensor")} == set(SENSOR_EFFECTS)
+    assert {w.names[0] for w in drawn("sensor")} == set(SENSOR_FIELDS)
     assert {w.names[0] for w in drawn("outside")} == set(OUTSIDE)
     assert {(w.links, w.method) for w in drawn("null")} >= {(3, "dop853"), (5, "rk4")}
     named = {n: w for w in drawn("single") for n in w.names}

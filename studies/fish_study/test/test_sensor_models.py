@@ -10,7 +10,6 @@ import pytest
 from prove_samples import small
 
 from fish_bag import read_dataset
-from fish_sim.sensors import SENSOR_EFFECTS
 from fish_sim.sensors.noise_levels import CAMERA_LATENCY
 from fish_study.build import make_readings, make_recordings
 from fish_study.oracle import as_experiment, with_truth
@@ -19,6 +18,7 @@ from fish_study.swim import Inertial, swim
 from fish_sysid.dataset.experiment import build_experiment
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import evaluate
+from fish_sysid.estimation.parametrization import SENSOR_FIELDS
 
 
 def test_recordings_say_what_the_instruments_read(tmp_path) -> None:
@@ -70,10 +70,10 @@ def test_recordings_are_as_noisy_as_the_filter_takes_them_to_be() -> None:
     np.testing.assert_allclose(np.nanmean(imu[1:] * imu[:-1], axis=(0, 1)), 0.0, atol=0.06)
 
 
-@pytest.mark.parametrize("name", SENSOR_EFFECTS)
+@pytest.mark.parametrize("name", SENSOR_FIELDS)
 def test_the_filter_undoes_what_an_instrument_does(name: str) -> None:
     """Likeliest is its true value: not none, and not the opposite one."""
-    scenario = small("sensor", list(SENSOR_EFFECTS).index(name), noise=1.0)
+    scenario = small("sensor", list(SENSOR_FIELDS).index(name), noise=1.0)
     read = as_experiment(make_readings(scenario), scenario.encoder)
     hypothesis, theta = with_truth(scenario, scenario.names)
     opposite = 2.0 if name == "camera_latency" else -1.0  # an image cannot be of the future
