@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_sim.model import DT
+from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.dataset.experiment import Experiment, Frames
 
 STROKE = 2.0  # Hz
@@ -28,6 +29,7 @@ class World:
     swing: float = 0.05  # rad, of the heading with every stroke
     speeds: tuple[float, float] = (40.0, 90.0)  # rad/s, range of the rotor's amplitude
     one_heading: bool = False
+    wall: float = 0.0  # share of its speed that the fish loses at a wall; it then starts at one
     wait: float = 0.0  # s before the rotor starts
 
 
@@ -58,15 +60,21 @@ def _swim(world: World, random: np.random.Generator, count: int) -> tuple:
     u = _lagged(0.13 * np.sqrt(power / 2000.0), 0.5)
     rate = _lagged(2.0 * commands[:, 1], 0.4)
     start = 0.3 if world.one_heading else random.uniform(-np.pi, np.pi)
+    place = np.array([random.uniform(-0.6, 0.6), random.uniform(-0.4, 0.4)])
+    if world.wall:
+        side = random.choice([-1.0, 1.0])
+        place = np.array([2.0 * place[0], side * (0.5 * WIDTH - 0.03)])
+        start = -side * 0.5 * np.pi + random.uniform(-0.5, 0.5)
     swing = world.swing * np.sin(2.0 * np.pi * STROKE * t) * (t >= world.wait)
     heading = start + DT * np.cumsum(rate) + swing
     cos, sin = np.cos(heading), np.sin(heading)
     v = -0.06 * rate + 0.02 * np.cos(2.0 * np.pi * STROKE * t) * (t >= world.wait)
     velocity = np.column_stack([u * cos - v * sin, u * sin + v * cos])
-    place = np.array([random.uniform(-0.6, 0.6), random.uniform(-0.4, 0.4)])
     position = np.empty((count, 2))
     for k in range(count):
         position[k] = place
+        gap = min(0.5 * LENGTH - abs(place[0]), 0.5 * WIDTH - abs(place[1]))
+        velocity[k] *= 1.0 - world.wall * np.exp(-max(gap, 0.0) / 0.2)
         velocity[k] += (world.flow[0] + world.shear * place[1], world.flow[1])
         place = place + DT * velocity[k]
     felt = np.gradient(velocity, DT, axis=0)

@@ -124,6 +124,19 @@ def test_what_the_recordings_cannot_tell_is_said_with_the_reason(world, lacking,
     assert found.needs
 
 
+def test_a_fish_that_walls_slow_down_is_told_with_how_much():
+    swims = kinematic_swims(World(wall=0.5, turns=False), seed=4, trials=8, duration=12.0)
+    found = answers(swims)["wall_effect"]
+    assert found.status == "found"
+    assert found.parameters["slowdown"].value == pytest.approx(0.5, abs=0.15)
+
+
+def test_walls_are_not_judged_where_the_camera_sees_the_fish_beyond_them(null):
+    found = answers(with_current(null, (0.3, 0.0)))["wall_effect"]
+    assert found.status == "cannot tell"
+    assert "beyond the walls" in found.reason
+
+
 def test_of_two_trials_nothing_is_told(null):
     for found in symmetry_findings(null.select([0, 1]), Robot()):
         assert found.status == "cannot tell", found.name

@@ -134,7 +134,7 @@ def _rows(experiment: Experiment, m: int) -> tuple[Rows, float] | None:
     None where a sensor is missing or the heading is not followed.
     """
     steps, frames = int(experiment.steps[m]), experiment.frames[m]
-    t = DT * np.arange(steps)
+    t: Array = DT * np.arange(steps, dtype=np.float64)
     gyro, accel = experiment.gyro[:steps, m], experiment.accel[:steps, m]
     known = np.isfinite(gyro) & np.isfinite(accel).all(axis=1)
     if known.sum() < 0.5 * steps or len(frames.t) < LEAST_FRAMES:

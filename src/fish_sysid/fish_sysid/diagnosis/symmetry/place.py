@@ -35,6 +35,7 @@ from fish_sysid.estimation.thresholds import (
 Array = NDArray[np.float64]
 
 WALL_LENGTH = 0.2  # m over which a wall's influence fades
+MARGIN, LEAST_BEYOND = 0.05, 0.01  # m and share of places that may seem to be beyond a wall
 NEAR_WALL = 0.3  # of the influence at the wall
 MEAN = ("mean_x", "mean_y")
 TERMS = ("strain", "shear_x", "shear_y", "gyre_11", "gyre_12", "gyre_21", "gyre_22")
@@ -94,14 +95,18 @@ def wall_effect(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
     """How much slower the fish is at a wall than the same commands make it elsewhere."""
     if len(trials) < FEWEST_TRIALS:
         return wall_finding("cannot tell", reason=FEW_TRIALS)
+    beyond = np.concatenate([gap(s) < -MARGIN for s in trials]).mean()
+    if beyond > LEAST_BEYOND:
+        text = f"{beyond:.0%} of the places are beyond the walls: they are not where they should be"
+        return wall_finding("cannot tell", reason=text)
     near = np.concatenate([nearness(s) > NEAR_WALL for s in trials]).mean()
     if not LEAST_NEAR_WALL < near < 1.0 - LEAST_NEAR_WALL:
         return wall_finding("cannot tell", reason=f"the fish is near a wall {near:.0%} of the time")
     judged = judge([Rows(_base(s), _walls(s), ground_velocity(s)) for s in trials])
     if judged.term_share < LEAST_OWN_SHARE:
         return wall_finding("cannot tell", reason="near walls commands differ from elsewhere")
-    slower = _relative(trials, -judged.coefficients[-2], judged.std[-2])
-    found = judged.stands(SYMMETRY_GAIN, -2) and slower.value > 0.0
+    slower = _relative(trials, -judged.coefficients[-1], judged.std[-1])
+    found = judged.stands(SYMMETRY_GAIN, -1) and slower.value > 0.0
     text = f"at a wall the fish is {slower.value:.0%} slower than elsewhere"
     return _answer(wall_finding, found, text, {"slowdown": slower}, judged.evidence)
 
@@ -145,9 +150,13 @@ def _answer(
 
 def nearness(trial: StrokeMeans) -> Array:
     """A wall's influence (C,): 1 at the nearest wall, fading over WALL_LENGTH."""
+    return np.asarray(np.exp(-np.maximum(gap(trial), 0.0) / WALL_LENGTH))
+
+
+def gap(trial: StrokeMeans) -> Array:
+    """Distance (C,) of the camera's point from the nearest wall in m, negative beyond it."""
     x, y = np.abs(trial.pose[:, 0]), np.abs(trial.pose[:, 1])
-    gap = np.minimum(LENGTH / 2 - x, WIDTH / 2 - y)
-    return np.asarray(np.exp(-np.maximum(gap, 0.0) / WALL_LENGTH))
+    return np.asarray(np.minimum(LENGTH / 2 - x, WIDTH / 2 - y))
 
 
 def drive(trial: StrokeMeans) -> Array:
@@ -179,10 +188,8 @@ def _flows(trial: StrokeMeans) -> Array:
 
 
 def _walls(trial: StrokeMeans) -> Array:
-    """Columns (2C, 2): surge in proportion to the drive, sway to the rudder, both near a wall."""
-    near, nothing = nearness(trial), np.zeros(len(trial.t))
-    surge = np.concatenate([near * drive(trial), nothing])
-    return np.column_stack([surge, np.concatenate([nothing, near * trial.rudder])])
+    """Column (2C, 1): surge in proportion to the drive near a wall."""
+    return np.concatenate([nearness(trial) * drive(trial), np.zeros(len(trial.t))])[:, None]
 
 
 def _patches(trial: StrokeMeans) -> Array:
