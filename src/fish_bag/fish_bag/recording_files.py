@@ -55,13 +55,17 @@ def parts(folder: Path) -> list[Path]:
     rosbag2 splits a long recording into <folder>_0, <folder>_1 and so on. A file of ROS 1 is a recording of its own.
     """
     inside = list(folder.iterdir())
-    files = sorted((p for p in inside if p.is_file() and is_storage_file(p)), key=part_order)
+    files = sorted((p for p in inside if p.is_file() and _is_part(p)), key=part_order)
     split = re.compile(rf"{re.escape(folder.name)}_\d+\.(?:mcap|db3)")
     one = [f.suffix != ".bag" for f in files] == [True] or all(
         split.fullmatch(bare_name(file.name)) for file in files
     )
     below = any(is_recording(p) for p in inside if p.is_dir())
     return files if files and one and not below else []
+
+
+def _is_part(path: Path) -> bool:
+    return bare_name(path.name).endswith(PARTS)
 
 
 def part_order(path: Path) -> tuple[str, int, str]:
@@ -86,9 +90,9 @@ def find_files(path: Path) -> RecordingFiles:
     stated = read_metadata(path)
     if stated is not None:
         return _stated_files(path, stated)
-    found = parts(path)
+    files = [p for p in path.iterdir() if is_storage_file(p)]
+    found = parts(path) or (files if len(files) == 1 else [])
     if not found:
-        files = [p for p in path.iterdir() if is_storage_file(p)]
         advice = "give one of the recordings in it" if files else "there is no recording in it"
         raise RecordingError(
             f"{path}: no {FILE_NAME} and {len(files)} storage files, which are not the parts {path.name}_0, "

@@ -117,6 +117,7 @@ def write_sqlite_with_log(directory: Path, messages: list[Message]) -> Path:
     connection.close()  # takes the log into the database, which a killed recorder does not
     file.write_bytes(database)
     companion.write_bytes(kept)
+    (whole / "metadata.yaml").unlink()  # which a killed recorder has not written
     return whole
 
 
