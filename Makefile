@@ -106,8 +106,8 @@ train evaluate paper:
 	@$(ROBOFISH) $@ --out '$(or $(OUT),out/$@)' $(ARGS)
 
 # --- tests ----------------------------------------------------------------------------------------------------------------
-# The longest tests, those of fish_sysid and fish_study, run beside all the others: both cores stay busy.
-LONGEST := fish_sysid fish_study
+# The longest tests run beside all the others: both cores stay busy.
+LONGEST := fish_sysid fish_study fish_sim
 test: setup install/.studies
 	@$(WORKSPACE); status=0; \
 		colcon --log-base log/longest test $(WITH_STUDIES) --packages-select $(LONGEST) --executor sequential --return-code-on-test-failure & \

@@ -111,6 +111,14 @@ def test_ruff(check):
     assert result.returncode == 0, "\n" + result.stdout + result.stderr
 
 
+@pytest.mark.timeout(900)  # a minute of processor time without its cache
+def test_mypy():
+    program = shutil.which("mypy", path=str(Path(sys.executable).parent))
+    packages = [str(FOLDERS[name] / name) for name in PACKAGES]
+    result = subprocess.run([program, *packages], cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, "\n" + result.stdout + result.stderr
+
+
 @pytest.mark.parametrize("package", ["fish_sim", "fish_train", "fish_sysid", "fish_report"])
 def test_every_data_file_of_a_package_is_installed(package):
     """C texts and page templates are read at run time: a file that setup.py forgets is missing only when installed."""
