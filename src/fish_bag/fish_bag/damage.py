@@ -32,10 +32,10 @@ class Sample:
     file: Path  # its storage file
     data: bytes = field(repr=False)
     messages: Counter[Message] = field(repr=False)
-    # byte after the message
-    ends: list[tuple[int, Message]] = field(default_factory=list, repr=False)
-    # first and last byte of chunks
-    chunk_ends: list[tuple[int, int]] = field(default_factory=list, repr=False)
+    ends: list[tuple[int, Message]] = field(
+        default_factory=list, repr=False
+    )  # byte after the message
+    chunk_ends: list[tuple[int, int]] = field(default_factory=list)  # first and last byte of chunks
 
 
 def make_sample(name: str, path: Path) -> Sample:

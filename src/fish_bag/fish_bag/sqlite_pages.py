@@ -32,14 +32,15 @@ class Row:
     )
 
 
-def rows(data: Buffer) -> Iterator[Row]:
-    """All rows that are whole, in order of their place in the file."""
+def rows(data: Buffer, last_pages: int | None = None) -> Iterator[Row]:
+    """All rows that are whole, or those in the last pages, in order of their place in the file."""
     page_bytes = int.from_bytes(data[16:18], "big")
     page_bytes = 65536 if page_bytes == 1 else page_bytes
     if page_bytes < 512 or page_bytes & (page_bytes - 1):
         page_bytes = USUAL_PAGE
     usable = page_bytes - data[20] if len(data) > 20 and data[20] < page_bytes - 480 else page_bytes
-    for start in range(0, len(data), page_bytes):
+    starts = range(0, len(data), page_bytes)
+    for start in starts if last_pages is None else starts[-last_pages:]:
         yield from _page(data, start, page_bytes, usable)
 
 
@@ -74,8 +75,7 @@ def _row(data: Buffer, at: int, page_end: int, page_bytes: int, usable: int) -> 
         return None
     payload = bytes(data[at:end])
     following = int.from_bytes(data[end : end + 4], "big") if local < size else 0
-    # what follows the first part of a long row is the number of the page where it goes on
-    zeros_follow = local == size and not any(data[end : end + 2])
+    zeros_follow = local == size and end < len(data) and not any(data[end : end + 2])
     while len(payload) < size:
         page = (following - 1) * page_bytes
         take = min(size - len(payload), usable - 4)

@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 from fish_bag.message_types import ros2_type_name
 from fish_bag.sqlite_pages import Row, rows
 from fish_bag.storage import (
+    ENOUGH_OTHERS,
     Contents,
     Keep,
     Messages,
@@ -32,6 +33,7 @@ COMPANIONS = (
     "-journal",
 )  # files in which sqlite3 keeps what is not yet, or no more, in the database
 TOPIC_COLUMNS = ("serialization_format", "offered_qos_profiles", "type_description_hash")
+LAST_PAGES = 64  # in which a row that reaches to the file's end is looked for
 ENCODINGS = ("ros2msg", "ros2idl", "unknown", "")
 
 
@@ -46,6 +48,7 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
         contents = Contents(notes=notes)
         try:
             _read(database, contents, keep)
+            _drop_zeroed(database.read_bytes(), contents)
         except (sqlite3.Error, UnicodeDecodeError) as error:
             contents = Contents(notes=notes)
             contents.lost.append(
@@ -89,6 +92,9 @@ def _read(path: Path, contents: Contents, keep: Keep) -> None:
         found = connection.execute("PRAGMA quick_check(1)").fetchone()
         if found is None or found[0] != "ok":
             raise sqlite3.DatabaseError(found[0] if found else "no answer")
+        (page_bytes,) = connection.execute("PRAGMA page_size").fetchone()
+        if path.stat().st_size % page_bytes:  # sqlite3 takes zeros for what is missing
+            raise sqlite3.DatabaseError("the file ends inside a page")
         definitions = {}
         if _columns(connection, "message_definitions"):
             query = (
@@ -162,6 +168,27 @@ def _read_pages(data: bytes, contents: Contents) -> None:
         named = dict(zip(TOPIC_COLUMNS, texts[2:], strict=False))
         contents.topics[number] = _topic(texts[0], texts[1], named, definitions)
     _keep_whole(messages, contents, content_end)
+
+
+def _drop_zeroed(data: bytes, contents: Contents) -> None:
+    """Take out a message whose end zeros at the file's end have overwritten: sqlite3 does not see that."""
+    content_end = end_of_content(data)
+    if content_end == len(data):
+        return
+    for row in rows(data, LAST_PAGES):
+        if row.end <= content_end or [type(v) for v in row.values[1:]] != [int, int, bytes]:
+            continue
+        _, topic, time_ns, raw = row.values
+        if not (isinstance(topic, int) and isinstance(time_ns, int) and isinstance(raw, bytes)):
+            continue
+        found = contents.messages.get(topic, Messages())
+        place = len(found) - 1
+        while place >= 0 and (found.times[place], found.raws[place]) != (time_ns, raw):
+            place -= 1
+        others = found.raws[:place] + found.raws[place + 1 :]
+        if place >= 0 and len(others) >= ENOUGH_OTHERS and not ends_like_others(raw, others):
+            del found.times[place], found.raws[place]
+            contents.lost.append("a message that reaches into zeros at the file's end")
 
 
 def _keep_whole(found: dict[int, Row], contents: Contents, content_end: int) -> None:

@@ -100,6 +100,8 @@ def ends_like_others(raw: bytes, others: list[bytes]) -> bool:
     where all of it is zeros.
     """
     own = len(raw) - len(raw.rstrip(b"\0"))
+    if raw and not own:
+        return True
     return (
         len(others) >= ENOUGH_OTHERS
         and own < len(raw)

@@ -167,7 +167,8 @@ def test_a_message_that_ends_in_more_zeros_than_others_is_not_trusted():
     assert ends_like_others(b"\7\7\7\0\0", others)
     assert not ends_like_others(b"\7\7\0\0\0", others)
     assert not ends_like_others(b"\0\0", others)
-    assert not ends_like_others(b"\7\7\7", others[:3])
+    assert not ends_like_others(b"\7\7\0", others[:3])
+    assert ends_like_others(b"\7\7\7", [])
 
 
 def test_messages_in_the_write_ahead_log_are_read(wholes):
