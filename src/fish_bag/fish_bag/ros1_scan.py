@@ -182,8 +182,9 @@ class _Scan:
                 "ros1msg",
                 hash=inner[b"md5sum"].decode(),
             )
-            self.contents.topics[connection] = topic
-            self.kept[connection] = self.keep(topic)
+            if connection not in self.contents.topics:  # the index says it once more
+                self.contents.topics[connection] = topic
+                self.kept[connection] = self.keep(topic)
         elif operation == CHUNK_INFO:
             for at in range(0, len(data), COUNT.size):
                 connection, count = COUNT.unpack_from(data, at)

@@ -16,6 +16,7 @@ from fish_bag.storage import Buffer
 LEAF = 0x0D  # type of a page with rows of a table
 FILE_HEAD_BYTES = 100
 USUAL_PAGE = 4096
+NEAR_PAGES = 64  # before a place, in which rows that reach there are looked for
 INTEGER_BYTES = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}  # serial type -> bytes
 Value = int | str | bytes | None
 
@@ -32,15 +33,18 @@ class Row:
     )
 
 
-def rows(data: Buffer, last_pages: int | None = None) -> Iterator[Row]:
-    """All rows that are whole, or those in the last pages, in order of their place in the file."""
+def rows(data: Buffer, near: int | None = None) -> Iterator[Row]:
+    """All rows that are whole, or those in the pages up to byte `near`, in order of their place in the file."""
     page_bytes = int.from_bytes(data[16:18], "big")
     page_bytes = 65536 if page_bytes == 1 else page_bytes
     if page_bytes < 512 or page_bytes & (page_bytes - 1):
         page_bytes = USUAL_PAGE
     usable = page_bytes - data[20] if len(data) > 20 and data[20] < page_bytes - 480 else page_bytes
     starts = range(0, len(data), page_bytes)
-    for start in starts if last_pages is None else starts[-last_pages:]:
+    if near is not None:
+        last = near // page_bytes
+        starts = starts[max(0, last - NEAR_PAGES) : last + 1]
+    for start in starts:
         yield from _page(data, start, page_bytes, usable)
 
 

@@ -33,7 +33,6 @@ COMPANIONS = (
     "-journal",
 )  # files in which sqlite3 keeps what is not yet, or no more, in the database
 TOPIC_COLUMNS = ("serialization_format", "offered_qos_profiles", "type_description_hash")
-LAST_PAGES = 64  # in which a row that reaches to the file's end is looked for
 ENCODINGS = ("ros2msg", "ros2idl", "unknown", "")
 
 
@@ -48,7 +47,10 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
         contents = Contents(notes=notes)
         try:
             _read(database, contents, keep)
-            _drop_zeroed(database.read_bytes(), contents)
+            head = path.read_bytes()  # the database without its companions
+            content_end = end_of_content(head)
+            if content_end < len(head):
+                _drop_zeroed(database.read_bytes(), content_end, contents)
         except (sqlite3.Error, UnicodeDecodeError) as error:
             contents = Contents(notes=notes)
             contents.lost.append(
@@ -170,12 +172,9 @@ def _read_pages(data: bytes, contents: Contents) -> None:
     _keep_whole(messages, contents, content_end)
 
 
-def _drop_zeroed(data: bytes, contents: Contents) -> None:
-    """Take out a message whose end zeros at the file's end have overwritten: sqlite3 does not see that."""
-    content_end = end_of_content(data)
-    if content_end == len(data):
-        return
-    for row in rows(data, LAST_PAGES):
+def _drop_zeroed(data: bytes, content_end: int, contents: Contents) -> None:
+    """Take out a message whose end the zeros from byte `content_end` on have overwritten: sqlite3 does not see that."""
+    for row in rows(data, content_end):
         if row.end <= content_end or [type(v) for v in row.values[1:]] != [int, int, bytes]:
             continue
         _, topic, time_ns, raw = row.values
@@ -188,7 +187,7 @@ def _drop_zeroed(data: bytes, contents: Contents) -> None:
         others = found.raws[:place] + found.raws[place + 1 :]
         if place >= 0 and len(others) >= ENOUGH_OTHERS and not ends_like_others(raw, others):
             del found.times[place], found.raws[place]
-            contents.lost.append("a message that reaches into zeros at the file's end")
+            contents.lost.append("a message that reaches into zeros")
 
 
 def _keep_whole(found: dict[int, Row], contents: Contents, content_end: int) -> None:
