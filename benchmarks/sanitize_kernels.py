@@ -36,7 +36,7 @@ SANITIZED = (
     "-fno-omit-frame-pointer",
 )
 STRUCTURES: tuple[Structure, ...] = ((1, ()), (3, ()), (1, tuple(EFFECTS.values())))
-METHODS = ("euler", "dop853")  # of one link, beside the default
+METHODS = ("euler", "dop853")  # of one link, as well as the default
 
 Case = tuple[str, str, Check]  # name, C text, its check
 

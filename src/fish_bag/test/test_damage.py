@@ -107,8 +107,11 @@ def test_a_foreign_topic_never_harms_the_others(
     text=st.one_of(st.text(max_size=300), st.binary(max_size=300).map(lambda b: b.decode("latin1")))
 )
 def test_any_metadata_is_survived(text):
-    parse_metadata(text)
-    parse_metadata("rosbag2_bagfile_information:\n  relative_file_paths: " + text)
+    for said in (text, "rosbag2_bagfile_information:\n  relative_file_paths: " + text):
+        stated = parse_metadata(said)
+        assert all(isinstance(file, str) for file in stated.files)
+        assert stated.notes  # no such text is complete
+        assert all("metadata.yaml" in note for note in stated.notes)
 
 
 @SOME

@@ -17,7 +17,7 @@ class TailHardening(Effect):
 
     name = "tail_hardening"
     kind = "physics"
-    equation = "torque = k3 phi^3 at every tail joint, beside tail_stiffness phi"
+    equation = "torque = k3 phi^3 at every tail joint, in addition to tail_stiffness phi"
     source = SOURCE
     parameters = {"k3": Parameter(0.0, "N m/rad^3", 0.0, 3.0, SOURCE, typical=0.3)}
     strength = ("k3",)
