@@ -23,10 +23,11 @@ from pathlib import Path
 
 from fish_sim.compiled import TOLERANCE, Check, compile_library, compiler, lanes, largest
 from fish_sim.effects import EFFECTS
+from fish_sim.kernel_source import PARTS, kernel_source
 from fish_sim.model import Structure
 from fish_sim.scheme import Scheme, default_scheme
 from fish_sim.self_check import kernel_errors
-from fish_sim.step import PARTS, Stepper, kernel_source
+from fish_sim.step import Stepper
 
 SANITIZED = (
     "-O1",

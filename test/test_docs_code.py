@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fish_sim.robot import load_robot
+from fish_sim.robot_file import load_robot
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"<!-- test: (\w+) -->\n```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)

@@ -16,7 +16,8 @@ from typing import Any
 
 import casadi
 
-from fish_sim.dynamics import EnabledEffect, Solution, solve
+from fish_sim.chain import EnabledEffect
+from fish_sim.dynamics import Solution, solve
 from fish_sim.effects.effect import Drive, Effect
 from fish_sim.ops import CASADI, Scalar
 from fish_sim.robot import Structure, nominal_parameters, parameter_names

@@ -1,7 +1,7 @@
-"""robot.yaml <-> the robot's parameters and the effects that are switched on.
+"""A robot: number of tail links, parameter values and the effects that are switched on.
 
-Names, units and nominal values are those of the model description; every value in a file is checked and an
-error names file, field, value and what was expected.
+Names, units and nominal values are those of the model description; every value is checked, and an error names field,
+value and what was expected.
 """
 
 from __future__ import annotations
@@ -11,10 +11,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
-
-import yaml
 
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import Effect
@@ -24,7 +21,6 @@ from fish_sim.sensors import SENSOR_EFFECTS
 # number of tail links, and the enabled effects in the order in which they act
 Structure = tuple[int, tuple[type[Effect], ...]]
 
-FORMAT = 1
 STRIP_ADDED_MASS = (
     1000.0 * math.pi / 4.0 * 0.075**2
 )  # kg/m, slender body strip rho pi/4 h^2, height h = 0.075 m
@@ -33,7 +29,6 @@ KNOWLEDGE = (
     "estimated",
     "unknown",
 )  # of a parameter: within 5 %, tens of per cent, a factor of three
-STATES = ("filter", "shooting")  # ways to the state that a prediction starts from
 MAX_LINKS = 12  # beyond this the fastest tail mode needs steps far below 1 ms
 
 
@@ -47,7 +42,7 @@ def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
     Lengths and masses: measured or published (head 150 mm, tail 100 mm, 535 g); coefficients: assumptions
     that reproduce the published range of speeds and turning radii.
     """
-    _check_links(links)
+    check_links(links)
     n = links
     measured, assumed = (
         "measured (weighed, ruler)",
@@ -89,7 +84,7 @@ def nominal_parameters(links: int = 3) -> dict[str, Parameter]:
     }
 
 
-def _check_links(links: int) -> None:
+def check_links(links: int) -> None:
     if isinstance(links, bool) or not isinstance(links, int) or not 1 <= links <= MAX_LINKS:
         raise RobotError(f"links: got {links!r}; expected a whole number from 1 to {MAX_LINKS}")
 
@@ -216,137 +211,3 @@ def _check_effects(
         for name in table
         if name in given
     }
-
-
-def load_robot(path: str | Path) -> Robot:
-    """Read robot.yaml (or a model.yaml written by the diagnosis). Raises RobotError with file and field."""
-    path = Path(path)
-    try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise RobotError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (
-        yaml.YAMLError,
-        ValueError,
-    ) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
-        raise RobotError(f"{path}: cannot be read as YAML: {error}") from error
-    try:
-        return _from_content(content)
-    except RobotError as error:
-        raise RobotError(f"{path}: {error}") from error
-
-
-def _from_content(content: Any) -> Robot:
-    if not isinstance(content, dict):
-        raise RobotError(
-            f"got {type(content).__name__}; expected a table with format, links, parameters"
-        )
-    known = {"format", "name", "links", "parameters", "effects", "sensors", "prediction", "notes"}
-    if unknown := sorted(map(str, set(content) - known)):
-        raise RobotError(f"{unknown[0]}: unknown field; known: {', '.join(sorted(known))}")
-    if content.get("format") != FORMAT:
-        raise RobotError(f"format: got {content.get('format')!r}; expected {FORMAT}")
-    links = content.get("links", 3)
-    _check_links(links)
-    return Robot(
-        links=links,
-        parameters=_values(
-            "parameters", content.get("parameters") or {}, nominal_parameters(links)
-        ),
-        effects=_effect_values("effects", content.get("effects") or {}, EFFECTS),
-        sensors=_effect_values("sensors", content.get("sensors") or {}, SENSOR_EFFECTS),
-        name=str(content.get("name", "fish")),
-        prediction=_check_prediction(content.get("prediction") or {}),
-        knowledge={
-            name: entry["knowledge"]
-            for name, entry in (content.get("parameters") or {}).items()
-            if isinstance(entry, dict) and "knowledge" in entry
-        },
-    )
-
-
-def _check_prediction(given: Any) -> dict[str, Any]:
-    """{states: shooting or filter, noise: {name: number, ..}}; what the numbers mean is up to the estimator."""
-    if not isinstance(given, dict):
-        raise RobotError(f"prediction: got {given!r}; expected a table with states and noise")
-    for name in given:
-        if name not in ("states", "noise"):
-            raise RobotError(f"prediction.{name}: unknown field; known: states, noise")
-    if given.get("states", STATES[0]) not in STATES:
-        raise RobotError(
-            f"prediction.states: got {given['states']!r}; expected one of {', '.join(STATES)}"
-        )
-    if not isinstance(given.get("noise", {}), dict):
-        raise RobotError(
-            f"prediction.noise: got {given['noise']!r}; expected a table of name: number"
-        )
-    return dict(given)
-
-
-def _effect_values(where: str, given: Any, table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Parameter values of every effect in a file; unknown names are left to Robot to refuse."""
-    if not isinstance(given, dict):
-        raise RobotError(f"{where}: got {given!r}; expected a table of effect: parameters")
-    return {
-        name: _values(
-            f"{where}.{name}", values or {}, table[name].parameters if name in table else None
-        )
-        for name, values in given.items()
-    }
-
-
-def _values(where: str, table: Any, units: Mapping[str, Parameter] | None = None) -> dict[str, Any]:
-    """Entries are plain numbers or {value, unit, std, source}; a unit, where given, must be the model's."""
-    if not isinstance(table, dict):
-        raise RobotError(f"{where}: got {table!r}; expected a table of name: value")
-    result = {}
-    for name, entry in table.items():
-        if isinstance(entry, dict):
-            if "value" not in entry:
-                raise RobotError(
-                    f"{where}.{name}: got {entry!r}; expected a number or a table with 'value'"
-                )
-            if units and name in units and entry.get("unit", units[name].unit) != units[name].unit:
-                raise RobotError(
-                    f"{where}.{name}.unit: got {entry['unit']!r}; expected {units[name].unit!r}"
-                )
-            entry = entry["value"]
-        result[name] = entry
-    return result
-
-
-def save_robot(
-    robot: Robot, path: str | Path, std: Mapping[str, float] | None = None, notes: str = ""
-) -> None:
-    """Write robot.yaml with units and sources; `std` maps `name` or `effect.name` to a standard error."""
-    std = std or {}
-
-    def rows(
-        values: Mapping[str, float], specification: Mapping[str, Parameter], prefix: str = ""
-    ) -> dict[str, Any]:
-        table = {}
-        for name, value in values.items():
-            parameter = specification[name]
-            row: dict[str, Any] = {"value": float(value), "unit": parameter.unit}
-            if prefix + name in std:
-                row["std"] = float(std[prefix + name])
-            if not prefix and name in robot.knowledge:
-                row["knowledge"] = robot.knowledge[name]
-            row["source"] = (
-                parameter.source if value == parameter.value else "identified or set by the user"
-            )
-            table[name] = row
-        return table
-
-    content: dict[str, Any] = {"format": FORMAT, "name": robot.name, "links": robot.links}
-    content["parameters"] = rows(robot.parameters, nominal_parameters(robot.links))
-    for key, table in (("effects", EFFECTS), ("sensors", SENSOR_EFFECTS)):
-        enabled = getattr(robot, key)
-        content[key] = {
-            name: rows(v, table[name].parameters, f"{name}.") for name, v in enabled.items()
-        }
-    if robot.prediction:
-        content["prediction"] = dict(robot.prediction)
-    if notes:
-        content["notes"] = notes
-    Path(path).write_text(yaml.safe_dump(content, sort_keys=False, width=110))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from fish_report.errors import user_errors
-from fish_sim.robot import Robot, load_robot
+from fish_sim.robot import Robot
+from fish_sim.robot_file import load_robot
 
 
 def read_model(path: Path | None) -> Robot:

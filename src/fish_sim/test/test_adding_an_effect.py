@@ -7,7 +7,8 @@ import pytest
 import yaml
 
 from fish_sim.effects import EFFECTS
-from fish_sim.robot import Robot, load_robot
+from fish_sim.robot import Robot
+from fish_sim.robot_file import load_robot
 
 PAGE = Path(__file__).parent.parent / "docs" / "adding_an_effect.md"
 

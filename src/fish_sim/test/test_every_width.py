@@ -9,11 +9,12 @@ import torch
 from fish_sim import torch_step
 from fish_sim.effects import EFFECTS
 from fish_sim.kernel import CompiledKernel
+from fish_sim.kernel_source import PARTS
 from fish_sim.methods import METHODS
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.self_check import random_parameters, random_states
-from fish_sim.step import PARTS, Stepper, kernel
+from fish_sim.step import Stepper, kernel
 
 PERIODS = 3
 ACTING = (EFFECTS["wake_memory"], EFFECTS["rudder_lag"])  # a state of the motion, a memory

@@ -11,11 +11,12 @@ from fish_sim import step
 from fish_sim.effects import EFFECTS
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel
+from fish_sim.kernel_source import PARTS
 from fish_sim.methods import METHODS
 from fish_sim.model import Layout
 from fish_sim.scheme import Scheme
 from fish_sim.self_check import Sample, relative_error, run
-from fish_sim.step import PARTS, Stepper
+from fish_sim.step import Stepper
 
 SCHEME = Scheme("rk4")
 GCC = shutil.which("gcc") or shutil.which("cc")

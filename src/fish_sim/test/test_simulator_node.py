@@ -24,7 +24,8 @@ from fish_node import rivals
 from fish_sim.nodes.lockstep import AHEAD
 from fish_sim.nodes.simulator import SimulatorNode
 from fish_sim.pool import LENGTH
-from fish_sim.robot import Robot, RobotError, save_robot
+from fish_sim.robot import Robot, RobotError
+from fish_sim.robot_file import save_robot
 from fish_sim.simulation_config import SimulatorConfig
 
 pytestmark = pytest.mark.ros

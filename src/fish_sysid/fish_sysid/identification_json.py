@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fish_report.json_file import write_json
-from fish_sim.robot import save_robot
+from fish_sim.robot_file import save_robot
 from fish_sysid.identification import Identification
 
 

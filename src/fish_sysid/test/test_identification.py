@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_sim.robot import Robot, load_robot
+from fish_sim.robot import Robot
+from fish_sim.robot_file import load_robot
 from fish_sysid.coverage import (
     Repetition,
     repeat,

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from fish_report.errors import UserError
-from fish_sim.robot import Robot, RobotError, load_robot, save_robot
+from fish_sim.robot import Robot, RobotError
+from fish_sim.robot_file import load_robot, save_robot
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.prediction.kept_noise import kept_noise, uses_shooting, with_noise
 

@@ -11,7 +11,7 @@ from swims import GIVEN, fish, swim
 
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.quadratic_drag import QuadraticDrag
-from fish_sim.robot import load_robot, save_robot
+from fish_sim.robot_file import load_robot, save_robot
 from fish_sysid.diagnosis import pipeline
 from fish_sysid.diagnosis.conclusion import shares
 from fish_sysid.diagnosis.corrected_model import corrected

@@ -37,7 +37,8 @@ from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.lockstep import Lockstep
 from fish_sim.nodes.pacer import MAX_LAG, Pacer
-from fish_sim.robot import Robot, load_robot
+from fish_sim.robot import Robot
+from fish_sim.robot_file import load_robot
 from fish_sim.simulation import Readings, Simulation
 from fish_sim.simulation_config import SimulatorConfig
 

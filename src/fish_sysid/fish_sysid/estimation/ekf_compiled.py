@@ -13,9 +13,10 @@ import numpy as np
 
 from fish_report.parallel import on_all_cores
 from fish_sim.compiled import Check, lanes, library
+from fish_sim.kernel_source import filter_source
 from fish_sim.model import DT
 from fish_sim.robot import Structure
-from fish_sim.step import Stepper, filter_source
+from fish_sim.step import Stepper
 from fish_sysid.estimation.ekf_check import SENSORS, filter_errors
 from fish_sysid.estimation.ekf_numpy import Filter
 from fish_sysid.estimation.ekf_types import (

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fish_sim.robot import STATES, Robot
+from fish_sim.robot import Robot
+from fish_sim.robot_file import STATES
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.prediction.kept_noise import with_noise

@@ -13,8 +13,9 @@ from fish_report.errors import UserError, user_errors
 from fish_report.json_file import write_json
 from fish_report.named_path import named_path
 from fish_report.writable import writable_folder
-from fish_sim.robot import Robot, save_robot
+from fish_sim.robot import Robot
 from fish_sim.robot_argument import read_model
+from fish_sim.robot_file import save_robot
 from fish_sysid.dataset.read import read_experiment
 
 
