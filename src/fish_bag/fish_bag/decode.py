@@ -24,7 +24,7 @@ from fish_bag.trial import (
 )
 
 POSE_ROWS = np.array([0, 1, 5])  # x, y, rotation about z in a 6x6 covariance (REP 103 order)
-NOT_MEASURED = "not_measured"  # array beside those of a stream: (n, 2) for ABSENT_COLUMNS
+NOT_MEASURED = "not_measured"  # an array of a stream of its own: (n, 2) for ABSENT_COLUMNS
 ABSENT_COLUMNS = ("gyro", "accel")
 Arrays = dict[str, np.ndarray]
 

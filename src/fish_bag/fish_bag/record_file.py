@@ -19,7 +19,7 @@ class RecordFile:
     """An output stream of the mcap package without a buffer: a killed process loses nothing that was written."""
 
     def __init__(self, path: Path) -> None:
-        """Create the file, which must not exist yet, and a reserve beside it.
+        """Create the file, which must not exist yet, and a reserve file in the same folder.
 
         Raises:
             DiskFullError: there is no room for either.

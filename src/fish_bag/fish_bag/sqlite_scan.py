@@ -40,7 +40,7 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
     """Collect every message that can be read.
 
     Args:
-        path: the database; its companions lie beside it.
+        path: the database; its companions (-wal, -shm) lie in the same folder.
         keep: how many bytes of the messages of a topic are kept.
     """
     with _settled(path) as (database, notes):

@@ -54,7 +54,7 @@ def next_excursion(program: Program, begin: float, robot: Robot, seed: int = 0) 
     """
     random = np.random.default_rng(seed)
     for end in np.arange(program.duration, begin + SHORTEST - 1e-9, -STEP):
-        start = find_start(foretold_way(program, begin, float(end), robot), random, MARGIN)
+        start = find_start(predicted_way(program, begin, float(end), robot), random, MARGIN)
         if start is not None:
             x, y, heading = map(float, start)
             return Excursion(begin, float(end), x, y, math.remainder(heading, 2.0 * math.pi))
@@ -64,7 +64,7 @@ def next_excursion(program: Program, begin: float, robot: Robot, seed: int = 0) 
     )
 
 
-def foretold_way(program: Program, begin: float, end: float, robot: Robot) -> Array:
+def predicted_way(program: Program, begin: float, end: float, robot: Robot) -> Array:
     """Poses (T, 3) of the head from the origin, at rest, until the fish has glided to its end."""
     excitation = Excitation(program, begin, end)
     commands = [excitation.command(DT) for _ in range(round((end - begin + COAST) / DT))]

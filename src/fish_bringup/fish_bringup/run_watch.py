@@ -107,7 +107,7 @@ class Robot:
             self._look()
             sight, tracker = self._seen()
             patience.heed(sight)
-            end_where_told(run_watch, sight.stamp, self.watch.seen)
+            end_if_due(run_watch, sight.stamp, self.watch.seen)
             on_path = tracker.update((sight.x, sight.y))
             line.update(
                 f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
@@ -132,7 +132,7 @@ class Robot:
 
 
 class Patience:
-    """Ends a run whose estimate stands still: its time is told by the robot's stamps, and would never be over."""
+    """Ends a run whose estimate no longer changes: the run's time is the time of its stamps and would never be over."""
 
     def __init__(self, nodes: NodeProcesses) -> None:
         self._nodes = nodes
@@ -149,11 +149,11 @@ class Patience:
         elif time.monotonic() - self._since > STILL_TIMEOUT:
             raise UserError(
                 f"no new odometry/filtered for {STILL_TIMEOUT:g} s: {FUSION.name}, or a node that it hears (simulator, camera, "
-                f"tracker), hangs; see {self._nodes.running[FUSION].log} and the logs beside it; what was recorded is kept"
+                f"tracker), hangs; see {self._nodes.running[FUSION].log} and the logs in its folder; what was recorded is kept"
             )
 
 
-def end_where_told(run_watch: RunWatch, now: float, seen: Seen | None) -> None:
+def end_if_due(run_watch: RunWatch, now: float, seen: Seen | None) -> None:
     """Raise UserError with the reason for which the run must end at `now` [s], the robot's time; seen: by the camera."""
     if reason := run_watch.reason_to_end(now, seen):
         raise UserError(f"{reason}; what was recorded is kept")

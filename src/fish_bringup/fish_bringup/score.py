@@ -99,7 +99,7 @@ def what_is_missing(score: RunScore) -> str | None:
         return (
             f"the approach phase never ended: within {score.t[-1] - score.t[0]:.1f} s the fish was never within {NEAR_PATH:g} m "
             f"and {NEAR_HEADING:g} rad of its path and {100 * NEAR_SPEED:.0f} % of its speed at once (nearest to the path: "
-            f"{np.abs(score.cross_track).min():.2f} m); no error without approach can be told"
+            f"{np.abs(score.cross_track).min():.2f} m); the error without the approach is not defined"
         )
     for with_approach in (False, True):
         for name, size in score.summaries(with_approach=with_approach).items():

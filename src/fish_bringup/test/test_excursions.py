@@ -7,7 +7,7 @@ from fish_bringup.excursions import (
     MARGIN,
     SHORTEST,
     excursions,
-    foretold_way,
+    predicted_way,
 )
 from fish_control.excitation import Program, ProgramError, Row
 from fish_control.pool import wall_distance
@@ -27,7 +27,7 @@ def test_every_experiment_that_a_diagnosis_proposes_can_be_swum_in_the_pool(plan
     assert program.duration - swims[-1].end < SHORTEST
     assert [s.begin for s in swims[1:]] == [s.end for s in swims[:-1]]
     for swim in swims:
-        way = foretold_way(program, swim.begin, swim.end, robot)[:, :2]
+        way = predicted_way(program, swim.begin, swim.end, robot)[:, :2]
         cos, sin = np.cos(swim.heading), np.sin(swim.heading)
         there = way @ np.array([[cos, sin], [-sin, cos]]) + [swim.x, swim.y]
         assert wall_distance(there) >= MARGIN - 1e-6

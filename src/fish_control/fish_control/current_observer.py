@@ -58,7 +58,10 @@ MOVE_NOISE = 0.1  # m/s for each rad that the rudder has just moved, of v
 EARLY_NOISE = 0.1  # m/s, times root s, of u and v at first: fusion starts with errors of 5 cm/s that last half a second
 EARLY_TIME = 0.3  # s, in which it fades
 THRUST_LIMIT = 2.0  # e stays within
-SIZE, LAGGED = 4, 3  # numbers of the estimate; and those beside it and its covariance
+SIZE, LAGGED = (
+    4,
+    3,
+)  # numbers of the estimate; further numbers that are neither estimate nor covariance
 
 
 class WaterState(NamedTuple):

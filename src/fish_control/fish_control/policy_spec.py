@@ -70,7 +70,7 @@ class ContractError(ValueError):
 
 @dataclass(frozen=True)
 class PolicySpec:
-    """Everything besides the weights that decides what the controller does with them."""
+    """Everything but the weights that decides what the controller does with them."""
 
     layers: tuple[int, ...] = HIDDEN  # sizes with input and output; () for constant gains
     inputs: tuple[Input, ...] = INPUTS

@@ -30,7 +30,7 @@ def path_digest(path: ReferencePath) -> str:
 class ProgressFile:
     """Keeps the progress along one path at a time.
 
-    Written beside the caller: a disk that is busy with other files holds up a write by half a second at times.
+    A thread of its own writes, because a write to a busy disk can take half a second.
     """
 
     def __init__(self, file: Path) -> None:

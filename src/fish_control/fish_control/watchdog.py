@@ -30,7 +30,7 @@ class Health:
 
 
 class Watchdog:
-    """Stops on the first fault; goes on after all faults have been gone for `resume_delay`, or when told.
+    """Stops on the first fault; goes on after all faults have been gone for `resume_delay`, or when asked to.
 
     Before the first motion it waits without calling it a fault.
     """

@@ -28,7 +28,7 @@ def read_settings(
         path: YAML.
         node: full name, such as /fish/rudder; see read_node_parameters.
         kind: the dataclass.
-        say: is told of unknown parameters, which are left out; it may raise.
+        say: called with a message for unknown parameters, which are left out; it may raise.
 
     Raises:
         ValueError: as read_node_parameters, or a value of the wrong type or out of range; names the file.

@@ -12,7 +12,7 @@ class Rivals:
     Args:
         topic: full name.
         count: gives the publishers of a topic, the node's own among them.
-        warn: is told once of each rival.
+        warn: called once with a message for each rival.
         now: clock [s].
     """
 

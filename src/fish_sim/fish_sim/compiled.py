@@ -140,7 +140,7 @@ def library(source: str, check: Check, width: int) -> ctypes.CDLL | None:
 
 
 def compile_library(cc: str, source: str, flags: tuple[str, ...], path: Path) -> None:
-    """Compile a C text into a shared library at `path`; its text stays beside it.
+    """Compile a C text into a shared library at `path`; its text stays in the same folder.
 
     Raises:
         subprocess.CalledProcessError: the compiler refuses the text or a flag; stderr holds its message.

@@ -133,7 +133,7 @@ def follow_command(
     own = 3 if layout.has_linkage else 2
     r, effects = unpack_effects(layout, p, m[own:], "memory")
     rotor, rudder = command
-    # the range is the command's; a horn that sits askew carries the rudder beyond it
+    # the range is the command's; with a rudder offset the rudder itself goes beyond it
     rudder = xp.fmax(xp.fmin(rudder, r.rudder_range), -r.rudder_range)
     kept: list[dict[str, Scalar]] = []
     for e in effects:

@@ -464,7 +464,7 @@ def test_a_linkage_sits_behind_the_servo_and_its_range():
     assert states[-1, 12] == pytest.approx(0.8 + 0.1 - 0.05)
     stepper = Stepper.of(robot)
     rest = stepper.rest(parameters=stepper.parameters(robot))
-    assert rest[12] == pytest.approx(0.1 - 0.05)  # askew, and dragged there against the play
+    assert rest[12] == pytest.approx(0.1 - 0.05)  # offset, and dragged there against the play
 
 
 def test_left_rudder_turns_left_and_so_does_a_positive_offset(strokes):

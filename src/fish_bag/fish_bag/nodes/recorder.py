@@ -129,7 +129,7 @@ class RecorderNode(Node):
 
 def main() -> int:
     """Record until SIGINT or SIGTERM; 1 and one line if the recording cannot be made or the disk is full."""
-    # rclpy ends the spinning; a KeyboardInterrupt besides would tear a record that is being written
+    # rclpy ends the spinning; a KeyboardInterrupt would also tear a record that is being written
     before = signal.signal(signal.SIGINT, lambda *_: None)
     try:
         return run(RecorderNode, "recorder")

@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_report.page import Table
     from fish_report.terminal import print_table, say, terminal
 
-    # `.` and `..` have no name of their own; a link keeps its own, so that the folder is made beside it
+    # `.` and `..` have no name of their own; a link keeps its own, so that the folder is made where the link is
     named = Path(os.path.abspath(args.recording))
     out = args.out or named.parent / f"{named.stem if named.is_file() else named.name}_recovered"
     result = recover(args.recording, out)

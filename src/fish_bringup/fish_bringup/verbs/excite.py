@@ -41,7 +41,7 @@ from fish_bringup.run_watch import (
     LOOK_PERIOD,
     Patience,
     check_running,
-    end_where_told,
+    end_if_due,
 )
 from fish_bringup.run_watch import Robot as Running
 from fish_control.excitation import LAST_ROW, Program, read_program
@@ -218,7 +218,7 @@ def _swim(
                 at = watch.sight
                 patience.heed(at)
                 if at is not None:
-                    end_where_told(run_watch, at.stamp, watch.seen)
+                    end_if_due(run_watch, at.stamp, watch.seen)
                 line.update(
                     f"{watch.diagnostics[EXCITER_NAME]['time_s']} s of the program   "
                     + (f"x {at.x:+.2f} m  y {at.y:+.2f} m   speed {at.speed:.2f} m/s" if at else "")

@@ -24,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("recording", type=Path, help="a recording with reference/path and odometry")
     parser.add_argument(
-        "--out", type=Path, help="page to write (default: score_<name>.html beside the recording)"
+        "--out",
+        type=Path,
+        help="page to write (default: score_<name>.html in the folder of the recording)",
     )
 
 
@@ -37,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(f"{trial.name}: {missing}")
     table = error_table(score)
     print_table(Console(), table)
-    # named after the recording: it replaces neither the page of the one beside it nor a demo's report.html
+    # named after the recording: it replaces neither the page of another recording in this folder nor a demo's report.html
     page = args.out or recording.parent / f"score_{trial.name}.html"
     write_run_page(page, f"Run {trial.name}", trial, score, [table])
     print(f"page: {page}")

@@ -1,4 +1,4 @@
-"""A servo horn that sits askew."""
+"""A servo horn that is mounted at an angle."""
 
 from typing import Any
 

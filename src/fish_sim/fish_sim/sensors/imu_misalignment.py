@@ -1,4 +1,4 @@
-"""An IMU that is glued in askew."""
+"""An IMU that is glued in at an angle."""
 
 from types import SimpleNamespace
 from typing import Any
