@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import re
 import shutil
 import subprocess
 import sys
@@ -82,6 +83,18 @@ def test_only_nodes_know_ros():
         if not set(GRAPH_FOLDERS) & set(path.relative_to(FOLDERS[package]).parts)
         for line, name in imported(path)
         if is_ros(name)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_one_console_for_all_verbs():
+    """fish_report.terminal: its console takes no text of a file for markup."""
+    wrong = [
+        f"{path.relative_to(ROOT)}: use fish_report.terminal.terminal()"
+        for _, path in SOURCES
+        if path.name != "terminal.py"
+        and "test" not in path.parts
+        and re.search(r"\bConsole\(", path.read_text())
     ]
     assert not wrong, "\n".join(wrong)
 

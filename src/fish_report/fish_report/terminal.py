@@ -13,8 +13,9 @@ from rich.text import Text
 from fish_report.page import Table
 from fish_report.printable import LONGEST, plain
 
-__all__ = ["cell", "plain", "print_table", "say", "terminal"]
+__all__ = ["PARAGRAPH", "cell", "plain", "print_table", "say", "terminal"]
 
+PARAGRAPH = 4 * LONGEST  # characters of a text of several sentences
 FILE_WIDTH = 160  # columns when the output is not a terminal
 
 
@@ -28,9 +29,9 @@ def say(console: Console, text: object, longest: int = LONGEST, style: str = "")
     console.print(Text(plain(text, longest), style=style), soft_wrap=True, highlight=False)
 
 
-def terminal() -> Console:
-    """The console, wide enough for the tables where the output is no terminal."""
-    console = Console()
+def terminal(stderr: bool = False) -> Console:
+    """The console, without rich's markup and wide enough for the tables where the output is no terminal."""
+    console = Console(stderr=stderr, markup=False, highlight=False)
     if not console.is_terminal:
         console.width = FILE_WIDTH
     return console
@@ -47,4 +48,4 @@ def print_table(console: Console, table: Table) -> None:
     console.print(shown)
     if table.note:
         for line in table.note.splitlines():
-            console.print(cell(line, 4 * LONGEST), style="dim")
+            console.print(cell(line, PARAGRAPH), style="dim")

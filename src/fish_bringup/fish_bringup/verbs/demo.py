@@ -36,7 +36,7 @@ from fish_report.errors import UserError, user_errors
 from fish_report.interruption import Interruption
 from fish_report.output_folder import new_folder
 from fish_report.page import Table
-from fish_report.terminal import print_table
+from fish_report.terminal import print_table, say, terminal
 
 LONGEST = 600.0  # s, a run that does not end by itself
 SIMULATOR = SIMULATED[0]
@@ -78,14 +78,15 @@ def run(args: argparse.Namespace) -> int:
         domain = choose_domain(args.domain)
     start = start_pose(args.letter, args.path_args)
     folder = new_folder(args.out, "demo_" + "".join(c if c.isalnum() else "_" for c in args.letter))
-    console = Console(highlight=False)
-    console.print(
-        f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}"
+    console = terminal()
+    say(
+        console,
+        f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}",
     )
     end, latency = _swim(
         domain, node_parameters(args, start, folder), folder, args.duration, console
     )
-    console.print(f"ended {end.reason}, {end.seconds:.1f} s after the first odometry")
+    say(console, f"ended {end.reason}, {end.seconds:.1f} s after the first odometry")
     trial = read_trial(folder / "recording")
     score = score_trial(trial)
     tables = [error_table(score), latency, _cpu_table(end)]
@@ -93,7 +94,8 @@ def run(args: argparse.Namespace) -> int:
         print_table(console, table)
     page = folder / "report.html"
     write_run_page(page, f"Path {args.letter} at {args.speed:g} m/s", trial, score, tables)
-    console.print(f"recording: {folder / 'recording'}\npage: {page}", soft_wrap=True)
+    say(console, f"recording: {folder / 'recording'}")
+    say(console, f"page: {page}")
     if missing := what_is_missing(score):
         raise UserError(missing)
     return 0

@@ -50,7 +50,7 @@ from fish_report.errors import UserError, user_errors
 from fish_report.interruption import Interruption
 from fish_report.output_folder import new_folder
 from fish_report.page import Table
-from fish_report.terminal import print_table, terminal
+from fish_report.terminal import print_table, say, terminal
 from fish_sim.robot import Robot
 from fish_sim.robot_argument import read_model
 
@@ -95,8 +95,8 @@ def run(args: argparse.Namespace) -> int:
             return 0
         folder = new_folder(args.out, "excite")
         domain = choose_domain(args.domain)
-        console = Console(highlight=False)
-        console.print(f"program of {program.duration:g} s, ROS domain {domain}, output in {folder}")
+        console = terminal()
+        say(console, f"program of {program.duration:g} s, ROS domain {domain}, output in {folder}")
         count, lacking = _swim_all(program, robot, args, domain, folder, console)
     recordings = folder / "recordings"
     if lacking:
@@ -104,9 +104,9 @@ def run(args: argparse.Namespace) -> int:
             f"{', '.join(lacking)} of {count} recordings in {recordings} lack what the lines above say: swim them again, or "
             "leave them out"
         )
-    console.print(
+    say(
+        console,
         f"{count} recordings in {recordings}; next: robofish diagnose {recordings} --out {folder / 'diagnosis'}",
-        soft_wrap=True,
     )
     return 0
 
@@ -149,9 +149,8 @@ def _swim_all(
             if lacks:
                 lacking.append(name)
                 said = f"incomplete: {'; '.join(lacks)}"
-            console.print(
-                f"{name}: {begin:.1f} to {reached:.1f} s of {program.duration:g} s; {said}",
-                soft_wrap=True,
+            say(
+                console, f"{name}: {begin:.1f} to {reached:.1f} s of {program.duration:g} s; {said}"
             )
             count += 1
             if reached - begin < 1.0 and not interruption.asked:

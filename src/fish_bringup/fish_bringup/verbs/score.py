@@ -9,15 +9,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
-
 from fish_bag import read_trial
 from fish_bringup.run_page import write_run_page
 from fish_bringup.score import score_trial, what_is_missing
 from fish_bringup.score_table import error_table
 from fish_report.errors import UserError
 from fish_report.named_path import named_path
-from fish_report.terminal import print_table
+from fish_report.terminal import print_table, say, terminal
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,9 +36,9 @@ def run(args: argparse.Namespace) -> int:
     if missing := what_is_missing(score):
         raise UserError(f"{trial.name}: {missing}")
     table = error_table(score)
-    print_table(Console(), table)
+    print_table(terminal(), table)
     # named after the recording: it replaces neither the page of another recording in this folder nor a demo's report.html
     page = args.out or recording.parent / f"score_{trial.name}.html"
     write_run_page(page, f"Run {trial.name}", trial, score, [table])
-    print(f"page: {page}")
+    say(terminal(), f"page: {page}")
     return 0

@@ -91,7 +91,7 @@ def tell(
 ) -> None:
     """Print and write what the repetitions say; repetitions: how many they are."""
     from fish_report.page import Table
-    from fish_report.terminal import print_table
+    from fish_report.terminal import print_table, say
     from fish_sysid.coverage import summarise
 
     result = summarise(found)
@@ -112,9 +112,9 @@ def tell(
     )
     inside, within = result.overall
     spent = time.monotonic() - began
-    console.print(
+    say(
+        console,
         f"all parameters: {inside:.3f} in 95 % intervals, {within:.3f} within 3 s.e.; {spent:.0f} s; {out}",
-        soft_wrap=True,
     )
     scores = {str(r.seed): dict(zip(r.names, r.score.tolist(), strict=True)) for r in found}
     content = {"inside95": inside, "within3": within, "seconds": spent, "scores": scores}

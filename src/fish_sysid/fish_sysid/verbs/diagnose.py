@@ -6,12 +6,11 @@ import argparse
 import time
 from pathlib import Path
 
-from rich.console import Console
-
 from fish_bag.topic_arguments import add_topic_arguments, topic_map
 from fish_report.errors import UserError, user_errors
 from fish_report.json_file import write_json
 from fish_report.named_path import named_path
+from fish_report.terminal import PARAGRAPH, cell, say, terminal
 from fish_report.writable import writable_folder
 from fish_sim.robot import Robot
 from fish_sim.robot_argument import read_model
@@ -60,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_sysid.reports.diagnosis_page import write_diagnosis_page
     from fish_sysid.reports.verdict_sentence import sentence
 
-    console, start = Console(stderr=True), time.monotonic()
+    console, start = terminal(stderr=True), time.monotonic()
     robot = read_model(args.robot)
     with user_errors():
         level = Level(args.false_alarms)
@@ -69,14 +68,15 @@ def run(args: argparse.Namespace) -> int:
     writable_folder(args.out)
     with console.status("diagnosing") as status:
 
-        def say(text: str) -> None:
-            status.update(f"{time.monotonic() - start:5.0f} s  {text}")
+        def progress(text: str) -> None:
+            line = f"{time.monotonic() - start:5.0f} s  {text}"
+            status.update(cell(line))
             if not console.is_terminal:
-                console.print(f"{time.monotonic() - start:5.0f} s  {text}")
+                say(console, line)
 
         try:
             result = diagnose(
-                experiment, robot, level, say, names, without=left_out_stages(args.without)
+                experiment, robot, level, progress, names, without=left_out_stages(args.without)
             )
         except NoCandidateError as error:
             raise UserError(str(error)) from error
@@ -92,10 +92,10 @@ def run(args: argparse.Namespace) -> int:
     write_diagnosis_page(
         args.out / "report.html", named_path(args.dataset[0]).name, content, result
     )
-    for text in left_out:
-        print(f"left out: {text}")
-    print(sentence(content))
-    print(f"{args.out}/diagnosis.json, model.yaml, report.html ({time.monotonic() - start:.0f} s)")
+    files = f"{args.out}/diagnosis.json, model.yaml, report.html"
+    for text in [*(f"left out: {text}" for text in left_out), sentence(content)]:
+        say(terminal(), text, PARAGRAPH)
+    say(terminal(), f"{files} ({time.monotonic() - start:.0f} s)")
     return 0
 
 

@@ -13,7 +13,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from fish_bag.topic_arguments import add_topic_arguments, topic_map
 from fish_report.errors import user_errors
-from fish_report.terminal import terminal
+from fish_report.terminal import PARAGRAPH, plain, say, terminal
 from fish_report.writable import writable_folder
 from fish_sim.robot_argument import read_model
 from fish_sysid.dataset.read import read_experiment
@@ -64,20 +64,20 @@ def run(args: argparse.Namespace) -> int:
     robot = read_model(args.robot)
     experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
     writable_folder(args.out)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar, user_errors():
         task, began = bar.add_task("identifying", total=None), time.monotonic()
 
-        def say(text: str) -> None:
-            bar.update(task, description=text)
+        def progress(text: str) -> None:
+            bar.update(task, description=plain(text))
             if not console.is_terminal:
-                console.print(f"{time.monotonic() - began:5.0f} s  {text}", highlight=False)
+                say(console, f"{time.monotonic() - began:5.0f} s  {text}")
 
         result = identify(
             experiment,
             robot,
             hold_out=args.hold_out,
-            report=say,
+            report=progress,
             effects=() if chosen else tuple(name for name in args.effects.split(",") if name),
             choose_from=tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else (),
         )
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     print_table(console, parameter_table(result))
     print_table(console, error_table(result.errors))
     for text in [*(f"left out: {text}" for text in left_out), *result.statements]:
-        console.print(f"- {text}", highlight=False, soft_wrap=True)
+        say(console, f"- {text}", PARAGRAPH)
     files = "robot.yaml, identification.json and report.html"
-    console.print(f"{result.seconds:.0f} s; {files} in {args.out}", highlight=False, soft_wrap=True)
+    say(console, f"{result.seconds:.0f} s; {files} in {args.out}")
     return 0

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fish_bag.topic_arguments import add_topic_arguments, topic_map
 from fish_report.errors import user_errors
-from fish_report.terminal import terminal
+from fish_report.terminal import say, terminal
 from fish_sim.robot_argument import read_model
 from fish_sysid.dataset.read import read_experiment
 
@@ -53,12 +53,13 @@ def run(args: argparse.Namespace) -> int:
             predict(experiment, model, noise, args.horizon, 1.0, WARM_UP), horizons
         )
     for text in left_out:
-        console.print(f"left out: {text}", highlight=False, soft_wrap=True)
+        say(console, f"left out: {text}")
     if errors.counts.any():
         print_table(console, error_table({"model": errors}))
     else:
-        console.print(
-            f"no trial lasts {WARM_UP + args.horizon:g} s: errors at the horizon cannot be stated"
+        say(
+            console,
+            f"no trial lasts {WARM_UP + args.horizon:g} s: errors at the horizon cannot be stated",
         )
-    console.print(f"{rows} rows: {args.out}", highlight=False, soft_wrap=True)
+    say(console, f"{rows} rows: {args.out}")
     return 0

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from fish_report.terminal import say
 from fish_train.training.run import Status
 
 LINE_PERIOD = 10.0  # s between lines of a run where there is no terminal
@@ -29,11 +30,9 @@ class Display:
         if self._live is not None:
             self._live.update(self._table())
         elif status.state != "training" or self._due(status.seed):
-            self._console.print(line(status), soft_wrap=True, highlight=False)
+            say(self._console, line(status))
         if status.message:
-            self._console.print(
-                f"seed {status.seed}: {status.message}", soft_wrap=True, highlight=False
-            )
+            say(self._console, f"seed {status.seed}: {status.message}")
 
     def _due(self, seed: int) -> bool:
         now = time.monotonic()

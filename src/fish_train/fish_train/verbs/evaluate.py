@@ -20,12 +20,11 @@ from rich.console import Console
 from rich.progress import Progress
 
 from fish_report.errors import UserError
+from fish_report.terminal import say, terminal
 from fish_report.writable import partial_file, writable_folder
 
 if TYPE_CHECKING:
     from fish_train.evaluation.study import Row
-
-LOG_WIDTH = 200  # characters, where the output is no terminal
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -106,9 +105,7 @@ def run(args: argparse.Namespace) -> int:
     cells = make_cells(
         args.paths, args.speeds, range(args.first_seed, args.first_seed + args.seeds)
     )
-    console, began = Console(), time.monotonic()
-    if not console.is_terminal:
-        console = Console(width=LOG_WIDTH)
+    console, began = terminal(), time.monotonic()
     total, nominal = len(candidates) * len(conditions) * len(cells), conditions[0].name
     folder = writable_folder(args.out)
     table, page = folder / "runs.csv", folder / "evaluation.html"
@@ -121,10 +118,7 @@ def run(args: argparse.Namespace) -> int:
     failed = [row for row in rows if row.metrics.failure]
     _say_failures(failed, console)
     spent = time.monotonic() - began
-    console.print(
-        f"{len(rows)} runs in {spent:.0f} s; {table.name} and {page.name} in {folder}",
-        soft_wrap=True,
-    )
+    say(console, f"{len(rows)} runs in {spent:.0f} s; {table.name} and {page.name} in {folder}")
     return 1 if failed else 0
 
 
@@ -151,9 +145,9 @@ def _swum(
         if rows:
             table, page = partial_file(table), partial_file(page)
             write_study(table, page, rows, nominal)
-            console.print(
+            say(
+                console,
                 f"{len(rows)} of {total} runs; {table.name} and {page.name} in {table.parent}",
-                soft_wrap=True,
             )
         raise
 
@@ -162,10 +156,7 @@ def _say_failures(failed: list[Row], console: Console) -> None:
     """The first of them, a line each."""
     for row in failed[:20]:
         cell = f"{row.cell.path} at {row.cell.speed:g} m/s, seed {row.cell.seed}"
-        console.print(
-            f"failed: {row.candidate}, {row.condition}, {cell}: {row.metrics.failure}",
-            soft_wrap=True,
-        )
+        say(console, f"failed: {row.candidate}, {row.condition}, {cell}: {row.metrics.failure}")
 
 
 def write_study(table: Path, page: Path, rows: list[Row], nominal: str) -> None:

@@ -21,6 +21,7 @@ from rich.console import Console
 
 from fish_report.command_words import words_after
 from fish_report.errors import UserError
+from fish_report.terminal import say, terminal
 from fish_sim.robot_argument import read_model
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     config = make_config(
         {**(load_config(args.config) if args.config else {}), **parse_settings(args.set)}
     )
-    console = Console()
+    console = terminal()
     robot = read_model(args.robot)
     law = robot_law(robot, args.robot, console)
     jobs = [
@@ -119,9 +120,9 @@ def run(args: argparse.Namespace) -> int:
     with Display(console) as display:
         statuses = run_all(jobs, min(args.jobs, args.seeds), display)
     finished = sum(status.state == "finished" for status in statuses)
-    console.print(
+    say(
+        console,
         f"{finished} of {len(statuses)} runs finished; weights, cards and curves in {args.out}",
-        soft_wrap=True,
     )
     return 0 if finished == len(statuses) else 1
 
@@ -136,14 +137,14 @@ def robot_law(robot: Robot, file: Path | None, console: Console) -> Law:
     try:
         law = law_of_robot(robot)
     except DoesNotSwim as error:
-        console.print(f"{file}: {error}; the nominal fish's feed-forward is used", soft_wrap=True)
+        say(console, f"{file}: {error}; the nominal fish's feed-forward is used")
         return Law()
     limits, guidance = law.limits, law.guidance
-    console.print(
+    say(
+        console,
         f"feed-forward of {file}: throttle {limits.throttle_linear:.3g} u + {limits.throttle_quadratic:.3g} u^2, in turns "
         f"alpha^2 ({limits.turn_linear:.3g} u + {limits.turn_quadratic:.3g} u^2) more; rudder {limits.curvature_gain:.3g} m "
         f"kappa; slip {guidance.slip_arm:.3g} m + {guidance.slip_time:.3g} s u",
-        soft_wrap=True,
     )
     return law
 

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 from rich.box import SIMPLE
-from rich.console import Console
 from rich.table import Table
 
 from fish_control.gains_file import GainsFileError, read_gains_file
 from fish_control.policy import Policy, policy_inputs
 from fish_control.policy_spec import INPUTS
 from fish_report.errors import UserError
+from fish_report.terminal import cell, terminal
 
 SITUATIONS = (  # heading error [rad], speed error [m/s], cross-track error [m], wanted speed [m/s]
     ("on the path, 0.1 m/s", 0.0, 0.0, 0.0, 0.1),
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         policy = read_gains_file(args.file)
     except GainsFileError as error:
         raise UserError(str(error)) from error
-    console = Console()
+    console = terminal()
     console.print(contract_table(policy, args.file))
     console.print(gains_table(policy))
     return 0
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 def contract_table(policy: Policy, file: Path) -> Table:
     """What the file promises."""
     c = policy.contract
-    table = Table("", "", title=str(file), title_justify="left", box=SIMPLE, show_header=False)
+    table = Table("", "", title=cell(file), title_justify="left", box=SIMPLE, show_header=False)
     numbers = sum(tensor.size for tensor in policy.tensors.values())
     kind = (
         "-".join(map(str, c.layers)) + f", {c.activation}, tanh" if c.layers else "constant gains"
@@ -67,7 +67,7 @@ def contract_table(policy: Policy, file: Path) -> Table:
         ("guidance", ", ".join(f"{k} {v}" for k, v in vars(c.guidance).items())),
     ]
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(cell, row))
     return table
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from fish_report.errors import UserError
+from fish_report.terminal import say, terminal
 from fish_study import paper_numbers as paper
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
     if min(args.seeds, args.jobs, args.training_seeds) < 1:
         raise UserError("--seeds, --jobs and --training-seeds: expected at least 1")
-    console, robot = Console(), read_model(args.robot)
+    console, robot = terminal(), read_model(args.robot)
     folder = args.training or args.out / "training"
     args.out.mkdir(parents=True, exist_ok=True)
     curves, levels = trained(folder, args.training_seeds, robot, args.robot, args.jobs, console)
@@ -73,9 +74,7 @@ def run(args: argparse.Namespace) -> int:
     )
     condition = make_condition(robot)
     cells = make_cells(paper.LETTERS, paper.SPEEDS, range(args.seeds))
-    console.print(
-        f"swimming {len(cells)} letters through camera, IMU and fusion ...", highlight=False
-    )
+    say(console, f"swimming {len(cells)} letters through camera, IMU and fusion ...")
     traces, rows = swim_all(candidate, condition, cells, args.jobs)
     page = args.out / "paper.html"
     write_paper_page(
@@ -89,9 +88,9 @@ def run(args: argparse.Namespace) -> int:
         ],
     )
     total = len(paper.LETTERS) * len(paper.SPEEDS)
-    console.print(
+    say(
+        console,
         f"better than the paper's real robot in {better_cells(rows)} of {total} cells; {page}",
-        soft_wrap=True,
     )
     return 0
 

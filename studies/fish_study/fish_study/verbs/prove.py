@@ -11,6 +11,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,7 @@ from rich.progress import (
 )
 
 from fish_report.errors import UserError
+from fish_report.terminal import say
 
 if TYPE_CHECKING:
     from fish_study.new_study import Asked
@@ -135,7 +137,7 @@ def _ran(args: argparse.Namespace, asked: Asked, console: Console) -> Study:
         if new
         else f"going on with {args.out}: {left} of {all_} scenarios to go"
     )
-    console.print(line, soft_wrap=True)
+    say(console, line)
     with _progress(console, "scenarios", left) as done:
         run_study(study, args.jobs, done, keep=args.keep, cluster=args.cluster)
     return study
@@ -161,8 +163,8 @@ def _report(args: argparse.Namespace, studies: list[Study], console: Console) ->
     about = [study.about for study in studies]
     write_prove_page(args.out / "report.html", about, scores, oracle)
     seeds = ", ".join(str(a["seed"]) for a in about)
-    files = "" if args.pool else "; labels.json, commitments.json beside it"
-    console.print(f"{args.out}/report.html; seed {seeds}{files}", soft_wrap=True)
+    files = "" if args.pool else "; labels.json and commitments.json in the same folder"
+    say(console, f"{args.out}/report.html; seed {seeds}{files}")
     return 0
 
 
@@ -171,10 +173,10 @@ def _say_ended_at_wall(results: Mapping[str, Mapping[str, Any]], console: Consol
     ended = {name: r["ended_at_wall"] for name, r in results.items() if r.get("ended_at_wall")}
     if ended:
         count = sum(map(len, ended.values()))
-        console.print(
+        say(
+            console,
             f"{count} trials in {len(ended)} of {len(results)} scenarios came to a wall of the pool and end there: "
             f"{', '.join(ended)} (ended_at_wall in result.json)",
-            soft_wrap=True,
         )
 
 
@@ -210,7 +212,7 @@ def _ablation(args: argparse.Namespace, asked: Asked, console: Console) -> int:
     (first, *_) = studies.values()
     lead = f"{len(first.scenarios)} scenarios of seed {first.about['seed']}."
     write_page(args.out / "ablation.html", "Which stages of the search pay", lead, [table])
-    console.print(f"{args.out}/ablation.html", soft_wrap=True)
+    say(console, f"{args.out}/ablation.html")
     return 0
 
 
@@ -231,7 +233,7 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
         recordings = args.out / "recordings"
         plan = Plan(scenario, recordings, args.out, search=args.search, trainings=args.trainings)
         prepare(plan)
-        rows = close_loop(plan, args.jobs, console.print)
+        rows = close_loop(plan, args.jobs, partial(say, console))
     result = [loop_table(rows), speed_table(rows)]
     for table in result:
         print_table(console, table)
@@ -239,7 +241,7 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
     lead = f"The second plant with {args.close_loop} concealed in it, seed {scenario.seed}."
     blocks: list[Block] = [*result, Figure("Every run", loop_figure(rows))]
     write_page(args.out / "loop.html", "Does a better model make better gains?", lead, blocks)
-    console.print(f"{args.out}/loop.html, runs.csv", soft_wrap=True)
+    say(console, f"{args.out}/loop.html, runs.csv")
     return 0
 
 
@@ -264,9 +266,6 @@ def _progress(console: Console, what: str, total: int) -> Iterator[Callable[[str
             bar.advance(task)
             if not console.is_terminal:
                 left = (time.monotonic() - began) / count * (total - count)
-                console.print(
-                    f"{name}: {count} of {total} {what}, about {left / 60.0:.0f} min left",
-                    soft_wrap=True,
-                )
+                say(console, f"{name}: {count} of {total} {what}, about {left / 60.0:.0f} min left")
 
         yield done
