@@ -18,6 +18,7 @@ MAY_IMPORT = {
     "fish_report": set(),
     "fish_sim": {"fish_report"},
     "fish_vision": set(),
+    "fish_description": set(),
     "fish_control": {"fish_report"},
     "fish_hw": set(),
     "fish_bag": {"fish_report"},

@@ -10,6 +10,7 @@ import rclpy
 NODES = {
     "fish_sim": ("simulator", "camera"),
     "fish_vision": ("tracker",),
+    "fish_description": ("joint_angles",),
     "fish_control": ("fusion", "planner", "controller", "exciter"),
     "fish_hw": ("rotor", "rudder", "imu", "camera"),
     "fish_bag": ("recorder", "replayer"),

@@ -13,9 +13,18 @@ from typing import Any
 
 from fish_bag.playback import ReplayerConfig
 from fish_bag.recorder_config import RecorderConfig
-from fish_bringup.node_table import CONTROL, EXCITER, REAL, RECORDER, REPLAYER, SIMULATED
+from fish_bringup.node_table import (
+    CONTROL,
+    EXCITER,
+    JOINT_ANGLES,
+    REAL,
+    RECORDER,
+    REPLAYER,
+    SIMULATED,
+)
 from fish_control.fusion import FusionConfig
 from fish_control.node_configs import ControllerConfig, ExciterConfig, PlannerConfig
+from fish_description.joint_angles import JointAnglesConfig
 from fish_hw.settings.camera import CameraSettings
 from fish_hw.settings.imu import ImuSettings
 from fish_hw.settings.rotor import RotorSettings
@@ -39,8 +48,9 @@ CONFIGS: dict[str, type[Any]] = {
     "fish_control/exciter": ExciterConfig,
     "fish_bag/recorder": RecorderConfig,
     "fish_bag/replayer": ReplayerConfig,
+    "fish_description/joint_angles": JointAnglesConfig,
 }
-SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER)
+SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
 INTRODUCTION = """# Parameters of the nodes
 
 A node reads its parameters once, when it starts, and refuses a value that it cannot use with one line: name, value and

@@ -7,10 +7,18 @@ import importlib.util
 from collections import defaultdict
 from pathlib import Path
 
-from fish_bringup.node_table import CONTROL, EXCITER, REAL, RECORDER, REPLAYER, SIMULATED
+from fish_bringup.node_table import (
+    CONTROL,
+    EXCITER,
+    JOINT_ANGLES,
+    REAL,
+    RECORDER,
+    REPLAYER,
+    SIMULATED,
+)
 from reference_pages.markdown import HEADER, cell, table
 
-SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER)
+SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
 CREATORS = {
     "create_publisher": "publishes",
     "create_subscription": "takes",
@@ -33,6 +41,7 @@ MEANING = {
     "control/twist": "wanted speed [m/s] and turn rate [rad/s]; 50 Hz",
     "control/gains": "Kp, Ki, Kd of steering, then of speed; 50 Hz",
     "tracking/error": "cross-track [m], heading [rad], speed [m/s]; 50 Hz",
+    "description/joint_states": "every joint for robot_state_publisher: rotor, rudder, tail [rad]; 30 Hz",
     "battery_state": "voltage [V], current [A]; 1 Hz",
     "sim/odometry": "the simulator's true pose and velocity; 100 Hz",
     "sim/joint_states": "the simulator's true rudder and tail angles [rad]; 100 Hz",

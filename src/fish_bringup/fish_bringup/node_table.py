@@ -62,6 +62,7 @@ CONTROL = (
 EXCITER = NodeSpec("fish_control", "exciter", "exciter.yaml")
 RECORDER = NodeSpec("fish_bag", "recorder", "recorder.yaml")
 REPLAYER = NodeSpec("fish_bag", "replayer", "replayer.yaml")
+JOINT_ANGLES = NodeSpec("fish_description", "joint_angles", "joint_angles.yaml")
 
 ROBOTS = {"sim": (*SIMULATED, *CONTROL, RECORDER), "real": (*REAL, *CONTROL, RECORDER)}
 

@@ -1,0 +1,7 @@
+"""Entry points of the installed executables."""
+
+from functools import partial
+
+from fish_node.entry import start
+
+joint_angles = partial(start, "fish_description", "joint_angles")
