@@ -28,70 +28,21 @@ from fish_train.training.closed_loop_equations import (
     Law,
 )
 from fish_train.training.expressions import expressions
+from fish_train.training.loop_arguments import (
+    MAX_LAYERS,
+    POINTER,
+    NetworkArguments,
+    PathArguments,
+    SearchArguments,
+    WindowArguments,
+)
 from fish_train.training.loop_check import loop_errors
 from fish_train.training.network import LAYERS, split, weight_count
 from fish_train.training.path_bank import PathBank
 from fish_train.training.torch_loop import TorchLoop
 
 Array = NDArray[np.float64]
-MAX_LAYERS = 8
 BLOCK = 8
-POINTER = ctypes.c_void_p
-
-
-class _Network(ctypes.Structure):
-    _fields_ = [
-        ("layers", ctypes.c_long),
-        ("columns", ctypes.c_long),
-        ("size", ctypes.c_long * (MAX_LAYERS + 1)),
-        *(
-            (name, POINTER * MAX_LAYERS)
-            for name in ("panels", "transposed", "activation", "adjoint", "bias")
-        ),
-    ]
-
-
-class _Window(ctypes.Structure):
-    _fields_ = [
-        *((name, ctypes.c_long) for name in ("batch", "steps", "hold", "gradient")),
-        *(
-            (name, POINTER)
-            for name in (
-                "p",
-                "speed",
-                "cost",
-                "noise",
-                "delay",
-                "path",
-                "plant",
-                "memory",
-                "place",
-                "history",
-                "report",
-                "gains",
-                "value",
-            )
-        ),
-    ]
-
-
-class _Path(ctypes.Structure):
-    _fields_ = [
-        ("table", POINTER),
-        ("spacing", ctypes.c_double),
-        ("lap_end", ctypes.c_double),
-        ("count", ctypes.c_long),
-        ("last", ctypes.c_long),
-        ("closed", ctypes.c_int),
-        ("restarts", ctypes.c_int),
-    ]
-
-
-class _Search(ctypes.Structure):
-    _fields_ = [
-        (k, ctypes.c_double)
-        for k in ("search_window", "lookahead", "lookahead_search", "capture_distance")
-    ]
 
 
 def loop_source(stepper: Stepper, law: Law, width: int) -> str:
@@ -167,7 +118,7 @@ class CompiledLoop:
         self.layers = layers
         self.set_bank(bank)
         tracker = law.tracker
-        self._search = _Search(
+        self._search = SearchArguments(
             tracker.search_window, tracker.lookahead, LOOKAHEAD_SEARCH, tracker.capture_distance
         )
         self._room: tuple[int, int] | None = None
@@ -184,9 +135,9 @@ class CompiledLoop:
         self.bank = bank
         tables = [np.ascontiguousarray(t.rows) for t in bank.tables]
         self._tables = tables  # the kernel holds pointers into them
-        self._paths = (_Path * len(tables))(
+        self._paths = (PathArguments * len(tables))(
             *(
-                _Path(
+                PathArguments(
                     rows.ctypes.data,
                     t.spacing,
                     t.lap_end,
@@ -240,11 +191,13 @@ class CompiledLoop:
             applied,
             value,
         )
-        window = _Window(batch, steps, hold, int(gradient), *(a.ctypes.data for a in arrays))
+        window = WindowArguments(
+            batch, steps, hold, int(gradient), *(a.ctypes.data for a in arrays)
+        )
         total = self._run_blocks(window, weights, gradient)
         return WindowResult(float(value.sum() / (batch * steps)), total, report, applied)
 
-    def _run_blocks(self, window: _Window, weights: Array, gradient: bool) -> Array | None:
+    def _run_blocks(self, window: WindowArguments, weights: Array, gradient: bool) -> Array | None:
         """Block after block of `width` fish, whose activations fit the cache; the sum of their weight gradients."""
         network, scratch = ctypes.byref(self._network), POINTER(self._scratch.ctypes.data)
         self._library.repack(network, POINTER(weights.ctypes.data), ctypes.c_long(gradient))
@@ -283,7 +236,7 @@ class CompiledLoop:
         self._adjoint = [_aligned(o, columns) for _, o in pairs]
         self._panels = [_aligned(_padded(o), i) for i, o in pairs]
         self._transposed = [_aligned(_padded(i), o) for i, o in pairs]
-        network = _Network(len(pairs), columns, (ctypes.c_long * (MAX_LAYERS + 1))(*layers))
+        network = NetworkArguments(len(pairs), columns, (ctypes.c_long * (MAX_LAYERS + 1))(*layers))
         for name in ("panels", "transposed", "activation", "adjoint"):
             matrices = getattr(self, f"_{name}")
             setattr(network, name, (POINTER * MAX_LAYERS)(*(m.ctypes.data for m in matrices)))
