@@ -22,14 +22,13 @@ class RecordedTopic(Protocol):
     count: int
 
 
-def write_metadata(
-    directory: Path,
+def metadata_text(
     file_name: str,
     topics: Sequence[RecordedTopic],
     time_range: tuple[int, int] | None,
     custom: dict[str, str],
-) -> None:
-    """Write `directory`/metadata.yaml in one step (a reader never sees half of it).
+) -> str:
+    """The text of metadata.yaml.
 
     Args:
         time_range: first and last arrival [ns], None without messages.
@@ -49,7 +48,11 @@ def write_metadata(
         "custom_data": custom or None,
         "ros_distro": "jazzy",
     }
-    text = yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False)
+    return yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False)
+
+
+def write_metadata(directory: Path, text: str) -> None:
+    """Write `directory`/metadata.yaml in one step: a reader never sees half of it."""
     part = directory / "metadata.yaml.part"
     part.write_text(text)
     os.replace(part, directory / "metadata.yaml")

@@ -20,11 +20,12 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import DataEnd, Footer
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
-from fish_bag.bag_metadata import write_metadata
+from fish_bag.bag_metadata import metadata_text, write_metadata
 from fish_bag.message_types import MessageType, message_type
 from fish_bag.problem import RecordingError
 from fish_bag.qos import Qos
 from fish_bag.record_file import DiskFullError, RecordFile
+from fish_bag.storage import ROSBAG2_NAME
 
 CHUNK_BYTES = 32 * 1024  # a killed process loses at most one chunk
 PACKED_CHUNK_BYTES = 1024 * 1024
@@ -123,7 +124,7 @@ class McapRecording:
                 name,
                 kind.serialization,
                 self._schema_ids[kind],
-                {"offered_qos_profiles": profiles},
+                {"offered_qos_profiles": profiles, "topic_type_hash": kind.hash},
             )
         if self._file.size != before:
             self._chunk_is_written()
@@ -172,6 +173,7 @@ class McapRecording:
             self._chunk_is_written()
         end = self._file.size
         with self._closing_when_full(end):
+            self._writer.add_metadata(ROSBAG2_NAME, {"serialized_metadata": self._metadata()})
             self._writer.finish()  # type: ignore[no-untyped-call]
         self._finish()
 
@@ -206,6 +208,9 @@ class McapRecording:
     def _finish(self) -> None:
         self._closed = True
         self._file.close()
-        write_metadata(
-            self.directory, self.path.name, list(self.topics.values()), self._range, self.custom
-        )
+        write_metadata(self.directory, self._metadata())
+
+    def _metadata(self) -> str:
+        """The text of metadata.yaml, which the file holds too."""
+        topics = list(self.topics.values())
+        return metadata_text(self.path.name, topics, self._range, self.custom)

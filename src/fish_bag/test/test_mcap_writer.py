@@ -35,7 +35,9 @@ def test_mcap_library_finds_index_and_checksums_right(tmp_path):
         assert (
             max(c.uncompressed_size for c in summary.chunk_indexes) < 34_000
         )  # 32 KiB and a message
-        assert len(summary.metadata_indexes) == 1
+        assert [index.name for index in summary.metadata_indexes] == ["fish_bag", "rosbag2"]
+        by_topic = {channel.topic: channel.metadata for channel in summary.channels.values()}
+        assert by_topic["/fish/imu/data"]["topic_type_hash"].startswith("RIHS01_")
         imu = [m.log_time for _, _, m in reader.iter_messages(topics=["/fish/imu/data"])]
         assert imu == [samples.ns(0.01 * i + 0.002) for i in range(300)]
         window = list(
@@ -59,6 +61,15 @@ def test_rosbag2_metadata(tmp_path):
     assert qos["/path"].depth == 1
     assert qos["/lossy"].reliability == QosReliability.BEST_EFFORT
     assert not (tmp_path / "a" / RESERVE_NAME).exists()
+
+
+def test_the_file_holds_a_copy_of_metadata_yaml(tmp_path):
+    path = samples.robot_recording(tmp_path / "a", duration=0.5)
+    with (path / "a.mcap").open("rb") as file:
+        copies = [m for m in make_reader(file).iter_metadata() if m.name == "rosbag2"]
+    assert [m.metadata for m in copies] == [
+        {"serialized_metadata": (path / "metadata.yaml").read_text()}
+    ]
 
 
 def test_never_overwrites(tmp_path):
