@@ -48,7 +48,8 @@ def metadata_text(
         "custom_data": custom or None,
         "ros_distro": "jazzy",
     }
-    return yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False)
+    text: str = yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False)
+    return text
 
 
 def write_metadata(directory: Path, text: str) -> None:
