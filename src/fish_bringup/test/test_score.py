@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fish_bag import message_build as build
+from fish_bag import sample_recordings as samples
 from fish_bag.trial import (
     NOT_FINITE,
     Odometry,
@@ -194,20 +196,42 @@ def test_a_table_with_holes_is_told_by_what_is_missing(tmp_path):
     assert what_is_missing(score_trial(on_path)) is None
 
 
+def swum(folder, asides):
+    """A recording of 9 s in which each namespace's robot swims so far [m] beside the straight path."""
+    messages = []
+    for namespace, aside in asides.items():
+        messages += [
+            (0, f"{namespace}/reference/path", build.path(0, "pool", STRAIGHT.points)),
+            (0, f"{namespace}/reference/speed", build.number(0.2)),
+        ]
+        messages += [
+            (
+                samples.ns(t),
+                f"{namespace}/sim/odometry",
+                build.odometry(samples.ns(t), (0.2 * t - 1.0, aside, 0.0), (0.2, 0.0, 0.0)),
+            )
+            for t in np.arange(0.0, 9.0, 0.01)
+        ]
+    return samples.write_mcap(folder, sorted(messages, key=lambda message: message[0]))
+
+
 @pytest.mark.parametrize(("aside", "status"), [(0.0, 0), (0.31, 1)])
-def test_the_command_refuses_a_run_that_never_came_onto_its_path(
-    tmp_path, monkeypatch, capsys, aside, status
-):
-    t = np.arange(0.0, 9.0, 0.01)
-    trial = recorded_run(
-        tmp_path, STRAIGHT.points, t, np.column_stack([0.2 * t - 1.0, 0.0 * t + aside]), end=9.0
-    )
-    monkeypatch.setattr("fish_bringup.verbs.score.read_trial", lambda _: trial)
-    assert command.main(["score", str(tmp_path), "--out", str(tmp_path / "page.html")]) == status
+def test_the_command_refuses_a_run_that_never_came_onto_its_path(tmp_path, capsys, aside, status):
+    recording = swum(tmp_path / "a", {"/fish": aside})
+    assert command.main(["score", str(recording), "--out", str(tmp_path / "page.html")]) == status
     said = capsys.readouterr()
     assert ("a: the approach phase never ended" in said.err) == bool(status)
     assert ("RMSE" in said.out) == (tmp_path / "page.html").exists() == (not status)
     assert "nan" not in said.out
+
+
+def test_one_of_two_recorded_robots_is_scored(tmp_path, capsys):
+    recording = swum(tmp_path / "a", {"/one": 0.01, "/two": 0.02})
+    for namespace, error in (("/one", "0.0100"), ("/two", "0.0200")):
+        words = ["score", str(recording), "--out", str(tmp_path / "page.html")]
+        assert command.main([*words, "--namespace", namespace]) == 0
+        row = next(line for line in capsys.readouterr().out.splitlines() if "cross-track" in line)
+        assert error in row
 
 
 def test_a_run_without_a_wanted_speed_or_a_pose_on_its_path_is_refused(tmp_path):

@@ -10,6 +10,7 @@ import argparse
 from pathlib import Path
 
 from fish_bag import read_trial
+from fish_bag.topic_arguments import add_topic_arguments, topic_map
 from fish_bringup.run_page import write_run_page
 from fish_bringup.score import score_trial, what_is_missing
 from fish_bringup.score_table import error_table
@@ -26,12 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="page to write (default: score_<name>.html in the folder of the recording)",
     )
+    add_topic_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the table of errors and write the page."""
     recording = named_path(args.recording)
-    trial = read_trial(recording)
+    trial = read_trial(recording, topic_map(args))
     score = score_trial(trial)
     if missing := what_is_missing(score):
         raise UserError(f"{trial.name}: {missing}")
