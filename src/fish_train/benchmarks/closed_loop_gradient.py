@@ -33,7 +33,7 @@ from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.step import Stepper
-from fish_train.training.batch_state import Fleet
+from fish_train.training.batch_state import BatchState
 from fish_train.training.closed_loop_equations import (
     PHYSICS_STEPS,
     SIZES,
@@ -306,7 +306,9 @@ class JaxLoop:
         return (costs.sum() + sensed["cost"][0].sum()) / (len(speed) * STEPS)
 
 
-def make_fleet(stepper: Stepper, bank: PathBank, batch: int, rng: np.random.Generator) -> Fleet:
+def make_batch(
+    stepper: Stepper, bank: PathBank, batch: int, rng: np.random.Generator
+) -> BatchState:
     """Fish near the start of their paths, swimming at 0.2 m/s."""
     path = np.arange(batch) % len(bank)
     poses = np.array([[*bank.paths[k].point(0.0), bank.paths[k].heading_at(0.0)] for k in path])
@@ -315,25 +317,29 @@ def make_fleet(stepper: Stepper, bank: PathBank, batch: int, rng: np.random.Gene
     size = stepper.layout.links + 3
     plant[:, size : size + 2] = 0.2 * np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
     seen = np.column_stack([poses, np.full(batch, 0.2), np.zeros((batch, 2))])
-    return Fleet.at(plant, stepper.parameters(Robot()), path, rng.uniform(0.1, 0.3, batch), seen)
+    return BatchState.at(
+        plant, stepper.parameters(Robot()), path, rng.uniform(0.1, 0.3, batch), seen
+    )
 
 
-def carry_of(fleet: Fleet) -> dict:
-    """The fleet's state as JaxLoop carries it: rows are quantities, columns fish."""
+def carry_of(batch_state: BatchState) -> dict:
+    """The batch's state as JaxLoop carries it: rows are quantities, columns fish."""
     cuts = np.cumsum([SIZES[k] for k in ("guidance", "control", "actuator")])
     parts = dict(
         zip(
-            ("guidance", "control", "actuator", "last"), np.split(fleet.memory.T, cuts), strict=True
+            ("guidance", "control", "actuator", "last"),
+            np.split(batch_state.memory.T, cuts),
+            strict=True,
         )
     )
     carry = {
-        "plant": fleet.plant.T,
-        "before": fleet.history[:, -1].T,
+        "plant": batch_state.plant.T,
+        "before": batch_state.history[:, -1].T,
         **parts,
-        "progress": fleet.place[:, 0],
+        "progress": batch_state.place[:, 0],
     }
     return {k: jnp.array(v) for k, v in carry.items()} | {
-        "captured": jnp.array(fleet.place[:, 1] != 0.0)
+        "captured": jnp.array(batch_state.place[:, 1] != 0.0)
     }
 
 
@@ -373,23 +379,23 @@ def main() -> None:
     )
     ours, theirs = CompiledLoop(stepper, law, bank), JaxLoop(stepper, law, bank)
     for batch in args.batch:
-        fleet = make_fleet(stepper, bank, batch, rng)
+        batch_state = make_batch(stepper, bank, batch, rng)
         for _ in range(3):
-            ours.window(weights, fleet, STEPS, COST)
+            ours.window(weights, batch_state, STEPS, COST)
         inputs = (
             jnp.array(weights),
-            carry_of(fleet),
-            *map(jnp.array, (fleet.path, fleet.speed, fleet.parameters)),
+            carry_of(batch_state),
+            *map(jnp.array, (batch_state.path, batch_state.speed, batch_state.parameters)),
         )
         began = time.perf_counter()
         value, gradient = jax.block_until_ready(theirs.gradient(*inputs))
         compiled_in = time.perf_counter() - began
-        mine = ours.window(weights, fleet.copy(), STEPS, COST)
+        mine = ours.window(weights, batch_state.copy(), STEPS, COST)
         apart = np.abs(np.asarray(gradient) - mine.gradient).max() / np.abs(mine.gradient).max()
-        scratch = fleet.copy()
+        scratch = batch_state.copy()
 
-        def kernel(scratch: Fleet = scratch, fleet: Fleet = fleet) -> None:
-            for name, value in vars(fleet).items():
+        def kernel(scratch: BatchState = scratch, batch_state: BatchState = batch_state) -> None:
+            for name, value in vars(batch_state).items():
                 getattr(scratch, name)[...] = value
             ours.window(weights, scratch, STEPS, COST)
 

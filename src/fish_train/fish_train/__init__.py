@@ -1,1 +1,1 @@
-"""Offline package: recordings, identification, diagnosis, training, evaluation, reports."""
+"""Training of the controller's gains, and evaluation of how well they follow paths."""

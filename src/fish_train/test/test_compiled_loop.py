@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from training_setup import COST, make_bank, make_fleet, make_stepper, make_weights
+from training_setup import COST, make_bank, make_batch, make_stepper, make_weights
 
 from fish_train.training.closed_loop_equations import Law
 from fish_train.training.compiled_loop import CompiledLoop, fastest_loop
@@ -32,11 +32,11 @@ def relative(a: np.ndarray, b: np.ndarray) -> float:
 def test_cost_gradient_and_state_agree_with_autograd() -> None:
     kernel, torch_loop, stepper, bank = both()
     rng = np.random.default_rng(1)
-    weights, fleet = make_weights("network", rng), make_fleet(stepper, bank, 5, rng)
-    fleet.delay[:] = [0, 3, 1, 2, 30]
+    weights, batch_state = make_weights("network", rng), make_batch(stepper, bank, 5, rng)
+    batch_state.delay[:] = [0, 3, 1, 2, 30]
     for _ in range(2):  # the second window begins with a history and controllers that have run
         noise = 0.01 * rng.standard_normal((5, 5, 6))
-        ours, theirs = fleet.copy(), fleet.copy()
+        ours, theirs = batch_state.copy(), batch_state.copy()
         a = kernel.window(weights, ours, 4, COST, noise, hold=2)
         b = torch_loop.window(weights, theirs, 4, COST, noise, hold=2)
         assert a.cost == pytest.approx(b.cost, rel=1e-12)
@@ -45,7 +45,7 @@ def test_cost_gradient_and_state_agree_with_autograd() -> None:
         assert np.allclose(a.applied, b.applied, atol=1e-12)
         for name, value in vars(theirs).items():
             assert np.allclose(getattr(ours, name), value, atol=1e-10), name
-        fleet = ours
+        batch_state = ours
 
 
 @compiled
@@ -53,9 +53,9 @@ def test_cost_gradient_and_state_agree_with_autograd() -> None:
 def test_baseline_forms_agree_with_autograd(form: str) -> None:
     kernel, torch_loop, stepper, bank = both(form)
     rng = np.random.default_rng(2)
-    weights, fleet = make_weights(form, rng), make_fleet(stepper, bank, 2, rng)
-    a = kernel.window(weights, fleet.copy(), 3, COST)
-    b = torch_loop.window(weights, fleet.copy(), 3, COST)
+    weights, batch_state = make_weights(form, rng), make_batch(stepper, bank, 2, rng)
+    a = kernel.window(weights, batch_state.copy(), 3, COST)
+    b = torch_loop.window(weights, batch_state.copy(), 3, COST)
     assert len(weights) == weight_count(FORMS[form].layers)
     assert a.cost == pytest.approx(b.cost, rel=1e-12)
     assert relative(a.gradient, b.gradient) < 1e-10
@@ -65,15 +65,17 @@ def test_baseline_forms_agree_with_autograd(form: str) -> None:
 def test_gradient_agrees_with_finite_differences() -> None:
     kernel, _, stepper, bank = both()
     rng = np.random.default_rng(3)
-    weights, fleet = make_weights("network", rng), make_fleet(stepper, bank, 8, rng)
-    kernel.window(weights, fleet, 60, COST, gradient=False)  # away from the start's symmetry
-    gradient = kernel.window(weights, fleet.copy(), 15, COST).gradient
+    weights, batch_state = make_weights("network", rng), make_batch(stepper, bank, 8, rng)
+    kernel.window(weights, batch_state, 60, COST, gradient=False)  # away from the start's symmetry
+    gradient = kernel.window(weights, batch_state.copy(), 15, COST).gradient
     for _ in range(3):
         along = rng.standard_normal(len(weights))
         along /= np.linalg.norm(along)
         step = 1e-5
         costs = [
-            kernel.window(weights + s * step * along, fleet.copy(), 15, COST, gradient=False).cost
+            kernel.window(
+                weights + s * step * along, batch_state.copy(), 15, COST, gradient=False
+            ).cost
             for s in (1.0, -1.0)
         ]
         assert (costs[0] - costs[1]) / (2.0 * step) == pytest.approx(
@@ -86,12 +88,12 @@ def test_a_batch_equals_its_fish_one_by_one() -> None:
     """11 fish: a full block and a part of one; the padding lanes count for nothing."""
     kernel, _, stepper, bank = both()
     rng = np.random.default_rng(4)
-    weights, fleet = make_weights("network", rng), make_fleet(stepper, bank, 11, rng)
-    together, costs, gradients = fleet.copy(), [], []
+    weights, batch_state = make_weights("network", rng), make_batch(stepper, bank, 11, rng)
+    together, costs, gradients = batch_state.copy(), [], []
     whole = kernel.window(weights, together, 10, COST)
     for k in range(11):
-        alone = fleet.copy()
-        for name, value in vars(fleet).items():
+        alone = batch_state.copy()
+        for name, value in vars(batch_state).items():
             setattr(alone, name, value[k : k + 1].copy())
         single = kernel.window(weights, alone, 10, COST)
         costs.append(single.cost)
@@ -105,10 +107,10 @@ def test_without_a_compiler_the_numbers_are_the_same(monkeypatch: pytest.MonkeyP
     law, rng = Law(), np.random.default_rng(5)
     bank = make_bank(law)
     interpreted = make_stepper(compiled=False)
-    weights, fleet = make_weights("network", rng), make_fleet(interpreted, bank, 2, rng)
-    slow = TorchLoop(interpreted, law, bank).window(weights, fleet.copy(), 4, COST)
+    weights, batch_state = make_weights("network", rng), make_batch(interpreted, bank, 2, rng)
+    slow = TorchLoop(interpreted, law, bank).window(weights, batch_state.copy(), 4, COST)
     if CompiledLoop.available():
-        fast = CompiledLoop(make_stepper(), law, bank).window(weights, fleet.copy(), 4, COST)
+        fast = CompiledLoop(make_stepper(), law, bank).window(weights, batch_state.copy(), 4, COST)
         assert slow.cost == pytest.approx(fast.cost, rel=1e-12)
         assert relative(slow.gradient, fast.gradient) < 1e-10
     monkeypatch.setenv("FISH_SIM_NO_COMPILER", "1")
@@ -129,11 +131,11 @@ def test_a_loop_that_the_compiler_gets_wrong_is_that_of_torch(wrong_compiler, ca
 def test_a_fish_that_is_nowhere_does_not_crash_the_kernel() -> None:
     kernel, _, stepper, bank = both()
     rng = np.random.default_rng(6)
-    fleet = make_fleet(stepper, bank, 3, rng)
-    fleet.plant[1, 0] = np.nan
-    result = kernel.window(make_weights("network", rng), fleet, 5, COST)
+    batch_state = make_batch(stepper, bank, 3, rng)
+    batch_state.plant[1, 0] = np.nan
+    result = kernel.window(make_weights("network", rng), batch_state, 5, COST)
     assert np.isnan(result.cost)
-    assert np.all(np.isfinite(fleet.plant[[0, 2]]))
+    assert np.all(np.isfinite(batch_state.plant[[0, 2]]))
 
 
 def test_hold_must_divide_the_window() -> None:
@@ -142,5 +144,5 @@ def test_hold_must_divide_the_window() -> None:
     loop = TorchLoop(stepper, law, bank)
     with pytest.raises(ValueError, match="hold: got 4 for a window of 10"):
         loop.window(
-            make_weights("network", rng), make_fleet(stepper, bank, 1, rng), 10, COST, hold=4
+            make_weights("network", rng), make_batch(stepper, bank, 1, rng), 10, COST, hold=4
         )

@@ -16,7 +16,7 @@ from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_train.evaluation.follow import Follower
 from fish_train.evaluation.gains_source import PolicyGains
-from fish_train.training.batch_state import Fleet
+from fish_train.training.batch_state import BatchState
 from fish_train.training.closed_loop_equations import Law
 from fish_train.training.compiled_loop import CompiledLoop
 from fish_train.training.network import initial_weights, to_tensors
@@ -98,13 +98,13 @@ def test_training_runs_the_nodes_laws(setting) -> None:
     bank = PathBank([path], law.tracker)
     kind = CompiledLoop if CompiledLoop.available() else TorchLoop
     seen = np.array([[*START, 0.0, 0.0, 0.0]])
-    fleet = Fleet.at(
+    batch_state = BatchState.at(
         stepper.rest(START)[None], stepper.parameters(Robot()), np.zeros(1), np.array([SPEED]), seen
     )
     loop = kind(stepper, law, bank)
     for k in range(0, STEPS, 20):
-        loop.window(weights, fleet, 20, COST, gradient=False)
-        assert np.allclose(fleet.plant[0], expected[0.0][k + 19], atol=1e-9)
+        loop.window(weights, batch_state, 20, COST, gradient=False)
+        assert np.allclose(batch_state.plant[0], expected[0.0][k + 19], atol=1e-9)
 
 
 @pytest.mark.parametrize("listen_time", [0.0, 0.5])

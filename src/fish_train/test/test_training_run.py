@@ -341,7 +341,7 @@ def test_robots_differ_in_what_is_uncertain_of_them_and_not_in_their_effects(
     )
     trainer = Trainer(short(batch=50), robot, 3)
     own = dict(zip(trainer._stepper.layout.parameters, robot.vector(), strict=True))
-    drawn = dict(zip(own, trainer.fleet.parameters.T, strict=True))
+    drawn = dict(zip(own, trainer.batch_state.parameters.T, strict=True))
     for name, values in drawn.items():
         if name in CERTAIN or "." in name:
             assert (values == own[name]).all(), name
@@ -450,10 +450,10 @@ def test_search_does_not_lose_against_its_start(short_search: None) -> None:
     bank = trainer.ladder_bank()
     found, weights = search(trainer, said.append)
     again = constant()
-    fleet, noise = again.draw_fleet(again.ladder_bank()), again.draw_noise()
-    assert again.rollout_cost(weights, fleet.copy(), bank, noise) == pytest.approx(found)
-    assert found <= again.rollout_cost(again.weights, fleet.copy(), bank, noise)
-    assert again.rollout_cost(weights, fleet.copy(), bank) != pytest.approx(
+    batch_state, noise = again.draw_batch(again.ladder_bank()), again.draw_noise()
+    assert again.rollout_cost(weights, batch_state.copy(), bank, noise) == pytest.approx(found)
+    assert found <= again.rollout_cost(again.weights, batch_state.copy(), bank, noise)
+    assert again.rollout_cost(weights, batch_state.copy(), bank) != pytest.approx(
         found
     )  # what is seen has errors
     assert said

@@ -1,11 +1,11 @@
-"""A small fleet, bank and network shared by the tests of training."""
+"""A small batch, bank and network shared by the tests of training."""
 
 import numpy as np
 
 from fish_control.paths import make_path
 from fish_sim.robot import Robot
 from fish_sim.step import Scheme, Stepper
-from fish_train.training.batch_state import Fleet
+from fish_train.training.batch_state import BatchState
 from fish_train.training.closed_loop_equations import Law
 from fish_train.training.network import FORMS, initial_weights
 from fish_train.training.path_bank import PathBank
@@ -38,7 +38,9 @@ def make_weights(form: str, rng: np.random.Generator) -> np.ndarray:
     return weights + 0.02 * rng.standard_normal(weights.shape)
 
 
-def make_fleet(stepper: Stepper, bank: PathBank, batch: int, rng: np.random.Generator) -> Fleet:
+def make_batch(
+    stepper: Stepper, bank: PathBank, batch: int, rng: np.random.Generator
+) -> BatchState:
     """Fish beside the starts of their paths, swimming at 0.15 m/s."""
     path = np.arange(batch) % len(bank)
     poses = np.array([[*bank.paths[k].point(0.3), bank.paths[k].heading_at(0.3)] for k in path])
@@ -47,6 +49,8 @@ def make_fleet(stepper: Stepper, bank: PathBank, batch: int, rng: np.random.Gene
     size = stepper.layout.links + 3
     plant[:, size : size + 2] = 0.15 * np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
     seen = np.column_stack([poses, np.full(batch, 0.15), np.zeros((batch, 2))])
-    fleet = Fleet.at(plant, stepper.parameters(Robot()), path, rng.uniform(0.1, 0.3, batch), seen)
-    fleet.place[:, [0, 2]] = 0.3
-    return fleet
+    batch_state = BatchState.at(
+        plant, stepper.parameters(Robot()), path, rng.uniform(0.1, 0.3, batch), seen
+    )
+    batch_state.place[:, [0, 2]] = 0.3
+    return batch_state

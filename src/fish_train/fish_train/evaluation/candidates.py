@@ -42,7 +42,7 @@ def read_policy(name: str, path: Path) -> Candidate:
 
 
 def read_schedule(name: str, path: Path) -> Candidate:
-    """The coefficients of scheduled gains with the law they were made for; a file of old, without one: the nominal fish's."""
+    """The coefficients of scheduled gains with their law; a file without a law has the nominal fish's."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         weights = np.array(content["weights"], dtype=float)

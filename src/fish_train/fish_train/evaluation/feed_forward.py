@@ -1,4 +1,4 @@
-"""The law's knowledge of its robot, measured: throttle and rudder of steady swims, straight and in turns, and their slip.
+"""The feed-forward of the control law, measured on a robot: throttle, rudder and slip of steady swims, straight and in turns.
 
     s                   = a u + b u |u|                           straight
     s                   = a u + b u |u| + alpha^2 (c u + d u |u|)  with the rudder at alpha

@@ -1,4 +1,4 @@
-"""What the control law sees of the true motion: everything at once, or what sensors and fusion make of it."""
+"""What the control law sees: the true motion, or what sensors and fusion estimate of it."""
 
 from __future__ import annotations
 

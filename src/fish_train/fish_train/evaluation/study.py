@@ -34,7 +34,7 @@ MakePlant = Callable[[Sequence[Robot], Sequence[int], float], Plant]
 
 @dataclass(frozen=True)
 class Condition:
-    """On what and with what eyes."""
+    """A plant and its sensing."""
 
     name: str = "nominal"
     robot: Robot = field(default_factory=Robot)
@@ -109,9 +109,9 @@ def run_study(
     report: Callable[[int, int], None] | None = None,
     keep: Callable[[int, list[Row]], object] | None = None,
 ) -> list[Row]:
-    """Everything against everything, `jobs` processes; cells of like duration swim together.
+    """Every candidate under every condition on every cell, in `jobs` processes; cells of similar duration swim together.
 
-    keep: hears of each batch when it is finished, and of its place in the order.
+    keep: called with the place in the order and the rows of each batch when it is finished.
     """
     tasks = [
         (c, d, batch) for c in candidates for d in conditions for batch in _batches(cells, jobs)
@@ -131,7 +131,7 @@ def run_study(
 
 
 def _batches(cells: Sequence[Cell], jobs: int) -> list[list[Cell]]:
-    """Cells of like duration together, no batch longer than needed to occupy every process."""
+    """Cells of similar duration together, no batch longer than needed to occupy every process."""
     ordered = sorted(cells, key=lambda cell: longest(read_path(cell.path), cell.speed))
     size = max(1, min(LARGEST_BATCH, -(-len(ordered) // jobs)))
     return [ordered[k : k + size] for k in range(0, len(ordered), size)]
@@ -144,7 +144,7 @@ def _in_processes(
     report: Callable[[int, int], None] | None = None,
     keep: Callable[[int, Any], object] | None = None,
 ) -> list[Any]:
-    """work(*task) for every task, one core for each process; results in order, and to `keep` with their place as they come."""
+    """work(*task) for every task, one core for each process; results in order, `keep` gets each with its place when it ends."""
     with worker_pool(jobs) as pool:
         places = {pool.submit(work, *task): place for place, task in enumerate(tasks)}
         for done, future in enumerate(as_completed(places), start=1):

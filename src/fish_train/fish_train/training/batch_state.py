@@ -1,4 +1,4 @@
-"""The fish of a batch: everything that one window hands to the next."""
+"""The state of a batch of fish between two windows of the closed loop."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MEMORY_SIZE = SIZES["guidance"] + SIZES["control"] + SIZES["actuator"] + SIZES["
 
 
 @dataclass
-class Fleet:
+class BatchState:
     """B fish between two windows; arrays are C-contiguous and are written in place.
 
     Attributes:
@@ -50,7 +50,7 @@ class Fleet:
         speed: Array,
         motion: Array,
         delay: NDArray[np.int64] | None = None,
-    ) -> Fleet:
+    ) -> BatchState:
         """Fish that start an episode: controllers reset, what they see now was true all the time (`motion` (B, 6))."""
         batch = len(plant)
         return cls(
@@ -71,9 +71,9 @@ class Fleet:
     def __len__(self) -> int:
         return len(self.plant)
 
-    def copy(self) -> Fleet:
-        """An independent fleet in the same state."""
-        return Fleet(**{name: value.copy() for name, value in vars(self).items()})
+    def copy(self) -> BatchState:
+        """An independent copy."""
+        return BatchState(**{name: value.copy() for name, value in vars(self).items()})
 
 
 def check_hold(steps: int, hold: int) -> None:

@@ -184,7 +184,7 @@ def sense(
 def _wanted(
     state: GuidanceState, moved: Motion, path: PathAhead, speed: Scalar, law: Law, xp: Any
 ) -> tuple[Errors, TrackingErrors]:
-    """What the control law is told, and what the planner says."""
+    """Inputs of the control law and outputs of the planner."""
     errors = tracking_errors(state.stroke, moved, path, speed, law.guidance, xp)
     water = through_water(state, errors.course, path.curvature, speed, xp)
     e_psi = heading_error(state, moved, water, law.guidance, xp)

@@ -16,7 +16,7 @@ from fish_sim.kernel_source import kernel_source
 from fish_sim.step import Stepper
 from fish_train.training.batch_state import (
     HISTORY,
-    Fleet,
+    BatchState,
     WindowResult,
     check_hold,
 )
@@ -153,20 +153,20 @@ class CompiledLoop:
     def window(
         self,
         weights: Array,
-        fleet: Fleet,
+        batch_state: BatchState,
         steps: int,
         cost: Array,
         noise: Array | None = None,
         gradient: bool = True,
         hold: int = 1,
     ) -> WindowResult:
-        """Run `steps` control periods from the fleet's state, which is advanced in place.
+        """Run `steps` control periods from this state of the batch, which is advanced in place.
 
         weights: flat (W,). cost: (6,) weights of the stage cost. noise: (steps + 1, B, 6) added to what is seen.
         hold: periods for which the gains of one policy decision are kept; divides steps.
         """
         check_hold(steps, hold)
-        batch = len(fleet)
+        batch = len(batch_state)
         self._make_room(steps, hold)
         weights, cost = np.ascontiguousarray(weights, float), np.ascontiguousarray(cost, float)
         noise = (
@@ -177,16 +177,16 @@ class CompiledLoop:
         report = np.empty((steps + 1, batch, SIZES["report"]))
         applied, value = np.empty((steps, batch, SIZES["last"])), np.empty(batch)
         arrays = (
-            fleet.parameters,
-            fleet.speed,
+            batch_state.parameters,
+            batch_state.speed,
             cost,
             noise,
-            fleet.delay,
-            fleet.path,
-            fleet.plant,
-            fleet.memory,
-            fleet.place,
-            fleet.history,
+            batch_state.delay,
+            batch_state.path,
+            batch_state.plant,
+            batch_state.memory,
+            batch_state.place,
+            batch_state.history,
             report,
             applied,
             value,

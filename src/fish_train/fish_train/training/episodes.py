@@ -9,7 +9,7 @@ from fish_control.path_batch import TrackerConfig
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
-from fish_train.training.batch_state import Fleet
+from fish_train.training.batch_state import BatchState
 from fish_train.training.closed_loop_equations import CONTROL_PERIOD
 from fish_train.training.config import TrainConfig
 from fish_train.training.path_bank import PathBank
@@ -42,7 +42,7 @@ class Episodes:
             [n not in CERTAIN and "." not in n for n in stepper.layout.parameters]
         )
 
-    def start(self, bank: PathBank, rng: np.random.Generator) -> Fleet:
+    def start(self, bank: PathBank, rng: np.random.Generator) -> BatchState:
         """A batch, some at rest, most near the wanted speed, scattered about random places on random paths."""
         c, batch = self._config, self._config.batch
         path = rng.integers(len(bank), size=batch)
@@ -63,9 +63,9 @@ class Episodes:
         parameters = self._robots(batch, rng)
         seen = np.column_stack([poses, surge, np.zeros((batch, 2))])
         delay = rng.integers(round(c.latency / DT) + 1, size=batch)
-        fleet = Fleet.at(plant, parameters, path, speed, seen, delay)
-        fleet.place[:, [0, 2]] = progress[:, None]
-        return fleet
+        batch_state = BatchState.at(plant, parameters, path, speed, seen, delay)
+        batch_state.place[:, [0, 2]] = progress[:, None]
+        return batch_state
 
     def _room(self, bank: PathBank, k: int, speed: float) -> float:
         """Progress up to which an open path is long enough for an episode [m]."""

@@ -1,4 +1,4 @@
-"""The compiled closed loop against torch's autograd on the same equations, in place of trust in the compiler.
+"""The compiled closed loop compared with torch's autograd on the same equations.
 
 The reference's physics is the interpreted kernel with its own adjoint: nothing of it is compiled here.
 """
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fish_control.paths import make_path
 from fish_sim.self_check import random_parameters, random_states, relative_error
 from fish_sim.step import Stepper
-from fish_train.training.batch_state import LONGEST_DELAY, Fleet, WindowResult
+from fish_train.training.batch_state import LONGEST_DELAY, BatchState, WindowResult
 from fish_train.training.closed_loop_equations import (
     COST_NAMES,
     INPUT_COUNTS,
@@ -39,7 +39,7 @@ class Loop(Protocol):
     def window(
         self,
         weights: Array,
-        fleet: Fleet,
+        batch_state: BatchState,
         steps: int,
         cost: Array,
         noise: Array | None,
@@ -68,11 +68,11 @@ def loop_errors(
         np.full(len(COST_NAMES), 0.5),
         1e-3 * random.standard_normal((PERIODS + 1, width + 1, 6)),
     )
-    fleet = _fleet(stepper, bank, width + 1, random)
-    fleets = [fleet.copy(), fleet.copy()]
+    batch_state = _batch_state(stepper, bank, width + 1, random)
+    batch_states = [batch_state.copy(), batch_state.copy()]
     right, found = (
-        loop.window(weights, fleet, PERIODS, cost, noise, True, HOLD)
-        for loop, fleet in zip((slow, make(bank, layers)), fleets, strict=True)
+        loop.window(weights, batch_state, PERIODS, cost, noise, True, HOLD)
+        for loop, batch_state in zip((slow, make(bank, layers)), batch_states, strict=True)
     )
     assert right.gradient is not None
     assert found.gradient is not None
@@ -83,13 +83,17 @@ def loop_errors(
         for name in ("report", "applied")
     }
     errors |= {
-        name: relative_error(*(getattr(fleet, name) for fleet in reversed(fleets)))
+        name: relative_error(
+            *(getattr(batch_state, name) for batch_state in reversed(batch_states))
+        )
         for name in FLEET
     }
     return errors
 
 
-def _fleet(stepper: Stepper, bank: PathBank, batch: int, random: np.random.Generator) -> Fleet:
+def _batch_state(
+    stepper: Stepper, bank: PathBank, batch: int, random: np.random.Generator
+) -> BatchState:
     """Fish beside their paths, in motion."""
     layout = stepper.layout
     path = np.arange(batch) % len(bank)
@@ -101,6 +105,8 @@ def _fleet(stepper: Stepper, bank: PathBank, batch: int, random: np.random.Gener
     seen = np.column_stack([poses, random.uniform(-0.1, 0.2, (batch, 3))])
     delay = np.arange(batch) % (LONGEST_DELAY + 1)
     parameters = random_parameters(layout, batch, random)
-    fleet = Fleet.at(plant, parameters, path, random.uniform(0.1, 0.3, batch), seen, delay)
-    fleet.place[:, [0, 2]] = 0.3
-    return fleet
+    batch_state = BatchState.at(
+        plant, parameters, path, random.uniform(0.1, 0.3, batch), seen, delay
+    )
+    batch_state.place[:, [0, 2]] = 0.3
+    return batch_state

@@ -1,4 +1,4 @@
-"""One training run in its folder: resume, train, save, hand out."""
+"""One training run in its folder: resume, train, save, write the weights."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ class Status:
 def run(job: Job, report: Callable[[Status], None]) -> Status:
     """Train to the end of the recipe; returns the last status.
 
-    Diverging training is rolled back to the last good checkpoint, whose weights are handed out, and said: status, curve and
-    card tell of these weights and of no update after them.
+    Training that diverges goes back to the last good checkpoint, and its weights are written. Status, curve and card
+    describe these weights and no update after them.
     """
     torch.set_num_threads(1)
     # whatever can be refused is refused before --overwrite deletes a run
@@ -113,7 +113,7 @@ def run(job: Job, report: Callable[[Status], None]) -> Status:
 
 
 def _search(job: Job, trainer: Trainer, report: Callable[[Status], None]) -> Status:
-    """Hand out what differential evolution finds."""
+    """Write what differential evolution finds."""
     began = time.monotonic()
 
     def status(state: State, message: str) -> Status:
@@ -174,7 +174,7 @@ class _Session:
         )
 
     def _episode(self) -> None:
-        """Swim and tell one episode; the polish may end within it."""
+        """Swim and report one episode; the polish may end within it."""
         progress = None
         while progress is None and not self._trainer.finished:
             progress = self._trainer.step()
@@ -203,7 +203,7 @@ class _Session:
         self._saved = self.progress
 
     def roll_back(self) -> None:
-        """Forget what was told after the checkpoint, which the trainer is at again."""
+        """Drop what was reported after the checkpoint, to which the trainer has returned."""
         self.progress = self._saved
         self._log.roll_back(self._trainer.update)
 

@@ -24,9 +24,11 @@ REACH = 3.0  # of the numbers before tanh: gains to within 0.25 % of their range
 def search(trainer: Trainer, report: Callable[[str], None]) -> tuple[float, Array]:
     """(mean stage cost, flat weights) of the best candidate found."""
     bank = trainer.ladder_bank()
-    fleets = [trainer.draw_fleet(bank) for _ in range(EPISODES)]
-    noises = [trainer.draw_noise() for _ in fleets]  # the same for all candidates, like the fleets
-    swims = list(zip(fleets, noises, strict=True))
+    batch_states = [trainer.draw_batch(bank) for _ in range(EPISODES)]
+    noises = [
+        trainer.draw_noise() for _ in batch_states
+    ]  # the same for all candidates, like the states
+    swims = list(zip(batch_states, noises, strict=True))
     count = weight_count(trainer.form.layers)
 
     def cost(weights: Array) -> float:

@@ -15,7 +15,7 @@ from fish_sim.ops import torch_ops
 from fish_sim.step import Stepper
 from fish_train.training.batch_state import (
     HISTORY,
-    Fleet,
+    BatchState,
     WindowResult,
     check_hold,
 )
@@ -52,19 +52,19 @@ class TorchLoop:
     def window(
         self,
         weights: Array,
-        fleet: Fleet,
+        batch_state: BatchState,
         steps: int,
         cost: Array,
         noise: Array | None = None,
         gradient: bool = True,
         hold: int = 1,
     ) -> WindowResult:
-        """Run `steps` periods from the fleet's state, which is advanced in place; see `CompiledLoop.window`."""
+        """Run `steps` periods from this state of the batch, which is advanced in place; see `CompiledLoop.window`."""
         check_hold(steps, hold)
         flat = torch.tensor(weights, requires_grad=gradient)
-        noise = np.zeros((steps + 1, len(fleet), SIZES["motion"])) if noise is None else noise
+        noise = np.zeros((steps + 1, len(batch_state), SIZES["motion"])) if noise is None else noise
         run = _Window(
-            self, flat, fleet, torch.from_numpy(np.asarray(noise)), tuple(map(float, cost))
+            self, flat, batch_state, torch.from_numpy(np.asarray(noise)), tuple(map(float, cost))
         )
         with torch.set_grad_enabled(gradient):
             total, reports, applied = torch.zeros(()), [], []
@@ -76,21 +76,23 @@ class TorchLoop:
                     run.decide(sensed)
                 total = total + run.advance(sensed)
                 applied.append(_stack(run.last))
-            kept = fleet.place.copy()
+            kept = batch_state.place.copy()
             sensed = run.look(steps)
-            fleet.place[:] = kept  # the next window looks again at its first period
+            batch_state.place[:] = kept  # the next window looks again at its first period
             reports.append(_stack(sensed["report"]))
-            mean = (total + sensed["cost"][0].sum()) / (len(fleet) * steps)
+            mean = (total + sensed["cost"][0].sum()) / (len(batch_state) * steps)
         found = torch.autograd.grad(mean, flat)[0].numpy() if gradient else None
         run.store()
         report, moved = (torch.stack(rows).detach().numpy() for rows in (reports, applied))
         return WindowResult(float(mean.detach()), found, report, moved)
 
-    def find(self, fleet: Fleet, which: int, position: Tensor) -> list[Tensor]:
+    def find(self, batch_state: BatchState, which: int, position: Tensor) -> list[Tensor]:
         """Geometry of every fish on its path; `which` place (0 seen, 1 true) moves on."""
         geometry = [
             locate(self.bank.tables[k], self._law.tracker, place[2 * which : 2 * which + 2], xy)
-            for k, place, xy in zip(fleet.path, fleet.place, position.detach().numpy(), strict=True)
+            for k, place, xy in zip(
+                batch_state.path, batch_state.place, position.detach().numpy(), strict=True
+            )
         ]
         return list(torch.from_numpy(np.array(geometry)).unbind(-1))
 
@@ -107,19 +109,24 @@ class _Window:
     """The state of one window, as lists of (B,) tensors."""
 
     def __init__(
-        self, loop: TorchLoop, flat: Tensor, fleet: Fleet, noise: Tensor, cost: tuple[float, ...]
+        self,
+        loop: TorchLoop,
+        flat: Tensor,
+        batch_state: BatchState,
+        noise: Tensor,
+        cost: tuple[float, ...],
     ) -> None:
-        self._loop, self._fleet, self._noise, self._cost = loop, fleet, noise, cost
+        self._loop, self._batch_state, self._noise, self._cost = loop, batch_state, noise, cost
         self._weights = split(flat, loop.layers)
-        self._plant = torch.from_numpy(fleet.plant.copy())
+        self._plant = torch.from_numpy(batch_state.plant.copy())
         self._parameters, self._speed = (
-            torch.from_numpy(a) for a in (fleet.parameters, fleet.speed)
+            torch.from_numpy(a) for a in (batch_state.parameters, batch_state.speed)
         )
-        memory = list(torch.from_numpy(fleet.memory.copy()).unbind(-1))
+        memory = list(torch.from_numpy(batch_state.memory.copy()).unbind(-1))
         cuts = np.cumsum([SIZES[k] for k in ("guidance", "control", "actuator")])
         self._guidance, self._control = memory[: cuts[0]], memory[cuts[0] : cuts[1]]
         self._actuator, self.last = memory[cuts[1] : cuts[2]], memory[cuts[2] :]
-        self._motions = [*torch.from_numpy(fleet.history.copy()).unbind(1), self._motion()]
+        self._motions = [*torch.from_numpy(batch_state.history.copy()).unbind(1), self._motion()]
 
     def _motion(self) -> Tensor:
         s, size = self._plant.unbind(-1), self._loop.stepper.layout.links + 3
@@ -127,14 +134,16 @@ class _Window:
 
     def look(self, t: int) -> dict[str, list[Tensor]]:
         """Sense at the start of period t of the window."""
-        fleet, true = self._fleet, self._motions[-1]
-        newest = HISTORY + PHYSICS_STEPS * t - fleet.delay
+        batch_state, true = self._batch_state, self._motions[-1]
+        newest = HISTORY + PHYSICS_STEPS * t - batch_state.delay
         seen = [
             torch.stack([self._motions[at - back][b] for b, at in enumerate(newest)])
             + self._noise[t]
             for back in reversed(range(PHYSICS_STEPS))
         ]
-        near, real = (self._loop.find(fleet, k, o[:, :2]) for k, o in enumerate((seen[-1], true)))
+        near, real = (
+            self._loop.find(batch_state, k, o[:, :2]) for k, o in enumerate((seen[-1], true))
+        )
         setpoint = self.last[SIZES["gains"] :]
         rows = (
             torch.cat(seen, dim=-1).unbind(-1),
@@ -182,13 +191,13 @@ class _Window:
         return raw
 
     def store(self) -> None:
-        """Hand the state back to the fleet."""
+        """Write the state back."""
         memory = [*self._guidance, *self._control, *self._actuator, *self.last]
         like = self._speed
         columns = [m if isinstance(m, Tensor) else torch.full_like(like, m) for m in memory]
-        self._fleet.plant[:] = self._plant.detach().numpy()
-        self._fleet.memory[:] = torch.stack(columns, dim=-1).detach().numpy()
-        self._fleet.history[:] = (
+        self._batch_state.plant[:] = self._plant.detach().numpy()
+        self._batch_state.memory[:] = torch.stack(columns, dim=-1).detach().numpy()
+        self._batch_state.history[:] = (
             torch.stack(self._motions[-1 - HISTORY : -1], dim=1).detach().numpy()
         )
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.step import Stepper
-from fish_train.training.batch_state import Fleet, WindowResult
+from fish_train.training.batch_state import BatchState, WindowResult
 from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law
 from fish_train.training.compiled_loop import fastest_loop
 from fish_train.training.config import TrainConfig
@@ -100,13 +100,13 @@ class Trainer:
         )
 
     def rollout_cost(
-        self, weights: Array, fleet: Fleet, bank: PathBank, noise: Array | None = None
+        self, weights: Array, batch_state: BatchState, bank: PathBank, noise: Array | None = None
     ) -> float:
-        """Mean stage cost of an episode from a fleet's state on a bank's paths; the fleet is advanced."""
+        """Mean stage cost of an episode from a state of the batch on a bank's paths; the state is advanced."""
         self._loop.set_bank(bank)
         cost, hold = np.array(self.config.cost), self.config.hold
         result = self._loop.window(
-            weights, fleet, self._episode_steps, cost, noise, gradient=False, hold=hold
+            weights, batch_state, self._episode_steps, cost, noise, gradient=False, hold=hold
         )
         return result.cost
 
@@ -115,7 +115,7 @@ class Trainer:
         """Control periods."""
         return self._episode_windows * self._window
 
-    def draw_fleet(self, bank: PathBank) -> Fleet:
+    def draw_batch(self, bank: PathBank) -> BatchState:
         """The start of an episode."""
         return self._episodes.start(bank, self.rng)
 
@@ -142,7 +142,7 @@ class Trainer:
         return PathBank(self.levels[self.level].paths(self.config, rng), self.law.tracker)
 
     def _begin_episode(self) -> None:
-        self.fleet: Fleet = self._episodes.start(self._loop.bank, self.rng)
+        self.batch_state: BatchState = self._episodes.start(self._loop.bank, self.rng)
         self._noise.reset(self.rng)
         self._rows: list[tuple[Array, Array, float, float]] = []
 
@@ -156,7 +156,7 @@ class Trainer:
         noise = self._noise.window(self._window, self.rng)
         weights = self._flat.detach().numpy()
         result = self._loop.window(
-            weights, self.fleet, self._window, np.array(c.cost), noise, hold=c.hold
+            weights, self.batch_state, self._window, np.array(c.cost), noise, hold=c.hold
         )
         norm = self._descend(result)
         self.update += 1
@@ -239,7 +239,7 @@ class Trainer:
             "random": self.rng.bit_generator.state,
             "optimiser_step": float(moments.get("step", 0.0)),
         }
-        arrays = {f"fleet.{name}": value for name, value in vars(self.fleet).items()}
+        arrays = {f"batch_state.{name}": value for name, value in vars(self.batch_state).items()}
         arrays |= {"weights": self.weights, "noise": self._noise.state}
         for name in ("exp_avg", "exp_avg_sq"):
             if name in moments:
@@ -262,10 +262,12 @@ class Trainer:
             }
         self._noise.state = np.array(arrays["noise"])
         self._loop.set_bank(self._make_bank())
-        fleet: dict[str, Any] = {
-            k.removeprefix("fleet."): v for k, v in arrays.items() if k.startswith("fleet.")
+        batch_state: dict[str, Any] = {
+            k.removeprefix("batch_state."): v
+            for k, v in arrays.items()
+            if k.startswith("batch_state.")
         }
-        self.fleet = Fleet(**fleet)
+        self.batch_state = BatchState(**batch_state)
         self._rows = []
 
 

@@ -1,4 +1,4 @@
-"""What a run hands out: the weights file the controller loads, and a model card beside it."""
+"""The weights file that the controller loads, and its model card."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def make_policy(trainer: Trainer, note: str) -> Policy:
 
 
 def write_weights(folder: Path, trainer: Trainer, command: str) -> None:
-    """Weights file; of a schedule, which no controller loads, its coefficients and the law they are for."""
+    """Write the weights file, or a schedule's coefficients with their law: no controller loads a schedule."""
     if trainer.form.inputs == "schedule":
         law: Law = trainer.law
         content = {
@@ -72,7 +72,7 @@ def write_weights(folder: Path, trainer: Trainer, command: str) -> None:
 
 
 def holds_weights(folder: Path, trainer: Trainer) -> bool:
-    """Whether what is handed out in the folder has the trainer's numbers already; a file that cannot be read has not."""
+    """Whether the weights file in the folder holds the trainer's weights; a file that cannot be read does not."""
     try:
         if trainer.form.inputs == "schedule":
             content = json.loads((folder / SCHEDULE).read_text(encoding="utf-8"))
@@ -94,7 +94,7 @@ def write_card(
 
 
 def training_state(trainer: Trainer, diverged: bool = False) -> str:
-    """How far training came; diverged: and that it went no further than this, rolled back."""
+    """How far training came; diverged: training went back to the last good checkpoint."""
     how = "diverged, rolled back to" if diverged else "stopped at"
     state = (
         "finished" if trainer.finished else f"{how} level {trainer.level} of {len(trainer.levels)}"
@@ -105,7 +105,7 @@ def training_state(trainer: Trainer, diverged: bool = False) -> str:
 def model_card(
     trainer: Trainer, made: str, last: Progress | None, seconds: float, command: str
 ) -> str:
-    """Markdown: what it is, how it was made, what it is good for."""
+    """Markdown: what the policy is, how it was trained, how well it follows paths."""
     c, robot = trainer.config, trainer.robot
     effects = ", ".join(robot.effects) or "none"
     lines = [

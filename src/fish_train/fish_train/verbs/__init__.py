@@ -1,1 +1,1 @@
-"""Verbs of the `fish_train` command: one file each, listed in verbs.VERBS."""
+"""Commands of this package for `robofish`, one module each."""
