@@ -24,12 +24,13 @@ WITH_STUDIES := --base-paths src studies/fish_study
 PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help setup build demo test lint docs identify diagnose prove train evaluate paper clean distclean
+.PHONY: help setup build demo test test-noble lint docs identify diagnose prove train evaluate paper clean distclean
 
 help:
 	@echo "make demo       the whole robot swims the letter R, is recorded, scored and shown; options:"
 	@echo "                LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder"
 	@echo "make test       build, the tests of every package, the tests across packages"
+	@echo "make test-noble the tests of every package but training, with the versions of Ubuntu 24.04"
 	@echo "make identify, diagnose DATASET=folder   the model's parameters; the physics that it lacks"
 	@echo "make prove      a short blind study: hidden effects, sealed labels, tables and a page; ARGS='--scenarios 300' for the long one"
 	@echo "make train, evaluate, paper   learn the gains; how well they follow paths; the figures and the table of the paper"
@@ -113,7 +114,28 @@ test: setup install/.studies
 		colcon --log-base log/longest test $(WITH_STUDIES) --packages-select $(LONGEST) --executor sequential --return-code-on-test-failure & \
 		colcon test $(WITH_STUDIES) --packages-skip $(LONGEST) --executor sequential --return-code-on-test-failure || status=1; \
 		python -m pytest test || status=1; \
-		wait $$! || status=1; colcon test-result --all --verbose || status=1; exit $$status
+		wait $$! || status=1; colcon test-result --all --verbose || status=1; \
+		if python3.12 -c '' 2>/dev/null; then $(MAKE) test-noble || status=1; fi; exit $$status
+
+# Ubuntu 24.04's versions of Python and of every library that rosdep installs there; all packages but training.
+NOBLE := .noble
+NOBLE_PYTHON ?= $(shell for p in python3.12 $(HOME)/.pyenv/versions/3.12*/bin/python3.12 $(PYTHON); do \
+	$$p -c 'import ensurepip, venv' >/dev/null 2>&1 && echo $$p && break; done)
+NOBLE_SKIP := fish_train fish_study
+$(NOBLE)/.run: requirements-noble.txt requirements-ros.txt
+	@[ -n "$(NOBLE_PYTHON)" ] || { echo "error: no Python 3.12 or 3.11 with venv found; say make test-noble NOBLE_PYTHON=/path/to/python3.12" >&2; exit 1; }
+	@$(NOBLE_PYTHON) -m venv --clear $(NOBLE)/venv
+	@echo "setup: wheels of requirements-noble.txt"
+	@$(NOBLE)/venv/bin/python -m pip --disable-pip-version-check install --quiet --quiet $(PIP_ARGS) -r requirements-noble.txt
+	@touch $@
+
+test-noble: $(NOBLE)/.run
+	@$(NOBLE)/venv/bin/python -c 'import sys; v = sys.version_info[:2]; v == (3, 12) or print(f"test-noble: Python {v[0]}.{v[1]} with the libraries of Ubuntu 24.04, which has 3.12")'
+	@source $(NOBLE)/venv/bin/activate; colcon --log-base $(NOBLE)/log build --base-paths src --build-base $(NOBLE)/build --install-base $(NOBLE)/install
+	@source $(NOBLE)/venv/bin/activate; source $(NOBLE)/install/setup.bash; status=0; \
+		colcon --log-base $(NOBLE)/log test --base-paths src --build-base $(NOBLE)/build --install-base $(NOBLE)/install \
+			--packages-skip $(NOBLE_SKIP) --executor sequential --return-code-on-test-failure || status=1; \
+		colcon test-result --test-result-base $(NOBLE)/build --verbose || status=1; exit $$status
 
 lint: setup
 	@$(ACTIVATE); ruff format --check .; ruff check .; mypy src/*/fish_* studies/*/fish_* studies/*.py
@@ -125,7 +147,7 @@ docs: install/.studies $(VENV)/.docs
 	@echo "site: docs/_build/html/index.html"
 
 clean:
-	rm -rf docs/_build build install log
+	rm -rf docs/_build build install log $(NOBLE)/build $(NOBLE)/install $(NOBLE)/log
 
 distclean: clean
-	rm -rf $(VENV)
+	rm -rf $(VENV) $(NOBLE)

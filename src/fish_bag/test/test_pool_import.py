@@ -248,7 +248,7 @@ def test_imu_without_repeats_and_with_gravity(imported):
 
 def test_control(imported):
     _, trial = imported
-    np.testing.assert_allclose(trial.target.x, 2.0 - CENTRE[0])
+    np.testing.assert_allclose(trial.target.x, 2.0 - CENTRE[0], rtol=1e-6)  # float32
     np.testing.assert_array_equal(trial.gains.values[0], [1, 2, 3, 4, 5, 6])
     assert trial.gains.names[0] == "steering_kp"
     e = trial.tracking_error

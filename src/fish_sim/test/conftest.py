@@ -1,6 +1,8 @@
 """Swimming programs that several tests share."""
 
+import importlib.util
 import os
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -8,7 +10,19 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 import numpy as np
 import pytest
 
+TORCH = importlib.util.find_spec("torch") is not None
+# the second implementation in torch is only for training and for these tests
+collect_ignore = [
+    path.name
+    for path in Path(__file__).parent.glob("test_*.py")
+    if not TORCH and any(word in path.read_text() for word in ("torch", "import lagrangian"))
+]
 NEAR_WALL = (0.3, 0.85, 0.1)  # m, m, rad
+
+
+def pytest_report_header() -> str:
+    """Say which tests are left out."""
+    return f"left out without torch: {', '.join(collect_ignore)}" if collect_ignore else ""
 
 
 @pytest.fixture

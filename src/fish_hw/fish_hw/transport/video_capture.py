@@ -43,9 +43,7 @@ class VideoCapture:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        cv2.utils.logging.setLogLevel(
-            cv2.utils.logging.LOG_LEVEL_SILENT
-        )  # the reason is said once, here
+        silence_opencv()  # the reason is said once, here
         self._settings = settings
         self._clock, self._sleep = clock, sleep
         self._live = settings.device.startswith("/dev/")
@@ -135,6 +133,14 @@ class VideoCapture:
 
     def _others(self) -> list[str]:
         return sorted(path for path in glob("/dev/video*") if path != self._settings.device)
+
+
+def silence_opencv() -> None:
+    """No messages of OpenCV's own on the console; the setting has another name before OpenCV 4.7."""
+    if hasattr(cv2, "utils") and hasattr(cv2.utils, "logging"):
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    else:
+        cv2.setLogLevel(0)
 
 
 def compressed_frame(time_s: float, data: bytes) -> Frame | None:

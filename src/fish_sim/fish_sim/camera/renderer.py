@@ -71,9 +71,10 @@ class PoolRenderer:
         cv2.add(picture, self._light, dst=result)
 
     def jpeg(self, picture: Image) -> bytes:
-        """The picture as JPEG with 4:2:2 colour, as webcams send it."""
+        """The picture as JPEG with 4:2:2 colour, as webcams send it; OpenCV before 4.7 only has 4:2:0."""
         options = [cv2.IMWRITE_JPEG_QUALITY, self._look.jpeg_quality]
-        options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_422]
+        if hasattr(cv2, "IMWRITE_JPEG_SAMPLING_FACTOR"):
+            options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_422]
         return cv2.imencode(".jpg", picture, options)[1].tobytes()
 
     def _draw_fish(self, picture: Image, poses: Sequence[FishPose]) -> None:
