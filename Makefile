@@ -72,7 +72,9 @@ $(VENV)/.docs: requirements-docs.txt constraints.txt $(VENV)/.diagnose
 	@$(PIP) -r requirements-docs.txt
 	@touch $@
 
+# With Python 3.12 `make test` also runs the tests with Ubuntu 24.04's versions; their wheels belong to the set-up.
 setup: $(VENV)/.dev
+	@if python3.12 -c '' 2>/dev/null; then $(MAKE) .noble/.run; fi
 
 # --- build ----------------------------------------------------------------------------------------------------------------
 # The command robofish in the environment's folder of commands runs colcon's executable, or says what to source.
