@@ -50,11 +50,13 @@ class Run:
         self.nodes.start(spec, self.parameters[spec])
 
     def until(self, there: Callable[[], bool], what: str) -> None:
-        """Listen until something is so; every node must be alive meanwhile."""
+        """Listen until something is so, and keep the robot armed; every node must be alive meanwhile."""
         deadline = time.monotonic() + PATIENCE
         while not there():
             if time.monotonic() > deadline:
                 pytest.fail(f"{what} did not come within {PATIENCE:.0f} s; seen: {self.seen()}")
+            if self.watch.disarmed:
+                self.watch.ask_to_arm()
             self.listen(0.05)
             check_running(self.nodes)
 

@@ -19,6 +19,7 @@ from fish_bringup.node_table import (
 from reference_pages.markdown import HEADER, cell, table
 
 SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
+ARMING = "fish_node.nodes.arming"
 CREATORS = {
     "create_publisher": "publishes",
     "create_subscription": "takes",
@@ -42,6 +43,11 @@ MEANING = {
     "control/gains": "Kp, Ki, Kd of steering, then of speed; 50 Hz",
     "tracking/error": "cross-track [m], heading [rad], speed [m/s]; 50 Hz",
     "description/joint_states": "every joint for robot_state_publisher: rotor, rudder, tail [rad]; 30 Hz",
+    "arming/state": "level OK: armed, else the message is the reason; 20 Hz and on change",
+    "arming/disarm": "a node's reason to disarm; when it has one",
+    "operator/estop": "true while the emergency stop is pressed; on change",
+    "operator/deadman": "true while the operator holds it; 10 Hz, where deadman_timeout_s is set",
+    "rudder/trouble": "empty, or why the rudder does not work; 20 Hz",
     "battery_state": "voltage [V], current [A]; 1 Hz",
     "sim/odometry": "the simulator's true pose and velocity; 100 Hz",
     "sim/joint_states": "the simulator's true rudder and tail angles [rad]; 100 Hz",
@@ -51,7 +57,7 @@ MEANING = {
     "pause": "stops and continues simulated time",
     "reset": "puts the simulated fish back to its start",
     "resume": "lets the controller go on after its watchdog stopped the fish",
-    "~/enable": "lets the rotor go or stops it",
+    "arm": "true arms the robot, false disarms it; refused with everything that speaks against it",
     "~/clear_faults": "erases the rotor module's faults",
     "~/pause": "stops and continues a replay",
 }
@@ -123,7 +129,24 @@ def interfaces(package: str, executable: str) -> list[tuple[str, str, str]]:
                 near, _, name = node.module.rpartition(".")
                 if near == f"{package}.nodes" and name not in done:
                     todo.append(name)
+                if node.module == ARMING:
+                    found += arming_interfaces({alias.name for alias in node.names})
     return found
+
+
+def arming_interfaces(classes: set[str]) -> list[tuple[str, str, str]]:
+    """(role, type, name) of the arming state's owner or listener, as its classes say."""
+    path = Path(str(importlib.util.find_spec(ARMING).origin))  # type: ignore[union-attr]
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    types = imported_types(tree)
+    return [
+        found
+        for owner in tree.body
+        if isinstance(owner, ast.ClassDef) and owner.name in classes
+        for node in ast.walk(owner)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+        for found in interface(node, node.func.attr, types)
+    ]
 
 
 def imported_types(tree: ast.AST) -> dict[str, str]:

@@ -21,6 +21,7 @@ DEFAULT_TOPICS = (
     "reference/*",
     "control/*",
     "tracking/error",
+    "arming/*",
     "battery_state",
     "sim/odometry",
     "sim/joint_states",

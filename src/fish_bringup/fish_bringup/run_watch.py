@@ -43,6 +43,16 @@ class Watch(Protocol):
     sight: Sight | None
     seen: Seen | None  # by the camera
     tracker: PathTracker | None
+    refusal: str  # why the robot was not armed when it was last asked
+
+    @property
+    def disarmed(self) -> str | None:
+        """Why the robot is disarmed; empty while it is armed, None before anybody said."""
+        ...
+
+    def ask_to_arm(self) -> None:
+        """Ask a disarmed robot to be armed."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -85,16 +95,32 @@ class Robot:
                     f"no {what} within {START_TIMEOUT:.0f} s; see the logs of the nodes"
                 )
 
+    def arm(self) -> None:
+        """Arm a robot that hurts nobody: a simulated one.
+
+        Raises:
+            UserError: it refuses; the message says why.
+        """
+
+        def armed() -> bool:
+            self.watch.ask_to_arm()
+            return self.watch.disarmed == ""
+
+        try:
+            self.wait_for(armed, "armed robot")
+        except UserError as error:
+            raise UserError(f"{error}; it was not armed: {self.watch.refusal}") from error
+
     def swim(self, duration: float, console: Console) -> SwimEnd:
         """Watch for at most `duration` seconds of the robot's own time, with a line of progress."""
         begin, before = time.monotonic(), self.nodes.cpu_times()
         with console.status("") as line:
-            reason = self._follow(duration, line)
+            reason = self._follow(duration, line, console)
         seconds = time.monotonic() - begin
         used = {spec: spent - before[spec] for spec, spent in self.nodes.cpu_times().items()}
         return SwimEnd(reason, seconds, {spec: cpu_s / seconds for spec, cpu_s in used.items()})
 
-    def _follow(self, duration: float, line: Status) -> str:
+    def _follow(self, duration: float, line: Status, console: Console) -> str:
         """Until the end of the path, one lap of a closed one, the end of the time or Ctrl-C; the reason.
 
         Raises:
@@ -103,12 +129,14 @@ class Robot:
         sight, tracker = self._seen()
         first, lap_start = sight.stamp, tracker.progress
         patience, run_watch = Patience(self.nodes), RunWatch(first)
+        said = ""
         while (t := sight.stamp - first) < duration and not self.interruption.asked:
             self._look()
             sight, tracker = self._seen()
             patience.heed(sight)
             end_if_due(run_watch, sight.stamp, self.watch.seen)
             on_path = tracker.update((sight.x, sight.y))
+            said = self._arm_again(t, said, console)
             line.update(
                 f"{t:6.1f} s   x {sight.x:+.2f} m  y {sight.y:+.2f} m   "
                 f"cross-track {1000 * on_path.cross_track_error:+4.0f} mm   speed {sight.speed:.2f} m/s   "
@@ -120,6 +148,15 @@ class Robot:
             if tracker.path.closed and on_path.progress - lap_start >= tracker.path.length:
                 return "after one lap"
         return "as interrupted" if self.interruption.asked else f"after {duration:.0f} s"
+
+    def _arm_again(self, t: float, said: str, console: Console) -> str:
+        """A robot that was disarmed on the way at `t` [s] is armed again; one line, unless `said` is the same."""
+        disarmed = self.watch.disarmed or ""
+        if disarmed:
+            self.watch.ask_to_arm()
+            if disarmed != said:
+                console.print(f"{t:.1f} s: disarmed ({disarmed}); armed again by this command")
+        return disarmed
 
     def _seen(self) -> tuple[Sight, PathTracker]:
         if self.watch.sight is None or self.watch.tracker is None:

@@ -31,6 +31,13 @@ class Fish:
     def __init__(self, path):
         self.path, self.tracker, self.time = path, PathTracker(path), 0.0
         self.events = {}  # s of its time -> something that happens
+        self.disarmed, self.refusal, self.asked = "not armed since the start", "it is too hot", 0
+
+    def ask_to_arm(self):
+        """It is armed at the third request."""
+        self.asked += 1
+        if self.asked == 3:
+            self.disarmed = ""
 
     @property
     def sight(self):
@@ -65,6 +72,27 @@ def interruption():
 
 def swim(fish, nodes, interruption, duration=600.0):
     return Robot(nodes, fish, fish.listen, interruption).swim(duration, Console(quiet=True))
+
+
+def test_a_simulated_robot_is_asked_until_it_is_armed(nodes, interruption):
+    fish = Fish(make_path("straight", length=2.0))
+    Robot(nodes, fish, fish.listen, interruption).arm()
+    assert (fish.disarmed, fish.asked) == ("", 3)
+
+
+def test_a_robot_that_is_disarmed_on_the_way_is_armed_again_and_it_is_said(
+    nodes, interruption, capsys
+):
+    fish = Fish(make_path("straight", length=2.0))
+
+    def disarm():
+        fish.disarmed, fish.asked = "camera lost", 0
+
+    fish.events[3.0] = disarm
+    Robot(nodes, fish, fish.listen, interruption).arm()
+    Robot(nodes, fish, fish.listen, interruption).swim(600.0, Console())
+    assert fish.disarmed == ""
+    assert capsys.readouterr().out.count("disarmed (camera lost); armed again") == 1
 
 
 def test_a_run_ends_at_the_end_of_an_open_path(nodes, interruption):

@@ -14,7 +14,7 @@ from fish_control.wall_guard import heads_for_a_wall, stopping_rudder
 from fish_control.watchdog import EstimateHealth, estimate_fault
 
 AT_REST = Command(0.0, 0.0, 0.0)
-State = Literal["waiting", "resting", "swimming", "ended", "before a wall", "lost"]
+State = Literal["waiting", "resting", "swimming", "ended", "before a wall", "lost", "disarmed"]
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,24 @@ class Exciter:
         self.state: State = "waiting"
         self.reason = "waiting for odometry"
 
-    def command(self, now: float, dt: float, sight: Sight | None) -> Command:
+    def command(self, now: float, dt: float, sight: Sight | None, disarmed: str = "") -> Command:
         """The command of `now` [s], `dt` [s] after the one before; `state` and `reason` say what it is about.
 
-        After the end or a stop the excitation brings rotor and rudder to rest.
+        It begins when the robot is armed. After the end or a stop the excitation brings rotor and rudder to rest.
+
+        Args:
+            now: s.
+            dt: s.
+            sight: the newest estimate.
+            disarmed: why the robot is disarmed; empty while it is armed, or where nobody arms it.
         """
-        if self.state == "waiting" and (sight is not None or not self._config.guard):
+        if disarmed:
+            self._disarmed(disarmed)
+        if (
+            self.state == "waiting"
+            and not disarmed
+            and (sight is not None or not self._config.guard)
+        ):
             self._began = now
             self._become("resting", "at rest")
         if self.state == "resting" and now - self._began >= self._config.rest:
@@ -50,6 +62,16 @@ class Exciter:
         if self.state == "swimming":
             self._look(sight)
         return self._excitation.command(dt)
+
+    def _disarmed(self, reason: str) -> None:
+        """Before the first stroke it is waited for; later nothing goes on by itself."""
+        if self.state in ("waiting", "resting"):
+            self._become("waiting", f"waiting for the robot to be armed: {reason}")
+        elif self.state == "swimming":
+            self._excitation.stop()
+            self._become(
+                "disarmed", f"stopped at {self._excitation.time:.1f} s: disarmed: {reason}"
+            )
 
     def _look(self, sight: Sight | None) -> None:
         """End where the program does; stop where the guard finds a reason."""

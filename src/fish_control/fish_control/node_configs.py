@@ -89,7 +89,7 @@ class ControllerConfig:
     lookahead: float = TrackerConfig.lookahead  # m, must be the weights file's and the planner's
     robot_hash: str = ""  # refuse weights trained for another robot; empty: accept any
     odometry_timeout: float = 0.15  # s
-    target_timeout: float = 0.25  # s
+    target_timeout: float = 0.2  # s
     largest_variance: float = LARGEST_VARIANCE  # of an estimate that is not lost
     resume: str = (
         "auto"  # after a stop: auto when all is well; manual when service resume is called

@@ -27,12 +27,15 @@ class Health:
 
     estimate: EstimateHealth | None
     target_age: float | None  # s since the stamp
+    disarmed: str = (
+        ""  # why the robot is disarmed; empty while it is armed, or where nobody arms it
+    )
 
 
 class Watchdog:
     """Stops on the first fault; goes on after all faults have been gone for `resume_delay`, or when asked to.
 
-    Before the first motion it waits without calling it a fault.
+    Before the first motion, and while the robot is disarmed, it waits without calling it a fault.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
@@ -46,6 +49,9 @@ class Watchdog:
     def check(self, now: float, signs: Health) -> bool:
         """Whether the fish may swim at `now` [s]; `reason` says why not."""
         fault = self._fault(signs)
+        if fault is None and signs.disarmed:
+            self.state, self.reason = "waiting", f"disarmed: {signs.disarmed}"
+            return False
         if fault is not None:
             self._good_since = math.inf
             self._released = False

@@ -48,6 +48,24 @@ def test_it_rests_swims_its_part_and_ends_at_rest():
     assert not end[-10:, 1:].any()
 
 
+def test_it_begins_when_the_robot_is_armed():
+    running = exciter()
+    for k in range(300):
+        assert running.command(DT * k, DT, MIDDLE, "not armed since the start").rotor_speed == 0.0
+    assert running.reason == "waiting for the robot to be armed: not armed since the start"
+    assert not swim(running, 0.49, MIDDLE, begin=3.0)[:, 1:].any()
+    assert np.abs(swim(running, 1.0, MIDDLE, begin=3.49)[:, 1]).max() > 60.0
+
+
+def test_a_robot_that_is_disarmed_on_the_way_ends_the_swim_for_good():
+    running = exciter()
+    swim(running, 1.5, MIDDLE)
+    running.command(1.5, DT, MIDDLE, "coil at 90 deg C")
+    assert running.state == "disarmed"
+    assert running.reason == "stopped at 1.0 s: disarmed: coil at 90 deg C"
+    assert not swim(running, 4.0, MIDDLE, begin=1.51)[-10:, 1:].any()
+
+
 @pytest.mark.parametrize(
     ("sight", "state", "said"),
     [

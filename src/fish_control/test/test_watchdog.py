@@ -52,6 +52,14 @@ def test_every_fault_stops_at_once_and_is_said(said):
     assert dog.stops == 1
 
 
+def test_a_disarmed_robot_is_waited_for_without_calling_it_a_stop():
+    dog = swimming()
+    assert not dog.check(0.01, replace(GOOD, disarmed="coil at 90 deg C"))
+    assert (dog.state, dog.stops) == ("waiting", 0)
+    assert dog.reason == "disarmed: coil at 90 deg C"
+    assert dog.check(0.02, GOOD)
+
+
 def test_clocks_that_differ_by_little_are_no_fault():
     assert swimming().check(0.01, replace(but(age=-0.05), target_age=-0.05))
 

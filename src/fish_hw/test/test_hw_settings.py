@@ -32,9 +32,9 @@ def test_yaml_has_every_parameter_with_its_default(name):
         (RotorSettings, "sign", 0, "sign is 0, expected one of 1, -1"),
         (
             RotorSettings,
-            "resume",
-            "soon",
-            "resume is 'soon', expected one of 'zero', 'auto', 'manual'",
+            "leak_level",
+            "wet",
+            "leak_level is 'wet', expected one of 'low', 'high'",
         ),
         (RotorSettings, "stale_s", 5.0, "stale_s is 5.0, expected 0.03 to 1.0"),
         (RotorSettings, "cell_warn_v", 3.0, "cell_warn_v is 3.0, expected 3.3 to 5.0"),

@@ -12,6 +12,7 @@ from waiting import wait_until
 
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.leak_sensor import LeakSensor
 from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.rotor_driver import RotorDriver
 from fish_hw.devices.rotor_guard import Phase
@@ -24,7 +25,13 @@ from fish_hw.transport.serial_port import SerialPort
 
 # generous times: a loaded machine keeps the emulator waiting, and that is not what is tested here
 SETTINGS = RotorSettings(
-    port="test", resume="auto", reply_timeout_s=0.2, stale_s=0.4, module_timeout_s=0.5
+    port="test",
+    estimate="ignored",
+    rudder_timeout_s=0.0,
+    reply_timeout_s=0.2,
+    stale_s=0.4,
+    module_timeout_s=0.5,
+    telemetry_timeout_s=1.0,
 )
 DT = 0.01
 
@@ -41,11 +48,14 @@ class Bench:
         """Connect, in the second or third try if the emulator's thread is kept waiting."""
         assert self.run(15.0, until=lambda: self.driver.connected)
 
-    def run(self, duration_s: float, command=None, until=None) -> bool:
+    def run(self, duration_s: float, command=None, until=None, arm: bool = True) -> bool:
+        """With a command, the operator arms as often as it may be armed; with arm=False nobody does."""
         start = time.monotonic()
         while time.monotonic() - start < duration_s:
             if command is not None:
                 self.driver.command(command(time.monotonic() - start))
+                if arm and not self.driver.arming.armed:
+                    self.driver.arming.arm(time.monotonic())
             cycle = self.driver.step()
             self.events += cycle.events
             self.samples += [cycle.sample] if cycle.sample else []
@@ -136,7 +146,7 @@ def test_stale_command_coasts_without_polling(bench):
     assert bench.emulator.mode == reg.COAST
     assert bench.emulator.timeouts == 0
     assert bench.driver.status().level == WARN
-    assert any("no command for" in event for event in bench.events)
+    assert any("no joint_command for 0.4 s" in event for event in bench.events)
 
 
 def test_module_stops_by_itself_if_coast_is_lost(bench):
@@ -188,14 +198,16 @@ def test_unplugged_then_plugged_again(bench):
     bench.emulator.close()
     assert bench.run(15.0, steady, until=lambda: not bench.driver.connected)
     assert bench.driver.status().level == ERROR
-    assert bench.driver.guard.latched
+    assert not bench.driver.arming.armed
     assert bench.driver.guard.phase is Phase.COASTING
     said = len(bench.events)
     bench.run(0.3, steady)
     assert len(bench.events) == said  # not once per cycle
     bench.emulator = VertiqEmulator()
     try:
-        assert bench.run(15.0, steady, until=lambda: bench.driver.connected)
+        assert bench.run(15.0, steady, until=lambda: bench.driver.connected, arm=False)
+        bench.run(1.0, steady, arm=False)
+        assert bench.emulator.mode == reg.COAST  # it is back, and nobody armed it
         assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     finally:
         bench.driver.close()
@@ -218,15 +230,65 @@ def test_low_battery_stops_and_stays_stopped(vertiq_emulator):
     bench.emulator.volts = 4 * 3.2
     assert bench.run(15.0, steady, until=lambda: bench.driver.guard.phase is Phase.COASTING)
     said = "battery at 3.20 V per cell"
-    assert said in bench.driver.guard.reason
+    assert said in bench.driver.arming.reason
     driven = sum(m == reg.CTRL_VELOCITY.set(0, 60.0) for m in bench.emulator.log)
     assert bench.run(15.0, steady, until=lambda: bench.driver.guard.phase is Phase.RESTING)
-    bench.run(0.3, steady)
+    bench.run(0.3, steady)  # the operator tries to arm all the time
     assert sum(m == reg.CTRL_VELOCITY.set(0, 60.0) for m in bench.emulator.log) == driven
     assert said in bench.driver.status().message
     bench.emulator.volts = 4 * 3.8
+    bench.run(1.0, steady, arm=False)
+    assert bench.emulator.mode == reg.COAST  # a battery that recovered arms nothing
     assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     bench.driver.close()
+
+
+@pytest.mark.parametrize("speed", [math.nan, math.inf])
+def test_a_command_that_is_no_number_disarms(bench, speed):
+    assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
+    bench.driver.command(speed)
+    assert bench.run(15.0, steady, arm=False, until=lambda: bench.emulator.mode == reg.COAST)
+    assert f"commanded speed is {speed}" in bench.driver.arming.reason
+
+
+def test_a_jammed_rotor_disarms(bench):
+    assert bench.run(15.0, oscillation, until=lambda: abs(bench.emulator.velocity) > 50.0)
+    bench.emulator.jammed = True
+    assert bench.run(15.0, oscillation, arm=False, until=lambda: not bench.driver.arming.armed)
+    assert "jammed" in bench.driver.arming.reason or "stuck" in bench.driver.arming.reason
+
+
+class Wire:
+    """A GPIO line that a test pulls low."""
+
+    low = False
+
+    def wait(self, timeout_s: float) -> None:
+        del timeout_s
+
+    def is_low(self) -> bool:
+        return self.low
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+def test_water_in_the_hull_disarms_and_forbids_to_arm(vertiq_emulator):
+    wire = Wire()
+    driver = RotorDriver(
+        SETTINGS,
+        lambda: SerialPort(vertiq_emulator.port, 115200),
+        leak=LeakSensor(lambda: wire, wet_is_low=True),
+    )
+    bench = Bench(vertiq_emulator)
+    bench.driver = driver
+    bench.connect()
+    assert bench.run(15.0, steady, until=lambda: vertiq_emulator.mode == VELOCITY_MODE)
+    wire.low = True
+    assert bench.run(15.0, steady, until=lambda: vertiq_emulator.mode == reg.COAST)
+    assert driver.arming.reason == "leak: water in the hull"
+    assert "leak" in driver.arming.arm(time.monotonic())
+    driver.close()
 
 
 def test_protection_works_without_the_derate_register(vertiq_emulator):
@@ -235,7 +297,7 @@ def test_protection_works_without_the_derate_register(vertiq_emulator):
     bench = Bench(vertiq_emulator, replace(SETTINGS, battery_filter_s=0.0, reply_timeout_s=0.05))
     bench.connect()
     vertiq_emulator.faults = 0x40
-    assert bench.run(15.0, steady, until=lambda: "coil temperature" in bench.driver.guard.reason)
+    assert bench.run(15.0, steady, until=lambda: "coil temperature" in bench.driver.arming.reason)
     assert bench.driver.status().level == ERROR
     bench.driver.close()
 
@@ -244,7 +306,7 @@ def test_missing_telemetry_is_an_error(vertiq_emulator):
     vertiq_emulator.mangle = lambda reply: b"" if reply[2:4] == bytes([88, 1]) else reply
     bench = Bench(vertiq_emulator, replace(SETTINGS, reply_timeout_s=0.05))
     bench.connect()
-    said = "no telemetry: battery and temperature are not watched"
+    said = "no telemetry: battery and temperature not answered"
     assert bench.run(15.0, steady, until=lambda: bench.driver.status().message == said)
     assert bench.driver.status().level == ERROR
     vertiq_emulator.mangle = lambda reply: reply

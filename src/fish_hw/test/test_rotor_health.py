@@ -1,5 +1,6 @@
 """Battery, temperature and fault limits."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -20,8 +21,8 @@ def test_well():
 def test_battery_filter_is_a_first_order_lag():
     health = RotorHealth(SETTINGS)
     health.judge(WELL, 0.0)
-    for i in range(1, 26):
-        health.judge(replace(WELL, volts=12.6), 0.2 * i)
+    for i in range(1, 5):
+        health.judge(replace(WELL, volts=12.6), SETTINGS.battery_filter_s / 4 * i)
     # one time constant after a step the rest is 1/e
     assert health.filtered_volts == pytest.approx(12.6 + (15.6 - 12.6) * 0.36788, abs=1e-3)
 
@@ -29,9 +30,21 @@ def test_battery_filter_is_a_first_order_lag():
 def test_sag_under_load_does_not_stop_but_an_empty_battery_does():
     health = RotorHealth(SETTINGS)
     health.judge(WELL, 0.0)
-    assert not health.judge(replace(WELL, volts=11.0), 0.2).stops
-    stops = [health.judge(replace(WELL, volts=12.8), 0.4 + 0.2 * i).stops for i in range(200)]
+    for i in range(100):  # 4 Hz ripple of 2 V, asked at 10 Hz
+        ripple = replace(WELL, volts=14.6 + math.sin(math.tau * 4.0 * 0.1 * i))
+        assert not health.judge(ripple, 0.1 * i).stops
+    stops = [health.judge(replace(WELL, volts=12.8), 10.0 + 0.1 * i).stops for i in range(30)]
     assert stops[-1] == ("battery at 3.20 V per cell",)
+    assert next(i for i, stop in enumerate(stops) if stop) * 0.1 < 1.0
+
+
+def test_a_peak_of_voltage_warns_and_a_high_battery_stops():
+    health = RotorHealth(SETTINGS)
+    assert not health.judge(replace(WELL, volts=4 * 4.4), 0.0).stops
+    assert not health.judge(WELL, 0.1).stops
+    assert not health.judge(replace(WELL, volts=4 * 4.4), 0.2).stops
+    said = health.judge(replace(WELL, volts=4 * 4.4), 0.3).stops
+    assert said == ("battery driven up to 4.40 V per cell",)
 
 
 def test_battery_must_recover_above_the_warning():

@@ -68,6 +68,7 @@ class ServoBench:
         for _ in range(round(duration_s / DT)):
             if alpha is not None:
                 self.servo.command(alpha, self.now)
+            self.servo.armed(True, self.now)
             self.servo.step(self.now)
             angles.append(self.servo.alpha)
             self.now += DT
@@ -103,11 +104,36 @@ def test_stale_command_centres_at_the_slew_rate(direction):
     assert angles[-1] == 0.0
 
 
+def test_a_disarmed_servo_centres_and_stays_there_until_armed():
+    bench = ServoBench()
+    bench.run(1.0, 0.6)
+    for _ in range(100):
+        bench.servo.armed(False, bench.now)
+        bench.servo.command(0.6, bench.now)
+        bench.servo.step(bench.now)
+        bench.now += DT
+    assert bench.servo.alpha == 0.0
+    assert bench.servo.idle(bench.now) == "disarmed"
+    assert bench.run(1.0, 0.6)[-1] == pytest.approx(0.6)
+
+
+def test_a_servo_that_hears_nothing_of_the_arming_state_centres():
+    bench = ServoBench()
+    bench.run(1.0, 0.6)
+    for _ in range(100):
+        bench.servo.command(0.6, bench.now)
+        bench.servo.step(bench.now)
+        bench.now += DT
+    assert bench.servo.alpha == 0.0
+    assert "no arming/state for 0.2 s" in bench.servo.idle(bench.now)
+
+
 def test_a_late_cycle_earns_no_jump():
     bench = ServoBench()
     bench.run(0.1, 0.0)
     bench.now += 5.0
     bench.servo.command(0.8, bench.now)
+    bench.servo.armed(True, bench.now)
     bench.servo.step(bench.now)
     assert 0.0 < bench.servo.alpha <= SETTINGS.max_rate * 0.05 + 1e-12
 
@@ -329,6 +355,7 @@ class DriverBench:
             self.now += DT
             if alpha is not None:
                 self.driver.command(alpha)
+            self.driver.armed(True)
             self.events += self.driver.step()
 
 
@@ -342,7 +369,7 @@ def test_driver_starts_centred_and_follows(chip):
     bench.run(1.0)
     assert chip.read("duty_cycle") == 1_500_000
     assert bench.driver.status().level == WARN
-    assert bench.events == ["rudder follows commands", "rudder centred: no command"]
+    assert bench.events == ["rudder follows commands", "rudder centred: no command for 0.25 s"]
 
 
 @BOTH_WAYS
@@ -425,6 +452,7 @@ def test_bus_error_loses_the_board_and_finds_it_again():
     def run(duration_s: float) -> None:
         for _ in range(round(duration_s / DT)):
             now[0] += DT
+            driver.armed(True)
             driver.command(0.3 if now[0] % 0.4 < 0.2 else -0.3)
             events.extend(driver.step())
 

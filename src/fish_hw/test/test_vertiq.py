@@ -8,7 +8,7 @@ from waiting import wait_until
 
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.vertiq import Vertiq
+from fish_hw.devices.vertiq import RotorTelemetry, Vertiq
 from fish_hw.protocol.iquart import REPLY, SET, Message, encode
 from fish_hw.transport.recorded import RecordedStream
 from fish_hw.transport.serial_port import SerialPort
@@ -243,12 +243,17 @@ def test_telemetry(module):
     emulator.volts, emulator.amps, emulator.faults = 14.2, 3.5, 0b100100
     emulator.controller_c, emulator.coil_c = 36.5, 51.5
     emulator._booted -= 3600.0
-    telemetry = vertiq.telemetry()
+    telemetry = telemetry_of(vertiq)
     assert (telemetry.volts, telemetry.amps) == pytest.approx((14.2, 3.5))
     assert (telemetry.controller_c, telemetry.coil_c) == pytest.approx((36.5, 51.5))
     assert telemetry.uptime_s == pytest.approx(3600.0, abs=5.0)
     assert reg.fault_names(telemetry.faults) == ["reference voltage", "controller temperature"]
     assert (telemetry.derate, telemetry.mode) == (1.0, reg.COAST)
+
+
+def telemetry_of(vertiq: Vertiq) -> RotorTelemetry:
+    """Answers to both questions."""
+    return vertiq.power().completed(vertiq.state())
 
 
 def dropping(*registers: reg.Register):
@@ -261,18 +266,27 @@ def test_telemetry_keeps_the_answers_that_came(module):
     vertiq, emulator = module
     emulator.faults = 0b10
     emulator.mangle = dropping(reg.DERATE)
-    telemetry = vertiq.telemetry()
+    telemetry = telemetry_of(vertiq)
     assert (telemetry.volts, telemetry.faults, telemetry.derate) == (
         pytest.approx(14.8),
         0b10,
         None,
     )
     emulator.mangle = dropping(reg.TELEMETRY)
-    telemetry = vertiq.telemetry()
+    telemetry = telemetry_of(vertiq)
     assert (telemetry.volts, telemetry.faults, telemetry.derate) == (None, 0b10, 1.0)
     emulator.mangle = dropping(reg.FAULT_NOW, reg.CTRL_MODE)
-    telemetry = vertiq.telemetry()
+    telemetry = telemetry_of(vertiq)
     assert (telemetry.volts, telemetry.faults, telemetry.mode) == (pytest.approx(14.8), None, None)
+
+
+def test_a_register_that_is_never_answered_is_not_asked_for_ever(module):
+    vertiq, emulator = module
+    emulator.mangle = dropping(reg.DERATE)
+    for _ in range(5):
+        assert vertiq.state().faults == 0
+    asked = sum((m.type, m.param) == (reg.DERATE.type, reg.DERATE.param) for m in emulator.log)
+    assert asked == 3
 
 
 def test_fault_memory_that_could_not_be_read_is_not_erased(module):

@@ -25,6 +25,8 @@ BROUGHT_BY = {
     "demo": "fish_bringup",
     "score": "fish_bringup",
     "excite": "fish_bringup",
+    "arm": "fish_bringup",
+    "disarm": "fish_bringup",
     "inspect": "fish_bag",
     "recover": "fish_bag",
     "import_pool": "fish_bag",

@@ -45,7 +45,7 @@ class Readings:
 
 
 class Simulation:
-    """Follows the newest command; without a fresh one the rotor runs down and the rudder centres.
+    """Follows the newest command; without a fresh one, or disarmed, the rotor runs down and the rudder centres.
 
     Attributes:
         walls: the pool's walls and the contacts with them; without `config.walls` nothing asks them.
@@ -61,6 +61,8 @@ class Simulation:
         self._pushed = [names.index(f"disturbance.{key}") for key in ("surge", "sway", "yaw")]
         self._constant_push = self._parameters[self._pushed].copy()
         self._periods = 0  # since the start; a reset does not turn time back
+        self._armed, self._disarmed_time = True, math.inf
+        self._last_command = (0.0, 0.0)
         self.resets = -1
         self.walls = Walls()
         self.reset()
@@ -98,6 +100,12 @@ class Simulation:
         """Time since the last command [s]; infinite before the first."""
         return self.time - self._command_time
 
+    def follow(self, armed: bool) -> None:
+        """Whether rotor and rudder follow commands from the next period on; a new simulation does."""
+        if self._armed and not armed:
+            self._disarmed_time, self._last_command = self.time, self.effective_command()
+        self._armed = armed
+
     def command(self, rotor_speed: float, rudder: float) -> None:
         """Follow this from the next period on [rad/s, rad]. Raises ValueError for what no motor can do."""
         if not (math.isfinite(rotor_speed) and abs(rotor_speed) <= MAX_ROTOR_SPEED):
@@ -109,13 +117,15 @@ class Simulation:
         self._command, self._command_time = (rotor_speed, rudder), self.time
 
     def effective_command(self) -> tuple[float, float]:
-        """The command; a stale one lets the rotor run down in stop_time and the rudder centre."""
-        late = self.command_age - self._config.command_timeout
-        if late <= 0.0:
+        """The command; a stale one or a disarmed robot lets the rotor run down in stop_time and the rudder centre."""
+        late, speed = self.command_age - self._config.command_timeout, self._command[0]
+        if not self._armed:
+            late, speed = self.time - self._disarmed_time, self._last_command[0]
+        elif late <= 0.0:
             return self._command
         if late >= self._config.stop_time:
             return 0.0, 0.0
-        return self._command[0] * (1.0 - late / self._config.stop_time), 0.0
+        return speed * (1.0 - late / self._config.stop_time), 0.0
 
     def advance(self) -> Readings:
         """One period of DT; raises FloatingPointError (after a reset) if the motion diverges."""

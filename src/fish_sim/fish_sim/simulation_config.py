@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from fish_node.arming import ArmingSettings
 from fish_sim import pool
 from fish_sim.sensors import changes_camera_poses
 from fish_sim.sensors.settings import SensorSettings
@@ -23,7 +24,9 @@ class SimulationConfig(SensorSettings):
     walls: bool = True  # stop the head's centre at the pool's edge; false: the water has no end
     disturbance: float = 0.002  # N, std of the water's random push on the head; 0 = still water
     command_timeout: float = 0.25  # s, older commands are stale
-    stop_time: float = 0.5  # s, in which the rotor of a stale command runs down
+    stop_time: float = (
+        0.1  # s, in which the rotor of a stale command or of a disarmed robot runs down
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -42,9 +45,16 @@ class SimulationConfig(SensorSettings):
 
 
 @dataclass(frozen=True)
-class SimulatorConfig(SimulationConfig):
-    """ROS parameters of the simulator node."""
+class SimulatorConfig(SimulationConfig, ArmingSettings):
+    """ROS parameters of the simulator node.
 
+    It owns the arming state as node rotor does on the robot. A busy computer delays pictures and estimates, and nothing
+    real moves, so that an estimate is not needed and silence is borne for longer than on the robot.
+    """
+
+    estimate: str = "watched"  # required | watched | ignored: odometry/filtered and camera/pose
+    odometry_timeout_s: float = 0.5  # s without new odometry/filtered until the robot is disarmed
+    camera_timeout_s: float = 1.0  # s without a new camera/pose until the robot is disarmed
     real_time_factor: float = 1.0  # simulated per real second; 0 = as fast as possible
     camera: str = (
         "image"  # image: the camera node renders; pose: publish camera/pose from the sensor model
@@ -56,6 +66,7 @@ class SimulatorConfig(SimulationConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        ArmingSettings.__post_init__(self)
         if not 0.0 <= self.real_time_factor <= 100.0:
             raise ValueError(f"real_time_factor = {self.real_time_factor}: expected 0 to 100")
         if not 0.0 <= self.lockstep <= 60.0:

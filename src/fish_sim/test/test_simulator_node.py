@@ -38,6 +38,7 @@ TOPICS = {
     "sim/joint_states": JointState,
     "battery_state": BatteryState,
     "camera/pose": PoseWithCovarianceStamped,
+    "arming/state": DiagnosticArray,
     "/diagnostics": DiagnosticArray,
 }
 
@@ -92,6 +93,21 @@ class Bench:
         command.header.stamp = stamp or Time()
         self.commands.publish(command)
 
+    def arm(self) -> None:
+        """As an operator does while commands come."""
+        client = self.peer.create_client(SetBool, "arm")
+        for spin in range(20000):
+            if spin % 5 == 0:
+                self.command(0.0, 0.0)
+                client.call_async(SetBool.Request(data=True))
+            self.executor.spin_once(timeout_sec=1.0)
+            if self.got["arming/state"] and self.armed():
+                return
+        pytest.fail("arming was refused")
+
+    def armed(self) -> bool:
+        return self.got["arming/state"][-1].status[0].level == DiagnosticStatus.OK
+
     def close(self) -> None:
         self.executor.shutdown()
         for node in (self.simulator, self.peer):
@@ -129,11 +145,36 @@ def test_every_topic_has_its_type_frame_and_rate(bench):
     assert gap / (len(pose) - 1) == pytest.approx(1 / 30, rel=0.1)
     assert seconds(bench.got["/clock"][-1].clock) >= stamps[-2]
     status = bench.collect("/diagnostics", 1)[-1].status[0]
-    assert (status.level, status.message[:23]) == (DiagnosticStatus.WARN, "no fresh joint_command:")
+    said = "disarmed: not armed since the start"
+    assert (status.level, status.message) == (DiagnosticStatus.WARN, said)
+
+
+def test_a_commanded_fish_stays_where_it_is_until_it_is_armed(bench):
+    bench.collect("sim/odometry", 1)
+    for _ in range(50):
+        bench.command(100.0, 0.3)
+        bench.collect("sim/odometry", 1)
+    assert all(abs(m.velocity[0]) < 2.0 for m in bench.got["joint_states"])  # the encoder's noise
+    assert max(abs(m.twist.twist.linear.x) for m in bench.got["sim/odometry"]) < 0.01
+
+
+def test_silence_of_the_commands_disarms_for_good(bench):
+    bench.arm()
+    for _ in range(20):
+        bench.command(100.0, 0.0)
+        bench.collect("sim/odometry", 1)
+    bench.until(lambda: not bench.armed())
+    assert bench.got["arming/state"][-1].status[0].message == "no joint_command for 0.25 s"
+    bench.collect("sim/odometry", 20)
+    for _ in range(50):
+        bench.command(100.0, 0.0)
+        bench.collect("sim/odometry", 1)
+    assert all(abs(m.velocity[0]) < 2.0 for m in bench.got["joint_states"][-50:])
+    assert not bench.armed()
 
 
 def test_a_commanded_fish_swims_and_the_truth_says_so(bench):
-    bench.collect("sim/odometry", 1)
+    bench.arm()
     for _ in range(150):
         phase = 4 * math.pi * seconds(bench.got["sim/odometry"][-1].header.stamp)
         bench.command(100 * math.sin(phase), 0.0)
@@ -198,7 +239,7 @@ def test_in_lockstep_a_commander_that_is_late_loses_no_period(bench):
 
 @pytest.mark.parametrize("bench", [{"start_x": 2.1}], indirect=True)
 def test_a_fish_that_comes_to_a_wall_stops_there_and_is_said_once(bench, capfd):
-    bench.collect("sim/odometry", 1)
+    bench.arm()
     for _ in range(400):
         phase = 4 * math.pi * seconds(bench.got["sim/odometry"][-1].header.stamp)
         bench.command(100 * math.sin(phase), 0.0)

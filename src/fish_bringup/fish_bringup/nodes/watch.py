@@ -1,7 +1,7 @@
 """Watches a run from outside, for progress lines and tests: where the robot is, what the nodes say.
 
-In: odometry/filtered, camera/pose, reference/path, /diagnostics. Out: nothing. Not a process of its own: it lives in
-the command that starts the robot.
+In: odometry/filtered, camera/pose, reference/path, arming/state, /diagnostics. Out: nothing; it may call the service arm.
+Not a process of its own: it lives in the command that starts the robot.
 """
 
 from __future__ import annotations
@@ -22,14 +22,18 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from std_msgs.msg import Header
+from std_srvs.srv import SetBool
 
 from fish_bringup.node_table import NAMESPACE, middleware
 from fish_bringup.run_limits import Seen
 from fish_bringup.run_watch import Sight
 from fish_bringup.score import path_from_points
 from fish_control.path_tracker import PathTracker
+from fish_node.nodes.arming import ArmingListener
 
+ASK_AGAIN = 0.5  # s between two requests to arm
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -43,6 +47,9 @@ class WatchNode(Node):
         self.diagnostics: dict[str, dict[str, str]] = {}
         self.levels: dict[str, tuple[int, str]] = {}
         self.tracker: PathTracker | None = None
+        self.refusal = "the service arm is not there"
+        self._arming, self._ask_at = ArmingListener(self), 0.0
+        self._arm = self.create_client(SetBool, "arm")
         self.create_subscription(Path, "reference/path", self._on_path, LATCHED)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 1)
         self.create_subscription(PoseWithCovarianceStamped, "camera/pose", self._on_camera, 1)
@@ -51,6 +58,24 @@ class WatchNode(Node):
     def sees(self, node: str) -> bool:
         """Whether a node of this name is in the graph."""
         return node in self.get_node_names()
+
+    @property
+    def disarmed(self) -> str | None:
+        """Why the robot is disarmed; empty while it is armed, None before anybody said."""
+        return None if self._arming.armed is None else self._arming.reason
+
+    def ask_to_arm(self) -> None:
+        """Ask a disarmed robot to be armed, at most every ASK_AGAIN; `refusal` says why it was not."""
+        now = time.monotonic()
+        if self._arming.armed or now < self._ask_at or not self._arm.service_is_ready():
+            return
+        self._ask_at = now + ASK_AGAIN
+        self._arm.call_async(SetBool.Request(data=True)).add_done_callback(self._on_answer)
+
+    def _on_answer(self, future: Future) -> None:
+        answer = future.result()
+        if answer is not None and not answer.success:
+            self.refusal = answer.message
 
     def _on_path(self, msg: Path) -> None:
         if self.tracker is None and len(msg.poses) > 1:

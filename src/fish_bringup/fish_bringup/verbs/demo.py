@@ -1,9 +1,10 @@
 """The whole robot: start every node, let the fish swim a path, record, score and show it.
 
 Simulator, camera, tracker, fusion, planner, controller and recorder run as processes of their own, on
-their own ROS domain. The run ends at the end of the path (a closed one: after a lap), after --duration, or
-with Ctrl-C; what was recorded is then scored. It ends with an error when the fish is at a wall of the pool or beyond for 1 s,
-when the camera is silent for 30 s, and when a node ends or hangs; the recording is kept. Times are the simulator's.
+their own ROS domain. The command arms the simulated robot itself. The run ends at the end of the path (a closed one: after
+a lap), after --duration, or with Ctrl-C; what was recorded is then scored. It ends with an error when the fish is at a wall
+of the pool or beyond for 1 s, when the camera is silent for 30 s, and when a node ends or hangs; the recording is kept.
+Times are the simulator's.
 """
 
 from __future__ import annotations
@@ -149,6 +150,8 @@ def _swim(
             nodes.start(CONTROLLER, changed.get(CONTROLLER))
             robot.wait_for(lambda: watch.tracker is not None, "reference/path")
             robot.wait_for(lambda: watch.sight is not None, "odometry/filtered")
+            robot.arm()
+            console.print("armed by this command: the robot is simulated, nobody can be hurt")
             end = robot.swim(duration, console)
             nodes.stop([RECORDER])
             return end, _latency_table(watch.diagnostics)

@@ -5,7 +5,8 @@ swims that the pool has room for, each recorded from rest; the folder of recordi
 A swim ends with an error when the fish leaves the pool, when the camera is silent for 30 s, or when it lasts 10 s longer
 than its part of the program, all by the simulator's clock. Every recording is checked: what it lacks is said, and the exit
 status is then 1.
-On the real robot the same program runs with `ros2 launch fish_bringup fish.launch.py robot:=real program:=FILE begin:=S
+The command arms the simulated robot itself. On the real robot a person does (robofish arm), and the same
+program runs with `ros2 launch fish_bringup fish.launch.py robot:=real program:=FILE begin:=S
 end:=S`, swim after swim as --plan lists them.
 """
 
@@ -97,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
         domain = choose_domain(args.domain)
         console = terminal()
         say(console, f"program of {program.duration:g} s, ROS domain {domain}, output in {folder}")
+        say(console, "this command arms the robot for every swim: it is simulated")
         count, lacking = _swim_all(program, robot, args, domain, folder, console)
     recordings = folder / "recordings"
     if lacking:
@@ -208,6 +210,7 @@ def _swim(
         running.wait_for(lambda: watch.sight is not None, "odometry/filtered")
         nodes.start(EXCITER, changed[EXCITER])
         running.wait_for(lambda: EXCITER_NAME in watch.diagnostics, "exciter")
+        running.arm()
         patience, at = Patience(nodes), watch.sight
         run_watch = RunWatch(0.0 if at is None else at.stamp, swim.end - swim.begin + SLACK)
         with console.status("") as line:

@@ -2,8 +2,9 @@
 
 joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder:
 position = alpha (rad). control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy of the
-weights file gives them. The watchdog stops rotor and rudder on stale or bad odometry, lost sensors and a
-stale target; service resume (std_srvs/Trigger) lets the fish swim again where resume is manual. Decisions are
+weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog stops rotor and rudder on
+stale or bad odometry, lost sensors and a stale target, and disarms the robot (arming/disarm); service
+resume (std_srvs/Trigger) lets the fish swim again where resume is manual. Decisions are
 in Controller and Watchdog.
 """
 
@@ -17,7 +18,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 from std_srvs.srv import Trigger
 
 from fish_control.control_law import Gains
@@ -37,6 +38,7 @@ from fish_control.nodes.messages import (
 )
 from fish_control.nodes.reporter import Reporter
 from fish_control.watchdog import Health, Watchdog, loss
+from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.start import read_parameters, run
 
 
@@ -68,6 +70,8 @@ class ControllerNode(Node):
     def _create_interfaces(self) -> None:
         self._command = self.create_publisher(JointState, "joint_command", 10)
         self._gains = self.create_publisher(Float64MultiArray, "control/gains", 10)
+        self._disarm = self.create_publisher(String, "arming/disarm", 10)
+        self._arming = ArmingListener(self)
         self._reporter = Reporter(self, self._command)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_subscription(TwistStamped, "control/twist", self._on_twist, 10)
@@ -112,7 +116,10 @@ class ControllerNode(Node):
         dt = 1.0 / self._config.command_rate_hz if math.isnan(self._now) else now - self._now
         dt = min(max(dt, 0.0), LONGEST_PERIOD)
         self._now = now
+        stops = self._watchdog.stops
         may_swim = self._watchdog.check(now, self._signs(now))
+        if self._watchdog.stops > stops:
+            self._disarm.publish(String(data=f"controller: {self._watchdog.reason}"))
         if not may_swim:
             self._controller.rest()
         elif self._wanted.speed <= 0.0:
@@ -131,6 +138,7 @@ class ControllerNode(Node):
         return Health(
             None if self._odometry is None else estimate_signs(self._odometry, now),
             None if math.isnan(self._target_time) else now - self._target_time,
+            self._arming.reason,
         )
 
     def _report(self) -> None:

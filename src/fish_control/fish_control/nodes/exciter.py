@@ -1,9 +1,9 @@
 """odometry/filtered -> joint_command: runs an open-loop program, for recordings that tell what a robot lacks.
 
 joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder:
-position = alpha (rad). It takes the place of planner and controller, begins when the estimate has come and ends
-by itself. The guard looks at the estimate only to stop: before a wall, and when the estimate is lost. Decisions
-are in Exciter and Excitation.
+position = alpha (rad). It takes the place of planner and controller, begins when the estimate has come and the robot is
+armed (arming/state), and ends by itself. The guard looks at the estimate only to stop: before a wall, and when the estimate
+is lost, which also disarms (arming/disarm). Decisions are in Exciter and Excitation.
 """
 
 import math
@@ -13,6 +13,7 @@ from typing import Any
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from fish_control.controller import LONGEST_PERIOD
 from fish_control.excitation import Excitation, read_program
@@ -27,6 +28,7 @@ from fish_control.nodes.messages import (
     motion_of,
 )
 from fish_control.nodes.reporter import Reporter
+from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.start import read_parameters, run
 
 RESENT = 1000  # commands kept for a recorder that lags on a busy computer: 10 s
@@ -34,6 +36,7 @@ LEVELS: dict[State, bytes] = {
     "waiting": WARN,
     "before a wall": WARN,
     "lost": ERROR,
+    "disarmed": ERROR,
 }  # the others are well
 
 
@@ -59,6 +62,8 @@ class ExciterNode(Node):
         self._now = math.nan
         self._said: State | None = None
         self._command = self.create_publisher(JointState, "joint_command", RESENT)
+        self._disarm = self.create_publisher(String, "arming/disarm", 10)
+        self._arming = ArmingListener(self)
         self._reporter = Reporter(self, self._command)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_timer(1.0 / config.command_rate_hz, self._tick)
@@ -72,9 +77,11 @@ class ExciterNode(Node):
         now = clock.nanoseconds * 1e-9
         dt = 0.0 if math.isnan(self._now) else min(max(now - self._now, 0.0), LONGEST_PERIOD)
         self._now = now
-        command = self._exciter.command(now, dt, self._sight(now))
+        command = self._exciter.command(now, dt, self._sight(now), self._arming.reason)
         self._command.publish(joint_command(clock.to_msg(), command))
         if self._exciter.state != self._said:
+            if self._exciter.state == "lost":
+                self._disarm.publish(String(data=f"exciter: {self._exciter.reason}"))
             self._report()
 
     def _sight(self, now: float) -> Sight | None:

@@ -7,6 +7,8 @@ from fish_hw.devices.vertiq import RotorTelemetry
 from fish_hw.devices.vertiq_registers import fault_names
 from fish_hw.settings.rotor import RotorSettings
 
+HIGH_ANSWERS = 2  # in a row with too high a voltage
+
 
 @dataclass(frozen=True)
 class Health:
@@ -20,7 +22,8 @@ class RotorHealth:
     """Judges telemetry.
 
     The battery is judged by its filtered voltage, v += (1 - exp(-dt / battery_filter_s)) (v_measured - v):
-    the load ripples at 4 Hz. Once it stopped the rotor it must recover above the warning level.
+    the load ripples at 4 Hz. Once it stopped the rotor it must recover above the warning level. Too high a voltage stops
+    it when two answers in a row say so: a single one may be the peak of a braking rotor.
     """
 
     def __init__(self, settings: RotorSettings) -> None:
@@ -29,6 +32,7 @@ class RotorHealth:
         self._known = RotorTelemetry()
         self._last_time = 0.0
         self._battery_stopped = False
+        self._high = 0  # answers in a row
 
     def judge(self, telemetry: RotorTelemetry, now: float) -> Health:
         """Warnings and stops for the newest telemetry; now in s.
@@ -37,6 +41,8 @@ class RotorHealth:
         """
         if telemetry.volts is not None:
             self._filter(telemetry.volts, now)
+            high = telemetry.volts / self._settings.battery_cells > self._settings.cell_over_v
+            self._high = self._high + 1 if high else 0
         telemetry = self._known = telemetry.completed(self._known)
         warnings: list[str] = []
         stops: list[str] = []
@@ -67,8 +73,9 @@ class RotorHealth:
             stops.append(f"battery at {cell:.2f} V per cell")
         elif cell < settings.cell_warn_v:
             warnings.append(f"battery at {cell:.2f} V per cell")
-        if volts / settings.battery_cells > settings.cell_over_v:
-            warnings.append(f"battery driven up to {volts / settings.battery_cells:.2f} V per cell")
+        if self._high:
+            found = stops if self._high >= HIGH_ANSWERS else warnings
+            found.append(f"battery driven up to {volts / settings.battery_cells:.2f} V per cell")
 
     def _judge_temperature(
         self, telemetry: RotorTelemetry, warnings: list[str], stops: list[str]

@@ -43,7 +43,7 @@ class PwmOutput(Protocol):
 
 
 class RudderDriver:
-    """Follows commands; centres when they stop, at the start and at the end."""
+    """Follows commands while the robot is armed; centres when it is not, when they stop, at the start and at the end."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class RudderDriver:
         self._pulse_ns = 0
         self._connected_s = 0.0
         self._checked = 0.0
-        self._stale = True
+        self._idle = "disarmed"
 
     @property
     def connected(self) -> bool:
@@ -71,9 +71,12 @@ class RudderDriver:
         return self._output is not None
 
     def connect(self) -> None:
-        """Open the output and centre; PortUnavailable or TransportError if it cannot."""
+        """Open the output where the servo is; PortUnavailable or TransportError if it cannot.
+
+        That is the centre at the start, and after a loss the angle that was sent last: from there the slew limit holds.
+        """
         output = self._open_output()
-        self._pulse_ns = self.servo.centre_ns()
+        self._pulse_ns = self.servo.pulse_ns(self.servo.alpha)
         self._checked = self._connected_s = self._clock()
         self._output = (
             output  # before there are pulses: close() ends them, too, if a signal interrupts this
@@ -89,6 +92,16 @@ class RudderDriver:
         """Take a commanded angle [rad]."""
         with self._lock:
             self.servo.command(alpha, self._clock())
+
+    def armed(self, armed: bool) -> None:
+        """Take the word of the arming state's owner."""
+        with self._lock:
+            self.servo.armed(armed, self._clock())
+
+    @property
+    def trouble(self) -> str:
+        """Why the rudder cannot steer; empty while its output works."""
+        return "" if self._output is not None else self._link.trouble or "output lost"
 
     def step(self) -> list[str]:
         """One cycle; returns events worth a line in the log."""
@@ -138,21 +151,21 @@ class RudderDriver:
         }
         if self._output is None:
             return Status(ERROR, self._link.trouble, values)
-        if self._stale:
-            return Status(WARN, f"no command for {self._settings.stale_s} s: centred", values)
+        if self._idle:
+            return Status(WARN, f"centred: {self._idle}", values)
         return Status(OK, "following commands", values)
 
     def _cycle(self, output: PwmOutput, now: float) -> list[str]:
         with self._lock:
             pulse_ns = self.servo.step(now)
-            stale = self.servo.stale(now)
+            idle = self.servo.idle(now)
         if pulse_ns != self._pulse_ns:
             output.set_pulse_ns(pulse_ns)
             self._pulse_ns = pulse_ns
         events = self._check(output, now) if now - self._checked >= CHECK_S else []
-        if stale != self._stale:
-            self._stale = stale
-            events.append("rudder centred: no command" if stale else "rudder follows commands")
+        if idle != self._idle:
+            self._idle = idle
+            events.append(f"rudder centred: {idle}" if idle else "rudder follows commands")
         return events
 
     def _check(self, output: PwmOutput, now: float) -> list[str]:

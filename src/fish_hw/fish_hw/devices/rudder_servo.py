@@ -1,4 +1,4 @@
-"""The rudder servo: rudder angle to pulse, with limits, slew rate and watchdog.
+"""The rudder servo: rudder angle to pulse, with limits, slew rate, arming state and watchdog.
 
     pulse = centre_us + us_per_rad sign (alpha + trim), within min_us .. max_us
 
@@ -30,6 +30,7 @@ class RudderServo:
         self._settings = settings
         self._target = 0.0
         self._target_time: float | None = None
+        self._armed_time: float | None = None
         self._last_step: float | None = None
 
     def command(self, alpha: float, now: float) -> None:
@@ -42,15 +43,25 @@ class RudderServo:
         self._target = min(max(alpha, -limit), limit)
         self._target_time = now
 
-    def stale(self, now: float) -> bool:
-        """Whether no good command came for stale_s."""
-        return self._target_time is None or now - self._target_time > self._settings.stale_s
+    def armed(self, armed: bool, now: float) -> None:
+        """Take the word of the arming state's owner."""
+        self._armed_time = now if armed else None
+
+    def idle(self, now: float) -> str:
+        """Why the rudder does not follow commands; empty if it does."""
+        if self._armed_time is None:
+            return "disarmed"
+        if now - self._armed_time > self._settings.armed_timeout_s:
+            return f"no arming/state for {self._settings.armed_timeout_s:g} s"
+        if self._target_time is None or now - self._target_time > self._settings.stale_s:
+            return f"no command for {self._settings.stale_s:g} s"
+        return ""
 
     def step(self, now: float) -> int:
-        """Pulse [ns] of this cycle: towards the command, or to the centre without one."""
+        """Pulse [ns] of this cycle: towards the command, or to the centre while it is idle."""
         dt = 0.0 if self._last_step is None else min(now - self._last_step, LONGEST_STEP_S)
         self._last_step = now
-        target = 0.0 if self.stale(now) else self._target
+        target = 0.0 if self.idle(now) else self._target
         most = self._settings.max_rate * dt
         self.alpha += min(max(target - self.alpha, -most), most)
         return self.pulse_ns(self.alpha)

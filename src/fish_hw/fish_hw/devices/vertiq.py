@@ -83,6 +83,7 @@ class Vertiq:
         self._reply_timeout_s = reply_timeout_s
         self._clock = clock
         self._unanswered = False
+        self._derate_tries = 0  # unanswered in a row, although the rest was answered
         self._asked_s = 0.0  # when the newest question went out
         self._last: RotorSample | None = None
 
@@ -112,15 +113,21 @@ class Vertiq:
         self._stream.write(encode(reg.FAULT_EVER.set(self._module, 0)))
         return int(ever[0])
 
-    def telemetry(self) -> RotorTelemetry:
-        """Voltages, temperatures, faults and mode, as far as the module answers."""
-        slow, faults, mode = self.read(reg.TELEMETRY, reg.FAULT_NOW, reg.CTRL_MODE)
-        (derate,) = self.read(reg.DERATE)
+    def power(self) -> RotorTelemetry:
+        """Battery, temperatures and time since the module's start, if it answers."""
+        (slow,) = self.read(reg.TELEMETRY)
+        if slow is None:
+            return RotorTelemetry()
+        controller, coil, volts, amps, _, _, uptime = slow
+        return RotorTelemetry(controller / 100, coil / 100, volts / 100, amps / 100, uptime)
+
+    def state(self) -> RotorTelemetry:
+        """Faults, control mode and derating, as far as the module answers."""
+        asked = (reg.FAULT_NOW, reg.CTRL_MODE, reg.DERATE)
+        faults, mode, derate = (*self.read(*asked[: 3 if self._has_derate else 2]), None)[:3]
+        if faults is not None and mode is not None:
+            self._derate_tries = 0 if derate is not None else self._derate_tries + 1
         values: dict[str, Any] = {}
-        if slow is not None:
-            controller, coil, volts, amps, _, _, uptime = slow
-            values |= {"controller_c": controller / 100, "coil_c": coil / 100}
-            values |= {"volts": volts / 100, "amps": amps / 100, "uptime_s": uptime}
         if faults is not None:
             values["faults"] = int(faults[0])
         if derate is not None:
@@ -128,6 +135,11 @@ class Vertiq:
         if mode is not None:
             values["mode"] = int(mode[0])
         return RotorTelemetry(**values)
+
+    @property
+    def _has_derate(self) -> bool:
+        """Some firmware has no such register; to wait for its answer for ever would cost time."""
+        return self._derate_tries < CONFIGURE_TRIES
 
     def configure(self, timeout_s: float) -> list[str]:
         """Set the module's own watchdog (coast, no error, no song) and read it back; nothing is saved in the

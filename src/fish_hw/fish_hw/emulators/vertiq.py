@@ -38,6 +38,7 @@ class VertiqEmulator:
         self.module, self.lag_s = module, lag_s
         self.velocity = self.commanded = self.angle = 0.0
         self.mode = reg.COAST
+        self.jammed = False
         self.timeouts = 0
         self.volts, self.amps, self.controller_c, self.coil_c = 14.8, 0.5, 35.0, 40.0
         self.faults = self.faults_ever = 0
@@ -101,7 +102,10 @@ class VertiqEmulator:
             self.mode, self.commanded = reg.COAST, 0.0
             self.timeouts += 1
         target = self.commanded if self.mode == VELOCITY_MODE else 0.0
-        self.velocity += (target - self.velocity) * (1.0 - math.exp(-dt / self.lag_s))
+        if self.jammed:
+            self.velocity = 0.0
+        else:
+            self.velocity += (target - self.velocity) * (1.0 - math.exp(-dt / self.lag_s))
         self.angle += self.velocity * dt
 
     def _handle(self, message: Message) -> None:

@@ -70,7 +70,8 @@ class DeviceNode(Node):
         self._repeat: tuple[Callable[[], None], float] | None = None  # step, period [s]
         self._emulated = False
         self._worker: Worker | None = None
-        self._give_up_s = time.monotonic() + self.settings.startup_timeout_s
+        wait_s = self.settings.startup_timeout_s or float("inf")
+        self._give_up_s = time.monotonic() + wait_s
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._log = StatusLog(self.get_logger())
         self.create_timer(1.0, self._on_diagnostics)
@@ -92,9 +93,9 @@ class DeviceNode(Node):
         try:
             device.connect()
         except (TransportError, DeviceError) as error:
-            if self.settings.startup_timeout_s == 0.0:
-                raise
-            self.get_logger().error(f"{error}; trying for {self.settings.startup_timeout_s} s")
+            limit_s = self.settings.startup_timeout_s
+            how_long = f"for {limit_s:g} s" if limit_s else "until it is there"
+            self.get_logger().error(f"{error}; trying {how_long}")
         else:
             self.get_logger().info("emulated device ready" if self._emulated else "device ready")
         self._worker = Worker(lambda: self._step(device, step), period_s, self._on_failure)
@@ -141,13 +142,12 @@ class DeviceNode(Node):
                 self.get_logger().info(event)
 
     def _step(self, device: Device, step: Callable[[], None]) -> None:
+        step()
         if device.connected:
             self._give_up_s = float("inf")  # from now on it is waited for without end
         elif time.monotonic() > self._give_up_s:
             self.failure = device.status().message
             self.context.try_shutdown()
-            return
-        step()
 
     def _on_failure(self) -> None:
         """A step raised what nobody expected: that must not leave the device as it is."""

@@ -1,25 +1,34 @@
 """Node `rotor`: the Vertiq module that turns the rotor.
 
-In:  joint_command (joint rotor: velocity [rad/s])
+It owns the arming state of the robot (fish_node.nodes.arming): what must stop the rotor is decided where the rotor is
+driven, without a way through another process.
+
+In:  joint_command (joint rotor: velocity [rad/s]), rudder/trouble (std_msgs/String: empty, or why the rudder does not
+     work), odometry/filtered, camera/pose, operator/deadman, operator/estop, arming/disarm
 Out: joint_states (joint rotor: position [rad], velocity [rad/s]; stamped when measured), battery_state,
-     /diagnostics
-Services: ~/enable (std_srvs/SetBool: false stops until true), ~/clear_faults (std_srvs/Trigger)
+     arming/state, /diagnostics
+Services: arm (std_srvs/SetBool: true arms, false disarms), ~/clear_faults (std_srvs/Trigger)
 """
 
 import math
+import time
 
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import BatteryState, JointState
-from std_srvs.srv import SetBool, Trigger
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
-from fish_hw.devices.rotor_driver import RotorDriver
+from fish_hw.devices.leak_sensor import LeakSensor
+from fish_hw.devices.rotor_driver import RUDDER, RotorDriver
 from fish_hw.devices.vertiq import RotorSample, RotorTelemetry
 from fish_hw.emulators.vertiq import VertiqEmulator
 from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.nodes.joint_message import joint_value
 from fish_hw.settings.rotor import RotorSettings
+from fish_hw.transport.gpio_line import InterruptLine
 from fish_hw.transport.interfaces import ByteStream
 from fish_hw.transport.serial_port import SerialPort
+from fish_node.nodes.arming import ArmingServer
 
 BATTERY_PERIOD_S = 1.0
 
@@ -34,10 +43,11 @@ class RotorNode(DeviceNode):
         self._emulator = (
             VertiqEmulator(self.settings.module_id) if self.settings.port == "emulator" else None
         )
-        self._driver = RotorDriver(self.settings, self._open_port)
+        self._driver = RotorDriver(self.settings, self._open_port, leak=self._leak_sensor())
         self._telemetry: RotorTelemetry | None = None
+        self._arming = ArmingServer(self, self._driver.arming, self.settings, time.monotonic)
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
-        self.create_service(SetBool, "~/enable", self._on_enable)
+        self.create_subscription(String, "rudder/trouble", self._on_rudder, QoSProfile(depth=1))
         self.create_service(Trigger, "~/clear_faults", self._on_clear_faults)
         self.create_timer(BATTERY_PERIOD_S, self._on_battery)
         self.use(self._driver, self._cycle, 1.0 / self.settings.rate_hz, self._emulator is not None)
@@ -46,18 +56,24 @@ class RotorNode(DeviceNode):
         port = self.settings.port if self._emulator is None else self._emulator.port
         return SerialPort(port, self.settings.baud)
 
-    def _on_command(self, message: JointState) -> None:
-        velocity = joint_value(message, "rotor", "velocity")
-        self._driver.command(math.nan if velocity is None else velocity)  # counted as rejected
+    def _leak_sensor(self) -> LeakSensor | None:
+        settings = self.settings
+        if settings.leak_line < 0:
+            return None
+        return LeakSensor(
+            lambda: InterruptLine(settings.leak_chip, settings.leak_line),
+            settings.leak_level == "low",
+        )
 
-    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        if request.data:
-            self._driver.enable()
-        else:
-            self._driver.stop("stopped by the operator")
-        response.success = True
-        response.message = "enabled" if request.data else "stopping"
-        return response
+    def _on_command(self, message: JointState) -> None:
+        rudder = joint_value(message, "rudder", "position")
+        if rudder is not None and not math.isfinite(rudder):
+            self._driver.arming.disarm(f"commanded rudder is {rudder}, expected a finite number")
+        self._driver.command(joint_value(message, "rotor", "velocity"))
+
+    def _on_rudder(self, message: String) -> None:
+        trouble = f"rudder: {message.data}" if message.data else ""
+        self._driver.arming.heard(RUDDER, time.monotonic(), trouble)
 
     def _on_clear_faults(
         self, _request: Trigger.Request, response: Trigger.Response
@@ -73,6 +89,7 @@ class RotorNode(DeviceNode):
 
     def _cycle(self) -> None:
         cycle = self._driver.step()
+        self._arming.say_change()
         self.log_events(cycle.events)
         if cycle.telemetry is not None and cycle.telemetry.volts is not None:
             self._telemetry = cycle.telemetry

@@ -1,7 +1,7 @@
 """Node `rudder`: the servo that bends the tail.
 
-In:  joint_command (joint rudder: position = alpha [rad], positive steers left)
-Out: servo pulses, /diagnostics
+In:  joint_command (joint rudder: position = alpha [rad], positive steers left), arming/state
+Out: servo pulses, rudder/trouble (std_msgs/String, 20 Hz: empty, or why the rudder does not work), /diagnostics
 """
 
 import math
@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from fish_hw.devices.rudder_driver import PwmOutput, RudderDriver
 from fish_hw.devices.rudder_output import open_output
@@ -18,16 +19,22 @@ from fish_hw.emulators.pwm_chip import PwmChipEmulator
 from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.nodes.joint_message import joint_value
 from fish_hw.settings.rudder import RudderSettings
+from fish_node.nodes.arming import ArmingListener
+
+TROUBLE_PERIOD_S = 0.05
 
 
 class RudderNode(DeviceNode):
-    """Commands in, pulses out; limits and watchdog are in RudderServo."""
+    """Commands in, pulses out; limits, arming state and watchdog are in RudderServo."""
 
     def __init__(self) -> None:
         super().__init__("rudder", RudderSettings)
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._driver = RudderDriver(self.settings, self._open_output)
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
+        self._arming = ArmingListener(self, self._on_state)
+        self._trouble = self.create_publisher(String, "rudder/trouble", 10)
+        self.create_timer(TROUBLE_PERIOD_S, self._say_trouble)
         emulated = self.settings.backend == "emulator"
         self.use(self._driver, self._cycle, 1.0 / self.settings.rate_hz, emulated)
 
@@ -45,6 +52,12 @@ class RudderNode(DeviceNode):
     def _on_command(self, message: JointState) -> None:
         alpha = joint_value(message, "rudder", "position")
         self._driver.command(math.nan if alpha is None else alpha)  # counted as rejected
+
+    def _on_state(self) -> None:
+        self._driver.armed(bool(self._arming.armed))
+
+    def _say_trouble(self) -> None:
+        self.publish(self._trouble, String(data=self._driver.trouble))
 
     def _cycle(self) -> None:
         self.log_events(self._driver.step())

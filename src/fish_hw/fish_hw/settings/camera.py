@@ -11,7 +11,7 @@ class CameraSettings:
 
     device: str = "/dev/video0"  # V4L2 device, video file (played in a loop), or "emulator"
     startup_timeout_s: float = (
-        0.0  # s to wait for the camera at start; then the node ends with an error
+        0.0  # s to wait for the camera at start, then the node ends with an error; 0: without end
     )
     width: int = 1280  # px
     height: int = 720  # px

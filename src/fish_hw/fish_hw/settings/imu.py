@@ -25,7 +25,7 @@ class ImuSettings:
     )  # i2c: line that H_INTN is wired to (BCM number); -1 not wired: time stamps up to 10 ms late
     port: str = "/dev/ttyUSB0"  # rvc: serial device
     startup_timeout_s: float = (
-        0.0  # s to wait for the sensor at start; then the node ends with an error
+        0.0  # s to wait for the sensor at start, then the node ends with an error; 0: without end
     )
     rate_hz: float = 100.0  # Hz, asked of the sensor (rvc: 100 always)
     watchdog_s: float = (

@@ -19,7 +19,7 @@ class RudderSettings:
     pca_clock_hz: float = 25e6  # Hz, real clock of the board (measure the pulses and correct)
     pwm_hz: float = 50.0  # Hz, repetition of the pulses
     startup_timeout_s: float = (
-        0.0  # s to wait for the port at start; then the node ends with an error
+        0.0  # s to wait for the output at start, then the node ends with an error; 0: without end
     )
     rate_hz: float = 100.0  # Hz, updates of the pulse
     sign: int = 1  # -1 if longer pulses steer right
@@ -31,6 +31,7 @@ class RudderSettings:
     max_angle: float = 0.8  # rad, limit of alpha
     max_rate: float = 6.0  # rad/s, slew limit of alpha
     stale_s: float = 0.25  # s without a command until the rudder goes to the centre
+    armed_timeout_s: float = 0.2  # s without arming/state until the rudder goes to the centre
     off_at_exit: bool = (
         True  # pulses off after centring; some digital servos hold their place all the same
     )
@@ -52,3 +53,4 @@ class RudderSettings:
         require_range("max_angle", self.max_angle, 0.0, 1.6)
         require_range("max_rate", self.max_rate, 0.1, 50.0)
         require_range("stale_s", self.stale_s, 0.02, 2.0)
+        require_range("armed_timeout_s", self.armed_timeout_s, 0.1, 2.0)

@@ -3,8 +3,11 @@
 In: joint_command (sensor_msgs/JointState, names rotor and rudder; rotor: velocity in rad/s, rudder: position
 in rad). Out, 100 Hz: joint_states (rotor encoder), imu/data, sim/odometry (nav_msgs/Odometry, the truth,
 pool -> base_link), sim/joint_states (tail_1 .. relative angles, rad), /clock; 1 Hz: battery_state,
-/diagnostics; with camera:=pose also camera/pose, on which alone the robot file's camera effects act. Services: pause
-(SetBool), reset (Trigger).
+/diagnostics; with camera:=pose also camera/pose, on which alone the robot file's camera effects act. Services: arm
+(SetBool), pause (SetBool), reset (Trigger).
+
+Rotor and rudder move only while the robot is armed. The node owns the arming state (fish_node.nodes.arming) as node rotor
+does on the robot; its clock is the simulated time.
 
 With `walls` the head's centre stops at the pool's edge: one line on the console for each contact, and on /diagnostics
 wall_contacts.
@@ -16,6 +19,7 @@ With lockstep it stands still while joint_command or odometry/filtered are behin
 does not depend on how busy the computer is.
 """
 
+import math
 import time
 
 from builtin_interfaces.msg import Time
@@ -30,6 +34,8 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
+from fish_node.arming import Arming, Source, operator_and_estimate
+from fish_node.nodes.arming import ArmingServer
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
 from fish_node.rivals import Rivals
@@ -45,6 +51,7 @@ from fish_sim.simulation_config import SimulatorConfig
 QUEUE = 10
 RESENT = 1000  # messages that lockstep keeps for a recorder that lags: 10 s
 SAY_AGAIN = 0.5  # s of real time that lockstep waits before it says the newest IMU sample again
+COMMAND = "joint_command"  # source of the arming state
 SLOW = 0.95  # share of the asked pace below which the node says that it lags
 
 
@@ -64,6 +71,9 @@ class SimulatorNode(Node):
             config.real_time_factor == 1.0
             and not config.lockstep
             and not self.get_parameter("use_sim_time").value
+        )
+        self._arming = Arming(
+            (Source(COMMAND, config.command_timeout), *operator_and_estimate(config))
         )
         self._paused = config.paused
         self._refused = self._divergences = self._contacts = 0
@@ -105,12 +115,17 @@ class SimulatorNode(Node):
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
             self.create_subscription(Odometry, "odometry/filtered", self._on_estimate, QUEUE)
+        self._armed = ArmingServer(self, self._arming, self._config, lambda: self._simulation.time)
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Trigger, "reset", self._on_reset)
 
     def _on_command(self, msg: JointState) -> None:
         try:
-            self._simulation.command(*messages.command(msg))
+            speed, rudder = messages.command(msg)
+            if not (math.isfinite(speed) and math.isfinite(rudder)):
+                self._arming.disarm(f"commanded {speed} rad/s and {rudder} rad, expected numbers")
+            self._simulation.command(speed, rudder)
+            self._arming.heard(COMMAND, self._simulation.time)
         except ValueError as error:
             self._refused += 1
             self._refusal = str(error)
@@ -153,6 +168,8 @@ class SimulatorNode(Node):
             self._restart_pace()
             return
         for _ in range(min(periods, 1) if self._config.lockstep else periods):
+            self._simulation.follow(self._arming.check(self._simulation.time))
+            self._armed.say_change()
             try:
                 self._publish(self._simulation.advance())
             except FloatingPointError as error:
@@ -266,8 +283,8 @@ class SimulatorNode(Node):
             )
         if pace < SLOW * self._config.real_time_factor:
             return DiagnosticStatus.WARN, f"behind real time, running at {pace:.2f}"
-        if self._simulation.command_age > self._config.command_timeout:
-            return DiagnosticStatus.WARN, "no fresh joint_command: rotor runs down, rudder centred"
+        if not self._arming.armed:
+            return DiagnosticStatus.WARN, f"disarmed: {self._arming.reason}"
         return DiagnosticStatus.OK, "running"
 
 

@@ -1,0 +1,17 @@
+"""Disarm the robot: the rotor ramps down and coasts, the rudder goes to its centre, until it is armed again."""
+
+from __future__ import annotations
+
+import argparse
+
+from fish_bringup.verbs.arm import add_robot, ask
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    add_robot(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Ask the robot, and say what it answers."""
+    return ask(False, args)

@@ -1,0 +1,180 @@
+"""Whether the motors may move: disarmed at the start, armed by a person, disarmed by any trouble and then latched.
+
+Disarmed is the state that nothing but `arm` ends: neither a fresh command nor a device that is back. No ROS and no
+clock of its own; times are in s of one clock that is never set.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+ESTIMATES = ("required", "watched", "ignored")
+AT_START = "not armed since the start"
+
+
+@dataclass(frozen=True)
+class ArmingSettings:
+    """Parameters of the node that owns the arming state.
+
+    estimate: "required" refuses to arm without odometry and camera poses, "watched" disarms when they cease to come,
+    "ignored" does not look at them (tests on the bench).
+    """
+
+    estimate: str = "required"  # required | watched | ignored: odometry/filtered and camera/pose
+    odometry_timeout_s: float = 0.15  # s without new odometry/filtered until the robot is disarmed
+    camera_timeout_s: float = 0.2  # s without a new camera/pose until the robot is disarmed
+    largest_variance: float = 1.0  # m^2, rad^2 and their rates; fusion marks what it lost with 1e4
+    deadman_timeout_s: float = 0.0  # s without `true` on operator/deadman; 0: no deadman is used
+
+    def __post_init__(self) -> None:
+        if self.estimate not in ESTIMATES:
+            raise ValueError(f"estimate is {self.estimate!r}, expected one of {ESTIMATES}")
+        for name, low, high in (
+            ("odometry_timeout_s", 0.02, 5.0),
+            ("camera_timeout_s", 0.05, 5.0),
+            ("largest_variance", 1e-6, 1e3),
+            ("deadman_timeout_s", 0.0, 5.0),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} is {value}, expected {low:g} to {high:g}")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Something that must be well, and must go on coming, while the robot is armed.
+
+    Attributes:
+        name: what it is in messages, such as joint_command.
+        timeout_s: silence [s] that disarms; infinite where silence is no trouble.
+        required: whether the robot can be armed without having heard it.
+    """
+
+    name: str
+    timeout_s: float = math.inf
+    required: bool = True
+
+
+@dataclass
+class _Heard:
+    """The newest word of a source."""
+
+    time_s: float | None = None
+    trouble: str = ""
+
+
+class Arming:
+    """The arming state of one robot; methods may be called from several threads.
+
+    Attributes:
+        reason: why the robot is disarmed; empty while it is armed.
+        count: how often it was armed.
+    """
+
+    def __init__(self, sources: Iterable[Source] = ()) -> None:
+        self.reason = AT_START
+        self.count = 0
+        self._armed = False
+        self._sources = {source.name: source for source in sources}
+        self._heard = {name: _Heard() for name in self._sources}
+        self._lock = threading.RLock()
+
+    @property
+    def armed(self) -> bool:
+        """Whether the motors may move, as of the last check."""
+        return self._armed
+
+    def heard(self, name: str, now: float, trouble: str = "") -> None:
+        """Note that a source spoke at `now` [s], and what its trouble is; an unknown name has no timeout."""
+        with self._lock:
+            self._sources.setdefault(name, Source(name, required=False))
+            self._heard[name] = _Heard(now, trouble)
+
+    def troubles(self, now: float) -> list[str]:
+        """Everything that forbids to move at `now` [s], in words."""
+        with self._lock:
+            found = [self._trouble(source, now) for source in self._sources.values()]
+        return [trouble for trouble in found if trouble]
+
+    def arm(self, now: float) -> str:
+        """Arm; the reason why not, or an empty text."""
+        with self._lock:
+            self._forget_silent(now)
+            if troubles := self.troubles(now):
+                return "; ".join(troubles)
+            if not self._armed:
+                self._armed, self.reason = True, ""
+                self.count += 1
+            return ""
+
+    def disarm(self, reason: str) -> None:
+        """Disarm until `arm`; the first reason of a stop is kept."""
+        with self._lock:
+            if self._armed:
+                self._armed, self.reason = False, reason
+
+    def check(self, now: float) -> bool:
+        """Whether the motors may move at `now` [s]; disarms at the first trouble."""
+        with self._lock:
+            if self._armed and (troubles := self.troubles(now)):
+                self.disarm("; ".join(troubles))
+            return self._armed
+
+    def _forget_silent(self, now: float) -> None:
+        """What is not required and fell silent is not waited for."""
+        for name, source in self._sources.items():
+            time_s = self._heard[name].time_s
+            if not source.required and time_s is not None and now - time_s > source.timeout_s:
+                self._heard[name] = _Heard()
+
+    def _trouble(self, source: Source, now: float) -> str:
+        heard = self._heard[source.name]
+        if heard.time_s is None:
+            return f"no {source.name} yet" if source.required else ""
+        if heard.trouble:
+            return heard.trouble
+        if now - heard.time_s > source.timeout_s:
+            return f"no {source.name} for {source.timeout_s:g} s"
+        return ""
+
+
+ODOMETRY, CAMERA, DEADMAN, ESTOP = (
+    "odometry/filtered",
+    "camera/pose",
+    "operator/deadman",
+    "operator/estop",
+)
+
+
+def operator_and_estimate(settings: ArmingSettings) -> tuple[Source, ...]:
+    """The sources that every owner of the arming state has: the estimate of the motion, and the deadman if one is used."""
+    sources: list[Source] = []
+    if settings.estimate != "ignored":
+        required = settings.estimate == "required"
+        sources += [
+            Source(ODOMETRY, settings.odometry_timeout_s, required),
+            Source(CAMERA, settings.camera_timeout_s, required),
+        ]
+    if settings.deadman_timeout_s > 0.0:
+        sources.append(Source(DEADMAN, settings.deadman_timeout_s))
+    return tuple(sources)
+
+
+def estimate_trouble(
+    pose_variance: float, twist_variance: float, finite: bool, largest_variance: float
+) -> str:
+    """What is wrong with an estimate of the motion; empty if nothing is.
+
+    The variances are the largest of the pose [m^2, rad^2] and of the velocity [m^2/s^2, rad^2/s^2]; one that is no number
+    is too large.
+    """
+    if not finite:
+        return "odometry/filtered is not finite"
+    if not pose_variance <= largest_variance:
+        return "camera lost: fusion does not vouch for the pose"
+    if not twist_variance <= largest_variance:
+        return "IMU lost: fusion does not vouch for the velocity"
+    return ""

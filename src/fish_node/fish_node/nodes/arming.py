@@ -1,0 +1,169 @@
+"""The arming state in ROS: the node that owns it serves and publishes it, the others listen.
+
+Owner (node rotor on the robot, node simulator in simulation). Service arm (std_srvs/SetBool: true arms, false disarms).
+Out: arming/state (diagnostic_msgs/DiagnosticArray: level OK is armed, the message is the reason), 20 Hz and on change.
+In: odometry/filtered, camera/pose, operator/estop and operator/deadman (std_msgs/Bool), arming/disarm (std_msgs/String:
+another node's reason to disarm).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool, Header, String
+from std_srvs.srv import SetBool
+
+from fish_node.arming import (
+    CAMERA,
+    DEADMAN,
+    ESTOP,
+    ODOMETRY,
+    Arming,
+    ArmingSettings,
+    estimate_trouble,
+)
+
+STATE_PERIOD_S = 0.05
+PLANAR = (0, 7, 35)  # x, y and rotation about z on the diagonal of a covariance of 6
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+ARMED = "armed"
+
+
+class ArmingServer:
+    """Serves and publishes the arming state of a node, and hears its sources.
+
+    Args:
+        node: the owner.
+        arming: the state.
+        clock: s, the clock of the arming state.
+    """
+
+    def __init__(
+        self, node: Node, arming: Arming, settings: ArmingSettings, clock: Callable[[], float]
+    ) -> None:
+        self._node, self._arming, self._settings, self._clock = node, arming, settings, clock
+        self._stamps: dict[str, Time] = {}
+        self._said: str | None = None
+        self._state = node.create_publisher(DiagnosticArray, "arming/state", 10)
+        node.create_service(SetBool, "arm", self._on_arm)
+        if settings.estimate != "ignored":
+            node.create_subscription(Odometry, "odometry/filtered", self._on_odometry, NEWEST)
+            node.create_subscription(
+                PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST
+            )
+        if settings.deadman_timeout_s > 0.0:
+            node.create_subscription(Bool, "operator/deadman", self._on_deadman, 1)
+        node.create_subscription(Bool, "operator/estop", self._on_estop, 1)
+        node.create_subscription(String, "arming/disarm", self._on_disarm, 10)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(STATE_PERIOD_S, self.publish, clock=steady)
+
+    def say_change(self) -> None:
+        """Publish and log at once if the state is not the one published last."""
+        if self._arming.reason != self._said:
+            self.publish()
+
+    def publish(self) -> None:
+        """Publish the state; log it if it changed."""
+        self._arming.check(self._clock())
+        armed, reason = self._arming.armed, self._arming.reason
+        if reason != self._said:
+            self._said = reason
+            log = self._node.get_logger()
+            if armed:
+                log.info("armed: the motors follow commands")
+            else:
+                log.warning(f"disarmed: {reason}")
+        level = DiagnosticStatus.OK if armed else DiagnosticStatus.WARN
+        status = DiagnosticStatus(name="arming", level=level, message=reason or ARMED)
+        status.values = [KeyValue(key="count", value=str(self._arming.count))]
+        stamp = self._node.get_clock().now().to_msg()
+        try:
+            self._state.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
+        except RCLError:  # a device's thread lives a little longer than the context
+            if self._node.context.ok():
+                raise
+
+    def _on_arm(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        if request.data:
+            refusal = self._arming.arm(self._clock())
+            response.success, response.message = not refusal, refusal or "armed"
+        else:
+            self._arming.disarm("disarmed by the operator")
+            response.success, response.message = True, "disarmed"
+        self.publish()
+        return response
+
+    def _on_odometry(self, message: Odometry) -> None:
+        if not self._is_new(ODOMETRY, message.header.stamp):
+            return
+        pose, twist = message.pose, message.twist
+        position, speed = pose.pose.position, twist.twist
+        q = pose.pose.orientation
+        values = (position.x, position.y, q.z, q.w, speed.linear.x, speed.linear.y, speed.angular.z)
+        trouble = estimate_trouble(
+            max_or_nan(pose.covariance[i] for i in PLANAR),
+            max_or_nan(twist.covariance[i] for i in PLANAR),
+            all(map(math.isfinite, values)),
+            self._settings.largest_variance,
+        )
+        self._arming.heard(ODOMETRY, self._clock(), trouble)
+
+    def _on_camera(self, message: PoseWithCovarianceStamped) -> None:
+        if self._is_new(CAMERA, message.header.stamp):
+            self._arming.heard(CAMERA, self._clock())
+
+    def _on_deadman(self, message: Bool) -> None:
+        trouble = "" if message.data else "the operator let the deadman go"
+        self._arming.heard(DEADMAN, self._clock(), trouble)
+
+    def _on_estop(self, message: Bool) -> None:
+        trouble = "emergency stop is pressed" if message.data else ""
+        self._arming.heard(ESTOP, self._clock(), trouble)
+        self._arming.check(self._clock())
+        self.say_change()
+
+    def _on_disarm(self, message: String) -> None:
+        self._arming.disarm(message.data or "a node asked for it without a reason")
+        self.say_change()
+
+    def _is_new(self, source: str, stamp: Time) -> bool:
+        """Whether a message is not the one before again: one that repeats a stamp says nothing new."""
+        before, self._stamps[source] = self._stamps.get(source), stamp
+        return bool(stamp != before)
+
+
+class ArmingListener:
+    """What a node hears of the arming state.
+
+    Attributes:
+        armed: None before the first word.
+        reason: why the robot is disarmed; empty while it is armed and before the first word.
+    """
+
+    def __init__(self, node: Node, on_state: Callable[[], None] = lambda: None) -> None:
+        self.armed: bool | None = None
+        self.reason = ""
+        self._on_state = on_state
+        node.create_subscription(DiagnosticArray, "arming/state", self._on_message, 10)
+
+    def _on_message(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.armed = status.level == DiagnosticStatus.OK
+            self.reason = "" if self.armed else status.message
+        self._on_state()
+
+
+def max_or_nan(values: Iterable[float]) -> float:
+    """The largest value; NaN if one is no number."""
+    found = list(values)
+    return math.nan if any(map(math.isnan, found)) else max(found)

@@ -1,0 +1,147 @@
+"""The arming state: who arms, what disarms, what stays latched."""
+
+import math
+
+import pytest
+
+from fish_node.arming import (
+    AT_START,
+    CAMERA,
+    DEADMAN,
+    ESTOP,
+    ODOMETRY,
+    Arming,
+    ArmingSettings,
+    Source,
+    estimate_trouble,
+    operator_and_estimate,
+)
+
+COMMAND = Source("joint_command", 0.15)
+SETTINGS = ArmingSettings(deadman_timeout_s=0.3)
+
+
+def ready(*more: Source) -> Arming:
+    """Every source was heard at 0 s."""
+    arming = Arming((COMMAND, *operator_and_estimate(SETTINGS), *more))
+    for name in (COMMAND.name, ODOMETRY, CAMERA, DEADMAN):
+        arming.heard(name, 0.0)
+    return arming
+
+
+def armed(*more: Source) -> Arming:
+    arming = ready(*more)
+    assert arming.arm(0.0) == ""
+    return arming
+
+
+def hear_all_but(arming: Arming, silent: str, now: float) -> None:
+    for name in (COMMAND.name, ODOMETRY, CAMERA, DEADMAN):
+        if name != silent:
+            arming.heard(name, now)
+
+
+def test_a_robot_is_disarmed_until_a_person_arms_it():
+    arming = ready()
+    assert not arming.check(0.0)
+    assert arming.reason == AT_START
+    assert arming.arm(0.0) == ""
+    assert arming.check(0.1)
+    assert (arming.reason, arming.count) == ("", 1)
+
+
+def test_arming_is_refused_with_every_reason():
+    arming = Arming((COMMAND, Source("rotor module")))
+    arming.heard("rotor module", 0.0, "module faults: coil temperature")
+    assert arming.arm(0.0) == "no joint_command yet; module faults: coil temperature"
+    assert not arming.armed
+    assert arming.count == 0
+
+
+@pytest.mark.parametrize(
+    ("silent", "limit_s"), [(COMMAND.name, 0.15), (ODOMETRY, 0.15), (CAMERA, 0.2), (DEADMAN, 0.3)]
+)
+def test_silence_of_a_source_disarms_after_its_timeout(silent, limit_s):
+    arming, now = armed(), 0.0
+    while arming.check(now):
+        now += 0.01
+        hear_all_but(arming, silent, now)
+    assert now == pytest.approx(limit_s, abs=0.02)
+    assert arming.reason == f"no {silent} for {limit_s:g} s"
+
+
+@pytest.mark.parametrize(
+    ("name", "trouble"),
+    [
+        ("rotor module", "coil at 90 deg C"),
+        ("leak sensor", "leak: water in the hull"),
+        (ESTOP, "emergency stop is pressed"),
+        (DEADMAN, "the operator let the deadman go"),
+        (ODOMETRY, "IMU lost: fusion does not vouch for the velocity"),
+    ],
+)
+def test_a_trouble_disarms_at_once_and_its_end_does_not_arm_again(name, trouble):
+    arming = armed()
+    arming.heard(name, 0.01, trouble)
+    assert not arming.check(0.01)
+    assert arming.reason == trouble
+    assert trouble in arming.arm(0.02)  # refused while it lasts
+    arming.heard(name, 0.03)
+    assert not arming.check(0.03)
+    assert arming.reason == trouble
+    assert arming.arm(0.03) == ""
+    assert arming.check(0.04)
+
+
+def test_the_first_reason_is_kept():
+    arming = armed()
+    arming.disarm("rotor jammed")
+    arming.disarm("disarmed by the operator")
+    assert not arming.check(5.0)
+    assert arming.reason == "rotor jammed"
+
+
+def test_what_is_only_watched_is_not_needed_but_disarms_when_it_ceases():
+    settings = ArmingSettings(estimate="watched")
+    arming = Arming(operator_and_estimate(settings))
+    assert arming.arm(0.0) == ""
+    assert arming.check(100.0)
+    arming.heard(CAMERA, 100.0)
+    assert arming.check(100.1)
+    assert not arming.check(101.0)
+    assert arming.reason == "no camera/pose for 0.2 s"
+    assert arming.arm(102.0) == ""  # it is not waited for
+    assert arming.check(200.0)
+
+
+def test_an_ignored_estimate_has_no_say():
+    assert operator_and_estimate(ArmingSettings(estimate="ignored")) == ()
+
+
+@pytest.mark.parametrize(
+    ("pose", "twist", "finite", "said"),
+    [
+        (0.1, 0.1, True, ""),
+        (1e4, 0.1, True, "camera lost"),
+        (0.1, 1e4, True, "IMU lost"),
+        (math.nan, 0.1, True, "camera lost"),
+        (0.1, 0.1, False, "not finite"),
+    ],
+)
+def test_what_fusion_does_not_vouch_for_is_lost(pose, twist, finite, said):
+    trouble = estimate_trouble(pose, twist, finite, 1.0)
+    assert said in trouble
+    assert bool(trouble) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"estimate": "maybe"}, "estimate is 'maybe'"),
+        ({"camera_timeout_s": math.nan}, "camera_timeout_s is nan, expected 0.05 to 5"),
+        ({"deadman_timeout_s": -1.0}, "deadman_timeout_s is -1.0"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(values, said):
+    with pytest.raises(ValueError, match=said):
+        ArmingSettings(**values)
