@@ -1,7 +1,7 @@
 from setuptools import find_packages, setup
 
 NAME = "fish_sysid"
-VERBS = ("identify", "diagnose", "predict", "coverage")
+VERBS = ("identify", "diagnose", "predict", "coverage", "plan_calibration", "distinguish")
 
 setup(
     name=NAME,

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fish_bringup.excursions import Excursion
 from fish_bringup.node_table import ROBOTS, NodeSpec
 from fish_bringup.run_limits import LONGEST_WITHOUT_CAMERA, Seen
 from fish_bringup.run_watch import FUSION, Robot, Sight
 from fish_bringup.verbs import excite
+from fish_control.excursions import Excursion
 from fish_control.path_tracker import PathTracker
 from fish_control.paths import make_path
 from fish_control.pool import HALF_LENGTH

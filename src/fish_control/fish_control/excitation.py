@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from fish_control.control_law import AMPLITUDE_AT_FULL_THROTTLE, ControlLimits
 from fish_control.controller import Command
@@ -26,6 +28,7 @@ FASTEST_ROTOR = (
     AMPLITUDE_AT_FULL_THROTTLE * 2.0 * math.pi * STROKE_FREQUENCY
 )  # rad/s, at full throttle
 FREQUENCY_RATE = 4.0  # Hz/s; the rotor's speed must not jump
+PERIOD = 0.01  # s between commands
 STOPPING = 3.0  # s that a stopped fish holds its rudder, until it stands
 LIMITS = ControlLimits()
 EXPECTED = "a list of rows {t: s, amplitude: rad, frequency: Hz, rudder: rad}, alone, under `program` or in a diagnosis.json"
@@ -46,9 +49,10 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Program:
-    """Rows in the order of time; the last one lasts LAST_ROW."""
+    """Rows in the order of time; the last one lasts LAST_ROW, or until the last of `ends`."""
 
     rows: tuple[Row, ...]
+    ends: tuple[float, ...] = ()  # s at which a swim ends and the next one begins from rest
 
     def __post_init__(self) -> None:
         if not self.rows:
@@ -61,11 +65,20 @@ class Program:
                 raise ProgramError(
                     f"row {number}: t is {t:g} s, expected more than the {before:g} s of the row before"
                 )
+        if self.ends and (self.ends[-1] <= times[-1] or list(self.ends) != sorted(self.ends)):
+            raise ProgramError(
+                f"swims end at {', '.join(f'{t:g}' for t in self.ends)} s, expected times in order, the last after the last row "
+                f"at {times[-1]:g} s"
+            )
 
     @property
     def duration(self) -> float:
         """Time at which all ends [s]."""
-        return self.rows[-1].t + LAST_ROW
+        return self.ends[-1] if self.ends else self.rows[-1].t + LAST_ROW
+
+    def end_of_swim(self, t: float) -> float:
+        """End [s] of the swim that is under way, or begins, at t [s]."""
+        return next((end for end in self.ends if end > t + 1e-9), self.duration)
 
     def at(self, t: float) -> Row:
         """The row of time t [s]."""
@@ -86,15 +99,35 @@ def read_program(path: Path) -> Program:
         raise ProgramError(
             f"{path} is neither JSON nor YAML ({error.__class__.__name__}); expected {EXPECTED}"
         ) from None
+    ends: tuple[float, ...] = ()
     for key in ("next_experiment", "program"):
         if isinstance(content, dict) and key in content:
+            ends = _ends(path, content)
             content = content[key]
     if not isinstance(content, list):
         raise ProgramError(f"{path} holds {type(content).__name__}; expected {EXPECTED}")
     try:
-        return Program(tuple(_row(number, entry) for number, entry in enumerate(content)))
+        return Program(tuple(_row(number, entry) for number, entry in enumerate(content)), ends)
     except ProgramError as error:
         raise ProgramError(f"{path}: {error}") from None
+
+
+def _ends(path: Path, content: dict[str, Any]) -> tuple[float, ...]:
+    """When the swims of a calibration plan end [s]; none of other files."""
+    swims = content.get("swims", [])
+    if not isinstance(swims, list) or not all(
+        isinstance(swim, dict) and isinstance(swim.get("end"), int | float) for swim in swims
+    ):
+        raise ProgramError(f"{path}: swims is {swims!r}; expected a list of {{begin: s, end: s}}")
+    return tuple(float(swim["end"]) for swim in swims)
+
+
+def command_table(program: Program, begin: float, end: float, glide: float) -> NDArray[np.float64]:
+    """(T, 2) rotor speed [rad/s] and rudder [rad] every 10 ms from `begin` to `end` [s] and `glide` [s] beyond."""
+    excitation = Excitation(program, begin, end)
+    count = round((end - begin + glide) / PERIOD)
+    commands = [excitation.command(PERIOD) for _ in range(count)]
+    return np.array([[c.rotor_speed, c.alpha] for c in commands])
 
 
 class Excitation:

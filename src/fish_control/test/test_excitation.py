@@ -14,6 +14,7 @@ from fish_control.excitation import (
     Program,
     ProgramError,
     Row,
+    command_table,
     read_program,
 )
 
@@ -150,3 +151,29 @@ def test_what_is_no_program_is_named(tmp_path, content, said):
 def test_an_empty_part_of_a_program_is_refused(begin, end):
     with pytest.raises(ProgramError, match="begin is"):
         Excitation(Program((Row(0.0, 8.0, 2.0, 0.0),)), begin, end)
+
+
+def test_a_plan_ends_its_swims_where_it_says(tmp_path):
+    file = tmp_path / "plan.json"
+    rows = [{"t": t, "amplitude": 8, "frequency": 2, "rudder": 0.3} for t in (0, 6)]
+    swims = [{"begin": 0, "end": 6, "what": "one"}, {"begin": 6, "end": 9, "what": "another"}]
+    file.write_text(json.dumps({"program": rows, "swims": swims}))
+    program = read_program(file)
+    assert program.duration == 9.0
+    assert [program.end_of_swim(t) for t in (0.0, 5.9, 6.0, 8.0)] == [6.0, 6.0, 9.0, 9.0]
+
+
+@pytest.mark.parametrize("swims", [[{"end": 9}, {"end": 7}], [{"end": 5}], [{"begin": 0}], "all"])
+def test_swims_that_end_in_no_order_are_refused(tmp_path, swims):
+    file = tmp_path / "plan.json"
+    rows = [{"t": t, "amplitude": 8, "frequency": 2, "rudder": 0.3} for t in (0, 6)]
+    file.write_text(json.dumps({"program": rows, "swims": swims}))
+    with pytest.raises(ProgramError, match="expected"):
+        read_program(file)
+
+
+def test_a_command_table_glides_after_its_end():
+    table = command_table(Program((Row(0.0, 6.0, 2.0, 0.4),)), 0.0, 2.0, 3.0)
+    assert table.shape == (500, 2)
+    assert np.abs(table[:200, 1]).min() == 0.4
+    assert np.abs(table[450:]).max() < 1e-9

@@ -34,6 +34,8 @@ BROUGHT_BY = {
     "diagnose": "fish_sysid",
     "predict": "fish_sysid",
     "coverage": "fish_sysid",
+    "plan_calibration": "fish_sysid",
+    "distinguish": "fish_sysid",
     "train": "fish_train",
     "evaluate": "fish_train",
     "weights": "fish_train",
@@ -78,7 +80,7 @@ def usage() -> str:
 
 def run_verb(verb: str, argv: list[str] | None = None) -> int:
     """Parse the arguments of one verb and run it; an error that the user can mend becomes one line and status 1."""
-    verbs = installed_verbs()
+    verbs, verb = installed_verbs(), verb.replace("-", "_")
     if verb not in verbs:
         print(f"robofish: {_unknown(verb, verbs)}", file=sys.stderr)
         return 2

@@ -12,9 +12,13 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.parametrization import Parametrization, nominal_hypothesis
+from fish_sysid.estimation.parametrization import (
+    KNOWLEDGE_PRIOR,
+    Parametrization,
+    nominal_hypothesis,
+)
 from fish_sysid.estimation.shooting.clustered_errors import clustered_covariance, scores_by_trial
-from fish_sysid.estimation.shooting.coordinates import KNOWLEDGE, ShotParametrization
+from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.multiple_shooting import Shooting
 from fish_sysid.estimation.shooting.multistep import Multistep
 from fish_sysid.estimation.shooting.prediction_fit import with_links
@@ -183,7 +187,7 @@ def test_the_prior_is_as_wide_as_what_is_known() -> None:
         NOMINAL, knowledge={"head_drag_surge": "measured", "head_drag_yaw": "estimated"}
     )
     coordinates = ShotParametrization(nominal_hypothesis(robot, FREE))
-    expected = [KNOWLEDGE[word] for word in ("measured", "estimated", "unknown")]
+    expected = [KNOWLEDGE_PRIOR[word] for word in ("measured", "estimated", "unknown")]
     assert coordinates.prior.tolist() == expected
 
 

@@ -14,19 +14,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
 
 from fish_bag import read_trial
 from fish_bringup.excite_check import incomplete
-from fish_bringup.excursions import (
-    COAST,
-    SHORTEST,
-    Excursion,
-    excursions,
-    next_excursion,
-)
 from fish_bringup.node_table import (
     EXCITER,
     RECORDER,
@@ -46,6 +40,14 @@ from fish_bringup.run_watch import (
 )
 from fish_bringup.run_watch import Robot as Running
 from fish_control.excitation import LAST_ROW, Program, read_program
+from fish_control.excursions import (
+    COAST,
+    SHORTEST,
+    Excursion,
+    excursions,
+    next_begin,
+    next_excursion,
+)
 from fish_node.domain import choose_domain
 from fish_report.errors import UserError, user_errors
 from fish_report.interruption import Interruption
@@ -54,6 +56,7 @@ from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
 from fish_sim.robot import Robot
 from fish_sim.robot_argument import read_model
+from fish_sim.way import way_from_rest
 
 SIMULATOR, CAMERA = SIMULATED
 EXCITER_NAME = "fish/exciter"
@@ -92,7 +95,10 @@ def run(args: argparse.Namespace) -> int:
                 f"{program.duration:g} s ({LAST_ROW:g} s from its last row on), a swim at least {SHORTEST:g} s"
             )
         if args.plan:
-            print_table(terminal(), plan_table(excursions(program, robot, args.begin)))
+            print_table(
+                terminal(),
+                plan_table(excursions(program, partial(way_from_rest, robot), args.begin)),
+            )
             return 0
         folder = new_folder(args.out, "excite")
         domain = choose_domain(args.domain)
@@ -141,7 +147,7 @@ def _swim_all(
     begin, count, lacking = args.begin, 0, []
     with Interruption() as interruption:
         while program.duration - begin >= SHORTEST and not interruption.asked:
-            swim = next_excursion(program, begin, robot)
+            swim = next_excursion(program, begin, partial(way_from_rest, robot))
             name = f"trial_{count:02d}"
             changed = parameters(args, swim, folder, name)
             reached, said = _swim(
@@ -159,7 +165,7 @@ def _swim_all(
                 raise UserError(
                     f"the fish came no further than {reached:.1f} s; see the logs in {folder / 'logs'}"
                 )
-            begin = reached
+            begin = next_begin(program, reached)
     return count, lacking
 
 

@@ -68,7 +68,7 @@ def record(
     pushed = robot.with_effect("disturbance")
     stepper = Stepper.of(pushed)
     state, wrench = _swim(stepper, stepper.parameters(pushed), commands, noise, random)
-    gyro, accel = _imu(stepper, stepper.parameters(pushed), state, wrench, commands)
+    gyro, accel = true_imu(stepper, stepper.parameters(pushed), state, wrench, commands)
     T, M = commands.shape[:2]
     bias = random.standard_normal((M, 3)) * BIAS
     gyro = gyro + bias[:, 0] + noise.gyro * random.standard_normal((T, M))
@@ -103,7 +103,7 @@ def _swim(
     return states, wrench
 
 
-def _imu(
+def true_imu(
     stepper: Stepper, p: Array, state: Array, wrench: Array, commands: Array
 ) -> tuple[Array, Array]:
     """True yaw rate (T, M) and acceleration forward and left (T, M, 2) just after the grid points."""

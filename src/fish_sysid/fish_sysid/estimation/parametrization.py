@@ -53,6 +53,8 @@ LOG_PRIOR = {
     "fin_inertia_factor": 0.3,
 }  # others: WIDE_PRIOR
 WIDE_PRIOR = 0.5  # of the logarithm: "tens of per cent"
+# standard deviation of the logarithm by what a robot.yaml says of a parameter: 5 %, tens of per cent, a factor of three
+KNOWLEDGE_PRIOR = {"measured": 0.05, "estimated": 0.3, "unknown": 1.1}
 EFFECT_PRIOR = 4.0  # typical strengths
 
 # sensor effect -> field of the filter's SensorModel
@@ -279,8 +281,11 @@ class Parametrization:
     def _row(self, name: str) -> tuple[float, float, float, float, float]:
         """(neutral, scale, prior std of theta, lowest, highest) of a free parameter."""
         if "." not in name:
-            value = self.hypothesis.robot.parameters[name]
-            return value, 1.0, LOG_PRIOR.get(name, WIDE_PRIOR), value * 1e-3, value * 1e3
+            robot = self.hypothesis.robot
+            value, prior = robot.parameters[name], LOG_PRIOR.get(name, WIDE_PRIOR)
+            if name in robot.knowledge:
+                prior = KNOWLEDGE_PRIOR[robot.knowledge[name]]
+            return value, 1.0, prior, value * 1e-3, value * 1e3
         effect, key = name.split(".")
         parameter = self.hypothesis.effect(effect).parameters[key]
         return (

@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from fish_sim.robot import nominal_parameters
 from fish_sim.scheme import Scheme, stable_scheme
 from fish_sim.step import Stepper
-from fish_sysid.estimation.parametrization import Hypothesis, Parametrization
+from fish_sysid.estimation.parametrization import KNOWLEDGE_PRIOR, Hypothesis, Parametrization
 
 Array = NDArray[np.float64]
 
 QUICK = Scheme("rk4", 1)
-# standard deviation of the logarithm by what a robot.yaml says of a parameter: 5 %, tens of per cent, a factor of three
-KNOWLEDGE = {"measured": 0.05, "estimated": 0.3, "unknown": 1.1}
 UNSTATED = "unknown"
 ROUNDING = 1e-9  # of a logarithm and back: keeps a value at an end of its range inside it
 
@@ -29,7 +27,7 @@ class ShotParametrization(Parametrization):
     def __init__(self, hypothesis: Hypothesis, theta: Array | None = None) -> None:
         super().__init__(hypothesis)
         known = hypothesis.robot.knowledge
-        sigma = [KNOWLEDGE[known.get(name, UNSTATED)] for name in hypothesis.free]
+        sigma = [KNOWLEDGE_PRIOR[known.get(name, UNSTATED)] for name in hypothesis.free]
         self.prior = np.where(self.is_log, sigma, self.prior)
         table = nominal_parameters(hypothesis.robot.links)
         for i, name in enumerate(hypothesis.free):
