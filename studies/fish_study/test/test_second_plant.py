@@ -79,3 +79,17 @@ def test_seen_from_the_water_the_second_plant_swims_in_wind_as_in_still_water(ba
     assert (
         blown[-100:, 0, 3].mean() > still[-100:, 0, 3].mean() + 0.03
     )  # from behind: faster over ground
+
+
+@pytest.mark.slow
+def test_a_second_plant_that_is_pushed_backwards_at_the_start_swims_ahead(basin) -> None:
+    plant = basin(2)
+    plant.reset(np.zeros((2, 3)))
+    for data in plant._data:
+        data.qvel[0] -= 0.03
+    speed = []
+    for k in range(600):
+        rotor = min(1.0, 0.01 * k) * 50.0 * np.sin(2.0 * np.pi * 2.0 * 0.01 * k)
+        plant.step(np.tile([rotor, 0.0], (2, 1)))
+        speed.append(plant.motion[:, 3])
+    assert np.all(np.mean(speed[-100:], axis=0) > 0.05)
