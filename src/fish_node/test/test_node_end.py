@@ -17,11 +17,11 @@ def run(monkeypatch, error, alive):
 
     replaced = {
         "init": lambda: None,
-        "spin": spin,
         "ok": lambda: alive,
         "try_shutdown": lambda: ended.append("shut down"),
     }
     monkeypatch.setattr(start, "rclpy", SimpleNamespace(**replaced))
+    monkeypatch.setattr(start, "spin", spin)
     start.run(lambda: SimpleNamespace(destroy_node=lambda: ended.append("destroyed")), "controller")
     return ended
 

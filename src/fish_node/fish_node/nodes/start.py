@@ -11,6 +11,7 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
+from fish_node.nodes.executor import spin
 from fish_node.parameters import in_type_of, unknown_names
 
 Config = TypeVar("Config")
@@ -65,7 +66,7 @@ def run(
     try:
         try:
             node = make_node()
-            rclpy.spin(node)
+            spin(node)
         except (KeyboardInterrupt, ExternalShutdownException):
             pass
         except Exception:
