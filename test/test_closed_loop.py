@@ -172,7 +172,8 @@ def resumed(tmp_path_factory) -> Resumed:
     """The sinusoid again; planner, fusion and controller are killed on the way, one after the other."""
     folder = tmp_path_factory.mktemp("resumed")
     seen = Resumed(folder / "recording")
-    with running(folder, parameters(folder, "sinusoid", LONG, LONG_START, FACTOR)) as run:
+    settings = parameters(folder, "sinusoid", LONG, LONG_START, FACTOR, LOCKSTEP)
+    with running(folder, settings) as run:
         for spec, place in ((PLANNER, 0.4), (FUSION, 0.9), (CONTROLLER, 1.4)):
             run.until(lambda place=place: run.progress() > place, f"progress of {place} m")
             # without estimates the fish is to stop, which takes a while
