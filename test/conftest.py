@@ -13,6 +13,7 @@ import pytest
 
 from fish_bringup.node_table import (
     CONTROL,
+    NAMESPACE,
     RECORDER,
     SIMULATED,
     NodeSpec,
@@ -103,11 +104,19 @@ def parameters(
 
 @contextmanager
 def running(
-    folder: Path, settings: dict[NodeSpec, dict[str, object]], *, swims: bool = True
+    folder: Path,
+    settings: dict[NodeSpec, dict[str, object]],
+    *,
+    swims: bool = True,
+    domain: int | None = None,
+    namespace: str = NAMESPACE,
 ) -> Iterator[Run]:
-    """Start the nodes; with `swims` the fish has path and estimate when this returns."""
-    domain = choose_domain()
-    with NodeProcesses(domain, folder / "logs") as nodes, watching(domain) as (watch, listen):
+    """Start the nodes, on a free domain unless one is given; with `swims` the fish has path and estimate when this returns."""
+    domain = choose_domain() if domain is None else domain
+    with (
+        NodeProcesses(domain, folder / "logs", namespace) as nodes,
+        watching(domain, namespace) as (watch, listen),
+    ):
         run = Run(domain, nodes, watch, listen, settings)
         for spec in settings:
             if spec != CONTROLLER:

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
-import inspect
-import io
-import re
-import tokenize
 from types import ModuleType
 from typing import Any
 
@@ -22,13 +18,18 @@ from fish_bringup.node_table import (
     REPLAYER,
     SIMULATED,
 )
-from fish_control.fusion import FusionConfig
-from fish_control.node_configs import ControllerConfig, ExciterConfig, PlannerConfig
+from fish_control.node_configs import (
+    ControllerConfig,
+    ExciterConfig,
+    FusionNodeConfig,
+    PlannerConfig,
+)
 from fish_description.joint_angles import JointAnglesConfig
 from fish_hw.settings.camera import CameraSettings
 from fish_hw.settings.imu import ImuSettings
 from fish_hw.settings.rotor import RotorSettings
 from fish_hw.settings.rudder import RudderSettings
+from fish_node.parameter_docs import parameter_docs
 from fish_sim.camera.config import CameraConfig
 from fish_sim.simulation_config import SimulatorConfig
 from fish_vision.config import TrackerConfig
@@ -42,7 +43,7 @@ CONFIGS: dict[str, type[Any]] = {
     "fish_hw/imu": ImuSettings,
     "fish_hw/camera": CameraSettings,
     "fish_vision/tracker": TrackerConfig,
-    "fish_control/fusion": FusionConfig,
+    "fish_control/fusion": FusionNodeConfig,
     "fish_control/planner": PlannerConfig,
     "fish_control/controller": ControllerConfig,
     "fish_control/exciter": ExciterConfig,
@@ -53,9 +54,11 @@ CONFIGS: dict[str, type[Any]] = {
 SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
 INTRODUCTION = """# Parameters of the nodes
 
-A node reads its parameters once, when it starts, and refuses a value that it cannot use with one line: name, value and
-what is allowed. `ros2 param set` is refused: start the node again. The files `config/NODE.yaml` of each package list
-the same parameters with their defaults. The column "allowed" says what the node itself answers to a wrong value.
+A node refuses a value that it cannot use with one line: name, value and what is allowed. These can be set while it runs:
+`speed`, `path`, `path_args` and `end` of the planner, the limits of the gains of the controller, the colours of the tracker.
+All others are read-only: start the node again. The files `config/NODE.yaml` of each package list the same parameters with
+their defaults. The column "allowed" says what the node itself answers to a wrong value. `ros2 param describe` shows the same
+text.
 """
 
 
@@ -75,40 +78,18 @@ def section(name: str) -> str:
     module: ModuleType = importlib.import_module(f"{package}.nodes.{executable}")
     summary = (module.__doc__ or "").partition("\n")[0]
     kind = CONFIGS[name]
-    comments = field_comments(kind)
+    docs = parameter_docs(kind())
     rows = (
         (
             f"`{field.name}`",
             shown(getattr(kind(), field.name)),
-            cell(comments.get(field.name, "")),
-            cell(allowed(kind, field.name)),
+            cell(docs[field.name].description),
+            cell(docs[field.name].allowed),
         )
         for field in dataclasses.fields(kind)
     )
     head = ("parameter", "default", "unit and meaning", "allowed")
     return f"## {package} {executable}\n\n{escaped(summary)}\n\n{table(head, rows)}"
-
-
-def field_comments(kind: type[Any]) -> dict[str, str]:
-    """Field name -> the comment beside its definition, of a dataclass and its bases."""
-    found: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        if dataclasses.is_dataclass(base):
-            found |= _comments_of_class(inspect.getsource(base))
-    return found
-
-
-def _comments_of_class(source: str) -> dict[str, str]:
-    """Comments between the start of a field and the start of the next one."""
-    found: dict[str, list[str]] = {}
-    name = ""
-    for token in tokenize.generate_tokens(io.StringIO(inspect.cleandoc(source)).readline):
-        if token.type == tokenize.NAME and token.start[1] == 4:
-            field = re.match(r"    (\w+) *:", token.line)
-            name = field[1] if field else ""
-        elif token.type == tokenize.COMMENT and name:
-            found.setdefault(name, []).append(token.string.lstrip("# ").strip())
-    return {field: " ".join(texts) for field, texts in found.items()}
 
 
 def shown(value: object) -> str:
@@ -118,26 +99,3 @@ def shown(value: object) -> str:
     if isinstance(value, tuple):
         return "see file" if len(value) > 6 else f"`{list(value)}`".replace("'", "")
     return f"`{value}`" if value != "" else "empty"
-
-
-def allowed(kind: type[Any], name: str) -> str:
-    """What a dataclass says it expects when this field is far out of range; empty if it accepts anything."""
-    like = getattr(kind(), name)
-    if isinstance(like, bool):
-        return "true, false"
-    wrong: tuple[object, ...] = (1e300, -1e300)
-    if isinstance(like, int):
-        wrong = (10**9, -(10**9))
-    elif isinstance(like, str):
-        wrong = ("?",)
-    elif not isinstance(like, float):
-        return ""
-    for value in wrong:
-        try:
-            kind(**{name: value})
-        except (ValueError, OSError) as error:
-            message = str(error)
-            said = re.search(r"(?:expected|known:) (?:one of )?(.+)$", message)
-            if said and message.startswith(name):
-                return said[1].replace("a finite number, ", "")
-    return ""

@@ -52,9 +52,13 @@ MEANING = {
     "sim/odometry": "the simulator's true pose and velocity; 100 Hz",
     "sim/joint_states": "the simulator's true rudder and tail angles [rad]; 100 Hz",
     "/tf": "pool to base_link, where tf2_msgs is installed; 100 Hz",
+    "/tf_static": "base_link to imu_link, pool to the camera, where tf2_msgs is installed; once, transient local",
+    "path/status": "waiting, executing, succeeded or canceled, with progress and cross-track error [m]; 1 Hz and on change",
     "/diagnostics": "state of every node; 1 Hz and on change",
     "/clock": "simulated time",
     "pause": "stops and continues simulated time",
+    "path/start": "follows the path from its beginning",
+    "path/cancel": "gives the path up: the fish glides to a stop",
     "reset": "puts the simulated fish back to its start",
     "resume": "lets the controller go on after its watchdog stopped the fish",
     "arm": "true arms the robot, false disarms it; refused with everything that speaks against it",
@@ -113,24 +117,24 @@ def nodes(names: set[str]) -> str:
 
 
 def interfaces(package: str, executable: str) -> list[tuple[str, str, str]]:
-    """(role, type, name) of a node: of its own module and of those of the same folder that it imports."""
-    folder = Path(str(importlib.util.find_spec(f"{package}.nodes").origin)).parent  # type: ignore[union-attr]
-    todo, done = [f"{executable}"], set()
+    """(role, type, name) of a node: of its own module and of the nodes' modules that it imports."""
+    todo, done = [f"{package}.nodes.{executable}"], set()
     found = []
     while todo:
         module = todo.pop()
         done.add(module)
-        tree = ast.parse((folder / f"{module}.py").read_text(encoding="utf-8"))
+        source = Path(str(importlib.util.find_spec(module).origin))  # type: ignore[union-attr]
+        tree = ast.parse(source.read_text(encoding="utf-8"))
         types = imported_types(tree)
         for node in ast.walk(tree):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
                 found += interface(node, node.func.attr, types)
             if isinstance(node, ast.ImportFrom) and node.module:
-                near, _, name = node.module.rpartition(".")
-                if near == f"{package}.nodes" and name not in done:
-                    todo.append(name)
+                near = node.module.rpartition(".")[0]
                 if node.module == ARMING:
                     found += arming_interfaces({alias.name for alias in node.names})
+                elif near in (f"{package}.nodes", "fish_node.nodes") and node.module not in done:
+                    todo.append(node.module)
     return found
 
 

@@ -21,6 +21,7 @@ DEFAULT_TOPICS = (
     "reference/*",
     "control/*",
     "tracking/error",
+    "path/status",
     "arming/*",
     "battery_state",
     "sim/odometry",

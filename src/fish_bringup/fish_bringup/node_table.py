@@ -31,11 +31,13 @@ class NodeSpec:
 
     Attributes:
         parameter_file: in config/ of the package's share directory.
+        frames: whether it has the parameter frame_prefix.
     """
 
     package: str
     executable: str
     parameter_file: str
+    frames: bool = False
 
     @property
     def name(self) -> str:
@@ -44,19 +46,19 @@ class NodeSpec:
 
 
 SIMULATED = (
-    NodeSpec("fish_sim", "simulator", "simulator.yaml"),
-    NodeSpec("fish_sim", "camera", "camera.yaml"),
+    NodeSpec("fish_sim", "simulator", "simulator.yaml", frames=True),
+    NodeSpec("fish_sim", "camera", "camera.yaml", frames=True),
 )
 REAL = (
-    NodeSpec("fish_hw", "rotor", "rotor.yaml"),
+    NodeSpec("fish_hw", "rotor", "rotor.yaml", frames=True),
     NodeSpec("fish_hw", "rudder", "rudder.yaml"),
-    NodeSpec("fish_hw", "imu", "imu.yaml"),
-    NodeSpec("fish_hw", "camera", "camera.yaml"),
+    NodeSpec("fish_hw", "imu", "imu.yaml", frames=True),
+    NodeSpec("fish_hw", "camera", "camera.yaml", frames=True),
 )
 CONTROL = (
-    NodeSpec("fish_vision", "tracker", "tracker.yaml"),
-    NodeSpec("fish_control", "fusion", "fusion.yaml"),
-    NodeSpec("fish_control", "planner", "planner.yaml"),
+    NodeSpec("fish_vision", "tracker", "tracker.yaml", frames=True),
+    NodeSpec("fish_control", "fusion", "fusion.yaml", frames=True),
+    NodeSpec("fish_control", "planner", "planner.yaml", frames=True),
     NodeSpec("fish_control", "controller", "controller.yaml"),
 )
 EXCITER = NodeSpec("fish_control", "exciter", "exciter.yaml")
@@ -98,15 +100,38 @@ def parameter_path(spec: NodeSpec) -> Path:
 def command(
     spec: NodeSpec, parameters: Parameters | None = None, namespace: str = NAMESPACE
 ) -> list[str]:
-    """Command line of a node: its parameter file, then single parameters that override it."""
+    """Command line of a node: its parameter file, then single parameters that override it.
+
+    A fish in another namespace than the usual one may be the second on its domain: its clock and its frames are its own.
+    """
     line = [str(executable_path(spec)), "--ros-args", "-r", f"__ns:={namespace}"]
+    for old, new in remappings(namespace):
+        line += ["-r", f"{old}:={new}"]
     line += ["--params-file", str(parameter_path(spec))]
-    for name, value in (parameters or {}).items():
+    own = {"frame_prefix": frame_prefix(namespace)} if spec.frames else {}
+    for name, value in {**own, **(parameters or {})}.items():
         line += [
             "-p",
             f"{name}:={json.dumps(value)}",
         ]  # JSON is YAML, and keeps "N" a string and 1.0 a float
     return line
+
+
+def remappings(namespace: str) -> tuple[tuple[str, str], ...]:
+    """Absolute topics that a fish in another namespace than the usual one has to itself."""
+    if is_usual(namespace):
+        return ()
+    return (("/clock", f"/{namespace.strip('/')}/clock"),)
+
+
+def frame_prefix(namespace: str) -> str:
+    """What stands before the names of frames: nothing for the usual namespace, otherwise the namespace."""
+    return "" if is_usual(namespace) else f"{namespace.strip('/')}/"
+
+
+def is_usual(namespace: str) -> bool:
+    """Whether a namespace is the one that a fish has by itself."""
+    return namespace.strip("/") == NAMESPACE.strip("/")
 
 
 def middleware() -> dict[str, str]:

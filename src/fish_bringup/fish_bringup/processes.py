@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Self
 
 from fish_bringup.node_table import (
+    NAMESPACE,
     NodeSpec,
     Parameters,
     command,
@@ -30,13 +31,18 @@ class NodeProcess:
     """One running node."""
 
     def __init__(
-        self, spec: NodeSpec, parameters: Parameters | None, env: dict[str, str], log_folder: Path
+        self,
+        spec: NodeSpec,
+        parameters: Parameters | None,
+        env: dict[str, str],
+        log_folder: Path,
+        namespace: str = NAMESPACE,
     ) -> None:
         self.spec = spec
         self.log = log_folder / f"{spec.package}.{spec.executable}.log"
         with self.log.open("ab") as log:
             self._popen = subprocess.Popen(
-                command(spec, parameters),
+                command(spec, parameters, namespace),
                 env=env,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
@@ -89,15 +95,15 @@ class NodeProcess:
 class NodeProcesses:
     """A set of nodes that is ended as a whole; a context manager, so that nothing is left behind."""
 
-    def __init__(self, domain: int, log_folder: Path) -> None:
+    def __init__(self, domain: int, log_folder: Path, namespace: str = NAMESPACE) -> None:
         log_folder.mkdir(parents=True, exist_ok=True)
         self.environment = environment(domain)
-        self._log_folder = log_folder
+        self._log_folder, self._namespace = log_folder, namespace
         self.running: dict[NodeSpec, NodeProcess] = {}
 
     def start(self, spec: NodeSpec, parameters: Parameters | None = None) -> NodeProcess:
         """Start a node, or start it again after its end."""
-        process = NodeProcess(spec, parameters, self.environment, self._log_folder)
+        process = NodeProcess(spec, parameters, self.environment, self._log_folder, self._namespace)
         self.running[spec] = process
         return process
 

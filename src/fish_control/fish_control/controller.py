@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -59,6 +60,7 @@ class Controller:
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
         self._limits = policy.contract.limits
+        self._bounds = np.zeros(6), np.full(6, np.inf)
         self._guidance = policy.contract.guidance
         self._motion: Motion | None = None
         self._observer = MotionObserver(GuidanceState(), self._observe)
@@ -67,6 +69,10 @@ class Controller:
         self._actuators = ActuatorState()
         self._glides = True
         self._listened, self._swims = 0.0, False
+
+    def limit_gains(self, lowest: Sequence[float], highest: Sequence[float]) -> None:
+        """From now on no gain below or above these (6,), in the order of Gains."""
+        self._bounds = np.array(lowest), np.array(highest)
 
     def observe(self, time: float, motion: Motion) -> None:
         """Take in odometry stamped `time` [s]; call it with every message."""
@@ -102,7 +108,7 @@ class Controller:
             np,
             self._policy.contract.inputs,
         )
-        gains = Gains(*map(float, self._policy.gains(np.array(inputs))))
+        gains = Gains(*map(float, np.clip(self._policy.gains(np.array(inputs)), *self._bounds)))
         self._swims = self._swims or bool(has_listened(self._listened, motion, self._guidance, np))
         if not self._swims:
             self.rest()

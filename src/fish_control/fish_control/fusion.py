@@ -60,7 +60,7 @@ class FusionConfig(MotionNoise):
     largest_yaw_rate: float = 12.0  # rad/s; a sample above it is wrong (trials reach 5.3)
 
     def __post_init__(self) -> None:
-        for f in fields(self):
+        for f in fields(FusionConfig):
             value = getattr(self, f.name)
             lowest = -0.5 if f.name == "camera_offset" else 0.0
             if not (math.isfinite(value) and (value > lowest or value == f.default)):

@@ -1,4 +1,4 @@
-"""Parameters of the nodes planner, controller and exciter; those of the fusion node are FusionConfig."""
+"""Parameters of the nodes fusion, planner, controller and exciter."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from fish_control.fusion import FusionConfig
 from fish_control.line_of_sight import GuidanceConfig
 from fish_control.path_batch import TrackerConfig
 from fish_control.planner import FASTEST, SLOWEST
 from fish_control.reference_path import End
+from fish_node.frames import BODY, IMU, POOL, require_frame, require_frame_prefix
 
 Resume = Literal["auto", "manual"]
+LARGEST_GAIN = 10.0
 LARGEST_VARIANCE = 1.0  # m^2, rad^2 and their rates; fusion marks what it has lost with 1e4
 
 
@@ -25,6 +28,22 @@ def require_one_of(name: str, value: str, known: tuple[str, ...]) -> None:
     """Raise ValueError naming field, value and choices."""
     if value not in known:
         raise ValueError(f"{name} is {value!r}; known: {', '.join(known)}")
+
+
+@dataclass(frozen=True)
+class FusionNodeConfig(FusionConfig):
+    """Constants of the fusion, and its frames."""
+
+    pool_frame: str = POOL  # frame of the pose, which several fish share
+    body_frame: str = BODY  # frame of the head's centre of mass
+    imu_frame: str = IMU  # frame of the IMU, whose axes are those of body_frame
+    frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("pool_frame", "body_frame", "imu_frame"):
+            require_frame(name, getattr(self, name))
+        require_frame_prefix(self.frame_prefix)
 
 
 @dataclass(frozen=True)
@@ -50,6 +69,9 @@ class PlannerConfig:
     largest_variance: float = (
         LARGEST_VARIANCE  # of a pose; nothing is planned from one that is lost
     )
+    pool_frame: str = POOL  # frame of path and target
+    body_frame: str = BODY  # frame of control/twist
+    frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
 
     def __post_init__(self) -> None:
         require_range("speed", self.speed, SLOWEST, FASTEST, "m/s")
@@ -59,6 +81,9 @@ class PlannerConfig:
         require_range("rate_hz", self.rate_hz, 1.0, 100.0, "Hz")
         require_range("resume_timeout", self.resume_timeout, 0.0, 3600.0, "s")
         require_range("largest_variance", self.largest_variance, 1e-6, 1e3, "")
+        require_frame("pool_frame", self.pool_frame)
+        require_frame("body_frame", self.body_frame)
+        require_frame_prefix(self.frame_prefix)
         self.tracker()
 
     def ending(self) -> End | None:
@@ -95,6 +120,13 @@ class ControllerConfig:
         "auto"  # after a stop: auto when all is well; manual when service resume is called
     )
     resume_delay: float = 0.5  # s, how long all must be well before auto resumes
+    gains_lowest: tuple[float, ...] = (
+        *(0.0,) * 6,  # least gains: steering Kp, Ki, Kd, then speed Kp, Ki, Kd
+    )
+    gains_highest: tuple[float, ...] = (
+        *(LARGEST_GAIN,)
+        * 6,  # greatest gains, likewise; the weights file's own range holds as well
+    )
 
     def __post_init__(self) -> None:
         require_range("rate_hz", self.rate_hz, 10.0, 200.0, "Hz")
@@ -113,6 +145,19 @@ class ControllerConfig:
         require_range("largest_variance", self.largest_variance, 1e-6, 1e3, "")
         require_one_of("resume", self.resume, get_args(Resume))
         require_range("resume_delay", self.resume_delay, 0.0, 60.0, "s")
+        self._check_gains()
+
+    def _check_gains(self) -> None:
+        for name in ("gains_lowest", "gains_highest"):
+            gains = getattr(self, name)
+            if len(gains) != 6 or not all(0.0 <= gain <= LARGEST_GAIN for gain in gains):
+                raise ValueError(
+                    f"{name} is {list(gains)}, expected six numbers, 0 to {LARGEST_GAIN:g}"
+                )
+        if any(low > high for low, high in zip(self.gains_lowest, self.gains_highest, strict=True)):
+            raise ValueError(
+                f"gains_lowest is {list(self.gains_lowest)}, expected none above gains_highest {list(self.gains_highest)}"
+            )
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,12 @@ def test_it_steers_towards_the_wanted_course():
         assert np.sign(made.command(0.01).alpha) == np.sign(course)
 
 
+def test_gains_stay_within_limits_that_are_set():
+    made = controller()
+    made.limit_gains([0.0, 0.0, 0.0, 0.7, 0.0, 0.01], [0.2, 9.0, 9.0, 9.0, 9.0, 9.0])
+    assert made.decide(STRAIGHT) == pytest.approx((0.2, 0.4, 0.03, 0.7, 0.07, 0.01))
+
+
 def test_gains_are_the_policys():
     assert controller().decide(STRAIGHT) == pytest.approx(GAINS)
 

@@ -382,6 +382,83 @@ def test_planner_follows_a_path_from_a_topic_and_refuses_one_through_the_wall(be
     assert b.heard["control/target"][0].pose.position.x == pytest.approx(-0.5, abs=1e-3)
 
 
+@pytest.mark.parametrize("qos", [LATCHED, 10], ids=["transient local", "volatile"])
+def test_a_path_is_heard_once_from_publishers_of_either_durability(bench, qos):
+    b = bench(PlannerNode, path="topic")
+    taken = b.node._progress  # a planner per path taken
+    b.say("reference/path", path_message(1.0), qos)
+    b.until(lambda: b.node._planner is not None)
+    planner = b.node._planner
+    b.spin(0.3)
+    assert b.node._planner is planner
+    assert taken.problem == ""
+
+
+def test_path_and_speed_can_be_set_while_it_swims(bench):
+    b = bench(PlannerNode, path="straight", path_args="{length: 3.0}", speed=0.15)
+    b.listen("control/twist", TwistStamped)
+    b.listen("reference/path", Path, LATCHED)
+    b.say("odometry/filtered", odometry(b.now(), x=-1.4))
+    b.until(lambda: b.heard["control/twist"])
+    assert b.node.set_parameters([Parameter("speed", value=0.3)])[0].successful
+    b.say("odometry/filtered", odometry(b.now(), x=-1.3))
+    b.until(lambda: b.heard["control/twist"][-1].twist.linear.x == 0.3)
+    changes = [
+        Parameter("path", value="circle"),
+        Parameter("path_args", value="{radius: 0.5}"),
+    ]
+    assert b.node.set_parameters_atomically(changes).successful
+    b.until(lambda: len(b.heard["reference/path"]) > 1)
+    xs = [pose.pose.position.x for pose in b.heard["reference/path"][-1].poses]
+    assert max(xs) - min(xs) == pytest.approx(1.0, abs=0.01)
+    b.say("odometry/filtered", odometry(b.now(), x=0.5))
+    turn = 0.3 / 0.5  # rad/s
+    b.until(lambda: b.heard["control/twist"][-1].twist.angular.z == pytest.approx(turn, abs=0.01))
+
+
+def call(b, service):
+    """The answer of one of the planner's services."""
+    client = b.other.create_client(Trigger, service)
+    b.until(client.service_is_ready)
+    future = client.call_async(Trigger.Request())
+    b.until(future.done)
+    return future.result()
+
+
+def test_following_a_path_is_started_watched_and_canceled(bench):
+    b = bench(PlannerNode, path="straight", path_args="{length: 3.0}", speed=0.15)
+    b.listen("path/status", DiagnosticStatus, LATCHED)
+    b.listen("control/twist", TwistStamped)
+
+    def state():
+        return b.heard["path/status"][-1].message if b.heard["path/status"] else None
+
+    b.say("odometry/filtered", odometry(b.now(), x=-1.4, y=0.05))
+    b.until(lambda: state() == "executing")
+    feedback = {pair.key: float(pair.value) for pair in b.heard["path/status"][-1].values}
+    assert feedback["length_m"] == pytest.approx(3.0)
+    assert feedback["progress_m"] == pytest.approx(0.1, abs=0.01)
+    assert feedback["cross_track_m"] == pytest.approx(0.05)
+    assert call(b, "path/cancel").success
+    b.say("odometry/filtered", odometry(b.now(), x=-1.3))
+    b.until(lambda: state() == "canceled")
+    b.until(lambda: b.heard["control/twist"][-1].twist.linear.x == 0.0)
+    again = call(b, "path/cancel")
+    assert not again.success
+    assert again.message == "no path is being followed"
+    assert call(b, "path/start").success
+    b.say("odometry/filtered", odometry(b.now(), x=-1.4))
+    b.until(lambda: state() == "executing")
+
+
+def test_there_is_nothing_to_start_before_a_path_came(bench):
+    answer = call(bench(PlannerNode, path="topic"), "path/start")
+    assert (answer.success, answer.message) == (
+        False,
+        "there is no path yet: publish reference/path first",
+    )
+
+
 def path_message(half_length=1.0, frame="pool", pose_frame=""):
     message = Path()
     message.header.frame_id = frame
@@ -746,7 +823,7 @@ def test_a_second_node_of_the_same_kind_is_warned_of_on_diagnostics_and_console(
         (
             planner.main,
             "sped:=0.1",
-            "unknown parameter sped (did you mean speed?); known: capture_distance, ",
+            "unknown parameter sped (did you mean speed?); known: body_frame, ",
         ),
         (controller.main, "lokahead:=0.4", "unknown parameter lokahead (did you mean lookahead?)"),
         (fusion.main, "foo:=1", "unknown parameter foo; known: "),

@@ -21,7 +21,7 @@ class JointAnglesConfig:
         if not 1 <= self.tail_links <= 12:
             raise ValueError(f"tail_links: got {self.tail_links}; expected 1 to 12")
         if not 0.0 < self.tail_timeout < math.inf:
-            raise ValueError(f"tail_timeout: got {self.tail_timeout:g}; expected a time above 0 s")
+            raise ValueError(f"tail_timeout: got {self.tail_timeout:g}; expected above 0 s")
 
 
 def tail_names(links: int) -> tuple[str, ...]:

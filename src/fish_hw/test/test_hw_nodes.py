@@ -303,7 +303,13 @@ def test_imu_topics(graph):
 
 def test_imu_message_keeps_every_axis(graph):
     """The emulated sensor turns about one axis only."""
-    g = graph(ImuNode, bus="emulator", orientation_stddev=0.1, gyro_stddev=0.2, accel_stddev=0.3)
+    g = graph(
+        ImuNode,
+        bus="emulator",
+        orientation_stdev=0.1,
+        angular_velocity_stdev=0.2,
+        linear_acceleration_stdev=0.3,
+    )
     message = g.node._message(
         ImuSample(1.0, (0.1, 0.2, 0.3, 0.9), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 3)
     )

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fish_node.arming import ArmingSettings
+from fish_node.frames import BODY, IMU, POOL, require_frame, require_frame_prefix
 from fish_sim import pool
 from fish_sim.sensors import changes_camera_poses
 from fish_sim.sensors.settings import SensorSettings
@@ -63,6 +64,10 @@ class SimulatorConfig(SimulationConfig, ArmingSettings):
     lockstep: float = (
         0.0  # s of real time to wait for estimates and commands that lag; 0 = do not wait
     )
+    pool_frame: str = POOL  # frame of the pool, which several fish share
+    body_frame: str = BODY  # frame of the head's centre of mass
+    imu_frame: str = IMU  # frame of imu/data
+    frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -71,6 +76,9 @@ class SimulatorConfig(SimulationConfig, ArmingSettings):
             raise ValueError(f"real_time_factor = {self.real_time_factor}: expected 0 to 100")
         if not 0.0 <= self.lockstep <= 60.0:
             raise ValueError(f"lockstep = {self.lockstep}: expected 0 to 60 s")
+        for name in ("pool_frame", "body_frame", "imu_frame"):
+            require_frame(name, getattr(self, name))
+        require_frame_prefix(self.frame_prefix)
         if self.camera not in ("image", "pose"):
             raise ValueError(f"camera = {self.camera!r}: expected 'image' or 'pose'")
 

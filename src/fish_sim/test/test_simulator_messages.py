@@ -35,7 +35,7 @@ def test_a_command_is_read_by_name(names: list[str]) -> None:
 
 
 def test_odometry_is_the_truth() -> None:
-    msg = messages.odometry(HEADER, TRUTH)
+    msg = messages.odometry(HEADER, "fish_2/base_link", TRUTH)
     p, twist = msg.pose.pose.position, msg.twist.twist
     assert (p.x, p.y, p.z, heading(msg.pose.pose.orientation)) == pytest.approx(
         (1.0, 2.0, 0.0, 2.5)

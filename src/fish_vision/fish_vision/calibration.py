@@ -79,6 +79,14 @@ class Mount:
         """(3, 3) turns pool vectors into optical ones."""
         return cv2.Rodrigues(np.asarray(self.tilt, float))[0] @ R_DOWN
 
+    @property
+    def quaternion(self) -> tuple[float, ...]:
+        """Orientation of the camera's optical frame in the pool: x, y, z, w."""
+        turn = cv2.Rodrigues(self.R.T)[0].ravel()
+        angle = float(np.linalg.norm(turn))
+        axis = turn / angle if angle > 0.0 else turn
+        return (*map(float, axis * np.sin(angle / 2)), float(np.cos(angle / 2)))
+
 
 class Calibration:
     """Maps pixels to the plane z = plane_height of the pool frame and back.

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
+from fish_node.frames import require_frame, require_frame_prefix
 from fish_node.parameter_file import read_settings
 from fish_vision.calibration import Mount
 from fish_vision.pose import MarkerLayout
@@ -51,12 +52,17 @@ class TrackerConfig:
     reacquire_s: float = 0.5  # a jump that lasts so long is believed, s
     pixel_std: float = 0.06  # standard deviation of a whole marker's middle, pixels
     pool_margin: float = 0.10  # a pose so far outside the walls is refused, m
+    camera_frame: str = "overhead_optical"  # of the camera; its place goes to /tf_static
+    frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
 
     def __post_init__(self) -> None:
         for name, count in _LISTS:
             value = getattr(self, name)
             if len(value) != count or not all(isfinite(v) for v in value):
                 raise ValueError(f"{name} = {list(value)}: expected {count} finite numbers")
+        require_frame("frame_id", self.frame_id)
+        require_frame("camera_frame", self.camera_frame)
+        require_frame_prefix(self.frame_prefix)
         for name, low, high in _RANGES:
             value = getattr(self, name)
             if not low <= value <= high:

@@ -201,3 +201,16 @@ def test_a_broken_lens_file_is_refused_with_its_name(tmp_path: Path, text: str |
         path.write_text(text)
     with pytest.raises(CalibrationError, match=r"bad.yaml"):
         read_lens(path)
+
+
+@pytest.mark.parametrize("tilt", [(0.0, 0.0, 0.0), (-0.022, 0.018, 0.010), (0.3, -0.2, 1.0)])
+def test_the_quaternion_turns_optical_axes_into_the_pool(tilt: tuple[float, ...]) -> None:
+    mount = Mount((0.0, 0.0, 3.0), tilt)
+    x, y, z, w = mount.quaternion
+    assert x * x + y * y + z * z + w * w == pytest.approx(1.0)
+    axis = np.array([x, y, z])
+    for column in np.eye(3):  # v + 2 w (q x v) + 2 q x (q x v)
+        turned = column + 2.0 * np.cross(axis, np.cross(axis, column) + w * column)
+        assert turned == pytest.approx(mount.R.T @ column, abs=1e-9)
+    if not any(tilt):
+        assert mount.quaternion == pytest.approx((1.0, 0.0, 0.0, 0.0))

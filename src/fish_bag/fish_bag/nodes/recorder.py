@@ -41,6 +41,7 @@ class RecorderNode(Node):
         self.recording = McapRecording(directory, custom, self._config.chunk_s)
         self._subscriptions_of: dict[tuple[str, str], tuple[Subscription, Qos]] = {}
         self._refused: set[tuple[str, str]] = set()
+        self._patterns = [self._resolved(pattern) for pattern in self._config.topics]
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(self._config.discovery_s, self._discover, clock=steady)
@@ -49,10 +50,15 @@ class RecorderNode(Node):
         self._discover()
         self.get_logger().info(f"recording to {directory}")
 
+    def _resolved(self, pattern: str) -> str:
+        """An absolute name as this node's remapping rules have it: the clock of a second fish; patterns stay what they are."""
+        name = pattern.startswith("/") and not set("*?[") & set(pattern)
+        return str(self.resolve_topic_name(pattern)) if name else pattern
+
     def _discover(self) -> None:
         """Subscribe to selected topics that are new, or again where publishers offer something else."""
         for topic, types in self.get_topic_names_and_types():
-            if is_selected(topic, self._config.topics, self.get_namespace()):
+            if is_selected(topic, self._patterns, self.get_namespace()):
                 for msgtype in types:
                     self._follow(topic, msgtype)
 

@@ -40,8 +40,8 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 class WatchNode(Node):
     """Keeps the latest of what it hears; progress and cross-track error from the path followed in order."""
 
-    def __init__(self, context: Context) -> None:
-        super().__init__("watch", namespace=NAMESPACE, context=context)
+    def __init__(self, context: Context, namespace: str = NAMESPACE) -> None:
+        super().__init__("watch", namespace=namespace, context=context)
         self.sight: Sight | None = None
         self.seen: Seen | None = None
         self.diagnostics: dict[str, dict[str, str]] = {}
@@ -57,7 +57,7 @@ class WatchNode(Node):
 
     def sees(self, node: str) -> bool:
         """Whether a node of this name is in the graph."""
-        return node in self.get_node_names()
+        return (node, self.get_namespace()) in self.get_node_names_and_namespaces()
 
     @property
     def disarmed(self) -> str | None:
@@ -106,7 +106,9 @@ def seconds(header: Header) -> float:
 
 
 @contextmanager
-def watching(domain: int) -> Iterator[tuple[WatchNode, Callable[[float], None]]]:
+def watching(
+    domain: int, namespace: str = NAMESPACE
+) -> Iterator[tuple[WatchNode, Callable[[float], None]]]:
     """A WatchNode in an own context of the domain, and a function that listens for so many seconds.
 
     Signals stay with the caller: ROS installs no handlers.
@@ -114,7 +116,7 @@ def watching(domain: int) -> Iterator[tuple[WatchNode, Callable[[float], None]]]
     os.environ.update(middleware())
     context = Context()
     rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-    node = WatchNode(context)
+    node = WatchNode(context, namespace)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
 

@@ -9,6 +9,7 @@ in Controller and Watchdog.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -39,7 +40,10 @@ from fish_control.nodes.messages import (
 from fish_control.nodes.reporter import Reporter
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
+from fish_node.nodes.changes import Changes
 from fish_node.nodes.start import read_parameters, run
+
+SETTABLE = ("gains_lowest", "gains_highest")
 
 
 class ControllerNode(Node):
@@ -52,11 +56,13 @@ class ControllerNode(Node):
             automatically_declare_parameters_from_overrides=True,
             **options,
         )
-        self._config = config = read_parameters(self, ControllerConfig)
+        self._config = config = read_parameters(self, ControllerConfig, SETTABLE)
         file = config.weights_file or installed_weights()
         policy = read_gains_file(file)
         require_fit(policy, file, 1.0 / config.rate_hz, config.lookahead, config.robot_hash)
         self._controller = Controller(policy)
+        self._controller.limit_gains(config.gains_lowest, config.gains_highest)
+        Changes(self, config, self._change)
         self._watchdog = Watchdog(config)
         self._odometry: Odometry | None = None
         self._odometry_time = self._target_time = math.nan
@@ -66,6 +72,10 @@ class ControllerNode(Node):
         self._latency = Latency()
         self._said = ""
         self._create_interfaces()
+
+    def _change(self, _: ControllerConfig, after: ControllerConfig) -> Callable[[], None]:
+        """What takes over limits of the gains that were set at run time."""
+        return lambda: self._controller.limit_gains(after.gains_lowest, after.gains_highest)
 
     def _create_interfaces(self) -> None:
         self._command = self.create_publisher(JointState, "joint_command", 10)

@@ -1,7 +1,7 @@
 """camera/pose + imu/data -> odometry/filtered (100 Hz, pool -> base_link), /diagnostics.
 
 A pose variance of 1e4 says that the camera is lost, a twist variance of 1e4 that the IMU is. The transform
-pool -> base_link is broadcast where tf2_msgs is installed. Decisions are in Fusion.
+pool -> base_link and the static base_link -> imu_link are broadcast where tf2_msgs is installed. Decisions are in Fusion.
 """
 
 from typing import Any
@@ -13,7 +13,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu
 
-from fish_control.fusion import Estimate, Fusion, FusionConfig
+from fish_control.fusion import Estimate, Fusion
+from fish_control.node_configs import FusionNodeConfig
 from fish_control.nodes.messages import (
     ERROR,
     OK,
@@ -26,12 +27,10 @@ from fish_control.nodes.messages import (
     yaw_of,
 )
 from fish_control.nodes.reporter import Reporter
+from fish_node.frames import BODY, POOL
+from fish_node.nodes.frame_broadcaster import FrameBroadcaster
 from fish_node.nodes.start import read_parameters, run
-
-try:
-    from tf2_msgs.msg import TFMessage
-except ImportError:  # not among the pip wheels
-    TFMessage = None
+from fish_node.nodes.static_frames import publish_static_frame
 
 SENSORS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -46,9 +45,14 @@ class FusionNode(Node):
             automatically_declare_parameters_from_overrides=True,
             **options,
         )
-        self._fusion = Fusion(read_parameters(self, FusionConfig))
+        config = read_parameters(self, FusionNodeConfig)
+        self._fusion = Fusion(config)
+        self._frames = config.pool_frame, config.frame_prefix + config.body_frame
+        self._imu_frame = publish_static_frame(
+            self, self._frames[1], config.frame_prefix + config.imu_frame
+        )
         self._odometry = self.create_publisher(Odometry, "odometry/filtered", 10)
-        self._transform = self.create_publisher(TFMessage, "/tf", 10) if TFMessage else None
+        self._transform = FrameBroadcaster(self)
         self._reporter = Reporter(self, self._odometry)
         self.create_subscription(Imu, "imu/data", self._on_imu, SENSORS)
         self.create_subscription(PoseWithCovarianceStamped, "camera/pose", self._on_pose, SENSORS)
@@ -86,10 +90,9 @@ class FusionNode(Node):
     def _publish(self, estimate: Estimate | None) -> None:
         if estimate is None:
             return
-        message = to_odometry(estimate)
+        message = to_odometry(estimate, *self._frames)
         self._odometry.publish(message)
-        if self._transform:
-            self._transform.publish(TFMessage(transforms=[to_transform(message)]))
+        self._transform.send(to_transform(message))
         if self._state(estimate)[1] != self._said:
             self._report(estimate)
 
@@ -112,10 +115,10 @@ class FusionNode(Node):
         self._reporter.report(level, self._said, values)
 
 
-def to_odometry(estimate: Estimate) -> Odometry:
+def to_odometry(estimate: Estimate, pool_frame: str = POOL, body_frame: str = BODY) -> Odometry:
     """An estimate as a message."""
-    message = Odometry(child_frame_id="base_link")
-    message.header.frame_id = "pool"
+    message = Odometry(child_frame_id=body_frame)
+    message.header.frame_id = pool_frame
     message.header.stamp = to_stamp(estimate.time)
     pose, twist = message.pose.pose, message.twist.twist
     pose.position.x, pose.position.y = map(float, estimate.pose[:2])

@@ -5,17 +5,17 @@ control/twist (50 Hz, base_link): wanted surge speed (m/s; 0 after the end of th
 speed times the curvature of the path). tracking/error: x cross-track (m, positive: robot left of the path), y
 heading (rad, of the way over ground, mean over the stroke), z speed (m/s); wanted minus actual. reference/path and
 reference/speed (transient local) on change; with path:=topic the path is taken from reference/path instead, in the
-frame pool. While fusion is silent or does not vouch for the pose nothing is planned. Decisions are in Planner.
+frame pool. Services path/start, path/cancel and the topic path/status: PathService. While
+fusion is silent or does not vouch for the pose nothing is planned. Decisions are in Planner.
 """
 
 import math
-import os
-import tempfile
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
@@ -33,18 +33,26 @@ from fish_control.nodes.messages import (
     seconds,
     to_quaternion,
 )
+from fish_control.nodes.path_messages import (
+    check_frames,
+    configured_path,
+    default_state_file,
+    to_message,
+)
+from fish_control.nodes.path_service import PathService, State
 from fish_control.nodes.reporter import Reporter
-from fish_control.paths import make_path, read_arguments
 from fish_control.planner import Plan, Planner
 from fish_control.pool import check_inside_pool
 from fish_control.progress_file import ProgressFile, path_digest
 from fish_control.reference_path import PathError, ReferencePath
 from fish_control.watchdog import pose_loss
+from fish_node.nodes.changes import Changes
 from fish_node.nodes.start import read_parameters, run
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-PATH_STEP = 0.02  # m between poses of the published path
-FRAMES = ("", "pool")  # that a path may be in; a message by hand often names none
+TOPIC = "topic"  # as path: it comes on reference/path
+VOLATILE = QoSProfile(depth=1)
+SETTABLE = ("path", "path_args", "end", "speed")
 SILENCE = 0.5  # s without odometry that are worth a warning
 
 
@@ -58,7 +66,7 @@ class PlannerNode(Node):
             automatically_declare_parameters_from_overrides=True,
             **options,
         )
-        self._config = config = read_parameters(self, PlannerConfig)
+        self._config = config = read_parameters(self, PlannerConfig, SETTABLE)
         self._target = self.create_publisher(PoseStamped, "control/target", 10)
         self._twist = self.create_publisher(TwistStamped, "control/twist", 10)
         self._error = self.create_publisher(Vector3Stamped, "tracking/error", 10)
@@ -69,20 +77,21 @@ class PlannerNode(Node):
         )
         self._planner: Planner | None = None
         self._plan: Plan | None = None
-        self._fresh = False
+        self._fresh = self._canceled = False
         self._planned = -math.inf  # s, stamp of the last odometry that was planned for
         self._said_speed = math.nan
         self._bad_odometry = 0
         self._heard: tuple[float, float] | None = None  # s, when odometry came last; see _silence
         self._loss: str | None = None  # why nothing is planned from the newest odometry
         self._problem = ""
-        if config.path == "topic":
-            self.create_subscription(Path, "reference/path", self._on_path, LATCHED)
+        self._heard_path: tuple[Path, bool] | None = None
+        if config.path == TOPIC:
+            self._hear_paths()
         else:
             self._path = self.create_publisher(Path, "reference/path", LATCHED)
-            path = configured_path(config)
-            self._follow(path)
-            self._path.publish(to_message(path, self.get_clock().now().to_msg()))
+            self._follow_own(configured_path(config))
+        self._service = PathService(self, self._start, self._cancel)
+        Changes(self, config, self._change)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_timer(1.0, self._report)
 
@@ -91,6 +100,59 @@ class PlannerNode(Node):
         self._progress.forget()
         self._progress.settle()
 
+    def _hear_paths(self) -> None:
+        """Of publishers of either durability: a latched subscription hears no volatile publisher, such as `ros2 topic pub`."""
+        for qos, latched in ((LATCHED, True), (VOLATILE, False)):
+            self.create_subscription(
+                Path, "reference/path", partial(self._hear_path, latched=latched), qos
+            )
+
+    def _change(self, before: PlannerConfig, after: PlannerConfig) -> Callable[[], None]:
+        """What takes over parameters that were set at run time. Raises ValueError to refuse them."""
+        if (before.path == TOPIC) != (after.path == TOPIC):
+            raise ValueError(
+                "path cannot change between topic and a path at run time: start the planner again"
+            )
+        path = None
+        if after.path != TOPIC and (before.path, before.path_args, before.end) != (
+            after.path,
+            after.path_args,
+            after.end,
+        ):
+            path = configured_path(after)
+            check_inside_pool(path, after.margin)
+
+        def take_over() -> None:
+            self._config = after
+            if path is not None:
+                self._follow_own(path)
+            elif self._planner is not None:
+                self._planner.speed = after.speed
+
+        return take_over
+
+    def _start(self) -> str:
+        """Follow the path from its beginning; what it is. Raises ValueError where there is none."""
+        if self._planner is None:
+            raise ValueError("there is no path yet: publish reference/path first")
+        self._progress.forget()
+        self._follow(self._planner.path)
+        return f"following {self._planner.path.name}"
+
+    def _cancel(self) -> str:
+        """Let the fish glide to a stop. Raises ValueError where it follows nothing."""
+        if self._planner is None or self._planner.finished:
+            raise ValueError("no path is being followed")
+        self._planner.finished = True
+        self._canceled = True
+        return f"{self._planner.path.name} given up at {self._planner.tracker.progress:.2f} m"
+
+    def _follow_own(self, path: ReferencePath) -> None:
+        """Follow a path of the parameters, and say it."""
+        self._follow(path)
+        stamp = self.get_clock().now().to_msg()
+        self._path.publish(to_message(path, self._config.pool_frame, stamp))
+
     def _follow(self, path: ReferencePath) -> None:
         check_inside_pool(path, self._config.margin)
         if self._planner is not None and self._planner.finished:
@@ -98,14 +160,23 @@ class PlannerNode(Node):
         config = self._config
         self._planner = Planner(path, config.speed, config.tracker(), config.guidance())
         self._digest = path_digest(path)
-        self._fresh = True
+        self._fresh, self._canceled = True, False
+
+    def _hear_path(self, message: Path, latched: bool) -> None:
+        """Take a path once: a latched publisher is heard by both subscriptions."""
+        if self._heard_path == (message, not latched):
+            self._heard_path = None
+            return
+        self._heard_path = message, latched
+        self._on_path(message)
 
     def _on_path(self, message: Path) -> None:
         points = [(pose.pose.position.x, pose.pose.position.y) for pose in message.poses]
         closed = len(points) > 3 and math.dist(points[0], points[-1]) < 1e-3
         try:
             check_frames(
-                {message.header.frame_id, *(pose.header.frame_id for pose in message.poses)}
+                {message.header.frame_id, *(pose.header.frame_id for pose in message.poses)},
+                self._config.pool_frame,
             )
             path = ReferencePath.from_points(
                 points, name="reference/path", closed=closed, end=self._config.ending()
@@ -156,7 +227,8 @@ class PlannerNode(Node):
         target = PoseStamped(header=odometry.header)
         target.pose.position.x, target.pose.position.y = map(float, plan.at.target)
         target.pose.orientation = to_quaternion(plan.errors.course)
-        twist = TwistStamped(header=Header(stamp=odometry.header.stamp, frame_id="base_link"))
+        body = self._config.frame_prefix + self._config.body_frame
+        twist = TwistStamped(header=Header(stamp=odometry.header.stamp, frame_id=body))
         twist.twist.linear.x, twist.twist.angular.z = plan.speed, plan.yaw_rate
         error = Vector3Stamped(header=odometry.header)
         e = plan.errors
@@ -164,6 +236,8 @@ class PlannerNode(Node):
         self._twist.publish(twist)
         self._error.publish(error)
         self._target.publish(target)
+        if self._state() != self._service.state:
+            self._report()
         if plan.speed != self._said_speed:
             self._said_speed = plan.speed
             self._speed.publish(Float64(data=plan.speed))
@@ -188,9 +262,8 @@ class PlannerNode(Node):
             level, message = WARN, "waiting for reference/path"
         elif self._plan is not None:
             path = self._planner.path
-            message = (
-                f"finished {path.name}" if self._planner.finished else f"following {path.name}"
-            )
+            over = "canceled" if self._canceled else "finished"
+            message = f"{over if self._planner.finished else 'following'} {path.name}"
             values["progress_m"] = f"{self._plan.at.progress:.3f}"
             values["length_m"] = f"{path.length:.3f}"
             values["cross_track_m"] = f"{self._plan.errors.cross_track:.4f}"
@@ -202,40 +275,15 @@ class PlannerNode(Node):
         if problem:
             level, message = ERROR, problem
         self._reporter.report(level, message, values)
+        self._service.say(self._state(), values)
 
-
-def check_frames(frames: set[str]) -> None:
-    """Raise PathError if a path and its poses are not in the pool's frame: its numbers would be taken for the pool's."""
-    if wrong := sorted(frames.difference(FRAMES)):
-        raise PathError(
-            f"frame_id is {wrong[0]!r}, expected 'pool' or none; transform the path before it is sent"
-        )
-
-
-def configured_path(config: PlannerConfig) -> ReferencePath:
-    """The path that the parameters name. Raises PathError."""
-    arguments = read_arguments(config.path_args, "path_args")
-    if config.end:
-        arguments["end"] = config.end
-    return make_path(config.path, **arguments)
-
-
-def default_state_file(namespace: str) -> str:
-    """One for each user, domain and fish; no name in a `namespace` such as /fish has a dot."""
-    domain, fish = os.environ.get("ROS_DOMAIN_ID", "0"), namespace.replace("/", ".")
-    return f"{tempfile.gettempdir()}/fish_planner_{os.getuid()}_{domain}{fish}.json"
-
-
-def to_message(path: ReferencePath, stamp: Any) -> Path:
-    """Poses along the path, tangent as orientation; a closed path ends where it begins."""
-    message = Path()
-    message.header.frame_id, message.header.stamp = "pool", stamp
-    for s in np.linspace(0.0, path.length, max(int(path.length / PATH_STEP), 2) + 1):
-        pose = PoseStamped(header=message.header)
-        pose.pose.position.x, pose.pose.position.y = map(float, path.point(s))
-        pose.pose.orientation = to_quaternion(float(path.heading_at(s)))
-        message.poses.append(pose)
-    return message
+    def _state(self) -> State:
+        """How far the following of the path has come."""
+        if self._planner is None or self._plan is None:
+            return "waiting"
+        if not self._planner.finished:
+            return "executing"
+        return "canceled" if self._canceled else "succeeded"
 
 
 def main() -> int:

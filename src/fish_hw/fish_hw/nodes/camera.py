@@ -77,7 +77,10 @@ class CameraNode(DeviceNode):
             self._publish_picture(cycle.picture)
 
     def _publish_picture(self, picture: Picture) -> None:
-        header = Header(stamp=self.stamp(picture.time_s), frame_id=self.settings.frame_id)
+        header = Header(
+            stamp=self.stamp(picture.time_s),
+            frame_id=self.settings.frame_prefix + self.settings.frame_id,
+        )
         self._info.header = header
         self.publish(
             self._compressed,

@@ -57,10 +57,10 @@ class ImuNode(DeviceNode):
     def _message_template(self) -> Imu:
         """What is the same in every message: frame and covariances (REP 145)."""
         message = Imu()
-        message.header.frame_id = self.settings.frame_id
-        message.orientation_covariance = diagonal(self.settings.orientation_stddev)
-        message.angular_velocity_covariance = diagonal(self.settings.gyro_stddev)
-        message.linear_acceleration_covariance = diagonal(self.settings.accel_stddev)
+        message.header.frame_id = self.settings.frame_prefix + self.settings.frame_id
+        message.orientation_covariance = diagonal(self.settings.orientation_stdev)
+        message.angular_velocity_covariance = diagonal(self.settings.angular_velocity_stdev)
+        message.linear_acceleration_covariance = diagonal(self.settings.linear_acceleration_stdev)
         return message
 
     def _message(self, sample: ImuSample) -> Imu:

@@ -99,7 +99,7 @@ class RotorNode(DeviceNode):
     def _joint_message(self, sample: RotorSample) -> JointState:
         message = JointState(name=["rotor"], position=[sample.angle], velocity=[sample.velocity])
         message.header.stamp = self.stamp(sample.time_s)
-        message.header.frame_id = self.settings.frame_id
+        message.header.frame_id = self.settings.frame_prefix + self.settings.frame_id
         return message
 
     def _on_battery(self) -> None:

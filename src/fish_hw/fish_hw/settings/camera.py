@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from fish_hw.settings.checks import require_range
+from fish_node.frames import require_frame, require_frame_prefix
 
 
 @dataclass(frozen=True)
@@ -24,9 +25,12 @@ class CameraSettings:
     jpeg_quality: int = 85  # 1 to 100, only where the camera does not send JPEG itself
     publish_raw: bool = False  # also camera/image_raw (2.8 MB a frame)
     calibration_file: str = ""  # YAML of camera_calibration; empty: camera_info without calibration
-    frame_id: str = "overhead_optical"
+    frame_id: str = "overhead_optical"  # of pictures and camera_info
+    frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
 
     def __post_init__(self) -> None:
+        require_frame("frame_id", self.frame_id)
+        require_frame_prefix(self.frame_prefix)
         require_range("startup_timeout_s", self.startup_timeout_s, 0.0, 3600.0)
         require_range("width", self.width, 16, 8192)
         require_range("height", self.height, 16, 8192)

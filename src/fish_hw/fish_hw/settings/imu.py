@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from fish_hw.settings.checks import require_choice, require_range
+from fish_node.frames import require_frame, require_frame_prefix
 
 INTERFACES = ("i2c", "rvc")
 
@@ -34,12 +35,15 @@ class ImuSettings:
     mount_roll: float = 0.0  # rad
     mount_pitch: float = 0.0  # rad
     mount_yaw: float = 0.0  # rad
-    orientation_stddev: float = 0.044  # rad, game rotation vector: 2.5 deg
-    gyro_stddev: float = 0.054  # rad/s, 3.1 deg/s worst case
-    accel_stddev: float = 0.3  # m/s^2
-    frame_id: str = "imu_link"
+    orientation_stdev: float = 0.044  # rad, game rotation vector: 2.5 deg
+    angular_velocity_stdev: float = 0.054  # rad/s, 3.1 deg/s worst case
+    linear_acceleration_stdev: float = 0.3  # m/s^2
+    frame_id: str = "imu_link"  # of imu/data
+    frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
 
     def __post_init__(self) -> None:
+        require_frame("frame_id", self.frame_id)
+        require_frame_prefix(self.frame_prefix)
         require_choice("interface", self.interface, INTERFACES)
         require_choice("address", self.address, (0x4A, 0x4B))
         require_range("startup_timeout_s", self.startup_timeout_s, 0.0, 3600.0)
@@ -48,5 +52,5 @@ class ImuSettings:
         require_range("watchdog_s", self.watchdog_s, 0.1, 60.0)
         for name in ("mount_roll", "mount_pitch", "mount_yaw"):
             require_range(name, getattr(self, name), -math.pi, math.pi)
-        for name in ("orientation_stddev", "gyro_stddev", "accel_stddev"):
+        for name in ("orientation_stdev", "angular_velocity_stdev", "linear_acceleration_stdev"):
             require_range(name, getattr(self, name), 1e-6, 10.0)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from fish_hw.settings.checks import require_choice, require_range
 from fish_node.arming import ArmingSettings
+from fish_node.frames import require_frame, require_frame_prefix
 
 CYCLES = 3  # that a command or an answer may be late without anything being stopped
 
@@ -49,10 +50,13 @@ class RotorSettings(ArmingSettings):
     battery_filter_s: float = 0.4  # s, the rotor's load ripples at 4 Hz
     temperature_warn_c: float = 70.0  # deg C, coil or controller
     temperature_stop_c: float = 85.0  # deg C, coil or controller: the robot is disarmed
-    frame_id: str = "base_link"
+    frame_id: str = "base_link"  # of joint_states
+    frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_frame("frame_id", self.frame_id)
+        require_frame_prefix(self.frame_prefix)
         require_range("baud", self.baud, 9600, 3_000_000)
         require_range("module_id", self.module_id, 0, 63)
         require_range("startup_timeout_s", self.startup_timeout_s, 0.0, 3600.0)

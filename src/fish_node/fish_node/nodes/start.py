@@ -1,16 +1,16 @@
 """What every node does to start and to stop: parameters from a dataclass, a clean end."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import asdict
 from typing import TypeVar
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
+from fish_node.nodes.descriptors import descriptors
 from fish_node.nodes.executor import spin
 from fish_node.parameters import in_type_of, unknown_names
 
@@ -19,11 +19,17 @@ Made = TypeVar("Made", bound=Node)
 REFUSALS = (ValueError, OSError, RCLError)  # of arguments, of parameters, of files that they name
 
 
-def read_parameters(node: Node, kind: type[Config]) -> Config:
+def read_parameters(node: Node, kind: type[Config], settable: Collection[str] = ()) -> Config:
     """Declare every field of a dataclass as ROS parameter and read them; the defaults are those of the dataclass.
 
-    They are read once: a change at run time is refused, since it would be reported as set and do nothing. The node must
-    have been made with automatically_declare_parameters_from_overrides: a misspelt name would go unnoticed.
+    Each gets a descriptor with unit, meaning and range. They are read once and then read-only, except those that the node
+    takes over at run time (nodes/changes.py). The node must have been made with
+    automatically_declare_parameters_from_overrides: a misspelt name would go unnoticed.
+
+    Args:
+        node: has no parameters of its own yet.
+        kind: the dataclass.
+        settable: names of the parameters that the node takes over at run time.
 
     Raises:
         ValueError: an unknown name, or a value of the wrong type or out of range, naming parameter, value and
@@ -32,17 +38,18 @@ def read_parameters(node: Node, kind: type[Config]) -> Config:
     defaults = asdict(kind())  # type: ignore[call-overload]
     if unknown := unknown_names(node.get_parameters_by_prefix(""), defaults):
         raise ValueError(unknown)
-    descriptor = ParameterDescriptor(dynamic_typing=True, read_only=True)
     values = {}
     for name, like in defaults.items():
-        if node.has_parameter(
-            name
-        ):  # declared with the type that came, which may not be the right one
-            node.undeclare_parameter(name)
-        start = list(like) if isinstance(like, tuple) else like
-        given = node.declare_parameter(name, start, descriptor).value
+        given = node.get_parameter(name).value if node.has_parameter(name) else like
         values[name] = in_type_of(name, given, like)
-    return kind(**values)
+    config = kind(**values)
+    for name, descriptor in descriptors(config, settable).items():
+        if node.has_parameter(name):  # declared with the type that came, and without a descriptor
+            node.undeclare_parameter(name)
+        value = values[name]
+        start = list(value) if isinstance(value, tuple) else value
+        node.declare_parameter(name, start, descriptor, ignore_override=True)
+    return config
 
 
 def run(

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import isfinite
 
+from fish_node.frames import require_frame, require_frame_prefix
 from fish_sim.camera.fish import FishShape
 from fish_sim.camera.model import CameraModel
 from fish_sim.camera.renderer import Look
@@ -43,6 +44,7 @@ class CameraConfig:
     link_length: float = 0.07 / 3  # of one tail link, m
     fin_length: float = 0.03  # m
     tail_links: int = 3  # marked tail links
+    frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
 
     def __post_init__(self) -> None:
         for name, count in (
@@ -55,6 +57,8 @@ class CameraConfig:
             value = getattr(self, name)
             if len(value) != count or not all(isfinite(v) for v in value):
                 raise ValueError(f"{name} = {list(value)}: expected {count} finite numbers")
+        require_frame("frame_id", self.frame_id)
+        require_frame_prefix(self.frame_prefix)
         for name, low, high in _RANGES:
             value = getattr(self, name)
             if not low <= value <= high:

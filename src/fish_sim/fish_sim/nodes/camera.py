@@ -103,7 +103,8 @@ class CameraNode(Node):
     def _take(self, exposure: float) -> Frame:
         """Draw and encode the frame whose exposure is centred at a time."""
         picture = self._renderer.render(self._poses(exposure), exposure)
-        header = Header(stamp=Time(seconds=exposure).to_msg(), frame_id=self._config.frame_id)
+        frame = self._config.frame_prefix + self._config.frame_id
+        header = Header(stamp=Time(seconds=exposure).to_msg(), frame_id=frame)
         compressed = CompressedImage(header=header, format="bgr8; jpeg compressed bgr8")
         compressed.data = self._renderer.jpeg(picture)
         raw = _raw_image(header, picture) if self._raw is not None else None

@@ -76,6 +76,11 @@ class SimulatorNode(Node):
             (Source(COMMAND, config.command_timeout), *operator_and_estimate(config))
         )
         self._paused = config.paused
+        self._frames = (
+            config.pool_frame,
+            config.frame_prefix + config.body_frame,
+            config.frame_prefix + config.imu_frame,
+        )
         self._refused = self._divergences = self._contacts = 0
         self._refusal = ""
         self._lockstep = Lockstep(config.lockstep)
@@ -104,9 +109,10 @@ class SimulatorNode(Node):
         self._battery = self.create_publisher(BatteryState, "battery_state", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
-        self._rivals = Rivals(
-            self._odometry.topic_name, self.count_publishers, self.get_logger().warning
-        )
+        self._rivals = [
+            Rivals(publisher.topic_name, self.count_publishers, self.get_logger().warning)
+            for publisher in (self._odometry, self._clock_publisher)
+        ]
         self._camera = (
             self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
             if camera_pose
@@ -222,12 +228,12 @@ class SimulatorNode(Node):
     def _publish(self, readings: Readings) -> None:
         stamp = self._stamp(readings.time)
         self._clock_publisher.publish(ClockMessage(clock=stamp))
-        pool, body = Header(stamp=stamp, frame_id="pool"), Header(stamp=stamp, frame_id="base_link")
+        pool, body = (Header(stamp=stamp, frame_id=frame) for frame in self._frames[:2])
         self._tail.publish(messages.tail(body, readings.truth))
-        self._odometry.publish(messages.odometry(pool, readings.truth))
+        self._odometry.publish(messages.odometry(pool, body.frame_id, readings.truth))
         self._joints.publish(messages.rotor(body, readings.rotor))
         self._felt = messages.imu(
-            Header(stamp=stamp, frame_id="imu_link"), readings.imu, self._config
+            Header(stamp=stamp, frame_id=self._frames[2]), readings.imu, self._config
         )
         self._felt_said = time.monotonic()
         self._imu.publish(self._felt)
@@ -235,7 +241,7 @@ class SimulatorNode(Node):
             self._battery.publish(messages.battery(body, readings.battery))
         if self._camera is not None:
             for sample in readings.camera:
-                header = Header(stamp=self._stamp(sample.stamp), frame_id="pool")
+                header = Header(stamp=self._stamp(sample.stamp), frame_id=pool.frame_id)
                 self._camera.publish(messages.camera_pose(header, sample, self._config))
 
     def _report(self) -> None:
@@ -246,7 +252,7 @@ class SimulatorNode(Node):
         pace = (simulated - simulated_then) / (now - then)
         level, text = self._judge(pace, lost - lost_then)
         self._log.say(level, text)
-        if warning := self._rivals.warning():
+        for warning in filter(None, [rivals.warning() for rivals in self._rivals]):
             level, text = max(level, DiagnosticStatus.WARN), f"{text}; {warning}"
         if self._simulation.walls.touches(simulated):
             level, text = (

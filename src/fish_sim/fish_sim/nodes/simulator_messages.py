@@ -34,9 +34,9 @@ def quaternion(heading: float) -> Quaternion:
     return Quaternion(z=math.sin(heading / 2), w=math.cos(heading / 2))
 
 
-def odometry(header: Header, truth: Truth) -> Odometry:
-    """The truth: pose in `pool`, velocity in base_link, zero covariance."""
-    msg = Odometry(header=header, child_frame_id="base_link")
+def odometry(header: Header, body_frame: str, truth: Truth) -> Odometry:
+    """The truth: pose in the header's frame, the pool; velocity in base_link, zero covariance."""
+    msg = Odometry(header=header, child_frame_id=body_frame)
     position, twist = msg.pose.pose.position, msg.twist.twist
     position.x, position.y = truth.pose[:2]
     msg.pose.pose.orientation = quaternion(truth.pose[2])

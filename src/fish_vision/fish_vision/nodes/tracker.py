@@ -7,6 +7,7 @@ angles, rad), both stamped as the image; with debug_image camera/debug/compresse
 and calibrations are counted and said in the diagnostics.
 """
 
+from collections.abc import Callable
 from math import cos, sin
 from time import perf_counter
 from typing import Any
@@ -21,7 +22,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.changes import Changes
 from fish_node.nodes.start import read_parameters, run
+from fish_node.nodes.static_frames import publish_static_frame
 from fish_node.nodes.status_log import StatusLog
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, CalibrationError, Lens
@@ -31,6 +34,7 @@ from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
 from fish_vision.statistics import Statistics
 from fish_vision.tracker import Detection, Tracker
 
+SETTABLE = ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour")
 QUEUE = 10
 # a late image is worse than a lost one; a raw image is many packets, of which best effort sooner or later loses one
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -48,13 +52,21 @@ class TrackerNode(Node):
         cv2.setNumThreads(
             1
         )  # one small region per image: more threads only take time from other nodes
-        self._config = read_parameters(self, TrackerConfig)
+        self._config = read_parameters(self, TrackerConfig, SETTABLE)
+        Changes(self, self._config, self._change)
         self._info: tuple[Any, ...] | None = None  # fields of the camera_info in use
         self._calibration: Calibration | None = None
         self._calibration_error = "no camera/camera_info yet"
         self._tracker: Tracker | None = None
         self._statistics = Statistics()
         self._images_before = self._tracked_before = 0
+        self._mounted = publish_static_frame(
+            self,
+            self._config.frame_id,
+            self._config.frame_prefix + self._config.camera_frame,
+            self._config.camera_position,
+            self._config.mount().quaternion,
+        )
         self._pose = self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
         self._tail = self.create_publisher(JointState, "camera/tail", QUEUE)
         self._debug = None
@@ -72,6 +84,16 @@ class TrackerNode(Node):
                 CompressedImage, "camera/image_raw/compressed", self._on_image, NEWEST
             )
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _change(self, _: TrackerConfig, after: TrackerConfig) -> Callable[[], None]:
+        """What takes over colours that were set at run time: the fish is looked for anew."""
+
+        def take_over() -> None:
+            self._config = after
+            if self._calibration is not None:
+                self._tracker = Tracker(after, self._calibration)
+
+        return take_over
 
     def _on_info(self, msg: CameraInfo) -> None:
         """Take over a calibration when it changes."""
