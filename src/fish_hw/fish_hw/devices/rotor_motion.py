@@ -54,7 +54,7 @@ class MotionCheck:
         self._equal += 1
         self._lowest, self._highest = min(self._lowest, command), max(self._highest, command)
         if self._equal >= STUCK_SAMPLES and self._highest - self._lowest > STUCK_CHANGE:
-            return f"encoder stuck: the measured speed stands still at {sample.velocity:.1f} rad/s"
+            return f"rotor jammed or encoder stuck: measured speed stands still at {sample.velocity:.1f} rad/s"
         return ""
 
     def _runaway(self, sample: RotorSample) -> str:

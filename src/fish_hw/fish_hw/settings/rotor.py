@@ -33,7 +33,7 @@ class RotorSettings(ArmingSettings):
     )
     answer_timeout_s: float = 0.15  # s without measured speed until the module is given up
     telemetry_timeout_s: float = (
-        0.2  # s without battery, temperatures or faults until the robot is disarmed
+        0.15  # s without battery, temperatures or faults until the robot is disarmed
     )
     rudder_timeout_s: float = (
         0.2  # s without a word of node rudder until the robot is disarmed; 0: no rudder
