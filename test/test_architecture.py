@@ -37,7 +37,7 @@ MAY_IMPORT = {
 PACKAGES = tuple(MAY_IMPORT)
 FOLDERS = {name: ROOT / ("studies" if name == "fish_study" else "src") / name for name in PACKAGES}
 ROS = ("rclpy", "rcl_interfaces", "launch", "launch_ros", "rosgraph_msgs", "builtin_interfaces")
-GRAPH_FOLDERS = ("nodes", "launch", "test")
+GRAPH_FOLDERS = ("nodes", "launch", "test", "benchmarks")
 SOURCES = [
     (name, path) for name, folder in FOLDERS.items() for path in sorted(folder.rglob("*.py"))
 ]

@@ -29,7 +29,7 @@ PROGRAMS = {"polite": POLITE, "deaf": DEAF, "busy": BUSY, "broken": BROKEN}
 def nodes(tmp_path, monkeypatch):
     """A set of processes that run PROGRAMS by executable name."""
     monkeypatch.setattr(
-        processes, "command", lambda spec, _=None: [sys.executable, "-c", PROGRAMS[spec.executable]]
+        processes, "command", lambda spec, *_: [sys.executable, "-c", PROGRAMS[spec.executable]]
     )
     monkeypatch.setattr(
         processes, "GRACE", ((signal.SIGINT, 3.0), (signal.SIGTERM, 0.2), (signal.SIGKILL, 3.0))
@@ -96,7 +96,7 @@ import sys, time
 from pathlib import Path
 from fish_bringup import processes
 from fish_bringup.node_table import NodeSpec
-processes.command = lambda spec, _=None: [sys.executable, "-c", {POLITE!r}]
+processes.command = lambda spec, *_: [sys.executable, "-c", {POLITE!r}]
 nodes = processes.NodeProcesses(0, Path({str(tmp_path)!r}))
 print(nodes.start(NodeSpec("test", "polite", "none.yaml")).pid, flush=True)
 time.sleep(60)
