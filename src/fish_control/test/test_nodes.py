@@ -433,22 +433,22 @@ def test_following_a_path_is_started_watched_and_canceled(bench):
     def state():
         return b.heard["path/status"][-1].message if b.heard["path/status"] else None
 
-    b.say("odometry/filtered", odometry(b.now(), x=-1.4, y=0.05))
-    b.until(lambda: state() == "executing")
+    def comes(wanted, x, y=0.0):  # the estimate is said until it is heard
+        b.until(lambda: b.say("odometry/filtered", odometry(b.now(), x, y)) or state() == wanted)
+
+    comes("executing", -1.4, 0.05)
     feedback = {pair.key: float(pair.value) for pair in b.heard["path/status"][-1].values}
     assert feedback["length_m"] == pytest.approx(3.0)
     assert feedback["progress_m"] == pytest.approx(0.1, abs=0.01)
     assert feedback["cross_track_m"] == pytest.approx(0.05)
     assert call(b, "path/cancel").success
-    b.say("odometry/filtered", odometry(b.now(), x=-1.3))
-    b.until(lambda: state() == "canceled")
+    comes("canceled", -1.3)
     b.until(lambda: b.heard["control/twist"][-1].twist.linear.x == 0.0)
     again = call(b, "path/cancel")
     assert not again.success
     assert again.message == "no path is being followed"
     assert call(b, "path/start").success
-    b.say("odometry/filtered", odometry(b.now(), x=-1.4))
-    b.until(lambda: state() == "executing")
+    comes("executing", -1.4)
 
 
 def test_there_is_nothing_to_start_before_a_path_came(bench):
@@ -582,7 +582,7 @@ def test_a_planner_that_crashes_leaves_its_progress_and_one_that_ends_does_not(
         assert file.exists()
         raise ValueError("a mistake in a callback") if crash else KeyboardInterrupt
 
-    monkeypatch.setattr(rclpy, "spin", spin)
+    monkeypatch.setattr("fish_node.nodes.start.spin", spin)
     arguments = ["path:=straight", 'path_args:="{length: 2.0}"', f"state_file:={file}"]
     monkeypatch.setattr(
         sys, "argv", ["node", "--ros-args", *(w for a in arguments for w in ("-p", a))]

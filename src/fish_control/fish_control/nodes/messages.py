@@ -16,6 +16,7 @@ from fish_control.planner import motion_is_finite
 from fish_control.watchdog import EstimateHealth
 
 PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
+PLANAR_VARIANCES = np.array([7 * k for k in PLANAR])  # their places among its 36 numbers
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -68,15 +69,11 @@ def planar_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
     """What speaks for an estimate at `now` [s]."""
-    pose, twist = (
-        planar_covariance(message.pose.covariance),
-        planar_covariance(message.twist.covariance),
-    )
     return EstimateHealth(
         age=now - seconds(message.header.stamp),
         finite=motion_is_finite(motion_of(message)),
-        pose_variance=float(pose.diagonal().max()),
-        twist_variance=float(twist.diagonal().max()),
+        pose_variance=float(message.pose.covariance[PLANAR_VARIANCES].max()),
+        twist_variance=float(message.twist.covariance[PLANAR_VARIANCES].max()),
     )
 
 
