@@ -115,7 +115,7 @@ def library(source: str, check: Check, width: int) -> ctypes.CDLL | None:
         "\n".join([source, cc, _processor(), *FLAGS, str(levels), str(TOLERANCE)]).encode()
     )
     try:
-        folder = cache_folder()
+        folder = cache_folder().resolve()  # a name without a folder would be looked for elsewhere
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{key}.so"
         result = _cached(path) or _build(cc, source, check, levels, path)
@@ -130,12 +130,7 @@ def library(source: str, check: Check, width: int) -> ctypes.CDLL | None:
             " ".join(result.flags),
         )
     except (OSError, subprocess.CalledProcessError) as error:
-        detail = (
-            error.stderr.decode()[:400]
-            if isinstance(error, subprocess.CalledProcessError)
-            else error
-        )
-        log.warning("no compiled kernel (%s); the slower interpreted form is used", detail)
+        log.warning("no compiled kernel (%s); the slower interpreted form is used", _detail(error))
     return None
 
 
@@ -160,23 +155,53 @@ def largest(errors: Mapping[str, float]) -> float:
 def _build(
     cc: str, source: str, check: Check, levels: tuple[tuple[str, ...], ...], path: Path
 ) -> Result:
-    """Of the first level that passes, or of the last; the library of that level stands at `path` afterwards."""
+    """Of the first level that passes, or of the last that compiles; its library stands at `path` afterwards.
+
+    Raises:
+        OSError, subprocess.CalledProcessError: no level gives a library that can be loaded.
+    """
+    best: tuple[Result, Path] | None = None
+    failure: OSError | subprocess.CalledProcessError | None = None
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         for number, flags in enumerate(levels):
             built = Path(folder) / f"{number}.so"  # a path that was loaded once is not loaded again
-            compile_library(cc, source, flags, built)
-            errors = dict(check(ctypes.CDLL(str(built))))
-            result = Result(
-                largest(errors) <= TOLERANCE, list(flags), errors, _digest(built.read_bytes())
-            )
-            if result.passed:
+            try:
+                compile_library(cc, source, flags, built)
+                errors = _errors(check, ctypes.CDLL(str(built)))
+            except (OSError, subprocess.CalledProcessError) as error:
+                failure = error
+                log.info("no kernel compiled with %s: %s", " ".join(flags), _detail(error))
+                continue
+            passed = largest(errors) <= TOLERANCE
+            best = Result(passed, list(flags), errors, _digest(built.read_bytes())), built
+            if passed:
                 break
             log.info("compiled with %s a kernel is wrong: %s", " ".join(flags), errors)
+        if best is None:
+            raise failure or ValueError("levels: got none; expected at least one")
+        result, built = best
         record = Path(folder) / "result.json"
         record.write_text(json.dumps(asdict(result)))
         built.replace(path)
         record.replace(path.with_suffix(".json"))
     return result
+
+
+def _errors(check: Check, loaded: ctypes.CDLL) -> dict[str, float]:
+    """What a check says of a library; one without the kernel's functions is as wrong as can be."""
+    try:
+        return dict(check(loaded))
+    except AttributeError as error:
+        log.info("a library lacks a function: %s", error)
+        return {"functions": np.inf}
+
+
+def _detail(error: OSError | subprocess.CalledProcessError) -> str:
+    """What the compiler said, in whatever language, or how it ended."""
+    if isinstance(error, OSError):
+        return str(error)
+    said: str = error.stderr.decode(errors="replace")[:400].strip()
+    return said or f"{error.cmd[0]} ended with status {error.returncode}"
 
 
 def _cached(path: Path) -> Result | None:

@@ -7,7 +7,7 @@ one more than a vector holds. The draws are seeded and typical of a swimming fis
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel, Part
 from fish_sim.methods import METHODS
-from fish_sim.model import DRIVE_NAMES, Layout
+from fish_sim.model import DRIVE_NAMES, DT, Layout
 from fish_sim.parameter import Parameter
 from fish_sim.robot import Structure, nominal_parameters
 from fish_sim.scheme import Scheme
+from fish_sim.stability import modes_at_rest
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,8 @@ PERIODS, MANY = 2, 16  # one period where it is that many steps of the integrato
 SEED = 1
 SPREAD = 0.1  # of the parameters about their typical values
 FAINT = 0.02  # what a parameter without a typical value is, where its default is 0
+MASSES = ("_mass", "_mass_surge", "_mass_sway", "head_inertia")  # ends of their names
+TURN = 1.0  # rad, by which the fastest mode of a sample turns in a step of the integrator at most
 SMALL = 1e-3  # a component smaller than this share of the largest is measured by that share
 # half widths by the name in a state vector; other angles and states of effects: ELSE
 TYPICAL = {
@@ -47,7 +50,7 @@ def kernel_errors(
     layout, errors = Layout(structure), dict[str, float]()
     interpreted = InterpretedKernel(structure, METHODS[scheme.method], scheme.substeps)
     for batch in (1, width + 1):
-        sample = Sample.draw(layout, batch, 1 if scheme.substeps > MANY else PERIODS)
+        sample = Sample.draw(layout, batch, 1 if scheme.substeps > MANY else PERIODS).slowed(scheme)
         right, found = (
             run(kernel, sample, part) for kernel in (interpreted, CompiledKernel(library))
         )
@@ -57,7 +60,12 @@ def kernel_errors(
 
 
 def relative_error(found: Array, right: Array) -> float:
-    """Largest difference (..., size), each component measured by its largest magnitude or SMALL of all components'."""
+    """Largest difference (..., size), each component measured by its largest magnitude or SMALL of all components'.
+
+    Infinite where a number of either is not finite.
+    """
+    if not (np.isfinite(found).all() and np.isfinite(right).all()):
+        return np.inf
     found, right = (a.reshape(-1, a.shape[-1]) for a in (found, right))
     size = np.abs(right).max(axis=0)
     difference = np.abs(found - right).max(axis=0)
@@ -101,6 +109,13 @@ class Sample:
         )
         return cls(layout, states, commands, drive, parameters, *directions)
 
+    def slowed(self, scheme: Scheme) -> Sample:
+        """The same fish, as heavy as the scheme's steps need (`heaviness`)."""
+        factor = heaviness(self.layout, scheme, self.parameters)
+        return replace(
+            self, parameters=self.parameters * factor, d_parameters=self.d_parameters * factor
+        )
+
 
 def random_states(layout: Layout, shape: tuple[int, ...], random: np.random.Generator) -> Array:
     """States (*shape, NS): in the middle of the pool, the tail bent, as fast as a fish swims."""
@@ -119,6 +134,23 @@ def random_parameters(layout: Layout, batch: int, random: np.random.Generator) -
     ranges = np.array([(p.lowest, p.highest) for p in table]).T
     parameters: Array = np.clip(np.array([_typical(p) for p in table]) * factor, *ranges)
     return parameters
+
+
+def heaviness(layout: Layout, scheme: Scheme, parameters: Array) -> Array:
+    """Factors (NP,) of parameters (B, NP): 1 but for masses and inertias.
+
+    A scheme may be too coarse for a typical fish: it is meant for a slower one. The motion would grow from step to step,
+    and with it the rounding error of a right kernel. Masses grow until no mode turns by more than TURN in a step.
+    """
+    modes = modes_at_rest(layout.structure, parameters.mean(axis=0))
+    turn = float(np.abs(modes).max()) * DT / scheme.substeps
+    heavier = max(1.0, (turn / TURN) ** 2)  # a mode's rate goes with the mass's root, or faster
+    return np.array(
+        [
+            heavier if name.endswith(MASSES) and "." not in name else 1.0
+            for name in layout.parameters
+        ]
+    )
 
 
 def run(kernel: CompiledKernel | InterpretedKernel, sample: Sample, part: Part) -> dict[str, Array]:

@@ -1,5 +1,6 @@
 """Compiled kernels: cached, thread-safe, and dispensable."""
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -44,6 +45,49 @@ def test_a_broken_compiler_is_said_and_done_without(fresh, monkeypatch, caplog, 
     assert not list(fresh.glob("*.so"))
     assert isinstance(Stepper((1, ()), SCHEME)._kernel(1), InterpretedKernel)
     assert np.isfinite(expected).all()
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("printf 'ung\\374ltig' >&2; exit 1", "ung"),  # a message in Latin-1
+        ("kill -9 $$", "ended with status -9"),
+        ("for a; do case $a in *.so) : > $a;; esac; done", "too short"),
+    ],
+)
+def test_whatever_becomes_of_a_compiler_the_user_is_told(
+    fresh, monkeypatch, caplog, strokes, script, said
+):
+    cc = fresh / "cc"
+    cc.write_text(f"#!/bin/sh\n{script}\n")
+    cc.chmod(0o755)
+    monkeypatch.setenv("CC", str(cc))
+    assert np.isfinite(swim(strokes)).all()
+    assert said in caplog.text
+    assert not list(fresh.glob("*.so"))
+
+
+@pytest.mark.skipif(compiled.compiler() is None, reason="no C compiler on this computer")
+def test_a_compiler_that_fails_with_the_fast_flags_is_given_safer_ones(
+    fresh, monkeypatch, caplog, strokes
+):
+    cc = fresh / "cc"
+    gcc = compiled.compiler()
+    cc.write_text(f'#!/bin/sh\ncase " $* " in *" -O3 "*) exit 4;; esac\nexec {gcc} "$@"\n')
+    cc.chmod(0o755)
+    monkeypatch.setenv("CC", str(cc))
+    assert np.isfinite(swim(strokes)).all()
+    (result,) = fresh.glob("*.json")
+    assert json.loads(result.read_text())["flags"] == ["-O1"]
+    assert not caplog.text
+
+
+@pytest.mark.skipif(compiled.compiler() is None, reason="no C compiler on this computer")
+def test_the_cache_may_be_the_current_folder(fresh, monkeypatch, caplog, strokes):
+    monkeypatch.chdir(fresh)
+    monkeypatch.setenv("FISH_SIM_CACHE", ".")
+    assert np.isfinite(swim(strokes)).all()
+    assert not caplog.text
 
 
 def test_a_folder_that_cannot_be_written_is_said_and_done_without(

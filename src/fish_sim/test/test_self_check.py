@@ -3,6 +3,7 @@
 import json
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,10 +69,11 @@ def one_step(batch=3):
     return relative_error(states[1:], right[1:])
 
 
-# a coefficient of the cosine's polynomial, the weights of the stages
+# a coefficient of the cosine's polynomial, the weights of the stages, what is no number
 EDITS = [
     "s/4.16666666666666019037e-02/4.16666766666666019037e-02/",
     "s/(h \\* B\\[i\\])/(h * B[0])/",
+    "s/1.58969099521155010221e-10/(0.0 \\/ 0.0)/",
 ]
 
 
@@ -114,6 +116,33 @@ def test_a_kernel_that_stays_wrong_is_replaced_and_the_user_is_told_once(
     assert one_step(batch) < 1e-11  # what is known to be wrong is neither built nor trusted again
     assert len(results(cache)) == 1
     assert not results(cache)[0]["passed"]
+
+
+def test_a_kernel_that_loses_its_functions_is_replaced_and_the_user_is_told(
+    cache, bad_compiler, caplog
+):
+    bad_compiler("s/^void /static void /", "-shared")
+    assert one_step() < 1e-11
+    (record,) = caplog.records
+    assert "the slower interpreted form is used" in record.message
+
+
+@pytest.mark.parametrize(("links", "scheme"), [(7, Scheme("rk4", 5)), (12, Scheme("cfmr7", 25))])
+@pytest.mark.parametrize("part", ["tangents", "adjoints"])
+def test_rounding_errors_stay_small_where_a_scheme_is_too_coarse_for_a_typical_fish(
+    links, scheme, part
+):
+    """A right kernel of such a scheme is not refused: identification takes half of the simulator's steps, or fewer."""
+    structure = (links, ())
+    kernel = InterpretedKernel(structure, METHODS[scheme.method], scheme.substeps)
+    sample = Sample.draw(Layout(structure), 3, 1).slowed(scheme)
+    random = np.random.default_rng(5)
+    moved = replace(
+        sample,
+        states=sample.states * (1.0 + 2e-16 * random.choice([-1, 0, 1], sample.states.shape)),
+    )
+    for name, values in run(kernel, sample, part).items():
+        assert relative_error(run(kernel, moved, part)[name], values) < 1e-10, name
 
 
 @pytest.mark.parametrize("part", ["tangents", "adjoints", "memory"])
