@@ -16,7 +16,9 @@ from fish_control.path_batch import TrackerConfig
 from fish_control.policy import Policy
 from fish_control.policy_spec import INPUTS, PolicySpec
 from fish_report.errors import UserError
+from fish_sim.methods import METHODS
 from fish_sim.robot import Robot
+from fish_sim.stability import growth, modes_at_rest
 from fish_train.evaluation.candidates import read_candidate
 from fish_train.training import parallel_runs
 from fish_train.training.batch_state import WindowResult
@@ -39,7 +41,7 @@ from fish_train.training.run import (
 )
 from fish_train.training.run_log import RunLog, read_curve
 from fish_train.training.search import search
-from fish_train.training.trainer import Trainer, TrainingDiverged
+from fish_train.training.trainer import Trainer, TrainingDiverged, training_scheme
 from fish_train.training.weights_output import SCHEDULE, write_weights
 
 SHORT = {
@@ -74,6 +76,17 @@ def episodes(trainer: Trainer, count: int) -> list:
         if (progress := trainer.step()) is not None:
             rows.append(progress)
     return rows
+
+
+@pytest.mark.parametrize("links", range(1, 13))
+def test_the_steps_of_training_are_stable_for_every_tail(links: int) -> None:
+    """Also where it is a fifth stiffer than the nominal one: training draws its fish."""
+    robot = Robot(links=links)
+    stiffer = Robot(links, {"tail_stiffness": 1.2 * robot.parameters["tail_stiffness"]})
+    scheme = training_scheme(robot)
+    for tail in (robot, stiffer):
+        modes = modes_at_rest(tail.structure, np.array(tail.vector()))
+        assert growth(METHODS[scheme.method], modes, scheme.substeps) < 1.0 + 1e-6
 
 
 def test_a_restored_run_continues_exactly(tmp_path: Path) -> None:

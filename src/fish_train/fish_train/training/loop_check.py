@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.paths import make_path
-from fish_sim.self_check import random_parameters, random_states, relative_error
+from fish_sim.self_check import heaviness, random_parameters, random_states, relative_error
 from fish_sim.step import Stepper
 from fish_train.training.batch_state import LONGEST_DELAY, BatchState, WindowResult
 from fish_train.training.closed_loop_equations import (
@@ -105,6 +105,7 @@ def _batch_state(
     seen = np.column_stack([poses, random.uniform(-0.1, 0.2, (batch, 3))])
     delay = np.arange(batch) % (LONGEST_DELAY + 1)
     parameters = random_parameters(layout, batch, random)
+    parameters *= heaviness(layout, stepper.scheme, parameters)
     batch_state = BatchState.at(
         plant, parameters, path, random.uniform(0.1, 0.3, batch), seen, delay
     )

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
-from fish_sim.scheme import Scheme
+from fish_sim.scheme import Scheme, default_scheme, stable_scheme
 from fish_sim.step import Stepper
 from fish_train.training.batch_state import BatchState, WindowResult
 from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law
@@ -272,5 +272,8 @@ class Trainer:
 
 
 def training_scheme(robot: Robot) -> Scheme:
-    """RK4, one step in 10 ms for up to three links; its damping of the fastest tail mode does not matter to gains."""
-    return Scheme("rk4", 1 if robot.links <= 3 else 2 if robot.links <= 5 else 6)
+    """RK4 with half of the simulator's steps, one for up to three links, or as many as are stable for the robot.
+
+    Its damping of the fastest tail mode does not matter to gains.
+    """
+    return stable_scheme(robot, Scheme("rk4", (default_scheme(robot.links).substeps + 1) // 2))
