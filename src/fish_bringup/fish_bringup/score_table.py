@@ -15,6 +15,10 @@ def error_table(score: RunScore) -> Table:
     header = ["error", "RMSE", "95 %", "max", "RMSE *", "95 % *", "max *"]
     approach = "never ended" if np.isnan(score.approach_s) else f"took {score.approach_s:.1f} s"
     note = f"Without the approach phase, which {approach}; * with it. Heading: mean over a stroke of the tail."
+    if not (score.finished or score.path.closed):
+        note += (
+            f" The run ended at {score.progress[-1]:.2f} m of a path of {score.path.length:.2f} m."
+        )
     return Table("Tracking errors", header, rows, note)
 
 

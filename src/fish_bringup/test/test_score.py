@@ -80,6 +80,17 @@ def test_samples_after_the_end_of_an_open_path_do_not_count():
     assert np.abs(score.cross_track).max() < 1e-9
 
 
+def test_a_table_of_a_run_that_did_not_come_to_the_end_of_its_path_says_how_far_it_came():
+    t = np.arange(0.0, 20.0, 0.01)
+    moved = motion(t, -1.0 + np.minimum(0.2 * t, 2.2), 0.0, 0.0, 0.2)
+    whole, half = (
+        error_table(score_motion(moved.take(t < end), STRAIGHT, 0.2, 0.0, "truth")).note
+        for end in (20.0, 5.0)
+    )
+    assert "ended at" not in whole
+    assert "ended at 1.00 m of a path of 2.00 m" in half
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("last", ["path", "heading", "speed"])
 def test_approach_ends_when_path_heading_and_speed_are_all_near(last, side):
