@@ -9,7 +9,9 @@ from fish_hw.settings.checks import require_range
 class CameraSettings:
     """USB camera: device, picture, fixed exposure against glare, calibration."""
 
-    device: str = "/dev/video0"  # V4L2 device, video file (played in a loop), or "emulator"
+    device: str = (
+        "/dev/video0"  # V4L2 device, video file (played in a loop), unix:FILE, or "emulator"
+    )
     startup_timeout_s: float = (
         0.0  # s to wait for the camera at start, then the node ends with an error; 0: without end
     )
