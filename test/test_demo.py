@@ -7,12 +7,14 @@ import signal
 import socket
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 from ament_index_python.packages import get_package_prefix
 
 from fish_node.domain import choose_domain, discovery_port, domain_in_use
 
+ROOT = Path(__file__).parents[1]
 PROGRAM = f"{get_package_prefix('fish_report')}/lib/fish_report/robofish"
 
 
@@ -99,6 +101,7 @@ BAD_INPUT = {
     "not a number": (["--speed", "fast"], "invalid float value: 'fast'"),
     "speed": (["--speed", "9"], "expected 0.05 to 0.5"),
     "duration": (["--duration", "-1"], "expected a positive number"),
+    "hardware": (["--hardware", "real"], "expected one of sim, fake"),
     "domain": (["--domain", "500"], "0 to 232"),
     "weights": (["--weights", BROKEN], "not a safetensors file"),
     "robot": (["--robot", "absent.yaml"], "absent.yaml"),
@@ -109,6 +112,14 @@ BAD_INPUT = {
 def test_bad_input_is_one_line(arguments, expected, tmp_path):
     (tmp_path / BROKEN).write_text(json.dumps("not weights"))
     assert_one_line(demo(tmp_path, *arguments), expected)
+
+
+def test_an_unknown_make_variable_is_one_line():
+    command = ["make", "--silent", "help", "LETER=S"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode != 0
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert "unknown variable LETER; known: LETTER" in result.stderr
 
 
 def test_a_domain_in_use_is_one_line(tmp_path):

@@ -12,6 +12,7 @@ from fish_bag.recorder_config import RecorderConfig
 from fish_bringup.node_table import (
     CONTROL,
     EXCITER,
+    FAKE,
     JOINT_ANGLES,
     REAL,
     RECORDER,
@@ -26,6 +27,7 @@ from fish_control.node_configs import (
 )
 from fish_description.joint_angles import JointAnglesConfig
 from fish_hw.settings.camera import CameraSettings
+from fish_hw.settings.fake_robot import FakeRobotSettings
 from fish_hw.settings.imu import ImuSettings
 from fish_hw.settings.rotor import RotorSettings
 from fish_hw.settings.rudder import RudderSettings
@@ -42,6 +44,7 @@ CONFIGS: dict[str, type[Any]] = {
     "fish_hw/rudder": RudderSettings,
     "fish_hw/imu": ImuSettings,
     "fish_hw/camera": CameraSettings,
+    "fish_hw/fake_robot": FakeRobotSettings,
     "fish_vision/tracker": TrackerConfig,
     "fish_control/fusion": FusionNodeConfig,
     "fish_control/planner": PlannerConfig,
@@ -51,7 +54,7 @@ CONFIGS: dict[str, type[Any]] = {
     "fish_bag/replayer": ReplayerConfig,
     "fish_description/joint_angles": JointAnglesConfig,
 }
-SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
+SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
 INTRODUCTION = """# Parameters of the nodes
 
 A node refuses a value that it cannot use with one line: name, value and what is allowed. These can be set while it runs:

@@ -10,6 +10,7 @@ from pathlib import Path
 from fish_bringup.node_table import (
     CONTROL,
     EXCITER,
+    FAKE,
     JOINT_ANGLES,
     REAL,
     RECORDER,
@@ -18,7 +19,7 @@ from fish_bringup.node_table import (
 )
 from reference_pages.markdown import HEADER, cell, table
 
-SPECS = (*SIMULATED, *REAL, *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
+SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
 ARMING = "fish_node.nodes.arming"
 CREATORS = {
     "create_publisher": "publishes",
@@ -48,6 +49,11 @@ MEANING = {
     "operator/estop": "true while the emergency stop is pressed; on change",
     "operator/deadman": "true while the operator holds it; 10 Hz, where deadman_timeout_s is set",
     "rudder/trouble": "empty, or why the rudder does not work; 20 Hz",
+    "fake/joint_command": "what the fake robot's rotor and rudder do; 100 Hz",
+    "fake/imu": "what the simulator feels, for the fake robot's IMU; 100 Hz",
+    "fake/image/compressed": "what the simulator draws, for the fake robot's camera; 30 Hz",
+    "fake/battery_state": "the simulator's battery, for the fake robot's rotor module; 1 Hz",
+    "fake/fault": "name of a fault of the fake robot, or mend",
     "battery_state": "voltage [V], current [A]; 1 Hz",
     "sim/odometry": "the simulator's true pose and velocity; 100 Hz",
     "sim/joint_states": "the simulator's true rudder and tail angles [rad]; 100 Hz",

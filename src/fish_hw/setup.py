@@ -28,6 +28,7 @@ setup(
             "rudder = fish_hw.nodes.entry:rudder",
             "imu = fish_hw.nodes.entry:imu",
             "camera = fish_hw.nodes.entry:camera",
+            "fake_robot = fish_hw.nodes.entry:fake_robot",
             "safe_stop = fish_hw.commands.safe_stop:main",
         ],
     },

@@ -32,12 +32,14 @@ class NodeSpec:
     Attributes:
         parameter_file: in config/ of the package's share directory.
         frames: whether it has the parameter frame_prefix.
+        remaps: rules "from:=to" of topics, services and of the node's name (__node).
     """
 
     package: str
     executable: str
     parameter_file: str
     frames: bool = False
+    remaps: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -66,7 +68,62 @@ RECORDER = NodeSpec("fish_bag", "recorder", "recorder.yaml")
 REPLAYER = NodeSpec("fish_bag", "replayer", "replayer.yaml")
 JOINT_ANGLES = NodeSpec("fish_description", "joint_angles", "joint_angles.yaml")
 
+# The real drivers on the devices of a fake robot: the simulated pool lies behind the devices, and what it measures and
+# draws reaches the robot's topics through the drivers alone.
+BEHIND = tuple(
+    f"{name}:=fake/{name.rpartition('/')[2]}"
+    for name in (
+        "joint_command",
+        "joint_states",
+        "battery_state",
+        "arm",
+        "arming/state",
+        "arming/disarm",
+    )
+)
+FAKE = (
+    NodeSpec("fish_hw", "fake_robot", "fake_robot.yaml"),
+    NodeSpec("fish_sim", "simulator", "simulator.yaml", remaps=(*BEHIND, "imu/data:=fake/imu")),
+    NodeSpec(
+        "fish_sim",
+        "camera",
+        "camera.yaml",
+        remaps=(
+            "__node:=fake_camera",
+            "camera/image_raw/compressed:=fake/image/compressed",
+            "camera/camera_info:=fake/camera_info",
+        ),
+    ),
+)
+
+HARDWARE = ("sim", "fake")  # what a run of this computer alone can swim with
 ROBOTS = {"sim": (*SIMULATED, *CONTROL, RECORDER), "real": (*REAL, *CONTROL, RECORDER)}
+
+
+def robot_of(hardware: str) -> tuple[NodeSpec, ...]:
+    """The nodes of "sim", the simulator, or of "fake", the real drivers on the devices of a fake robot.
+
+    Raises:
+        UserError: another name.
+    """
+    if hardware not in HARDWARE:
+        raise UserError(f"hardware is {hardware!r}, expected one of {', '.join(HARDWARE)}")
+    return ROBOTS["sim"] if hardware == "sim" else (*FAKE, *ROBOTS["real"])
+
+
+def fake_parameters(devices: Path) -> dict[NodeSpec, dict[str, object]]:
+    """What the nodes of a fake robot need to find its devices, which lie in a folder with a short name."""
+    fake_robot, simulator, _ = FAKE
+    rotor, rudder, imu, camera = REAL
+    lens = Path(get_package_share_directory("fish_vision")) / "config" / "simulated_camera.yaml"
+    return {
+        fake_robot: {"folder": str(devices)},
+        simulator: {"estimate": "ignored"},
+        rotor: {"port": str(devices / "rotor"), "battery_cells": 3},
+        rudder: {"chip": str(devices / "pwmchip0")},
+        imu: {"bus": f"unix:{devices / 'i2c'}"},
+        camera: {"device": f"unix:{devices / 'camera'}", "calibration_file": str(lens)},
+    }
 
 
 def open_loop(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
@@ -107,6 +164,7 @@ def command(
     line = [str(executable_path(spec)), "--ros-args", "-r", f"__ns:={namespace}"]
     for old, new in remappings(namespace):
         line += ["-r", f"{old}:={new}"]
+    line += [word for rule in spec.remaps for word in ("-r", rule)]
     line += ["--params-file", str(parameter_path(spec))]
     own = {"frame_prefix": frame_prefix(namespace)} if spec.frames else {}
     for name, value in {**own, **(parameters or {})}.items():

@@ -36,9 +36,13 @@ class RunWatch:
     def reason_to_end(self, now: float, seen: Seen | None) -> str | None:
         """Why the run must end at `now` [s] with the newest pose of the camera; None where it may go on.
 
-        Poses older than the newest one are left out.
+        Poses older than the newest one are left out, and so are poses that are no numbers.
         """
-        if seen is not None and (self._seen is None or seen.stamp > self._seen.stamp):
+        if (
+            seen is not None
+            and np.isfinite([seen.x, seen.y]).all()
+            and (self._seen is None or seen.stamp > self._seen.stamp)
+        ):
             self._take(seen)
         return self._outside() or self._blind(now) or self._late(now)
 

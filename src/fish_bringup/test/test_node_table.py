@@ -21,6 +21,7 @@ EVERY_NODE = sorted(
     {
         *node_table.ROBOTS["sim"],
         *node_table.ROBOTS["real"],
+        *node_table.FAKE,
         node_table.REPLAYER,
         node_table.EXCITER,
     },
@@ -52,6 +53,21 @@ def test_every_node_has_an_entry_point_and_a_parameter_file(spec):
     )
     for settings in parameters.values():
         assert isinstance(settings["ros__parameters"], dict)
+
+
+def test_a_fake_robot_leaves_the_robots_topics_to_the_drivers(installed):
+    """The simulator behind the devices must not publish beside the real drivers, nor hear the robot's commands."""
+    behind = {spec.executable: spec for spec in node_table.robot_of("fake") if spec.remaps}
+    moved = {rule.partition(":=")[0] for spec in behind.values() for rule in spec.remaps}
+    assert {"joint_command", "joint_states", "imu/data", "camera/image_raw/compressed"} <= moved
+    assert {"arm", "arming/state", "arming/disarm", "battery_state"} <= moved
+    line = node_table.command(NodeSpec("fish_sim", "camera", "camera.yaml", ("a:=b", "c:=d")))
+    assert [line[k + 1] for k, word in enumerate(line) if word == "-r"][1:] == ["a:=b", "c:=d"]
+
+
+def test_unknown_hardware_is_refused():
+    with pytest.raises(UserError, match="hardware is 'real', expected one of sim, fake"):
+        node_table.robot_of("real")
 
 
 def test_command_line_keeps_types_of_parameters(installed):

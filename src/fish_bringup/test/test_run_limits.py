@@ -44,6 +44,11 @@ def test_a_fish_that_comes_near_a_wall_or_is_misplaced_now_and_then_swims_on():
     assert reasons(RunWatch(100.0), [near] * 200 + ([beyond] * 20 + [near]) * 10) == [None] * 410
 
 
+def test_a_pose_that_is_no_number_is_no_place_outside():
+    nowhere = (float("nan"), 0.0)
+    assert reasons(RunWatch(100.0), [(0.0, 0.0)] + [nowhere] * 200) == [None] * 201
+
+
 def test_fusion_that_goes_on_without_the_camera_ends_the_run():
     watch = RunWatch(0.0)
     last = Seen(5.0, 0.0, 0.0)

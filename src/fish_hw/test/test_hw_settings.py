@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from fish_hw.settings.camera import CameraSettings
+from fish_hw.settings.fake_robot import FakeRobotSettings
 from fish_hw.settings.imu import ImuSettings
 from fish_hw.settings.rotor import RotorSettings
 from fish_hw.settings.rudder import RudderSettings
@@ -16,6 +17,7 @@ SETTINGS = {
     "rudder": RudderSettings,
     "imu": ImuSettings,
     "camera": CameraSettings,
+    "fake_robot": FakeRobotSettings,
 }
 CONFIG = Path(__file__).parents[1] / "config"
 

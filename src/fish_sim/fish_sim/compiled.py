@@ -27,6 +27,7 @@ Check = Callable[
     [ctypes.CDLL], Mapping[str, float]
 ]  # name of a result -> its largest relative error
 
+CHECKED = 2  # counts up when a check becomes stricter: what an older one has passed is built again
 TOLERANCE = 1e-9  # relative; a rounding error of a right kernel is below 1e-11
 FLAGS = (
     "-march=native",
@@ -65,10 +66,20 @@ def compiler() -> str | None:
     """Path of the C compiler ($CC, else cc, gcc, clang), or None; FISH_SIM_NO_COMPILER=1 pretends there is none."""
     if os.environ.get("FISH_SIM_NO_COMPILER"):
         return None
-    for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
-        if name and (path := shutil.which(name)):
-            return path
-    return None
+    asked = os.environ.get("CC")
+    found = (
+        path for name in (asked, "cc", "gcc", "clang") if name and (path := shutil.which(name))
+    )
+    chosen = next(found, None)
+    if asked and shutil.which(asked) is None:
+        _say_unknown(asked, chosen)
+    return chosen
+
+
+@functools.cache
+def _say_unknown(asked: str, chosen: str | None) -> None:
+    """Once: what $CC names cannot be run."""
+    log.warning("CC=%r is no program (flags cannot be given in it); %s is used", asked, chosen)
 
 
 def cache_folder() -> Path:
@@ -112,7 +123,9 @@ def library(source: str, check: Check, width: int) -> ctypes.CDLL | None:
         return None
     levels = SCALAR_OPTIMISATION if width == 1 else OPTIMISATION
     key = _digest(
-        "\n".join([source, cc, _processor(), *FLAGS, str(levels), str(TOLERANCE)]).encode()
+        "\n".join(
+            [source, cc, _processor(), *FLAGS, str(levels), str(TOLERANCE), str(CHECKED)]
+        ).encode()
     )
     try:
         folder = cache_folder().resolve()  # a name without a folder would be looked for elsewhere

@@ -1,6 +1,7 @@
 """Compiled kernels: cached, thread-safe, and dispensable."""
 
 import json
+import shutil
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -45,6 +46,14 @@ def test_a_broken_compiler_is_said_and_done_without(fresh, monkeypatch, caplog, 
     assert not list(fresh.glob("*.so"))
     assert isinstance(Stepper((1, ()), SCHEME)._kernel(1), InterpretedKernel)
     assert np.isfinite(expected).all()
+
+
+def test_a_compiler_with_arguments_is_said_and_the_usual_one_taken(fresh, monkeypatch, caplog):
+    monkeypatch.setenv("CC", "gcc -O0")
+    compiled._say_unknown.cache_clear()
+    assert compiled.compiler() == next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))))
+    assert compiled.compiler()
+    assert caplog.text.count("CC='gcc -O0' is no program") == 1
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ Times are the simulator's.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -18,11 +19,14 @@ from rich.console import Console
 from fish_bag import read_trial
 from fish_bringup.node_table import (
     CONTROL,
+    FAKE,
+    HARDWARE,
     RECORDER,
-    ROBOTS,
     SIMULATED,
     NodeSpec,
     Parameters,
+    fake_parameters,
+    robot_of,
 )
 from fish_bringup.nodes.watch import watching
 from fish_bringup.processes import NodeProcesses
@@ -40,7 +44,6 @@ from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
 
 LONGEST = 600.0  # s, a run that does not end by itself
-SIMULATOR = SIMULATED[0]
 PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
 
 
@@ -65,6 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--robot", type=Path, help="robot.yaml or model.yaml that the simulator swims"
     )
+    parser.add_argument(
+        "--hardware",
+        default="sim",
+        help=f"{' or '.join(HARDWARE)}: fake swims through the real drivers on emulated devices (sim)",
+    )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
     parser.add_argument(
         "--out", type=Path, help="new folder for recording, page and logs (out/...)"
@@ -75,6 +83,7 @@ def run(args: argparse.Namespace) -> int:
     """Swim, record, score, show."""
     if not args.duration > 0.0:
         raise UserError(f"duration is {args.duration:g} s, expected a positive number")
+    specs = robot_of(args.hardware)
     with user_errors():
         domain = choose_domain(args.domain)
     start = start_pose(args.letter, args.path_args)
@@ -84,9 +93,9 @@ def run(args: argparse.Namespace) -> int:
         console,
         f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}",
     )
-    end, latency = _swim(
-        domain, node_parameters(args, start, folder), folder, args.duration, console
-    )
+    with tempfile.TemporaryDirectory(prefix="fish_") as devices:
+        changed = node_parameters(args, start, folder, Path(devices))
+        end, latency = _swim(domain, specs, changed, folder, args.duration, console)
     say(console, f"ended {end.reason}, {end.seconds:.1f} s after the first odometry")
     trial = read_trial(folder / "recording")
     score = score_trial(trial)
@@ -103,16 +112,19 @@ def run(args: argparse.Namespace) -> int:
 
 
 def node_parameters(
-    args: argparse.Namespace, start: Parameters, folder: Path
+    args: argparse.Namespace, start: Parameters, folder: Path, devices: Path
 ) -> dict[NodeSpec, dict[str, object]]:
-    """What the command line changes in the nodes' parameter files."""
+    """What the command line changes in the nodes' parameter files; devices: folder of a fake robot's devices."""
+    fake = args.hardware == "fake"
+    simulator = FAKE[1] if fake else SIMULATED[0]
     changed: dict[NodeSpec, dict[str, object]] = {
-        SIMULATOR: dict(start),
+        **(fake_parameters(devices) if fake else {}),
         PLANNER: {"path": args.letter, "path_args": args.path_args, "speed": args.speed},
         RECORDER: {"output": str(folder.resolve()), "name": "recording"},
     }
+    changed[simulator] = {**changed.get(simulator, {}), **start}
     if args.robot:
-        changed[SIMULATOR]["robot_file"] = str(args.robot.resolve())
+        changed[simulator]["robot_file"] = str(args.robot.resolve())
     if args.weights:
         changed[CONTROLLER] = {"weights_file": str(args.weights.resolve())}
     return changed
@@ -134,6 +146,7 @@ def start_pose(name: str, path_args: str) -> Parameters:
 
 def _swim(
     domain: int,
+    specs: Sequence[NodeSpec],
     changed: Mapping[NodeSpec, Parameters],
     folder: Path,
     duration: float,
@@ -143,7 +156,7 @@ def _swim(
     with Interruption() as interruption, NodeProcesses(domain, folder / "logs") as nodes:
         with watching(domain) as (watch, listen):
             robot = Robot(nodes, watch, listen, interruption)
-            for spec in ROBOTS["sim"]:
+            for spec in specs:
                 if spec != CONTROLLER:
                     nodes.start(spec, changed.get(spec))
             robot.wait_for(lambda: watch.sees(RECORDER.executable), "recorder")

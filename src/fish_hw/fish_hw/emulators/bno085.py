@@ -124,13 +124,16 @@ class Bno085Emulator:
         x, y, z = (self._random.gauss(0.0, 0.05) for _ in range(3))
         return yaw, YAW_RATE * math.cos(YAW_FREQUENCY * t), (x, y, STANDARD_GRAVITY + z)
 
-    def _report(self, report_id: int) -> bytes:
+    def _values_of(self, report_id: int) -> tuple[float, ...]:
         yaw, rate, acceleration = self._values
-        values = {
+        return {
             sh2.ACCELEROMETER: acceleration,
             sh2.GYROSCOPE: (0.0, 0.0, rate),
             sh2.GAME_ROTATION_VECTOR: (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)),
         }[report_id]
+
+    def _report(self, report_id: int) -> bytes:
+        values = self._values_of(report_id)
         scale = 1 << sh2.LAYOUTS[report_id].q
         self._report_sequence = (self._report_sequence + 1) & 0xFF
         head = bytes([report_id, self._report_sequence, 3, 0])

@@ -16,6 +16,7 @@ from fish_hw.devices.usb_camera import FrameSource, Picture, UsbCamera, decode_j
 from fish_hw.emulators.walking_square import WalkingSquare
 from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.settings.camera import CameraSettings
+from fish_hw.transport.unix_socket import PREFIX, SocketCamera
 from fish_hw.transport.video_capture import VideoCapture
 
 
@@ -43,6 +44,8 @@ class CameraNode(DeviceNode):
     def _open_source(self) -> FrameSource:
         if self.settings.device == "emulator":
             return WalkingSquare(self.settings)
+        if self.settings.device.startswith(PREFIX):
+            return SocketCamera(self.settings.device)
         return VideoCapture(self.settings)
 
     def _camera_info(self) -> CameraInfo:

@@ -18,6 +18,7 @@ from fish_hw.transport.gpio_line import InterruptLine
 from fish_hw.transport.i2c_bus import KernelI2c
 from fish_hw.transport.interfaces import DataReady, I2cBus
 from fish_hw.transport.serial_port import SerialPort
+from fish_hw.transport.unix_socket import PREFIX, SocketI2c
 
 
 class ImuNode(DeviceNode):
@@ -41,6 +42,8 @@ class ImuNode(DeviceNode):
     def _open_bus(self) -> I2cBus:
         if self.settings.bus == "emulator":
             return I2cBusEmulator({self.settings.address: Bno085Emulator()})
+        if self.settings.bus.startswith(PREFIX):
+            return SocketI2c(self.settings.bus)
         return KernelI2c(self.settings.bus)
 
     def _open_line(self) -> DataReady | None:

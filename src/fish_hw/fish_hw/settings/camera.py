@@ -10,7 +10,9 @@ from fish_node.frames import require_frame, require_frame_prefix
 class CameraSettings:
     """USB camera: device, picture, fixed exposure against glare, calibration."""
 
-    device: str = "/dev/video0"  # V4L2 device, video file (played in a loop), or "emulator"
+    device: str = (
+        "/dev/video0"  # V4L2 device, video file (played in a loop), unix:FILE, or "emulator"
+    )
     startup_timeout_s: float = (
         0.0  # s to wait for the camera at start, then the node ends with an error; 0: without end
     )

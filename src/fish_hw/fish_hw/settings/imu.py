@@ -18,7 +18,7 @@ class ImuSettings:
     """
 
     interface: str = "i2c"  # i2c | rvc (serial, attitude only: rates are differences)
-    bus: str = "/dev/i2c-1"  # i2c: bus, or "emulator"
+    bus: str = "/dev/i2c-1"  # i2c: bus, unix:FILE of a fake robot, or "emulator"
     address: int = 0x4A  # i2c: 0x4A or 0x4B
     int_chip: str = "/dev/gpiochip0"  # i2c: GPIO chip of the interrupt line
     int_line: int = (

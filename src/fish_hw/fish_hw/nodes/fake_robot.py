@@ -1,0 +1,125 @@
+"""Node `fake_robot`: the devices of a robot made of software, for the real drivers, with the simulator behind them.
+
+The drivers find rotor, rudder, IMU and camera in the parameter `folder`. What rotor and rudder do goes to the simulator, and
+what its IMU and camera sense comes back through the devices.
+
+In:  fake/imu (sensor_msgs/Imu), fake/image/compressed (sensor_msgs/CompressedImage), fake/battery_state, fake/fault
+     (std_msgs/String: the name of a fault, or `mend`)
+Out: fake/joint_command (joint rotor: velocity [rad/s], joint rudder: position [rad]), /diagnostics
+"""
+
+import sys
+import time
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import BatteryState, CompressedImage, Imu, JointState
+from std_msgs.msg import Header, String
+from std_srvs.srv import SetBool
+
+from fish_hw.emulators.fake_robot import FakeRobot
+from fish_hw.emulators.fed_bno085 import Felt
+from fish_hw.settings.fake_robot import FakeRobotSettings
+from fish_hw.settings.rudder import RudderSettings
+from fish_node.nodes.start import read_parameters, run
+
+NEWEST = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class FakeRobotNode(Node):
+    """Messages of the simulator to and from the devices of FakeRobot."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "fake_robot", namespace="fish", automatically_declare_parameters_from_overrides=True
+        )
+        settings = read_parameters(self, FakeRobotSettings)
+        self._robot = FakeRobot(Path(settings.folder), RudderSettings(), settings.seed)
+        self._fault = "none"
+        self._command = self.create_publisher(JointState, "fake/joint_command", 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_subscription(Imu, "fake/imu", self._on_imu, NEWEST)
+        self.create_subscription(CompressedImage, "fake/image/compressed", self._on_picture, NEWEST)
+        self.create_subscription(BatteryState, "fake/battery_state", self._on_battery, 1)
+        self.create_subscription(String, "fake/fault", self._on_fault, 10)
+        self._arm = self.create_client(SetBool, "fake/arm")
+        self.create_timer(1.0 / settings.rate_hz, self._move)
+        self.create_timer(1.0, self._report)
+        for driver, values in self._robot.parameters().items():
+            said = ", ".join(f"{name}: {value}" for name, value in values.items())
+            self.get_logger().info(f"{driver}.yaml of the real driver: {said}")
+
+    def destroy_node(self) -> None:
+        """Take the devices away, then the node."""
+        self._robot.close()
+        super().destroy_node()
+
+    def _move(self) -> None:
+        message = JointState(name=["rotor", "rudder"])
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.velocity = [self._robot.rotor_speed(), 0.0]
+        message.position = [self._robot.rotor.angle, self._robot.rudder_angle()]
+        self._command.publish(message)
+
+    def _on_imu(self, message: Imu) -> None:
+        q, w, a = message.orientation, message.angular_velocity, message.linear_acceleration
+        self._robot.imu.feel(
+            Felt(
+                self._monotonic(message.header),
+                (q.x, q.y, q.z, q.w),
+                (w.x, w.y, w.z),
+                (a.x, a.y, a.z),
+            )
+        )
+
+    def _on_picture(self, message: CompressedImage) -> None:
+        self._robot.camera.show(bytes(message.data), self._monotonic(message.header))
+
+    def _on_battery(self, message: BatteryState) -> None:
+        self._robot.rotor.volts = float(message.voltage)
+
+    def _on_fault(self, message: String) -> None:
+        name = message.data
+        if name == "mend":
+            self._robot.mend()
+        elif name in self._robot.faults:
+            self._robot.faults[name]()
+        else:
+            known = ", ".join(("mend", *self._robot.faults))
+            self.get_logger().error(f"unknown fault {name!r}; known: {known}")
+            return
+        self._fault = "none" if name == "mend" else name
+        self.get_logger().info(f"fault: {name}")
+
+    def _monotonic(self, header: Header) -> float:
+        """Moment of a stamp on the monotonic clock [s]."""
+        stamp = header.stamp.sec + 1e-9 * header.stamp.nanosec
+        age_s: float = self.get_clock().now().nanoseconds * 1e-9 - stamp
+        return time.monotonic() - age_s
+
+    def _report(self) -> None:
+        if self._arm.service_is_ready():  # the simulated fish follows whatever the devices do
+            self._arm.call_async(SetBool.Request(data=True))
+        status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="fake robot")
+        status.level, status.message = DiagnosticStatus.OK, f"fault: {self._fault}"
+        rotor = self._robot.rotor
+        values = {
+            "commanded [rad/s]": f"{rotor.commanded:.1f}",
+            "mode": rotor.mode,
+            "timeouts": rotor.timeouts,
+        }
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def main() -> int:
+    """Entry point."""
+    return run(FakeRobotNode, "fake_robot")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
