@@ -95,6 +95,11 @@ class McapRecording:
         return sum(topic.count for topic in self.topics.values())
 
     @property
+    def closed(self) -> bool:
+        """Whether nothing more is taken."""
+        return self._closed
+
+    @property
     def size(self) -> int:
         """Bytes on disk."""
         return self._file.size

@@ -325,3 +325,32 @@ def test_ctrl_c_does_not_tear_what_the_recorder_is_writing(monkeypatch):
     assert recorder.main() == 0
     assert written == ["recorder"]
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_what_has_arrived_before_the_end_is_recorded(peer, tmp_path):
+    """A recorder on a busy computer is behind the middleware when it is told to end."""
+    from fish_bag.nodes.recorder import RecorderNode
+
+    arguments = [f"output:={tmp_path}", "name:=a", "topics:=[numbers]"]
+    words = ["node", "--ros-args", *(word for given in arguments for word in ("-p", given))]
+    rclpy.init(args=words, domain_id=peer.domain)
+    recorder, count = RecorderNode(), 200
+    publisher = peer.node.create_publisher(Float64, "numbers", ALL)
+    heard: list[float] = []
+    peer.node.create_subscription(Float64, "numbers", lambda m: heard.append(m.data), ALL)
+    try:
+        own = SingleThreadedExecutor()
+        own.add_node(recorder)
+        assert peer.spin_until(
+            lambda: own.spin_once(0.05) or publisher.get_subscription_count() == 2
+        )
+        for k in range(count):
+            publisher.publish(Float64(data=float(k)))
+        assert peer.spin_until(lambda: len(heard) == count)  # and the recorder has not been spun
+        time.sleep(0.5)  # its middleware has the last of them, too
+    finally:
+        rclpy.try_shutdown()  # what a signal does
+        recorder.destroy_node()
+    (topic,) = read_bag(tmp_path / "a", lambda *_: True).topics
+    assert len(topic.raws) == count
+    assert (np.diff(topic.arrival_ns) >= 0).all()

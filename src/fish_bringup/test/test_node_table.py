@@ -61,7 +61,9 @@ def test_a_fake_robot_leaves_the_robots_topics_to_the_drivers(installed):
     moved = {rule.partition(":=")[0] for spec in behind.values() for rule in spec.remaps}
     assert {"joint_command", "joint_states", "imu/data", "camera/image_raw/compressed"} <= moved
     assert {"arm", "arming/state", "arming/disarm", "battery_state"} <= moved
-    line = node_table.command(NodeSpec("fish_sim", "camera", "camera.yaml", remaps=("a:=b", "c:=d")))
+    line = node_table.command(
+        NodeSpec("fish_sim", "camera", "camera.yaml", remaps=("a:=b", "c:=d"))
+    )
     assert [line[k + 1] for k, word in enumerate(line) if word == "-r"][1:] == ["a:=b", "c:=d"]
 
 

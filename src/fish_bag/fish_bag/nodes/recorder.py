@@ -2,7 +2,8 @@
 
 In: every topic that the parameter `topics` selects, with the quality of service its publishers offer. Out:
 the recording; /diagnostics. The bag's time is the moment of arrival on the recorder's wall clock, also
-under use_sim_time: simulation time stands in the stamps and on /clock, and the reader relates the two.
+under use_sim_time: simulation time stands in the stamps and on /clock, and the reader relates the two. The middleware says
+when a message arrived, so that a busy computer does not change it. What has arrived before the end is recorded.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import sys
 import time
 from datetime import datetime
 from functools import partial
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
@@ -39,7 +41,7 @@ class RecorderNode(Node):
         directory = self._config.directory(datetime.now())
         custom = {"robot": self._config.robot} if self._config.robot else {}
         self.recording = McapRecording(directory, custom, self._config.chunk_s)
-        self._subscriptions_of: dict[tuple[str, str], tuple[Subscription, Qos]] = {}
+        self._subscriptions_of: dict[tuple[str, str], tuple[Subscription, Qos, list[Topic]]] = {}
         self._refused: set[tuple[str, str]] = set()
         self._patterns = [self._resolved(pattern) for pattern in self._config.topics]
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -91,12 +93,23 @@ class RecorderNode(Node):
             said = " ".join(str(error).split())
             self.get_logger().error(plain(f"{topic} ({msgtype}) is not recorded: {said}"))
             return
-        self._subscriptions_of[key] = (subscription, wanted)
+        self._subscriptions_of[key] = (subscription, wanted, target)
         target.append(self.recording.add_topic(topic, kind, offered[0]))
         self.get_logger().info(plain(f"recording {topic} ({msgtype})"))
 
-    def _store(self, topic: list[Topic], data: bytes) -> None:
-        self.recording.write(topic[0], time.time_ns(), data)
+    def _store(self, topic: list[Topic], data: bytes, about: dict[str, Any]) -> None:
+        self.recording.write(topic[0], about["received_timestamp"] or time.time_ns(), data)
+
+    def _store_the_rest(self) -> None:
+        """What arrived until now and waits for this node: on a busy computer that may be seconds."""
+        end = time.time_ns()
+        for subscription, _, topic in self._subscriptions_of.values():
+            with subscription.handle:
+                while taken := subscription.handle.take_message(subscription.msg_type, True):
+                    data, about = taken
+                    self._store(topic, data, about)
+                    if about["received_timestamp"] > end:
+                        break
 
     def _flush(self) -> None:
         self.recording.flush_old(time.time_ns())
@@ -124,6 +137,8 @@ class RecorderNode(Node):
     def destroy_node(self) -> None:
         """Close the recording, then the node."""
         recording = self.recording
+        if not recording.closed:  # as a full disk closes it
+            self._store_the_rest()
         recording.close()
         print(
             f"recorder: {recording.message_count} messages of {len(recording.topics)} topics, "
