@@ -92,7 +92,7 @@ class ImuPlausibility:
         dt = max(sample.time_s - used.time_s, self._period_s)
         change = math.dist(sample.angular_velocity, used.angular_velocity)
         turned = math.hypot(*mean_rate(used.orientation, sample.orientation, dt))
-        if change > LARGEST_TURN_ACCELERATION * dt + TURN_NOISE:
+        if change > LARGEST_TURN_ACCELERATION * min(dt, 2 * self._period_s) + TURN_NOISE:
             found = f"turn rate jumped by {change:.1f} rad/s"
         elif math.dist(sample.acceleration, used.acceleration) > LARGEST_ACCELERATION_CHANGE:
             found = "acceleration jumped"
