@@ -4,6 +4,7 @@ import itertools
 import math
 import statistics
 import struct
+import termios
 import time
 from dataclasses import replace
 
@@ -366,9 +367,38 @@ def test_port_that_is_absent(vertiq_emulator):
     assert driver.status().level == ERROR
 
 
-def test_wrong_module_id(vertiq_emulator):
-    settings = replace(SETTINGS, module_id=7, reply_timeout_s=0.01)
-    driver = RotorDriver(settings, lambda: SerialPort(vertiq_emulator.port, 115200))
-    with pytest.raises(DeviceError, match="no Vertiq module 7 answers"):
+def complaint(emulator: VertiqEmulator, **settings) -> str:
+    """What a driver says of a module that does not answer."""
+    changed = replace(SETTINGS, reply_timeout_s=0.01, **settings)
+
+    def open_at(baud: int) -> SerialPort:
+        return SerialPort(emulator.port, baud)
+
+    driver = RotorDriver(changed, lambda: open_at(changed.baud), open_at=open_at)
+    with pytest.raises(DeviceError, match=r"test: no Vertiq module \d answers") as caught:
         driver.connect()
-    SerialPort(vertiq_emulator.port, 115200).close()  # the port was given back
+    SerialPort(emulator.port, 115200).close()  # the port was given back
+    return str(caught.value)
+
+
+def test_a_wrong_module_id_is_told(vertiq_emulator):
+    said = complaint(vertiq_emulator, module_id=7)
+    assert "module 0 answers there: set module_id" in said
+
+
+def test_a_wrong_baud_rate_is_told():
+    emulator = VertiqEmulator(speed=termios.B921600)
+    try:
+        assert "module 0 answers at 921600 baud: set baud" in complaint(emulator)
+    finally:
+        emulator.close()
+
+
+def test_a_firmware_without_the_speed_command_is_told(vertiq_emulator):
+    vertiq_emulator.mangle = lambda reply: b"" if reply[2] == reg.TIMEOUT.type else reply
+    assert "needs the speed firmware" in complaint(vertiq_emulator)
+
+
+def test_a_module_without_power_is_told(vertiq_emulator):
+    vertiq_emulator.mangle = lambda _: b""
+    assert "check its power, wiring" in complaint(vertiq_emulator)

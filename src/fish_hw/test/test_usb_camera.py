@@ -97,6 +97,23 @@ def test_jpeg_without_a_size_is_dropped(bench):
     assert camera.missed == 1
 
 
+def test_a_picture_that_stands_still_is_not_sent_on_and_is_named():
+    clock = Clock()
+    source = Source(clock)
+    settings = CameraSettings(device="/dev/video0", width=64, height=48)
+    camera = UsbCamera(settings, lambda: source, clock)
+    camera.connect()
+    source.frames = [Frame(clock.now, image=picture() + np.uint8(k)) for k in range(10)]
+    assert sum(camera.step().picture is not None for _ in range(10)) == 10
+    source.frames = [Frame(clock.now + k, image=picture()) for k in range(60)]  # new stamps
+    sent = [camera.step() for _ in range(20)]
+    assert sum(cycle.picture is not None for cycle in sent) == 1
+    status = camera.status()
+    assert (status.level, status.message) == (ERROR, "the picture stands still: not sent on")
+    events = [event for _ in range(20) for event in camera.step().events]
+    assert events == ["camera /dev/video0: the picture stands still for 1.0 s"]
+
+
 def test_status_follows_the_rate(bench):
     camera, source, clock = bench
     source.frames = [Frame(clock.now, image=picture()) for _ in range(90)]

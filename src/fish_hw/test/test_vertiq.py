@@ -232,7 +232,7 @@ def test_configure_names_settings_that_the_firmware_lacks(module):
     assert vertiq.configure(0.25) == ["module does not take timeout song = 0"]
 
 
-def test_configure_without_module_says_what_to_check():
+def test_configure_without_module_says_what_came():
     vertiq, _ = recorded(b"", b"noise")
     with pytest.raises(DeviceError, match=r"no Vertiq module 0 answers.*baud rate and module_id"):
         vertiq.configure(0.25)

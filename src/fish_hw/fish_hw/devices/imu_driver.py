@@ -9,8 +9,9 @@ from fish_hw.devices.bno085 import Bno085
 from fish_hw.devices.bno085_rvc import Bno085Rvc
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.gravity_check import GravityCheck
+from fish_hw.devices.imu_plausibility import STANDS_STILL, ImuPlausibility
 from fish_hw.devices.imu_sample import ImuSample, Mounting
-from fish_hw.devices.reconnect import Link
+from fish_hw.devices.reconnect import Doubt, Link
 from fish_hw.devices.status import ERROR, OK, WARN, Status
 from fish_hw.protocol.rvc import PERIOD_S
 from fish_hw.settings.imu import ImuSettings
@@ -18,6 +19,8 @@ from fish_hw.transport.errors import TransportError
 from fish_hw.transport.interfaces import ByteStream, DataReady, I2cBus
 
 UNRELIABLE = 0
+DOUBTFUL = 3  # refused samples in a row that are worth a line of the log
+DOUBT_AGAIN_S = 10.0  # s between two lines of the log about samples that are not used
 LEAST_STEP_S = 1e-4  # the sensor's own tick
 SLOWEST_RATE, FASTEST_RATE = 0.9, 2.1  # of the asked rate, SH-2 manual
 
@@ -126,6 +129,8 @@ class ImuDriver:
         self._link = Link("IMU")
         self._last: ImuSample | None = None
         self._upright = GravityCheck()
+        self._plausibility = ImuPlausibility(1.0 / settings.rate_hz)
+        self._doubted_s = -math.inf  # when a doubt was said last
         self._changed_time = self._sample_time = 0.0
         self._newest_s = -math.inf
         self._rated = (0, clock())
@@ -146,6 +151,7 @@ class ImuDriver:
         self._changed_time = self._sample_time = self._clock()
         self._last = None
         self._upright.restart()
+        self._plausibility.restart()
         self._newest_s = -math.inf
         self._rated = (self.samples, self._clock())
 
@@ -158,7 +164,10 @@ class ImuDriver:
             samples = [
                 self._in_order(self._mounting.to_base(s)) for s in self._sensor.poll(timeout_s)
             ]
-            return ImuCycle(samples, self._watch(samples))
+            events = self._watch(samples)
+            return ImuCycle(
+                [s for s in samples if self._plausibility.use(s)], events + self._doubt()
+            )
         except (TransportError, DeviceError) as error:
             self.close()
             return ImuCycle(events=self._link.lose(str(error), now))
@@ -179,9 +188,17 @@ class ImuDriver:
         sensor = self._sensor
         if sensor is None:
             return Status(ERROR, self._link.trouble, values)
-        values |= {"sensor": sensor.name, "rate [Hz]": round(rate, 1), **sensor.counters()}
+        refused = {f"{name} samples": n for name, n in vars(self._plausibility.refusals).items()}
+        values |= {
+            "sensor": sensor.name,
+            "rate [Hz]": round(rate, 1),
+            **sensor.counters(),
+            **refused,
+        }
         if rate == 0.0:
             return Status(ERROR, "no samples", values)
+        if self._plausibility.trouble:
+            return Status(ERROR, f"samples are not used: {self._plausibility.trouble}", values)
         if self._last is not None and self._last.accuracy == UNRELIABLE:
             return Status(WARN, "the sensor calls its values unreliable", values)
         if self._upright.trouble:
@@ -189,6 +206,16 @@ class ImuDriver:
         if not SLOWEST_RATE * sensor.rate_hz <= rate <= FASTEST_RATE * sensor.rate_hz:
             return Status(WARN, f"{rate:.0f} samples/s instead of {sensor.rate_hz:.0f}", values)
         return Status(OK, f"{rate:.0f} samples/s", values)
+
+    def _doubt(self) -> list[str]:
+        """The event of samples that are not used, at most one in DOUBT_AGAIN_S; _watch says that values stand still."""
+        check, now = self._plausibility, self._clock()
+        trouble = check.trouble
+        lasts = check.in_a_row >= DOUBTFUL and trouble != STANDS_STILL
+        if not lasts or now - self._doubted_s < DOUBT_AGAIN_S:
+            return []
+        self._doubted_s = now
+        return [Doubt(f"IMU: {trouble}: not used")]
 
     def _in_order(self, sample: ImuSample) -> ImuSample:
         """The sample, later than the one before: a delayed read makes times jitter by some milliseconds."""

@@ -15,8 +15,9 @@ from fish_hw.devices.reconnect import Link
 from fish_hw.devices.rotor_guard import Action, RotorGuard
 from fish_hw.devices.rotor_watch import RotorWatch
 from fish_hw.devices.status import ERROR, OK, WARN, Status
-from fish_hw.devices.vertiq import RotorSample, RotorTelemetry, Vertiq
+from fish_hw.devices.vertiq import NoAnswer, RotorSample, RotorTelemetry, Vertiq
 from fish_hw.devices.vertiq_registers import fault_names
+from fish_hw.devices.vertiq_search import explain
 from fish_hw.settings.rotor import RotorSettings
 from fish_hw.transport.errors import TransportError
 from fish_hw.transport.interfaces import ByteStream
@@ -52,6 +53,13 @@ class RotorDriver:
     Attributes:
         arming: the arming state of the robot, which this driver owns.
         rejected: commands that were no finite numbers.
+
+    Args:
+        settings: of the rotor.
+        open_stream: opens the port as the settings say.
+        clock: s, monotonic.
+        leak: sensor of water in the hull, if there is one.
+        open_at: opens the port at a baud rate, to find out why nobody answers.
     """
 
     def __init__(
@@ -60,6 +68,7 @@ class RotorDriver:
         open_stream: Callable[[], ByteStream],
         clock: Callable[[], float] = time.monotonic,
         leak: LeakSensor | None = None,
+        open_at: Callable[[int], ByteStream] | None = None,
     ) -> None:
         self.arming = Arming(sources(settings))
         self.guard = RotorGuard(settings)
@@ -68,6 +77,7 @@ class RotorDriver:
         self._open_stream = open_stream
         self._clock = clock
         self._leak = leak
+        self._open_at = open_at
         self._lock = threading.Lock()  # of the guard: commands arrive on another thread
         self._stream: ByteStream | None = None
         self._vertiq: Vertiq | None = None
@@ -99,6 +109,9 @@ class RotorDriver:
             vertiq.coast()
             found = vertiq.configure(settings.module_timeout_s)
             tuning = ", ".join(f"{name} {value:g}" for name, value in vertiq.tuning().items())
+        except NoAnswer as error:
+            self._stream.close()
+            raise DeviceError(f"{settings.port}: {error}: {self._explained()}") from error
         except DeviceError as error:
             self._stream.close()
             raise DeviceError(f"{settings.port}: {error}") from error
@@ -108,6 +121,13 @@ class RotorDriver:
         self._vertiq = vertiq
         self._watch.restart()
         self._found = [*found, f"rotor module {settings.module_id} on {settings.port}: {tuning}"]
+
+    def _explained(self) -> str:
+        """What is there instead of the module."""
+        settings, found = self._settings, ""
+        if self._open_at is not None:
+            found = explain(self._open_at, settings.baud, settings.module_id, self._clock)
+        return found or "check its power, wiring, baud rate and module_id"
 
     def command(self, velocity: float | None) -> None:
         """Take a commanded speed [rad/s]; None stands for a message without one, which does not count as a command.

@@ -18,6 +18,7 @@ from fish_hw.settings.camera import CameraSettings
 from fish_hw.transport.errors import PortUnavailable
 from fish_hw.transport.video_capture import Frame
 
+LIVE = ("/dev/", "unix:")  # devices with noise of their own; a file may hold equal pictures
 CLOSE_WAIT_S = 1.5  # longer than a camera keeps OpenCV waiting
 SLOW = 0.8  # share of the asked rate below which the operator should know (dark picture, USB bandwidth)
 
@@ -63,6 +64,7 @@ class UsbCamera:
     ) -> None:
         self.frames = 0
         self.missed = 0
+        self.repeated = 0
         self._settings = settings
         self._open_source = open_source
         self._clock = clock
@@ -72,6 +74,7 @@ class UsbCamera:
         self._last_frame = clock()
         self._rated = (0, clock())
         self._size = (settings.width, settings.height)
+        self._newest, self._still = b"", False
 
     @property
     def connected(self) -> bool:
@@ -94,8 +97,11 @@ class UsbCamera:
             if frame is None:
                 self._miss()
                 return CameraCycle()
+            picture = self._picture(frame)
+            if picture is not None and self._stands_still(picture):
+                return CameraCycle()
             self._last_frame = self._clock()
-            return CameraCycle(self._picture(frame), self._link.works())
+            return CameraCycle(picture, self._link.works())
         except (PortUnavailable, DeviceError) as error:
             self.close()
             return CameraCycle(events=self._link.lose(str(error), now))
@@ -114,6 +120,7 @@ class UsbCamera:
         values: dict[str, object] = {
             "frames": self.frames,
             "missed frames": self.missed,
+            "repeated frames": self.repeated,
             "rate [Hz]": round(rate, 1),
             "size [px]": f"{self._size[0]}x{self._size[1]}",
             "reconnect attempts": self._link.attempts,
@@ -122,6 +129,8 @@ class UsbCamera:
             return Status(ERROR, self._link.trouble, values)
         if rate == 0.0:
             return Status(ERROR, "no frames", values)
+        if self._still:
+            return Status(ERROR, "the picture stands still: not sent on", values)
         if self._size != (self._settings.width, self._settings.height):
             wanted = f"{self._settings.width}x{self._settings.height}"
             return Status(
@@ -147,11 +156,25 @@ class UsbCamera:
         self._size = (width, height)
         return Picture(time_s, jpeg, width, height)
 
+    def _stands_still(self, picture: Picture) -> bool:
+        """Whether a camera's picture is the one before to the last bit, which its noise forbids: it is not sent on."""
+        before, self._newest = self._newest, picture.jpeg
+        self._still = before == picture.jpeg and self._settings.device.startswith(LIVE)
+        if not self._still:
+            return False
+        self.repeated += 1
+        self._give_up("the picture stands still")
+        return True
+
     def _miss(self) -> None:
         self.missed += 1
+        self._give_up("no frames")
+
+    def _give_up(self, what: str) -> None:
+        """Open the camera again when nothing new came for reopen_s."""
         if self._clock() - self._last_frame > self._settings.reopen_s:
             raise DeviceError(
-                f"camera {self._settings.device}: no frames for {self._settings.reopen_s} s"
+                f"camera {self._settings.device}: {what} for {self._settings.reopen_s} s"
             )
 
     def _rate(self) -> float:

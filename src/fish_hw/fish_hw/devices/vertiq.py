@@ -22,6 +22,10 @@ CONFIGURE_TRIES = 3
 DRAIN_READS = 8
 
 
+class NoAnswer(DeviceError):
+    """Nobody answers to the module's id."""
+
+
 @dataclass(frozen=True)
 class RotorSample:
     """Angle [rad, continuous], speed [rad/s], counter-clockwise positive, and when [s, monotonic clock]."""
@@ -149,14 +153,17 @@ class Vertiq:
             warnings: settings that this firmware does not have.
 
         Raises:
-            DeviceError: the module does not answer, or refuses the timeout.
+            NoAnswer: the module does not answer.
+            DeviceError: it refuses the timeout.
         """
-        if self._verified(reg.TIMEOUT, timeout_s) is not True:
-            raise DeviceError(
-                f"no Vertiq module {self._module} answers, or it refuses a timeout of {timeout_s} s"
-                f" ({self.parser.skipped_bytes} bytes of noise, {self.counters.unexpected} other messages):"
-                " check its power, wiring, baud rate and module_id"
+        verified = self._verified(reg.TIMEOUT, timeout_s)
+        if verified is None:
+            raise NoAnswer(
+                f"no Vertiq module {self._module} answers ({self.parser.skipped_bytes} bytes of noise,"
+                f" {self.counters.unexpected} other messages)"
             )
+        if not verified:
+            raise DeviceError(f"module {self._module} refuses a timeout of {timeout_s} s")
         wanted = ((reg.TIMEOUT_BEHAVIOR, 0), (reg.TIMEOUT_MEANING, 0), (reg.TIMEOUT_SONG, 0))
         return [
             f"module does not take {r.name} = {v}" for r, v in wanted if not self._verified(r, v)

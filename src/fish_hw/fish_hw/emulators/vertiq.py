@@ -3,6 +3,7 @@
 import os
 import pty
 import select
+import termios
 import threading
 import time
 import tty
@@ -10,14 +11,23 @@ import tty
 from fish_hw.emulators.vertiq_module import VELOCITY_MODE, VertiqModule
 
 POLL_S = 0.002
+OUTPUT_SPEED = 5  # index in termios.tcgetattr
+NOISE = b"\xf8\x00\xfe"  # what bytes at another speed look like
 
 __all__ = ["VELOCITY_MODE", "VertiqEmulator"]
 
 
 class VertiqEmulator(VertiqModule):
-    """Runs on its own thread until close(); `port` is what the driver opens."""
+    """Runs on its own thread until close(); `port` is what the driver opens.
 
-    def __init__(self, module: int = 0, lag_s: float = 0.01) -> None:
+    Args:
+        module: module id it answers to.
+        lag_s: time constant of the rotor.
+        speed: speed constant of termios that it runs at; a port that is set to another one reads noise. None: any.
+    """
+
+    def __init__(self, module: int = 0, lag_s: float = 0.01, speed: int | None = None) -> None:
+        self._speed = speed
         super().__init__(module, lag_s, time.monotonic)
         self._master, self._slave = pty.openpty()
         tty.setraw(self._master)
@@ -36,11 +46,15 @@ class VertiqEmulator(VertiqModule):
         os.close(self._slave)
         os.close(self._master)
 
+    def _understands(self) -> bool:
+        return self._speed is None or termios.tcgetattr(self._master)[OUTPUT_SPEED] == self._speed
+
     def _run(self) -> None:
         while not self._stop.is_set():
             readable, _, _ = select.select([self._master], [], [], POLL_S)
             self.move()
             if readable:
-                replies = self.feed(os.read(self._master, 512))
+                data = os.read(self._master, 512)
+                replies = self.feed(data) if self._understands() else NOISE
                 if replies:
                     os.write(self._master, replies)

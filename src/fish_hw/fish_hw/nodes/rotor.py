@@ -43,7 +43,9 @@ class RotorNode(DeviceNode):
         self._emulator = (
             VertiqEmulator(self.settings.module_id) if self.settings.port == "emulator" else None
         )
-        self._driver = RotorDriver(self.settings, self._open_port, leak=self._leak_sensor())
+        self._driver = RotorDriver(
+            self.settings, self._open_port, leak=self._leak_sensor(), open_at=self._open_at
+        )
         self._telemetry: RotorTelemetry | None = None
         self._arming = ArmingServer(self, self._driver.arming, self.settings, time.monotonic)
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
@@ -53,8 +55,11 @@ class RotorNode(DeviceNode):
         self.use(self._driver, self._cycle, 1.0 / self.settings.rate_hz, self._emulator is not None)
 
     def _open_port(self) -> ByteStream:
+        return self._open_at(self.settings.baud)
+
+    def _open_at(self, baud: int) -> ByteStream:
         port = self.settings.port if self._emulator is None else self._emulator.port
-        return SerialPort(port, self.settings.baud)
+        return SerialPort(port, baud)
 
     def _leak_sensor(self) -> LeakSensor | None:
         settings = self.settings
