@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from fish_control.fusion import FusionConfig
+from fish_control.fusion_config import FusionConfig
 from fish_control.line_of_sight import GuidanceConfig
 from fish_control.path_batch import TrackerConfig
 from fish_control.planner import FASTEST, SLOWEST
@@ -15,7 +15,7 @@ from fish_node.frames import BODY, IMU, POOL, require_frame, require_frame_prefi
 
 Resume = Literal["auto", "manual"]
 LARGEST_GAIN = 10.0
-LARGEST_VARIANCE = 1.0  # m^2, rad^2 and their rates; fusion marks what it has lost with 1e4
+LARGEST_VARIANCE = 0.01  # m^2, rad^2, of a pose; it grows while the camera is lost
 
 
 def require_range(name: str, value: float, lowest: float, highest: float, unit: str) -> None:

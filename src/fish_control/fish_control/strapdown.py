@@ -1,14 +1,18 @@
 """Strapdown motion model of the head: inertial measurements drive it, the camera corrects it.
 
 State x = (p_x, p_y, psi, v_x, v_y, b_g, b_x, b_y): position [m] and heading [rad] in the pool, velocity over
-ground in the pool frame [m/s], bias of the gyro [rad/s] and of both accelerometer axes [m/s^2].
+ground in the pool frame [m/s], bias of the yaw rate [rad/s] and of both accelerometer axes [m/s^2].
 
     p' = v,   psi' = w - b_g,   v' = R(psi) (a - b)
     z_camera = (p_x, p_y, psi) + noise
 
-a is the specific force in base_link; the pool is level and the fish swims upright, so gravity has no share in
-the plane (what tilt adds is taken up by the biases). The swing of the head is in the measurements and needs no
-model. Source: Titterton and Weston, Strapdown Inertial Navigation Technology, ch. 3, planar; noise: RECORDING.
+w is the rate of the IMU's own heading, a the specific force in base_link; the pool is level and the fish swims upright, so
+gravity has no share in the plane (what tilt adds is taken up by the biases). The rotor's swing of the head is in the
+measurements. All samples between two moments are integrated at once (preintegration).
+
+The noises follow the data: one factor each for positions and headings, which a share of the innovations exceeds.
+Sources: Titterton and Weston, Strapdown Inertial Navigation Technology, ch. 3, planar; Forster et al., On-manifold
+preintegration, 2017.
 """
 
 from __future__ import annotations
@@ -20,26 +24,24 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
-from fish_control.imu_history import InertialSample
+from fish_control.imu_heading import COASTING_TIME, SAMPLE_PERIOD
+from fish_control.imu_history import Interval
 
 Array = NDArray[np.float64]
 SIZE = 8
 POSE = slice(0, 3)
 H_CAMERA = np.eye(3, SIZE)
-SAMPLE_PERIOD = 0.01  # s, for which the noises of MotionNoise are given
-COASTING_SAMPLES = 10.0  # sample periods over which an unknown rate or acceleration keeps its sign
 
 
 @dataclass(frozen=True)
 class MotionNoise:
     """Standard deviations of the motion model; per sample means per sample at 100 Hz."""
 
-    gyro_noise: float = 0.02  # rad/s per sample; the sensor's 0.006 and the swing between samples
-    accel_noise: float = (
-        0.15  # m/s^2 per sample; the sensor's 0.05, tilt, and the swing between samples
-    )
+    gyro_noise: float = 0.006  # rad/s per sample
+    accel_noise: float = 0.05  # m/s^2 per sample
     gyro_drift: float = 1e-4  # rad/s per sqrt(s), of the bias
     accel_drift: float = 1e-3  # m/s^2 per sqrt(s), of the biases
+    heading_drift: float = 0.001  # rad per sqrt(s), of the IMU's heading against the camera's
     coasting_yaw_rate: float = (
         2.0  # rad/s, unknown yaw rate without IMU (the head swings at up to 4 rad/s)
     )
@@ -47,11 +49,17 @@ class MotionNoise:
 
 
 class StrapdownFilter:
-    """filterpy's extended Kalman filter with the motion model above."""
+    """filterpy's extended Kalman filter with the motion model above.
+
+    Attributes:
+        position_scale: factor on the variances of positions and accelerations.
+        heading_scale: the same of headings.
+    """
 
     def __init__(self, noise: MotionNoise) -> None:
         self._noise = noise
         self._filter = ExtendedKalmanFilter(dim_x=SIZE, dim_z=3)
+        self.position_scale = self.heading_scale = 1.0
 
     @property
     def x(self) -> Array:
@@ -69,70 +77,84 @@ class StrapdownFilter:
         """Continue from this state; the arrays are copied."""
         self._filter.x, self._filter.P = x.copy(), P.copy()
 
-    def advance(
-        self, dt: float, before: InertialSample | None, after: InertialSample | None
-    ) -> None:
-        """Predict over dt [s] with the mean of the measurements at its ends; None: unknown."""
-        known = before is not None and after is not None
-        w = forward = left = 0.0
-        x, F = self.x, np.eye(SIZE)
-        if before is not None and after is not None:
-            w = 0.5 * (before.yaw_rate + after.yaw_rate) - x[5]
-            forward = 0.5 * (before.forward + after.forward) - x[6]
-            left = 0.5 * (before.left + after.left) - x[7]
-        psi = x[2] + 0.5 * w * dt
-        c, s = math.cos(psi), math.sin(psi)
-        ax, ay = c * forward - s * left, s * forward + c * left
-        if known:
-            _fill_jacobian(F, dt, c, s, ax, ay)
-        else:
-            F[0, 3] = F[1, 4] = dt
-        x[0] += dt * x[3] + 0.5 * dt * dt * ax
-        x[1] += dt * x[4] + 0.5 * dt * dt * ay
-        x[2] = math.remainder(x[2] + w * dt, 2.0 * math.pi)
-        x[3] += dt * ax
-        x[4] += dt * ay
-        P = F @ self.P @ F.T
-        P.flat[:: SIZE + 1] += self._process_noise(dt, known)
-        self._filter.P = P
+    def advance(self, imu: Interval) -> None:
+        """Predict over an interval of the IMU."""
+        x, time = self.x, imu.time
+        dt = np.diff(time)
+        middle = 0.5 * (time[1:] + time[:-1])
+        since, left = middle - time[0], time[-1] - middle
+        known = imu.accel_known.astype(float)
+        turned = np.concatenate(([0.0], np.cumsum(np.where(imu.yaw_known, np.diff(imu.yaw), 0.0))))
+        biased = np.where(imu.yaw_known, x[5], 0.0) * dt  # without an IMU nothing is biased
+        drifted = np.concatenate(([0.0], np.cumsum(biased)))
+        heading = turned - drifted
+        psi = x[2] + 0.5 * (heading[1:] + heading[:-1])
+        c, s = np.cos(psi), np.sin(psi)
+        force = (0.5 * (imu.accel[1:] + imu.accel[:-1]) - x[6:8]) * known[:, None]
+        dv = dt[:, None] * np.column_stack(
+            [c * force[:, 0] - s * force[:, 1], s * force[:, 0] + c * force[:, 1]]
+        )
+        F = self._jacobian(dt, since, left, dv, np.column_stack([c, s]) * known[:, None])
+        F[2, 5] = -float(dt @ imu.yaw_known)
+        T = float(time[-1] - time[0])
+        x[0:2] += T * x[3:5] + left @ dv
+        x[2] = math.remainder(x[2] + heading[-1], 2.0 * math.pi)
+        x[3:5] += dv.sum(axis=0)
+        P = F @ self.P @ F.T + self._process_noise(imu, dt, left, dv)
+        self._filter.P = 0.5 * (P + P.T)
 
     def innovation(self, pose: Array, R: Array) -> tuple[Array, Array]:
-        """z - h(x) of a camera pose (x, y, psi) and its covariance S."""
+        """z - h(x) of a camera pose (x, y, psi) and its covariance S; R is scaled as the other noises are."""
         return pose_residual(pose, self.x[POSE]), self.P[POSE, POSE] + R
 
-    def correct(self, pose: Array, R: Array) -> None:
-        """Update with a camera pose (x, y, psi) [m, m, rad]."""
+    def correct(self, pose: Array, R: Array, fade: float = 1.0) -> None:
+        """Update with a camera pose (x, y, psi) [m, m, rad]; fade: multiplies the predicted covariance before."""
+        self._filter.P = fade * self.P
         self._filter.update(pose, lambda _: H_CAMERA, lambda x: x[POSE], R, residual=pose_residual)
         self.x[2] = math.remainder(self.x[2], 2.0 * math.pi)
 
-    def _process_noise(self, dt: float, known: bool) -> tuple[float, ...]:
-        """Diagonal of Q."""
-        n = self._noise
-        rate, accel = (
-            (n.gyro_noise, n.accel_noise) if known else (n.coasting_yaw_rate, n.coasting_accel)
-        )
-        correlation = dt * SAMPLE_PERIOD * (1.0 if known else COASTING_SAMPLES)
-        speed = accel**2 * correlation
-        place, bias = speed * dt * dt / 3.0, n.accel_drift**2 * dt
-        return place, place, rate**2 * correlation, speed, speed, n.gyro_drift**2 * dt, bias, bias
+    @staticmethod
+    def _jacobian(dt: Array, since: Array, left: Array, dv: Array, direction: Array) -> Array:
+        """d x(end) / d x(start); direction: (c, s) of the head in each step, 0 where the acceleration is unknown."""
+        F = np.eye(SIZE)
+        F[0, 3] = F[1, 4] = dt.sum()
+        turned = np.column_stack([-dv[:, 1], dv[:, 0]])  # d dv / d psi
+        axes = np.column_stack([dt[:, None] * direction, left[:, None] * dt[:, None] * direction])
+        c, s, c_left, s_left = axes.sum(axis=0)
+        F[3:5, 2], F[0:2, 2] = turned.sum(axis=0), left @ turned
+        F[3:5, 5], F[0:2, 5] = -since @ turned, -(left * since) @ turned
+        F[3:5, 6:8] = [[-c, s], [-s, -c]]
+        F[0:2, 6:8] = [[-c_left, s_left], [-s_left, -c_left]]
+        return F
+
+    def _process_noise(self, imu: Interval, dt: Array, left: Array, dv: Array) -> Array:
+        n, Q = self._noise, np.zeros((SIZE, SIZE))
+        known, coasting = n.accel_noise**2 * SAMPLE_PERIOD, n.coasting_accel**2 * COASTING_TIME
+        speed = dt * np.where(imu.accel_known, known * self.position_scale, coasting)
+        for p, v in ((0, 3), (1, 4)):
+            Q[v, v] = speed.sum()
+            Q[p, v] = Q[v, p] = speed @ left
+            Q[p, p] = speed @ (left * left + dt * dt / 12.0)
+        unknown = n.coasting_yaw_rate**2 * COASTING_TIME * dt
+        known_turn = (imu.yaw_variance + n.heading_drift**2 * dt) * self.heading_scale
+        turn = np.where(imu.yaw_known, known_turn, unknown)
+        # a turn in one step turns the accelerations of all later ones
+        turned = np.column_stack([-dv[:, 1], dv[:, 0]])
+        G = np.zeros((len(dt), 5))
+        G[:, 3:5] = _after(turned)
+        G[:, 0:2] = _after(left[:, None] * turned)
+        G[:, 2] = 1.0
+        Q[:5, :5] += (G * turn[:, None]).T @ G
+        T = dt.sum()
+        Q[5, 5] = n.gyro_drift**2 * T
+        Q[6, 6] = Q[7, 7] = n.accel_drift**2 * self.position_scale * T
+        return Q
 
 
-def _fill_jacobian(F: Array, dt: float, c: float, s: float, ax: float, ay: float) -> None:
-    """d x(t + dt) / d x(t) into an identity; (c, s): direction of the head, (ax, ay): acceleration in the pool.
-
-    Element by element: this runs for every IMU sample of a replay.
-    """
-    half = 0.5 * dt * dt
-    F[0, 3] = F[1, 4] = dt
-    F[2, 5] = -dt
-    F[0, 2], F[1, 2], F[3, 2], F[4, 2] = (
-        -half * ay,
-        half * ax,
-        -dt * ay,
-        dt * ax,
-    )  # d acceleration / d psi
-    F[0, 6], F[0, 7], F[1, 6], F[1, 7] = -half * c, half * s, -half * s, -half * c
-    F[3, 6], F[3, 7], F[4, 6], F[4, 7] = -dt * c, dt * s, -dt * s, -dt * c
+def _after(values: Array) -> Array:
+    """For each row, the sum of the rows after it and of half of it."""
+    total = np.cumsum(values[::-1], axis=0)[::-1]
+    return total - 0.5 * values
 
 
 def pose_residual(z: Array, predicted: Array) -> Array:

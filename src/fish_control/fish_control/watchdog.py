@@ -8,6 +8,7 @@ from typing import Literal
 
 from fish_control.node_configs import ControllerConfig
 
+LARGEST_TWIST_VARIANCE = 1.0  # m^2/s^2, rad^2/s^2; fusion marks the twist without IMU with 1e4
 AHEAD = 0.1  # s, a stamp may be this far ahead of the clock: two machines' clocks are not quite the same
 
 
@@ -99,7 +100,7 @@ class Watchdog:
 def estimate_fault(signs: EstimateHealth, timeout: float, largest_variance: float) -> str | None:
     """What is wrong with an estimate, None if nothing is.
 
-    timeout: s; largest_variance: m^2, rad^2 and their rates. Fusion marks what it has lost with a far larger one.
+    timeout: s; largest_variance: m^2, rad^2 of the pose, which grows while the camera is lost.
     """
     if not signs.finite:
         return "odometry is not finite"
@@ -110,7 +111,7 @@ def loss(signs: EstimateHealth, largest_variance: float) -> str | None:
     """Which sensor an estimate of any age lacks, None if none; a variance that is no number is one too many."""
     if lost_pose := pose_loss(signs, largest_variance):
         return lost_pose
-    if not signs.twist_variance <= largest_variance:
+    if not signs.twist_variance <= LARGEST_TWIST_VARIANCE:
         return "IMU lost: fusion does not vouch for the velocity"
     return None
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from fish_control.fusion import LOST_VARIANCE, Fusion, FusionConfig
+from fish_control.estimate import LOST_VARIANCE
+from fish_control.fusion import Fusion
+from fish_control.fusion_config import FusionConfig
 
 DT = 0.01
 W = 4.0 * np.pi
@@ -39,6 +41,29 @@ def measurements(seconds, seed=0, latency=0.08, gyro_bias=0.02, noisy=True):
         pose = truth(t)[0] + noise * rng.normal(0, [0.002, 0.002, 0.012])
         pose[2] = (pose[2] + np.pi) % (2 * np.pi) - np.pi
         events.append((t + latency + noise * rng.exponential(0.01), "camera", t, pose))
+    return sorted(events, key=lambda e: e[0])
+
+
+def true_pose(t, rest=1.0):
+    """Pose of a fish that waits, then swims on a straight course with a swing whose amplitude and mean vary."""
+    s = max(t - rest, 0.0)
+    heading = 0.2 * np.sin(W * s) * (1.0 + 0.3 * np.sin(0.7 * s)) + 0.3 * np.sin(0.8 * s)
+    return np.array([0.2 * (s - 1.0 + np.exp(-s)), 0.0, heading])
+
+
+def swum(seconds, latency=0.08, rest=1.0, seed=4):
+    """As `measurements`, of `true_pose`."""
+    rng, h, events = np.random.default_rng(seed), 1e-4, []
+    for t in np.arange(0.0, seconds, DT):
+        before, now, after = (true_pose(t + d, rest) for d in (-h, 0.0, h))
+        acceleration = (after[:2] - 2.0 * now[:2] + before[:2]) / h**2
+        c, s = np.cos(now[2]), np.sin(now[2])
+        force = np.array([[c, s], [-s, c]]) @ acceleration + rng.normal(0, 0.05, 2)
+        rate = (after[2] - before[2]) / (2.0 * h) + rng.normal(0, 0.006)
+        events.append((t, "imu", t, [rate, *force]))
+    for t in np.arange(0.003, seconds, 1.0 / 30.0):
+        pose = true_pose(t, rest) + rng.normal(0, [0.002, 0.002, 0.012])
+        events.append((t + latency, "camera", t, pose))
     return sorted(events, key=lambda e: e[0])
 
 
@@ -101,7 +126,8 @@ def test_order_of_arrival_makes_no_difference():
     rng = np.random.default_rng(5)
     start = [e for e in events if e[2] < 1.0]
     rest = [e for e in events if e[2] >= 1.0]
-    in_order, shuffled = Fusion(), Fusion()
+    config = FusionConfig(estimate_offset=False)
+    in_order, shuffled = Fusion(config), Fusion(config)
     feed(in_order, sorted(start, key=lambda e: e[2]) + sorted(rest, key=lambda e: e[2]))
     late = [
         (stamp + (rng.uniform(0.0, 0.5) if kind == "camera" else 0.0), kind, stamp, v)
@@ -110,8 +136,7 @@ def test_order_of_arrival_makes_no_difference():
     feed(shuffled, sorted(start, key=lambda e: e[2]) + sorted(late, key=lambda e: e[0]))
     a, b = in_order.estimate(), shuffled.estimate()
     assert shuffled.counts["pose"] == in_order.counts["pose"]
-    np.testing.assert_allclose(a.pose, b.pose, atol=1e-9)
-    np.testing.assert_allclose(a.pose_covariance, b.pose_covariance, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(a.pose, b.pose, atol=1e-4)  # what the noise factors learn differs
 
 
 def test_flipped_headings_and_far_positions_are_refused():
@@ -146,7 +171,8 @@ def test_what_the_imu_said_before_the_first_pose_came_is_not_lost():
     for event in measurements(1.0, latency=0.3, gyro_bias=0.0, noisy=False):
         feed(fusion, [event])
         estimate = estimate or fusion.estimate()
-    assert estimate.time < 0.1  # where the poses are that began it, a third of a second ago
+    assert estimate.time < 0.4
+    assert np.all(np.abs(pose_error(estimate)) < [0.1, 0.1, 0.2])  # it is a third of a second on
     assert estimate.twist[2] == pytest.approx(truth(estimate.time)[1], abs=0.05)
 
 
@@ -192,7 +218,7 @@ def test_when_both_sensors_were_silent_nobody_knows_what_happened_meanwhile(gap)
     fusion, events = Fusion(), measurements(5.0 + gap, seed=8, latency=0.0)
     _, error, spread = heading_errors(fusion, [e for e in events if not 3.0 < e[2] < 3.0 + gap]).T
     assert np.all(np.abs(error) < 5.0 * spread + 0.02)
-    assert fusion.counts["pose_outlier"] == 0
+    assert fusion.counts["pose_outlier"] <= 1  # the gate refuses one in a thousand
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
 
 
@@ -281,7 +307,7 @@ def test_too_late_and_repeated_measurements_are_dropped():
     fusion = Fusion()
     feed(fusion, measurements(3.0))
     assert not fusion.add_pose(0.5, truth(0.5)[0])
-    assert not fusion.add_imu(1.0 + 1.9, 0.0, 0.0, 0.0)
+    assert not fusion.add_imu(2.905, 0.0, 0.0, 0.0)
     assert fusion.counts["pose_too_late"] == 1
     assert fusion.counts["imu_out_of_order"] == 1
     assert fusion.add_imu(3.0, 0.0, 0.0, 0.0)
@@ -291,26 +317,30 @@ def test_too_late_and_repeated_measurements_are_dropped():
 def test_a_camera_that_comes_back_cannot_speak_of_what_is_longer_ago_than_the_history():
     fusion = Fusion()
     feed(fusion, [e for e in measurements(5.0) if e[1] == "imu" or e[2] < 2.0])
-    assert not fusion.add_pose(3.9, truth(3.9)[0])
+    assert not fusion.add_pose(2.9, truth(2.9)[0])
     assert fusion.counts["pose_too_late"] == 1
     assert fusion.add_pose(4.1, truth(4.1)[0])
 
 
 def test_lost_camera_is_said_in_the_covariance_and_passes():
     fusion, events = Fusion(), measurements(6.0)
-    lost = []
+    rows = []
     for event in events:
         if event[1] == "camera" and 2.0 < event[2] < 4.0:
             continue
         feed(fusion, [event])
         estimate = fusion.estimate()
         if event[1] == "imu" and estimate is not None:
-            lost.append(
-                (event[0], estimate.camera_lost, estimate.pose_covariance[0, 0] == LOST_VARIANCE)
-            )
-    times = [t for t, gone, said in lost if gone and said]
-    assert min(times) == pytest.approx(2.6, abs=0.06)
-    assert max(times) == pytest.approx(4.1, abs=0.1)
+            error, P = pose_error(estimate), estimate.pose_covariance
+            nees = error @ np.linalg.solve(P, error)
+            rows.append((event[0], estimate.camera_lost, P[0, 0], nees))
+    time, lost, variance, nees = np.array(rows).T
+    silent = (time > 2.1) & (time < 4.05)
+    assert time[lost > 0].min() == pytest.approx(2.7, abs=0.06)  # 0.6 s after the last one came
+    assert time[lost > 0].max() == pytest.approx(4.1, abs=0.1)
+    assert np.all(np.diff(variance[silent]) > 0.0)
+    assert variance[silent][-1] > 20.0 * variance[silent][0]
+    assert nees[silent].max() < 16.27  # as far off as the covariance says, chi^2 of 3 at 99.9 %
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
 
 
@@ -354,16 +384,112 @@ def test_a_pose_from_the_future_is_refused_and_holds_nothing_up(begun):
     assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
 
 
-def test_a_camera_far_ahead_of_the_imu_is_lost():
-    fusion, events = Fusion(), measurements(4.0)
-    feed(
-        fusion,
-        [(a, k, s + (5.0 if k == "camera" and s > 2.0 else 0.0), v) for a, k, s, v in events],
-    )
-    assert fusion.counts["pose_from_future"] == pytest.approx(59, abs=3)  # of 2 s at 30 Hz
+@pytest.mark.parametrize("jump", [5.0, -5.0, 1.0])
+def test_a_camera_whose_clock_is_set_is_followed(jump):
+    fusion, events = Fusion(), swum(6.0)
+    feed(fusion, [(a, k, s + jump * (k == "camera" and s > 3.0), v) for a, k, s, v in events])
+    assert fusion.camera_clock.jumps == 1
+    assert fusion.applied_offset == pytest.approx(-jump, abs=0.02)
+    assert not fusion.estimate().camera_lost
+
+
+@pytest.mark.parametrize("latency", [0.1, 0.6, 1.0])
+@pytest.mark.parametrize("late", [0.0, 0.05, 0.5, -1.0, 100.0])
+def test_an_offset_that_nobody_told_is_found(latency, late):
+    """late: how much later than the exposure the stamp is."""
+    fusion, events = Fusion(), swum(8.0, latency)
+    feed(fusion, [(a, k, s + late * (k == "camera"), v) for a, k, s, v in events])
+    clock = fusion.camera_clock
+    assert clock.current.sure
+    assert abs(clock.current.offset + late) < max(0.005, 4.0 * clock.current.std)
+    assert clock.age == pytest.approx(latency, abs=0.015)
+    error = fusion.estimate().pose - true_pose(fusion.estimate().time)
+    assert np.hypot(*error[:2]) < 0.02
+    assert abs(error[2]) < 0.02
+
+
+def test_a_latency_that_changes_is_followed():
+    events = swum(30.0)
+    fusion = Fusion()
+    feed(fusion, [(a, k, s + 0.08 * (k == "camera" and s > 10.0), v) for a, k, s, v in events])
+    assert fusion.applied_offset == pytest.approx(-0.08, abs=0.005)
+    assert fusion.counts["reacquired"] == 0
+
+
+def test_a_fish_at_rest_does_not_tell_the_offset():
+    fusion = Fusion()
+    feed(fusion, swum(12.0, rest=20.0))
+    assert not fusion.camera_clock.current.sure
+    assert fusion.applied_offset == 0.0
+
+
+def test_poses_that_come_twice_are_counted_and_used_once():
+    once, twice = Fusion(), Fusion()
+    for event in measurements(3.0):
+        feed(once, [event])
+        feed(twice, [event, event])
+    poses = sum(e[1] == "camera" for e in measurements(3.0))
+    assert twice.counts["pose_duplicate"] == poses
+    assert twice.counts["imu_duplicate"] == 300
+    np.testing.assert_array_equal(once.estimate().pose, twice.estimate().pose)
+
+
+def test_a_frozen_picture_with_new_stamps_is_noticed():
+    fusion, frozen = Fusion(), None
+    for arrival, kind, stamp, values in measurements(8.0):
+        if kind == "camera" and stamp > 4.0:
+            frozen = values if frozen is None else frozen
+            values = frozen
+        feed(fusion, [(arrival, kind, stamp, values)])
     estimate = fusion.estimate()
+    assert fusion.counts["pose_repeated"] > 100
+    assert fusion.counts["reacquired"] == 0
     assert estimate.camera_lost
-    assert not estimate.imu_lost
+    error = pose_error(estimate)
+    assert error @ np.linalg.solve(estimate.pose_covariance, error) < 16.27
+
+
+def test_a_fish_at_rest_may_be_seen_at_the_same_place_to_the_last_digit():
+    fusion = Fusion()
+    for k in range(300):
+        fusion.add_imu(0.01 * k, 0.0, 0.0, 0.0)
+        if k % 3 == 0:
+            fusion.add_pose(0.01 * k, [0.3, 0.2, 1.0])
+    assert fusion.counts["pose_repeated"] == 0
+    assert not fusion.estimate().camera_lost
+
+
+def test_a_gyro_that_is_not_measured_is_not_used():
+    fusion, errors = Fusion(), []
+    for k in range(1500):
+        t = 0.01 * k
+        psi = 0.8 * np.sin(0.9 * t)
+        fusion.add_imu(t, None, None, None)
+        if k % 3 == 0:
+            fusion.add_pose(t, [0.3, 0.2, psi], np.diag([1e-5, 1e-5, 1e-4]))
+        estimate = fusion.estimate()
+        if estimate is not None:
+            errors.append(estimate.pose[2] - psi)
+            assert estimate.twist_covariance[2, 2] == LOST_VARIANCE
+    assert np.std(errors) < 0.02
+
+
+def test_an_orientation_stands_in_for_a_wrong_gyro():
+    """Its zero is unknown; the gyro measures 30 % too little."""
+    rng, errors = np.random.default_rng(3), {}
+    for oriented in (False, True):
+        fusion, rows = Fusion(), []
+        for _, kind, stamp, values in swum(10.0, latency=0.5):
+            if kind == "imu":
+                yaw = true_pose(stamp)[2] + 2.0 + rng.normal(0.0, 0.003)
+                fusion.add_imu(stamp, 0.7 * values[0], *values[1:], yaw if oriented else None)
+                if fusion.estimate() is not None and stamp > 5.0:
+                    rows.append(fusion.estimate().pose[2] - true_pose(stamp)[2])
+            else:
+                fusion.add_pose(stamp, values)
+        errors[oriented] = np.sqrt(np.mean(np.square(rows)))
+    assert errors[True] < 0.02
+    assert errors[True] < 0.3 * errors[False]
 
 
 @pytest.mark.parametrize("ahead", [0.02, 0.05])
@@ -458,7 +584,7 @@ def test_camera_offset_moves_the_stamps():
         ("camera_position_noise", 0.0),
         ("gyro_noise", 0.0),
         ("imu_timeout", np.nan),
-        ("camera_offset", -0.5),
+        ("camera_offset_std", 0.0),
         ("largest_accel", 0.0),
         ("largest_yaw_rate", np.inf),
     ],

@@ -21,12 +21,12 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
-from fish_control.fusion import LOST_VARIANCE
+from fish_control.estimate import LOST_VARIANCE
 from fish_control.nodes import controller, exciter, fusion, planner
 from fish_control.nodes.controller import ControllerNode
 from fish_control.nodes.exciter import ExciterNode
 from fish_control.nodes.fusion import FusionNode
-from fish_control.nodes.messages import seconds, to_quaternion, to_stamp, yaw_of
+from fish_control.nodes.messages import inertial_values, seconds, to_quaternion, to_stamp, yaw_of
 from fish_control.nodes.planner import PlannerNode
 from fish_node import rivals
 
@@ -130,7 +130,7 @@ def odometry(time, x=0.0, y=0.0, yaw=0.0, u=0.2, variance=1e-5, twist_variance=1
     return message
 
 
-def feed_fusion(bench, start, seconds, camera=True, imu=True):
+def feed_fusion(bench, start, seconds, camera=True, imu=True, frame="pool"):
     """A fish that swims ahead at 0.2 m/s, in stamps that run ahead of the clock as fast as they are said."""
     for k in range(int(seconds * 100)):
         t = start + 0.01 * k
@@ -145,7 +145,7 @@ def feed_fusion(bench, start, seconds, camera=True, imu=True):
             )  # else poses overtake it
         if camera and k % 3 == 0:
             pose = PoseWithCovarianceStamped()
-            pose.header.stamp, pose.header.frame_id = to_stamp(t), "pool"
+            pose.header.stamp, pose.header.frame_id = to_stamp(t), frame
             pose.pose.pose.position.x = 0.2 * (t - start)
             pose.pose.pose.orientation = to_quaternion(0.0)
             bench.say("camera/pose", pose)
@@ -175,8 +175,9 @@ def test_fusion_says_at_once_that_the_camera_is_lost(bench):
     start = b.now()
     feed_fusion(b, start, 1.0)
     feed_fusion(b, start + 1.0, 1.0, camera=False)
-    b.until(lambda: b.heard["odometry/filtered"][-1].pose.covariance[0] == LOST_VARIANCE)
     b.until(lambda: b.said(b"\x02", "camera lost"))
+    seen, last = (b.heard["odometry/filtered"][k].pose.covariance[0] for k in (-100, -1))
+    assert last > 2.0 * seen  # it grows while nobody looks
     assert b.heard["odometry/filtered"][-1].twist.covariance[0] < 1.0
 
 
@@ -232,6 +233,29 @@ def test_fusion_is_not_stopped_by_one_pose_from_the_future(bench):
     assert max(stamps) < start + 2.0
     assert np.all(np.diff(stamps) > 0.0)
     assert b.node._fusion.counts["pose_from_future"] == 1
+
+
+def test_fusion_refuses_poses_of_another_frame_and_names_it(bench):
+    b = bench(FusionNode)
+    b.listen("odometry/filtered", Odometry)
+    start = b.now()
+    feed_fusion(b, start, 1.0)
+    feed_fusion(b, start + 1.0, 1.0, frame="camera_optical")
+    b.until(lambda: b.said(b"\x02", "camera_optical"))
+    assert b.node._fusion.counts["pose_wrong_frame"] > 10
+
+
+def test_fusion_uses_nothing_that_a_message_calls_not_measured(bench):
+    node = bench(FusionNode).node
+    message = Imu()
+    message.header.stamp = to_stamp(5.0)
+    message.angular_velocity.z, message.linear_acceleration.x = 3.0, 2.0
+    message.angular_velocity_covariance[0] = -1.0
+    message.linear_acceleration_covariance[0] = -1.0
+    message.orientation_covariance[0] = -1.0
+    assert inertial_values(message) == (None,) * 5
+    node._on_imu(message)
+    assert node._fusion.counts["imu"] == 1
 
 
 def test_fusion_survives_values_that_are_no_numbers(bench):

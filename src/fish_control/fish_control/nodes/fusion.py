@@ -1,7 +1,9 @@
 """camera/pose + imu/data -> odometry/filtered (100 Hz, pool -> base_link), /diagnostics.
 
-A pose variance of 1e4 says that the camera is lost, a twist variance of 1e4 that the IMU is. The transform
-pool -> base_link and the static base_link -> imu_link are broadcast where tf2_msgs is installed. Decisions are in Fusion.
+The variance of the pose grows while the camera is lost; a twist variance of 1e4 says that the IMU is lost. What a message
+calls not measured (first covariance -1, sensor_msgs) is used nowhere, and neither are poses of another frame than the
+pool's. The transform pool -> base_link and the static base_link -> imu_link are broadcast where tf2_msgs is
+installed. Decisions are in Fusion.
 """
 
 from typing import Any
@@ -13,12 +15,15 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu
 
-from fish_control.fusion import Estimate, Fusion
+from fish_control.estimate import Estimate
+from fish_control.fusion import Fusion
+from fish_control.fusion_status import clock_values, clock_warning, lost_sensors
 from fish_control.node_configs import FusionNodeConfig
 from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
+    inertial_values,
     planar_covariance,
     seconds,
     to_covariance,
@@ -59,15 +64,18 @@ class FusionNode(Node):
         self.create_timer(1.0, lambda: self._report(self._estimate()))
         self._used = 0.0  # s on this node's clock, when a measurement was last used
         self._said = ""
+        self._wrong_frame = ""
 
     def _on_imu(self, message: Imu) -> None:
-        time = seconds(message.header.stamp)
-        w, a = message.angular_velocity.z, message.linear_acceleration
-        if self._fusion.add_imu(time, w, a.x, a.y):
+        if self._fusion.add_imu(seconds(message.header.stamp), *inertial_values(message)):
             self._used = self._now()
             self._publish(self._estimate())
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        frame = message.header.frame_id
+        if frame not in ("", self._frames[0]):
+            self._refuse_frame(frame)
+            return
         time, p = seconds(message.header.stamp), message.pose.pose
         pose = np.array([p.position.x, p.position.y, yaw_of(p.orientation)])
         if self._fusion.add_pose(time, pose, planar_covariance(message.pose.covariance)):
@@ -75,6 +83,15 @@ class FusionNode(Node):
         estimate = self._estimate()
         if estimate is not None and estimate.imu_lost:  # no IMU message will publish it
             self._publish(estimate)
+
+    def _refuse_frame(self, frame: str) -> None:
+        self._fusion.counts["pose_wrong_frame"] += 1
+        if not self._wrong_frame:
+            self.get_logger().error(
+                f"camera/pose comes in frame {frame[:60]!r}, expected {self._frames[0]!r}: its poses are not fused; "
+                "set the tracker's frame or transform the poses"
+            )
+        self._wrong_frame = frame[:60]
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9
@@ -97,18 +114,22 @@ class FusionNode(Node):
             self._report(estimate)
 
     def _state(self, estimate: Estimate | None) -> tuple[bytes, str]:
+        lost = [] if estimate is None else lost_sensors(estimate)
+        if self._wrong_frame and (estimate is None or estimate.camera_lost):
+            return (
+                ERROR,
+                f"camera lost: its poses come in frame {self._wrong_frame!r}, not in {self._frames[0]!r}",
+            )
         if estimate is None:
             return WARN, "waiting for camera poses that agree"
-        lost = [
-            name
-            for name, gone in (("camera", estimate.camera_lost), ("IMU", estimate.imu_lost))
-            if gone
-        ]
-        return (ERROR, f"{' and '.join(lost)} lost") if lost else (OK, "estimating")
+        if lost:
+            return ERROR, f"{' and '.join(lost)} lost"
+        warning = clock_warning(self._fusion)
+        return (WARN, f"estimating; {warning}") if warning else (OK, "estimating")
 
     def _report(self, estimate: Estimate | None) -> None:
         level, self._said = self._state(estimate)
-        values: dict[str, object] = dict(self._fusion.counts)
+        values: dict[str, object] = {**self._fusion.counts, **clock_values(self._fusion)}
         if estimate is not None:
             values["gyro_bias_rad_s"] = f"{estimate.gyro_bias:.5f}"
             values["position_std_m"] = f"{np.sqrt(estimate.pose_covariance[0, 0]):.4f}"

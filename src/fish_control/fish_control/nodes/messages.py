@@ -8,13 +8,14 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 
 from fish_control.controller import Command
 from fish_control.line_of_sight import Motion
 from fish_control.planner import motion_is_finite
 from fish_control.watchdog import EstimateHealth
 
+NOT_MEASURED = -1.0  # first covariance of what an Imu message does not measure
 PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
 PLANAR_VARIANCES = np.array([7 * k for k in PLANAR])  # their places among its 36 numbers
 
@@ -38,6 +39,25 @@ def yaw_of(q: Quaternion) -> float:
     if not 0.5 < norm < 2.0:
         return math.nan
     return math.atan2(2.0 * (q.w * q.z + q.x * q.y), norm - 2.0 * (q.y * q.y + q.z * q.z))
+
+
+def inertial_values(
+    message: Imu,
+) -> tuple[float | None, float | None, float | None, float | None, float | None]:
+    """Yaw rate [rad/s], forward and left specific force [m/s^2], yaw [rad] and its deviation [rad].
+
+    None: not measured, which a first covariance of -1 says, or where a quaternion is none; a deviation that is not given.
+    """
+    rate = forward = left = yaw = std = None
+    if message.angular_velocity_covariance[0] != NOT_MEASURED:
+        rate = message.angular_velocity.z
+    if message.linear_acceleration_covariance[0] != NOT_MEASURED:
+        forward, left = message.linear_acceleration.x, message.linear_acceleration.y
+    measured = yaw_of(message.orientation)
+    if message.orientation_covariance[0] != NOT_MEASURED and math.isfinite(measured):
+        yaw, variance = measured, message.orientation_covariance[8]
+        std = math.sqrt(variance) if variance > 0.0 else None
+    return rate, forward, left, yaw, std
 
 
 def to_quaternion(yaw: float) -> Quaternion:

@@ -1,0 +1,114 @@
+"""Fusion over a folder of recordings in the order of arrival; prints a table.
+
+python benchmarks/fusion_recordings.py FOLDER
+
+A row is a recording: camera poses accepted, refused and repeated, reacquisitions, the camera's offset found (added to its
+stamps) with its standard deviation, the median age of an image at its arrival, the factors on the noises given, and the
+RMS distance [mm] and angle [degrees] between a pose that arrives and what was published for its moment before.
+Exit status 2: the folder is absent or holds no recordings.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from fish_bag import Trial, find_trials, read_trial
+from fish_control.fusion import Fusion
+from fish_control.noise_scale import Channel
+
+
+def events(trial: Trial) -> list[tuple[float, str, int]]:
+    """(arrival, kind, index) in the order of arrival."""
+    rows = []
+    for kind, stream in (("imu", trial.imu), ("camera", trial.camera)):
+        if stream is not None:
+            rows += [(float(t), kind, i) for i, t in enumerate(stream.t_arrival)]
+    return sorted(rows)
+
+
+def yaw(q: np.ndarray) -> float | None:
+    """Rotation about z [rad] of a quaternion x, y, z, w; None where it was not measured."""
+    x, y, z, w = map(float, q)
+    if not math.isfinite(x + y + z + w):
+        return None
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def fuse(trial: Trial) -> str:
+    """One row of the table."""
+    fusion, published, errors = Fusion(), [], []
+    imu, camera = trial.imu, trial.camera
+    assert camera is not None
+    for _, kind, i in events(trial):
+        if kind == "imu" and imu is not None:
+            rate, force = imu.gyro[i, 2], imu.accel[i]
+            known = [None if not math.isfinite(v) else float(v) for v in (rate, *force[:2])]
+            fusion.add_imu(float(imu.t[i]), *known, yaw(imu.orientation[i]))
+            estimate = fusion.estimate()
+            if estimate is not None and not estimate.imu_lost:
+                published.append((estimate.time, *estimate.pose))
+            continue
+        fusion.add_pose(float(camera.t[i]), camera.pose[i], camera.covariance[i])
+        time = float(camera.t[i]) + fusion.applied_offset
+        if (
+            fusion.camera_clock.current.sure
+            and published
+            and published[0][0] <= time <= published[-1][0]
+        ):
+            rows = np.array(published[-400:])
+            rows[:, 3] = np.unwrap(rows[:, 3])
+            at = [np.interp(time, rows[:, 0], rows[:, k]) for k in (1, 2, 3)]
+            errors.append(
+                (
+                    *(camera.pose[i, :2] - at[:2]),
+                    math.remainder(camera.pose[i, 2] - at[2], 2 * math.pi),
+                )
+            )
+    return row(trial.name, len(camera), fusion, np.array(errors).reshape(-1, 3))
+
+
+def row(name: str, poses: int, fusion: Fusion, errors: np.ndarray) -> str:
+    """A line of text."""
+    clock, counts = fusion.camera_clock, fusion.counts
+    fused = counts["pose"] + counts["started"] * fusion.config.start_frames
+    square = np.median(np.square(errors), axis=0) / 0.455 if len(errors) else np.full(3, np.nan)
+    return (
+        f"{name:12s} {poses:6d} {100 * fused / poses:8.1f} {counts['pose_outlier']:8d} {counts['pose_repeated']:8d} "
+        f"{counts['reacquired']:10d} {clock.current.offset:8.3f} +- {clock.current.std:.3f} {clock.age:6.3f} "
+        f"{factors(fusion.noise_scale.position)} {factors(fusion.noise_scale.heading)} "
+        f"{1e3 * math.sqrt(square[0] + square[1]):8.1f} {math.degrees(math.sqrt(square[2])):6.2f}"
+    )
+
+
+def factors(channel: Channel) -> str:
+    """Of the standard deviations of the poses and of the motion."""
+    return f"{math.sqrt(channel.total):5.2f} {math.sqrt(channel.total * channel.process):5.2f}"
+
+
+def main() -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    folder = parser.parse_args().folder
+    trials = find_trials(folder) if folder.is_dir() else []
+    if not trials:
+        print(
+            f"{folder}: absent or without recordings; expected a folder of recordings",
+            file=sys.stderr,
+        )
+        return 2
+    print(
+        "recording     poses accepted  refused repeated reacquired   offset +- std     age   noise x      mm degrees"
+    )
+    for path in trials:
+        print(fuse(read_trial(path)), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

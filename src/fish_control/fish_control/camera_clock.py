@@ -1,0 +1,238 @@
+"""How far the camera's stamps are from the IMU's clock, found from the heading that both measure.
+
+An image stamped t was taken at t + offset of the IMU's clock. For each offset of a grid the change of the camera's heading
+over LAG is compared with that of the IMU's heading; the offset with the smallest sum of squares is the estimate:
+
+    S(o) = sum over k of exp(-age_k / memory) (psi_k - psi_j - Y(t_k + o) + Y(t_j + o))^2,   t_k - t_j about LAG
+
+A parabola through the smallest three gives the value between grid points, its curvature the standard deviation. The
+swing of the head repeats itself once a stroke, so the estimate counts only where no other offset fits nearly as well. An
+image cannot be taken after it arrives: this bounds the grid, however far the clocks are apart. Source: time delay
+estimation by least squares (Jacovitti and Scarano 1993), on a grid with forgetting.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_control.imu_history import ImuHistory
+
+Array = NDArray[np.float64]
+
+LAG = 0.15  # s between the two poses of a pair, a third of a stroke
+LONGEST_PAIR = 0.4  # s
+STEP = 0.01  # s, of the grid
+OLDEST = 1.7  # s, largest age of an image at its arrival
+AHEAD = 0.1  # s, by which an image may seem to be taken after its arrival
+CLIP = 0.3  # rad, larger differences count no more
+MEMORY = 20.0  # s, of the estimate
+SHORT_MEMORY = 4.0  # s, of the one that notices changes
+CORRELATION = 2.0  # variance of the estimate to that of independent pairs: each pose is in two
+MODEL_STD = 3e-4  # s, of what the noise does not explain
+NEIGHBOURHOOD = 0.08  # s, within which offsets belong to one minimum
+REFINED = 0.005  # s, smaller changes are left to the long memory
+REACH = 0.2  # s, less than half a stroke, in which an offset is looked for that has changed
+CLEAR = 10.0  # log-likelihood by which every other minimum must be worse
+CLEAR_RATIO = 1.3  # and the ratio of the sums of squares
+LARGEST_STD = 0.005  # s, of an estimate that is applied
+LEAST_PAIRS = 12.0
+CLOCK_DRIFT = 1e-4  # s per s, of two clocks while nobody compares them
+JUMP = 0.25  # s, change of the time from stamp to arrival that says that a clock was set
+JUMP_POSES = 8  # in a row that must agree on it
+STEADY = 0.05  # s, within which they agree
+
+
+@dataclass(frozen=True)
+class ClockEstimate:
+    """Offset of the camera's clock."""
+
+    offset: float  # s, added to a stamp to get the IMU's time
+    std: float  # s
+    sure: bool  # whether it may be applied
+
+
+class _Sums:
+    """Sums of squares over the grid with one memory."""
+
+    def __init__(self, memory: float, size: int) -> None:
+        self.memory = memory
+        self.squares = np.zeros(size)
+        self.pairs = 0.0
+
+    def add(self, squares: Array, dt: float) -> None:
+        keep = math.exp(-max(dt, 0.0) / self.memory)
+        self.squares = keep * self.squares + squares
+        self.pairs = keep * self.pairs + 1.0
+
+    def log_likelihood(self) -> Array:
+        """Of each offset, less that of the best: at most 0."""
+        best = float(self.squares.min())
+        variance = max(best / max(self.pairs, 1.0), 1e-8)
+        return (best - self.squares) / (2.0 * CORRELATION * variance)
+
+    def estimate(self, grid: Array, around: float | None = None) -> ClockEstimate:
+        """The best offset of the grid, or of what lies within REACH of `around` [s]."""
+        within = np.ones(len(grid), dtype=bool)
+        if around is not None:
+            within = np.abs(grid - around) <= REACH
+        best = int(np.where(within, self.squares, np.inf).argmin())
+        edge = best < 2 or best > len(grid) - 3
+        if edge or self.pairs < LEAST_PAIRS:
+            return ClockEstimate(float(grid[best]), math.inf, False)
+        a, b, c = self.squares[best - 1 : best + 2]
+        curvature = a - 2.0 * b + c
+        if curvature <= 0.0:
+            return ClockEstimate(float(grid[best]), math.inf, False)
+        offset = float(grid[best] + 0.5 * STEP * (a - c) / curvature)
+        variance = max(b / self.pairs, 1e-8) * CORRELATION / (0.5 * curvature / STEP**2)
+        std = math.hypot(math.sqrt(variance), MODEL_STD)
+        other = within & (np.abs(grid - grid[best]) > NEIGHBOURHOOD)
+        clear = self.log_likelihood()[other].max() < -CLEAR
+        distinct = self.squares[other].min() > CLEAR_RATIO * b
+        return ClockEstimate(offset, std, bool(clear and distinct and std < LARGEST_STD))
+
+
+class CameraClock:
+    """Feed it every pose when it arrives; ask for the offset.
+
+    Attributes:
+        jumps: how often one of the clocks was set.
+    """
+
+    def __init__(self, offset: float, std: float) -> None:
+        """offset, std: what is known beforehand [s]."""
+        self._prior = ClockEstimate(offset, std, False)
+        self._latencies: deque[float] = deque(maxlen=30)  # s, from stamp to arrival, as stamped
+        self._grid: Array | None = None  # (G,) offsets [s]
+        self.jumps = 0
+        self.current = self._prior
+        self.contradicted = False
+        self._newest = -math.inf  # s, stamp of the newest pair
+        self._strange: list[float] = []
+        self._waiting: deque[tuple[float, float, float]] = deque()  # arrival, stamp, heading
+        self._sure: tuple[float, ClockEstimate] | None = (
+            None  # stamp and value of the newest sure one
+        )
+
+    @property
+    def age(self) -> float:
+        """Median age of an image at its arrival [s], NaN before the first."""
+        if not self._latencies:
+            return math.nan
+        return float(np.median(self._latencies)) - self.current.offset
+
+    def add(self, stamp: float, heading: float, imu: ImuHistory, now: float) -> None:
+        """A pose with this stamp and heading arrives when the IMU's clock is at `now` [s].
+
+        It is compared once the IMU has told all that the grid asks for.
+        """
+        self._watch(now - stamp)
+        self._waiting.append((now, stamp, heading))
+        while self._grid is not None and self._waiting and self._waiting[0][0] <= now - AHEAD:
+            self._compare(*self._waiting.popleft()[1:], imu)
+
+    def _compare(self, stamp: float, heading: float, imu: ImuHistory) -> None:
+        assert self._grid is not None
+        turned = imu.heading(stamp + self._grid)
+        while self._poses and stamp - self._poses[0][0] > LONGEST_PAIR:
+            self._poses.popleft()
+        before = next((p for p in reversed(self._poses) if stamp - p[0] >= LAG - 1e-3), None)
+        self._poses.append((stamp, heading, turned))
+        if before is None:
+            return
+        change = heading - before[1] - (turned - before[2])
+        change = np.abs((change + math.pi) % (2.0 * math.pi) - math.pi)
+        squares = np.minimum(change, CLIP) ** 2
+        for sums in (self._long, self._short):
+            sums.add(squares, stamp - self._newest)
+        self._newest = stamp
+        self._decide(stamp)
+
+    def _watch(self, latency: float) -> None:
+        """Where the grid lies, and whether a clock was set."""
+        if self._grid is None:
+            self._latencies.append(latency)
+            if len(self._latencies) >= 3:
+                self._place_grid(float(np.median(self._latencies)))
+            return
+        usual = float(np.median(self._latencies))
+        if abs(latency - usual) <= JUMP:
+            self._strange.clear()
+            self._latencies.append(latency)
+            return
+        self._strange.append(latency)
+        newest = self._strange[-JUMP_POSES:]
+        if len(newest) == JUMP_POSES and max(newest) - min(newest) < STEADY:
+            self._jumped(float(np.median(newest)), usual)
+
+    def _jumped(self, latency: float, usual: float) -> None:
+        self.jumps += 1
+        self._strange.clear()
+        self._latencies.clear()
+        self._latencies.append(latency)
+        age = latency - self.current.offset
+        moved = 0.0 if 0.0 <= age <= OLDEST else latency - usual
+        self.current = ClockEstimate(self.current.offset + moved, abs(latency - usual), False)
+        self._sure = None
+        self._prior = self.current
+        self._place_grid(latency)
+
+    def _place_grid(self, latency: float) -> None:
+        first = math.floor((latency - OLDEST) / STEP) * STEP
+        steps = np.arange(round((OLDEST + AHEAD) / STEP) + 1, dtype=np.float64)
+        grid: Array = first + STEP * steps
+        self._grid = grid
+        self._long, self._short = _Sums(MEMORY, len(grid)), _Sums(SHORT_MEMORY, len(grid))
+        self._poses: deque[tuple[float, float, Array]] = deque()
+        self._waiting.clear()
+        self._newest = -math.inf
+        age = latency - self._prior.offset
+        if not -AHEAD <= age <= OLDEST:  # the clocks are farther apart than anybody said
+            self._prior = ClockEstimate(latency - 0.1, 0.5, False)
+            self.current = self._prior
+            self.contradicted = True
+
+    def _decide(self, stamp: float) -> None:
+        assert self._grid is not None
+        found = self._long.estimate(self._grid)
+        if self._sure is not None:
+            held = self.current
+            recent = self._short.estimate(self._grid, held.offset)
+            apart = abs(recent.offset - held.offset)
+            if recent.sure and apart > max(4.0 * math.hypot(recent.std, held.std), REFINED):
+                self._long = _Sums(MEMORY, len(self._grid))  # what it remembers is over
+                found = recent
+        if found.sure:
+            self.current, self._sure, self.contradicted = found, (stamp, found), False
+        elif self._sure is not None:
+            since, held = stamp - self._sure[0], self._sure[1]
+            std = math.hypot(held.std, CLOCK_DRIFT * since)
+            self.current = ClockEstimate(held.offset, std, True)
+        else:
+            self._weigh_prior()
+
+    def _weigh_prior(self) -> None:
+        """Where the data contradict what was known beforehand, take the nearest offset that they allow."""
+        assert self._grid is not None
+        likelihood = self._long.log_likelihood()
+        near = np.abs(self._grid - self._prior.offset) <= max(2.0 * self._prior.std, STEP)
+        self.contradicted = bool(not near.any() or likelihood[near].max() < -CLEAR)
+        self.current = self._prior
+        if self.contradicted:
+            valley = np.flatnonzero((likelihood > -CLEAR) & _is_peak(likelihood))
+            nearest = valley[np.abs(self._grid[valley] - self._prior.offset).argmin()]
+            self.current = ClockEstimate(
+                float(self._grid[nearest]), max(self._prior.std, 2.0 * STEP), False
+            )
+
+
+def _is_peak(values: Array) -> NDArray[np.bool_]:
+    """Which are no smaller than their neighbours."""
+    padded = np.concatenate(([-np.inf], values, [-np.inf]))
+    peak: NDArray[np.bool_] = (values >= padded[:-2]) & (values >= padded[2:])
+    return peak

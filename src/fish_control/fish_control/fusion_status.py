@@ -1,0 +1,46 @@
+"""What fusion says of itself: lost sensors and the camera's clock."""
+
+from __future__ import annotations
+
+import math
+
+from fish_control.estimate import Estimate
+from fish_control.fusion import Fusion
+
+NOTABLE_OFFSET = 0.02  # s, difference to camera_offset that is worth a warning
+
+
+def lost_sensors(estimate: Estimate) -> list[str]:
+    """Names of the sensors that are lost."""
+    pairs = (("camera", estimate.camera_lost), ("IMU", estimate.imu_lost))
+    return [name for name, lost in pairs if lost]
+
+
+def clock_warning(fusion: Fusion) -> str | None:
+    """What is wrong with the camera's stamps, None if nothing is known to be."""
+    clock, given = fusion.camera_clock, fusion.config.camera_offset
+    current = clock.current
+    if current.sure and abs(current.offset - given) > max(NOTABLE_OFFSET, 3.0 * current.std):
+        return (
+            f"images are taken {-current.offset:.3f} s before their stamps: found and applied; "
+            f"camera_offset says {given:g} s, set it to {current.offset:.3f}"
+        )
+    if clock.contradicted:
+        return f"camera_offset {given:g} s contradicts the IMU; the right one is not yet sure"
+    return None
+
+
+def clock_values(fusion: Fusion) -> dict[str, str]:
+    """The camera's clock for /diagnostics."""
+    clock = fusion.camera_clock
+    values = {
+        "camera_offset_s": f"{fusion.applied_offset:.4f}",
+        "camera_offset_std_s": f"{clock.current.std:.4f}",
+        "camera_offset_sure": str(clock.current.sure).lower(),
+        "camera_clock_jumps": str(clock.jumps),
+        "camera_noise_factor": f"{math.sqrt(fusion.noise_scale.position.total):.2f}",
+        "motion_noise_factor": f"{math.sqrt(fusion.noise_scale.position.process):.2f}",
+    }
+    if math.isfinite(clock.age):
+        values["camera_latency_s"] = f"{clock.age:.3f}"
+    return values

@@ -1,0 +1,38 @@
+"""How much a camera pose counts: its message, the noise that the data show, and the camera's clock."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_control.camera_clock import ClockEstimate
+from fish_control.fusion_config import FusionConfig
+from fish_control.measurement_buffer import CameraPose
+from fish_control.noise_scale import NoiseScale
+
+Array = NDArray[np.float64]
+
+
+def given_covariance(covariance: Array | None, config: FusionConfig) -> Array:
+    """R (3, 3) of a camera pose: what its message says, or the parameters where it says nothing."""
+    deviations = [config.camera_position_noise] * 2 + [config.camera_heading_noise]
+    given = np.diag(np.square(deviations))
+    if covariance is None:
+        return given
+    R = np.array(covariance, dtype=float)
+    silent = np.all(np.isfinite(R)) and np.any(R.diagonal() <= 0.0)
+    return given if silent else R
+
+
+def weighted(
+    camera: CameraPose, scale: NoiseScale, clock: ClockEstimate, motion: Array
+) -> CameraPose:
+    """The pose with all that makes it uncertain.
+
+    motion: (v_x, v_y, psi') of the fish [m/s, m/s, rad/s], along which a camera's clock that is not known displaces it.
+    """
+    spread = np.sqrt([scale.position.total, scale.position.total, scale.heading.total])
+    R = camera.R * np.outer(spread, spread)
+    if not clock.sure:
+        R = R + clock.std**2 * np.outer(motion, motion)
+    return camera._replace(R=R)
