@@ -25,7 +25,7 @@ PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
 
 # A misspelt variable, such as LETER=S, would change nothing and nobody would notice.
-OURS := LETTER PATH_ARGS SPEED DURATION HARDWARE DOMAIN OUT ARGS DATASET PYTHON PIP_ARGS SHELL VENV
+OURS := LETTER PATH_ARGS SPEED DURATION HARDWARE DOMAIN OUT ARGS DATASET PYTHON NOBLE_PYTHON PIP_ARGS SHELL VENV
 UNKNOWN := $(filter-out $(OURS),$(foreach v,$(.VARIABLES),$(if $(findstring command line,$(origin $(v))),$(v))))
 $(if $(UNKNOWN),$(error unknown variable $(UNKNOWN); known: $(OURS)))
 
