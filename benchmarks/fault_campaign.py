@@ -1,0 +1,190 @@
+"""Random faults while the robot swims through the real drivers on a fake robot: crashes, forbidden motion, recoveries.
+
+    python benchmarks/fault_campaign.py [--faults 500] [--seed 0] [--out folder]
+
+For each fault the robot is armed and swims open loop; a device is broken or a node is killed, and mended or started again after
+a while. Counted: nodes that ended by themselves, rotor commands while disarmed, commands over the limits, robots that could not
+be armed again. Status 1 if any count is not zero. About 15 s a fault on a quiet computer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from fish_bringup.node_table import CONTROL, FAKE, REAL, NodeSpec, fake_parameters
+from fish_bringup.nodes.watch import WatchNode, watching
+from fish_bringup.processes import NodeProcesses
+from fish_node.domain import choose_domain
+
+ROTOR, RUDDER, IMU, CAMERA = REAL
+TRACKER, FUSION, *_ = CONTROL
+NODES = (*FAKE, *REAL, TRACKER, FUSION)
+KILLED = (ROTOR, RUDDER, IMU, CAMERA, TRACKER, FUSION)
+FAULTS = (
+    "rotor unplug", "rotor garbage", "rotor crc", "rotor silent", "rotor reboot", "rotor jam", "rotor stuck",
+    "rotor hot", "rotor fault", "imu unplug", "imu errors", "imu gone", "imu reset", "imu frozen", "imu bits",
+    "imu step", "camera unplug", "camera frozen", "rudder off",
+)  # fmt: off
+AMPLITUDE, FREQUENCY = 60.0, 2.0 * np.pi * 2.0  # rad/s, rad/s
+LIMIT = 160.0  # rad/s, max_velocity of rotor.yaml
+STOPPED_S = 0.5  # s after the disarming, within which the rotor must be at rest
+STILL = 20.0  # rad/s; the rotor has an inertia of its own
+SLOW_ROTOR = {
+    "camera_timeout_s": 5.0,
+    "odometry_timeout_s": 2.0,
+    "stale_s": 1.0,
+    "rudder_timeout_s": 2.0,
+}
+SLOW_FUSION: dict[str, object] = {"camera_timeout": 5.0, "imu_timeout": 1.0}
+ARMED_WITHIN_S = 60.0
+PERIOD_S = 0.01
+
+
+@dataclass
+class Counts:
+    """What went wrong, and what was done."""
+
+    done: Counter[str] = field(default_factory=Counter)
+    crashes: list[str] = field(default_factory=list)
+    moved_disarmed: int = 0
+    over_limits: int = 0
+    not_armed: list[str] = field(default_factory=list)
+    not_disarmed: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def failed(self) -> bool:
+        """Whether anything happened that must not."""
+        return bool(self.crashes or self.moved_disarmed or self.over_limits or self.not_armed)
+
+
+class Campaign:
+    """The robot and what is watched of it."""
+
+    def __init__(
+        self,
+        nodes: NodeProcesses,
+        watch: WatchNode,
+        listen: Callable[[float], None],
+        parameters: dict[NodeSpec, dict[str, object]],
+    ) -> None:
+        self.counts = Counts()
+        self._nodes, self._watch, self._listen = nodes, watch, listen
+        self._parameters = parameters
+        peer: Node = watch
+        self._command = peer.create_publisher(JointState, "joint_command", 1)
+        self._fault = peer.create_publisher(String, "fake/fault", 10)
+        self._disarmed_since = time.monotonic()
+        peer.create_subscription(JointState, "fake/joint_command", self._on_motion, 10)
+        peer.create_timer(PERIOD_S, self._swim)
+
+    def start(self, spec: NodeSpec) -> None:
+        """Start a node, or start it again."""
+        self._nodes.start(spec, self._parameters.get(spec))
+
+    def fault(self, name: str, lasts_s: float) -> None:
+        """Arm, let a fault happen, mend it."""
+        if not self._arm():
+            self.counts.not_armed.append(f"before {name}: {self._watch.refusal}")
+            return
+        self._listen(random.uniform(0.5, 1.5))
+        self.counts.done[name] += 1
+        killed = next((spec for spec in KILLED if name == f"kill {spec.name}"), None)
+        if killed is not None:
+            process = self._nodes.running[killed]
+            process.signal(signal.SIGKILL)
+            process.wait(5.0)
+        else:
+            self._fault.publish(String(data=name))
+        self._listen(lasts_s)
+        if not self._watch.disarmed:
+            self.counts.not_disarmed[name] += 1
+        if killed is not None:
+            self.start(killed)
+        self._fault.publish(String(data="mend"))
+        self._listen(0.3)
+        for process in self._nodes.ended():
+            self.counts.crashes.append(f"{name}: {process.spec.name}: {process.last_words()}")
+            self.start(process.spec)
+
+    def _arm(self) -> bool:
+        end = time.monotonic() + ARMED_WITHIN_S
+        while self._watch.disarmed != "" and time.monotonic() < end:
+            self._watch.ask_to_arm()
+            self._listen(0.1)
+        return self._watch.disarmed == ""
+
+    def _swim(self) -> None:
+        message = JointState(name=["rotor", "rudder"])
+        message.header.stamp = self._watch.get_clock().now().to_msg()
+        speed = AMPLITUDE * float(np.sin(FREQUENCY * time.monotonic()))
+        message.velocity, message.position = [speed, 0.0], [0.0, 0.2]
+        self._command.publish(message)
+
+    def _on_motion(self, message: JointState) -> None:
+        speed, now = abs(message.velocity[0]), time.monotonic()
+        self.counts.over_limits += speed > LIMIT
+        if self._watch.disarmed == "":
+            self._disarmed_since = now
+        elif now - self._disarmed_since > STOPPED_S and speed > STILL:
+            self.counts.moved_disarmed += 1
+
+
+def main() -> int:
+    """Run the campaign and print the counts."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--faults", type=int, default=500, help="how many (500)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--domain", type=int, help="ROS domain (a free one)")
+    parser.add_argument(
+        "--slow",
+        action="store_true",
+        help="timeouts of a computer that is too slow for cameras, so that its slowness is no fault",
+    )
+    parser.add_argument("--out", type=Path, default=Path("out/fault_campaign"), help="logs")
+    args = parser.parse_args()
+    random.seed(args.seed)
+    names = [*FAULTS, *(f"kill {spec.name}" for spec in KILLED)]
+    domain = choose_domain(args.domain)
+    with (
+        tempfile.TemporaryDirectory(prefix="fish_") as devices,
+        NodeProcesses(domain, args.out) as nodes,
+        watching(domain) as (watch, listen),
+    ):
+        parameters = fake_parameters(Path(devices))
+        if args.slow:
+            parameters[ROTOR] |= SLOW_ROTOR
+            parameters[FUSION] = SLOW_FUSION
+        campaign = Campaign(nodes, watch, listen, parameters)
+        for spec in NODES:
+            campaign.start(spec)
+        listen(5.0)
+        for k in range(args.faults):
+            name = random.choice(names)
+            campaign.fault(name, random.uniform(1.0, 3.0))
+            print(f"{k + 1:4} {name:28} {watch.disarmed or 'armed'}", flush=True)
+    counts = campaign.counts
+    print(f"faults: {dict(counts.done)}")
+    print(f"nodes that ended by themselves: {len(counts.crashes)} {counts.crashes}")
+    print(f"samples of motion while disarmed: {counts.moved_disarmed}")
+    print(f"samples over {LIMIT:g} rad/s: {counts.over_limits}")
+    print(f"could not be armed again: {len(counts.not_armed)} {counts.not_armed}")
+    print(f"not disarmed within the fault's time: {dict(counts.not_disarmed)}")
+    return 1 if counts.failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
