@@ -25,7 +25,7 @@ PYTHON ?= $(shell for p in python3 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1 && echo $$p && break; done)
 
 # A misspelt variable, such as LETER=S, would change nothing and nobody would notice.
-OURS := LETTER PATH_ARGS SPEED DURATION HARDWARE DOMAIN OUT ARGS DATASET PYTHON NOBLE_PYTHON PIP_ARGS SHELL VENV
+OURS := LETTER PATH_ARGS SPEED DURATION HARDWARE DOMAIN OUT VIEW ARGS DATASET PYTHON NOBLE_PYTHON NOBLE_SKIP PIP_ARGS SHELL VENV
 UNKNOWN := $(filter-out $(OURS),$(foreach v,$(.VARIABLES),$(if $(findstring command line,$(origin $(v))),$(v))))
 $(if $(UNKNOWN),$(error unknown variable $(UNKNOWN); known: $(OURS)))
 
@@ -33,7 +33,7 @@ $(if $(UNKNOWN),$(error unknown variable $(UNKNOWN); known: $(OURS)))
 
 help:
 	@echo "make demo       the whole robot swims the letter R, is recorded, scored and shown; options:"
-	@echo "                HARDWARE=fake  LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder"
+	@echo "                HARDWARE=fake  LETTER=S  SPEED=0.15  DURATION=20  LETTER=circle PATH_ARGS='{radius: 0.5}'  DOMAIN=7  OUT=folder  VIEW=1"
 	@echo "make test       build, the tests of every package, the tests across packages"
 	@echo "make test-noble the tests of every package but training, with the versions of Ubuntu 24.04"
 	@echo "make identify, diagnose DATASET=folder   the model's parameters; the physics that it lacks"
@@ -98,7 +98,7 @@ install/.studies: install/.built $(STUDIES)
 # --- the robot and the tools ----------------------------------------------------------------------------------------------
 demo: build
 	@$(ROBOFISH) demo $(if $(LETTER),--letter '$(LETTER)') $(if $(PATH_ARGS),--path-args '$(PATH_ARGS)') $(if $(SPEED),--speed '$(SPEED)') \
-		$(if $(HARDWARE),--hardware '$(HARDWARE)') $(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(ARGS)
+		$(if $(HARDWARE),--hardware '$(HARDWARE)') $(if $(DURATION),--duration '$(DURATION)') $(if $(DOMAIN),--domain '$(DOMAIN)') $(if $(OUT),--out '$(OUT)') $(if $(VIEW),--view) $(ARGS)
 
 # A few small scenarios; ARGS='--scenarios 300 --oracle' is the study. The same OUT goes on where it was stopped.
 prove: install/.studies $(VENV)/.diagnose

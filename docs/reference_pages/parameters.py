@@ -18,7 +18,9 @@ from fish_bringup.node_table import (
     RECORDER,
     REPLAYER,
     SIMULATED,
+    VIEW,
 )
+from fish_bringup.view_state import ViewConfig
 from fish_control.node_configs import (
     ControllerConfig,
     ExciterConfig,
@@ -38,6 +40,7 @@ from fish_vision.config import TrackerConfig
 from reference_pages.markdown import HEADER, cell, escaped, table
 
 CONFIGS: dict[str, type[Any]] = {
+    "fish_bringup/live_view": ViewConfig,
     "fish_sim/simulator": SimulatorConfig,
     "fish_sim/camera": CameraConfig,
     "fish_hw/rotor": RotorSettings,
@@ -54,7 +57,7 @@ CONFIGS: dict[str, type[Any]] = {
     "fish_bag/replayer": ReplayerConfig,
     "fish_description/joint_angles": JointAnglesConfig,
 }
-SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
+SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES, VIEW)
 INTRODUCTION = """# Parameters of the nodes
 
 A node refuses a value that it cannot use with one line: name, value and what is allowed. These can be set while it runs:

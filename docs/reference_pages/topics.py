@@ -16,10 +16,11 @@ from fish_bringup.node_table import (
     RECORDER,
     REPLAYER,
     SIMULATED,
+    VIEW,
 )
 from reference_pages.markdown import HEADER, cell, table
 
-SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES)
+SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES, VIEW)
 ARMING = "fish_node.nodes.arming"
 CREATORS = {
     "create_publisher": "publishes",

@@ -3,7 +3,7 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "fish_bringup"
-VERBS = ("demo", "score", "excite", "arm", "disarm")
+VERBS = ("demo", "score", "excite", "arm", "disarm", "view", "loopback")
 
 setup(
     name=NAME,
@@ -15,7 +15,7 @@ setup(
         ("share/" + NAME + "/config", glob("config/*")),
         ("share/" + NAME + "/launch", glob("launch/*")),
     ],
-    package_data={NAME: ["py.typed"]},
+    package_data={NAME: ["py.typed", "*.html"]},
     install_requires=["setuptools"],
     zip_safe=False,
     maintainer="Robot fish maintainers",
@@ -26,6 +26,7 @@ setup(
     entry_points={
         "robofish.verbs": [f"{verb} = {NAME}.verbs.{verb}" for verb in VERBS],
         "console_scripts": [
+            "live_view = fish_bringup.nodes.entry:live_view",
             *(f"{verb} = fish_report.robofish:{verb}" for verb in VERBS),
         ],
     },

@@ -97,7 +97,19 @@ FAKE = (
 )
 
 HARDWARE = ("sim", "fake")  # what a run of this computer alone can swim with
+VIEW = NodeSpec("fish_bringup", "live_view", "view.yaml")
+
 ROBOTS = {"sim": (*SIMULATED, *CONTROL, RECORDER), "real": (*REAL, *CONTROL, RECORDER)}
+
+IN_THE_FISH = REAL[:3]  # the camera hangs on the computer at the pool
+PARTS = ("all", "fish", "shore", "drivers")  # what a launch file starts of a robot
+
+
+def in_part(spec: NodeSpec, part: str) -> bool:
+    """Whether a node runs in a part of the real robot: in the fish, on the computer at the pool, or as a driver."""
+    if part == "drivers":
+        return spec in REAL
+    return part == "all" or (spec in IN_THE_FISH) == (part == "fish")
 
 
 def robot_of(hardware: str) -> tuple[NodeSpec, ...]:

@@ -10,7 +10,7 @@ from typing import Protocol
 from rich.console import Console
 from rich.status import Status
 
-from fish_bringup.node_table import CONTROL, NodeSpec
+from fish_bringup.node_table import CONTROL, VIEW, NodeSpec
 from fish_bringup.processes import NodeProcesses
 from fish_bringup.run_limits import RunWatch, Seen
 from fish_control.path_tracker import PathTracker
@@ -197,8 +197,10 @@ def end_if_due(run_watch: RunWatch, now: float, seen: Seen | None) -> None:
 
 
 def check_running(nodes: NodeProcesses) -> None:
-    """Raise UserError with a node's last words if one has ended."""
+    """Raise UserError with a node's last words if one has ended; the robot swims on without the live view."""
     for process in nodes.ended():
+        if process.spec == VIEW:
+            continue
         raise UserError(
             f"{process.spec.name} ended with status {process.status}: {process.last_words()} (log: {process.log})"
         )

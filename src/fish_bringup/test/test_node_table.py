@@ -24,6 +24,7 @@ EVERY_NODE = sorted(
         *node_table.FAKE,
         node_table.REPLAYER,
         node_table.EXCITER,
+        node_table.VIEW,
     },
     key=lambda spec: spec.name,
 )
@@ -124,6 +125,14 @@ def test_messages_stay_on_this_computer_with_any_middleware(monkeypatch):
     assert node_table.middleware() == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
+LAUNCH_ACTIONS = (
+    "DeclareLaunchArgument",
+    "OpaqueFunction",
+    "SetEnvironmentVariable",
+    "Shutdown",
+)
+
+
 class Recorded(types.SimpleNamespace):
     """Stands for a class of launch: keeps what it was made with."""
 
@@ -143,7 +152,7 @@ def launch_names(installed, monkeypatch):
     """The names of a package's launch file, with stand-ins for launch and launch_ros, which have no wheels."""
     stand_ins = {
         "launch": {"LaunchContext": dict, "LaunchDescription": Recorded},
-        "launch.actions": {"DeclareLaunchArgument": Recorded, "OpaqueFunction": Recorded},
+        "launch.actions": dict.fromkeys(LAUNCH_ACTIONS, Recorded),
         "launch.conditions": {"IfCondition": Recorded},
         "launch.substitutions": {"LaunchConfiguration": Configuration},
         "launch_ros": {},
@@ -154,7 +163,11 @@ def launch_names(installed, monkeypatch):
         module = types.ModuleType(name)
         vars(module).update(members)
         monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.delitem(sys.modules, LOGIC, raising=False)
     return lambda package, file: runpy.run_path(str(SOURCE / package / "launch" / file))
+
+
+LOGIC = "fish_bringup.nodes.launch_robot"
 
 
 @pytest.fixture
@@ -166,12 +179,13 @@ def launch_file(launch_names):
 @pytest.fixture
 def launched(launch_file):
     """launched(path="S", ...): the nodes that the launch file starts with these arguments, by executable, in order."""
-    [*_, opaque] = launch_file["generate_launch_description"]().args[0]
-    defaults = {name: default for name, (default, _) in launch_file["ARGUMENTS"].items()}
+    [*arguments, opaque] = launch_file["generate_launch_description"]().args[0]
+    defaults = {argument.args[0]: argument.default_value for argument in arguments}
 
     def nodes(**given):
         assert given.keys() <= defaults.keys()
-        return {node.executable: node for node in opaque.function({**defaults, **given})}
+        started = opaque.function({**defaults, **given})
+        return {made.executable: made for made in started if hasattr(made, "executable")}
 
     return nodes
 
@@ -225,6 +239,67 @@ def test_the_launch_file_hands_the_planner_its_path_and_arguments_as_text(launch
     planner = launched(path="circle", path_args="{radius: 0.6}", speed="0.1")["planner"]
     given = {"path": ("path", str), "path_args": ("path_args", str), "speed": ("speed", float)}
     assert parameters(planner) == [str(node_table.parameter_path(node_table.CONTROL[2])), given]
+
+
+def test_parts_of_the_robot_are_launched_alone(launched):
+    drivers = ["rotor", "rudder", "imu", "camera"]
+    assert list(launched(robot="real", part="drivers")) == drivers
+    assert list(launched(robot="real", part="fish")) == drivers[:3]
+    at_the_pool = ["camera", "tracker", "fusion", "planner", "controller"]
+    assert list(launched(robot="real", part="shore", record="false")) == at_the_pool
+    assert list(launched(view="true"))[-1] == "live_view"
+    with pytest.raises(RuntimeError, match="part:=fish of robot:=sim is unknown"):
+        launched(part="fish")
+    with pytest.raises(RuntimeError, match="got 'yes', expected true or false"):
+        launched(record="yes")
+
+
+@pytest.mark.parametrize("respawn", ["true", "false"])
+def test_a_node_that_ends_is_started_again_or_ends_the_launch(launched, respawn):
+    nodes = launched(respawn=respawn, view="true")
+    for name, node in nodes.items():
+        assert node.respawn == (respawn == "true")
+        ends_all = respawn == "false" and name not in ("recorder", "live_view")
+        assert (node.on_exit is not None) == ends_all
+    if respawn == "false":
+        assert nodes["planner"].on_exit.reason == "fish_control/planner ended"
+
+
+def test_a_second_fish_has_a_clock_and_frames_of_its_own(launched):
+    usual = launched()
+    assert {node.namespace for node in usual.values()} == {"fish"}
+    assert all(not node.remappings for node in usual.values())
+    second = launched(namespace="fish_2")
+    assert all(node.remappings == [("/clock", "clock")] for node in second.values())
+    assert {"frame_prefix": "fish_2/"} in second["fusion"].parameters
+    assert not any("frame_prefix" in given for given in second["controller"].parameters)
+
+
+@pytest.mark.parametrize(
+    ("file", "nodes"),
+    [
+        ("simulation", {"simulator", "planner", "recorder"}),
+        ("robot", {"rotor", "planner", "recorder"}),
+        ("in_the_fish", {"rotor", "rudder", "imu"}),
+        ("at_the_pool", {"camera", "planner", "recorder"}),
+    ],
+)
+def test_each_launch_file_fixes_its_choice(launch_names, file, nodes):
+    description = launch_names("fish_bringup", f"{file}.launch.py")["generate_launch_description"]
+    [*arguments, opaque] = description().args[0]
+    given = {argument.args[0]: argument.default_value for argument in arguments}
+    assert all(argument.description for argument in arguments)
+    assert not {"robot", "part"} & set(given)
+    started = {made.executable for made in opaque.function(given)}
+    assert nodes <= started
+    assert len(nodes & {"rotor", "simulator"}) == len(started & {"rotor", "simulator"})
+
+
+def test_messages_stay_on_this_computer_if_the_launch_says_so(launch_file):
+    [*arguments, opaque] = launch_file["generate_launch_description"]().args[0]
+    given = {argument.args[0]: argument.default_value for argument in arguments}
+    variables = [m.args for m in opaque.function({**given, "local": "true"}) if m.args]
+    assert variables == list(node_table.middleware().items())
 
 
 def test_the_launch_file_refuses_an_unknown_robot(launched):

@@ -27,6 +27,8 @@ BROUGHT_BY = {
     "excite": "fish_bringup",
     "arm": "fish_bringup",
     "disarm": "fish_bringup",
+    "view": "fish_bringup",
+    "loopback": "fish_bringup",
     "inspect": "fish_bag",
     "recover": "fish_bag",
     "import_pool": "fish_bag",

@@ -23,6 +23,7 @@ from fish_bringup.node_table import (
     HARDWARE,
     RECORDER,
     SIMULATED,
+    VIEW,
     NodeSpec,
     Parameters,
     fake_parameters,
@@ -34,6 +35,7 @@ from fish_bringup.run_page import write_run_page
 from fish_bringup.run_watch import Robot, SwimEnd
 from fish_bringup.score import score_trial, what_is_missing
 from fish_bringup.score_table import error_table
+from fish_bringup.view_state import ViewConfig
 from fish_control.paths import make_path, read_arguments
 from fish_control.reference_path import PathError
 from fish_node.domain import choose_domain
@@ -43,6 +45,7 @@ from fish_report.output_folder import new_folder
 from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
 
+VIEW_PORT = ViewConfig().port
 LONGEST = 600.0  # s, a run that does not end by itself
 PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
 
@@ -74,6 +77,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"{' or '.join(HARDWARE)}: fake swims through the real drivers on emulated devices (sim)",
     )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
+    parser.add_argument("--view", action="store_true", help="watch it live in a browser")
+    parser.add_argument(
+        "--view-port", type=int, default=VIEW_PORT, help=f"of the live view ({VIEW_PORT})"
+    )
     parser.add_argument(
         "--out", type=Path, help="new folder for recording, page and logs (out/...)"
     )
@@ -125,6 +132,8 @@ def node_parameters(
     changed[simulator] = {**changed.get(simulator, {}), **start}
     if args.robot:
         changed[simulator]["robot_file"] = str(args.robot.resolve())
+    if args.view:
+        changed[VIEW] = {"port": args.view_port}
     if args.weights:
         changed[CONTROLLER] = {"weights_file": str(args.weights.resolve())}
     return changed
@@ -156,7 +165,7 @@ def _swim(
     with Interruption() as interruption, NodeProcesses(domain, folder / "logs") as nodes:
         with watching(domain) as (watch, listen):
             robot = Robot(nodes, watch, listen, interruption)
-            for spec in specs:
+            for spec in (*specs, *([VIEW] if VIEW in changed else [])):
                 if spec != CONTROLLER:
                     nodes.start(spec, changed.get(spec))
             robot.wait_for(lambda: watch.sees(RECORDER.executable), "recorder")
@@ -165,9 +174,22 @@ def _swim(
             robot.wait_for(lambda: watch.sight is not None, "odometry/filtered")
             robot.arm()
             console.print("armed by this command: the robot is simulated, nobody can be hurt")
+            _say_view(nodes, changed, console)
             end = robot.swim(duration, console)
             nodes.stop([RECORDER])
             return end, _latency_table(watch.diagnostics)
+
+
+def _say_view(
+    nodes: NodeProcesses, changed: Mapping[NodeSpec, Parameters], console: Console
+) -> None:
+    """Where the live view is, or why there is none: the robot swims all the same."""
+    if VIEW not in changed:
+        return
+    if nodes.running[VIEW].status is None:
+        say(console, f"live view: http://127.0.0.1:{changed[VIEW]['port']}/")
+    else:
+        say(console, f"no live view: {nodes.running[VIEW].last_words()}")
 
 
 def _latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:

@@ -1,0 +1,7 @@
+"""Entry points of the installed executables."""
+
+from functools import partial
+
+from fish_node.entry import start
+
+live_view = partial(start, "fish_bringup", "live_view")

@@ -1,0 +1,164 @@
+"""What the launch files have in common: arguments, the nodes of a robot or of one computer, what follows from a node's end.
+
+A node that ends, ends the launch with it, so that nothing swims half: with respawn:=true it is started again instead. The
+recorder and the live view may end without the rest.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable, Shutdown
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+from fish_bringup.node_table import (
+    CONTROL,
+    EXCITER,
+    NAMESPACE,
+    PARTS,
+    RECORDER,
+    ROBOTS,
+    VIEW,
+    NodeSpec,
+    frame_prefix,
+    in_part,
+    is_usual,
+    middleware,
+    open_loop,
+    parameter_path,
+)
+
+PLANNER = CONTROL[2]
+RESPAWN_DELAY = 1.0  # s
+IN_FILE = "; without it what planner.yaml says"
+IN_PROGRAM = "; without it what exciter.yaml says"
+ARGUMENTS = {
+    "robot": ("sim", "sim or real"),
+    "part": ("all", "all, or of the real robot: fish, shore (two computers), drivers"),
+    "config": ("", "folder of parameter files that override the installed ones of the same name"),
+    "namespace": (
+        NAMESPACE.strip("/"),
+        "namespace of all nodes, relative; in another one than fish, clock and frames are the robot's own",
+    ),
+    "path": ("", f"letter or path family{IN_FILE}"),
+    "path_args": (
+        "",
+        f"YAML, arguments of the path family: '{{radius: 0.6}}', '{{}}' for none{IN_FILE}",
+    ),
+    "speed": ("", f"surge speed, m/s{IN_FILE}"),
+    "program": ("", "program of stroke and rudder to swim open loop, instead of path and speed"),
+    "begin": ("", f"s of the program's time{IN_PROGRAM}"),
+    "end": ("", f"s of the program's time; 0: its end{IN_PROGRAM}"),
+    "use_sim_time": ("", "true: nodes follow /clock; without it what their files say"),
+    "record": ("true", "false: no recorder"),
+    "view": ("false", "true: the live view in a browser, on this computer"),
+    "respawn": ("false", "true: a node that ends is started again; false: its end ends the launch"),
+    "local": (
+        "false",
+        "true: messages stay on this computer (the loopback profile of fish_bringup)",
+    ),
+}
+# parameter of a node: argument that gives it, its type; every node has the first
+OF_EVERY_NODE = {"use_sim_time": ("use_sim_time", bool)}
+OF_NODE: dict[NodeSpec, dict[str, tuple[str, type]]] = {
+    PLANNER: {"path": ("path", str), "path_args": ("path_args", str), "speed": ("speed", float)},
+    EXCITER: {"program_file": ("program", str), "begin": ("begin", float), "end": ("end", float)},
+}
+DISPENSABLE = (RECORDER, VIEW)  # the robot swims on without them
+
+
+def describe(**fixed: str) -> LaunchDescription:
+    """Arguments, then the nodes; `fixed` arguments are no longer the user's choice."""
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=text)
+        for name, (default, text) in ARGUMENTS.items()
+        if name not in fixed
+    ]
+
+    def nodes(context: LaunchContext) -> list[object]:
+        """What the arguments ask for; a namespace may have been pushed around the file."""
+        chosen = {
+            name: fixed.get(name) or LaunchConfiguration(name).perform(context)
+            for name in ARGUMENTS
+        }
+        pushed = getattr(context, "launch_configurations", {}).get("ros_namespace", "")
+        full = f"{pushed}/{chosen['namespace']}"
+        specs = _chosen(chosen)
+        local = [SetEnvironmentVariable(*pair) for pair in middleware().items()]
+        return [
+            *(local if _yes(chosen["local"]) else []),
+            *(_node(spec, chosen, full) for spec in specs),
+        ]
+
+    return LaunchDescription([*arguments, OpaqueFunction(function=nodes)])
+
+
+def _chosen(chosen: Mapping[str, str]) -> list[NodeSpec]:
+    """The nodes that the arguments ask for."""
+    robot, part = chosen["robot"], chosen["part"]
+    if robot not in ROBOTS:
+        raise RuntimeError(f"robot:={robot} is unknown; known: {', '.join(ROBOTS)}")
+    if part not in PARTS or (robot != "real" and part != "all"):
+        raise RuntimeError(
+            f"part:={part} of robot:={robot} is unknown; known: all, and of robot:=real {', '.join(PARTS[1:])}"
+        )
+    whole = open_loop(ROBOTS[robot]) if chosen["program"] else ROBOTS[robot]
+    specs = [spec for spec in whole if in_part(spec, part)]
+    if not _yes(chosen["record"]):
+        specs = [spec for spec in specs if spec != RECORDER]
+    if _yes(chosen["view"]):
+        specs.append(VIEW)
+    config = chosen["config"]
+    if config and not any(_own(spec, config) for spec in specs):
+        expected = ", ".join(spec.parameter_file for spec in specs)
+        raise RuntimeError(
+            f"config:={config} holds none of the nodes' parameter files; expected some of {expected}"
+        )
+    return specs
+
+
+def _node(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> Node:
+    """One node; `full` is its namespace with what was pushed around it."""
+    respawn, given = _yes(chosen["respawn"]), _given(spec, chosen)
+    second = not is_usual(full)
+    prefix = [{"frame_prefix": frame_prefix(full)}] if spec.frames and second else []
+    ends_all = spec not in DISPENSABLE and not respawn
+    return Node(
+        package=spec.package,
+        executable=spec.executable,
+        namespace=chosen["namespace"],
+        parameters=[
+            str(parameter_path(spec)),
+            *prefix,
+            *_own(spec, chosen["config"]),
+            *([given] if given else []),
+        ],
+        remappings=[("/clock", "clock")] if second else [],
+        respawn=respawn,
+        respawn_delay=RESPAWN_DELAY,
+        output="screen",
+        on_exit=Shutdown(reason=f"{spec.name} ended") if ends_all else None,
+    )
+
+
+def _given(spec: NodeSpec, chosen: Mapping[str, str]) -> dict[str, ParameterValue]:
+    """What the arguments say of a node's parameters; one that nobody gave must not override the robot's own file."""
+    return {
+        parameter: ParameterValue(LaunchConfiguration(argument), value_type=kind)
+        for parameter, (argument, kind) in {**OF_EVERY_NODE, **OF_NODE.get(spec, {})}.items()
+        if chosen[argument]
+    }
+
+
+def _own(spec: NodeSpec, config: str) -> list[str]:
+    """The robot's own file for a node, if there is one."""
+    file = Path(config).expanduser() / spec.parameter_file
+    return [str(file)] if config and file.exists() else []
+
+
+def _yes(text: str) -> bool:
+    if text.lower() not in ("true", "false"):
+        raise RuntimeError(f"got {text!r}, expected true or false")
+    return text.lower() == "true"

@@ -1,0 +1,48 @@
+"""Watch the robot in a browser: pool, path, fish, errors, gains, health, arming state; Foxglove gets every topic.
+
+It only shows, unless --control is given: then the page's buttons arm and disarm. It is served on this computer only, unless
+--address says otherwise: whoever reaches the page of a view with --control can stop the robot, and arm it. Ctrl-C ends it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+
+from fish_bringup.node_table import NAMESPACE, VIEW, command, middleware
+from fish_bringup.view_state import ViewConfig
+from fish_report.errors import UserError, user_errors
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    usual = ViewConfig()
+    parser.add_argument("--port", type=int, default=usual.port, help=f"of the page ({usual.port})")
+    parser.add_argument(
+        "--foxglove-port",
+        type=int,
+        default=usual.foxglove_port,
+        help=f"of the websocket for Foxglove, 0 for none ({usual.foxglove_port})",
+    )
+    parser.add_argument(
+        "--address",
+        default=usual.address,
+        help=f"to serve it on; 0.0.0.0 for other computers ({usual.address})",
+    )
+    parser.add_argument("--control", action="store_true", help="let the page arm and disarm")
+    parser.add_argument("--namespace", default=NAMESPACE, help=f"of the robot ({NAMESPACE})")
+    parser.add_argument("--domain", type=int, help="ROS domain (ROS_DOMAIN_ID)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Become the node live_view."""
+    with user_errors():
+        config = ViewConfig(args.address, args.port, args.foxglove_port, args.control)
+    if args.domain is not None and not 0 <= args.domain <= 232:
+        raise UserError(f"domain is {args.domain}, expected 0 to 232")
+    names = ("address", "port", "foxglove_port", "control")
+    line = command(VIEW, {name: getattr(config, name) for name in names}, args.namespace)
+    env = {**os.environ, **middleware(), "PYTHONUNBUFFERED": "1"}
+    if args.domain is not None:
+        env["ROS_DOMAIN_ID"] = str(args.domain)
+    os.execve(line[0], line, env)

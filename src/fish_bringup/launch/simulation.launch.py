@@ -1,0 +1,10 @@
+"""The simulated robot: `ros2 launch fish_bringup simulation.launch.py path:=S view:=true`."""
+
+from launch import LaunchDescription
+
+from fish_bringup.nodes.launch_robot import describe
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Arguments (--show-args), then the nodes."""
+    return describe(robot="sim", part="all")

@@ -1,0 +1,146 @@
+"""Node live_view among others: what it shows, what it may do, and that missing ports leave the rest alone."""
+
+import json
+import socket
+import time
+import urllib.request
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry, Path
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_srvs.srv import SetBool
+
+from fish_bringup.nodes.live_view import LiveViewNode
+from fish_bringup.view_server import HEADER
+
+pytestmark = pytest.mark.ros
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+PATIENCE = 30.0  # s
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Robot:
+    """A live view, and a node that stands for the robot."""
+
+    def __init__(self, **parameters):
+        self.port = free_port()
+        given = {"port": self.port, "foxglove_port": 0, **parameters}
+        self.node = LiveViewNode(
+            parameter_overrides=[Parameter(name, value=value) for name, value in given.items()]
+        )
+        self.other = Node("robot", namespace="fish")
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.executor.add_node(self.other)
+        self.asked = []
+        self.other.create_service(SetBool, "arm", self._on_arm)
+        self.odometry = self.other.create_publisher(Odometry, "odometry/filtered", 10)
+
+    def _on_arm(self, request, response):
+        self.asked.append(request.data)
+        return response
+
+    def until(self, condition):
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def swim(self, x):
+        message = Odometry()
+        message.pose.pose.position.x, message.pose.pose.orientation.w = x, 1.0
+        message.header.stamp = self.other.get_clock().now().to_msg()
+        self.odometry.publish(message)
+
+    def shown(self):
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/state", timeout=20) as answer:
+            return json.loads(answer.read())
+
+    def press(self, button):
+        request = urllib.request.Request(
+            f"http://127.0.0.1:{self.port}/{button}", data=b"", headers={HEADER: "1"}
+        )
+        urllib.request.urlopen(request, timeout=20).close()
+
+
+@pytest.fixture
+def robot(monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", "145")
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    rclpy.init()
+    made = []
+
+    def make(**parameters):
+        made.append(Robot(**parameters))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.executor.shutdown()
+        one.node.destroy_node()
+        one.other.destroy_node()
+    rclpy.try_shutdown()
+
+
+def test_the_page_gets_pose_path_and_health(robot):
+    r = robot()
+    paths = r.other.create_publisher(Path, "reference/path", LATCHED)
+    said = r.other.create_publisher(DiagnosticArray, "/diagnostics", 10)
+    r.until(lambda: said.get_subscription_count() and r.odometry.get_subscription_count())
+    paths.publish(Path())
+    names = ("fish/fusion", "fish_2/fusion")
+    said.publish(
+        DiagnosticArray(
+            status=[
+                DiagnosticStatus(name=name, level=DiagnosticStatus.WARN, message="waiting")
+                for name in names
+            ]
+        )
+    )
+    r.swim(0.7)
+    r.until(lambda: r.shown().get("health") and r.shown()["pose"])
+    assert r.shown()["pose"] == [0.7, 0.0, 0.0]
+    assert r.shown()["health"] == [{"node": "fusion", "level": "warn", "message": "waiting"}]
+    assert r.shown()["control"] is False
+
+
+def test_with_control_the_buttons_call_the_service(robot):
+    r = robot(control=True)
+    r.until(lambda: r.node._arm.service_is_ready())
+    r.press("disarm")
+    r.until(lambda: r.asked)
+    r.press("arm")
+    r.until(lambda: len(r.asked) > 1)
+    assert r.asked == [False, True]
+
+
+def test_foxglove_s_port_in_use_leaves_the_page_alone(robot):
+    pytest.importorskip("foxglove")
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        r = robot(foxglove_port=other.getsockname()[1])
+        assert r.node._bridge is None
+        r.until(lambda: "pool" in r.shown())
+
+
+def test_foxglove_gets_a_channel_for_each_topic_of_the_robot(robot):
+    pytest.importorskip("foxglove")
+    r = robot(foxglove_port=free_port())
+    stranger = Node("stranger", namespace="fish_2")
+    stranger.create_publisher(Odometry, "odometry/filtered", 10)
+    try:
+        r.until(lambda: "/fish/odometry/filtered" in r.node._bridge._known)
+        assert not any(topic.startswith("/fish_2/") for topic in r.node._bridge._known)
+    finally:
+        stranger.destroy_node()
