@@ -13,6 +13,7 @@ setup(
         ("share/" + NAME, ["package.xml"]),
         ("share/" + NAME + "/config", glob("config/*")),
         ("share/" + NAME + "/launch", glob("launch/*")),
+        ("share/" + NAME + "/system", glob("system/*")),
     ],
     package_data={NAME: ["py.typed"]},
     install_requires=["setuptools"],

@@ -71,6 +71,15 @@ def test_an_angle_that_stands_still_is_noticed_though_the_speed_moves():
     assert after <= 0.21
 
 
+def test_a_steady_speed_is_not_stuck_in_the_moment_in_which_its_command_changes():
+    """The sample is taken when the new command arrives: the rotor cannot have followed yet."""
+    check = MotionCheck()
+    for k in range(40):
+        assert check.add(60.0, RotorSample(DT * k, 0.6 * k, 60.0)) == ""
+    assert check.add(-60.0, RotorSample(0.4, 24.0, 60.0)) == ""
+    assert check.add(-60.0, RotorSample(0.41, 24.1, -20.0)) == ""
+
+
 def test_a_rotor_that_runs_away_is_noticed():
     rotor = Rotor(0.02)
     rotor.run(1.0)

@@ -10,7 +10,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from math import atan2
+from math import atan2, inf
 
 import numpy as np
 import rclpy
@@ -33,6 +33,7 @@ from fish_bringup.score import path_from_points
 from fish_control.path_tracker import PathTracker
 from fish_node.nodes.arming import ArmingListener
 
+STATE_TIMEOUT = 2.0  # s without arming/state: its owner is gone
 ASK_AGAIN = 0.5  # s between two requests to arm
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -48,7 +49,8 @@ class WatchNode(Node):
         self.levels: dict[str, tuple[int, str]] = {}
         self.tracker: PathTracker | None = None
         self.refusal = "the service arm is not there"
-        self._arming, self._ask_at = ArmingListener(self), 0.0
+        self._arming, self._ask_at = ArmingListener(self, self._on_state), 0.0
+        self._state_at = -inf  # s, when arming/state was heard last
         self._arm = self.create_client(SetBool, "arm")
         self.create_subscription(Path, "reference/path", self._on_path, LATCHED)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 1)
@@ -61,16 +63,20 @@ class WatchNode(Node):
 
     @property
     def disarmed(self) -> str | None:
-        """Why the robot is disarmed; empty while it is armed, None before anybody said."""
-        return None if self._arming.armed is None else self._arming.reason
+        """Why the robot is disarmed; empty while it is armed, None while nobody says."""
+        heard = time.monotonic() - self._state_at < STATE_TIMEOUT
+        return self._arming.reason if heard else None
 
     def ask_to_arm(self) -> None:
         """Ask a disarmed robot to be armed, at most every ASK_AGAIN; `refusal` says why it was not."""
         now = time.monotonic()
-        if self._arming.armed or now < self._ask_at or not self._arm.service_is_ready():
+        if self.disarmed == "" or now < self._ask_at or not self._arm.service_is_ready():
             return
         self._ask_at = now + ASK_AGAIN
         self._arm.call_async(SetBool.Request(data=True)).add_done_callback(self._on_answer)
+
+    def _on_state(self) -> None:
+        self._state_at = time.monotonic()
 
     def _on_answer(self, future: Future) -> None:
         answer = future.result()

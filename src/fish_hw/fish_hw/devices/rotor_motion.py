@@ -21,6 +21,7 @@ class MotionCheck:
 
     def __init__(self) -> None:
         self._last: RotorSample | None = None
+        self._before = 0.0
         self.restart()
 
     def restart(self) -> None:
@@ -35,6 +36,10 @@ class MotionCheck:
     def add(self, command: float, sample: RotorSample) -> str:
         """Take the speed that was sent [rad/s] and the sample after it; what is wrong, or an empty text."""
         last, self._last = self._last, sample
+        acted, self._before = (
+            self._before,
+            command,
+        )  # a sample is of the moment in which its command arrives
         self._largest = max(self._largest, abs(command))
         if last is None:
             self._since_s = sample.time_s
@@ -45,7 +50,7 @@ class MotionCheck:
             return ""
         self._commanded += abs(command) * dt
         self._measured += abs(sample.angle - last.angle)
-        return self._stuck(command, sample, last) or self._runaway(sample) or self._jam(sample)
+        return self._stuck(acted, sample, last) or self._runaway(sample) or self._jam(sample)
 
     def _stuck(self, command: float, sample: RotorSample, last: RotorSample) -> str:
         if sample.velocity != last.velocity:
