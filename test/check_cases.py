@@ -7,16 +7,26 @@ A case is a folder in FOLDER whose name stands in CASES. Exit status: 0 all righ
 
 from __future__ import annotations
 
+import math
+import os
+import re
+import signal
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from sensor_msgs.msg import Imu
 
 from fish_bag import RecordingError, Trial, read_trial
 from fish_bag.playback import Playback, ReplayerConfig
 from fish_bag.recover import recover
+from fish_control.fusion import Fusion
+from fish_control.nodes.messages import inertial_values
+from fish_node.camera_file import read_camera_file
+from fish_vision.calibration import read_lens
 
 ROBOT = {"joint_command": 60, "joint_states": 60, "imu/data": 60, "camera/pose": 18}
 SHORT = {"joint_command": 20, "joint_states": 20, "imu/data": 20, "camera/pose": 6}
@@ -48,6 +58,58 @@ def refused(path: Path, *words: str) -> None:
     assert all(word in said for word in words), said
 
 
+def calibration_files(folder: Path) -> None:
+    """One reader: fish_hw's camera node and fish_vision's tools and tracker take each of them."""
+    models = {}
+    for file in sorted(folder.glob("*.y*ml")):
+        camera, lens = read_camera_file(file), read_lens(file)
+        assert lens.size == (camera.width, camera.height) == (800, 600)
+        assert lens.model == camera.model
+        np.testing.assert_allclose(lens.D, camera.distortion)
+        models[file.stem] = (camera.model, len(camera.distortion))
+    plain = ("plumb_bob", 5)
+    expected = {"equidistant": ("equidistant", 4), "four_coefficients": plain}
+    assert models == {**expected, "no_coefficients": plain, "opencv_head": plain}, models
+
+
+def fusion_frame(folder: Path) -> None:
+    """The folder's feed.py against the node: 2 s of poses in pool, then 2 s in another frame."""
+    environment = {"ROS_DOMAIN_ID": "58", **os.environ}
+    command = [sys.executable, "-c", "from fish_control.nodes.entry import fusion; fusion()"]
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as node:
+        try:
+            feed = [sys.executable, str(folder / "feed.py")]
+            said = subprocess.run(
+                feed, env=environment, capture_output=True, text=True, timeout=120
+            )
+        finally:
+            node.send_signal(signal.SIGINT)
+            logged = node.communicate(timeout=30)[1]
+    found = dict(re.findall(r"^(\w+) x = (\S+)", said.stdout, flags=re.M))
+    assert abs(float(found["pool"])) < 0.01, said.stdout
+    assert abs(float(found["camera_optical"])) < 0.05, said.stdout
+    assert logged.count("comes in frame") == 1, logged
+
+
+def fusion_not_measured() -> None:
+    """An Imu message whose gyro is not measured, zeros in its place, and a camera that sees the fish turn."""
+    fusion, errors = Fusion(), []
+    for k in range(1500):
+        t = 100.0 + 0.01 * k
+        psi = 0.8 * math.sin(0.9 * (t - 100.0))
+        message = Imu()
+        message.angular_velocity_covariance[0] = -1.0
+        message.orientation_covariance[0] = -1.0
+        fusion.add_imu(t, *inertial_values(message))
+        if k % 3 == 0:
+            place = [0.3 * math.cos(0.2 * t), 0.2 * math.sin(0.3 * t), psi]
+            fusion.add_pose(t, place, np.diag([1e-5, 1e-5, 1e-4]))
+        estimate = fusion.estimate()
+        if estimate is not None and k > 600:
+            errors.append(estimate.pose[2] - psi)
+    assert np.std(errors) < 0.02, f"heading rms {np.std(errors):.3f} rad, {dict(fusion.counts)}"
+
+
 def foreign_topic(folder: Path) -> None:
     for file in sorted(folder.glob("*.mcap")):
         for trial in (read_trial(file), recovered(file)):
@@ -60,6 +122,7 @@ def imu_not_measured(folder: Path) -> None:
     has(trial, "warning", "not_measured")
     assert trial.imu is not None
     assert np.isnan(trial.imu.gyro).all()
+    fusion_not_measured()
 
 
 def imu_units(folder: Path) -> None:
@@ -128,7 +191,9 @@ def two_publishers(folder: Path) -> None:
 
 
 CASES: tuple[Callable[[Path], None], ...] = (
+    calibration_files,
     foreign_topic,
+    fusion_frame,
     imu_not_measured,
     imu_units,
     lfs_pointer,

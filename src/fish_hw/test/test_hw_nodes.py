@@ -20,7 +20,6 @@ from std_srvs.srv import SetBool, Trigger
 from waiting import wait_until
 
 from fish_hw.devices import vertiq_registers as reg
-from fish_hw.devices.camera_calibration import CalibrationError
 from fish_hw.devices.imu_sample import ImuSample
 from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.rudder_driver import RudderDriver
@@ -34,6 +33,7 @@ from fish_hw.nodes.rotor import RotorNode
 from fish_hw.nodes.rudder import RudderNode
 from fish_hw.nodes.worker import Worker
 from fish_hw.transport.sysfs_pwm import SysfsPwm
+from fish_node.camera_file import CameraFileError
 
 pytestmark = pytest.mark.ros
 DOMAIN = 145 + os.getpid() % 50  # tests of other packages, at 141 to 144, run beside this one
@@ -375,7 +375,7 @@ def test_camera_info_is_the_calibration_of_the_file(graph, tmp_path):
 def test_a_calibration_of_another_size_is_refused(graph, tmp_path):
     path = tmp_path / "camera.yaml"
     path.write_text(CALIBRATION)
-    with pytest.raises(CalibrationError, match="is for 160x120 px, the camera is set to 320x240"):
+    with pytest.raises(CameraFileError, match="is for 160x120 px, the camera is set to 320x240"):
         graph(CameraNode, device="emulator", width=320, height=240, calibration_file=str(path))
 
 

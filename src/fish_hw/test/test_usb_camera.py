@@ -6,11 +6,9 @@ import threading
 import cv2
 import numpy as np
 import pytest
-import yaml
 from waiting import wait_until
 
 from fish_hw.devices import usb_camera
-from fish_hw.devices.camera_calibration import CalibrationError, read_calibration
 from fish_hw.devices.reconnect import Loss
 from fish_hw.devices.status import ERROR, OK, WARN
 from fish_hw.devices.usb_camera import UsbCamera, decode_jpeg, encode_jpeg, jpeg_size
@@ -386,65 +384,3 @@ def test_walking_square_walks():
     assert first.image.shape == (48, 64, 3)
     assert (first.image != second.image).any()
     assert second.time_s - first.time_s == pytest.approx(1 / 30)
-
-
-CALIBRATION = {
-    "image_width": 1280,
-    "image_height": 720,
-    "camera_name": "overhead",
-    "camera_matrix": {"rows": 3, "cols": 3, "data": [900.0, 0, 640, 0, 900, 360, 0, 0, 1]},
-    "distortion_model": "plumb_bob",
-    "distortion_coefficients": {"rows": 1, "cols": 5, "data": [-0.2, 0.05, 0, 0, 0]},
-    "rectification_matrix": {"rows": 3, "cols": 3, "data": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
-    "projection_matrix": {
-        "rows": 3,
-        "cols": 4,
-        "data": [900, 0, 640, 0, 0, 900, 360, 0, 0, 0, 1, 0],
-    },
-}
-
-
-def written(tmp_path, document) -> object:
-    path = tmp_path / "camera.yaml"
-    path.write_text(document if isinstance(document, str) else yaml.safe_dump(document))
-    return path
-
-
-def test_calibration(tmp_path):
-    calibration = read_calibration(written(tmp_path, CALIBRATION))
-    assert (calibration.width, calibration.height) == (1280, 720)
-    assert calibration.camera_matrix[2] == 640.0
-    assert calibration.distortion == (-0.2, 0.05, 0.0, 0.0, 0.0)
-    assert len(calibration.projection) == 12
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        ({"image_width": "wide"}, "image_width is 'wide', expected a number of pixels"),
-        (
-            {"camera_matrix": {"data": [1, 2]}},
-            r"camera_matrix.data is \[1, 2\], expected 9 numbers",
-        ),
-        ({"camera_matrix": 3}, "camera_matrix.data is None, expected 9 numbers"),
-        ({"distortion_model": "fancy"}, "distortion_model is 'fancy', expected one of plumb_bob"),
-    ],
-)
-def test_calibration_errors_name_the_field(tmp_path, change, expected):
-    with pytest.raises(CalibrationError, match=expected):
-        read_calibration(written(tmp_path, CALIBRATION | change))
-
-
-@pytest.mark.parametrize("text", ["", "[1, 2]", "{bad: [", "a: b: c"])
-def test_files_that_are_no_calibration(tmp_path, text):
-    with pytest.raises(CalibrationError, match=r"camera.yaml"):
-        read_calibration(written(tmp_path, text))
-
-
-def test_missing_field_and_missing_file(tmp_path):
-    with pytest.raises(CalibrationError, match="projection_matrix is missing"):
-        read_calibration(
-            written(tmp_path, {k: v for k, v in CALIBRATION.items() if k != "projection_matrix"})
-        )
-    with pytest.raises(CalibrationError, match="No such file"):
-        read_calibration(tmp_path / "nowhere.yaml")

@@ -6,7 +6,16 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fish_vision.calibration import NEAREST, R_DOWN, Array, CalibrationError, Lens, Mount
+from fish_vision.calibration import (
+    NEAREST,
+    R_DOWN,
+    Array,
+    CalibrationError,
+    Lens,
+    Mount,
+    project,
+    undistort,
+)
 from fish_vision.segmentation import Image
 
 BOARDS_MIN = 4  # pictures needed to tell lens from board poses
@@ -108,14 +117,19 @@ def mount_from_points(lens: Lens, points: ArrayLike, pixels: ArrayLike) -> tuple
     if np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6) < 2:
         raise CalibrationError("all points lie on one line: expected points spread over the pool")
     try:
-        _, rotation, t = cv2.solvePnP(points, pixels, lens.K, lens.D, flags=cv2.SOLVEPNP_SQPNP)
-        rotation, t = cv2.solvePnPRefineLM(points, pixels, lens.K, lens.D, rotation, t)
+        # a fisheye's rays are found first; the other models weigh every pixel alike
+        if lens.fisheye:
+            seen_at, K, D = undistort(pixels, lens), np.eye(3), np.zeros(5)
+        else:
+            seen_at, K, D = pixels, lens.K, lens.D
+        _, rotation, t = cv2.solvePnP(points, seen_at, K, D, flags=cv2.SOLVEPNP_SQPNP)
+        rotation, t = cv2.solvePnPRefineLM(points, seen_at, K, D, rotation, t)
     except cv2.error as error:
         raise CalibrationError(
             f"no camera sees the points at these pixels ({error.err}): expected each point's own pixel"
         ) from error
     R = cv2.Rodrigues(rotation)[0]
-    seen = cv2.projectPoints(points, rotation, t, lens.K, lens.D)[0].reshape(-1, 2)
+    seen = project(points, rotation, t, lens)
     rms = float(np.sqrt(np.mean(np.sum((seen - pixels) ** 2, axis=1))))
     position, tilt = (-R.T @ t).ravel(), cv2.Rodrigues(R @ R_DOWN)[0].ravel()
     highest = float(points[:, 2].max())

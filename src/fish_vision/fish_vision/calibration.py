@@ -8,15 +8,20 @@ from typing import Any
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike, NDArray
+
+from fish_node.camera_file import CameraFileError, read_camera_file
 
 Array = NDArray[Any]  # float64
 
 R_DOWN = np.diag(
     [1.0, -1.0, -1.0]
 )  # optical axes of an untilted camera: right = pool x, down = pool -y
-MODELS = {"plumb_bob": 5, "rational_polynomial": 8}  # distortion model -> number of coefficients
+MODELS = {  # distortion model -> number of coefficients
+    "plumb_bob": 5,
+    "rational_polynomial": 8,
+    "equidistant": 4,
+}
 POOL = (4.27, 2.13)  # m, along pool x and y
 FOCAL_MIN = 1.0  # pixels; a real lens has hundreds
 NEAREST = 0.01  # m from the camera down to the plane of the markers
@@ -28,11 +33,22 @@ class CalibrationError(ValueError):
 
 @dataclass(frozen=True)
 class Lens:
-    """What sensor_msgs/CameraInfo says of a camera: image size (pixels), camera matrix (3, 3), distortion."""
+    """What sensor_msgs/CameraInfo says of a camera: image size (pixels), camera matrix (3, 3), distortion.
+
+    fisheye: the distortion is that of distortion model equidistant (Kannala and Brandt 2006).
+    """
 
     size: tuple[int, int]  # width, height
     K: Array
     D: Array
+    fisheye: bool = False
+
+    @property
+    def model(self) -> str:
+        """Name of the distortion model."""
+        if self.fisheye:
+            return "equidistant"
+        return "plumb_bob" if len(self.D) == 5 else "rational_polynomial"
 
     @classmethod
     def from_camera_info(
@@ -57,9 +73,10 @@ class Lens:
             raise CalibrationError(
                 f"camera_info has distortion model {model!r} with {len(d)} coefficients: expected {MODELS}"
             )
-        D = np.zeros(5 if len(d) <= 5 else 8)
+        fisheye = model == "equidistant"
+        D = np.zeros(4 if fisheye else 5 if len(d) <= 5 else 8)
         D[: len(d)] = d
-        return cls((width, height), np.array(k, float).reshape(3, 3), D)
+        return cls((width, height), np.array(k, float).reshape(3, 3), D, fisheye)
 
 
 @dataclass(frozen=True)
@@ -126,9 +143,11 @@ class Calibration:
             )
 
     def _check_lens_invertible(self) -> None:
-        """Every pixel must have a ray, or the first picture would find out."""
+        """Every pixel must have a ray, or the first picture would find out; a fisheye's corners may see the horizon."""
         width, height = self.lens.size
         corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], float)
+        if self.lens.fisheye:
+            corners = 0.5 * (corners + np.array([width, height]) / 2.0)
         try:
             with np.errstate(all="ignore"):
                 rays = undistort(corners, self.lens)
@@ -144,9 +163,7 @@ class Calibration:
         """(N, 2) x, y in the markers' plane, m -> (N, 2) pixels."""
         points = np.asarray(points, float).reshape(-1, 2)
         solid = np.column_stack([points, np.full(len(points), self.plane_height)])
-        return cv2.projectPoints(solid, self._rotation, self._t, self.lens.K, self.lens.D)[
-            0
-        ].reshape(-1, 2)
+        return project(solid, self._rotation, self._t, self.lens)
 
     def pixel_to_pool(self, pixels: ArrayLike) -> Array:
         """(N, 2) pixels -> (N, 2) x, y in the markers' plane, m."""
@@ -172,7 +189,8 @@ def undistort(pixels: Array, lens: Lens) -> Array:
     """
     if len(pixels) == 0:
         return np.zeros((0, 2))
-    flat = cv2.undistortPoints(pixels.reshape(-1, 1, 2), lens.K, lens.D).reshape(-1, 2)
+    ideal = cv2.fisheye.undistortPoints if lens.fisheye else cv2.undistortPoints
+    flat: Array = ideal(pixels.reshape(-1, 1, 2), lens.K, lens.D).reshape(-1, 2)
     h = 1e-6
     shifts = np.array([[0.0, 0.0], [h, 0.0], [0.0, h]])[:, None]
     for _ in range(2):
@@ -184,24 +202,28 @@ def undistort(pixels: Array, lens: Lens) -> Array:
 
 def _distort(flat: Array, lens: Lens) -> Array:
     solid = np.column_stack([flat, np.ones(len(flat))])
-    return cv2.projectPoints(solid, np.zeros(3), np.zeros(3), lens.K, lens.D)[0].reshape(-1, 2)
+    return project(solid, np.zeros(3), np.zeros(3), lens)
+
+
+def project(points: Array, rotation: Array, t: Array, lens: Lens) -> Array:
+    """(N, 3) points, m -> (N, 2) pixels of a camera with this rotation vector and translation."""
+    rotation, t = np.reshape(rotation, (3, 1)), np.reshape(t, (3, 1))
+    if lens.fisheye:
+        pixels = cv2.fisheye.projectPoints(points.reshape(-1, 1, 3), rotation, t, lens.K, lens.D)[0]
+    else:
+        pixels = cv2.projectPoints(points, rotation, t, lens.K, lens.D)[0]
+    return pixels.reshape(-1, 2)
 
 
 def read_lens(path: Path) -> Lens:
-    """Lens from a camera calibration file (the YAML of camera_info_manager, usb_cam and `calibrate lens`)."""
+    """Lens from a camera calibration file (of camera_info_manager, camera_calibration, OpenCV or `calibrate lens`)."""
     try:
-        content: Any = yaml.safe_load(path.read_text())
+        camera = read_camera_file(path)
         return Lens.from_camera_info(
-            int(content["image_width"]),
-            int(content["image_height"]),
-            str(content["distortion_model"]),
-            [float(v) for v in content["camera_matrix"]["data"]],
-            [float(v) for v in content["distortion_coefficients"]["data"]],
+            camera.width, camera.height, camera.model, camera.camera_matrix, camera.distortion
         )
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise CalibrationError(
-            f"{path}: not a camera calibration file ({type(error).__name__}: {error})"
-        ) from error
+    except CameraFileError as error:
+        raise CalibrationError(str(error)) from error
 
 
 def lens_document(lens: Lens, camera_name: str) -> Mapping[str, Any]:
@@ -212,7 +234,7 @@ def lens_document(lens: Lens, camera_name: str) -> Mapping[str, Any]:
         "image_height": lens.size[1],
         "camera_name": camera_name,
         "camera_matrix": _matrix(lens.K),
-        "distortion_model": "plumb_bob" if len(lens.D) == 5 else "rational_polynomial",
+        "distortion_model": lens.model,
         "distortion_coefficients": _matrix(lens.D.reshape(1, -1)),
         "rectification_matrix": _matrix(np.eye(3)),
         "projection_matrix": _matrix(P),

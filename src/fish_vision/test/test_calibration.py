@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
+from fish_vision.calibrate import mount_from_points
 from fish_vision.calibration import (
     Calibration,
     CalibrationError,
@@ -50,6 +51,38 @@ def test_undistort_inverts_the_plumb_bob_formula_at_the_image_edge() -> None:
     y_d = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
     pixels = np.column_stack([634 + 1000 * x_d, 366 + 1000 * y_d])
     np.testing.assert_allclose(undistort(pixels, lens()), np.column_stack([x, y]), atol=1e-8)
+
+
+FISHEYE = (0.057, 0.038, -0.025, 0.004)  # k1 .. k4
+
+
+def fisheye_lens() -> Lens:
+    K = [400, 0, 634, 0, 404, 366, 0, 0, 1]
+    return Lens.from_camera_info(1280, 720, "equidistant", K, FISHEYE)
+
+
+def test_a_fisheye_follows_the_formula_of_kannala_and_brandt() -> None:
+    u, v = (a.ravel() for a in np.meshgrid(np.linspace(-1.2, 1.2, 7), np.linspace(-0.7, 0.7, 5)))
+    r = np.hypot(u, v)
+    angle = np.arctan(r)
+    k1, k2, k3, k4 = FISHEYE
+    bent = angle * (1 + k1 * angle**2 + k2 * angle**4 + k3 * angle**6 + k4 * angle**8)
+    scale = bent / np.where(r > 0, r, 1.0)
+    pixels = np.column_stack([634 + 400 * scale * u, 366 + 404 * scale * v])
+    np.testing.assert_allclose(
+        undistort(pixels, fisheye_lens()), np.column_stack([u, v]), atol=1e-7
+    )
+
+
+def test_a_fisheye_maps_the_pool_there_and_back_and_its_mount_is_found() -> None:
+    calibration = Calibration(fisheye_lens(), Mount((0.05, -0.08, 1.9), MOUNT.tilt))
+    points = np.array([[-1.9, -0.9], [1.9, -0.9], [1.9, 0.9], [-1.9, 0.9], [0.3, 0.1], [0.0, -0.5]])
+    pixels = calibration.pool_to_pixel(points)
+    np.testing.assert_allclose(calibration.pixel_to_pool(pixels), points, atol=1e-7)
+    solid = np.column_stack([points, np.zeros(len(points))])
+    mount, rms = mount_from_points(fisheye_lens(), solid, pixels)
+    assert rms < 1e-3
+    np.testing.assert_allclose(mount.position, (0.05, -0.08, 1.9), atol=1e-4)
 
 
 def rational_lens() -> Lens:
@@ -126,7 +159,8 @@ def test_no_points_give_no_points() -> None:
         ((1280, 720, "plumb_bob", [float("nan")] * 9, []), "not finite"),
         ((1280, 720, "plumb_bob", [1e-300] * 9, []), "not calibrated"),
         ((1280, 720, "plumb_bob", [1.0] * 4, []), "missing"),
-        ((1280, 720, "equidistant", [1.0] * 9, [0.1] * 4), "equidistant"),
+        ((1280, 720, "omnidirectional", [1.0] * 9, [0.1] * 4), "omnidirectional"),
+        ((1280, 720, "equidistant", [1.0] * 9, [0.1] * 5), "5 coefficients"),
         ((1280, 720, "plumb_bob", [1.0] * 9, [0.1] * 8), "8 coefficients"),
     ],
 )

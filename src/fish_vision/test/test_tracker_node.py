@@ -223,11 +223,11 @@ def test_bad_calibrations_are_said_and_a_good_one_mends_it(
         ({"k": [0.0] * 9}, "not calibrated"),
         (
             {
-                "distortion_model": "equidistant",
+                "distortion_model": "omnidirectional",
                 "d": [0.1] * 4,
                 "k": [901.0, *lens_fields()[3][1:]],
             },
-            "equidistant",
+            "omnidirectional",
         ),
         ({"k": [1e-300, 0.0, 640.0, 0.0, 1e-300, 360.0, 0.0, 0.0, 1.0]}, "not calibrated"),
         ({"k": [900.0, 0.0, 5000.0, 0.0, 900.0, 360.0, 0.0, 0.0, 1.0]}, "camera_position"),

@@ -11,13 +11,13 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
-from fish_hw.devices.camera_calibration import CalibrationError, read_calibration
 from fish_hw.devices.usb_camera import FrameSource, Picture, UsbCamera, decode_jpeg
 from fish_hw.emulators.walking_square import WalkingSquare
 from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.settings.camera import CameraSettings
 from fish_hw.transport.unix_socket import PREFIX, SocketCamera
 from fish_hw.transport.video_capture import VideoCapture
+from fish_node.camera_file import CameraFileError, read_camera_file
 
 
 class CameraNode(DeviceNode):
@@ -56,9 +56,9 @@ class CameraNode(DeviceNode):
                 "no calibration_file: camera_info is published without calibration"
             )
             return CameraInfo(width=settings.width, height=settings.height)
-        calibration = read_calibration(Path(settings.calibration_file).expanduser())
+        calibration = read_camera_file(Path(settings.calibration_file).expanduser())
         if (calibration.width, calibration.height) != (settings.width, settings.height):
-            raise CalibrationError(
+            raise CameraFileError(
                 f"calibration {settings.calibration_file} is for {calibration.width}x{calibration.height} px,"
                 f" the camera is set to {settings.width}x{settings.height}:"
                 " calibrate again or change the size"
@@ -66,7 +66,7 @@ class CameraNode(DeviceNode):
         return CameraInfo(
             width=calibration.width,
             height=calibration.height,
-            distortion_model=calibration.distortion_model,
+            distortion_model=calibration.model,
             d=calibration.distortion,
             k=calibration.camera_matrix,
             r=calibration.rectification,

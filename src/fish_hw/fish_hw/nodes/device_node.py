@@ -16,7 +16,6 @@ from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from fish_hw.devices.camera_calibration import CalibrationError
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.status import WARN, Status
@@ -28,7 +27,7 @@ from fish_node.nodes.status_log import StatusLog
 NAMESPACE = "fish"
 END_TIMEOUT_S = 2.0
 CLOCK_TRIES = 3
-EXPECTED = (TransportError, DeviceError, CalibrationError, ValueError)
+EXPECTED = (TransportError, DeviceError, ValueError)
 
 
 class Device(Protocol):

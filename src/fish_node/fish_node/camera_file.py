@@ -1,0 +1,150 @@
+"""Camera calibration files: what camera_info_manager, camera_calibration and OpenCV's FileStorage write.
+
+The one reader of all packages: YAML with image_width, image_height, camera_matrix and distortion_coefficients. OpenCV's
+files begin with %YAML:1.0, tag their matrices and often name no distortion model; it follows from the coefficients then.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+# numbers of coefficients that each model may have; none and four of plumb_bob are five with zeros
+COEFFICIENTS = {"plumb_bob": (5, 4, 0), "rational_polynomial": (8,), "equidistant": (4,)}
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+FIRST_LINE = "%YAML:1.0"  # OpenCV's, which is no YAML 1.1 directive
+LONGEST = 100  # characters of a foreign text in a message
+
+
+class CameraFileError(ValueError):
+    """A camera file that cannot be used; the message names file and field, and says what to change."""
+
+
+@dataclass(frozen=True)
+class CameraFile:
+    """A calibrated camera in the terms of sensor_msgs/CameraInfo; matrices row by row, pixels."""
+
+    width: int
+    height: int
+    model: str  # a key of COEFFICIENTS
+    distortion: tuple[float, ...]  # as many as the model has
+    camera_matrix: tuple[float, ...]  # (9,) K
+    rectification: tuple[float, ...]  # (9,) R
+    projection: tuple[float, ...]  # (12,) P
+
+
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]
+    """YAML with OpenCV's tagged matrices."""
+
+
+def _matrix(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+    return dict(loader.construct_mapping(node, deep=True))
+
+
+_Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
+
+
+def read_camera_file(path: Path) -> CameraFile:
+    """Read and check a camera file.
+
+    Raises:
+        CameraFileError: the file is no camera file, or a field is missing or impossible.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        if text.startswith(FIRST_LINE):
+            text = text[len(FIRST_LINE) :]
+        document = yaml.load(text, Loader=_Loader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+        raise CameraFileError(
+            f"{path}: no camera file: {_short(' '.join(str(error).split()))}"
+        ) from error
+    if not isinstance(document, dict):
+        raise CameraFileError(
+            f"{path}: no camera file: expected a YAML mapping with camera_matrix, got {type(document).__name__}"
+        )
+    fields = _Fields(path, document)
+    model, distortion = fields.distortion()
+    K = fields.numbers("camera_matrix", (9,))
+    if K[0] < 1.0 or K[4] < 1.0:
+        raise fields.wrong(
+            "camera_matrix", f"has focal lengths {K[0]:g}, {K[4]:g}", "those of a calibrated camera"
+        )
+    plain = (*K[0:3], 0.0, *K[3:6], 0.0, *K[6:9], 0.0)
+    return CameraFile(
+        fields.whole("image_width"),
+        fields.whole("image_height"),
+        model,
+        distortion,
+        K,
+        fields.numbers("rectification_matrix", (9,), IDENTITY),
+        fields.numbers("projection_matrix", (12,), plain),
+    )
+
+
+class _Fields:
+    """Checked fields of one document."""
+
+    def __init__(self, path: Path, document: dict[Any, Any]) -> None:
+        self._path, self._document = path, document
+
+    def wrong(self, name: str, what: str, expected: str) -> CameraFileError:
+        return CameraFileError(f"{self._path}: {name} {what}, expected {expected}")
+
+    def whole(self, name: str) -> int:
+        value = self._document.get(name)
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not 0 < value < 1e6
+            or value % 1
+        ):
+            raise self.wrong(name, f"is {_short(repr(value))}", "a number of pixels")
+        return int(value)
+
+    def numbers(
+        self, name: str, counts: tuple[int, ...], default: tuple[float, ...] | None = None
+    ) -> tuple[float, ...]:
+        if name not in self._document and default is not None:
+            return default
+        matrix = self._document.get(name)
+        data = matrix.get("data") if isinstance(matrix, dict) else matrix
+        data = [] if data is None and counts[-1] == 0 and isinstance(matrix, dict) else data
+        good = isinstance(data, list) and len(data) in counts and all(map(_is_number, data))
+        if not good:
+            expected = " or ".join(map(str, counts))
+            raise self.wrong(
+                f"{name}.data", f"is {_short(repr(data))}", f"{expected} finite numbers"
+            )
+        return tuple(float(value) for value in data)  # type: ignore[union-attr]
+
+    def distortion(self) -> tuple[str, tuple[float, ...]]:
+        """Model and coefficients."""
+        name = "distortion_coefficients"
+        model = self._document.get("distortion_model")
+        if model is None:
+            fisheye = bool(self._document.get("fisheye_model"))
+            data = self.numbers(name, (4,) if fisheye else (5, 4, 8, 0))
+            model = {8: "rational_polynomial"}.get(len(data), "plumb_bob")
+            model = "equidistant" if fisheye else model
+        if not isinstance(model, str) or model not in COEFFICIENTS:
+            known = ", ".join(COEFFICIENTS)
+            raise self.wrong(
+                "distortion_model",
+                f"is {_short(repr(model))}",
+                f"one of {known}; calibrate with one of these",
+            )
+        data = self.numbers(name, COEFFICIENTS[model])
+        return model, (*data, *[0.0] * (COEFFICIENTS[model][0] - len(data)))
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= LONGEST else text[:LONGEST] + " ..."
