@@ -56,7 +56,7 @@ class ClockEstimate:
     sure: bool  # whether it may be applied
 
 
-class _Sums:
+class OffsetSums:
     """Sums of squares over the grid with one memory."""
 
     def __init__(self, memory: float, size: int) -> None:
@@ -65,6 +65,7 @@ class _Sums:
         self.pairs = 0.0
 
     def add(self, squares: Array, dt: float) -> None:
+        """One more pair's squares (G,) [rad^2], dt [s] after the last."""
         keep = math.exp(-max(dt, 0.0) / self.memory)
         self.squares = keep * self.squares + squares
         self.pairs = keep * self.pairs + 1.0
@@ -187,7 +188,7 @@ class CameraClock:
         steps = np.arange(round((OLDEST + AHEAD) / STEP) + 1, dtype=np.float64)
         grid: Array = first + STEP * steps
         self._grid = grid
-        self._long, self._short = _Sums(MEMORY, len(grid)), _Sums(SHORT_MEMORY, len(grid))
+        self._long, self._short = OffsetSums(MEMORY, len(grid)), OffsetSums(SHORT_MEMORY, len(grid))
         self._poses: deque[tuple[float, float, Array]] = deque()
         self._waiting.clear()
         self._newest = -math.inf
@@ -205,7 +206,7 @@ class CameraClock:
             recent = self._short.estimate(self._grid, held.offset)
             apart = abs(recent.offset - held.offset)
             if recent.sure and apart > max(4.0 * math.hypot(recent.std, held.std), REFINED):
-                self._long = _Sums(MEMORY, len(self._grid))  # what it remembers is over
+                self._long = OffsetSums(MEMORY, len(self._grid))  # what it remembers is over
                 found = recent
         if found.sure:
             self.current, self._sure, self.contradicted = found, (stamp, found), False

@@ -39,14 +39,14 @@ class Fusion:
 
     Attributes:
         counts: what became of the measurements, for diagnostics.
+        camera_clock: what is known of the camera's clock.
     """
 
     def __init__(self, config: FusionConfig | None = None) -> None:
         self.config = config or FusionConfig()
-        self._filter = StrapdownFilter(self.config)
         self.counts: Counter[str] = Counter()
         self._scale = NoiseScale()
-        self._use_scale()
+        self._filter = StrapdownFilter(self.config, self._scale)
         self._clear()
 
     def _clear(self) -> None:
@@ -54,7 +54,7 @@ class Fusion:
         self._imu = ImuHistory(c.imu_timeout)
         noise = HeadingNoise(c.gyro_noise, c.gyro_drift, c.coasting_yaw_rate, c.imu_timeout)
         self._heading = ImuHeading(noise)
-        self._clock = CameraClock(c.camera_offset, c.camera_offset_std)
+        self.camera_clock = CameraClock(c.camera_offset, c.camera_offset_std)
         self._applied, self._jumps = c.camera_offset, 0
         self._raw: deque[RawPose] = deque()
         self._timeline: Timeline | None = None
@@ -69,11 +69,6 @@ class Fusion:
     def _restart(self) -> None:
         self._clear()
         self.counts["restarted"] += 1
-
-    @property
-    def camera_clock(self) -> CameraClock:
-        """What is known of the camera's clock."""
-        return self._clock
 
     @property
     def applied_offset(self) -> float:
@@ -96,12 +91,11 @@ class Fusion:
     ) -> bool:
         """A sample stamped `time` [s]: gyro [rad/s], specific force [m/s^2], yaw of the orientation [rad].
 
-        None says that a value is not measured. False if the sample was not used. What no fish does is a damaged sample,
-        such as one of a flipped bit: it would move a trusted pose, and the camera, which contradicts it, would be refused
-        until reacquire_time.
+        None: not measured. False if it was not used. What no fish does is a damaged sample, such as one of a flipped bit:
+        it would move a trusted pose, and the camera, which contradicts it, would be refused until reacquire_time.
         """
-        values = (yaw_rate, forward, left, yaw, yaw_std)
-        if not all(math.isfinite(v) for v in (time, *values) if v is not None):
+        values = (time, yaw_rate, forward, left, yaw, yaw_std)
+        if not all(math.isfinite(v) for v in values if v is not None):
             return self._refuse("imu_not_finite")
         largest = self.config.largest_accel, self.config.largest_yaw_rate
         if (
@@ -173,7 +167,7 @@ class Fusion:
             return None
         moment = self._timeline.at(time)
         camera_lost = now - self._accepted_at > self.config.camera_timeout
-        std = self._clock.current.std if not imu_lost else self.config.camera_offset_std
+        std = self.camera_clock.current.std if not imu_lost else self.config.camera_offset_std
         return to_estimate(
             moment,
             self._imu.yaw_rate(moment.time),
@@ -191,10 +185,10 @@ class Fusion:
         """Let the estimate of the camera's offset learn; apply it."""
         if not self.config.estimate_offset or not len(self._imu):
             return
-        self._clock.add(stamp, float(camera.pose[2]), self._imu, self._last_imu_time)
-        offset = self._clock.current.offset
-        if self._clock.jumps != self._jumps:  # what came before has another offset
-            self._jumps, self._applied = self._clock.jumps, offset
+        self.camera_clock.add(stamp, float(camera.pose[2]), self._imu, self._last_imu_time)
+        offset = self.camera_clock.current.offset
+        if self.camera_clock.jumps != self._jumps:  # what came before has another offset
+            self._jumps, self._applied = self.camera_clock.jumps, offset
             self._raw.clear()
         if abs(offset - self._applied) > REFIT:
             self.counts["offset_changed"] += 1
@@ -221,7 +215,7 @@ class Fusion:
         """A pose with what makes it uncertain; the filter must hold its prediction for `time` [s]."""
         rate = self._imu.yaw_rate(time) or 0.0
         motion = np.array([*self._filter.x[3:5], rate])
-        return weighted(camera, self._scale, self._clock.current, motion)
+        return weighted(camera, self._scale, self.camera_clock.current, motion)
 
     def _fuse(self, raw: RawPose, time: float, imu_lives: bool) -> bool:
         assert self._timeline is not None
@@ -236,16 +230,15 @@ class Fusion:
         camera = self._weighted(raw.camera, time)
         y, S = filter.innovation(pose, camera.R)
         fits = float(y @ np.linalg.solve(S, y)) <= self.config.gate
-        if self._clock.current.sure or not self._clock.contradicted:
+        if self.camera_clock.current.sure or not self.camera_clock.contradicted:
             self._scale.learn(y, S)
             if is_near(y) and math.hypot(x[3], x[4]) > SWIMS:
                 self._learn_motion(time, camera)
-            self._use_scale()
         if fits:
             self._candidates.clear()
             return self._accept(time, camera)
         agreeing = self._candidates.add(time, pose)
-        known = self._clock.current.sure or not imu_lives
+        known = self.camera_clock.current.sure or not imu_lives
         agree = agreeing >= self.config.start_frames
         if agree and doubts_motion(y, self._candidates.duration, known):
             self._scale.surprise(y, S)
@@ -272,11 +265,6 @@ class Fusion:
         if self._swum % EVERY == 0 and begin < time - HORIZON and time <= self._last_imu_time:
             before = self._timeline.predict(time, HORIZON)
             self._scale.learn_motion(*before.innovation(camera.pose, camera.R))
-
-    def _use_scale(self) -> None:
-        position, heading = self._scale.position, self._scale.heading
-        self._filter.position_scale = position.total * position.process
-        self._filter.heading_scale = heading.total * heading.process
 
     def _forget(self, now: float) -> None:
         assert self._timeline is not None

@@ -39,6 +39,11 @@ class Channel:
     process: float = 1.0
     count: int = 0
 
+    @property
+    def motion(self) -> float:
+        """On the variances of the motion."""
+        return self.total * self.process
+
     def learn(self, y: Array, S: Array) -> None:
         """An innovation (n,) and its covariance with the present factors."""
         exceeds = float(y @ np.linalg.solve(S, y)) > CHI2[len(y)]
@@ -60,8 +65,8 @@ class Channel:
 class NoiseScale:
     """Both channels of a pose (x, y, psi)."""
 
-    def __init__(self) -> None:
-        self.position, self.heading = Channel(process=FIRST_PROCESS), Channel()
+    def __init__(self, first_process: float = FIRST_PROCESS) -> None:
+        self.position, self.heading = Channel(process=first_process), Channel()
 
     def learn(self, y: Array, S: Array) -> None:
         """The innovation of a pose and its covariance."""

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from fish_control.imu_heading import COASTING_TIME, SAMPLE_PERIOD
 from fish_control.imu_history import Interval
+from fish_control.noise_scale import NoiseScale
 
 Array = NDArray[np.float64]
 SIZE = 8
@@ -51,15 +52,14 @@ class MotionNoise:
 class StrapdownFilter:
     """filterpy's extended Kalman filter with the motion model above.
 
-    Attributes:
-        position_scale: factor on the variances of positions and accelerations.
-        heading_scale: the same of headings.
+    Args:
+        noise: its constants.
+        scale: factors on the variances, which may change; all 1 without.
     """
 
-    def __init__(self, noise: MotionNoise) -> None:
-        self._noise = noise
+    def __init__(self, noise: MotionNoise, scale: NoiseScale | None = None) -> None:
+        self._noise, self._scale = noise, scale or NoiseScale(first_process=1.0)
         self._filter = ExtendedKalmanFilter(dim_x=SIZE, dim_z=3)
-        self.position_scale = self.heading_scale = 1.0
 
     @property
     def x(self) -> Array:
@@ -129,14 +129,15 @@ class StrapdownFilter:
 
     def _process_noise(self, imu: Interval, dt: Array, left: Array, dv: Array) -> Array:
         n, Q = self._noise, np.zeros((SIZE, SIZE))
+        position_scale, heading_scale = self._scale.position.motion, self._scale.heading.motion
         known, coasting = n.accel_noise**2 * SAMPLE_PERIOD, n.coasting_accel**2 * COASTING_TIME
-        speed = dt * np.where(imu.accel_known, known * self.position_scale, coasting)
+        speed = dt * np.where(imu.accel_known, known * position_scale, coasting)
         for p, v in ((0, 3), (1, 4)):
             Q[v, v] = speed.sum()
             Q[p, v] = Q[v, p] = speed @ left
             Q[p, p] = speed @ (left * left + dt * dt / 12.0)
         unknown = n.coasting_yaw_rate**2 * COASTING_TIME * dt
-        known_turn = (imu.yaw_variance + n.heading_drift**2 * dt) * self.heading_scale
+        known_turn = (imu.yaw_variance + n.heading_drift**2 * dt) * heading_scale
         turn = np.where(imu.yaw_known, known_turn, unknown)
         # a turn in one step turns the accelerations of all later ones
         turned = np.column_stack([-dv[:, 1], dv[:, 0]])
@@ -147,7 +148,7 @@ class StrapdownFilter:
         Q[:5, :5] += (G * turn[:, None]).T @ G
         T = dt.sum()
         Q[5, 5] = n.gyro_drift**2 * T
-        Q[6, 6] = Q[7, 7] = n.accel_drift**2 * self.position_scale * T
+        Q[6, 6] = Q[7, 7] = n.accel_drift**2 * position_scale * T
         return Q
 
 
