@@ -3,7 +3,7 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "fish_bringup"
-VERBS = ("demo", "score", "excite", "arm", "disarm", "view", "loopback")
+VERBS = ("demo", "score", "excite", "arm", "disarm", "view", "drive", "loopback")
 
 setup(
     name=NAME,
