@@ -3,7 +3,17 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "fish_bringup"
-VERBS = ("demo", "score", "latency", "excite", "arm", "disarm", "view", "loopback")
+VERBS = (
+    "demo",
+    "score",
+    "latency",
+    "excite",
+    "arm",
+    "disarm",
+    "view",
+    "drive",
+    "loopback",
+)
 
 setup(
     name=NAME,

@@ -28,6 +28,7 @@ BROUGHT_BY = {
     "arm": "fish_bringup",
     "disarm": "fish_bringup",
     "view": "fish_bringup",
+    "drive": "fish_bringup",
     "loopback": "fish_bringup",
     "inspect": "fish_bag",
     "recover": "fish_bag",

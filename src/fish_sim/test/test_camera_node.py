@@ -54,7 +54,7 @@ class Bench:
         self.executor.add_node(self.peer)
 
     def _keep(self, name: str, msg: object) -> None:
-        if name == "diagnostics" and msg.status[0].name != "/fish/camera":
+        if name == "diagnostics" and msg.status[0].name != "fish/camera":
             return  # /diagnostics has no namespace: a node of another test may speak in this domain
         self.got[name].append(msg)
         if name == "jpeg":
@@ -139,7 +139,7 @@ def test_diagnostics_say_what_is_missing_and_nan_is_ignored(
     bench.send(FishPose(float("nan"), 0.0, 0.0), bench.now())
     assert bench.spin_until(lambda: bool(bench.got["diagnostics"]))
     status = bench.got["diagnostics"][0].status[0]
-    assert status.name == "/fish/camera"
+    assert status.name == "fish/camera"
     assert status.level == DiagnosticStatus.WARN
     assert "sim/odometry" in status.message
     assert not bench.got["jpeg"]

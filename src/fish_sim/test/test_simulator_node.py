@@ -273,7 +273,7 @@ def test_bad_commands_are_refused_and_said_in_the_diagnostics(bench):
     status = bench.got["/diagnostics"][-1].status[0]
     assert status.level == DiagnosticStatus.WARN
     assert "joint_command refused" in status.message
-    assert status.name == "/fish/simulator"
+    assert status.name == "fish/simulator"
 
 
 def dict_of(message: DiagnosticArray) -> dict[str, str]:

@@ -115,7 +115,9 @@ class RecorderNode(Node):
         self.recording.flush_old(time.time_ns())
 
     def _report(self) -> None:
-        status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="recorder")
+        status = DiagnosticStatus(
+            name=self.get_fully_qualified_name().lstrip("/"), hardware_id="recorder"
+        )
         status.level, status.message = DiagnosticStatus.OK, "recording"
         if self._refused:
             status.level = DiagnosticStatus.WARN

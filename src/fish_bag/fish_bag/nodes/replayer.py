@@ -136,7 +136,9 @@ class ReplayerNode(Node):
         return response
 
     def _report(self) -> None:
-        status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="replayer")
+        status = DiagnosticStatus(
+            name=self.get_fully_qualified_name().lstrip("/"), hardware_id="replayer"
+        )
         status.level = DiagnosticStatus.OK
         status.message = "paused" if self._time.paused else "replaying"
         elapsed = (self._time.bag_time(time.monotonic_ns()) - self._playback.start_ns) * 1e-9

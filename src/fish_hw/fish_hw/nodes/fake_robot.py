@@ -102,7 +102,9 @@ class FakeRobotNode(Node):
     def _report(self) -> None:
         if self._arm.service_is_ready():  # the simulated fish follows whatever the devices do
             self._arm.call_async(SetBool.Request(data=True))
-        status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="fake robot")
+        status = DiagnosticStatus(
+            name=self.get_fully_qualified_name().lstrip("/"), hardware_id="fake robot"
+        )
         status.level, status.message = DiagnosticStatus.OK, f"fault: {self._fault}"
         rotor = self._robot.rotor
         values = {

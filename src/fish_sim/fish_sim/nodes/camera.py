@@ -155,7 +155,7 @@ class CameraNode(Node):
         """Diagnostics, once a second."""
         rate, self._sent_before = self._sent - self._sent_before, self._sent
         status = DiagnosticStatus(
-            name=self.get_fully_qualified_name(), hardware_id="simulated camera"
+            name=self.get_fully_qualified_name().lstrip("/"), hardware_id="simulated camera"
         )
         status.level, status.message = DiagnosticStatus.OK, "running"
         if self._head.at(0.0) is None:

@@ -269,7 +269,7 @@ class SimulatorNode(Node):
             "divergences": str(self._divergences),
             "wall_contacts": str(self._simulation.walls.contacts),
         }
-        status = messages.status(self.get_fully_qualified_name(), level, text, values)
+        status = messages.status(self.get_fully_qualified_name().lstrip("/"), level, text, values)
         header = Header(stamp=self._stamp(simulated))
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
         self._refusal = ""

@@ -35,6 +35,7 @@ from fish_vision.statistics import Statistics
 from fish_vision.tracker import Detection, Tracker
 
 SETTABLE = ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour")
+NO_INFO = "no camera/camera_info yet"
 QUEUE = 10
 # a late image is worse than a lost one; a raw image is many packets, of which best effort sooner or later loses one
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -56,7 +57,7 @@ class TrackerNode(Node):
         Changes(self, self._config, self._change)
         self._info: tuple[Any, ...] | None = None  # fields of the camera_info in use
         self._calibration: Calibration | None = None
-        self._calibration_error = "no camera/camera_info yet"
+        self._calibration_error = NO_INFO
         self._tracker: Tracker | None = None
         self._statistics = Statistics()
         self._images_before = self._tracked_before = 0
@@ -156,7 +157,7 @@ class TrackerNode(Node):
         level, message = self._state()
         self._log.say(level, message)
         status = DiagnosticStatus(
-            name=self.get_fully_qualified_name(), level=level, message=message
+            name=self.get_fully_qualified_name().lstrip("/"), level=level, message=message
         )
         status.hardware_id = "overhead camera"
         status.values = [
@@ -174,6 +175,8 @@ class TrackerNode(Node):
         )
         self._images_before, self._tracked_before = statistics.images, statistics.tracked
         refused, statistics.last_error = statistics.last_error, ""
+        if self._info is None:  # at the start; pictures without it are an error
+            return (DiagnosticStatus.WARN if not images else DiagnosticStatus.ERROR), NO_INFO
         if self._calibration is None:
             return DiagnosticStatus.ERROR, self._calibration_error
         if refused:

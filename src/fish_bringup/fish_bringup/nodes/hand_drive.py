@@ -1,0 +1,110 @@
+"""joy -> joint_command, operator/deadman: rotor and rudder by hand. Lives in the command `robofish drive`.
+
+joint_command (100 Hz) as the controller's; joy (sensor_msgs/Joy): the deadman's button must be held, axes give throttle and
+rudder. operator/deadman (std_msgs/Bool, 10 Hz) is true while the operator holds the deadman.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState, Joy
+from std_msgs.msg import Bool
+
+from fish_bringup.node_table import middleware
+from fish_control.manual_drive import ManualDrive
+from fish_node.nodes.arming import ArmingListener
+
+PERIOD = 0.01  # s, of joint_command
+DEADMAN_EVERY = 10  # commands
+RUN_DOWN = 0.6  # s, from full throttle to rest
+
+
+@dataclass(frozen=True)
+class Pad:
+    """Which button and axes of a gamepad do what."""
+
+    deadman: int = 5  # button
+    throttle: int = 1  # axis, forward is positive
+    rudder: int = 0  # axis, left is positive
+
+
+class HandDrive(Node):
+    """ManualDrive's command into messages; a gamepad's into ManualDrive."""
+
+    def __init__(self, context: Context, namespace: str, drive: ManualDrive, pad: Pad) -> None:
+        super().__init__("hand_drive", namespace=namespace, context=context)
+        self.drive, self._pad, self._ticks = drive, pad, 0
+        self.arming = ArmingListener(self)
+        self._command = self.create_publisher(JointState, "joint_command", 10)
+        self._deadman = self.create_publisher(Bool, "operator/deadman", 10)
+        self.create_subscription(Joy, "joy", self._on_joy, 10)
+        self.create_timer(PERIOD, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def rivals(self) -> int:
+        """Other publishers of joint_command."""
+        return int(self.count_publishers("joint_command")) - 1
+
+    def _on_joy(self, message: Joy) -> None:
+        pad = self._pad
+        buttons, axes = message.buttons, message.axes
+        if len(axes) <= max(pad.throttle, pad.rudder) or len(buttons) <= pad.deadman:
+            return
+        if not buttons[pad.deadman]:
+            self.drive.release()
+            return
+        self.drive.hold(time.monotonic())
+        self.drive.wish(axes[pad.throttle], axes[pad.rudder])
+
+    def _tick(self) -> None:
+        now = time.monotonic()
+        command = self.drive.command(now, PERIOD)
+        message = JointState(name=["rotor", "rudder"])
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.position = [command.phase, command.alpha]
+        message.velocity = [command.rotor_speed, 0.0]
+        self._command.publish(message)
+        if self._ticks % DEADMAN_EVERY == 0:
+            self._deadman.publish(Bool(data=self.drive.held(now)))
+        self._ticks += 1
+
+
+@contextmanager
+def driving(
+    domain: int | None, namespace: str, drive: ManualDrive, pad: Pad
+) -> Iterator[tuple[HandDrive, Callable[[float], None]]]:
+    """A HandDrive in an own context of the domain (None: the environment's), and a function that runs it for so many seconds.
+
+    Signals stay with the caller. At the end the last command is one of rest.
+    """
+    os.environ.update(middleware())
+    context = Context()
+    rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    node = HandDrive(context, namespace, drive, pad)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+
+    def spin(seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            executor.spin_once(timeout_sec=left)
+
+    try:
+        yield node, spin
+        drive.release()
+        spin(RUN_DOWN)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        context.try_shutdown()

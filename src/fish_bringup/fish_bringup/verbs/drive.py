@@ -1,0 +1,91 @@
+"""Drive rotor and rudder by hand, from the keyboard or a gamepad, for as long as a deadman is held.
+
+Keyboard: the arrow keys change throttle and rudder; keep pressing them: after --timeout without a key the rotor stops and the
+rudder goes to the centre, as with any other key; q ends. Gamepad (topic joy, node joy_node of the full ROS): hold the button
+--deadman. Planner and controller must not run meanwhile. The robot must be armed: `robofish arm`. operator/deadman is true
+while the deadman is held; a robot with deadman_timeout_s is disarmed when it is let go.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+from fish_bringup.keyboard import Keyboard, keyboard
+from fish_bringup.node_table import NAMESPACE
+from fish_bringup.nodes.hand_drive import HandDrive, Pad, driving
+from fish_control.manual_drive import ManualDrive
+from fish_report.errors import UserError, user_errors
+from fish_report.interruption import Interruption
+from fish_report.terminal import say, terminal
+
+TIMEOUT = 1.0  # s; a terminal repeats a key after half a second
+DISCOVERY = 1.0  # s, until other publishers are known
+LOOK = 0.02  # s between looks at the keyboard
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument(
+        "--timeout", type=float, default=TIMEOUT, help=f"s without a word until rest ({TIMEOUT:g})"
+    )
+    for name, default in (
+        ("deadman", Pad.deadman),
+        ("throttle", Pad.throttle),
+        ("rudder", Pad.rudder),
+    ):
+        kind = "button" if name == "deadman" else "axis"
+        parser.add_argument(
+            f"--{name}", type=int, default=default, help=f"{kind} of the gamepad ({default})"
+        )
+    parser.add_argument("--namespace", default=NAMESPACE, help=f"of the robot ({NAMESPACE})")
+    parser.add_argument("--domain", type=int, help="ROS domain (ROS_DOMAIN_ID)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Drive until q or Ctrl-C."""
+    if args.domain is not None and not 0 <= args.domain <= 232:
+        raise UserError(f"domain is {args.domain}, expected 0 to 232")
+    if min(args.deadman, args.throttle, args.rudder) < 0:
+        raise UserError("buttons and axes are counted from 0")
+    with user_errors():
+        drive = ManualDrive(args.timeout)
+    pad = Pad(args.deadman, args.throttle, args.rudder)
+    with (
+        Interruption() as interruption,
+        keyboard() as keys,
+        driving(args.domain, args.namespace, drive, pad) as (node, spin),
+    ):
+        spin(DISCOVERY)
+        if node.rivals > 0:
+            raise UserError(
+                "another node publishes joint_command: stop controller or exciter before you drive by hand"
+            )
+        ways = "arrow keys, any other key is rest, q ends" if keys else "no keyboard here, only joy"
+        say(terminal(), f"driving {args.namespace} by hand: {ways}")
+        said = None
+        while not interruption.asked and _heed(keys, drive):
+            spin(LOOK)
+            if (now := _armed(node)) != said:
+                said = now
+                say(terminal(), said)
+    return 0
+
+
+def _heed(keys: Keyboard | None, drive: ManualDrive) -> bool:
+    """Take a key; False if it ends the drive."""
+    key = keys.key() if keys else None
+    if key == "q":
+        return False
+    if key is not None and drive.press(key):
+        drive.hold(time.monotonic())
+    return True
+
+
+def _armed(node: HandDrive) -> str:
+    """What the robot says of its arming state."""
+    if node.arming.armed is None:
+        return "nothing heard of the robot's arming state yet"
+    return (
+        "armed" if node.arming.armed else f"disarmed ({node.arming.reason}); robofish arm arms it"
+    )
