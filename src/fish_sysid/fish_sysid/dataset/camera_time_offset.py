@@ -104,6 +104,54 @@ def _misfit(t: Array, heading: Array, turned: Array, delays: Array) -> Array:
     return np.asarray(np.mean(np.minimum(rest**2, CLIP**2), axis=0))
 
 
+def fine_delay(experiment: Experiment) -> tuple[float, float]:
+    """Delay [s] between the grid's delays, by a parabola through the least mean squares, and its jackknife error over trials.
+
+    NaN where fewer than two trials have a gyro and enough poses.
+    """
+    squares, count = misfits(experiment)
+    used = squares[count > 0]
+    if len(used) < 2:
+        return np.nan, np.nan
+    left_out = np.array([_lowest(np.delete(used, m, 0).mean(axis=0)) for m in range(len(used))])
+    spread = float(np.sqrt((len(used) - 1) / len(used) * ((left_out - left_out.mean()) ** 2).sum()))
+    return _lowest(used.mean(axis=0)), spread
+
+
+def _lowest(squares: Array) -> float:
+    """Where mean squares (D,) at DELAYS are least, by a parabola through the lowest three."""
+    best = int(np.clip(squares.argmin(), 1, len(squares) - 2))
+    before, at, after = squares[best - 1 : best + 2]
+    bend = before - 2.0 * at + after
+    return float(DELAYS[best] + (0.5 * STEP * (before - after) / bend if bend > 0.0 else 0.0))
+
+
+def gyro_windows(experiment: Experiment, m: int) -> Array:
+    """How the camera's heading differs from the gyro's angle in each window of trial m.
+
+    Returns:
+        (W, 4) in rad: projection of the difference, less its straight line, on the unit gyro rate, norm of that rate times
+        one second, projection on the unit gyro angle, norm of that angle; an image older by d [s] adds -d times the second
+        to the first, a gyro that reads (1 + e) times the rate adds -e times the fourth to the third.
+
+    """
+    turned = _turned(experiment, m)
+    if turned is None:
+        return np.zeros((0, 4))
+    frames, grid = experiment.frames[m], np.arange(len(turned)) + 0.5
+    rate, rows = np.gradient(turned, DT), []
+    for pick in _windows(frames, turned):
+        t = frames.t[pick]
+        line = np.column_stack([np.ones_like(t), t - t.mean()])
+        angle, speed = (np.interp(t / DT, grid, x) for x in (turned, rate))
+        columns = np.column_stack([frames.pose[pick, 2] - angle, speed, angle])
+        rest = columns - line @ np.linalg.lstsq(line, columns, rcond=None)[0]
+        lengths = np.maximum(np.linalg.norm(rest, axis=0), 1e-9)
+        by_rate, by_angle = rest[:, 0] @ rest[:, 1:] / lengths[1:]
+        rows.append([by_rate, lengths[1], by_angle, lengths[2]])
+    return np.array(rows).reshape(-1, 4)
+
+
 def moved_back(experiment: Experiment, delay: float) -> Experiment:
     """The experiment with every image at the moment it was taken; those taken before the first command are left out."""
     frames = tuple(_moved(f, delay) for f in experiment.frames)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from fish_bag import read_dataset
 from fish_bag.dataset import check_set, told_apart
 from fish_bag.topic_map import TopicMap
+from fish_bag.trial import Trial
 from fish_report.errors import UserError, user_errors
 from fish_sysid.dataset.experiment import Experiment, ExperimentError, build_experiment
 
@@ -21,6 +23,35 @@ def read_experiment(*paths: Path, topics: TopicMap | None = None) -> tuple[Exper
     Raises:
         UserError: no trial can be used, one is given twice, or the trials are not of one robot.
     """
+    trials, left_out = _usable(paths, topics)
+    if (text := mixed(trials)) is not None:
+        raise UserError(text)
+    with user_errors():
+        return build_experiment(trials), left_out
+
+
+def read_days(
+    new: Sequence[Path], olds: Sequence[Path], topics: TopicMap | None = None
+) -> tuple[Experiment, list[Experiment], list[str], str | None]:
+    """NEW, each day of OLD, what was left out, and why these are recordings of several robots (None: of one).
+
+    Raises UserError as `read_experiment`.
+    """
+    days = [_usable(paths, topics) for paths in (new, *([old] for old in olds))]
+    left_out = [text for _, texts in days for text in texts]
+    with user_errors():
+        first, *others = (build_experiment(trials) for trials, _ in days)
+    return first, others, left_out, mixed([trial for trials, _ in days for trial in trials])
+
+
+def mixed(trials: Sequence[Trial]) -> str | None:
+    """Why the trials are of several robots; None: of one."""
+    texts = (problem.text for problem in check_set(trials) if problem.kind == "mixed_robots")
+    return next(texts, None)
+
+
+def _usable(paths: Sequence[Path], topics: TopicMap | None) -> tuple[list[Trial], list[str]]:
+    """Trials that can be put on the grid, and what was left out and why."""
     read, trials, left_out = [], [], []
     with user_errors():
         for path in paths:
@@ -30,9 +61,6 @@ def read_experiment(*paths: Path, topics: TopicMap | None = None) -> tuple[Exper
             ]
             read += list(data)
         read = told_apart(read)
-    for problem in check_set(read):
-        if problem.kind == "mixed_robots":
-            raise UserError(problem.text)
     for trial in read:
         try:
             build_experiment([trial])
@@ -42,5 +70,4 @@ def read_experiment(*paths: Path, topics: TopicMap | None = None) -> tuple[Exper
             trials.append(trial)
     if not trials:
         raise UserError("no trial can be used: " + "; ".join(left_out))
-    with user_errors():
-        return build_experiment(trials), left_out
+    return trials, left_out

@@ -91,6 +91,11 @@ def next_experiment(
             else f"tighten {', '.join(found)}"
         )
         why, program = f"{aim}: {plan[0]}", plan[1]
+    return written(why, program)
+
+
+def written(why: str, program: list[tuple[float, float, float, float]]) -> dict[str, Any]:
+    """A plan as diagnosis.json has it, which `robofish excite` swims."""
     keys = ("t", "amplitude", "frequency", "rudder")
     return {
         "why": why,

@@ -15,7 +15,7 @@ from fish_report.writable import writable_folder
 from fish_sim.robot import Robot
 from fish_sim.robot_argument import read_model
 from fish_sim.robot_file import save_robot
-from fish_sysid.dataset.read import read_experiment
+from fish_sysid.dataset.read import read_days, read_experiment
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,6 +25,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         help="recordings or folders of recordings of one robot and day",
+    )
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        nargs="+",
+        metavar="OLD",
+        help="recordings of the same robot when it swam well, a folder for each day: say what changed since, "
+        "and nothing of what every recording lacks",
     )
     parser.add_argument("--robot", type=Path, help="robot.yaml (default: the nominal fish)")
     parser.add_argument(
@@ -59,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
     from fish_sysid.reports.diagnosis_page import write_diagnosis_page
     from fish_sysid.reports.verdict_sentence import sentence
 
+    if args.baseline:
+        return _compare(args)
     console, start = terminal(stderr=True), time.monotonic()
     robot = read_model(args.robot)
     with user_errors():
@@ -96,6 +106,40 @@ def run(args: argparse.Namespace) -> int:
     for text in [*(f"left out: {text}" for text in left_out), sentence(content)]:
         say(terminal(), text, PARAGRAPH)
     say(terminal(), f"{files} ({time.monotonic() - start:.0f} s)")
+    return 0
+
+
+def _compare(args: argparse.Namespace) -> int:
+    """What changed since the baseline: the same three files."""
+    from fish_sysid.diagnosis.change.change import Change
+    from fish_sysid.diagnosis.change.change_json import answer, changed_robot, sentence
+    from fish_sysid.diagnosis.change.compare import compare
+    from fish_sysid.reports.change_page import write_change_page
+
+    console, start = terminal(stderr=True), time.monotonic()
+    robot = read_model(args.robot)
+    new, olds, left_out, several = read_days(args.dataset, args.baseline, topic_map(args))
+    writable_folder(args.out)
+
+    def progress(text: str) -> None:
+        say(console, f"{time.monotonic() - start:5.0f} s  {text}")
+
+    change = (
+        compare(new, olds, robot, progress)
+        if several is None
+        else Change("not_comparable", reason=f"{several}; record NEW and OLD with the same robot")
+    )
+    content = answer(change)
+    content["left_out"] = [*left_out, *content["left_out"]]
+    write_json(args.out / "diagnosis.json", content)
+    written = "diagnosis.json, report.html"
+    if change.robot is not None:
+        save_robot(changed_robot(change), args.out / "model.yaml", notes=sentence(change))
+        written = "diagnosis.json, model.yaml, report.html"
+    write_change_page(args.out / "report.html", named_path(args.dataset[0]).name, content, change)
+    for text in [*(f"left out: {text}" for text in content["left_out"]), sentence(change)]:
+        say(terminal(), text, PARAGRAPH)
+    say(terminal(), f"{args.out}/{written} ({time.monotonic() - start:.0f} s)")
     return 0
 
 

@@ -139,12 +139,22 @@ def _rows(experiment: Experiment, m: int) -> tuple[Rows, float] | None:
     known = np.isfinite(gyro) & np.isfinite(accel).all(axis=1)
     if known.sum() < 0.5 * steps or len(frames.t) < LEAST_FRAMES:
         return None
-    felt = np.column_stack([np.interp(t, t[known], v[known]) for v in (gyro, *accel.T)])
-    heading, spread = followed_heading(t, felt[:, 0], frames.t, frames.pose[:, 2])
-    if spread > LARGEST_SPREAD:
+    rate = np.interp(t, t[known], gyro[known])
+    heading, spread = followed_heading(t, rate, frames.t, frames.pose[:, 2])
+    return None if spread > LARGEST_SPREAD else force_rows(experiment, m, heading)
+
+
+def force_rows(experiment: Experiment, m: int, heading: Array) -> tuple[Rows, float] | None:
+    """`_rows` of trial m with the heading (T,) [rad] at every grid point; None where too few windows are covered."""
+    steps, frames = int(experiment.steps[m]), experiment.frames[m]
+    t: Array = DT * np.arange(steps, dtype=np.float64)
+    accel = experiment.accel[:steps, m]
+    known = np.flatnonzero(np.isfinite(accel).all(axis=1))
+    if len(known) < LEAST_FRAMES:
         return None
+    felt = np.column_stack([np.interp(t, t[known], v[known]) for v in accel.T])
     turn = _turn(heading)
-    force = np.einsum("tij,tj->ti", turn, felt[:, 1:])
+    force = np.einsum("tij,tj->ti", turn, felt)
     measured, terms, base, noise = [], [], [], []
     others = np.where(np.arange(steps) % 2, -1.0, 1.0)  # every other sample less those between
     for centre in np.arange(HALF_WINDOW, t[-1] - HALF_WINDOW, STEP):

@@ -55,12 +55,12 @@ def _trial(experiment: Experiment, m: int) -> StrokeMeans:
     t, motion = t[covered], motion[covered]
     even, odd, throttle, rudder = features(experiment.commands[:steps, m], t)
     # the same weights on the gyro's angle at the same moments: both means are of the same rate
-    turned = DT * (np.cumsum(filled := _filled(experiment.gyro[:steps, m])) - 0.5 * filled)
+    turned = DT * (np.cumsum(gyro := filled(experiment.gyro[:steps, m])) - 0.5 * gyro)
     gyro = weights.slope[covered] @ np.interp(frames.t, DT * np.arange(steps), turned)
     return StrokeMeans(t, motion[:, :3], motion[:, 3:], gyro, even, odd, throttle, rudder)
 
 
-def _filled(values: Array) -> Array:
+def filled(values: Array) -> Array:
     """Values (T,) with gaps interpolated; all NaN where nothing was measured."""
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < 2:

@@ -1,0 +1,57 @@
+"""What a comparison finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from fish_sim.robot import Robot
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.change.strength import Refitted
+from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
+
+
+@dataclass(frozen=True)
+class Member:
+    """One name that explains a change as well as the others of its family."""
+
+    name: str
+    probability: float
+    gain: float  # nats per left-out trial of NEW
+    remainder_p_value: float  # of the swap test once it is taken out
+    refitted: Refitted
+
+
+@dataclass(frozen=True)
+class Named:
+    """One change: the best name first, then those that these recordings cannot tell from it."""
+
+    members: tuple[Member, ...]
+    family: str  # "" where it stands alone
+    gain: float
+    gain_std: float
+
+    @property
+    def name(self) -> str:
+        return self.members[0].name
+
+
+@dataclass(frozen=True)
+class Change:
+    """NEW against OLD."""
+
+    verdict: str  # unchanged, changed, not_comparable
+    reason: str = ""  # of not_comparable
+    p_value: float = float("nan")
+    look: str = ""  # which of the looks saw it
+    named: tuple[Named, ...] = ()
+    remainder_p_value: float = float("nan")
+    suspects: tuple[str, ...] = ()  # of a change without a name: what gains most
+    refused: tuple[str, ...] = ()  # degenerate answers
+    left_out: tuple[str, ...] = ()
+    robot: Robot | None = None  # OLD's best model
+    old: Experiment | None = None
+    new: Experiment | None = None
+    camera_delay: float = 0.0  # s, of OLD's images
+    symmetry: tuple[SymmetryFinding, ...] = ()  # of OLD
+    ratios: Mapping[str, float] = field(default_factory=dict)

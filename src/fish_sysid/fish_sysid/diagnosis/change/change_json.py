@@ -1,0 +1,190 @@
+"""A comparison in diagnosis.json, in a sentence, and as a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from fish_sim.robot import Robot
+from fish_sysid.diagnosis.change.change import Change, Member, Named
+from fish_sysid.diagnosis.families import FAMILIES, family_of
+from fish_sysid.diagnosis.next_experiment import next_experiment, written
+from fish_sysid.diagnosis.symmetry.symmetry_json import stated, symmetry_entry
+from fish_sysid.diagnosis.vocabulary import kind_of
+from fish_sysid.estimation.parametrization import effect_class
+
+Entry = dict[str, Any]
+NOT_A_NUMBER = float("nan")
+SURE = 0.9  # probability from which one member of a family is named alone
+
+
+def answer(change: Change) -> Entry:
+    """The dictionary written to diagnosis.json."""
+    effects = [_effect(named) for named in change.named]
+    shares = sum(named.gain for named in change.named) or 1.0
+    for entry, named in zip(effects, change.named, strict=True):
+        entry["share"] = named.gain / shares
+    return {
+        "verdict": verdict(change),
+        "effects": effects,
+        "symmetry": symmetry_entry(change.symmetry),
+        "change": {
+            "verdict": change.verdict,
+            "reason": change.reason,
+            "p_value": change.p_value,
+            "look": change.look,
+            "named": [named.name for named in change.named],
+            "remainder_p_value": change.remainder_p_value,
+            "survivors": [
+                m.name
+                for named in change.named
+                for m in named.members
+                if m.remainder_p_value > 0.05
+            ],
+            "suspects": list(change.suspects),
+            "refused": list(change.refused),
+        },
+        "unexplained": {"share": NOT_A_NUMBER, "where": {}, "description": remainder(change)},
+        "next_experiment": _next_experiment(change),
+        "sentence": sentence(change),
+        "left_out": list(change.left_out),
+    }
+
+
+def verdict(change: Change) -> str:
+    """no_mismatch, missing_physics, sensor_or_actuator or unexplained, of the change alone."""
+    if change.verdict != "changed":
+        return "no_mismatch" if change.verdict == "unchanged" else "unexplained"
+    if not change.named:
+        return "unexplained"
+    kinds = {
+        kind_of(named.name) if named.name != "imu_latency" else "sensor" for named in change.named
+    }
+    return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
+
+
+def sentence(change: Change) -> str:
+    """What changed, in words."""
+    if change.verdict == "not_comparable":
+        return f"NEW and OLD cannot be compared: {change.reason}"
+    lacks = in_every_recording(change)
+    if change.verdict == "unchanged":
+        return (
+            "Nothing changed that these recordings show: exchanged trials differ as much "
+            f"(p = {change.p_value:.2g}).{lacks}"
+        )
+    if not change.named:
+        return f"The fish changed (p = {change.p_value:.2g}), and no name explains it: {remainder(change)}.{lacks}"
+    parts = [_words(named) for named in change.named]
+    left = (
+        f" Beside that something else changed: {remainder(change)}."
+        if change.suspects
+        else f" What is left looks like exchanged trials (p = {change.remainder_p_value:.2g})."
+    )
+    return f"Since OLD the fish has {' and '.join(parts)} (p = {change.p_value:.2g}).{left}{lacks}"
+
+
+def remainder(change: Change) -> str:
+    """What of the change has no name."""
+    if not change.suspects:
+        return "nothing of the change"
+    return f"most alike are {', '.join(change.suspects)}, and none of them explains it"
+
+
+def in_every_recording(change: Change) -> str:
+    """What OLD shows already, by tests that need no model of the fish."""
+    found = [finding.statement for finding in stated(change.symmetry)]
+    return f" OLD as well as NEW: {'; '.join(found)}." if found else ""
+
+
+def _words(named: Named) -> str:
+    values = ", ".join(
+        f"{key} {p.value:.3g} ± {p.std:.2g} {p.unit}".rstrip(" 1")
+        for key, p in named.members[0].refitted.parameters.items()
+    )
+    text = f"{named.name} ({values})" if values else named.name
+    others = [m.name for m in named.members[1:]]
+    if not others or named.members[0].probability >= SURE:
+        return text
+    family = f" ({named.family})" if named.family else ""
+    return f"{text} or, which these recordings cannot tell apart{family}, {', '.join(others)}"
+
+
+def _effect(named: Named) -> Entry:
+    first = named.members[0]
+    kind = "sensor" if first.name == "imu_latency" else kind_of(first.name)
+    return {
+        "name": first.name,
+        "kind": kind,
+        "equation": effect_class(first.name).equation,
+        "parameters": _parameters(first),
+        "evidence": {
+            "basis": "baseline",
+            "log_likelihood_gain": NOT_A_NUMBER,
+            "left_out_gain": named.gain,
+            "left_out_gain_std": named.gain_std,
+            "p_value": NOT_A_NUMBER,
+            "probability": first.probability,
+        },
+        "share": NOT_A_NUMBER,
+        "rivals": [{"name": m.name, "probability": m.probability} for m in named.members[1:]],
+        "family": {
+            "name": named.family,
+            "members": [
+                {
+                    "name": m.name,
+                    "probability": m.probability,
+                    "parameters": _parameters(m),
+                    "remainder_p_value": m.remainder_p_value,
+                }
+                for m in named.members
+            ],
+        },
+        "where": {"dof": {}, "covariates": [], "time": [], "place": []},
+    }
+
+
+def _parameters(member: Member) -> Entry:
+    return {
+        key: {"value": float(p.value), "std": float(p.std), "unit": p.unit}
+        for key, p in member.refitted.parameters.items()
+    }
+
+
+def _next_experiment(change: Change) -> Entry:
+    """The manoeuvre that separates the members of the first family."""
+    for named in change.named:
+        family = family_of(named.name)
+        if family and len(named.members) > 1:
+            why, program = FAMILIES[family][1]
+            names = ", ".join(m.name for m in named.members)
+            return written(f"tell {names} apart: {why}", program)
+    return next_experiment([named.name for named in change.named], [])
+
+
+def changed_robot(change: Change) -> Robot:
+    """OLD's best model with the change; what every recording lacks stays as it is.
+
+    Raises ValueError where OLD was not fitted.
+    """
+    if change.robot is None:
+        raise ValueError("got a comparison without a model of OLD; expected one that was made")
+    robot = change.robot
+    if change.camera_delay > 0.0:
+        robot = robot.with_effect("camera_latency", delay=change.camera_delay)
+    for named in change.named:
+        robot = with_change(robot, named.members[0])
+    return robot
+
+
+def with_change(robot: Robot, member: Member) -> Robot:
+    """The robot with one more effect; an effect that it has already is changed by as much."""
+    effect = effect_class(member.name, robot.table)
+    had: Mapping[str, float] = {**robot.effects, **robot.sensors}.get(member.name, {})
+    values = {}
+    for key, parameter in effect.parameters.items():
+        found = member.refitted.parameters.get(key)
+        change = 0.0 if found is None else found.value - parameter.value
+        value = had.get(key, parameter.value) + change
+        values[key] = float(min(max(value, parameter.lowest), parameter.highest))
+    return robot.with_effect(member.name, **values)

@@ -1,0 +1,135 @@
+"""What is compared: stroke means, harmonics of the stroke, and the camera's clock, trial by trial.
+
+A column is an array (C, 12) at the centres of the stroke means, for the channels
+
+    surge, sway [m/s], yaw rate, camera's less the gyro's yaw rate [rad/s], real and imaginary parts of the harmonics
+
+and an array (W, 2) in windows of four seconds, for the channels
+
+    age of the images beyond the known one [rad], angle by the gyro [rad]
+
+both projections of camera heading less gyro angle: on its rate of change, and on the gyro angle itself. Last come the rows of
+`symmetry.accelerometer`: the camera's second derivative less the accelerometer's force, turned by the camera's heading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sim.model import DT
+from fish_sysid.dataset.camera_time_offset import gyro_windows
+from fish_sysid.dataset.experiment import Experiment, Frames
+from fish_sysid.diagnosis.change.harmonics import HARMONICS, StrokeWeights
+from fish_sysid.diagnosis.symmetry.accelerometer import force_rows
+from fish_sysid.diagnosis.symmetry.regression import Rows
+from fish_sysid.diagnosis.symmetry.stroke_means import StrokeMeans, filled, stroke_means
+from fish_sysid.prediction.stroke_average import stroke_mean
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+MEANS = 4  # channels of stroke means
+AT_CENTRES = MEANS + 2 * len(HARMONICS)
+IN_WINDOWS = 2
+CHANNELS = AT_CENTRES + IN_WINDOWS + 1
+NO_FORCE = Rows(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
+AGE = 0.05  # s, by which images are made older to see what that does
+
+
+@dataclass(frozen=True)
+class Swim:
+    """What is known of one trial."""
+
+    name: str
+    means: StrokeMeans
+    aged: Array  # (C, 3) surge, sway, yaw rate by the camera with images older by one second, to first order
+    amplitudes: Complex  # (C, 4) of HARMONICS
+    rotor: Array  # (C,) rad/s, amplitude of the rotor's command
+    stroke: Array  # (C,) rad/s
+    windows: Array  # (W, 4) rest on rate, length of rate, rest on gyro, length of gyro
+    force: Rows  # (V,) of the accelerometer: the lever, the force and the force turned by 90 degrees, the difference
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(C, W, V)."""
+        return len(self.means.t), len(self.windows), len(self.force.measured)
+
+    @property
+    def backwards(self) -> bool:
+        """Whether it swims with the tail ahead in the mean."""
+        return bool(self.means.velocity[:, 0].mean() < 0.0)
+
+    def measured(self) -> Array:
+        """(N,) all channels."""
+        u, v, r = self.means.velocity.T
+        turned = self.means.gyro
+        centres = np.column_stack([u, v, np.where(np.isfinite(turned), turned, r), r - turned])
+        both = np.hstack([centres, parts(self.amplitudes)])
+        return self.flat(both, self.windows[:, [0, 2]], self.force.measured)
+
+    def flat(
+        self, centres: Array | None = None, windows: Array | None = None, force: Array | None = None
+    ) -> Array:
+        """(N,) of a column (C, 12), (W, 2) and (V,); None: zeros."""
+        C, W, V = self.shape
+        centres = np.zeros((C, AT_CENTRES)) if centres is None else centres
+        windows = np.zeros((W, IN_WINDOWS)) if windows is None else windows
+        force = np.zeros(V) if force is None else force
+        return np.concatenate([centres.ravel(), windows.ravel(), force])
+
+    def means_only(self, **channel: Array) -> Array:
+        """(N,) of a column with some of u, v, r, d (C,) alone."""
+        zero = np.zeros(len(self.means.t))
+        four = np.column_stack([channel.get(name, zero) for name in "uvrd"])
+        return self.flat(np.hstack([four, np.zeros((len(zero), AT_CENTRES - MEANS))]))
+
+    @property
+    def channel(self) -> NDArray[np.int64]:
+        """(N,) which channel a row is."""
+        C, W, V = self.shape
+        centres, windows = np.arange(AT_CENTRES), AT_CENTRES + np.arange(IN_WINDOWS)
+        return np.concatenate([np.tile(centres, C), np.tile(windows, W), np.full(V, CHANNELS - 1)])
+
+
+def parts(amplitudes: Complex) -> Array:
+    """(C, 8) real and imaginary parts of amplitudes (C, 4)."""
+    return np.stack([amplitudes.real, amplitudes.imag], axis=-1).reshape(len(amplitudes), -1)
+
+
+def swims(experiment: Experiment) -> tuple[Swim, ...]:
+    """Every trial that is long enough."""
+    found = []
+    for m, name in enumerate(experiment.names):
+        alone = experiment.select([m])
+        for means in stroke_means(alone):
+            found.append(_swim(name, alone, means))
+    return tuple(found)
+
+
+def _swim(name: str, alone: Experiment, means: StrokeMeans) -> Swim:
+    frames, steps = alone.frames[0], int(alone.steps[0])
+    rotor = alone.commands[:steps, 0, 0]
+    felt = [alone.gyro[:steps, 0], *alone.accel[:steps, 0].T]
+    weights = StrokeWeights.of(rotor, means.t)
+    amplitudes = weights.amplitudes(*(filled(x) for x in felt))
+    aged, windows = _aged(frames, means), gyro_windows(alone, 0)
+    return Swim(
+        name, means, aged, amplitudes, weights.rotor, weights.stroke, windows, _force(alone)
+    )
+
+
+def _force(alone: Experiment) -> Rows:
+    """Rows of the accelerometer; none where it says too little."""
+    frames, t = alone.frames[0], DT * np.arange(int(alone.steps[0]))
+    found = force_rows(alone, 0, np.interp(t, frames.t, frames.pose[:, 2]))
+    return NO_FORCE if found is None else found[0]
+
+
+def _aged(frames: Frames, means: StrokeMeans) -> Array:
+    """Change of the stroke-mean velocity (C, 3) per second by which images are older."""
+    older = stroke_mean(frames.t + AGE, means.t)(frames.pose)[:, 3:]
+    change = (older - means.velocity) / AGE
+    return np.where(np.isfinite(change), change, 0.0)

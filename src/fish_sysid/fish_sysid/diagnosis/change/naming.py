@@ -1,0 +1,102 @@
+"""Which name: what each candidate is worth on NEW's trials left out in turn, and its strengths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sysid.diagnosis.change.shared_fit import CHANGE, Key, Regression
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One candidate in NEW alone."""
+
+    key: Key
+    gain: float  # nats per left-out trial, mean
+    std: float  # standard error of that mean
+    by_trial: Array  # (M,)
+    strengths: Array  # (K,) in typical ones
+    covariance: Array  # (K, K), by the jackknife over trials
+    whole: float  # nats on the trials that it was fitted to
+
+    @property
+    def name(self) -> str:
+        return self.key[0]
+
+    @property
+    def lower(self) -> float:
+        """The gain less its standard error."""
+        return self.gain - self.std
+
+
+def judge_all(fit: Regression, taken: Sequence[Key] = ()) -> dict[str, Judged]:
+    """Every candidate beside those `taken`, the best form of each."""
+    new = range(fit.old, len(fit.names))
+    base = _Fitter(fit, [i for k in taken for i in fit.at[k]])
+    without = [base.loss(m, *base.left_out(m)) for m in new]
+    found: dict[str, Judged] = {}
+    for key in fit.at:
+        if key in taken:
+            continue
+        judged = _judge(fit, key, taken, np.array(without), new)
+        if key[0] not in found or judged.whole > found[key[0]].whole:
+            found[key[0]] = judged
+    start = base.best
+    return {
+        n: Judged(j.key, j.gain, j.std, j.by_trial, j.strengths, j.covariance, j.whole - start)
+        for n, j in found.items()
+    }
+
+
+def _judge(
+    fit: Regression, key: Key, taken: Sequence[Key], without: Array, new: Sequence[int]
+) -> Judged:
+    own = [i for k in (*taken, key) for i in fit.at[k]]
+    fitter, K = _Fitter(fit, own), len(fit.at[key])
+    left_out = [fitter.left_out(m) for m in new]
+    gains = without - np.array(
+        [fitter.loss(m, *found) for m, found in zip(new, left_out, strict=True)]
+    )
+    values = np.array([b[-K:] for b, _ in left_out])
+    spread = values - values.mean(axis=0)
+    covariance = (len(new) - 1) / len(new) * spread.T @ spread
+    std = float(gains.std(ddof=1) / np.sqrt(len(gains))) if len(gains) > 1 else np.inf
+    return Judged(
+        key, float(gains.mean()), std, gains, fitter.coefficients[-K:], covariance, fitter.best
+    )
+
+
+class _Fitter:
+    """Shared columns with some candidates in NEW."""
+
+    def __init__(self, fit: Regression, own: Sequence[int]) -> None:
+        self._fit, self._own = fit, list(own)
+        self._S = fit.shared
+        self._at = [*range(self._S), *self._own]
+        new = slice(fit.old, None)
+        self._G = fit.gram[new][:, self._at][:, :, self._at].sum(axis=0)
+        self._h = fit.moment[new][:, self._at].sum(axis=0)
+        self._G[: self._S, : self._S] += fit.gram[: fit.old, : self._S, : self._S].sum(axis=0)
+        self._h[: self._S] += fit.moment[: fit.old, : self._S].sum(axis=0)
+        prior = np.concatenate([fit.precision, np.full(len(self._own), 1.0 / CHANGE**2)])
+        self._G += np.diag(prior)
+        self.coefficients = np.linalg.solve(self._G, self._h)
+        self.best = 0.5 * float(self._h @ self.coefficients)
+
+    def left_out(self, m: int) -> tuple[Array, int]:
+        """Coefficients without NEW's trial m."""
+        at = self._at
+        G = self._G - self._fit.gram[m][np.ix_(at, at)]
+        return np.linalg.solve(G, self._h - self._fit.moment[m][at]), m
+
+    def loss(self, m: int, b: Array, _: int) -> float:
+        """Half the weighted sum of squares of trial m."""
+        at = self._at
+        square = self._fit.square[m] - 2.0 * b @ self._fit.moment[m][at]
+        return 0.5 * float(square + b @ self._fit.gram[m][np.ix_(at, at)] @ b)

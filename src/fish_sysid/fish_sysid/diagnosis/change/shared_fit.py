@@ -1,0 +1,174 @@
+"""What OLD and NEW share: a ridge regression on both, with its ridge and noise chosen on OLD's left-out trials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sysid.diagnosis.change.candidates import PARAMETER, POOL_AND_SENSORS
+from fish_sysid.diagnosis.change.channels import CHANNELS
+from fish_sysid.diagnosis.change.rows import FIRST_NOISE, GYRO_BIAS, TrialRows
+
+Array = NDArray[np.float64]
+Key = tuple[str, int]
+
+# what is tried: precision of black-box columns, deviations of bodies and of pool and sensors in typical strengths
+RIDGES = tuple(product((1e-3, 1e-2, 1e-1), (0.1, 0.3, 1.0, 3.0), (1e-3, 0.1)))
+NOISE_ROUNDS = 2
+ROBUST = 3.0  # standard deviations
+SMALLEST_SCALE = 0.3  # of the robust spread
+CHANGE = 10.0  # deviation of a candidate's strength in NEW, in typical ones
+GYRO = (2, 3)  # channels with the gyro's bias
+
+
+@dataclass(frozen=True)
+class Regression:
+    """Normal equations of every trial, in units of noise.
+
+    Columns: shared ones first, then each candidate's own copies, that only NEW's trials count.
+    """
+
+    names: tuple[str, ...]  # of the trials, OLD first
+    old: int  # how many are OLD's
+    gram: Array  # (M, P, P)
+    moment: Array  # (M, P)
+    square: Array  # (M,) weighted sum of squares
+    precision: Array  # (S,) prior of the shared columns
+    at: dict[Key, NDArray[np.int64]]  # of a candidate's columns
+    noise: Array  # (CHANNELS,)
+    rest: Array  # (M,) mean square of what the shared columns leave, in units of noise
+    rows: tuple[
+        tuple[Array, Array, Array], ...
+    ]  # of NEW's trials: shared columns (N, S), measured, weights, all scaled
+
+    @property
+    def shared(self) -> int:
+        return len(self.precision)
+
+
+def regression(old: Sequence[TrialRows], new: Sequence[TrialRows]) -> Regression:
+    """The normal equations with noise and ridge from OLD."""
+    trials = [*old, *new]
+    keys = list(trials[0].candidates)
+    shared_keys = [k for k in keys if k[0] != PARAMETER + "all drags"]
+    at, start = {}, trials[0].black_box.shape[1]
+    for k in keys:
+        width = trials[0].candidates[k].shape[1]
+        at[k] = np.arange(start, start + width)
+        start += width
+    box, P = trials[0].black_box.shape[1], start
+    columns = [np.hstack([t.black_box, *(t.candidates[k] for k in keys)]) for t in trials]
+    noise = FIRST_NOISE
+    groups = _groups(box, P, at, shared_keys)
+    for _ in range(NOISE_ROUNDS):
+        scaled = [scaled_rows(t, x, noise) for t, x in zip(old, columns, strict=False)]
+        precision, residuals = _ridge(scaled, groups)
+        noise = noise * _spreads(old, residuals)
+    scaled = [scaled_rows(t, x, noise) for t, x in zip(trials, columns, strict=True)]
+    order = np.flatnonzero(np.isfinite(precision))
+    weights, rest = _robust(scaled, order, precision[order])
+    normal = [_normal(x * w[:, None], y * w) for (x, y), w in zip(scaled, weights, strict=True)]
+    G, h = (np.array([n[i] for n in normal]) for i in (0, 1))
+    own = np.concatenate([at[k] for k in keys])
+    perm = np.concatenate([order, own])
+    place = {int(p): len(order) + i for i, p in enumerate(own)}
+    return Regression(
+        tuple(t.name for t in trials), len(old), G[:, perm][:, :, perm], h[:, perm],
+        np.array([np.sum((y * w) ** 2) for (_, y), w in zip(scaled, weights, strict=True)]),
+        precision[order], {k: np.array([place[int(i)] for i in idx]) for k, idx in at.items()}, noise, rest,
+        tuple((x[:, order] * w[:, None], y * w, w) for (x, y), w in zip(scaled[len(old) :], weights[len(old) :], strict=True)),
+    )  # fmt: skip
+
+
+def _groups(box: int, P: int, at: dict[Key, NDArray[np.int64]], shared: Sequence[Key]) -> Array:
+    """(P,) 0 black box, 1 body, 2 pool and sensors, 3 not shared."""
+    group = np.full(P, 3)
+    group[:box] = 0
+    for k in shared:
+        group[at[k]] = 2 if k[0] in POOL_AND_SENSORS else 1
+    return group
+
+
+def scaled_rows(trial: TrialRows, columns: Array, noise: Array) -> tuple[Array, Array]:
+    """Columns and measurements in units of noise (CHANNELS,), whitened for the gyro's bias in the trial."""
+    size = 1.0 / noise[trial.channel]
+    sign = np.where(trial.channel == GYRO[0], 1.0, np.where(trial.channel == GYRO[1], -1.0, 0.0))
+    bias = np.where(trial.valid, GYRO_BIAS * sign * size, 0.0)
+    x, y, square = columns * size[:, None], trial.measured * size, float(bias @ bias)
+    # (I + b b')^-1/2 = I - (1 - 1 / sqrt(1 + b'b)) b b' / b'b
+    shrunk = bias * (1.0 - 1.0 / np.sqrt(1.0 + square)) / max(square, 1e-12)
+    return x - np.outer(shrunk, bias @ x), y - shrunk * (bias @ y)
+
+
+def _normal(x: Array, y: Array) -> tuple[Array, Array]:
+    return x.T @ x, x.T @ y
+
+
+def _ridge(scaled: Sequence[tuple[Array, Array]], groups: Array) -> tuple[Array, list[Array]]:
+    """Precisions (P,) that predict left-out trials best (infinite: not shared), and what they leave of each trial (N,)."""
+    normal = [_normal(x, y) for x, y in scaled]
+    G, h = sum(n[0] for n in normal), sum(n[1] for n in normal)
+    used = np.flatnonzero(groups < 3)
+    cut = np.ix_(used, used)
+
+    def residuals(prior: Array) -> list[Array]:
+        out = []
+        for (x, y), (g, m) in zip(scaled, normal, strict=True):
+            b = np.linalg.solve((G - g)[cut] + np.diag(prior[used]), (h - m)[used])
+            out.append(y - x[:, used] @ b)
+        return out
+
+    best: tuple[float, Array, list[Array]] | None = None
+    for flexible, body, pool in RIDGES:
+        prior = np.choose(groups.astype(np.int64), [flexible, 1.0 / body**2, 1.0 / pool**2, np.inf])
+        rest = residuals(prior)
+        cost = float(
+            np.sort([huber_loss(e) for e in rest])[:-1].sum()
+        )  # all but the strangest trial
+        if best is None or cost < best[0]:
+            best = cost, prior, rest
+    assert best is not None
+    return best[1], best[2]
+
+
+def _spreads(old: Sequence[TrialRows], residuals: Sequence[Array]) -> Array:
+    """Robust deviation (CHANNELS,) of residuals of left-out trials; 1 where there are none."""
+    rest, channel = np.concatenate(residuals), np.concatenate([t.channel for t in old])
+    valid = np.concatenate([t.valid for t in old])
+    found = np.ones(CHANNELS)
+    for c in range(CHANNELS):
+        own = np.abs(rest[(channel == c) & valid])
+        if len(own):
+            found[c] = max(1.4826 * float(np.median(own)), 1e-6)
+    return found
+
+
+def huber_loss(e: Array) -> float:
+    """Sum of squares over two up to ROBUST, linear beyond."""
+    size = np.abs(e)
+    return float(np.where(size < ROBUST, 0.5 * e**2, ROBUST * size - 0.5 * ROBUST**2).sum())
+
+
+def _robust(
+    scaled: Sequence[tuple[Array, Array]], used: NDArray[np.int64], precision: Array
+) -> tuple[list[Array], Array]:
+    """Roots of Huber's weights (N,) of each trial by the shared columns, and its mean square of residuals."""
+    weights = [np.ones(len(y)) for _, y in scaled]
+    rest: list[Array] = []
+    for _ in range(3):
+        normal = [
+            _normal(x[:, used] * w[:, None], y * w)
+            for (x, y), w in zip(scaled, weights, strict=True)
+        ]
+        G, h = sum(n[0] for n in normal), sum(n[1] for n in normal)
+        b = np.linalg.solve(G + np.diag(precision), h)
+        rest = [y - x[:, used] @ b for x, y in scaled]
+        weights = [np.sqrt(np.minimum(1.0, ROBUST / np.maximum(np.abs(e), 1e-9))) for e in rest]
+    e = np.concatenate(rest)
+    scale = max(float(np.sqrt(np.median(e[e != 0.0] ** 2) / 0.455)), SMALLEST_SCALE)
+    squares = np.array([np.mean(np.minimum(np.abs(e[e != 0.0]), 30.0) ** 2) for e in rest])
+    return [w / scale for w in weights], squares

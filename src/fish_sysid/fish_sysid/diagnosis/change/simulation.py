@@ -1,0 +1,124 @@
+"""Channels of a simulated robot under the recorded commands: what an effect or a parameter would change.
+
+The fish starts at rest; what a wrong start does is gone after the first second and a half, which no stroke mean covers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from fish_sim.model import DT
+from fish_sim.robot import Robot
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.change.channels import AT_CENTRES, MEANS, Swim, parts
+from fish_sysid.diagnosis.change.harmonics import StrokeWeights
+from fish_sysid.estimation.ekf import filter_stepper
+from fish_sysid.prediction.stroke_average import stroke_mean
+
+Array = NDArray[np.float64]
+
+LARGEST_MEAN, LARGEST_AMPLITUDE = (
+    2.0,
+    20.0,
+)  # m/s or rad/s, and SI units; what exceeds it has diverged
+LANES = 240  # trials times variants of one pass: memory
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A robot with an effect, or with other parameters of its own."""
+
+    effect: str  # "": none
+    values: Mapping[str, float]  # of all parameters of the effect, or of the robot
+
+
+def simulate(
+    robot: Robot, experiment: Experiment, days: Sequence[Swim], variants: Sequence[Variant]
+) -> list[list[Array]]:
+    """Channels (C, 12) of every variant in each of these trials; the camera and the gyro agree in them.
+
+    Variants of one effect share a compiled kernel and are simulated side by side.
+    """
+    trials = [experiment.names.index(swim.name) for swim in days]
+    lenses = [
+        _Lens.of(swim, experiment.commands[: experiment.steps[m], m, 0])
+        for m, swim in zip(trials, days, strict=True)
+    ]
+    at_once = max(1, LANES // len(trials))
+    found: dict[int, list[Array]] = {}
+    for effect in dict.fromkeys(v.effect for v in variants):
+        which = [i for i, v in enumerate(variants) if v.effect == effect]
+        for first in range(0, len(which), at_once):
+            some = which[first : first + at_once]
+            made = _pass(robot, experiment, lenses, trials, [variants[i] for i in some])
+            found.update(zip(some, made, strict=True))
+    return [found[i] for i in range(len(variants))]
+
+
+def _pass(
+    robot: Robot,
+    experiment: Experiment,
+    lenses: Sequence[_Lens],
+    trials: list[int],
+    variants: Sequence[Variant],
+) -> list[list[Array]]:
+    robots = [_robot(robot, variant) for variant in variants]
+    stepper, M = filter_stepper(robots[0]), len(trials)
+    table = np.array([stepper.parameters(r) for r in robots])
+    rest = np.array([stepper.rest((0.0, 0.0, 0.0), parameters=row) for row in table])
+    commands = np.tile(experiment.commands[:, trials], (1, len(variants), 1))
+    x = stepper.rollout(np.repeat(rest, M, axis=0), commands, np.repeat(table, M, axis=0))
+    turn = stepper.layout.links + 3
+    return [
+        [
+            lens.channels(x[: experiment.steps[m] + 1, i * M + j], turn)
+            for j, (m, lens) in enumerate(zip(trials, lenses, strict=True))
+        ]
+        for i in range(len(variants))
+    ]
+
+
+def _robot(robot: Robot, variant: Variant) -> Robot:
+    if not variant.effect:
+        return robot.with_parameters(**variant.values)
+    return robot.with_effect(variant.effect, **variant.values)
+
+
+@dataclass(frozen=True)
+class _Lens:
+    """What turns the states of a trial into channels."""
+
+    value: csr_matrix  # (C, T), of the stroke mean
+    slope: csr_matrix  # (C, T) 1/s
+    strokes: StrokeWeights
+
+    @classmethod
+    def of(cls, swim: Swim, rotor: Array) -> _Lens:
+        weights = stroke_mean(DT * np.arange(len(rotor), dtype=np.float64), swim.means.t)
+        value, slope = (csr_matrix(np.nan_to_num(w)) for w in (weights.value, weights.slope))
+        return cls(value, slope, StrokeWeights.of(rotor, swim.means.t))
+
+    def channels(self, x: Array, turn: int) -> Array:
+        """(C, 12) of states (T + 1, NS); `turn`: where the velocities begin."""
+        pose, velocity = x[:-1, :3], x[:, turn : turn + 2]
+        mean, rate = self.value @ pose, self.slope @ pose
+        surge, sway = _turned(rate[:, 0], rate[:, 1], mean[:, 2])
+        push = np.diff(velocity, axis=0) / DT
+        ahead, left = _turned(push[:, 0], push[:, 1], pose[:, 2])
+        H = parts(self.strokes.amplitudes(x[:-1, turn + 2], ahead, left))
+        out = np.zeros((len(mean), AT_CENTRES))
+        motion = np.column_stack([surge, sway, rate[:, 2]])
+        out[:, : MEANS - 1] = np.clip(np.nan_to_num(motion), -LARGEST_MEAN, LARGEST_MEAN)
+        out[:, MEANS:] = np.clip(np.nan_to_num(H), -LARGEST_AMPLITUDE, LARGEST_AMPLITUDE)
+        return out
+
+
+def _turned(x: Array, y: Array, heading: Array) -> tuple[Array, Array]:
+    """Forward and left parts of pool-frame components."""
+    cos, sin = np.cos(heading), np.sin(heading)
+    return x * cos + y * sin, y * cos - x * sin

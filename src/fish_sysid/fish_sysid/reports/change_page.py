@@ -1,0 +1,137 @@
+"""The page of a comparison: sentence, what changed, OLD and NEW side by side with the model, tests, next experiment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from fish_report.page import Figure, Table, Text, styled, write_page
+from fish_sim.robot import Robot
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.change.change import Change
+from fish_sysid.diagnosis.change.change_json import changed_robot
+from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.prediction.prediction import predict
+from fish_sysid.prediction.stroke_average import stroke_mean
+from fish_sysid.reports.identify_page_figures import MEASURED, SIMULATED
+from fish_sysid.reports.symmetry_table import symmetry_table
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Content = dict[str, Any]
+
+HORIZON = 2.0  # s, of the predictions that are drawn
+SHOWN = 3  # trials of OLD and of NEW
+UNCHANGED = "#8fbcbb"
+NOTE = (
+    f"Grey: measured, averaged over strokes. Lines: predicted {HORIZON:g} s ahead from estimated states, again and again, "
+    "with the recorded commands, by OLD's model and by OLD's model with the change."
+)
+
+
+def write_change_page(path: Path, name: str, content: Content, change: Change) -> None:
+    """Write report.html."""
+    blocks: list[Text | Table | Figure] = []
+    if change.named:
+        blocks.append(_named(content))
+    if change.robot is not None and change.old is not None and change.new is not None:
+        blocks.append(side_by_side(change))
+        blocks.append(_ratios(change))
+        blocks.append(symmetry_table(content["symmetry"]))
+    blocks += [Text("Next experiment", content["next_experiment"]["why"])]
+    blocks += [Text("Left out", text) for text in content["left_out"]]
+    blocks += [Text("Refused", text) for text in content["change"]["refused"]]
+    blocks.append(Text("What remains", content["unexplained"]["description"]))
+    write_page(path, f"What changed in {name}", content["sentence"], blocks)
+
+
+def _named(content: Content) -> Table:
+    rows = [
+        [
+            entry["name"] if i == 0 else "",
+            member["name"],
+            ", ".join(
+                f"{k} {p['value']:.3g} ± {p['std']:.2g} {p['unit']}"
+                for k, p in member["parameters"].items()
+            ),
+            f"{member['probability']:.2f}",
+            f"{member['remainder_p_value']:.2g}",
+        ]
+        for entry in content["effects"]
+        for i, member in enumerate(entry["family"]["members"])
+    ]
+    note = (
+        "Members of a family explain the change about equally well on trials of NEW that are left out in turn. p of the rest: of "
+        "the swap test once this one is taken out; small where it leaves something."
+    )
+    header = (
+        "changed",
+        "member of the family",
+        "in NEW beside OLD",
+        "probability",
+        "p of the rest",
+    )
+    return Table("What changed", header, rows, note)
+
+
+def _ratios(change: Change) -> Table:
+    best = sorted(change.ratios.items(), key=lambda item: -item[1])[:8]
+    note = "The largest of these is compared with that of exchanged trials: the swap test."
+    header = ("candidate", "gain in NEW over the 90 % quantile of exchanged trials")
+    return Table("What differs most", header, [[n, f"{r:.1f}"] for n, r in best], note)
+
+
+def side_by_side(change: Change) -> Figure:
+    """Surge speed and yaw rate of some trials of OLD and NEW, measured and predicted."""
+    changed = _without_age(changed_robot(change))
+    days = [(day, e) for day, e in (("OLD", change.old), ("NEW", change.new)) if e is not None]
+    shown = [(day, e.select([m])) for day, e in days for m in range(min(SHOWN, len(e.names)))]
+    titles = [f"{day} {one.names[0]}" for day, one in shown]
+    figure = make_subplots(2, len(shown), subplot_titles=titles, horizontal_spacing=0.04)
+    for column, (day, one) in enumerate(shown, 1):
+        t, mean = _measured(one)
+        _line(figure, t, mean, "measured", MEASURED, column)
+        if change.robot is not None:
+            _line(figure, *_predicted(one, change.robot), "OLD's model", UNCHANGED, column)
+        if day == "NEW" and change.named:
+            _line(figure, *_predicted(one, changed), "with the change", SIMULATED, column)
+        figure.update_xaxes(title="time (s)", row=2, col=column)
+    figure.update_yaxes(title="surge speed (m/s)", row=1, col=1)
+    figure.update_yaxes(title="yaw rate (rad/s)", row=2, col=1)
+    return Figure("OLD, NEW, and NEW with the change", styled(figure, 560, titled=True), NOTE)
+
+
+def _without_age(robot: Robot) -> Robot:
+    """The robot for recordings whose images are at the moment they were taken."""
+    from dataclasses import replace
+
+    return replace(robot, sensors={k: v for k, v in robot.sensors.items() if k != "camera_latency"})
+
+
+def _measured(one: Experiment) -> tuple[Array, Array]:
+    frames = one.frames[0]
+    return frames.t, stroke_mean(frames.t, frames.t)(frames.pose)
+
+
+def _predicted(one: Experiment, robot: Robot) -> tuple[Array, Array]:
+    """Times and motion (F, 6) by predictions of HORIZON, NaN between two of them."""
+    run = predict(one, robot, usual_noise(one), HORIZON, HORIZON)
+    frames, seen = one.frames[0], run.seen(0)[:, 0]
+    return frames.t, stroke_mean(frames.t, frames.t)(seen)
+
+
+def _line(figure: go.Figure, t: Array, motion: Array, label: str, colour: str, column: int) -> None:
+    shared = {
+        "name": label,
+        "legendgroup": label,
+        "line": {"color": colour, "width": 1.5},
+        "mode": "lines",
+        "col": column,
+    }
+    figure.add_scatter(
+        x=t, y=motion[:, 3], showlegend=column == 1 or label == "with the change", row=1, **shared
+    )
+    figure.add_scatter(x=t, y=motion[:, 5], showlegend=False, row=2, **shared)

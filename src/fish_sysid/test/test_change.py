@@ -1,0 +1,165 @@
+"""OLD and NEW of a fish without forces: the stages of the comparison find what was put in, and nothing where nothing was."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kinematic_swims import World, kinematic_swims
+
+from fish_sim.model import DT
+from fish_sim.robot import Robot
+from fish_sysid.dataset.injection import INJECTIONS, with_injection
+from fish_sysid.dataset.joined import joined
+from fish_sysid.diagnosis.change import comparable
+from fish_sysid.diagnosis.change.change import Change
+from fish_sysid.diagnosis.change.change_json import answer, with_change
+from fish_sysid.diagnosis.change.channels import swims
+from fish_sysid.diagnosis.change.compare import compare
+from fish_sysid.diagnosis.change.harmonics import StrokeWeights
+from fish_sysid.diagnosis.change.naming import judge_all
+from fish_sysid.diagnosis.change.rows import MEAN_MOTION, look, trial_rows
+from fish_sysid.diagnosis.change.shared_fit import regression
+from fish_sysid.diagnosis.change.strength import degenerate
+from fish_sysid.diagnosis.change.swap_test import exchanges, swap_test
+
+NAMES = ("current", "camera_latency", "camera_heading_offset", "gyro_scale", "imu_misalignment")
+OLD, NEW = 10, 5  # trials
+
+
+@pytest.fixture(scope="module")
+def days():
+    """OLD's trials and NEW's of the same fish, nothing hidden."""
+    return kinematic_swims(World(), 1, OLD), kinematic_swims(World(), 2, NEW)
+
+
+@pytest.fixture(scope="module")
+def tested(days):
+    """What the swap test and the names say of NEW with an injection."""
+    old, new = days
+    rows = look(trial_rows(Robot(), old, swims(old), NAMES), MEAN_MOTION)
+
+    def test(name: str = "", **values: float):
+        changed = with_injection(new, name, values) if name else new
+        fit = regression(
+            rows, look(trial_rows(Robot(), changed, swims(changed), NAMES), MEAN_MOTION)
+        )
+        return swap_test(fit, [0] * (OLD + NEW), 200), judge_all(fit)
+
+    return test
+
+
+def test_nothing_is_found_where_nothing_changed(tested) -> None:
+    swapped, _ = tested()
+    assert swapped.p_value > 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "strength"),
+    [
+        ("current", {"x": 0.03, "y": -0.02}, 1.0),
+        ("camera_heading_offset", {"offset": 0.06}, 1.0),
+        ("gyro_scale", {"factor": 1.05}, 1.0),
+        ("camera_latency", {"delay": 0.05}, 1.0),
+    ],
+)
+def test_what_was_put_in_is_found_with_its_strength(tested, name, values, strength) -> None:
+    swapped, judged = tested(name, **values)
+    assert swapped.p_value <= 0.01
+    assert max(swapped.ratio, key=lambda n: swapped.ratio[n]) == name
+    assert judged[name].strengths[0] == pytest.approx(strength, abs=0.25)
+
+
+def test_amplitudes_at_the_stroke_are_those_of_the_signal() -> None:
+    t = DT * np.arange(1200)
+    rotor = 60.0 * np.sin(2.0 * np.pi * 1.7 * t)
+    weights = StrokeWeights.of(rotor, np.array([4.0, 6.0]))
+    gyro = 0.5 * np.cos(2.0 * np.pi * 1.7 * t - 0.4) + 0.2
+    ahead = 0.3 * np.cos(4.0 * np.pi * 1.7 * t)
+    found = weights.amplitudes(gyro, ahead, 0.0 * t)
+    assert np.abs(found[:, 0]) == pytest.approx(0.5, abs=0.01)
+    assert np.abs(found[:, 1:3]) == pytest.approx(0.0, abs=0.02)
+    assert np.abs(found[:, 3]) == pytest.approx(0.3, abs=0.01)
+    assert weights.rotor == pytest.approx(60.0, rel=0.01)
+    assert weights.stroke == pytest.approx(2.0 * np.pi * 1.7, rel=0.01)
+
+
+def test_exchanged_trials_are_never_those_of_new_and_keep_its_kinds() -> None:
+    kinds, new = [0, 0, 0, 1, 1, 1, 0, 1], np.array([6, 7])
+    found = exchanges(kinds, new, np.random.default_rng(0), 200)
+    assert len(found) == 4 * 4 - 1
+    assert all(sorted(kinds[i] for i in rows) == [0, 1] for rows in found)
+
+
+def test_a_rudder_injection_leaves_the_motion_and_changes_the_log(days) -> None:
+    old, _ = days
+    rudder = old.commands[..., 1]
+    gained = with_injection(old, "rudder_gain", {"factor": 0.8})
+    shifted = with_injection(old, "rudder_offset", {"offset": 0.06})
+    late = with_injection(old, "rudder_delay", {"delay": 0.1})
+    assert gained.commands[..., 1] * 0.8 == pytest.approx(rudder)
+    assert shifted.commands[..., 1] + 0.06 == pytest.approx(rudder)
+    assert late.commands[:-10, :, 1] == pytest.approx(rudder[10:])
+    for changed in (gained, shifted, late):
+        assert changed.frames == old.frames
+        assert np.array_equal(changed.gyro, old.gyro)
+    with pytest.raises(ValueError, match="payload"):
+        with_injection(old, "payload", {})
+    assert len(INJECTIONS) == 9
+
+
+def test_days_that_cannot_be_compared_say_why_and_what_is_needed(days) -> None:
+    old, new = days
+    blind = replace(new, gyro=np.full_like(new.gyro, np.nan))
+    degrees = replace(new, commands=new.commands * [1.0, 180.0 / np.pi])
+    straight = kinematic_swims(World(turns=False, speeds=(10.0, 12.0)), 3, 4)
+    for other, text in (
+        (blind, "same topics"),
+        (degrees, "equal units"),
+        (new.select([0, 1]), "expected at least 3"),
+        (straight, "programs of OLD"),
+    ):
+        change = compare(other, [old], Robot())
+        assert change.verdict == "not_comparable"
+        assert text in change.reason
+        assert answer(change)["change"]["verdict"] == "not_comparable"
+
+
+def test_a_trial_that_swims_backwards_is_named_and_left_out(days) -> None:
+    old, _ = days
+    frames = old.frames[2]
+    turned = replace(frames, pose=frames.pose + [0.0, 0.0, np.pi])
+    backwards = replace(old, frames=(*old.frames[:2], turned, *old.frames[3:]))
+    kept, told = comparable.screened(swims(backwards), "OLD")
+    assert len(kept) == OLD - 1
+    assert told == ["OLD swim_2: swims backwards in the mean"]
+
+
+def test_days_are_joined_trial_by_trial(days) -> None:
+    old, new = days
+    both = joined([old, new])
+    assert len(both.names) == len(set(both.names)) == OLD + NEW
+    assert np.array_equal(both.commands[: new.length, OLD:], new.commands)
+
+
+def test_limits_of_an_effect_are_no_answer() -> None:
+    assert "range" in degenerate("rudder_delay", {"delay": 0.3})
+    assert "range" in degenerate("rudder_placement", {"tip_share": 1.0})
+    assert "no such effect" in degenerate("rudder_lag", {"time_constant": 0.0})
+    assert degenerate("rudder_lag", {"time_constant": 0.12}) == ""
+    assert degenerate("rudder_gain", {"factor": 0.8}) == ""
+
+
+def test_a_change_is_added_to_what_the_robot_has() -> None:
+    from fish_sysid.diagnosis.change.change import Member
+    from fish_sysid.diagnosis.change.strength import Refitted
+    from fish_sysid.diagnosis.symmetry.finding import Estimate
+
+    robot = Robot().with_effect("current", x=0.01, y=0.0)
+    values = {"x": Estimate(0.03, 0.001, "m/s"), "y": Estimate(-0.02, 0.001, "m/s")}
+    member = Member("current", 1.0, 10.0, 0.5, Refitted(values, "", np.zeros(3)))
+    changed = with_change(robot, member)
+    assert changed.effects["current"]["x"] == pytest.approx(0.04)
+    assert changed.effects["current"]["y"] == pytest.approx(-0.02)
+    assert answer(Change("unchanged", p_value=0.4))["verdict"] == "no_mismatch"
