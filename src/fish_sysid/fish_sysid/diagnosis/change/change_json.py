@@ -9,7 +9,7 @@ from fish_sim.robot import Robot
 from fish_sysid.diagnosis.change.change import Change, Member, Named
 from fish_sysid.diagnosis.families import FAMILIES, family_of
 from fish_sysid.diagnosis.next_experiment import next_experiment, written
-from fish_sysid.diagnosis.symmetry.symmetry_json import symmetry_entry
+from fish_sysid.diagnosis.symmetry.symmetry_json import stated, symmetry_entry
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.parametrization import effect_class
 
@@ -67,24 +67,34 @@ def sentence(change: Change) -> str:
     """What changed, in words."""
     if change.verdict == "not_comparable":
         return f"NEW and OLD cannot be compared: {change.reason}"
+    lacks = in_every_recording(change)
     if change.verdict == "unchanged":
-        return f"Nothing changed that these recordings show (exchanged trials differ as much, p = {change.p_value:.2g})."
+        return (
+            "Nothing changed that these recordings show: exchanged trials differ as much "
+            f"(p = {change.p_value:.2g}).{lacks}"
+        )
     if not change.named:
-        return f"The fish changed (p = {change.p_value:.2g}), and no name explains it: {remainder(change)}."
+        return f"The fish changed (p = {change.p_value:.2g}), and no name explains it: {remainder(change)}.{lacks}"
     parts = [_words(named) for named in change.named]
     left = (
         f" Beside that something else changed: {remainder(change)}."
         if change.suspects
         else f" What is left looks like exchanged trials (p = {change.remainder_p_value:.2g})."
     )
-    return f"Since OLD the fish has {' and '.join(parts)} (p = {change.p_value:.2g}).{left}"
+    return f"Since OLD the fish has {' and '.join(parts)} (p = {change.p_value:.2g}).{left}{lacks}"
 
 
 def remainder(change: Change) -> str:
     """What of the change has no name."""
     if not change.suspects:
-        return "what every recording of this fish lacks was not asked; diagnose OLD alone for it"
+        return "nothing of the change"
     return f"most alike are {', '.join(change.suspects)}, and none of them explains it"
+
+
+def in_every_recording(change: Change) -> str:
+    """What OLD shows already, by tests that need no model of the fish."""
+    found = [finding.statement for finding in stated(change.symmetry)]
+    return f" OLD as well as NEW: {'; '.join(found)}." if found else ""
 
 
 def _words(named: Named) -> str:

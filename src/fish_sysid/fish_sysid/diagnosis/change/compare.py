@@ -223,10 +223,11 @@ def _next(
     if not found:
         return None
     found.sort(key=lambda one: -one[1].by_trial.mean())
-    best, first = found[0]
-    alike = [(j, v) for j, v in found if not apart(first.by_trial, v.by_trial)]
+    top = found[0][1].by_trial
+    alike = [(j, v) for j, v in found if not apart(top, v.by_trial)]
     kept = {j.name for j, _ in alike}
-    alike = [(j, v) for j, v in alike if j is best or SPECIAL_CASE.get(j.name) not in kept]
+    alike = [(j, v) for j, v in alike if SPECIAL_CASE.get(j.name) not in kept]
+    best, first = alike[0]
     weights = [tie(first.by_trial, v.by_trial) for _, v in alike]
     members = []
     for (j, values), weight in zip(alike, weights, strict=True):
