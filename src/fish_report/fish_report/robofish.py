@@ -24,6 +24,7 @@ LONGEST_ERROR = 2000  # characters
 BROUGHT_BY = {
     "demo": "fish_bringup",
     "score": "fish_bringup",
+    "latency": "fish_bringup",
     "excite": "fish_bringup",
     "arm": "fish_bringup",
     "disarm": "fish_bringup",
