@@ -28,11 +28,11 @@ def set_armed(armed: bool, namespace: str, domain: int | None, timeout: float) -
     node = rclpy.create_node("operator", namespace=namespace, context=context)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
-    client = node.create_client(SetBool, "arm")
+    client, name = node.create_client(SetBool, "arm"), f"{namespace.rstrip('/')}/arm"
     try:
         if not client.wait_for_service(timeout):
             raise UserError(
-                f"no service {client.srv_name} on ROS domain {context.get_domain_id()} within {timeout:g} s; start the robot "
+                f"no service {name} on ROS domain {context.get_domain_id()} within {timeout:g} s; start the robot "
                 "(node rotor, or the simulator), or give --domain and --namespace"
             )
         future = client.call_async(SetBool.Request(data=armed))
@@ -43,7 +43,5 @@ def set_armed(armed: bool, namespace: str, domain: int | None, timeout: float) -
         node.destroy_node()
         context.try_shutdown()
     if answer is None:
-        raise UserError(
-            f"{client.srv_name} did not answer within {timeout:g} s; see the log of its node"
-        )
+        raise UserError(f"{name} did not answer within {timeout:g} s; see the log of its node")
     return bool(answer.success), str(answer.message)
