@@ -71,16 +71,29 @@ class _Case:
 
 
 def compare(
-    new: Experiment, olds: Sequence[Experiment], robot: Robot, report: Report = lambda _: None
+    new: Experiment,
+    olds: Sequence[Experiment],
+    robot: Robot,
+    report: Report = lambda _: None,
+    make_model: Callable[[Experiment, Robot], Robot] | None = None,
 ) -> Change:
-    """What changed in NEW against the days OLD; "not_comparable" with the reason where that cannot be said."""
+    """What changed in NEW against the days OLD; "not_comparable" with the reason where that cannot be said.
+
+    make_model: OLD's trials and the robot as given -> the robot whose columns are taken; None: `model_of`.
+    """
     try:
-        return _compare(new, olds, robot, report)
+        return _compare(new, olds, robot, report, make_model or model_of)
     except NotComparableError as error:
         return Change("not_comparable", reason=str(error))
 
 
-def _compare(new: Experiment, olds: Sequence[Experiment], robot: Robot, report: Report) -> Change:
+def _compare(
+    new: Experiment,
+    olds: Sequence[Experiment],
+    robot: Robot,
+    report: Report,
+    make_model: Callable[[Experiment, Robot], Robot],
+) -> Change:
     old = joined(olds)
     check_sensors(old, new)
     delay = align(old).delay
@@ -91,7 +104,7 @@ def _compare(new: Experiment, olds: Sequence[Experiment], robot: Robot, report: 
     new_days, more = screened(swims(new), "NEW")
     check_counts(old_days, new_days)
     report("fitting OLD by predictions")
-    model = model_of(old.select([old.names.index(s.name) for s in old_days]), robot)
+    model = make_model(old.select([old.names.index(s.name) for s in old_days]), robot)
     report("what each candidate would change")
     old_rows = trial_rows(model, old, old_days, NAMES)
     new_rows = trial_rows(model, new, new_days, NAMES)
