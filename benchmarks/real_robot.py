@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,8 @@ def described(fit: PredictionFit) -> dict[str, object]:
         "links": fit.robot.links,
         "effects": names,
         "cost": fit.found.cost,
+        "trust": asdict(fit.found.trust),
+        "judged": [(s.name, s.gain, s.deviation, s.added) for s in (*fit.steps, *fit.links_judged)],
         **fit.sensors,
         "parameters": parameters,
     }
@@ -94,7 +97,9 @@ def judged(
     )
     hypothesis, theta, _ = fit.with_camera_offset()
     noise = usual_noise(moved.select(rest))
-    robot = with_noise(plain(Parametrization(hypothesis).robot(theta)), noise, "shooting")
+    robot = with_noise(
+        plain(Parametrization(hypothesis).robot(theta)), noise, "shooting", fit.found.trust
+    )
     made = predict(moved.select(left_out), robot, noise, max(HORIZONS), EVERY, WARM_UP)
     bilinear = fit_baselines(moved.select(rest))["bilinear"]
     pair = [prediction_errors(p) for p in (made, predict_baseline(bilinear, made, HALF_WINDOW))]

@@ -70,20 +70,21 @@ def _from_content(content: Any) -> Robot:
 
 
 def _check_prediction(given: Any) -> dict[str, Any]:
-    """{states: shooting or filter, noise: {name: number, ..}}; what the numbers mean is up to the estimator."""
+    """{states: shooting or filter, noise and trust: {name: number, ..}}; what the numbers mean is up to the estimator."""
     if not isinstance(given, dict):
-        raise RobotError(f"prediction: got {given!r}; expected a table with states and noise")
+        raise RobotError(f"prediction: got {given!r}; expected a table with states, noise, trust")
     for name in given:
-        if name not in ("states", "noise"):
-            raise RobotError(f"prediction.{name}: unknown field; known: states, noise")
+        if name not in ("states", "noise", "trust"):
+            raise RobotError(f"prediction.{name}: unknown field; known: states, noise, trust")
     if given.get("states", STATES[0]) not in STATES:
         raise RobotError(
             f"prediction.states: got {given['states']!r}; expected one of {', '.join(STATES)}"
         )
-    if not isinstance(given.get("noise", {}), dict):
-        raise RobotError(
-            f"prediction.noise: got {given['noise']!r}; expected a table of name: number"
-        )
+    for name in ("noise", "trust"):
+        if not isinstance(given.get(name, {}), dict):
+            raise RobotError(
+                f"prediction.{name}: got {given[name]!r}; expected a table of name: number"
+            )
     return dict(given)
 
 

@@ -27,7 +27,9 @@ from fish_sysid.estimation.refit import ANNEAL_HELD, refit
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
+from fish_sysid.estimation.shooting.residuals import Scale
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
+from fish_sysid.estimation.shooting.start_states import START_TRUST
 from fish_sysid.estimation.thresholds import INNOVATION_RMS_REJECT, RATIO_REJECT
 from fish_sysid.identification_statements import (
     data_statements,
@@ -95,7 +97,7 @@ class Identification:
             robot = robot.with_effect("camera_latency", delay=self.camera_delay)
         if self.imu_delay:
             robot = robot.with_effect("imu_latency", delay=self.imu_delay)
-        return with_noise(robot, self.fit.noise, self.states)
+        return with_noise(robot, self.fit.noise, self.states, trust_of(self.predicted))
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -227,7 +229,7 @@ def by_predictions(
     fit = evaluate(hypothesis, theta, moved.select(train), own)
     fit = replace(fit, information=np.asarray(np.linalg.inv(covariance), dtype=float))
     report("which states predict better")
-    states = better_states(moved.select(train), plain(fit.robot), own)
+    states = better_states(moved.select(train), plain(fit.robot), own, found.found.trust)
     return Fitted(
         fit,
         moved,
@@ -253,9 +255,8 @@ def concluded(
     fit, moved = fitted.fit, fitted.experiment
     training, held_out = moved.select(train), moved.select(held) if held else None
     report("predicting trials left out")
-    judged, errors, lacking = judge(
-        training, held_out, start, with_noise(plain(fit.robot), fit.noise, fitted.states), fit.noise
-    )
+    robot = with_noise(plain(fit.robot), fit.noise, fitted.states, trust_of(fitted.predicted))
+    judged, errors, lacking = judge(training, held_out, start, robot, fit.noise)
     statements = (
         *data_statements(experiment, held_out),
         *lag_statements(lag),
@@ -281,6 +282,11 @@ def concluded(
         fitted.predicted,
         fitted.states,
     )
+
+
+def trust_of(predicted: PredictionFit | None) -> Scale:
+    """How far start states trust the sensors."""
+    return START_TRUST if predicted is None else predicted.found.trust
 
 
 def is_wrong(fit: Fit, noise: Noise) -> bool:

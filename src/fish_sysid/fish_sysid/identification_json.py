@@ -11,6 +11,7 @@ import numpy as np
 
 from fish_report.json_file import write_json
 from fish_sim.robot_file import save_robot
+from fish_sysid.estimation.shooting.selection import Step
 from fish_sysid.identification import Identification
 
 
@@ -62,23 +63,26 @@ def _predicted(result: Identification) -> dict[str, Any]:
     found = result.predicted
     if found is None:
         return {"fitted_to": "likelihood"}
-    steps = [
-        {
-            "name": step.name,
-            "gain": step.gain,
-            "std": step.deviation,
-            "added": step.added,
-            "alike": list(step.alike),
-        }
-        for step in found.steps
-    ]
     return {
         "fitted_to": "predictions",
-        "cost_by_links": {str(n): cost for n, cost in found.costs_by_links.items()},
+        "links": found.robot.links,
+        "links_judged": [_step(step) for step in found.links_judged],
+        "trust": asdict(found.found.trust),
         "spread_over_folds": found.parameter_spread,
         "sensors": {
             name: {"value": value, "std": found.sensor_errors[name]}
             for name, value in found.sensors.items()
         },
-        "effects_judged": steps,
+        "effects_judged": [_step(step) for step in found.steps],
+    }
+
+
+def _step(step: Step) -> dict[str, Any]:
+    """What one candidate did to trials left out."""
+    return {
+        "name": step.name,
+        "gain": step.gain,
+        "std": step.deviation,
+        "added": step.added,
+        "alike": list(step.alike),
     }

@@ -38,11 +38,10 @@ def step_statement(step: Step) -> str:
 
 def prediction_statements(found: PredictionFit) -> list[str]:
     """How a robot was fitted to predictions, and what that says."""
-    links = ", ".join(f"{n}: {cost:.0f}" for n, cost in sorted(found.costs_by_links.items()))
     clocks, deviation = found.sensors, found.sensor_errors
     out = [
-        f"cost of predictions by number of links of the tail, without effects: {links}; "
-        f"{found.robot.links} taken",
+        f"number of links of the tail: {found.robot.links}",
+        *map(step_statement, found.links_judged),
     ]
     out += [
         f"{name}: {clocks[name]:+.3f} +- {deviation[name]:.3f} beyond what camera and gyro say, by predictions"

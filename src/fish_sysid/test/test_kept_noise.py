@@ -41,7 +41,7 @@ def test_noise_that_cannot_be_used_is_refused(bad: dict[str, object]) -> None:
     ("text", "said"),
     [
         ("prediction: {states: guess}", "filter, shooting"),
-        ("prediction: {other: 1}", "known: states, noise"),
+        ("prediction: {other: 1}", "known: states, noise, trust"),
         (
             "parameters: {head_mass: {value: 0.465, knowledge: sure}}",
             "measured, estimated, unknown",

@@ -9,17 +9,18 @@ import pytest
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
-from fish_sysid.dataset.experiment import Experiment, Headings
+from fish_sysid.dataset.experiment import Experiment, Frames, Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.shooting.prediction_fit import (
-    fewest_links,
     fit_predictions,
+    more_links,
     prediction_hypothesis,
 )
-from fish_sysid.estimation.shooting.schedule import Found, polished
+from fish_sysid.estimation.shooting.schedule import Found, multistep, polished
 from fish_sysid.estimation.shooting.selection import choose
+from fish_sysid.estimation.shooting.trust import trusted
 
 FREE = ("head_drag_surge", "head_drag_yaw")
 TRIALS = 8
@@ -57,10 +58,12 @@ def test_iterations_are_no_evidence_where_nothing_is_concealed() -> None:
     assert all(step.gain < 0.1 for step in steps)
 
 
-def test_more_links_must_be_worth_it() -> None:
-    assert fewest_links({1: 103.0, 2: 110.0, 3: 100.0}) == 1
-    assert fewest_links({1: 120.0, 2: 104.0, 3: 100.0}) == 2
-    assert fewest_links({3: 100.0}) == 3
+@pytest.mark.parametrize("true", [1, 2])
+def test_more_links_must_predict_trials_left_out_better(true: int) -> None:
+    experiment = swum(Robot(links=true))
+    found, steps = more_links(experiment, fitted(experiment), Robot(links=1), FREE, (2,))
+    assert found.hypothesis.robot.links == true
+    assert [(step.name, step.added) for step in steps] == [("2 links", true == 2)]
 
 
 def test_the_servo_s_rate_is_held_and_its_range_follows_the_commands() -> None:
@@ -84,3 +87,21 @@ def test_a_fit_to_predictions_finds_the_robot_and_says_how_surely() -> None:
         assert error < 0.1
     assert fit.sensors["camera_latency.delay"] == pytest.approx(0.0, abs=0.005)
     assert set(fit.parameter_spread) == set(FREE)
+    assert fit.found.trust.position > 0.0
+
+
+def test_start_states_trust_the_sensor_that_is_right() -> None:
+    """A camera with ten times its usual noise is trusted less; only the training trials say so."""
+    experiment = swum(Robot(links=1))
+    random = np.random.default_rng(5)
+    shaken = tuple(
+        Frames(f.t, f.pose + [0.02, 0.02, 0.0] * random.standard_normal(f.pose.shape))
+        for f in experiment.frames
+    )
+    right = Found(nominal_hypothesis(Robot(links=1), FREE), np.zeros(len(FREE) + 3), np.inf)
+    clean, noisy = (
+        trusted(e, right, 4.0) for e in (experiment, replace(experiment, frames=shaken))
+    )
+    assert noisy.trust.fading > clean.trust.fading or noisy.trust.position > clean.trust.position
+    start = multistep(experiment, right, 4.0).cost(right.z)
+    assert clean.cost <= start

@@ -41,8 +41,9 @@ def conclude(state: State, task: Task) -> Diagnosis:
     if named(found) or not much_is_left(found) or not task.runs("surrogate model"):
         return found
     helpful = dict.fromkeys((*names, *(name for name in STRUCTURAL if name in task.names)))
-    choice = task.names if task.runs("surrogate's own choice") else ()
-    model = surrogate_model(nominal, tuple(helpful), training, task.progress, choice)
+    if task.runs("surrogate's own choice"):
+        helpful |= dict.fromkeys(task.names)
+    model = surrogate_model(nominal, tuple(helpful), training, task.progress)
     return replace(found, surrogate=model)
 
 

@@ -10,14 +10,37 @@ from typing import Any
 from fish_report.errors import UserError
 from fish_sim.robot import Robot
 from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.estimation.shooting.residuals import Scale
+from fish_sysid.estimation.shooting.start_states import START_TRUST
 
-STATES, NOISE = "states", "noise"  # of Robot.prediction
+STATES, NOISE, TRUST = "states", "noise", "trust"  # of Robot.prediction
+STATES_BY_SHOOTING = "shooting"
 
 
-def with_noise(robot: Robot, noise: Noise, states: str) -> Robot:
-    """The robot with the noise of its filter, and how its states at start points are estimated: filter or shooting."""
+def with_noise(robot: Robot, noise: Noise, states: str, trust: Scale = START_TRUST) -> Robot:
+    """The robot with the noise of its filter, and how its states at start points are estimated: filter or shooting.
+
+    trust: of shooting in the sensors.
+    """
     table = {k: list(v) if isinstance(v, tuple) else float(v) for k, v in asdict(noise).items()}
-    return replace(robot, prediction={STATES: states, NOISE: table})
+    kept: dict[str, Any] = {STATES: states, NOISE: table}
+    if states == STATES_BY_SHOOTING:
+        kept[TRUST] = {k: float(v) for k, v in asdict(trust).items()}
+    return replace(robot, prediction=kept)
+
+
+def kept_trust(robot: Robot) -> Scale:
+    """How far start states trust the sensors; raises UserError for numbers that cannot be used."""
+    table: Mapping[str, Any] = robot.prediction.get(TRUST, {})
+    known = tuple(f.name for f in fields(Scale))
+    for name, value in table.items():
+        good = isinstance(value, int | float) and math.isfinite(value) and value > 0.0
+        if name not in known or not good:
+            raise UserError(
+                f"prediction.trust.{name}: got {value!r}; expected positive numbers under the names {', '.join(known)}; "
+                "delete the entry for usual ones"
+            )
+    return replace(START_TRUST, **{k: float(v) for k, v in table.items()})
 
 
 def kept_noise(robot: Robot) -> Noise | None:
@@ -43,4 +66,4 @@ def kept_noise(robot: Robot) -> Noise | None:
 
 def uses_shooting(robot: Robot) -> bool:
     """Whether the robot's states at start points are estimated by shooting over the past second."""
-    return bool(robot.prediction.get(STATES) == "shooting")
+    return bool(robot.prediction.get(STATES) == STATES_BY_SHOOTING)

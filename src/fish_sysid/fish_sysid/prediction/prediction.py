@@ -22,7 +22,7 @@ from fish_sysid.estimation.ekf_types import WRENCH, Noise, SensorModel
 from fish_sysid.estimation.fixed_lag import smoothed
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.shooting.start_states import shot_states, without_sensor_errors
-from fish_sysid.prediction.kept_noise import uses_shooting
+from fish_sysid.prediction.kept_noise import kept_trust, uses_shooting
 from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
@@ -187,7 +187,8 @@ def predict(
         good = np.isfinite(known).all(axis=1)
         state[good, :nx], wrench[good] = known[good, :nx], known[good, nx : nx + 3]
     if uses_shooting(robot) and len(starts):
-        shot = shot_states(without_sensor_errors(experiment, sensors), robot, starts, ahead=ahead)
+        seen = without_sensor_errors(experiment, sensors)
+        shot = shot_states(seen, robot, starts, trust=kept_trust(robot), ahead=ahead)
         good = np.isfinite(shot).all(axis=1)
         state[good], wrench[good] = shot[good], 0.0
     pose = _simulate(experiment, robot, noise, starts, state, wrench, length)

@@ -19,9 +19,9 @@ from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.parametrization import Parametrization
 from fish_sysid.estimation.shooting.huber import huber, weight
-from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
+from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS, Scale
 from fish_sysid.estimation.shooting.rollout import STEP
-from fish_sysid.estimation.shooting.start_states import PAST, shot_states
+from fish_sysid.estimation.shooting.start_states import PAST, START_TRUST, shot_states
 from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, targets_of
 from fish_sysid.prediction.stroke_average import HALF_WINDOW
 
@@ -45,9 +45,11 @@ class Multistep:
         starts: Index,
         prior: Array | None = None,
         past: float = PAST,
+        trust: Scale = START_TRUST,
     ) -> None:
-        """starts: (S, 2) trial and grid point. prior: (K,) standard deviations of theta."""
-        self.experiment, self.coordinates, self.past = experiment, coordinates, past
+        """starts: (S, 2) trial and grid point. prior: (K,) standard deviations of theta. trust: of start states in sensors."""
+        self.experiment, self.coordinates = experiment, coordinates
+        self.past, self.trust = past, trust
         own = coordinates.prior if prior is None else prior
         self.prior = np.concatenate([own, np.ones(len(SENSORS))])
         self.targets = targets_of(experiment, starts)
@@ -59,7 +61,7 @@ class Multistep:
         """(S, NS) start states with z; NaN where none was found."""
         K = len(self.prior) - len(SENSORS)
         robot = self.coordinates.robot(z[:K])
-        return shot_states(self.experiment, robot, self.starts, z[K:], self.past)
+        return shot_states(self.experiment, robot, self.starts, z[K:], self.past, self.trust)
 
     def errors(self, z: Array, states: Array, slopes: bool = False) -> tuple[Array, Array]:
         """Scaled errors (R, 4) and, if asked, slopes (R, 4, K + 3); those without a start state are 0."""

@@ -16,7 +16,16 @@ from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.huber import weight
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
 from fish_sysid.estimation.shooting.schedule import Found, best_start, multistep, polished
-from fish_sysid.estimation.shooting.selection import Step, choose
+from fish_sysid.estimation.shooting.selection import (
+    EVERY,
+    FOLDS,
+    GLANCE,
+    Step,
+    choose,
+    judged,
+    left_out_costs,
+)
+from fish_sysid.estimation.shooting.trust import trusted
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -26,8 +35,6 @@ HELD = ("servo_rate_limit",)  # takes the place of any delay of the rudder
 RANGE = "rudder_range"  # free where commands go beyond it
 BEYOND = 0.95  # of the largest command: where the range starts, so that the data can move it
 IMU_CLOCK = "imu_latency.delay"  # free in windows alone: predictions hardly feel it, and leave it at its prior's 0
-FOLDS = 4
-ABOUT = 0.05  # of the cost: what a few more trials may turn round
 
 
 @dataclass(frozen=True)
@@ -38,7 +45,7 @@ class PredictionFit:
     steps: tuple[Step, ...]  # every effect that was judged
     covariance: Array  # (P, P) of z, clustered by trial
     spread: Array  # (P,) standard deviation of z over fits without a fold each, times the jackknife's factor
-    costs_by_links: dict[int, float]  # of the model without effects
+    links_judged: tuple[Step, ...]  # every number of links beyond the fewest that was judged
 
     @property
     def robot(self) -> Robot:
@@ -122,28 +129,51 @@ def fit_predictions(
 
     start: strength in typical ones, at which the fit of `effects` starts.
     """
-    tries: dict[int, Found] = {}
-    for count in links:
-        hypothesis = prediction_hypothesis(
-            with_links(robot, count), experiment, free, effects, start
-        )
-        tries[count] = best_start(experiment, hypothesis, report)
-    costs = {count: tried.cost for count, tried in tries.items()}
-    found = tries[fewest_links(costs)]
+    first, *more = sorted(links)
+    hypothesis = prediction_hypothesis(with_links(robot, first), experiment, free, effects, start)
+    found = best_start(experiment, hypothesis, report)
+    report("trust in the sensors at start points")
+    found = trusted(experiment, found, EVERY)
     steps: tuple[Step, ...] = ()
     if choose_from:
         found, steps = choose(experiment, found, choose_from, report)
+    found, judged = more_links(experiment, found, robot, free, more, report)
     report("predictions over 0.5 to 5 s, last steps")
-    found = polished(experiment, found)
+    found = polished(experiment, trusted(experiment, polished(experiment, found)))
     report("standard errors")
     covariance, spread = uncertainty(experiment, found)
-    return PredictionFit(found, steps, covariance, spread, costs)
+    return PredictionFit(found, steps, covariance, spread, judged)
 
 
-def fewest_links(costs: dict[int, float]) -> int:
-    """The fewest links whose cost is within ABOUT of the best one: more links fit more, and predict more slowly."""
-    best = min(costs.values())
-    return min(count for count, cost in costs.items() if cost <= (1.0 + ABOUT) * best)
+def more_links(
+    experiment: Experiment,
+    found: Found,
+    robot: Robot,
+    free: Sequence[str],
+    more: Sequence[int],
+    report: Report = lambda _: None,
+) -> tuple[Found, tuple[Step, ...]]:
+    """(the fit, or one of more links that predicts trials left out better by more than a standard error, what was judged)."""
+    steps: list[Step] = []
+    if len(experiment.names) < FOLDS:
+        return found, ()
+    for count in more:
+        control = left_out_costs(experiment, found)
+        names = tuple(
+            name for name in found.hypothesis.names if name in found.hypothesis.robot.table
+        )
+        hypothesis = prediction_hypothesis(
+            with_links(robot, count), experiment, free, names, GLANCE
+        )
+        longer = replace(best_start(experiment, hypothesis, report), trust=found.trust)
+        report(f"{count} links: leaving trials out")
+        step = judged(f"{count} links", control, left_out_costs(experiment, longer))
+        better = step.gain > step.deviation
+        steps.append(replace(step, added=better))
+        if not better:
+            break
+        found = longer
+    return found, tuple(steps)
 
 
 def uncertainty(experiment: Experiment, found: Found) -> tuple[Array, Array]:
@@ -151,7 +181,7 @@ def uncertainty(experiment: Experiment, found: Found) -> tuple[Array, Array]:
 
     The folds' fits are one Gauss-Newton step from the optimum, without a fold's trials each; the spread is the jackknife's.
     """
-    cost = multistep(experiment, found.hypothesis, found.z)
+    cost = multistep(experiment, found)
     e, J = cost.errors(found.z, cost.states(found.z), slopes=True)
     _, normal = cost.normal(found.z, e, J)
     flat, rows = e.ravel(), J.reshape(e.size, -1)

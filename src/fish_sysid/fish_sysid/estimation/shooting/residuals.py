@@ -34,6 +34,9 @@ class Scale:
     position: float = 0.004  # m
     heading: float = 0.03  # rad, by the camera
     orientation: float = 0.015  # rad, by the IMU
+    fading: float = (
+        np.inf
+    )  # s before a window's end at which a sample counts half: an old one says less of the end
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,8 @@ def residuals(
         (turned[:, 0] + zero[felt.window] - felt.value) / scale.orientation,
     ]
     window = np.concatenate([np.repeat(seen.window, 2), seen.window, felt.window])
-    joined = np.concatenate(e)
+    trust = _trust(windows, scale)
+    joined = trust * np.concatenate(e)
     joined = np.where(np.isfinite(joined), np.clip(joined, -LOST, LOST), LOST)
     if slope is None:
         nothing = np.zeros((len(joined), 0))
@@ -85,14 +89,24 @@ def residuals(
             d_turned[:, 0] / scale.orientation,
         ]
     )
+    J *= trust[:, None]
     J = np.where(np.isfinite(J) & (np.abs(J) < STEEPEST), J, 0.0)
     Js, zero_slope = _sensor_slopes(scale, rate, turning)
     return Residuals(
         window,
         joined,
-        np.column_stack([J[:, :theta_count], Js]),
-        np.column_stack([J[:, theta_count:], zero_slope]),
+        np.column_stack([J[:, :theta_count], trust[:, None] * Js]),
+        np.column_stack([J[:, theta_count:], trust * zero_slope]),
     )
+
+
+def _trust(windows: Windows, scale: Scale) -> Array:
+    """(R,) factor of each error by its age at the window's end."""
+    seen, felt = (
+        1.0 / (1.0 + (windows.steps * DT - samples.t) / scale.fading)
+        for samples in (windows.poses, windows.headings)
+    )
+    return np.concatenate([np.repeat(seen, 2), seen, felt])
 
 
 def _sensor_slopes(scale: Scale, rate: Array, turning: Array) -> tuple[Array, Array]:

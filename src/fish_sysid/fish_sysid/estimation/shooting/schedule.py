@@ -7,7 +7,7 @@ side, so that windows are fitted from several stiffnesses; the cost of predictio
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,8 @@ from fish_sysid.estimation.parametrization import Hypothesis, Parametrization
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.multiple_shooting import Shooting
 from fish_sysid.estimation.shooting.multistep import Multistep
-from fish_sysid.estimation.shooting.residuals import SENSORS
-from fish_sysid.estimation.shooting.start_states import PAST
+from fish_sysid.estimation.shooting.residuals import SENSORS, Scale
+from fish_sysid.estimation.shooting.start_states import PAST, START_TRUST
 from fish_sysid.estimation.shooting.windows import cut, regular_starts
 from fish_sysid.prediction.prediction import WARM_UP, start_points
 
@@ -44,6 +44,7 @@ class Found:
     hypothesis: Hypothesis
     z: Array  # (K + 3,) theta and the sensors' parameters
     cost: float  # of predictions
+    trust: Scale = START_TRUST  # of start states in the sensors
 
 
 def ladder_start(coordinates: Parametrization, stiffness: float, heavy: float) -> Array:
@@ -77,12 +78,11 @@ def can_be_predicted(experiment: Experiment) -> bool:
     )
 
 
-def multistep(
-    experiment: Experiment, hypothesis: Hypothesis, z: Array, every: float = FINE
-) -> Multistep:
-    """Prediction errors from start points every `every` [s] with a stepper that suits z."""
-    coordinates = ShotParametrization(hypothesis, z[: -len(SENSORS)])
-    return Multistep(experiment, coordinates, start_points(experiment, every, WARM_UP))
+def multistep(experiment: Experiment, found: Found, every: float = FINE) -> Multistep:
+    """Prediction errors from start points every `every` [s] with a stepper that suits the fit."""
+    coordinates = ShotParametrization(found.hypothesis, found.z[: -len(SENSORS)])
+    starts = start_points(experiment, every, WARM_UP)
+    return Multistep(experiment, coordinates, starts, trust=found.trust)
 
 
 def best_start(
@@ -93,7 +93,8 @@ def best_start(
     for stiffness, heavy in LADDER:
         report(f"shooting, {hypothesis.robot.links} links, tail {stiffness:g} times as stiff")
         _, z = shoot(experiment, hypothesis, ladder_start(origin, stiffness, heavy))
-        cost, z = multistep(experiment, hypothesis, z, 4.0 * FINE).improve(z, 2, 3)
+        start = Found(hypothesis, z, np.inf)
+        cost, z = multistep(experiment, start, 4.0 * FINE).improve(z, 2, 3)
         if best is None or cost < best.cost:
             best = Found(hypothesis, z, cost)
     assert best is not None
@@ -104,5 +105,5 @@ def polished(
     experiment: Experiment, found: Found, every: float = FINE, rounds: int = ROUNDS
 ) -> Found:
     """Predictions made better from where the fit stands."""
-    cost, z = multistep(experiment, found.hypothesis, found.z, every).improve(found.z, rounds)
-    return Found(found.hypothesis, z, cost)
+    cost, z = multistep(experiment, found, every).improve(found.z, rounds)
+    return replace(found, z=z, cost=cost)

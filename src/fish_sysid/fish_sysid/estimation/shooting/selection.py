@@ -75,14 +75,14 @@ def choose(
         promising = glances(experiment, found, left)[:JUDGED]
         report(f"effect {number + 1}: leaving trials out for {', '.join(promising)}")
         control = left_out_costs(experiment, found)
-        judged = [judge(experiment, found, name, control) for name in promising]
-        good = [step for step in judged if step.gain > step.deviation]
+        tried = [judge(experiment, found, name, control) for name in promising]
+        good = [step for step in tried if step.gain > step.deviation]
         best = max(good, key=lambda step: step.gain, default=None)
         steps += [
-            replace(s, added=s is best, alike=_alike(s, judged) if s is best else ())
-            for s in sorted(judged, key=lambda s: -s.gain)
+            replace(s, added=s is best, alike=_alike(s, tried) if s is best else ())
+            for s in sorted(tried, key=lambda s: -s.gain)
         ]
-        for step in judged:
+        for step in tried:
             report(f"{step.name}: {step_text(step)}")
         if best is None:
             break
@@ -106,12 +106,13 @@ def extended(found: Found, name: str, strength: float = GLANCE) -> Found:
     hypothesis = found.hypothesis.with_effect(name, SCALE)
     K = len(found.hypothesis.free)
     theta = extend(found.z[:K], hypothesis, name, strength)
-    return Found(hypothesis, np.concatenate([theta, found.z[K:]]), np.inf)
+    z = np.concatenate([theta, found.z[K:]])
+    return replace(found, hypothesis=hypothesis, z=z, cost=np.inf)
 
 
 def glances(experiment: Experiment, found: Found, names: Sequence[str]) -> list[str]:
     """Names in order of the cost to which one Gauss-Newton step with each would lead, the lowest first."""
-    base = multistep(experiment, found.hypothesis, found.z, EVERY)
+    base = multistep(experiment, found, EVERY)
     states = base.states(found.z)
     e, J = base.errors(found.z, states, slopes=True)
     promise = {name: _promise(experiment, found, name, base, e, J) for name in names}
@@ -123,7 +124,7 @@ def _promise(
 ) -> float:
     """Cost after a step along the fit's slopes and the secant of a candidate's strength."""
     more = extended(found, name)
-    sight = multistep(experiment, more.hypothesis, more.z, EVERY)
+    sight = multistep(experiment, more, EVERY)
     with_it = sight.errors(more.z, sight.states(more.z))[0]
     secant = (with_it - e) / GLANCE
     if not np.isfinite(secant).all() or len(secant) != len(e):
@@ -140,17 +141,20 @@ def left_out_costs(experiment: Experiment, found: Found) -> Array:
     for fold in range(FOLDS):
         left_out = [m for m in range(count) if m % FOLDS == fold]
         rest = [m for m in range(count) if m % FOLDS != fold]
-        fit = multistep(experiment.select(rest), found.hypothesis, found.z, EVERY)
+        fit = multistep(experiment.select(rest), found, EVERY)
         _, z = fit.improve(found.z, ROUNDS, ITERATIONS)
-        unseen = multistep(experiment.select(left_out), found.hypothesis, z, EVERY)
+        unseen = multistep(experiment.select(left_out), replace(found, z=z), EVERY)
         costs[left_out] = unseen.costs_by_trial(z)
     return costs
 
 
 def judge(experiment: Experiment, found: Found, name: str, control: Array) -> Step:
     """A candidate against the control's costs (M,) of trials left out."""
-    costs = left_out_costs(experiment, extended(found, name))
-    # logarithms: a trial that diverges without it would outweigh all others in a mean of costs
+    return judged(name, control, left_out_costs(experiment, extended(found, name)))
+
+
+def judged(name: str, control: Array, costs: Array) -> Step:
+    """Costs (M,) of trials left out against those of the control: logarithms, so that no trial outweighs all others."""
     ratio = np.log(control / costs)
     ratio = ratio[np.isfinite(ratio)]
     deviation = float(np.std(ratio, ddof=1) / np.sqrt(len(ratio))) if len(ratio) > 1 else np.inf

@@ -27,7 +27,9 @@ Array = NDArray[np.float64]
 
 PAST = 1.0  # s
 ITERATIONS = 6
-SCALE = Scale(position=0.002)  # within one second a wrong model misses less than within four
+# the camera's usual noise; an IMU's heading drifts by as much within the past; an error of a wrong model lasts half a second.
+# A fit finds its own (`trust`)
+START_TRUST = Scale(position=0.002, heading=0.012, orientation=0.012, fading=0.5)
 
 
 def without_sensor_errors(experiment: Experiment, sensors: SensorModel) -> Experiment:
@@ -46,11 +48,12 @@ def shot_states(
     starts: NDArray[np.int64],
     sensors: Array | None = None,
     past: float = PAST,
-    scale: Scale | None = None,
+    trust: Scale = START_TRUST,
     ahead: float = 0.0,
 ) -> Array:
     """(S, NS) states at starts (S, 2) of trial and grid point by what was measured in the `past` [s] before each.
 
+    trust: how far which sensor and an old sample are trusted.
     ahead: s after each start whose measurements may be known too; sensors: (3,) in units of SENSOR_SCALE. NaN where the camera
     hardly saw the fish or the motion diverged.
     """
@@ -62,7 +65,7 @@ def shot_states(
     windows = cut(experiment, early[possible], past + ahead, late=0.0)
     if not len(windows):
         return out
-    shooting = Shooting(experiment, coordinates, windows, scale or SCALE)
+    shooting = Shooting(experiment, coordinates, windows, trust)
     sensors = np.zeros(len(SENSORS)) if sensors is None else sensors
     guess = shooting.settle(shooting.first_guess(np.zeros(0), sensors), ITERATIONS)
     p = coordinates.filter_inputs(np.zeros(0))[0]
