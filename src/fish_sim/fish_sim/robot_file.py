@@ -72,9 +72,7 @@ def _from_content(content: Any) -> Robot:
 def _check_prediction(given: Any) -> dict[str, Any]:
     """{states: shooting or filter, noise and trust: {name: number, ..}}; what the numbers mean is up to the estimator."""
     if not isinstance(given, dict):
-        raise RobotError(
-            f"prediction: got {given!r}; expected a table with states, noise and trust"
-        )
+        raise RobotError(f"prediction: got {given!r}; expected a table with states, noise, trust")
     for name in given:
         if name not in ("states", "noise", "trust"):
             raise RobotError(f"prediction.{name}: unknown field; known: states, noise, trust")
