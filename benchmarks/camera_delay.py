@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How old the camera's images are: its heading against the gyro's, for every delay and trial; prints, and draws an SVG.
 
 python benchmarks/camera_delay.py DATASET --out docs/results/camera_delay.svg

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Random faults while the robot swims through the real drivers on a fake robot: crashes, forbidden motion, recoveries.
 
     python benchmarks/fault_campaign.py [--faults 500] [--seed 0] [--out folder]

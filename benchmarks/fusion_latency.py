@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fusion of the simulated fish for camera latencies and clock offsets that nobody told it; prints a table.
 
 python benchmarks/fusion_latency.py [--seeds 3] [--seconds 30]

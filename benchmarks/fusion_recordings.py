@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fusion over a folder of recordings in the order of arrival; prints a table.
 
 python benchmarks/fusion_recordings.py FOLDER

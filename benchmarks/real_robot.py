@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Runs left out of the fit, predicted: ratios to the bilinear baseline on the same windows, and seconds.
 
 python benchmarks/real_robot.py POOL [--leave-out 1] [--effects tip_slip,rudder_gain | choose] [--links 1]

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every kernel under the address and undefined-behaviour sanitizers, or under any flags, against the interpreted form.
 
     python benchmarks/sanitize_kernels.py

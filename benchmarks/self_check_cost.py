@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the self-check of a kernel costs beside its build, in processor time.
 
     python benchmarks/self_check_cost.py

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Times and errors of the whole overhead camera chain: render, JPEG, decode, track. One core.
 
     python benchmarks/vision_chain.py [--frames 600]

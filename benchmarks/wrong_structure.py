@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Do bands of predictions mean what they say where the structure is wrong? Three links, fitted by one.
 
 python benchmarks/wrong_structure.py --repetitions 5

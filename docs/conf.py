@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Settings of the documentation (Sphinx): Markdown by MyST, the theme furo, the Python API by autodoc."""
 
 import re

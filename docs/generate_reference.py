@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Write the generated pages of docs/reference, or check that they are current.
 
     python docs/generate_reference.py            # writes the pages

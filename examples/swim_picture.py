@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the overhead camera saw of a recorded swim: the fish at several moments, the path it was to follow, the path it swam.
 
 python examples/swim_picture.py out/demo_.../recording --out docs/_static/letter_R.jpg      (a recording of the simulator)

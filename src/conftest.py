@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fixtures that the tests of several packages use."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Make scenarios of a recorded study again, diagnose them with today's tool, and compare the answers.
 
     python studies/compare_with_recorded.py --limit 60 --jobs 2 --out out/compare

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Pack finished studies into one file: python studies/pack_study.py FILE.tar.xz FOLDER [FOLDER ...]."""
 
 import sys

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Write the generated part of docs/results/blind_studies.md from the newest study's archive."""
 
 from pathlib import Path

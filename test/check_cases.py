@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of a folder of cases against their right answers; the folder is not a part of the project.
 
     python test/check_cases.py FOLDER

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Real nodes for tests across packages: processes of the built workspace, each set on an own ROS domain."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Rendered image -> JPEG -> tracker: accuracy over the whole pool, detection under glare, matching files."""
 
 from dataclasses import replace

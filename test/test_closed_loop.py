@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Real nodes in closed loop: a path is followed, killed nodes resume, a replay gives the same odometry."""
 
 import math
@@ -23,17 +25,15 @@ LONG, LONG_START = (
     (-1.3, 0.0, math.atan(0.25 * 2.0 * math.pi / 2.6)),
 )
 LOCKSTEP = 5.0  # s of real time that the simulator waits for estimates and commands
-FACTOR = (
-    0.5  # simulated seconds in a second: time enough on a computer that does other things as well
-)
+# simulated seconds in a second: time enough on a computer that does other things as well
+FACTOR = 0.5
 CROSS_TRACK_RMSE, SPEED_RMSE = 0.03, 0.04  # m, m/s; on a quiet computer 0.010 and 0.024
 SAME_POSITION, SAME_HEADING = (
     0.006,
     0.03,
 )  # m, rad, in 95 % of them; the noise is 0.002 m and 0.012 rad
-STOP_WITHIN = (
-    0.8  # s from the last estimate: 0.15 s until it is stale, 0.5 s in which the rotor runs down
-)
+# s from the last estimate: 0.15 s until it is stale, 0.5 s in which the rotor runs down
+STOP_WITHIN = 0.8
 GLIDE = 1.0  # m at most without a node and until the planner speaks again
 BACK_WITHIN, BACK_FOR = (
     0.1,

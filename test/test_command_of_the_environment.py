@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The command robofish that the virtual environment has: runs the sourced workspace's, or says that there is none."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The demo as a user starts it: all nodes with rendered images; and bad input, one line each."""
 
 import json

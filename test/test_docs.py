@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """README and docs: links lead somewhere, examples run, commands exist, generated pages are current."""
 
 import argparse

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The Python of the pages runs: blocks below `<!-- test: run -->`, those of a page as one program."""
 
 import re

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the pages say of parameters, arguments and messages is what the code has."""
 
 import ast

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The example that is no fish: names dry friction where there is some, nothing where there is none."""
 
 import importlib.util

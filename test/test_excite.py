@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A program swum open loop by the simulated robot, as a user starts it, and its recordings."""
 
 import json

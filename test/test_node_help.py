@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every node's executable with --help says what it is and starts nothing."""
 
 import importlib

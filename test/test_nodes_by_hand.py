@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every node of the robot runs alone by hand, says how it is, and ends with 0 on SIGINT and on SIGTERM."""
 
 import importlib

@@ -1,9 +1,12 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Package manifests: every import is declared, by a rosdep key where one exists and in requirements-ros.txt otherwise."""
 
 from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -99,3 +102,23 @@ def test_what_apt_does_not_bring_stands_in_the_requirements_of_the_full_ros() ->
     }
     assert pinned >= {DISTRIBUTIONS.get(name, name) for name in WITHOUT_KEY}
     assert pinned >= {name for name, key in KEYS.items() if key.endswith("-pip")}
+
+
+def test_every_file_says_whose_it_is_and_under_which_licence() -> None:
+    names = subprocess.run(
+        ["git", "ls-files", "*.py"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
+    header = ("# Copyright", "# SPDX-License-Identifier: Apache-2.0")
+    without = [
+        name
+        for name in names
+        if [line[: len(part)] for line, part in zip(lines_of(ROOT / name), header, strict=False)]
+        != list(header)
+    ]
+    assert not without, f"without copyright header: {', '.join(without)}"
+
+
+def lines_of(path: Path) -> list[str]:
+    """The first lines of a file, less the one that names its interpreter."""
+    lines = path.read_text(encoding="utf-8").splitlines()[:3]
+    return lines[1:] if lines and lines[0].startswith("#!") else lines

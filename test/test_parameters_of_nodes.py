@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """`ros2 param describe` and `ros2 param set` for every parameter of every node."""
 
 import importlib

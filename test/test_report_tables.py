@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Numbers on pages: in the units of their headings, at the right place, and what could not be had left empty."""
 
 from __future__ import annotations

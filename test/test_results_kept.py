@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """No work is lost at its end: outputs are tried before it, and Ctrl-C keeps what is finished."""
 
 import json

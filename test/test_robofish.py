@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The command line: every verb loads, mistakes are one line."""
 
 import subprocess

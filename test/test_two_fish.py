@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Two fish swim at once on one ROS domain, each in its own pool, and do not hear each other."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Workers end with their pool. They import this module for their tasks: nothing heavy is imported at its top."""
 
 import multiprocessing

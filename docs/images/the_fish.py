@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Draw the fish from above, with the lengths of Robot(): python docs/images/the_fish.py [FILE]."""
 
 from __future__ import annotations

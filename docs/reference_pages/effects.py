@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of the effects: what the nominal model may lack, with equation and parameters."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Markdown from plain text: tables and escaped prose."""
 
 from __future__ import annotations

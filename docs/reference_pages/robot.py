@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of robot.yaml: the nominal parameters with unit, range and source."""
 
 from __future__ import annotations

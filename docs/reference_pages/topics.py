@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of topics and services: who publishes and takes what, read from the nodes' source."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of the command `robofish`: every verb with the arguments that its parser declares."""
 
 from __future__ import annotations

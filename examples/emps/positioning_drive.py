@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which friction does a positioning drive hide? The method of the fish on a stage with one degree of freedom.
 
     python examples/emps/positioning_drive.py emps.csv.gz

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Write the recordings of this example again: a fish with form drag that its model lacks, and other drags and stiffness.
 
 Into this example's own folder, whose recordings are replaced, or into a new or empty folder that is given.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Diagnose the recordings of this example and draw what was found: docs/_static/hidden_drag.svg.
 
 python examples/hidden_drag/picture.py [--out docs/_static/hidden_drag.svg]      (half a minute; needs requirements-bench.txt)

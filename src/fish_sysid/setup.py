@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 from setuptools import find_packages, setup
 
 NAME = "fish_sysid"

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recovery of recordings with random damage: never an exception, never a message that was not there, none lost without need.
 
     python src/fish_bag/benchmarks/damage_recordings.py [--damages 10000] [--seed 0]

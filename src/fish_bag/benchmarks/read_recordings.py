@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Reading rate: 100 made-up trials of 20 s into typed data sets, against rosbags' raw reading of the same files.
 
     python src/fish_bag/benchmarks/read_recordings.py [--trials 100] [--recordings FOLDER]

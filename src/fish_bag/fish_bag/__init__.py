@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings: read anything into one typed data set (public names of the package)."""
 
 from fish_bag.dataset import find_trials, read_dataset

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Raw contents of one recording, whatever its format: bytes and arrival times of every topic."""
 
 from __future__ import annotations

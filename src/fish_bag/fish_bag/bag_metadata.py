@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """metadata.yaml of a rosbag2 directory (version 9, as ROS 2 Jazzy writes it)."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What is wrong with a trial: sample flags and problems. Nothing is changed or removed here."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Offset and drift of one machine's clock against the recorder's, from arrival times and stamps."""
 
 from __future__ import annotations
@@ -6,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BLOCKS = (
-    40  # the recording is cut into so many pieces of time; resampling them gives the uncertainty
-)
+# the recording is cut into so many pieces of time; resampling them gives the uncertainty
+BLOCKS = 40
 LOWEST = 3  # points kept of each piece: only the lowest can touch the envelope
 RESAMPLES = 50
 FEWEST = 10  # messages; below this nothing is said about drift and uncertainty

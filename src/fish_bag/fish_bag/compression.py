@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Compression of recordings, known by its first bytes: of a whole file, a chunk, or a single message."""
 
 from __future__ import annotations

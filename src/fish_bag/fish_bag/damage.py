@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Random damage to recordings, and what recovery must give back of them: for tests and benchmarks."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A folder of trials in, one data set out; many trials are read by several processes."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """From decoded message fields to the arrays of a stream: one function per role, all listed in ROLES."""
 
 from __future__ import annotations

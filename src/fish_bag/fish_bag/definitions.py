@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fields of a message type: as the recording defines them, or as the common interfaces do."""
 
 from __future__ import annotations

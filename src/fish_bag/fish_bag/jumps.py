@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Poses that no fish could have: single camera frames with swapped or lost markers."""
 
 from __future__ import annotations

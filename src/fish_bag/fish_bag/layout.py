@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where the fields of a serialised message lie, and decoding of many messages of one layout at once.
 
 Messages of one topic nearly always have the same size, the same strings and the same sequence lengths; only
@@ -32,9 +34,8 @@ DTYPES = {
     "float32": "f4",
     "float64": "f8",
 }
-MAX_LAYOUTS = (
-    200  # per topic; more means that lengths change with every message and columns make no sense
-)
+# per topic; more means that lengths change with every message and columns make no sense
+MAX_LAYOUTS = 200
 
 
 class LayoutError(Exception):

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A chunk of an MCAP file: whether it is whole, and what is left of it where it is cut.
 
 Source: MCAP specification (mcap.dev/spec).

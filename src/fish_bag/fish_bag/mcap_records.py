@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Records of an MCAP file as the mcap package reads them, with the checks that it leaves out, and the file's summary.
 
 Source: MCAP specification (mcap.dev/spec).

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every message of an MCAP file in the order of the file, whole or damaged: no index is needed.
 
 The file is walked record by record with the record classes of the mcap package. Its StreamReader does not serve here: it takes

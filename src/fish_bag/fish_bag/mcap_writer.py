@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A rosbag2 recording in MCAP that survives a kill: what is older than `chunk_s` is on disk.
 
 The mcap package writes the records, in chunks of 32 KiB without compression, to a `RecordFile`. That file passes every

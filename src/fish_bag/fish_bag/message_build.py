@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Builders of the messages that importers and tests write, as rosbags' message objects."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Message definitions of ROS 2 Jazzy as recordings store them: text and hash by type name."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which robot a recording is of: the namespace its topics stand in."""
 
 from __future__ import annotations

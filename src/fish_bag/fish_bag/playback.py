@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """When each recorded message is due: pure timing of a replay, with rate, pause and loop."""
 
 from __future__ import annotations

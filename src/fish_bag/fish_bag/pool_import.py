@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Importer of the real robot's ROS 1 bags (own message types) into recordings in the project's format.
 
 What the fields mean and how the robot's axes and clocks lie is said in the data's own README; here it is a
@@ -31,9 +33,8 @@ CENTRE = np.array(
 GRAVITY = 9.81  # m/s^2, what the sensor's gravity removal is undone with
 ENCODER_AGE_S = 0.042  # s, encoder samples are older than their stamp
 IMU_AGE_S = 0.014  # s, half of the polling and refresh time
-CAMERA_QUANTILE = (
-    0.01  # of arrival minus stamp: the camera clock's offset (single frames come early)
-)
+# of arrival minus stamp: the camera clock's offset (single frames come early)
+CAMERA_QUANTILE = 0.01
 CAMERA_VARIANCE = np.array([9e-6, 9e-6, 9e-4])  # m^2, m^2, rad^2
 TAIL_NAMES = ["tail_1", "tail_2"]
 GAIN_FIELDS = ("yaw_Kp", "yaw_Ki", "yaw_Kd", "vel_Kp", "vel_Ki", "vel_Kd")

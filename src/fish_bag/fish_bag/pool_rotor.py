@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The real robot's rotor command, rebuilt from what its ROS 1 recordings hold.
 
 The bags carry amplitude A and frequency f of every control loop, but not the speed sent to the motor. Every

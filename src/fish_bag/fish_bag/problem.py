@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What is wrong with a recording: one Problem per finding, RecordingError where nothing can be read."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Two publishers on one topic: values that jump between two sources."""
 
 from __future__ import annotations
@@ -13,9 +15,8 @@ from fish_bag.trial import NOT_FINITE, UNREADABLE, Commands, Stream
 FEWEST = 40  # samples
 ALTERNATES = 2.0  # steps to the next sample against those to the one after it; 0.5 where values change steadily, 1 for noise
 ALONE = 0.05  # share of commands that lie apart from both neighbours
-UNEVEN = (
-    0.3  # of the median period: distances of stamps that alternate by more come from two senders
-)
+# of the median period: distances of stamps that alternate by more come from two senders
+UNEVEN = 0.3
 
 
 def check_publishers(stream: Stream) -> Iterator[Problem]:

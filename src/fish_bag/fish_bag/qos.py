@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Quality of service as recordings store it: what decides whether publisher and subscriber meet."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A file that only ever holds whole records: what is appended is on disk entirely or not at all."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of the recorder node, and which topics it takes."""
 
 from __future__ import annotations

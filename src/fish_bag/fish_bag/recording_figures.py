@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Plots of what is in a trial (plotly figures): path, measurements over time, latency and gaps."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which files a recording consists of, and what kind each is: by its first bytes, not by its name."""
 
 from __future__ import annotations

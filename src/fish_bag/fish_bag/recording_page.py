@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One page on what is in a data set: tables and plots."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What is in a data set, as rows of text: topics, clocks, problems (for the terminal and for the page)."""
 
 from __future__ import annotations

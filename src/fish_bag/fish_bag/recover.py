@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Mend a recording that was cut off or damaged: save every whole message, say what is lost."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every message of a ROS 1 bag in the order of the file, with or without index.
 
 Nothing in this format has a checksum but the chunks that bz2 packs: a changed byte in a message stays unseen.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The same messages in every format that is read: for tests and benchmarks."""
 
 from __future__ import annotations

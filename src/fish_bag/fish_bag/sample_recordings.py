@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Small recordings of a robot whose every value is known in closed form: for tests and examples."""
 
 from __future__ import annotations

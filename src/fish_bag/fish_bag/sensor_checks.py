@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Sensors compared with each other: units, signs and axes that do not fit are errors, as no fit can mend them.
 
 Every check compares two records of the same motion by a straight line through their common variation. It speaks only where

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Rows of a damaged sqlite3 recording, read from its pages one by one without the tree that joins them.
 
 A table's rows stand in leaf pages. rosbag2 never changes or deletes a row, so that every row in any leaf page is one.

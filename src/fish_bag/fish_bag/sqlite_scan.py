@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every message of a sqlite3 recording of rosbag2, also of one whose recorder was killed or whose file is damaged.
 
 The file is opened as sqlite3 asks for it: changes that still stand in its `-wal` or `-journal` file are taken in, in a copy.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What metadata.yaml of a rosbag2 directory says, versions 1 to 10, as far as it can be read.
 
 A recording can be read without it. It helps to find the files, and its counts are compared with what was read.

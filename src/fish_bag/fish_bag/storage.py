@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What one storage file of a recording holds: topics, messages, and what is wrong with the file."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Typed streams from raw topics: header stamps, frames and values of every message, nothing left out."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Counts, rates, gaps and latencies of every topic in a recording, mapped or not."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One time axis for all topics of a trial, whatever machines their stamps and arrivals come from."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The arguments by which a command learns how the topics of recordings are called."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which topic plays which role, on which clock and in which frame: the default names, or a YAML file."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The typed data set: what a recording becomes, numpy arrays on one time axis.
 
 Time: every `t` is float64 seconds from `Trial.origin_ns`, the moment of measurement (header stamp, mapped

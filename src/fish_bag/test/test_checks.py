@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Faults in a recording: each is named, counted and flagged, and no sample is lost."""
 
 import numpy as np

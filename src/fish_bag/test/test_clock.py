@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Clock offset and drift from arrival times, against clocks whose error is known."""
 
 import numpy as np

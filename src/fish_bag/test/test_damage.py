@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recovery of damaged recordings: no exception, no invented message, none lost that is whole before the damage."""
 
 import struct

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Folders of trials: order, bad trials, mixed robots, several processes."""
 
 import re

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The vectorised decoder against rosbags' own, on random messages of every layout."""
 
 import numpy as np

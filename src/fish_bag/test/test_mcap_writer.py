@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The writer: valid MCAP for every reader, whole after a kill, closed on a full disk."""
 
 import os

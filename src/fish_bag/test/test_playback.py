@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Timing of a replay, and what its configuration refuses."""
 
 from dataclasses import asdict

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Importer of the real robot's ROS 1 bags, on a small bag of the same message types made here."""
 
 from pathlib import Path

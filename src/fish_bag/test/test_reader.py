@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """read_trial: every storage format gives the values that were written, on one time axis."""
 
 import numpy as np

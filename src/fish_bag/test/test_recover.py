@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recovery: what was whole is saved bit by bit, what was lost is said."""
 
 import struct

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Sensors that do not fit each other are errors, whatever the fault; a faultless swim has none."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The topic map: the YAML file holds the defaults, mistakes are named."""
 
 from dataclasses import asdict

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a recording of an open-loop swim lacks: commands of the program, sensors, a fish that no wall touched."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Keys of a terminal, one at a time and without waiting; the terminal is given back as it was."""
 
 from __future__ import annotations

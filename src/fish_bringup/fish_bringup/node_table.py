@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The one table of the robot's nodes, and how each is started.
 
 The pip-only starter (`processes.py`, used by `robofish demo` and the tests) and launch/fish.launch.py

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Starts and ends nodes as processes: own process group each, output to a log file, CPU time from /proc."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """When a run must end before its own end: the fish is out of the pool, the camera is silent, the time is up. No ROS, no clock.
 
 All times are stamps of the robot: in simulation the simulator's, so that a slow computer ends no run.

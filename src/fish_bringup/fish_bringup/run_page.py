@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of one run: where the fish swam, how far off it was, and what the controller did."""
 
 from __future__ import annotations

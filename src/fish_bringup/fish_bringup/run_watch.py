@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One run of the started robot, watched until it ends: progress, end of path or time, what must end it before (RunWatch)."""
 
 from __future__ import annotations
@@ -19,9 +21,8 @@ from fish_report.interruption import Interruption
 
 FUSION = CONTROL[1]  # says odometry/filtered
 START_TIMEOUT = 30.0  # s in which each thing that is waited for must come
-STILL_TIMEOUT = (
-    30.0  # s of real time without any new stamp of the estimate, however slow the computer
-)
+# s of real time without any new stamp of the estimate, however slow the computer
+STILL_TIMEOUT = 30.0
 LOOK_PERIOD = 0.1  # s between looks at the robot
 LAST_LOOK = 0.5  # s after the end of the path: the estimate may be there a little before the fish
 

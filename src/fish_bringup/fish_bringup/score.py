@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How well a recorded run followed its path: errors over time and their summary, from poses and speeds alone.
 
     e_y   = n(s) . (p - p(s))        cross-track [m], positive: head left of the path; s: progress, in order

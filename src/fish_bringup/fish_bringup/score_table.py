@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The tables of a scored run, for the terminal and for the page: the same cells in both."""
 
 from __future__ import annotations

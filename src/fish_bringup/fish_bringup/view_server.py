@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Serves the live view's page, its state and, if that is allowed, its buttons, on one address. No ROS."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the live view shows of one robot, as one JSON document. No ROS, no network."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The computer at the pool, of two: camera, tracker, fusion, planner, controller, recorder, and the live view with view:=true."""
 
 from launch import LaunchDescription

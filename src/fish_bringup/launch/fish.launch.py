@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The whole robot with the full ROS 2: `ros2 launch fish_bringup fish.launch.py robot:=sim path:=R speed:=0.2`.
 
 The same nodes with the same parameter files as the pip-only starter (fish_bringup.node_table); robot:=real takes

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The computer in the fish, of two: drivers of rotor, rudder and IMU.
 
 `ros2 launch fish_bringup in_the_fish.launch.py config:=myfish`.

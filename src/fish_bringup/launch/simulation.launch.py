@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The simulated robot: `ros2 launch fish_bringup simulation.launch.py path:=S view:=true`."""
 
 from launch import LaunchDescription

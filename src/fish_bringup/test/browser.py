@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A headless Chromium that tests drive over its debugging pipe."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Driving by hand on ROS: a gamepad's deadman, and keys of a real terminal."""
 
 import os

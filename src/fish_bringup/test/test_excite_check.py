@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a recording of a program lacks, on recordings with one thing taken away."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A program cut into swims: all of it, and every one inside the pool."""
 
 from functools import partial

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Verb latency on recordings as they are read."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Node live_view among others: what it shows, what it may do, and that missing ports leave the rest alone."""
 
 import json

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The node table: complete, startable, the same for the pip-only starter and the launch file."""
 
 import os

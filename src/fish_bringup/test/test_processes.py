@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Starting and ending processes: small Python programs stand for nodes."""
 
 import signal

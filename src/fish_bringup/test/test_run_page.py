@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Pages: self-contained, and what came from outside is escaped."""
 
 import re

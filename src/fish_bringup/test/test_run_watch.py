@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How a watched run ends, with a fish that moves along its path whenever somebody listens."""
 
 import os

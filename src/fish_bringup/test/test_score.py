@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The score of a run against motions whose errors are known by construction."""
 
 from dataclasses import replace

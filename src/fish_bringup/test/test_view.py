@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The live view without ROS: its document, its server, and its page in a real browser."""
 
 import json

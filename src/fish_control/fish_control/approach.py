@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The end of the approach: the first moment at which a fish is on its path, heads along it and has its speed."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How far the camera's stamps are from the IMU's clock, found from the heading that both measure.
 
 An image stamped t was taken at t + offset of the IMU's clock. For each offset of a grid the change of the camera's heading

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """From errors and gains to rudder and rotor: two PIDs, feed-forward, throttle map, actuator limits.
 
 Everything is written on generic scalars: `xp` is numpy or casadi (anything with fmin, fmax, sin, sqrt),

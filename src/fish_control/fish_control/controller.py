@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The controller: motion and plan in; gains, rudder and rotor commands out. No ROS, no clock."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the water does, learned while swimming: a Kalman filter of the current and of the robot's own thrust.
 
 State: w speed through the water along the mean heading psi, (c_x, c_y) current in the pool frame, e thrust beyond
@@ -36,17 +38,15 @@ from fish_control.control_law import (
 )
 
 LAG = 3.7  # s^2/m, M: a step of the throttle is answered within M / ff'(w), 2 s at 0.1 m/s
-MOVE_TIME = (
-    0.3  # s, for which a move of the rudder counts; also in which the rotor follows the throttle
-)
+# s, for which a move of the rudder counts; also in which the rotor follows the throttle
+MOVE_TIME = 0.3
 # spreads at the start
 SPEED_SPREAD = 0.2  # m/s, of w
 CURRENT_SPREAD = 0.03  # m/s, of each component
 THRUST_SPREAD = 1.0  # of e: wide, as a robot that is not the nominal one must not swim against a current that is none
 # drifts, per root s
-CURRENT_DRIFT = (
-    0.003  # m/s, of each component; a faster one takes the start of a strong robot for a current
-)
+# m/s, of each component; a faster one takes the start of a strong robot for a current
+CURRENT_DRIFT = 0.003
 THRUST_DRIFT = 0.005  # of e
 SPEED_DRIFT = 0.05  # m/s for each throttle, of w
 TURN_DRIFT = 0.1  # m/s for each rad of rudder, of w

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What fusion publishes: pose, velocity and how far to trust them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Open-loop programs of stroke and rudder, for recordings from which a model is identified. No ROS, no clock.
 
 phi_dot = A w sin(phase),   phase' = w = 2 pi f        rotor (MODEL, rotor and throttle)
@@ -24,9 +26,8 @@ from fish_control.stroke_mean import STROKE_FREQUENCY
 
 LAST_ROW = 8.0  # s that the last row lasts
 FASTEST_STROKE = 4.0  # Hz
-FASTEST_ROTOR = (
-    AMPLITUDE_AT_FULL_THROTTLE * 2.0 * math.pi * STROKE_FREQUENCY
-)  # rad/s, at full throttle
+# rad/s, at full throttle
+FASTEST_ROTOR = AMPLITUDE_AT_FULL_THROTTLE * 2.0 * math.pi * STROKE_FREQUENCY
 FREQUENCY_RATE = 4.0  # Hz/s; the rotor's speed must not jump
 PERIOD = 0.01  # s between commands
 STOPPING = 3.0  # s that a stopped fish holds its rudder, until it stands

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """An open-loop swim, from the estimate's arrival to rest: when it begins, and what ends it. No ROS, no clock."""
 
 from __future__ import annotations

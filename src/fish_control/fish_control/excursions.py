@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Cuts a program of stroke and rudder into swims that the pool has room for, each from a place of its own.
 
 A straight run of forty seconds is ten metres long. A model predicts the way from rest; where the robot swims elsewhere, the

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fusion of camera and IMU; a camera pose counts at the moment it was taken, not when it arrives."""
 
 from __future__ import annotations

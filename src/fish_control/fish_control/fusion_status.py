@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What fusion says of itself: lost sensors and the camera's clock."""
 
 from __future__ import annotations

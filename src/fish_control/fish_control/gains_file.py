@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The weights file: safetensors with the contract as JSON in its metadata."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Constant gains found by hand in the closed loop with simulated sensors; the baseline of every learned policy.
 
 `python -m fish_control.hand_tuned FILE` writes them as a weights file.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Heading of the IMU alone: gyro and orientation, whichever the sensor measures.
 
     psi' = w - b + noise,   z = psi + noise

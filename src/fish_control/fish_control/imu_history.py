@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The IMU's recent samples as arrays: integrated heading and specific force."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Percentiles of a running series of delays."""
 
 from __future__ import annotations

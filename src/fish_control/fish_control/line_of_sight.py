@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Line of sight: from pose and velocity to course, heading, speed and cross-track errors.
 
     chi_los = atan2(y_t - y, x_t - x)                 towards the lookahead point (the paper's law)
@@ -28,9 +30,8 @@ from fish_control.control_law import ControlLimits, Setpoint
 from fish_control.current_observer import WaterState, bounded, see_across, see_ahead, swim
 from fish_control.stroke_mean import TURN_LAG, StrokeState, stroke_step
 
-LEAST_HEADWAY = (
-    0.3  # of the wanted speed, through the water: a stronger current ahead is not believed
-)
+# of the wanted speed, through the water: a stronger current ahead is not believed
+LEAST_HEADWAY = 0.3
 SLOW = 0.02  # m/s, a robot that is slower has no course of its own: its heading stands for it
 
 

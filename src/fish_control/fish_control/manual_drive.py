@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Rotor and rudder by hand: what the operator wants, for as long as the deadman is held."""
 
 from __future__ import annotations
@@ -9,9 +11,8 @@ import numpy as np
 from fish_control.control_law import ActuatorState, ControlLimits, Setpoint, actuator_step
 from fish_control.controller import Command
 
-STEPS = (
-    10  # presses of a key from rest to full throttle, and from centre to the largest rudder angle
-)
+# presses of a key from rest to full throttle, and from centre to the largest rudder angle
+STEPS = 10
 
 
 class ManualDrive:

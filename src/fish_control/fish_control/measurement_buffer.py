@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A filter over camera poses that arrive late and out of order.
 
 Every pose of the last seconds is kept at the moment it was taken, with the filter's state after it. One that arrives

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A filter's memory of one robot's motion, kept up to date from odometry messages."""
 
 from __future__ import annotations
@@ -8,9 +10,8 @@ from typing import Generic, TypeVar
 
 from fish_control.line_of_sight import Motion
 
-LONGEST_STEP = (
-    0.1  # s, a longer gap between odometry messages, or a longer step back, restarts the filters
-)
+# s, a longer gap between odometry messages, or a longer step back, restarts the filters
+LONGEST_STEP = 0.1
 State = TypeVar("State")
 
 

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Factors on the variances that follow the innovations.
 
 `total` multiplies all variances of a channel. It grows by GAIN in the logarithm with every innovation that exceeds the

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Many robots on many paths: progress, cross-track error and lookahead points, vectorised.
 
 The one implementation of path following; `PathTracker` is a batch of one.

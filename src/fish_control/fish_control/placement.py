@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where a fish that swims without looking must begin to stay in the pool."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The planner: a path, a speed and a robot's motion in; target point, wanted course, speed and turn, and
 errors out.
 """
@@ -24,9 +26,8 @@ from fish_control.reference_path import ReferencePath
 from fish_control.stroke_mean import StrokeState, stroke_step
 
 SLOWEST, FASTEST = 0.05, 0.5  # m/s, the range of speeds of the robot
-GLIDING_YAW_RATE = (
-    0.5  # rad/s, wanted after the end; the rudder is hard over, so only its sign counts
-)
+# rad/s, wanted after the end; the rudder is hard over, so only its sign counts
+GLIDING_YAW_RATE = 0.5
 
 
 @dataclass(frozen=True)

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Gains from the robot's situation: a small network, or constants; numpy only."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a weights file promises and a controller expects: the contract between training and robot."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The pool's walls, and the refusal of paths that would touch them."""
 
 from __future__ import annotations
@@ -9,9 +11,8 @@ from fish_control.reference_path import ReferencePath
 
 HALF_LENGTH = 2.135  # m, wall at x = +-2.135 (MODEL: pool of 4.27 x 2.13 m, origin at its centre)
 HALF_WIDTH = 1.065  # m, wall at y = +-1.065
-STOPPING_RADIUS = (
-    0.27  # m, of the turn in which a fish stops with its rudder hard over; it turns in 0.257 m
-)
+# m, of the turn in which a fish stops with its rudder hard over; it turns in 0.257 m
+STOPPING_RADIUS = 0.27
 STOPPING_TURN = 1.9  # rad, how far it comes round from 0.3 m/s (1.5 rad from 0.2 m/s)
 
 

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Camera poses that may not be what they seem: repeats of one picture, and poses that contradict the estimate."""
 
 from __future__ import annotations

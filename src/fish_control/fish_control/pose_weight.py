@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How much a camera pose counts: its message, the noise that the data show, and the camera's clock."""
 
 from __future__ import annotations

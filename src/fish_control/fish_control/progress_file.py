@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The planner's progress on disk, so that a planner that was killed goes on where it was.
 
 Odometry alone cannot say where on a self-crossing path the robot is, and topics of a killed publisher are gone.

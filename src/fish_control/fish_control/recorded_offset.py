@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The camera's offset to the IMU's clock from a whole recording, with its standard deviation.
 
 The sums of squares are those of `camera_clock`, of blocks of BLOCK each. All blocks together give the estimate; leaving out

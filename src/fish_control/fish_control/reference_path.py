@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A path to follow: a dense curve over arc length, with tangent, heading and curvature."""
 
 from __future__ import annotations
@@ -8,9 +10,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-SAMPLE_SPACING = (
-    0.005  # m, nominal; a tenth of the smallest error that matters (cross-track of a few cm)
-)
+# m, nominal; a tenth of the smallest error that matters (cross-track of a few cm)
+SAMPLE_SPACING = 0.005
 LONGEST = 200.0  # m; the tables with which so long a path is followed take 1 GB
 
 End = Literal["stop", "loop"]

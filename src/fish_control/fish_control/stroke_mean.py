@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Mean motion of a body that swings once a stroke: a notch at the rotor's frequency.
 
 The rotor swings the head by 0.1 to 0.3 rad at 2 Hz; fed back as it is, the swing would wag the rudder. The
@@ -22,12 +24,10 @@ import math
 from typing import Any, NamedTuple
 
 STROKE_FREQUENCY = 2.0  # Hz, fixed by the throttle map of MODEL (A carries the throttle)
-DAMPING = (
-    0.3  # zeta, half the notch's width: wider delays turns, narrower learns a new swing slowly
-)
-TURN_LAG = (
-    2.0 * DAMPING / (2.0 * math.pi * STROKE_FREQUENCY)
-)  # s, by which psi_mean is late in a steady turn
+# zeta, half the notch's width: wider delays turns, narrower learns a new swing slowly
+DAMPING = 0.3
+# s, by which psi_mean is late in a steady turn
+TURN_LAG = 2.0 * DAMPING / (2.0 * math.pi * STROKE_FREQUENCY)
 
 
 class StrokeState(NamedTuple):

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Whether a fish that does not look where it swims must be stopped before a wall. No ROS, no clock."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """When the fish may swim: a verdict from the age and quality of what the controller is fed."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fusion, planner and controller around the simulated fish with its noisy, delayed sensors; no ROS."""
 
 from dataclasses import dataclass

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """An independent reading of simple SVG documents: de Casteljau, the arc's equations and products of matrices.
 
 Nothing of fish_control or svgelements is used here.

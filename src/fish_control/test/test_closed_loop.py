@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The whole chain without ROS: simulated fish, noisy and delayed sensors, fusion, planner, controller."""
 
 import numpy as np

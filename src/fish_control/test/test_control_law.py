@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The control law: one expression for numpy and CasADi, limits, anti-windup, throttle map, phase."""
 
 import casadi

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The filter of current and thrust: against the textbook's matrices, and what it learns in made-up waters."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """When an open-loop swim begins, and what ends it."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fusion of a swinging head seen by a late, lossy camera."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The weights file: round trip, inference, and what differs when it does not fit."""
 
 import json

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Errors of a robot that is where it should be are zero; others have the right sign and size."""
 
 import casadi

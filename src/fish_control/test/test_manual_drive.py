@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Driving by hand: set-points from keys, rest without the operator."""
 
 import math

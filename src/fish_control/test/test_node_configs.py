@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """YAML files and dataclasses say the same; ranges are checked."""
 
 from dataclasses import asdict

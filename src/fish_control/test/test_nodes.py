@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The nodes in one process: topics, frames, units, faults; and how they start and end as programs."""
 
 import json

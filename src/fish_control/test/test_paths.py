@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """PolicySpec of every path family, and what is special about each."""
 
 import numpy as np

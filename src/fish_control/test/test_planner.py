@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The planner: what it wants, how it ends, how it goes on after an interruption."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Points of CSV files: columns by name, dialects, and what is refused."""
 
 import csv

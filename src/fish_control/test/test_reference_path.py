@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Geometry of sampled paths against closed forms."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The constants of feed-forward, slip and water filter against the simulated fish, which knows nothing of them."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """SVG drawings: what a viewer shows is read, where it shows it; what cannot be judged is refused."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Angles of the fish's joints, as far as they are measured, commanded, or follow from the model. No ROS, no clock."""
 
 from __future__ import annotations

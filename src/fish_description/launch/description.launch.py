@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The fish for rviz: robot_state_publisher, joint_angles and, on demand, rviz itself.
 
 ros2 launch fish_description description.launch.py rviz:=true

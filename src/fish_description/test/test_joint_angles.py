@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Joint angles: what is measured, commanded, or follows from the springs."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The node alone: what is said on three topics is one message with every joint."""
 
 from __future__ import annotations

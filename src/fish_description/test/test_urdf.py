@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The picture of the fish has the geometry of the model."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How long a stop takes: from its cause to the last command that is not zero, and until the module drives no more.
 
     python src/fish_hw/benchmarks/stop_times.py [--times 20]

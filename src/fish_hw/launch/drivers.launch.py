@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The four drivers of the real robot, for the full ROS 2.
 
 ros2 launch fish_hw drivers.launch.py config:=FOLDER

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Shared by the tests of this package: emulated devices that are always given back."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Stands in for the kernel: its I2C driver, so that the real smbus2 runs, and its rules for PWM files."""
 
 import ctypes

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The BNO085 device and the IMU driver on the emulated hub, on simulated time, with every kind of damage."""
 
 import errno

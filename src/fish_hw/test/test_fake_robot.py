@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The fake robot's devices through the real drivers: what goes in comes out, and every fault can be mended."""
 
 import errno

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The interrupt line on a stand-in for the kernel: real descriptors, replaced ioctl."""
 
 import errno

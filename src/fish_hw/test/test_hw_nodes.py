@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The nodes: topics, units, frames, stamps and refusals in one process; signals with real processes."""
 
 import os

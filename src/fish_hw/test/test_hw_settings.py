@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Settings: their YAML files, and what they refuse."""
 
 from dataclasses import asdict

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The I2C transport with the real smbus2 on a stand-in for the kernel."""
 
 import errno

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Samples that cannot be used are told from a fish that swims hard, and from a hit."""
 
 import math

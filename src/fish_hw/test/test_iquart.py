@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """IQUART against messages made by the vendor's library (recorded), and against damaged lines."""
 
 import random

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The whole rotor driver on a real port with the emulated module behind it, in real time."""
 
 import itertools

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The rotor's limits and its way to a stop, on simulated time."""
 
 import itertools

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Jam, stuck encoder and runaway are told from a rotor that lags, on simulated time."""
 
 import math

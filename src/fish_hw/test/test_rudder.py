@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Rudder: pulses, limits, watchdog, both PWM outputs, and the driver around them."""
 
 import errno

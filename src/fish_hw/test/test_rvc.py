@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """UART-RVC against the datasheet's frame and two recorded ones, and against damage."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """SHTP and SH-2 against recorded packets (parsed by the vendor's example library) and against damage."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every cause stops the rotor in time and is latched; driver and emulated module on one simulated clock."""
 
 import itertools

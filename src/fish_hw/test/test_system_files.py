@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Files for the robot's computer: the tools that read them accept them, and they name what exists."""
 
 import re

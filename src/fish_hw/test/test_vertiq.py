@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The Vertiq device code on recorded bytes and on the emulated module behind a real port."""
 
 import math

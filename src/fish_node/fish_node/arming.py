@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Whether the motors may move: disarmed at the start, armed by a person, disarmed by any trouble and then latched.
 
 Disarmed is the state that nothing but `arm` ends: neither a fresh command nor a device that is back. No ROS and no

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Camera calibration files: what camera_info_manager, camera_calibration and OpenCV's FileStorage write.
 
 The one reader of all packages: YAML with image_width, image_height, camera_matrix and distortion_coefficients. OpenCV's

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """ROS domains on this machine: is one in use, and which is free."""
 
 from __future__ import annotations

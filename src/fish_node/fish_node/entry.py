@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where the installed executables start: a signal that comes while Python still imports a node ends it with 0 too.
 
 With --help a node says what it is and is not started: a driver would open its device.

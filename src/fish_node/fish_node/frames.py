@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Names of frames. A second fish has a prefix before every frame's name but the pool's, which both share."""
 
 from __future__ import annotations

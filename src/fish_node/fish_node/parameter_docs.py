@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a dataclass of parameters says of itself: units and meaning beside its fields, ranges in its refusals.
 
 The nodes' parameter descriptors and the reference page of the documentation are both made from this. No ROS.

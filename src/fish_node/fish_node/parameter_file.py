@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One node's parameters from a ROS parameter file, without ROS: for commands that act where the node would."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Names and types of parameters, without ROS."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Whether a second node publishes what only one may: two of them pull the fish to and fro, and nothing fails."""
 
 import time

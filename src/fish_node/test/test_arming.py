@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The arming state: who arms, what disarms, what stays latched."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """ROS domains: ports of the RTPS standard, use seen by binding them."""
 
 import socket

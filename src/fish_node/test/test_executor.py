@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The executor with a kept wait set runs every kind of callback, also of entities that come and go while it spins."""
 
 from __future__ import annotations

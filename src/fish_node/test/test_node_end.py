@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A node's end: what a signal brings about is no failure, what cannot start is one line, a mistake shows its traceback."""
 
 from types import SimpleNamespace

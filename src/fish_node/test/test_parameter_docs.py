@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Descriptions and ranges from a dataclass of parameters."""
 
 from dataclasses import dataclass

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a file has for a node is what ROS gives to it; where that is not clear, it is said."""
 
 from dataclasses import dataclass

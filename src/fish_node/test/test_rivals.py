@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A second node that publishes the same is noticed, one that takes over is not."""
 
 from fish_node.rivals import Rivals

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Static frames as messages."""
 
 from fish_node.nodes.static_frames import static_transform

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a node says of itself, once on the console."""
 
 from diagnostic_msgs.msg import DiagnosticStatus

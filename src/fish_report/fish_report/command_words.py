@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the user typed, for files that tell by which command they came about."""
 
 from __future__ import annotations

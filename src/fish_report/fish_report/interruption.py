@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Ctrl-C and SIGTERM as a question that a loop asks, so that they never cut something short."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """JSON that every reader can read: what is not finite becomes null, numpy's numbers become plain ones."""
 
 from __future__ import annotations

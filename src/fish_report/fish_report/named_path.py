@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A path whose last part is a name, after which pages and titles are called."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One self-contained HTML page of tables and plotly figures; opens without network, server or other files."""
 
 from __future__ import annotations

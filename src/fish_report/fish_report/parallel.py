@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Work on several threads: for what runs outside Python's lock, or waits for other processes."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Texts of foreign origin made harmless.
 
 Texts from files and from other nodes may hold anything: escape sequences that a terminal would obey, or a megabyte.

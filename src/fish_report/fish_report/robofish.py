@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The command `robofish`: `robofish VERB ...`, or every verb as an executable of its own package.
 
 A verb is a module with `add_arguments(parser)` and `run(args) -> int` (exit status). A package offers its verbs by

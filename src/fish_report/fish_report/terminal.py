@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The terminal: its console, tables in it, and texts of foreign origin.
 
 Texts from files and from other nodes are shown by `printable.plain` and never taken for rich's markup.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Worker processes that end with their work: neither an error nor Ctrl-C leaves one of them running."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where a verb writes, tried before it computes for minutes or hours what it then could not keep."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Texts of foreign origin in the terminal: shown, never obeyed and never taken for markup."""
 
 from __future__ import annotations

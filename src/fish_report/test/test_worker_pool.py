@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Worker processes: what they return, and what is left of them when their work goes wrong."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Compare the simulator with trajectories of an independent implementation of the same equations.
 
     python src/fish_sim/benchmarks/check_reference.py FOLDER

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Forward steps per second on one core against MuJoCo's C engine with the same number of joints.
 
     taskset -c 0 python src/fish_sim/benchmarks/forward_speed.py

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How the nominal fish swims: steady speed over throttle, and the limit cycle of a stroke.
 
     python src/fish_sim/benchmarks/swimming.py [--out swimming.svg]

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The chain of rigid bodies: where head, links, fin and what is fixed to the head are, and how they move.
 
 q = (x, y, theta_head, theta_1 .. theta_n), absolute angles in the pool frame; link 1 hangs on the head and the fin on the

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What to ask after a rollout: what diverged.
 
 The stepper refuses commands, parameters and a single start state that are not finite. In a batch an element that

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Compile C text once, check what the compiler made of it, cache both by content, load it.
 
 A library is built in a folder of its own, checked there, and moved into the cache; its result follows as KEY.json. The

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The planar fish: Kane's equations with Kirchhoff added mass and a tip that does not slide sideways.
 
     M(q) q'' + h(q, q') = Q + N^T lambda,    N q' = n . (v_tip - V_water) = 0

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """CasADi expression -> C source whose every variable is a SIMD vector: one lane per batch element.
 
 CasADi's own C generator emits scalar code; emitting the same instruction list over `V` (a GCC vector type, or a plain

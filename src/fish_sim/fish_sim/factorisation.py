@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """M = L D L^T on generic scalars: numbers, batches of numbers or symbols, so that a kernel can be built through it."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Numbers that are not finite, found and named."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The same kernel without a compiler: Runge-Kutta loops in NumPy around CasADi's virtual machine.
 
 Arrays and results are those of `kernel.CompiledKernel`; columns of a matrix are batch elements.

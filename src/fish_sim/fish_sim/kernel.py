@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The compiled kernel: NumPy arrays in, NumPy arrays out, through ctypes (which releases the interpreter lock)."""
 
 from __future__ import annotations

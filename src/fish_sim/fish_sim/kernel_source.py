@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """C text of a kernel: the sizes and the tableau, the emitted expressions, and the loops of c/ around them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Explicit Runge-Kutta tableaus. CFMR7, the default, is made for oscillations: order 7, 9 rates a step.
 
 The tail's fastest mode is an almost undamped oscillation of about 150 rad/s (n = 3). In steps of 5 ms CFMR7 follows a

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The equations as CasADi functions for one structure: number of links and enabled effects.
 
 Layout of the state vector of a step:

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The few elementary functions the equations need, for every carrier of numbers they run on.
 
 The equations of `dynamics.py` and of the effects take one of these tables as `xp` and therefore work on NumPy

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One number of a model with its unit, admissible range and source."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A robot: number of tail links, parameter values and the effects that are switched on.
 
 Names, units and nominal values are those of the model description; every value is checked, and an error names field,
@@ -21,9 +23,8 @@ from fish_sim.sensors import SENSOR_EFFECTS
 # number of tail links, and the enabled effects in the order in which they act
 Structure = tuple[int, tuple[type[Effect], ...]]
 
-STRIP_ADDED_MASS = (
-    1000.0 * math.pi / 4.0 * 0.075**2
-)  # kg/m, slender body strip rho pi/4 h^2, height h = 0.075 m
+# kg/m, slender body strip rho pi/4 h^2, height h = 0.075 m
+STRIP_ADDED_MASS = 1000.0 * math.pi / 4.0 * 0.075**2
 KNOWLEDGE = (
     "measured",
     "estimated",

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """robot.yaml: read and write a robot with units, sources and standard errors.
 
 Every value in a file is checked; an error names file, field, value and what was expected.

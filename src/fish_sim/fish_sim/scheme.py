@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which method integrates a period of 10 ms in how many steps."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A compiled kernel against the interpreted one: what the compiler made of the C text is not taken on trust.
 
 Both run a few periods of a few fish of the same random states, commands, parameters and directions: one fish alone, and

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The pool with the fish in it, one command period at a time: physics, water disturbance, sensors. No ROS."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of the simulated pool and of the simulator node."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Is a step fine enough? The fish's own modes about rest against a method's stability function."""
 
 from __future__ import annotations

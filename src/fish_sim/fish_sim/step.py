@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Advance the fish: `Stepper` for NumPy arrays, compiled where a C compiler exists, interpreted otherwise.
 
 One step is one command period of 10 ms. Shapes: state (..., NS), command (..., 2), parameters (NP,) or (..., NP).

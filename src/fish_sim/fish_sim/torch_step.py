@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """`step` and `rollout` for torch tensors of any batch shape, differentiable in state, commands and parameters.
 
 On the CPU in float64 the compiled kernels run inside one autograd node; on any other device or dtype the same

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The pool's walls: they stop the centre of the fish's head, and count how often it came to them.
 
 |x| <= LENGTH / 2,   |y| <= WIDTH / 2          pool frame

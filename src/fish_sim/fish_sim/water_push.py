@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The water's random push on the head: an Ornstein-Uhlenbeck wrench in base_link, one command period at a time.
 
 dW = -W dt / time + sqrt(2 / time) size dB, stationary standard deviation `size`; exact over a period (Gillespie 1996). The caller

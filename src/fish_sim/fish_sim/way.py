@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The way of a fish that swims from rest at the origin."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The fish once more, from its Lagrangian by automatic differentiation: an answer independent of `dynamics`.
 
     d/dt dT/dq' - dT/dq + dV/dq + dR/dq' = rotor reaction + N^T lambda,   N q' = 0

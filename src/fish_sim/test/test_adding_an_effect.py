@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The example of docs/adding_an_effect.md, run as it is written."""
 
 import re

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where head, tail and markers of the drawn fish are."""
 
 from math import cos, pi, sin

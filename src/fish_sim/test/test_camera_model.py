@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """CameraModel against closed forms written out here and against OpenCV's forward model."""
 
 import cv2

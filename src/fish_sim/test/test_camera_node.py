@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The camera node in this process: stamps, delay, loss, messages, bad input."""
 
 import os

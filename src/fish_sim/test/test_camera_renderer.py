@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The rendered picture: the fish is where the geometry says, noise and glare are what was asked for."""
 
 import cv2

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The equations against a Lagrangian derived by automatic differentiation, and their conservation laws."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What single effects do, against closed forms and other ways to the same number."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What every effect in the table must fulfil, whatever its physics."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Values, tangents and adjoints: compiled against interpreted at every batch up to 17, of every integrator and compiler."""
 
 import shutil

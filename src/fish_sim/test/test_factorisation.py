@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The factorisation on generic scalars against LAPACK's, and on a matrix that needs its pivots' reciprocals."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Derivatives against finite differences for every parameter of the robot and of every effect."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Waiting for the loop on made-up clocks."""
 
 from fish_sim.model import DT

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The tableaus: order of convergence, and what they do to an oscillation."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Pace of the simulation on made-up clocks."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Robot descriptions: nominal values, files, and every kind of mistake in them."""
 
 import math

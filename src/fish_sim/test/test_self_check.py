@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A kernel that the compiler gets wrong is caught when it is built, built otherwise, and in the end not used."""
 
 import json

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Sensor effects against their one-line meaning, noise against its stated size."""
 
 import math

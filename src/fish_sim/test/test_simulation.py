@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The pool without ROS: commands, stale commands, noise from one seed, reset."""
 
 import math

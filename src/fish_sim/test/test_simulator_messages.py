@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Messages of the simulator node: every number in its field, with a value of its own."""
 
 import math

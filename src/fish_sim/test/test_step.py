@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The stepper against SciPy, against itself in all its forms, and against bad input."""
 
 import subprocess

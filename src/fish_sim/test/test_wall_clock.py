@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The simulator node beside a wall clock that is set, and after it was held up; the test calls its callbacks itself."""
 
 import pytest

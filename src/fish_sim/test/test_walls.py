@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The pool's walls: the fish stops there, truth and sensors agree, and nothing changes for a fish that never comes to them."""
 
 import math

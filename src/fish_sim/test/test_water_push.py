@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The water's random push: stationary from its first value, as strong and as lasting as it says."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a comparison says of recordings of one robot when an effect is put into some of them exactly, or nothing.
 
 python src/fish_sysid/benchmarks/change_tests.py FOLDER [--new 4] [--splits 3] [--seed 0]

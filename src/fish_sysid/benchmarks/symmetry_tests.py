@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the symmetry tests find in data sets, as they are or with a known effect put in exactly.
 
 python src/fish_sysid/benchmarks/symmetry_tests.py FOLDER... [--inject-current VX VY] [--inject-latency S]

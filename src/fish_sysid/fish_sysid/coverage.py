@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Do the standard errors mean what they say? Identification of many synthetic robots whose truth is known."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Identify a robot from recordings: parameters with standard errors, and how well they predict unseen trials.
 
 First windows of raw measurements ask whether the model can follow the fish at all. Where it can, its likelihood is right and

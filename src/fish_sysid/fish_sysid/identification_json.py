@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """An identification as files: robot.yaml with standard errors, and everything else as JSON."""
 
 from __future__ import annotations

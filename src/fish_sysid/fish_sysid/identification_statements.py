@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """An identification in words: what the data lack and do not determine, and whether physics beats the baselines."""
 
 from __future__ import annotations
@@ -18,12 +20,10 @@ from fish_sysid.prediction.stroke_average import stroke_mean
 
 UNDETERMINED = 0.7  # posterior over prior standard deviation; above, the data say little
 ENTANGLED = 0.95  # correlation of two parameters that the data hardly tell apart
-WORSE = (
-    1.1  # times the error of the robot it began with: more than two robots as good differ by chance
-)
-STILL = (
-    0.02  # rad and share of full speed: below this spread of the commands nothing excites the fish
-)
+# times the error of the robot it began with: more than two robots as good differ by chance
+WORSE = 1.1
+# rad and share of full speed: below this spread of the commands nothing excites the fish
+STILL = 0.02
 LONG_GAP = 1.0  # s without a sample of IMU or camera
 NO_TURN = 0.3  # rad, between the leftmost and the rightmost stroke-mean heading of a trial
 NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Swims written down as kinematics, without forces: what symmetry tests are tried on where the truth is known exactly."""
 
 from __future__ import annotations

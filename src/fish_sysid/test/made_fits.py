@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fits with chosen numbers, for tests of decisions between them."""
 
 from __future__ import annotations

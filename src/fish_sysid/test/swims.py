@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Small data sets with known answers: a fish of one link in short swims."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a grown model loses, what competes with each of its effects, and how probable that leaves the names."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Predictors without mechanics: each finds a system of its own kind, and their inputs are what they are said to be."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Sensors laid over each other before anything is fitted: camera and gyro, a rolling IMU, a rotor that runs down."""
 
 from __future__ import annotations

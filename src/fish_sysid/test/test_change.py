@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """OLD and NEW of a fish without forces: the stages of the comparison find what was put in, and nothing where nothing was."""
 
 from __future__ import annotations

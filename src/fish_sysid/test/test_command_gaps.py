@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Commands that the recorder lost: what stands for them costs next to nothing, and what was not lost is held as it was."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a fit gains on unseen trials: exact where all is linear, and an open parameter costs nothing."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Names that swims can tell apart, by sensitivities: what physics says of a straight and of a turning swim."""
 
 import numpy as np

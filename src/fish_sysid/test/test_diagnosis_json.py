@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the answer says of verdict, evidence, rivals and errors."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a diagnosis says to people: its sentence, its tables, its figures."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The filter: the C pass against the NumPy pass, and its statistics where the truth is known."""
 
 from __future__ import annotations

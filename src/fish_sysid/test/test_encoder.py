@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The encoder's part of the likelihood: Gaussian inside the gate, indifferent beyond, its noise told by the median."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a servo does whose controller has ended, an IMU that is late, and what a recording lacks."""
 
 from __future__ import annotations

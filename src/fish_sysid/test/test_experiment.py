@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """From recordings to the filter's grid: every sample once, at its place, and nothing invented where nothing was measured."""
 
 from __future__ import annotations

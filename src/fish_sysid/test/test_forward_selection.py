@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The search: which candidates are refitted, look-alikes from the winner's optimum, and what is accepted."""
 
 import numpy as np

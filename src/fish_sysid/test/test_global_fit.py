@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A global fit reaches the optimum of the truth where one way from the nominal values ends in a poor one."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Identification on synthetic recordings: the truth comes back, and what the data cannot say is said."""
 
 from __future__ import annotations

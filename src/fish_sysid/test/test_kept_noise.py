@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The noise that an identification found goes through robot.yaml to predictions."""
 
 from __future__ import annotations

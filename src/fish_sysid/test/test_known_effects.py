@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What of the given robot is refitted: its nominal parameters, and of its own effects what the recordings determine."""
 
 import numpy as np

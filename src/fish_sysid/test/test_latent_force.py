@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where and when force is missing or an effect acts, from forces made by hand."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A name takes the place of a law that predicts no better."""
 
 import numpy as np

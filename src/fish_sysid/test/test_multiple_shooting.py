@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Multiple shooting: known parameters come back, and its matrices and slopes are what they are said to be."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The maximum-likelihood noise is found from near and far, along the ridge on which a few seconds of data leave it."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What is free and in which parametrization: there and back, slopes against differences, standard errors to first order."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The diagnosis finds what was hidden, and nothing where nothing is."""
 
 from __future__ import annotations

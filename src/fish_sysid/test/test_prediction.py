@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Predictions: exact without noise, causal, and as a table; stroke means; baselines on motion they can represent."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Effects are chosen by trials left out against a control with as many iterations."""
 
 from __future__ import annotations

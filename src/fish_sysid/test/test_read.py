@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings as an experiment: what cannot be used is said, and robots are not mixed."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A refit reaches the optimum from afar with the schedule that suits, and keeps what it has where nothing is better."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A sensor's samples between the grid's times: a known signal, noise that stays white, gaps, other rates and rough stamps."""
 
 import numpy as np

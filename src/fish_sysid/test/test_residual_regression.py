@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A law of the remaining force: a hidden one is read off with its coefficient, and nothing where there is none."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Rest at a trial's start: strokes that begin at once do not speak against it, a glide that the gyro does not feel does."""
 
 from __future__ import annotations

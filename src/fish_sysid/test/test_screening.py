@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every effect is found from the place and the strength from which it can be."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Sensor noise from the signals' roughness: what the sensors were made with, whatever the fish does."""
 
 from dataclasses import replace

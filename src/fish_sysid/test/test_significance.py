@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What counts as significant, how probable names are, and when a simpler one stands for a richer one."""
 
 import numpy as np

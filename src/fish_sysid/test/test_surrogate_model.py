@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The robot to go on with where no name fits: it predicts better, by effects that help and no others."""
 
 from __future__ import annotations

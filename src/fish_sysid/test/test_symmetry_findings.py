@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What breaks a symmetry is found with its size, nothing is found in nulls, and lacking data are said to lack."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the answer and the sentence say of symmetry findings, beside what the search names."""
 
 from __future__ import annotations

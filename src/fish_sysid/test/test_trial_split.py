@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which trials are held out, searched and checked."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which names there are, and which of them recordings can judge."""
 
 from dataclasses import replace

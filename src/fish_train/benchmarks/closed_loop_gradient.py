@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Gradient of a training window: compiled kernel against jitted JAX, same equations, same numbers, one core.
 
     taskset -c 0 python src/fish_train/benchmarks/closed_loop_gradient.py

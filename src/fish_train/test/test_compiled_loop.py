@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The compiled window against torch's autograd on the same equations, finite differences, other batches."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Metrics of known errors, plants and sensing, studies over cells, and the pages."""
 
 import re

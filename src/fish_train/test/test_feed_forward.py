@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Feed-forward measured on what swims: against the equations, against swims of its own, and without what is the pool's."""
 
 from dataclasses import asdict, replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The batch follower and the training loop run what the nodes run: fish_control's Controller and Planner."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The search that training uses finds what fish_control's PathBatch finds."""
 
 import numpy as np

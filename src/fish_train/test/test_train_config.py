@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recipes: the shipped YAML is the default, and what cannot work is refused by name."""
 
 from pathlib import Path

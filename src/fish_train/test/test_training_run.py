@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A run on disk: exact resume, roll-back of diverging training, weights that the controller reads."""
 
 import json

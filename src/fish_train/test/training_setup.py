@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A small batch, bank and network shared by the tests of training."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Calibrating a camera: its lens from chessboard pictures, its mount from known points of the pool."""
 
 from collections.abc import Sequence

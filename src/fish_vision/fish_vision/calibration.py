@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Pixels to metres in the pool's plane: lens, camera pose, and the files that hold them."""
 
 from collections.abc import Mapping, Sequence

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Bytes of image messages to pictures (h, w, 3; blue, green, red) and back."""
 
 import cv2

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Markers to pose: which spots are the head's, where it is and points, how the tail bends, how surely."""
 
 from collections.abc import Sequence

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Colour segmentation: which pixels have a marker's colour, and where the middle of each blob is."""
 
 from collections.abc import Sequence

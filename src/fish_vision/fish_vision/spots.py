@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """From colours in an image to spots in the pool: blobs of a marker's colour and size."""
 
 from collections.abc import Sequence

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the tracker did lately: counts, times, and whether the calibration still fits. For diagnostics."""
 
 from collections import Counter, deque

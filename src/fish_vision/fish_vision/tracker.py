@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The tracker: one image in, one pose out, or the reason why there is none."""
 
 from collections.abc import Sequence

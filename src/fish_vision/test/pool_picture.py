@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Pictures for the tests: discs in a pool seen straight down through a lens without distortion."""
 
 from math import cos, sin

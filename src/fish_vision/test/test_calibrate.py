@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Calibration recovers a camera that made the pictures, drawn here ray by ray."""
 
 import cv2

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Calibration against similar triangles and formulas written out here."""
 
 from pathlib import Path

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The commands calibrate and check_image, called as from the shell."""
 
 import sys

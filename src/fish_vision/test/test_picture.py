@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Message bytes to pictures, and what is said of bytes that are none."""
 
 import cv2

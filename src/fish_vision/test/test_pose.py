@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Markers to pose: exact recovery, covariance against finite differences, identities."""
 
 from math import cos, pi, sin

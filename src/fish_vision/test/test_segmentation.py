@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Blobs of discs drawn here with exact antialiasing (many subpixels)."""
 
 import cv2

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The tracker on drawn pictures: poses, reasons when there is none, what it refuses."""
 
 import sys

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The tracker node in this process: messages in and out, and bad input of every kind."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which stages of the diagnosis pay: the same scenarios diagnosed with each stage of the search left out in turn.
 
 OUT/complete and OUT/without_STAGE are studies of their own, all of one seed: each goes on where it was stopped.

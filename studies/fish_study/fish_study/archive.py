@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Finished studies as one file: a tar archive, compressed by xz, with the folder of each study in it."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What is asked of the diagnosis, fixed before any study, beside what a study measures."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Does a better model make better gains? Gains trained on three models and searched on the second plant, compared there.
 
 nominal     the robot file as it is

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Commitments to labels: SHA-256 of a random salt and the label's JSON, published before the run and checked after it."""
 
 from __future__ import annotations

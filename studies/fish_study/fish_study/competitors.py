@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What else one could do with the residual force of the refitted nominal model: sparse regression, a neural network.
 
 Both get the force that this project's own filter and smoother estimate; neither refits anything. The sparse regression is

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Readings as recordings on disk, in the project's format; many messages of one kind are serialised at once."""
 
 from __future__ import annotations

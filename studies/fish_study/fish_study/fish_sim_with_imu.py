@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """fish_sim as a plant of the study: other numbers of links, steps and integrators than the tool's, any concealed effect."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Gains searched on a plant itself: what no model can beat by much."""
 
 from __future__ import annotations

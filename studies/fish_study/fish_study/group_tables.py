@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Answers by group and by what is hidden, and the scenarios without an answer."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """AIC, BIC and the smallest held-out error as competitors, over the tool's own refits of all candidates."""
 
 from __future__ import annotations

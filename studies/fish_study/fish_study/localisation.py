@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where localised effects really act, and how well an answer's times and covariates agree with that."""
 
 from __future__ import annotations

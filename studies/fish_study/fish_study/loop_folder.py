@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The folder of a closed loop: for which scenario it was made, so that nothing in it is taken for another scenario's.
 
 loop.json    the scenario and the arguments on which what is kept depends

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How much of the way from the nominal model's gains to the plant's own each model's gains go: table and figure."""
 
 from __future__ import annotations

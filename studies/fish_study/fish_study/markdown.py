@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Tables as Markdown, and pages of which a part between two marks is generated."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What can be concealed in the second plant: things of its own engine, and the vocabulary's names that mean the same."""
 
 from __future__ import annotations

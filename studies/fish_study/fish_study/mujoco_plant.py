@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The second plant: a fish in MuJoCo. No code and no equation is shared with fish_sim.
 
     Water: the engine's ellipsoid fluid model (added mass, blunt, slender and angular drag, Kutta lift) on every body. No point

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A study of what the command line asks for: begun, or gone on with where its folder holds one."""
 
 from __future__ import annotations

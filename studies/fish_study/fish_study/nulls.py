@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What names gain where nothing is hidden: the level of the diagnosis held against its null distribution."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The oracle: it knows which effect to look for and where the parameters are, and may do no more than fit them."""
 
 from __future__ import annotations

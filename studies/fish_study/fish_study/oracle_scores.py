@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """After the labels are open: the oracle on every scenario, and the scores of an answer that need the truth."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Tables of the oracle's scores: against the truth fitted, and competitors on the residual force."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Physics that the vocabulary names, in a form other than the tool's own candidate; the right answer is that name."""
 
 from __future__ import annotations

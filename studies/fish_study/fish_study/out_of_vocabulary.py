@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Effects that the vocabulary has no name for: a plant may have them, the tool's table EFFECTS does not hold them.
 
 The right answer to each is `unexplained`, or `no_mismatch` where too weak to see; any name is a wrong name.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Numbers printed in the paper of the robot fish, beside which ours are shown; SI units."""
 
 SPEEDS = (0.10, 0.15, 0.20, 0.25)  # m/s

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The paper's figures and table remade on one page, the paper's numbers beside ours."""
 
 from __future__ import annotations

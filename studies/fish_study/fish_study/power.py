@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Detection power over the strength of what is hidden, beside the oracle's."""
 
 from __future__ import annotations

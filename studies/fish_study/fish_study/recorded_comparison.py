@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Today's diagnosis against recorded answers: the same verdict, the same names, the same parameters?"""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The newest study's tables as they stand in docs/results/blind_studies.md."""
 
 from __future__ import annotations

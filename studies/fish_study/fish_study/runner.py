@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Make each scenario's recordings, run the tool on them as a process of its own, keep what it answers.
 
 The tool's process gets the folder of recordings and an output folder, whose names tell nothing.

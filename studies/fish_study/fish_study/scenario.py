@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A scenario: what is hidden in one data set. Its JSON is the label that is committed to."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The groups of the study: who hides what from whom. Each is a row of the table and a function (random, number) -> Scenario."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What an answer is worth once the label is open."""
 
 from __future__ import annotations

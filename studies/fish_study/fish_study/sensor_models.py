@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The sensors of a recorded trial: overhead camera, IMU, encoder, with their noise and their errors.
 
 Noise as in `fish_sim.sensors.noise_levels`, times a factor. Knows nothing of the fish, so that the second plant can use it.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How many of how many, with an exact interval."""
 
 from __future__ import annotations

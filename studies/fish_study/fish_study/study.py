@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A study on disk: commitments to labels, one result per scenario, everything there to go on after a kill.
 
 study.json        what was asked for, and of which version of the tool

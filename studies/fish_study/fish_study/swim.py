@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Let a plant swim under a driver and write down what its sensors say."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Swims that are kept, one file for each gains: a closed loop that was stopped swims none of them twice."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which tool a study examines: a digest of the code that an answer depends on, so that no table mixes two of them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Commands of the trials of a data set: open-loop programs, and paths under feedback."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which names count as right for a scenario: its own, or for another form or engine those that mean the same physics."""
 
 from __future__ import annotations

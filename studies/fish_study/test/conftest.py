@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A finished study of three scenarios, run by a stand-in for the tool."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A stand-in for `robofish diagnose`: answers at once, from nothing but the name and size of what it was given."""
 
 import json

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Small scenarios of the blind study, and answers to them as the tool would write them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Gains from three models and from the plant itself: what is searched and what is compared."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """AIC, BIC and the held-out error as competitors, by hand."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where and when localised effects act, against their own equations."""
 
 from __future__ import annotations

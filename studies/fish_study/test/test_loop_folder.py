@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The folder of a closed loop, and the swims that are kept in it."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How much of the gap each model closes, and how sure that is."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The oracle and the competitors: what they find, and how it is counted."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of the paper: what stands beside its numbers, and how its seeds are trained."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The verb prove: a study is gone on with as it was begun, and read from folders and archives."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The newest study's file: complete, as it was committed to, made again from its seeds, and the page shows its numbers."""
 
 from __future__ import annotations

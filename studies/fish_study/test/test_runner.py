@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Running the tool on scenarios: what it is given, what is kept, what happens when it fails or is stopped."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Scenarios of the blind study: what is drawn, and how it is swum."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The second plant swims, turns and drifts as a fish in water does."""
 
 from __future__ import annotations

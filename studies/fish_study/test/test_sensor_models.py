@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the sensors make of the true motion, and when a command source sees it."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A study on disk: labels that cannot be changed afterwards, scenarios that count once, one version of the tool."""
 
 from __future__ import annotations

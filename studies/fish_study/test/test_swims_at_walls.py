@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A study's swim ends at the wall: trials are cut there and counted."""
 
 from pathlib import Path

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The version of the tool is that of the code that its answers depend on."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What recorder and replayer share: message classes by name, and quality of service to and from rclpy."""
 
 from __future__ import annotations

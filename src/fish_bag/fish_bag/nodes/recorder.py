@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recorder: writes topics as they come, undecoded, to a rosbag2 recording (MCAP) that survives a kill.
 
 In: every topic that the parameter `topics` selects, with the quality of service its publishers offer. Out:

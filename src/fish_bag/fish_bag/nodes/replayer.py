@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Replayer: publishes a recording's messages undecoded, at the times at which they had arrived.
 
 Out: the recorded topics that `topics` selects and `exclude` leaves, with the quality of service they were

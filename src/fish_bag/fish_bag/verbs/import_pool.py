@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Convert the real robot's ROS 1 bags (own message types) to recordings in the project's format."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Print and plot what is in a recording or data set: topics, rates, gaps, latency, clocks, problems."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Mend a truncated or damaged recording: every whole message is saved to a new one, what is lost is said."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Hands every topic of the robot to Foxglove, undecoded, over a websocket; needs the package foxglove-sdk."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """joy -> joint_command, operator/deadman: rotor and rudder by hand. Lives in the command `robofish drive`.
 
 joint_command (100 Hz) as the controller's; joy (sensor_msgs/Joy): the deadman's button must be held, axes give throttle and

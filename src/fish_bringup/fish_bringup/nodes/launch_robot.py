@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the launch files have in common: arguments, the nodes of a robot or of one computer, what follows from a node's end.
 
 A node that ends, ends the launch with it, so that nothing swims half: with respawn:=true it is started again instead. The

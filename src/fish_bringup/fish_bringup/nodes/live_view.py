@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """odometry/filtered, reference/path, tracking/error, control/gains, camera/tail, arming/state, /diagnostics -> a page.
 
 A page in a browser shows pool, path, fish, errors, gains, health and arming state; Foxglove gets every topic over a websocket.

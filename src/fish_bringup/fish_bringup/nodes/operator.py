@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The operator's word: calls the service arm of the robot's owner of the arming state (node rotor, or the simulator)."""
 
 from __future__ import annotations

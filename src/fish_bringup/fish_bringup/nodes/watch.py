@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Watches a run from outside, for progress lines and tests: where the robot is, what the nodes say.
 
 In: odometry/filtered, camera/pose, reference/path, arming/state, /diagnostics. Out: nothing; it may call the service arm.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Arm the robot: rotor and rudder follow commands from then on; --off disarms it at once.
 
 A robot is disarmed when it starts, and again after every trouble: stale commands, a lost camera or IMU, a hot coil, a leak and

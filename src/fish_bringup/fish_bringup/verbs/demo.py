@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The whole robot: start every node, let the fish swim a path, record, score and show it.
 
 Simulator, camera, tracker, fusion, planner, controller and recorder run as processes of their own, on

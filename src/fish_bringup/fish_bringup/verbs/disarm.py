@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Disarm the robot: the rotor ramps down and coasts, the rudder goes to its centre, until it is armed again."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Drive rotor and rudder by hand, from the keyboard or a gamepad, for as long as a deadman is held.
 
 Keyboard: the arrow keys change throttle and rudder; keep pressing them: after --timeout without a key the rotor stops and the

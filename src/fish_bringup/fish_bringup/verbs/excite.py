@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Swim a program of stroke and rudder open loop and record it: the next experiment of a diagnosis, or your own.
 
 The program is a diagnosis.json, or rows {t: s, amplitude: rad, frequency: Hz, rudder: rad} in JSON or YAML. It is cut into

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How old the camera's images are and how far its clock is from the IMU's, from recordings, with standard deviations.
 
 The heading that the camera saw is compared with that of the IMU. What is printed as offset belongs into the parameter

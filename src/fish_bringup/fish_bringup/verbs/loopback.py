@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Print the shell lines that keep messages on this computer: eval "$(robofish loopback)" before nodes are started by hand.
 
 Fast DDS then opens no port towards the network, and shared memory is off. `demo`, `excite` and `view` do the same by

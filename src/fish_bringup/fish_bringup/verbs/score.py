@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Score a recorded run against its reference path: a table and a self-contained page.
 
 A run that never came onto its path, or a recording without odometry, path or speed, is refused with a line that says what is

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Watch the robot in a browser: pool, path, fish, errors, gains, health, arming state; Foxglove gets every topic.
 
 It only shows, unless --control is given: then the page's buttons arm and disarm. It is served on this computer only, unless

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """camera/pose + imu/data -> odometry/filtered (100 Hz, pool -> base_link), /diagnostics.
 
 The variance of the pose grows while the camera is lost; a twist variance of 1e4 says that the IMU is lost. What a message

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Paths as messages, and where the planner's path and progress are kept."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Start, feedback, cancel and result of following a path.
 
 Services path/start and path/cancel (std_srvs/Trigger), topic path/status (diagnostic_msgs/DiagnosticStatus, transient local;

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """odometry/filtered -> control/target, control/twist, tracking/error, reference/path, reference/speed.
 
 control/target (50 Hz, frame pool): position of the lookahead point, orientation of the wanted course.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How a node says how it is."""
 
 from diagnostic_msgs.msg import DiagnosticArray

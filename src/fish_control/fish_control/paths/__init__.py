@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Reference paths by name: one family a file, one line a family here."""
 
 from __future__ import annotations

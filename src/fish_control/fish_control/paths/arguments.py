@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Arguments of a path family as a user types them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Figure of eight (lemniscate of Gerono), a closed path that crosses itself."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Capital letters, each swum in one stroke with rounded corners."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The strokes of the letters, as corners to be rounded; units of letter height.
 
 A corner is (x, y) or (x, y, radius). Turns that a pen would make by lifting are loops, because a fish can

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The points of a CSV file, found by the names of their columns."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """User-drawn paths: a CSV file of points or an SVG drawing."""
 
 from __future__ import annotations

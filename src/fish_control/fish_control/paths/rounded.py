@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Polylines with circular fillets: the corners a fish can swim."""
 
 from __future__ import annotations
@@ -8,9 +10,8 @@ from scipy.ndimage import gaussian_filter1d
 
 Array = NDArray[np.float64]
 
-ARC_STEP = (
-    5e-4  # m between points on an arc; leaves a heading error of ARC_STEP / (8 radius) ~ 3e-4 rad
-)
+# m between points on an arc; leaves a heading error of ARC_STEP / (8 radius) ~ 3e-4 rad
+ARC_STEP = 5e-4
 EASED_STEP = 2e-3  # m between points of an eased curve
 HAIRPIN = np.deg2rad(175.0)  # a corner sharper than this has no useful fillet
 

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """joint_states, joint_command, camera/tail -> description/joint_states: every joint, for robot_state_publisher.
 
 description/joint_states (sensor_msgs/JointState): rotor, rudder, tail_1 .. [rad]. What is measured, what is commanded and

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Command `safe_stop`: coast the rotor and centre the rudder, without ROS.
 
 For systemd's ExecStopPost, which runs also after a node was killed: PWM outputs have no watchdog of their own

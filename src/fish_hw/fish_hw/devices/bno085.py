@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """BNO085 on I2C: acceleration, angular velocity and game rotation vector as one sample.
 
 The bus carries no checksum and the hub stretches the clock, so packets arrive damaged: what is not plausible

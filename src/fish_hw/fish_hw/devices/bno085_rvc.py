@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """BNO085 in its UART-RVC mode: attitude and acceleration at 100 Hz from a serial port, nothing to set.
 
 The datasheet (1000-3927, section 1.3.5.2) contradicts itself on the axes: its text calls pitch the rotation

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Whether an IMU's attitude and its accelerometer agree on where up is."""
 
 import math
@@ -8,9 +10,8 @@ from fish_hw.devices.rotation import Vector, rotate
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 QUIET = 0.05  # share of 1 g; samples that are further from it say little about where up is
-WINDOW_S = (
-    2.0  # of quiet samples: a strong sway tilts single ones by 15 deg, its mean stays upright
-)
+# of quiet samples: a strong sway tilts single ones by 15 deg, its mean stays upright
+WINDOW_S = 2.0
 LIMIT_DEG = 10.0  # the sensor's worst is 3.5 deg
 
 

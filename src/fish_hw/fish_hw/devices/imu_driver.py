@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The IMU as a whole: sensor by I2C or serial, mounting, watchdog, and finding it again after it was lost."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which IMU samples can be used: values that stand still, that jump, or that contradict each other are not.
 
 A bit error may leave every value within the sensor's range, so that only its rate of change betrays it. The fish cannot turn

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One IMU measurement, and the turn from sensor axes to base_link."""
 
 from dataclasses import dataclass

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A leak sensor on a GPIO line: two wires at the hull's lowest place, or a board with a logic output."""
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """PCA9685, sixteen PWM outputs of 12 bits on I2C.
 
     prescale = round(clock / (4096 f)) - 1,   count = round(pulse / tick),   tick = (prescale + 1) / clock

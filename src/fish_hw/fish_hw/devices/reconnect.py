@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a driver does about a device that comes and goes: when to try it again, and what the log says of it."""
 
 FIRST_WAIT_S = 0.5

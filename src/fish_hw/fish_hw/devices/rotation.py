@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Rotations of the sensor mounting: unit quaternions as (x, y, z, w)."""
 
 import math

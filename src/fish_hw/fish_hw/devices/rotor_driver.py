@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The rotor as a whole: port, module, arming state, guard and watch, one cycle per step.
 
 One thread calls step() and owns the port; commands and requests may come from other threads.

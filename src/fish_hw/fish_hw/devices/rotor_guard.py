@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the rotor may do, decided from commands, the arming state and time alone.
 
     RESTING  coasting; measured, not driven

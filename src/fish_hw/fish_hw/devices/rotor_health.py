@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Battery, temperatures and faults of the rotor module: what to warn of and when to stop."""
 
 import math

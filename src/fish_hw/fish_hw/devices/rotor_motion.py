@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Whether the rotor does what it is commanded: jam, stuck encoder, runaway.
 
 Compared over windows: commanded way L_c = integral of |omega_c|, measured way L_m = sum of |delta theta|.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the rotor's own device says against moving: telemetry, its silence, motion against the command, forgotten set-up."""
 
 from fish_hw.devices.rotor_guard import Phase

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The rudder as a whole: PWM output, servo, and finding the output again after it was lost.
 
 One thread calls step() and owns the output; commands may come from another thread.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The PWM output that the settings ask for."""
 
 from fish_hw.devices.pca9685 import Pca9685Pwm

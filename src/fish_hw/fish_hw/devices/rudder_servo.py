@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The rudder servo: rudder angle to pulse, with limits, slew rate, arming state and watchdog.
 
     pulse = centre_us + us_per_rad sign (alpha + trim), within min_us .. max_us

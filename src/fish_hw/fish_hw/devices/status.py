@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a device says about itself, for diagnostics."""
 
 from dataclasses import dataclass, field

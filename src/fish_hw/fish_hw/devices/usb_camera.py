@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The overhead camera as a whole: frames as JPEG with the middle of their exposure, found again after it was
 lost.
 """

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A Vertiq 40-06 motor module behind an IQUART port: write, read back, measure, coast.
 
 The module answers `get` only, and its replies carry no number: replies are matched by register and module,

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Registers of a Vertiq 40-06 (speed firmware) that the rotor needs.
 
 Source: iq-module-communication-doc, docs/clients; numbers as in the vendor's client files.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Why a module does not answer: another id, another baud rate, another firmware, or nobody there."""
 
 import time

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A BNO085 at the level of its I2C messages: advertisement, product id, features, reports, damage on request.
 
 The sensor turns about its z axis: yaw rate 0.5 cos(2 pi 0.2 Hz t) rad/s, plus seeded noise on the

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The devices of a whole robot made of software, where real drivers find them: files of one folder.
 
 rotor     pseudo-terminal of the module (a symbolic link)

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A BNO085 that measures what it is given: the simulator's IMU behind the hub's protocol."""
 
 import struct

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The real RotorDriver on an emulated module, both on one simulated clock: what is measured does not depend on the computer."""
 
 import math

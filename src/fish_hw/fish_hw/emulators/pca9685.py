@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A PCA9685 at the level of its I2C registers."""
 
 SLEEP = 0x10

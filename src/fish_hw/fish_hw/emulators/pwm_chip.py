@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A folder that looks like /sys/class/pwm/pwmchipN with one exported channel."""
 
 from pathlib import Path

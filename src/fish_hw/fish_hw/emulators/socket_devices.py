@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The fake robot's ends of the Unix sockets: an I2C bus with emulated devices, and a camera."""
 
 import errno

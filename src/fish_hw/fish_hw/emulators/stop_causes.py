@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Everything that must stop the rotor, as it happens to a LockstepRotor, and how long the stop may take."""
 
 import math

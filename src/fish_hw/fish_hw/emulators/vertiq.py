@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A VertiqModule behind a pseudo-terminal: the real driver talks to it through a real port."""
 
 import os

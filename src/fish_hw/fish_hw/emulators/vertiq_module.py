@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A Vertiq 40-06 (speed firmware) made of software: bytes in, bytes out, on any clock.
 
 The rotor follows its command with a first-order lag. As in the real module any valid message feeds the timeout.

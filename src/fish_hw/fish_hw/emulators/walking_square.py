@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A camera made of software: a grey picture with a bright square that walks to the right."""
 
 import time

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the four driver nodes share: parameters, the thread that owns the device, diagnostics, the way to
 end.
 """

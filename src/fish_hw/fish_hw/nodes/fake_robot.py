@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Node `fake_robot`: the devices of a robot made of software, for the real drivers, with the simulator behind them.
 
 The drivers find rotor, rudder, IMU and camera in the parameter `folder`. What rotor and rudder do goes to the simulator, and

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Node `imu`: BNO085.
 
 Out: imu/data (orientation without absolute heading, angular velocity [rad/s], specific force [m/s^2];

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Reads one joint out of a JointState."""
 
 from sensor_msgs.msg import JointState

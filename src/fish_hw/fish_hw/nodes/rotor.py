@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Node `rotor`: the Vertiq module that turns the rotor.
 
 It owns the arming state of the robot (fish_node.nodes.arming): what must stop the rotor is decided where the rotor is

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Node `rudder`: the servo that bends the tail.
 
 In:  joint_command (joint rudder: position = alpha [rad], positive steers left), arming/state

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A thread that repeats one step at a fixed rate: rclpy timers above 30 Hz are dear on a small computer."""
 
 import threading

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """IQUART, the serial protocol of Vertiq modules.
 
     0x55 | length u8 | type u8 | subtype u8 | object << 2 | access u8 | data | CRC-16 little-endian

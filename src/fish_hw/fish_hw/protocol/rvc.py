@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """UART-RVC, the plain 100 Hz output of the BNO085: attitude and acceleration, no gyroscope.
 
     AA AA | index u8 | yaw, pitch, roll i16 (0.01 deg) | ax, ay, az i16 (milli-g) | 3 reserved | checksum u8

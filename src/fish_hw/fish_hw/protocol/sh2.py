@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """SH-2, what the BNO085 says on its channels: feature requests, product id, input reports.
 
 An input cargo is 0xFB, base i32 (100 us), then reports. A report is id, sequence, status, delay, data:

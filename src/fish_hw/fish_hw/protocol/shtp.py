@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """SHTP, the packet layer of the BNO085: headers, sequence numbers, fragments.
 
     length u16 (bit 15: continuation of the previous cargo; header included) | channel u8 | sequence u8 |

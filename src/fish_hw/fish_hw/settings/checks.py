@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Checks shared by the settings; each error names the field, its value and what is allowed."""
 
 import math

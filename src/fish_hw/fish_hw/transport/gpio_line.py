@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One interrupt line through the kernel's GPIO character device; edges carry the kernel's time.
 
 Source: linux/gpio.h, version 2 of the interface (kernel 5.10 or later); sizes and numbers were compared with

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """An I2C bus of the kernel by smbus2, one plain message per call."""
 
 import errno

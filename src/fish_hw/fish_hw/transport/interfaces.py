@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The two kinds of port that devices are written against."""
 
 from typing import Protocol

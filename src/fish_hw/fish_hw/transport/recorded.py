@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A byte stream that replays recorded bytes, so that device code runs without a port."""
 
 from collections import deque

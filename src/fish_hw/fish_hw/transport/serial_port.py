@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A serial port by pyserial, opened exclusively, with every failure turned into a TransportError."""
 
 import errno

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One PWM channel of the kernel through /sys/class/pwm, no dependency."""
 
 import errno

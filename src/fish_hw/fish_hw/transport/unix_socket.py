@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Ports of the fake robot (node fake_robot) as Unix sockets: an I2C bus and a camera, where the kernel has no emulation.
 
 A device name that begins with `unix:` names the socket. I2C: a request (operation, address, count, data) and its answer (errno,

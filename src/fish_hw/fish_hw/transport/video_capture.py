@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A V4L2 camera or a video file by OpenCV: the newest frame with its time, JPEG as the camera sent it if it
 can.
 """

@@ -1,1 +1,3 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """ROS 2 nodes: parameters, messages and one call into the core each."""

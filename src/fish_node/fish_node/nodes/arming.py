@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The arming state in ROS: the node that owns it serves and publishes it, the others listen.
 
 Owner (node rotor on the robot, node simulator in simulation). Service arm (std_srvs/SetBool: true arms, false disarms).

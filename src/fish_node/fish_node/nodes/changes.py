@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters that a node takes over at run time: checked as a whole first, then taken over, or refused with the reason."""
 
 from collections.abc import Callable

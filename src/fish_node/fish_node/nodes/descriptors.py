@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Parameter descriptors from a dataclass: what `ros2 param describe` shows."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """An executor that keeps its wait set: rclpy's own builds it anew for every callback, and twice.
 
 rclpy's SingleThreadedExecutor collects all entities of all nodes before every wait. Each callback also triggers the

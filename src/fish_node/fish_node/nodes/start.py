@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What every node does to start and to stop: parameters from a dataclass, a clean end."""
 
 import sys

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Static frames on /tf_static, where tf2_msgs is installed: it is not among the wheels."""
 
 from collections.abc import Sequence

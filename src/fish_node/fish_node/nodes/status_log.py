@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """On the console too, what a node says of itself on /diagnostics: nobody sees that without `ros2 topic echo`."""
 
 import re

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The overhead camera: geometry, picture, timing of its frames. Pure; the node is fish_sim.nodes.camera."""
 
 from fish_sim.camera.config import CameraConfig as CameraConfig

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The fish as coloured outlines in the pool's surface: what the camera has to draw."""
 
 from collections.abc import Sequence

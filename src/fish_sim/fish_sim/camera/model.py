@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The overhead camera as geometry: pool coordinates to pixels and back."""
 
 from dataclasses import dataclass

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The picture that the overhead camera takes of the pool with the fish in it."""
 
 from collections.abc import Sequence

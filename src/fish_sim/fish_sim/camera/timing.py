@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """When the camera takes its frames, and where the fish was then."""
 
 from bisect import bisect_right

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The empty pool from above: still picture, and the light that moves on floor and surface."""
 
 from dataclasses import dataclass

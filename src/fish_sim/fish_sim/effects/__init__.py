@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Missing physics and actuator behaviour, one class per file; the table below is all there is.
 
 Order: physics as in the diagnosis vocabulary; then what happens to a rudder command, and to a rotor command,

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """An external wrench on the head: what pushes the fish and has no name (yet)."""
 
 import math

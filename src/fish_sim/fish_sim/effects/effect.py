@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What an effect may add to the nominal model, and what it may look at.
 
 An effect is one class: parameters, optional states and only those methods in which it differs from the

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Something heavy tied to the head."""
 
 from fish_sim.effects.effect import Effect, Values

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The tail's tip slides sideways."""
 
 from collections.abc import Mapping

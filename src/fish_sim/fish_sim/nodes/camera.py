@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The overhead camera of the simulated pool.
 
 In: sim/odometry (nav_msgs/Odometry, pose of the head in the pool), sim/joint_states (sensor_msgs/JointState,

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Whether the nodes that close the loop have kept up with the simulation."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How many periods of the simulation are due at a moment of real time."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The simulated fish in its pool: what the robot's drivers would publish, and the truth.
 
 In: joint_command (sensor_msgs/JointState, names rotor and rudder; rotor: velocity in rad/s, rudder: position

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Messages of the simulator node from the values of the simulation, and back."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Models of the robot's sensors: what they do wrong (SENSOR_EFFECTS) and how they are noisy."""
 
 from fish_sim.sensors.camera_heading_offset import CameraHeadingOffset

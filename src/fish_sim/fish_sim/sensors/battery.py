@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Battery: voltage under the rotor's load."""
 
 from __future__ import annotations
@@ -6,9 +8,8 @@ from numpy.random import Generator
 
 from fish_sim.sensors.settings import SensorSettings
 
-BATTERY_DROP = (
-    2.0  # V, fall of the open-circuit voltage from full to empty, three LiPo cells; assumption
-)
+# V, fall of the open-circuit voltage from full to empty, three LiPo cells; assumption
+BATTERY_DROP = 2.0
 IDLE_CURRENT = 0.6  # A, computer and sensors; assumption
 EFFICIENCY = 0.5  # electrical to mechanical power; assumption
 SMOOTHING = 1.0  # s, the voltage is averaged so that it does not show the rotor's stroke

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A heading marker that sits at an angle."""
 
 from types import SimpleNamespace

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The enabled sensor effects of a robot, applied one after the other."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Encoder of the rotor's motor."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Inertial measurement unit at the head's centre of mass."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """An IMU that is glued in at an angle."""
 
 from types import SimpleNamespace

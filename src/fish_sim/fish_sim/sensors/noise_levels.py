@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Noise of the sensors, each number once: standard deviations unless the comment says otherwise.
 
 Sample noise, frame rate and lost frames are those of the supplied recordings. The simulator's own biases, encoder and frame

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The overhead camera as a sensor of poses: noise, jitter, lost frames and latency, without a picture."""
 
 from __future__ import annotations

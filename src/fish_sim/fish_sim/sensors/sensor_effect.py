@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a sensor may do to the truth, in the form of `effects.effect`: the sensor, not the fish."""
 
 from __future__ import annotations

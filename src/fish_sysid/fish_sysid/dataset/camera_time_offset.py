@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How much older than its stamp the camera's image is, from camera and gyro alone.
 
 The heading that the camera shows at t is the fish's at t - d, whose changes the gyro measures:

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Gaps in `joint_command`: commands that the robot followed but the recorder lost.
 
 A command held over a gap drives the model with a constant rotor speed, which the robot's was not: 10 ms of it cost 400 nats,

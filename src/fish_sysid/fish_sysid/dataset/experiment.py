@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Trials on the filter's grid: every 10 ms a command, an IMU sample, an encoder sample and perhaps a camera pose.
 
 All trials of a data set stand side by side, padded to the longest; `steps` says where a trial ends.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """IMU readings of a fish that rolls and pitches, for a model that swims level.
 
 With R from imu_link to a level frame with the z axis up, from the IMU's own orientation, and psi its heading:

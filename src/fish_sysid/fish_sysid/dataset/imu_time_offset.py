@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """IMU readings moved to the moment that they were taken."""
 
 from __future__ import annotations

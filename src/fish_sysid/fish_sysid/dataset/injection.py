@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Known effects put into recordings exactly, without a model of the fish.
 
 A current is a change of frame: the fish swims in the same water, which now moves. An old image is a stamp that is late. A scale,

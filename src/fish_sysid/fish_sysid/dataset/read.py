@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings as an experiment: every usable trial, and the reason for each that is left out."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A sensor with a clock of its own, as if it had measured at the times of the filter's grid.
 
 A sample 4 ms off that is taken for one of the grid's looks like a camera that is late by as much, one of an encoder like a rotor

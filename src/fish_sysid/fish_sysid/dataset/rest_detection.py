@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Whether a trial starts with the fish at rest, so that the filter may start with a small variance of its speed.
 
 The first gyro sample shows whether the fish turns, the first encoder sample whether the rotor does. Only the camera sees a

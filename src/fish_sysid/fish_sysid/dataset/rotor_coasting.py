@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A coasting rotor: where a command is forgotten, the encoder's speed replaces it.
 
 A controller that has ended leaves its last command standing while the motor is off and the rotor runs down. The model is

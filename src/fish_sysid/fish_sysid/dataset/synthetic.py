@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings made by the model itself, for studies in which the truth is known.
 
 Sensor noise is that of `Noise`; frame times and constant biases are those of `fish_sim.sensors.noise_levels`; the water

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A plan of calibration: swims that determine a model's parameters to wanted errors, for `robofish excite`."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Swims from which a calibration is chosen: strokes and rudder patterns of several lengths that the pool has room for."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which names of the vocabulary a program of swims can tell apart, by the signals that they leave in the filter's innovations.
 
 Of an effect i, s_i: change of the whitened innovations where the robot has it at its typical strength and the model does not. The

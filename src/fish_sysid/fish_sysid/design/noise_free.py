@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a robot's sensors would show in swims: the model's recordings without noise, pushes of the water and biases."""
 
 from __future__ import annotations

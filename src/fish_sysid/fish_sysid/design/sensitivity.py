@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What swims say of a model's parameters, and how its filter answers to what the model lacks.
 
     N = sum of J' J,   J = d e / d theta      e: whitened innovations of the filter that fits the model (`estimation.ekf_types`)

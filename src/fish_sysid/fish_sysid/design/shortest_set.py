@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The shortest set of swims that determines parameters to given errors, and a bound that no set can be shorter than.
 
     min over counts n   sum of n_i t_i    so that   [(P^-2 + sum of n_i N_ir)^-1]_kk <= s_k^2   for all parameters k, robots r

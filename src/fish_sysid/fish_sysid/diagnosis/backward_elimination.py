@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Backward elimination: what of a grown model is superfluous, or was taken for something else, now that all of it is there.
 
 An effect that was added while another one was missing has competed to explain what that one does as well.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """From the final models to the diagnosis: where force is missing, what each effect does, and errors on held-out trials."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a diagnosis comes to: which names stand, whether much is left, which robot to go on with."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a fit gains on trials that it was not fitted to, its parameters as unsure as the other trials leave them.
 
 log p(unseen | fitted) = log p(unseen, fitted) - log p(fitted), each by Laplace's approximation; the difference of two fits is

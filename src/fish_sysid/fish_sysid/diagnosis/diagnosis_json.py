@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """diagnosis.json: the answer in the project's fixed format."""
 
 from __future__ import annotations

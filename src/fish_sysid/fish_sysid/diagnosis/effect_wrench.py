@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What an effect that was found does to the fish, and where: in which intervals of time, over which range of a covariate."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Families of names that recordings often cannot tell apart, and the manoeuvre that separates their members."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Forward selection: add one effect at a time while one is significant and predicts trials that it was not fitted to."""
 
 from __future__ import annotations

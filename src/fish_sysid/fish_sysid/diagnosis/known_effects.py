@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The model that a diagnosis starts from: the given robot, free in all that the recordings determine of it.
 
 The effects and sensor errors of the given robot belong to it like its drags: one that is a little off would be taken for

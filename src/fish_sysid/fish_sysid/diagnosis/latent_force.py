@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where the refitted nominal model misses force: degree of freedom, time, place, covariates."""
 
 from __future__ import annotations

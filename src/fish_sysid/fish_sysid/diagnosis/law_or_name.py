@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A name in the place of a law: where no name is significant and yet a law is left."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Model order: how many links stand for the tail. It competes with the candidates but is no name.
 
 A tail that bends continuously, described by too few links, leaves a force that candidates would take up.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which manoeuvre would separate what the data could not: a program the simulator and the robot can run."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The method on one page: symmetries, fit, select effects, choose the number of links, eliminate, say what is left."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Residual regression: a law for the force that a model leaves, of the few terms that lower the cost most.
 
 The force is written as an effect with a free coefficient for every term on every degree of freedom, so that one pass of the

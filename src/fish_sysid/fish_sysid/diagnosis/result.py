@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a diagnosis finds: rounds of the search, its state between the stages, and the whole of it."""
 
 from __future__ import annotations

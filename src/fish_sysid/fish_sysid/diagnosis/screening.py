@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Screening: how many nats every candidate gains, quickly, on short trials.
 
 The local screening adds each candidate to the base at the base's noise, which is inflated by what the model lacks. Where the

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One round of the forward selection: screen all candidates, refit the best, their look-alikes, and the base itself.
 
 Every hypothesis refits all nominal parameters: an effect counts only for what they cannot absorb.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """From fits to statements: what counts as significant, how probable each name is."""
 
 from __future__ import annotations

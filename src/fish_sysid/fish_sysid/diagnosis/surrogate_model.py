@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Surrogate model: where no name fits, the robot whose predictions over seconds are best.
 
 The likelihood misleads a model that lacks something without a name: its parameters go where the next 50 ms are right. Here the

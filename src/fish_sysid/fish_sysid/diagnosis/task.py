@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a diagnosis is asked: trials, candidates, level, and the stages of the method that run."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which trials fit, which are held out, which are enough to search on."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The names a diagnosis may answer with, and which of them the recordings can judge."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Annealed fit: the IMU's noise is inflated at first, so that the camera decides, and lowered stage by stage.
 
 With the full weight of accelerometer and gyro the likelihood has many optima, because a wrong phase of the tail's swing is as

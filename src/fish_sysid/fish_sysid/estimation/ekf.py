@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One pass of the extended Kalman filter over an experiment: compiled where possible, else in NumPy."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The compiled filter against the NumPy one on a few invented samples, in place of trust in the compiler."""
 
 from __future__ import annotations

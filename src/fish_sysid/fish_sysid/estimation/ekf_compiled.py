@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The filter's pass in C, one trial per call, several trials on several threads."""
 
 from __future__ import annotations

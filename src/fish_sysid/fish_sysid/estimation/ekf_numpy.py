@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The filter's pass in NumPy, all trials at once: what the compiled pass is compared with, and runs without a compiler."""
 
 from __future__ import annotations

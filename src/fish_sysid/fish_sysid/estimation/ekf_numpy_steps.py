@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Steps of the filter's pass in NumPy: the flow of a linear system over a step, and the Kalman update."""
 
 from __future__ import annotations

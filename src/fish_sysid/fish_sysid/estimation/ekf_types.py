@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Extended Kalman filter of the fish with forward sensitivities: the model, its numbers, its results.
 
 State xi = [motion (q, q', states of effects), wrench on the head (3), biases of gyro and accelerometer (3)].

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The rotor's encoder, whose likelihood needs no filter: the rotor's speed follows from the commands alone.
 
 Single samples of a real encoder can be far off (a held rotor, a wrong stamp). A residual beyond the gate costs a constant and

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """States at start points, given what was measured before them and a little of what comes after."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Global fit: no single start leads to the best optimum from everywhere.
 
 Mass and grip of the tail have many optima, the more the more links it has. Where the camera decides they lie close together,

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Initial noise estimate, chosen by likelihood before fitting, so that the EKF does not diverge on a wrong model."""
 
 from __future__ import annotations

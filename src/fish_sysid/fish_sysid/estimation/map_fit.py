@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Maximum a posteriori fit of a hypothesis at given noise: Levenberg-Marquardt on the likelihood of the innovations."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A hypothesis: a robot with effects and sensor errors, and which of its parameters are free.
 
 Free parameters live in a vector theta: nominal parameters as logarithms of their ratio to the start (they are positive),

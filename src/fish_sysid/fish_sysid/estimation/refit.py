@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One refit with a schedule: annealing, if any, then noise and parameters in turn."""
 
 from __future__ import annotations

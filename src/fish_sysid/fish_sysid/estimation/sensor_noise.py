@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Sensor noise estimated from the roughness of the signals, before anything is fitted, with the process noise of usual water.
 
 Too small a sensor noise would be fitted as a rough force on the fish, which biases every parameter.

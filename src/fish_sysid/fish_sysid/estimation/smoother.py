@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Rauch-Tung-Striebel smoother: state and missing wrench given the whole trial."""
 
 from __future__ import annotations

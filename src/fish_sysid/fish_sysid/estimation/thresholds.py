@@ -1,11 +1,12 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Every constant of the fit and of the search for effects: value, unit and reason."""
 
 from __future__ import annotations
 
 # --- fit of one hypothesis -----------------------------------------------------------------------
-LARGEST_STEP = (
-    0.5  # of theta in one Levenberg-Marquardt iteration: the model is linear about so far
-)
+# of theta in one Levenberg-Marquardt iteration: the model is linear about so far
+LARGEST_STEP = 0.5
 SMALL_GAIN = 0.05  # nats; an iteration that gains less has converged
 COARSE_GAIN = 3.0  # nats; the same in an annealing stage, whose optimum the next stage moves anyway
 FIRST_STEPS = 800  # grid points of 10 ms; eight seconds of a trial suffice to screen and to anneal
@@ -59,9 +60,8 @@ LARGE_EFFECT = 10  # parameters; an effect with more is held while others are sc
 # --- forward selection ---------------------------------------------------------------------------
 MOST_EFFECTS = 3  # more have not been told apart on twelve trials of 20 s
 SHORTLIST, ANNEALED_SHORTLIST = 4, 2  # candidates that are refitted
-WORTH_A_REFIT = (
-    0.2  # of the best gain and of the gain needed: whole trials gain more than short ones
-)
+# of the best gain and of the gain needed: whole trials gain more than short ones
+WORTH_A_REFIT = 0.2
 MOST_RESTARTS = 3  # screenings in a round, each from a better optimum of the base
 POOR_BASE = 0.5  # share of the best candidate's gain that a restarted base reaches without it
 FAIR_SHARE = 0.5  # of the gain on other trials that a true effect has in the mean
@@ -88,9 +88,8 @@ STILL = 1e-3  # rad, rad/s; a command that varies less excites nothing
 
 # --- number of links -----------------------------------------------------------------------------
 MORE_LINKS = (1, 2)  # beyond the robot's, that are tried
-PROMISING_RATIO = (
-    0.5  # of the best fit's process noise; with less the next number of links is tried
-)
+# of the best fit's process noise; with less the next number of links is tried
+PROMISING_RATIO = 0.5
 
 # --- cross-validation and residual regression ------------------------------------------------------
 MOST_ITERATIONS, NEAR_GAIN = 20, 1.0  # to the optimum of all trials, far for a flow; nats
@@ -110,9 +109,8 @@ SENSOR_GAIN = 0.1  # the same of scales and axes: 5 % of a rate are little besid
 SMALLEST_SCALE = 0.01  # data sheets promise no better
 SMALLEST_ANGLE = 0.02  # rad; markers and boards are mounted no better
 SMALLEST_DEAD_TIME = 0.02  # s, two grid points
-LEAST_OWN_SHARE = (
-    0.1  # of a term that a black-box fish does not span; with less the data cannot tell
-)
+# of a term that a black-box fish does not span; with less the data cannot tell
+LEAST_OWN_SHARE = 0.1
 LEAST_TURNING = 0.05  # rad/s, spread of the stroke-mean yaw rate; a straight swim has 0.02
 LEAST_ACCELERATION = 0.03  # m/s^2, spread of windowed accelerations; an IMU's noise leaves 0.004
 LEAST_SPEED = 0.02  # m/s, mean; a fish that hardly swims has no course

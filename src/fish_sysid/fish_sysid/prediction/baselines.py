@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a physics model has to beat: three predictors that know nothing of the fish's mechanics.
 
     constant    speed and yaw rate stay as they are
@@ -25,9 +27,8 @@ from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
 
-FULL_ACCELERATION = (
-    12.0 * (4.0 * np.pi) ** 2
-)  # rad/s^2, of the rotor at full throttle: 12 rad at 2 Hz
+# rad/s^2, of the rotor at full throttle: 12 rad at 2 Hz
+FULL_ACCELERATION = 12.0 * (4.0 * np.pi) ** 2
 STEP = 0.25  # s, period of the baselines
 STRIDE = round(STEP / DT)
 OUTLOOK = 3.0  # s, over which the bilinear model's surge is fitted

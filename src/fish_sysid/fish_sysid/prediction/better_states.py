@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which way to the state at a start point predicts better: the filter, or shooting over the past second."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Errors of an identified robot on trials that it was not fitted to, beside its start's and the baselines'."""
 
 from __future__ import annotations

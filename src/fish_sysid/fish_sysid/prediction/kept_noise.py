@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The noise that an identification found, kept with the robot in robot.yaml, so that predictions use the same."""
 
 from __future__ import annotations

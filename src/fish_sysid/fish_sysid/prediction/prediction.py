@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Predict recordings: from the filter's estimate at a moment, the fish is simulated forward with the recorded inputs.
 
 The estimate uses what was measured up to that moment only (an image belongs to the moment it was taken). All start

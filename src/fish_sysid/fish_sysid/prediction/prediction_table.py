@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Predictions as a table that anybody can score a model with."""
 
 from __future__ import annotations

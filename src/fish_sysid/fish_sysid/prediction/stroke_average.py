@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Pose and body velocity averaged over strokes: what a prediction and a recording are compared in.
 
 The fish swings with every stroke (0.5 s at 2 Hz). A local straight line through the poses of one second, weighted with a

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Held-out trials, measured and simulated without correction: the refitted nominal model and the one with the effects found."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of a comparison: sentence, what changed, OLD and NEW side by side with the model, tests, next experiment."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Figures of a diagnosis (plotly): the missing force, the water and the times of what was found, the next experiment."""
 
 from __future__ import annotations
@@ -26,9 +28,8 @@ from fish_sysid.estimation.parametrization import EffectTable
 COLOURS = {"surge": "#5b6bd6", "sway": "#1fa774", "yaw": "#e07b39"}
 SHOWN = 4000  # points of a scatter
 BINS = 15  # of a covariate, about equally full
-NOT_ALWAYS = (
-    0.75  # share of the time: an effect that acts for longer may be said to act all the time
-)
+# share of the time: an effect that acts for longer may be said to act all the time
+NOT_ALWAYS = 0.75
 MISTAKEN = 1 / 3  # of what F1 lacks where an effect is said to act all the time
 Content = dict[str, Any]
 Array = NDArray[np.float64]

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of a diagnosis: verdict first, then where, evidence, rivals, before and after, what to try next."""
 
 from __future__ import annotations

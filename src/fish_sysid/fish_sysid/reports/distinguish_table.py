@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which names can be told apart, as a table and as plain data."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of an identification: does the model swim as the fish did, and what is known about it."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Figures of an identification (plotly): measured against simulated motion, residuals, correlations."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The symmetry tests of a diagnosis as a table."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The verdict in one sentence: on the terminal, at the head of the page and in model.yaml."""
 
 from __future__ import annotations

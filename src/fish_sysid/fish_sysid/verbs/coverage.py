@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How often the intervals of an identification hold the truth.
 
 Synthetic robots with parameters up to 30 % off, recorded with the sensors' noise under five kinds of commands and identified

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Say where recordings and model differ, which physics is missing, and write the corrected robot."""
 
 from __future__ import annotations

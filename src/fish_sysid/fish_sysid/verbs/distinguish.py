@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which missing physics these sensors and this program of swims can tell apart, before anybody swims.
 
 For every name of the vocabulary: from which strength on `diagnose` can see it, what the model's own parameters take of it, and

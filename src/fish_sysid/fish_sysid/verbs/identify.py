@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Fit the robot's parameters to recordings, with standard errors, and judge them on trials left out of the fit.
 
 Writes robot.yaml (values with std), identification.json and report.html.

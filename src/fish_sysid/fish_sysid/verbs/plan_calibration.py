@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Plan the shortest set of swims that determines a robot's parameters to wanted errors, before anybody swims.
 
 The model itself tells what each of several hundred swims would say of its parameters, with the robot's sensors and the filter

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Predict a recording: every HORIZON seconds the robot starts from its estimated state and swims on with the recorded inputs.
 
 The state is estimated by a Kalman filter with the same model from what was measured up to that moment. The table has one

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Arguments of a robot's sensors, for verbs that look ahead of any recording."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Gains to be compared, read from what training wrote or from the command line."""
 
 from __future__ import annotations

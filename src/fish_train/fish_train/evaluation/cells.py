@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What is swum: paths by name, speeds, seeds, and where a run starts."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The conditions robots are judged under, by name and from the command line."""
 
 from __future__ import annotations

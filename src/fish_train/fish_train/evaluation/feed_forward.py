@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The feed-forward of the control law, measured on a robot: throttle, rudder and slip of steady swims, straight and in turns.
 
     s                   = a u + b u |u|                           straight

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A batch of robots on a batch of paths: sensing, planner's and controller's laws, plant, 10 ms at a time.
 
 The laws are those of the nodes (fish_control's generic functions) on arrays of B robots; the node's handling of a fish

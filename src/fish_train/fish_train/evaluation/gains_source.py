@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where gains come from: a weights file's policy, or one of the baselines' forms."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Errors of one run of a trace, with and without the approach, as `robofish score` defines them for recordings."""
 
 from __future__ import annotations

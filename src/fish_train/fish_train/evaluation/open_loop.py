@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The fish without a controller: a rotor that swings, a rudder that stays."""
 
 from __future__ import annotations

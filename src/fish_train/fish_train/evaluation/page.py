@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The page of an evaluation: summary, robustness and the cells of each candidate."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What swims: a batch of robots that take a command every 10 ms and have a true motion.
 
 The built-in plant is the project's simulator; another engine plugs in by offering the same three members.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What the control law sees: the true motion, or what sensors and fusion estimate of it."""
 
 from __future__ import annotations

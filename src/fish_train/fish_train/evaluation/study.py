@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Runs of candidates under conditions over cells, in batches and processes; rows of metrics come back."""
 
 from __future__ import annotations

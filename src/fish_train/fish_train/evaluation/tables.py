@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a study found, as tables for terminal and page."""
 
 from __future__ import annotations

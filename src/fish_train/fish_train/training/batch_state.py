@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The state of a batch of fish between two windows of the closed loop."""
 
 from __future__ import annotations
@@ -13,9 +15,8 @@ from fish_train.training.closed_loop_equations import PHYSICS_STEPS, SIZES
 Array = NDArray[np.float64]
 HISTORY = 32  # physics steps of 10 ms kept for delayed vision
 LONGEST_DELAY = HISTORY - PHYSICS_STEPS + 1
-START = (
-    GuidanceState().flat
-)  # memory of the guidance before the first period; all else starts at zero
+# memory of the guidance before the first period; all else starts at zero
+START = GuidanceState().flat
 MEMORY_SIZE = SIZES["guidance"] + SIZES["control"] + SIZES["actuator"] + SIZES["last"]
 
 

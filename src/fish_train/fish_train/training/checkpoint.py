@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A training run on disk: saved whole or not at all, so that a killed run continues exactly."""
 
 from __future__ import annotations

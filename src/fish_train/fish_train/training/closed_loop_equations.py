@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One control period of the closed loop on generic scalars: what is differentiated, and what the node runs.
 
 The laws are fish_control's own functions; this module only strings them together and adds the stage cost

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The closed loop as one compiled kernel (c/closed_loop.c): a window and the gradient of its cost in the weights."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a training run is made of; one dataclass, one YAML file (config/train.yaml) with the same keys."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The ladder of paths: sinusoids and circles in turn, each passed when the cross-track error stays small enough."""
 
 from __future__ import annotations

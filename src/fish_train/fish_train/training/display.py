@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Training as it runs: a live table on a terminal, a line now and then elsewhere."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Starts of episodes: where the fish are, how fast they should swim, how their robots differ, what they see."""
 
 from __future__ import annotations

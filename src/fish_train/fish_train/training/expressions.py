@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The period's equations (`loop`) as CasADi functions with their adjoints, for the compiled kernel."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Arguments of the compiled closed loop as C structures; fields as in c/closed_loop.c."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The compiled closed loop compared with torch's autograd on the same equations.
 
 The reference's physics is the interpreted kernel with its own adjoint: nothing of it is compiled here.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Reference paths as the tables that the kernel and the torch loop search."""
 
 from __future__ import annotations

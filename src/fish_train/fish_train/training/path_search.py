@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Where a fish is on its path, in NumPy: what c/path_search.h does, for machines without a C compiler."""
 
 from __future__ import annotations

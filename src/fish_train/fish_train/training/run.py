@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """One training run in its folder: resume, train, save, write the weights."""
 
 from __future__ import annotations

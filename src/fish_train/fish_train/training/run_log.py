@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The training curve of a run: a CSV file and TensorBoard events, cut back to the checkpoint on resume and on divergence."""
 
 from __future__ import annotations

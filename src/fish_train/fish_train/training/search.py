@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Gains without gradients: differential evolution of the same cost on the same paths, for comparison.
 
 Every candidate swims the same episodes; meant for the few numbers of constants and schedules.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The closed loop as torch operations: slow, for machines without a C compiler, and the check of the compiled one.
 
 The same equations (`loop`), differentiated by torch's autograd instead of by hand; physics through fish_sim.torch_step.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Backpropagation through time, window by window, up the ladder of levels; its whole state can be saved."""
 
 from __future__ import annotations

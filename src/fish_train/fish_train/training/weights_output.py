@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The weights file that the controller loads, and its model card."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How well gains follow paths: any weights on any paths, speeds, plants and seeds.
 
 Without --perfect every run goes through the camera model (noise, jitter, loss, latency), the IMU model and the

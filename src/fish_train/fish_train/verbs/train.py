@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Learn the gains by backpropagation through simulator, control law and actuators.
 
 Writes for every seed a folder with the weights file (gains.safetensors), a model card, the training curve

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Show what is in a weights file: contract, layers, gains at a few situations.
 
 robofish weights show FILE

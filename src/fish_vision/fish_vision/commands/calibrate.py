@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """calibrate lens | mount: make the two files that tell the tracker about its camera."""
 
 import argparse

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """check_image: what the tracker sees in one picture; for setting colours and checking a calibration."""
 
 import argparse

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Keep the memory of freed pictures for the next ones."""
 
 import ctypes

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The tracker node: overhead image to pose of the head and angles of the tail.
 
 In: camera/image_raw/compressed (sensor_msgs/CompressedImage) or, with use_raw, camera/image_raw

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Remake the paper's figures and table: trains nine seeds (unless they are there), swims, writes one page.
 
 The letters go through the camera model, the IMU model and the robot's own fusion.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Blind study: scenarios with something hidden, the whole tool on each without the label, labels opened afterwards.
 
 Writes commitments to the labels before the first run, results as they come, and at the end scores, opened labels and report.html.

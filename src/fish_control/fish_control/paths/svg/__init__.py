@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The line of an SVG drawing, as a viewer shows it and at its true size.
 
 The library svgelements reads the outline's commands, transforms, viewBox and colours; what is drawn at all is decided

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Clip paths: an outline that lies inside is shown whole, any other is refused."""
 
 from __future__ import annotations

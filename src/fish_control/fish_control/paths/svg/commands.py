@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The commands of an SVG path, checked by SVG's grammar and written out as M, L, C, Q, A and Z with absolute numbers.
 
 svgelements mirrors the control point after S and T also where the command before was a curve of the other kind, stops

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a viewer draws of an SVG document: the visible shapes with their place on the page."""
 
 from __future__ import annotations

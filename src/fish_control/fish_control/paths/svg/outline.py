@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The points of shapes: paths, lines, polygons, rectangles and ellipses."""
 
 from __future__ import annotations
@@ -19,9 +21,8 @@ Array = NDArray[np.float64]
 Outline = tuple[Array, bool]  # points (M, 2) in the shape's own units, and whether they are closed
 Viewport = tuple[float, float]  # width and height that percentages refer to [px]
 
-FLATNESS = (
-    2e-6  # of the curve's size, between a curve and its chords: an angle of 0.5 degrees on a circle
-)
+# of the curve's size, between a curve and its chords: an angle of 0.5 degrees on a circle
+FLATNESS = 2e-6
 
 
 def outlines(element: Element, viewport: Viewport, where: str) -> list[Outline]:

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which properties an element has: presentation attributes, style sheets and the style attribute (CSS cascade)."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Lengths and numbers of SVG and CSS."""
 
 from __future__ import annotations

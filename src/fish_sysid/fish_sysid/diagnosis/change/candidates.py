@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What may have changed, as columns that are linear in its parameters, in typical strengths.
 
 Flows, walls, lines and sensors are written down at the measured motion. Bodies and motors are differences of simulations with

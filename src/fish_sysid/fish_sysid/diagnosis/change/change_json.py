@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A comparison in diagnosis.json, in a sentence, and as a robot."""
 
 from __future__ import annotations

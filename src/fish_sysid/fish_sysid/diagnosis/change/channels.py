@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What is compared: stroke means, harmonics of the stroke, and the camera's clock, trial by trial.
 
 A column is an array (C, 12) at the centres of the stroke means, for the channels

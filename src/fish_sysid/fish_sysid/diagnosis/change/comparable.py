@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Can OLD and NEW be compared? Which trials are left out, and which are of one kind?"""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The method on one page: comparable? a model of OLD, rows, swap test, names, strengths, remainder."""
 
 from __future__ import annotations
@@ -50,9 +52,8 @@ SPECIAL_CASE = {"nonuniform_current": "current", "wake_memory": "tip_slip"}
 KIN = 6  # further members of the best one's family
 SUSPECTS = 4  # of a remainder without a name
 FEW_SWAPS = 150  # of a member's remainder
-SEPARATE = (
-    2.0  # standard errors by which one contender predicts left-out trials better than another
-)
+# standard errors by which one contender predicts left-out trials better than another
+SEPARATE = 2.0
 NAMES = tuple(dict.fromkeys((*POOL_AND_SENSORS, *COLUMNS, *SIMULATED)))
 
 

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Amplitudes of IMU signals at the rotor's stroke, relative to the phase of its command.
 
 In a window of weights w about a centre, with the phase phi of the command's analytic signal,

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which name: what each candidate is worth on NEW's trials left out in turn, and its strengths."""
 
 from __future__ import annotations

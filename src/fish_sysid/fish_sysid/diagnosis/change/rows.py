@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Rows of the regression: what is measured, what OLD and NEW share, and what each candidate would add in NEW alone."""
 
 from __future__ import annotations

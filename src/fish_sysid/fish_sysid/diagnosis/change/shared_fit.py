@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What OLD and NEW share: a ridge regression on both, with its ridge and noise chosen on OLD's left-out trials."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Channels of a simulated robot under the recorded commands: what an effect or a parameter would change.
 
 The fish starts at rest; what a wrong start does is gone after the first second and a half, which no stroke mean covers.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of a name in NEW, refitted at its strength: the simulation is linearised where they are, not at zero."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Is NEW different? Trials of OLD and NEW exchanged at random: what a candidate gains then is the null.
 
 The statistic is the largest gain over all names, each relative to what it gains when trials are exchanged. A trial that is

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Camera and accelerometer against each other: scale of positions, axes of the IMU.
 
 Turned by the heading psi, the specific force f is the acceleration of the camera's position x. With a window w that ends in zero

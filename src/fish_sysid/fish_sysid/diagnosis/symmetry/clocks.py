@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Clocks: the camera's against the gyro's, the encoder's against the command's, the IMU's against the command's."""
 
 from __future__ import annotations
@@ -22,9 +24,8 @@ from fish_sysid.estimation.thresholds import (
 
 Array = NDArray[np.float64]
 
-SHARP = (
-    2.0  # mean square at the worst delay over that at the best, below which the fish hardly turned
-)
+# mean square at the worst delay over that at the best, below which the fish hardly turned
+SHARP = 2.0
 DEAD_TIMES = np.arange(0, 31)  # grid points by which the encoder may be late
 STILL_ROTOR, MOVING_ROTOR = 1.0, 10.0  # rad/s of the rotor's command before and after a start
 REST = 0.5  # s, that the rotor must have stood before a start

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """What a symmetry test answers: found, not found, or why the recordings cannot tell."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """All symmetry tests of an experiment: seconds, without a model of the fish."""
 
 from __future__ import annotations

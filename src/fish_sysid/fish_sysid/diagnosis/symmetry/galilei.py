@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Uniform flow by Galilei's change of frame.
 
 A fish in water that moves swims as in still water, and is carried along:

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Mirror symmetry: with the rudder mirrored, sway and yaw rate should be mirrored.
 
 What breaks it is a trim of the rudder, an offset of the heading marker, a hull or a load that is not symmetric, or an uneven

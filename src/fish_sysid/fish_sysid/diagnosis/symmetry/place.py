@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Dependence on place: the regression of `galilei` with terms in the place.
 
 Translating the fish in the pool changes nothing of its swimming, unless the water or the walls differ from place to place.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Whether further terms of a linear regression predict trials that took no part in the fit.
 
 Ordinary least squares without a ridge, on columns of unit length; directions that the columns hardly span are left out.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Scale of the gyro, and the camera's heading against the course.
 
     gyro = factor * camera's yaw rate + bias of the trial

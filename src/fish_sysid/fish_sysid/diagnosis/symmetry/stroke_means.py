@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Stroke means of what camera and IMU measured, and features of the command history beside them.
 
 A fish is taken as a black box that commands drive: its stroke-mean surge is even in the rudder, sway and yaw rate are odd.

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Symmetry findings in diagnosis.json: the table of all tests, and what they add to the effects."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Standard errors of a fit whose errors hang together within a trial: the sandwich, clustered by trial.
 
     C = N^-1 (M / (M - 1) sum over trials of s_m s_m' + diag(1 / prior^2)) N^-1

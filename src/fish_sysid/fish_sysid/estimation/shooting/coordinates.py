@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Parametrization of a hypothesis for predictions over seconds: priors by what is known of a parameter, and a quick stepper.
 
 A likelihood needs the tail's mode to a part in a million, a prediction of stroke means does not: RK4 with as many steps in a

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Huber's function: quadratic up to ROBUST, linear beyond."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Can a model follow the fish at all? What short windows with free start states leave, over the noise of the camera.
 
 A model that is right leaves the noise. One that lacks something cannot follow two seconds of swimming from any start state: its

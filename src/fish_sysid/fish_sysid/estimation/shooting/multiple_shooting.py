@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters by multiple shooting: windows of raw measurements with free start states, by damped Gauss-Newton.
 
     min over theta, sensors, x_w, b_w   sum of rho(e) + 1/2 |(theta, sensors) / prior|^2 + 1/2 sum of |(x_w - x_w0) / spread|^2

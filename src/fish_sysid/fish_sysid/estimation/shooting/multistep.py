@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters that predict best over seconds, from states that know only what was before.
 
     min over theta   sum of rho(e) + 1/2 |(theta, sensors) / prior|^2,   e: `stroke_targets` after 0.5 to 5 s

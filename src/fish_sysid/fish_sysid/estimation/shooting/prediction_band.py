@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How far off a prediction may be: what its parameters leave open, and what the model missed in training.
 
     band^2 = J C J' + s^2,   s: robust spread of the training trials' errors at the same horizon

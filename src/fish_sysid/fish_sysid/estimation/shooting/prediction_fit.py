@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """A robot fitted to what it shall predict: number of links, starts, effects, polish, and errors clustered by trial."""
 
 from __future__ import annotations

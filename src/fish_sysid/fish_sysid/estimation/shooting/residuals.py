@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Residuals of windows of raw measurements, and their slopes.
 
 Of a window that starts with the motion x and whose IMU counts headings from an unknown zero b:

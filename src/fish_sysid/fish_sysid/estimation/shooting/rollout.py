@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Poses of many windows simulated at once, with their slopes with respect to parameters and start states.
 
 Slopes are forward differences: one more lane of the value kernel per direction. Of a tail of one link a lane of values costs

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """From a robot that nobody has measured to the optimum that predicts: starts over the tail's natural frequency, then polish.
 
 The stroke's phase makes the cost multimodal in how stiff and how heavy the tail is. A tail that is too stiff leads from a smooth

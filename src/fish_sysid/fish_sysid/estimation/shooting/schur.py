@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Normal equations of parameters and many start states, the start states eliminated by Schur's complement.
 
 [A   B_1 .. B_W] [dz ]     [g  ]

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which effects let a model predict trials that it was not fitted to: forward selection with left-out trials and a control.
 
 Every round each candidate is looked at where the fit stands: of its own slope and those of the fit, how far would one

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """The state at a moment from the second before it: a window that ends there, its start motion by least squares.
 
 Where a model is wrong a filter's gains are those of a force that the water never has. Shooting over a short past takes the

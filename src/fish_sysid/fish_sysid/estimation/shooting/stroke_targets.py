@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Stroke means that predictions are compared with: linear in the predicted poses, so that one product serves all.
 
 A target is the stroke mean of the camera's poses `h` seconds after a start point. Its errors, scaled by what counts as one,

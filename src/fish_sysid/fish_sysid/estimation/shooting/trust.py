@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How far start states trust camera, IMU and older samples: as far as predictions of the training trials ask for.
 
 A model that lacks something leaves its start state between what the sensors say now and what they said a second ago. Which of

@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Windows of raw measurements on which a model is shot: camera poses and the IMU's headings between two grid points.
 
 A window lasts the same number of steps in every trial, so that all windows are simulated side by side.
