@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Camera calibration files: what camera_info_manager, camera_calibration and OpenCV's FileStorage write.
 
-The one reader of all packages: YAML with image_width, image_height, camera_matrix and distortion_coefficients. OpenCV's
-files begin with %YAML:1.0, tag their matrices and often name no distortion model; it follows from the coefficients then.
+The one reader of all packages: image_width, image_height, camera_matrix and distortion_coefficients as YAML, as OpenCV's
+XML or JSON, or as the text ost.txt. OpenCV's files and ost.txt name no distortion model; it follows from the coefficients.
 """
 
 from __future__ import annotations
@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
+from fish_node.camera_document import WRONG, parse
 
 # numbers of coefficients that each model may have; none and four of plumb_bob are five with zeros
 COEFFICIENTS = {"plumb_bob": (5, 4, 0), "rational_polynomial": (8,), "equidistant": (4,)}
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-FIRST_LINE = "%YAML:1.0"  # OpenCV's, which is no YAML 1.1 directive
 LONGEST = 100  # characters of a foreign text in a message
 
 
@@ -39,17 +38,6 @@ class CameraFile:
     projection: tuple[float, ...]  # (12,) P
 
 
-class _Loader(yaml.SafeLoader):  # type: ignore[misc]
-    """YAML with OpenCV's tagged matrices."""
-
-
-def _matrix(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
-    return dict(loader.construct_mapping(node, deep=True))
-
-
-_Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
-
-
 def read_camera_file(path: Path) -> CameraFile:
     """Read and check a camera file.
 
@@ -57,17 +45,14 @@ def read_camera_file(path: Path) -> CameraFile:
         CameraFileError: the file is no camera file, or a field is missing or impossible.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-        if text.startswith(FIRST_LINE):
-            text = text[len(FIRST_LINE) :]
-        document = yaml.load(text, Loader=_Loader)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+        document = parse(path.read_text(encoding="utf-8"))
+    except (OSError, *WRONG) as error:
         raise CameraFileError(
             f"{path}: no camera file: {_short(' '.join(str(error).split()))}"
         ) from error
     if not isinstance(document, dict):
         raise CameraFileError(
-            f"{path}: no camera file: expected a YAML mapping with camera_matrix, got {type(document).__name__}"
+            f"{path}: no camera file: expected a mapping with camera_matrix, got {type(document).__name__}"
         )
     fields = _Fields(path, document)
     model, distortion = fields.distortion()

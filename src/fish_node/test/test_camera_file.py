@@ -104,3 +104,83 @@ def test_files_that_are_no_camera_file(tmp_path, text):
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(CameraFileError, match="No such file"):
         read_camera_file(tmp_path / "nowhere.yaml")
+
+
+OST = """# oST version 5.0 parameters
+
+
+[image]
+
+width
+640
+
+height
+480
+
+[narrow_stereo]
+
+camera matrix
+538.630000 0.000000 310.500000
+0.000000 539.720000 240.250000
+0.000000 0.000000 1.000000
+
+distortion
+-0.300000 0.080000 0.002000 -0.000100 0.000000
+
+rectification
+1.000000 0.000000 0.000000
+0.000000 1.000000 0.000000
+0.000000 0.000000 1.000000
+
+projection
+500.000000 0.000000 312.000000 0.000000
+0.000000 510.000000 241.000000 0.000000
+0.000000 0.000000 1.000000 0.000000
+"""
+
+
+def test_the_text_of_camera_calibration_is_read(tmp_path):
+    path = tmp_path / "ost.txt"
+    path.write_text(OST)
+    camera = read_camera_file(path)
+    assert (camera.width, camera.height, camera.model) == (640, 480, "plumb_bob")
+    assert camera.camera_matrix == (538.63, 0.0, 310.5, 0.0, 539.72, 240.25, 0.0, 0.0, 1.0)
+    assert camera.distortion == (-0.3, 0.08, 0.002, -0.0001, 0.0)
+    assert camera.projection[:4] == (500.0, 0.0, 312.0, 0.0)
+
+
+@pytest.mark.parametrize("suffix", [".xml", ".json", ".yaml"])
+@pytest.mark.parametrize("capitals", [False, True])
+def test_every_form_of_opencv_s_storage_is_read(tmp_path, suffix, capitals):
+    """Names with capitals are those of OpenCV's own calibration example."""
+    names = (
+        ("image_Width", "image_Height", "Camera_Matrix", "Distortion_Coefficients")
+        if capitals
+        else ("image_width", "image_height", "camera_matrix", "distortion_coefficients")
+    )
+    path = tmp_path / f"camera{suffix}"
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("calibration_Time", "Fri Nov 27 10:00:00 2026")
+    matrices = np.array(K, float).reshape(3, 3), np.array([[-0.3, 0.08, 0.002, -0.0001, 0.05]]).T
+    for name, value in zip(names, (800, 600, *matrices), strict=True):
+        storage.write(name, value)
+    storage.release()
+    camera = read_camera_file(path)
+    assert (camera.width, camera.height, camera.model) == (800, 600, "plumb_bob")
+    assert camera.camera_matrix == pytest.approx(K)
+    assert camera.distortion == pytest.approx((-0.3, 0.08, 0.002, -0.0001, 0.05))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<opencv_storage><camera_matrix>",
+        "<!DOCTYPE x [<!ENTITY a 'b'>]><opencv_storage/>",
+        "<opencv_storage><camera_matrix><data>1 2 x</data></camera_matrix></opencv_storage>",
+        "[image]\n\nwidth\nwide\n",
+    ],
+)
+def test_a_broken_file_of_any_form_is_one_line(tmp_path, text):
+    with pytest.raises(CameraFileError, match="no camera file") as refusal:
+        read_camera_file(written(tmp_path, text))
+    assert "\n" not in str(refusal.value)

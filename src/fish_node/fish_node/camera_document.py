@@ -1,0 +1,95 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The text of a camera file as a mapping: YAML, JSON, OpenCV's XML, or the oST text of camera_calibration.
+
+Names of fields become lower case: OpenCV's examples write Camera_Matrix and image_Width.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+from xml.etree import ElementTree
+
+import yaml
+
+YAML_LINE = "%YAML:1.0"  # OpenCV's first line, which is no YAML 1.1 directive
+# headings of the oST text and the names of their numbers
+OST = {
+    "width": "image_width",
+    "height": "image_height",
+    "camera matrix": "camera_matrix",
+    "distortion": "distortion_coefficients",
+    "rectification": "rectification_matrix",
+    "projection": "projection_matrix",
+}
+WRONG = (yaml.YAMLError, ElementTree.ParseError, ValueError, RecursionError)  # what parsing raises
+
+
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]
+    """YAML with OpenCV's tagged matrices."""
+
+
+def _matrix(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+    return dict(loader.construct_mapping(node, deep=True))
+
+
+_Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
+
+
+def parse(text: str) -> object:
+    """What a camera file says, in whatever form: a mapping of lower-case names where it is one.
+
+    Raises:
+        one of WRONG: the text is nothing of the kind.
+    """
+    start = text.lstrip("\ufeff \t\r\n")
+    if start.startswith("<"):
+        document: object = _xml(start)
+    elif re.match(r"(#[^\n]*\n|\s)*\[image\]", start):
+        document = _ost(start)
+    else:
+        document = yaml.load(start.removeprefix(YAML_LINE), Loader=_Loader)
+    if not isinstance(document, dict):
+        return document
+    return {str(name).lower(): value for name, value in document.items()}
+
+
+def _xml(text: str) -> dict[str, Any]:
+    """OpenCV's FileStorage: a matrix has rows, cols and data, anything else is a number or a text."""
+    if "<!ENTITY" in text:
+        raise ValueError("an XML file with entities is not read")
+    document: dict[str, Any] = {}
+    for entry in ElementTree.fromstring(text):
+        data = entry.find("data")
+        if data is None:
+            document[entry.tag] = _value(entry.text or "")
+        else:
+            document[entry.tag] = {"data": [float(word) for word in (data.text or "").split()]}
+    return document
+
+
+def _ost(text: str) -> dict[str, Any]:
+    """camera_calibration's ost.txt: a heading, then its numbers, until the next heading."""
+    numbers: dict[str, list[float]] = {}
+    heading = ""
+    for line in map(str.strip, text.splitlines()):
+        if line in OST:
+            heading = OST[line]
+            numbers[heading] = []
+        elif line.startswith(("#", "[")):
+            heading = ""
+        elif heading and line:
+            numbers[heading] += [float(word) for word in line.split()]
+    single = {
+        name: values[0] for name, values in numbers.items() if name.startswith("image_") and values
+    }
+    return {**{name: {"data": values} for name, values in numbers.items()}, **single}
+
+
+def _value(text: str) -> float | str:
+    """A number where the text is one; OpenCV puts texts in quotes."""
+    try:
+        return float(text)
+    except ValueError:
+        return text.strip().strip('"')
