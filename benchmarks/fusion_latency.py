@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Fusion of the simulated fish for camera latencies and clock offsets that nobody told it; prints a table.
+"""Fusion of the simulated fish for camera latencies and clock offsets that are not given; prints a table.
 
 python benchmarks/fusion_latency.py [--seeds 3] [--seconds 30]
 
