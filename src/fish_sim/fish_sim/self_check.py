@@ -29,6 +29,10 @@ PERIODS, MANY = 2, 16  # one period where it is that many steps of the integrato
 SEED = 1
 SPREAD = 0.1  # of the parameters about their typical values
 FAINT = 0.02  # what a parameter without a typical value is, where its default is 0
+UNBOUNDED, FAINTEST = (
+    1e3,
+    1e-6,
+)  # and what it is where its range is no bound: a coefficient of products of anything
 MASSES = ("_mass", "_mass_surge", "_mass_sway", "head_inertia")  # ends of their names
 TURN = 1.0  # rad, by which the fastest mode of a sample turns in a step of the integrator at most
 SMALL = 1e-3  # a component smaller than this share of the largest is measured by that share
@@ -191,4 +195,4 @@ def run(kernel: CompiledKernel | InterpretedKernel, sample: Sample, part: Part) 
 
 def _typical(parameter: Parameter) -> float:
     value = parameter.value if parameter.typical is None else parameter.typical
-    return value or FAINT
+    return value or (FAINTEST if parameter.highest > UNBOUNDED else FAINT)

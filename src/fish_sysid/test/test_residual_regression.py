@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fish_sim.compiled import compiler
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import BodyMotion, Drive
 from fish_sim.ops import NUMPY
 from fish_sim.pool import LENGTH, WIDTH
 from fish_sim.robot import Robot
+from fish_sim.scheme import default_scheme
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.diagnosis.cross_validation import Quadratic
 from fish_sysid.diagnosis.residual_regression import (
@@ -22,6 +24,7 @@ from fish_sysid.diagnosis.residual_regression import (
     regressors,
     residual_law,
 )
+from fish_sysid.estimation.ekf_compiled import filter_library
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import evaluate
 from fish_sysid.estimation.parametrization import nominal_hypothesis
@@ -131,3 +134,12 @@ def test_a_law_is_the_same_in_batches_of_one_trial():
     again = residual_law(fit, long)
     assert again.terms.keys() == whole.terms.keys()
     assert again.gain == pytest.approx(whole.gain, rel=1e-9)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler on this computer")
+@pytest.mark.parametrize("links", [1, 3])
+def test_the_filter_with_a_free_force_is_compiled(links, caplog):
+    """Its coefficients multiply squares of a rotor's speed: the self-check's fish must not be thrown out of the water."""
+    structure = (links, (FreeForce, EFFECTS["disturbance"]))
+    assert filter_library(structure, default_scheme(links).method) is not None
+    assert "no compiled kernel" not in caplog.text
