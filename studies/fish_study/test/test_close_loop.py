@@ -90,12 +90,18 @@ class Engine:
     def __init__(self) -> None:
         joint, body = SimpleNamespace(qposadr=[3]), SimpleNamespace(id=0)
         model = SimpleNamespace(
-            joint=lambda _: joint, body=lambda _: body, opt=SimpleNamespace(wind=np.zeros(3))
+            joint=lambda _: joint,
+            body=lambda _: body,
+            geom=lambda _: body,
+            geom_fluid=np.zeros((1, 12)),
+            opt=SimpleNamespace(wind=np.zeros(3)),
         )
+        self.mjtObj = SimpleNamespace(mjOBJ_GEOM=5)
         self.MjModel = SimpleNamespace(from_xml_string=lambda _: model)
 
     def MjData(self, model) -> SimpleNamespace:
         sizes = {"qpos": 4, "qvel": 4, "ctrl": 2, "sensordata": 6, "xfrc_applied": (1, 6)}
+        sizes["geom_xmat"] = (1, 9)
         return SimpleNamespace(
             **{k: np.zeros(n) for k, n in sizes.items()},
             warning=SimpleNamespace(number=np.zeros(8, int)),
@@ -103,6 +109,9 @@ class Engine:
 
     def mj_resetData(self, model, data) -> None:
         data.qpos[:], data.warning.number[:] = 0.0, 0
+
+    def mj_objectVelocity(self, model, data, kind, number, motion, local) -> None:
+        motion[:] = 0.0
 
     def mj_step(self, model, data, steps) -> None:
         data.qpos[0] += 1e-3 * steps
