@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What the self-check of a kernel costs beside its build, in processor time.
+"""The cost of a kernel's self-check as a share of the cost of its build, in processor time.
 
     python benchmarks/self_check_cost.py
     python benchmarks/self_check_cost.py --links 12
@@ -88,7 +88,7 @@ def main() -> int:
                 flush=True,
             )
     print(
-        f"all: {total_check:.1f} s of checks beside {total_build:.1f} s: {total_check / total_build:.1%}"
+        f"all: {total_check:.1f} s of checks, {total_build:.1f} s of builds: {total_check / total_build:.1%}"
     )
     return 0
 

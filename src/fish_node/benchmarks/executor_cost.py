@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Processor time of a node that hears an IMU, beside rclpy's own executor in the same run.
+"""Processor time of a node that hears an IMU, compared with rclpy's own executor in the same run.
 
     python src/fish_node/benchmarks/executor_cost.py
 

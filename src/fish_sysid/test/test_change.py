@@ -37,23 +37,23 @@ def days():
 
 
 @pytest.fixture(scope="module")
-def tested(days):
+def compared(days):
     """What the swap test and the names say of NEW with an injection."""
     old, new = days
     rows = look(trial_rows(Robot(), old, swims(old), NAMES), MEAN_MOTION)
 
-    def test(name: str = "", **values: float):
+    def with_change(name: str = "", **values: float):
         changed = with_injection(new, name, values) if name else new
         fit = regression(
             rows, look(trial_rows(Robot(), changed, swims(changed), NAMES), MEAN_MOTION)
         )
         return swap_test(fit, [0] * (OLD + NEW), 200), judge_all(fit)
 
-    return test
+    return with_change
 
 
-def test_nothing_is_found_where_nothing_changed(tested) -> None:
-    swapped, _ = tested()
+def test_nothing_is_found_where_nothing_changed(compared) -> None:
+    swapped, _ = compared()
     assert swapped.p_value > 0.01
 
 
@@ -66,8 +66,8 @@ def test_nothing_is_found_where_nothing_changed(tested) -> None:
         ("camera_latency", {"delay": 0.05}, 1.0),
     ],
 )
-def test_what_was_put_in_is_found_with_its_strength(tested, name, values, strength) -> None:
-    swapped, judged = tested(name, **values)
+def test_what_was_put_in_is_found_with_its_strength(compared, name, values, strength) -> None:
+    swapped, judged = compared(name, **values)
     assert swapped.p_value <= 0.01
     assert max(swapped.ratio, key=lambda n: swapped.ratio[n]) == name
     assert judged[name].strengths[0] == pytest.approx(strength, abs=0.25)

@@ -48,6 +48,7 @@ from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
 
 VIEW_PORT = ViewConfig().port
+LOCKSTEP = 60.0  # s of real time that simulated time waits for a node
 LONGEST = 600.0  # s, a run that does not end by itself
 PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
 
@@ -78,6 +79,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="sim",
         help=f"{' or '.join(HARDWARE)}: fake swims through the real drivers on emulated devices (sim)",
     )
+    parser.add_argument(
+        "--lockstep",
+        action="store_true",
+        help="the simulator waits for the nodes: for a computer that is too slow or too busy for real time",
+    )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
     parser.add_argument("--view", action="store_true", help="watch it live in a browser")
     parser.add_argument(
@@ -93,6 +99,10 @@ def run(args: argparse.Namespace) -> int:
     if not args.duration > 0.0:
         raise UserError(f"duration is {args.duration:g} s, expected a positive number")
     specs = robot_of(args.hardware)
+    if args.lockstep and args.hardware != "sim":
+        raise UserError(
+            "--lockstep is for the simulator alone: drivers and devices run in real time"
+        )
     with user_errors():
         domain = choose_domain(args.domain)
     start = start_pose(args.letter, args.path_args)
@@ -132,12 +142,16 @@ def node_parameters(
         RECORDER: {"output": str(folder.resolve()), "name": "recording"},
     }
     changed[simulator] = {**changed.get(simulator, {}), **start}
+    if args.lockstep:
+        changed[simulator]["lockstep"] = LOCKSTEP
+        for spec in robot_of("sim"):
+            changed[spec] = {**changed.get(spec, {}), "use_sim_time": True}
     if args.robot:
         changed[simulator]["robot_file"] = str(args.robot.resolve())
     if args.view:
         changed[VIEW] = {"port": args.view_port}
     if args.weights:
-        changed[CONTROLLER] = {"weights_file": str(args.weights.resolve())}
+        changed.setdefault(CONTROLLER, {})["weights_file"] = str(args.weights.resolve())
     return changed
 
 

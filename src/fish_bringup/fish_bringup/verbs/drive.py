@@ -5,7 +5,7 @@
 Keyboard: the arrow keys change throttle and rudder; keep pressing them: after --timeout without a key the rotor stops and the
 rudder goes to the centre, as with any other key; q ends. Gamepad (topic joy, node joy_node of the full ROS): hold the button
 --deadman. Planner and controller must not run meanwhile. The robot must be armed: `robofish arm`. operator/deadman is true
-while the deadman is held; a robot with deadman_timeout_s is disarmed when it is let go.
+while the deadman is held; a robot with deadman_timeout_s is disarmed when it is released.
 """
 
 from __future__ import annotations

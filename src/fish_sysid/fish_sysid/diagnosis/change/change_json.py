@@ -79,7 +79,7 @@ def sentence(change: Change) -> str:
         return f"The fish changed (p = {change.p_value:.2g}), and no name explains it: {remainder(change)}.{lacks}"
     parts = [_words(named) for named in change.named]
     left = (
-        f" Beside that something else changed: {remainder(change)}."
+        f" Something else changed too: {remainder(change)}."
         if change.suspects
         else f" What is left looks like exchanged trials (p = {change.remainder_p_value:.2g})."
     )

@@ -1,0 +1,32 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What the demo's options change in the nodes' parameters."""
+
+import argparse
+from pathlib import Path
+
+from fish_bringup.node_table import CONTROL, RECORDER, ROBOTS, SIMULATED
+from fish_bringup.verbs import demo
+
+
+def changed(*words: str) -> dict:
+    parser = argparse.ArgumentParser()
+    demo.add_arguments(parser)
+    return demo.node_parameters(
+        parser.parse_args(words), {"start_x": 0.0}, Path("folder"), Path("devices")
+    )
+
+
+def test_in_lockstep_the_simulator_waits_and_every_node_follows_its_clock(tmp_path) -> None:
+    weights = tmp_path / "gains.safetensors"
+    given = changed("--lockstep", "--weights", str(weights))
+    assert given[SIMULATED[0]]["lockstep"] == demo.LOCKSTEP
+    assert all(given[spec]["use_sim_time"] is True for spec in ROBOTS["sim"])
+    assert given[CONTROL[3]]["weights_file"] == str(weights)
+    assert given[RECORDER]["name"] == "recording"
+
+
+def test_without_it_nodes_follow_their_own_clocks() -> None:
+    given = changed()
+    assert "lockstep" not in given[SIMULATED[0]]
+    assert not any("use_sim_time" in values for values in given.values())
