@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 PROGRAM = f"{get_package_prefix('fish_report')}/lib/fish_report/robofish"
 
 
-def demo(folder, *arguments, limit_s=90):
+def demo(folder, *arguments, limit_s=240):
     """Run `robofish demo` in a folder."""
     command = [PROGRAM, "demo", *map(str, arguments)]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=limit_s)
@@ -28,7 +28,7 @@ def demo(folder, *arguments, limit_s=90):
 
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory):
-    """A short demo: its output and its folder."""
+    """A short demo, as slow as the computer needs: its output, its folder and its domain."""
     folder = tmp_path_factory.mktemp("demo")
     domain = choose_domain()
     result = demo(
@@ -39,6 +39,7 @@ def shown(tmp_path_factory):
         0.2,
         "--duration",
         10,
+        "--lockstep",
         "--domain",
         domain,
         "--out",
@@ -51,9 +52,7 @@ def shown(tmp_path_factory):
 def test_the_fish_swims_on_its_path(shown):
     output, *_ = shown
     rmse = float(re.search(r"cross-track, m +([\d.]+)", output)[1])
-    assert (
-        rmse < 0.1
-    )  # m, in real time; on a quiet computer below 0.015, with an idle rudder 0.3 and more
+    assert rmse < 0.015  # m; with an idle rudder 0.3 and more
 
 
 def test_latency_and_cpu_of_every_node_are_shown(shown):
