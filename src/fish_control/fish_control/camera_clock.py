@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +128,7 @@ class CameraClock:
         """Median age of an image at its arrival [s], NaN before the first."""
         if not self._latencies:
             return math.nan
-        return float(np.median(self._latencies)) - self.current.offset
+        return median(self._latencies) - self.current.offset
 
     def add(self, stamp: float, heading: float, imu: ImuHistory, now: float) -> None:
         """A pose with this stamp and heading arrives when the IMU's clock is at `now` [s].
@@ -161,9 +162,9 @@ class CameraClock:
         if self._grid is None:
             self._latencies.append(latency)
             if len(self._latencies) >= 3:
-                self._place_grid(float(np.median(self._latencies)))
+                self._place_grid(median(self._latencies))
             return
-        usual = float(np.median(self._latencies))
+        usual = median(self._latencies)
         if abs(latency - usual) <= JUMP:
             self._strange.clear()
             self._latencies.append(latency)
@@ -171,7 +172,7 @@ class CameraClock:
         self._strange.append(latency)
         newest = self._strange[-JUMP_POSES:]
         if len(newest) == JUMP_POSES and max(newest) - min(newest) < STEADY:
-            self._jumped(float(np.median(newest)), usual)
+            self._jumped(median(newest), usual)
 
     def _jumped(self, latency: float, usual: float) -> None:
         self.jumps += 1

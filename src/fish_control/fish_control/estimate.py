@@ -43,26 +43,30 @@ def to_estimate(
     yaw_rate: of the IMU [rad/s], None if it measures none; offset_std: of the camera's clock [s], which moves the pose
     along the motion; gyro_noise: rad/s.
     """
-    x, P = moment.x, moment.P
-    c, s = math.cos(x[2]), math.sin(x[2])
-    R = np.array([[c, s], [-s, c]])  # pool to body
-    u, v = R @ x[3:5]
-    r = 0.0 if yaw_rate is None else yaw_rate - x[5]
-    J = np.column_stack([[v, -u], R])  # d (u, v) / d (psi, v_x, v_y)
-    twist_P = np.zeros((3, 3))
-    twist_P[:2, :2], twist_P[2, 2] = J @ P[2:5, 2:5] @ J.T, P[5, 5] + gyro_noise**2
-    if imu_lost or yaw_rate is None:
-        twist_P[2, 2] = LOST_VARIANCE
-    if imu_lost:
-        twist_P = np.eye(3) * LOST_VARIANCE
-    motion = np.array([x[3], x[4], r])
+    x, y, psi, vx, vy, bias = moment.x[:6].tolist()
+    P = moment.P[:6, :6].tolist()
+    c, s = math.cos(psi), math.sin(psi)
+    u, v = c * vx + s * vy, c * vy - s * vx  # pool to body
+    r = 0.0 if yaw_rate is None else yaw_rate - bias
+    twist_P = np.eye(3) * LOST_VARIANCE
+    if not imu_lost:
+        J = ((v, c, s), (-u, -s, c))  # d (u, v) / d (psi, v_x, v_y)
+        JP = [[sum(j * P[2 + m][2 + n] for m, j in enumerate(row)) for n in range(3)] for row in J]
+        for i, k in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            twist_P[i, k] = sum(a * b for a, b in zip(JP[i], J[k], strict=True))
+        if yaw_rate is not None:
+            twist_P[2, 2] = P[5][5] + gyro_noise**2
+    motion, offset_variance = (vx, vy, r), offset_std**2
+    pose_P = [
+        [P[i][k] + offset_variance * motion[i] * motion[k] for k in range(3)] for i in range(3)
+    ]
     return Estimate(
         time=moment.time,
-        pose=x[:3].copy(),
+        pose=np.array([x, y, psi]),
         twist=np.array([u, v, r]),
-        pose_covariance=P[:3, :3] + offset_std**2 * np.outer(motion, motion),
+        pose_covariance=np.array(pose_P),
         twist_covariance=twist_P,
-        gyro_bias=float(x[5]),
+        gyro_bias=bias,
         camera_lost=camera_lost,
         imu_lost=imu_lost,
     )

@@ -31,15 +31,16 @@ class InertialSample(NamedTuple):
     accel_known: bool = True
 
 
-class Interval(NamedTuple):
-    """The IMU between two moments, cut at its samples: n steps between n + 1 knots."""
+class Step(NamedTuple):
+    """The IMU between two moments with no sample between them."""
 
-    time: Array  # (n + 1,) s
-    yaw: Array  # (n + 1,) rad
-    accel: Array  # (n + 1, 2) m/s^2, forward and left
-    yaw_variance: Array  # (n,) rad^2 of each step
-    yaw_known: NDArray[np.bool_]  # (n,)
-    accel_known: NDArray[np.bool_]  # (n,)
+    dt: float  # s
+    turn: float  # rad, change of the heading
+    yaw_variance: float  # rad^2, of the turn
+    forward: float  # m/s^2, mean specific force
+    left: float  # m/s^2
+    yaw_known: bool  # whether the heading was measured
+    accel_known: bool
 
 
 class ImuHistory:
@@ -113,35 +114,65 @@ class ImuHistory:
         """Continuous heading [rad] at `times` [s], linear between the samples and constant beyond them."""
         return np.interp(times, self.times, self.yaw)
 
-    def between(self, start: float, end: float) -> Interval:
-        """The IMU from `start` to `end` [s].
+    def between(self, start: float, end: float) -> list[Step]:
+        """The IMU from `start` to `end` [s], cut at its samples.
 
         A step is known where the samples around it are no more than `reach` apart; beyond the first and the last
         sample their values hold as far as they reach.
         """
-        rows = self._rows[self._begin : self._end]
-        t = rows[:, TIME]
-        first, last = np.searchsorted(t, start, side="right"), np.searchsorted(t, end, side="left")
-        time = np.concatenate(([start], t[first:last], [end]))
-        steps = len(time) - 1
-        if not len(rows):
-            unknown = np.zeros(steps, dtype=bool)
-            return Interval(time, np.zeros(2), np.zeros((2, 2)), np.zeros(1), unknown, unknown)
-        after = np.arange(first, last + 1)  # of each step, the sample that ends it
-        a, b = np.clip(after - 1, 0, None), np.clip(after, None, len(rows) - 1)
-        apart = np.where(a == b, np.maximum(time[1:] - t[-1], t[0] - time[:-1]), t[b] - t[a])
+        t = self.times
+        if not len(t):
+            return [Step(end - start, 0.0, 0.0, 0.0, 0.0, False, False)]
+        first = int(np.searchsorted(t, start, side="right"))
+        last = int(np.searchsorted(t, end, side="left"))
+        skipped = max(first - 1, 0)
+        # plain numbers: most intervals have one to four steps, for which arrays cost many times as much
+        rows = self._rows[self._begin + skipped : min(self._begin + last + 1, self._end)].tolist()
+        steps, before = [], _Knot(start, rows, max(first - skipped, 1))
+        for k in range(first - skipped, last - skipped + 1):
+            ends = k == last - skipped
+            after = _Knot(end if ends else rows[k][TIME], rows, max(k, 1))
+            steps.append(
+                self._step(before, after, rows[max(k - 1, 0)], rows[min(k, len(rows) - 1)])
+            )
+            before = after
+        return steps
+
+    def _step(self, before: _Knot, after: _Knot, a: list[float], b: list[float]) -> Step:
+        """Between two knots; a, b: the samples around the step, the same one where it lies beyond all samples."""
+        dt, apart = after.time - before.time, b[TIME] - a[TIME]
+        share = 1.0
+        if a is b:
+            apart = max(after.time - b[TIME], b[TIME] - before.time)
+        else:
+            share = min(max(dt / apart, 0.0), 1.0)
         near = apart <= self.reach + 1e-9
-        share = np.where(a == b, 1.0, np.diff(time) / np.where(a == b, 1.0, t[b] - t[a]))
-        yaw = np.interp(time, t, rows[:, YAW])
-        if end > t[-1]:  # the newest rate holds
-            yaw[-1] += rows[-1, RATE] * (end - max(start, t[-1]))
-            yaw[0] += rows[-1, RATE] * max(0.0, start - t[-1])
-        accel = np.column_stack([np.interp(time, t, rows[:, c]) for c in (FORWARD, LEFT)])
-        return Interval(
-            time,
-            yaw,
-            accel,
-            rows[b, SPREAD] * np.clip(share, 0.0, 1.0),
-            near & (rows[b, YAW_KNOWN] > 0.0),
-            near & (rows[a, ACCEL_KNOWN] * rows[b, ACCEL_KNOWN] > 0.0),
+        return Step(
+            dt,
+            after.yaw - before.yaw,
+            b[SPREAD] * share,
+            0.5 * (before.forward + after.forward),
+            0.5 * (before.left + after.left),
+            near and b[YAW_KNOWN] > 0.0,
+            near and a[ACCEL_KNOWN] * b[ACCEL_KNOWN] > 0.0,
         )
+
+
+class _Knot:
+    """Heading and specific force at a time [s], linear between samples k - 1 and k; beyond the last one its rate holds."""
+
+    __slots__ = ("forward", "left", "time", "yaw")
+
+    def __init__(self, time: float, rows: list[list[float]], k: int) -> None:
+        self.time = time
+        a = rows[k - 1]
+        if k >= len(rows) or time <= a[TIME]:  # beyond the last, or before the first
+            beyond = max(time - a[TIME], 0.0)
+            self.yaw = a[YAW] + a[RATE] * beyond
+            self.forward, self.left = a[FORWARD], a[LEFT]
+            return
+        b = rows[k]
+        share = (time - a[TIME]) / (b[TIME] - a[TIME])
+        self.yaw = a[YAW] + share * (b[YAW] - a[YAW])
+        self.forward = a[FORWARD] + share * (b[FORWARD] - a[FORWARD])
+        self.left = a[LEFT] + share * (b[LEFT] - a[LEFT])

@@ -20,6 +20,7 @@ preintegration, 2017.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,11 +28,11 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
 from fish_control.imu_heading import COASTING_TIME, SAMPLE_PERIOD
-from fish_control.imu_history import Interval
+from fish_control.imu_history import Step
 from fish_control.noise_scale import NoiseScale
+from fish_control.preintegration import SIZE, Preintegration
 
 Array = NDArray[np.float64]
-SIZE = 8
 POSE = slice(0, 3)
 H_CAMERA = np.eye(3, SIZE)
 
@@ -79,30 +80,17 @@ class StrapdownFilter:
         """Continue from this state; the arrays are copied."""
         self._filter.x, self._filter.P = x.copy(), P.copy()
 
-    def advance(self, imu: Interval) -> None:
-        """Predict over an interval of the IMU."""
-        x, time = self.x, imu.time
-        dt = np.diff(time)
-        middle = 0.5 * (time[1:] + time[:-1])
-        since, left = middle - time[0], time[-1] - middle
-        known = imu.accel_known.astype(float)
-        turned = np.concatenate(([0.0], np.cumsum(np.where(imu.yaw_known, np.diff(imu.yaw), 0.0))))
-        biased = np.where(imu.yaw_known, x[5], 0.0) * dt  # without an IMU nothing is biased
-        drifted = np.concatenate(([0.0], np.cumsum(biased)))
-        heading = turned - drifted
-        psi = x[2] + 0.5 * (heading[1:] + heading[:-1])
-        c, s = np.cos(psi), np.sin(psi)
-        force = (0.5 * (imu.accel[1:] + imu.accel[:-1]) - x[6:8]) * known[:, None]
-        dv = dt[:, None] * np.column_stack(
-            [c * force[:, 0] - s * force[:, 1], s * force[:, 0] + c * force[:, 1]]
-        )
-        F = self._jacobian(dt, since, left, dv, np.column_stack([c, s]) * known[:, None])
-        F[2, 5] = -float(dt @ imu.yaw_known)
-        T = float(time[-1] - time[0])
-        x[0:2] += T * x[3:5] + left @ dv
-        x[2] = math.remainder(x[2] + heading[-1], 2.0 * math.pi)
-        x[3:5] += dv.sum(axis=0)
-        P = F @ self.P @ F.T + self._process_noise(imu, dt, left, dv)
+    def advance(self, steps: Sequence[Step]) -> None:
+        """Predict over the IMU's steps, all at once."""
+        x, moved = self.x, Preintegration(self.x, steps)
+        T = moved.duration
+        x[0] += T * x[3] + moved.left_dv[0]
+        x[1] += T * x[4] + moved.left_dv[1]
+        x[2] = math.remainder(x[2] + moved.turn, 2.0 * math.pi)
+        x[3] += moved.dv[0]
+        x[4] += moved.dv[1]
+        F = moved.jacobian()
+        P = F @ self.P @ F.T + self._process_noise(moved)
         self._filter.P = 0.5 * (P + P.T)
 
     def innovation(self, pose: Array, R: Array) -> tuple[Array, Array]:
@@ -115,49 +103,42 @@ class StrapdownFilter:
         self._filter.update(pose, lambda _: H_CAMERA, lambda x: x[POSE], R, residual=pose_residual)
         self.x[2] = math.remainder(self.x[2], 2.0 * math.pi)
 
-    @staticmethod
-    def _jacobian(dt: Array, since: Array, left: Array, dv: Array, direction: Array) -> Array:
-        """d x(end) / d x(start); direction: (c, s) of the head in each step, 0 where the acceleration is unknown."""
-        F = np.eye(SIZE)
-        F[0, 3] = F[1, 4] = dt.sum()
-        turned = np.column_stack([-dv[:, 1], dv[:, 0]])  # d dv / d psi
-        axes = np.column_stack([dt[:, None] * direction, left[:, None] * dt[:, None] * direction])
-        c, s, c_left, s_left = axes.sum(axis=0)
-        F[3:5, 2], F[0:2, 2] = turned.sum(axis=0), left @ turned
-        F[3:5, 5], F[0:2, 5] = -since @ turned, -(left * since) @ turned
-        F[3:5, 6:8] = [[-c, s], [-s, -c]]
-        F[0:2, 6:8] = [[-c_left, s_left], [-s_left, -c_left]]
-        return F
-
-    def _process_noise(self, imu: Interval, dt: Array, left: Array, dv: Array) -> Array:
+    def _process_noise(self, moved: Preintegration) -> Array:
         n, Q = self._noise, np.zeros((SIZE, SIZE))
         position_scale, heading_scale = self._scale.position.motion, self._scale.heading.motion
-        known, coasting = n.accel_noise**2 * SAMPLE_PERIOD, n.coasting_accel**2 * COASTING_TIME
-        speed = dt * np.where(imu.accel_known, known * position_scale, coasting)
+        known = n.accel_noise**2 * SAMPLE_PERIOD * position_scale
+        coasting = n.coasting_accel**2 * COASTING_TIME
+        unknown_turn = n.coasting_yaw_rate**2 * COASTING_TIME
+        speed = mixed = place = 0.0  # of v, v and p, p
+        Q_turn = np.zeros((5, 5))
+        # a turn in one step turns the accelerations of all later ones, and half of its own
+        after_x, after_y = -moved.dv[1], moved.dv[0]
+        left_x, left_y = -moved.left_dv[1], moved.left_dv[0]
+        for step, (left, dvx, dvy) in zip(moved.steps, moved.parts, strict=True):
+            dt = step.dt
+            q = dt * (known if step.accel_known else coasting)
+            speed, mixed = speed + q, mixed + q * left
+            place += q * (left * left + dt * dt / 12.0)
+            half_x, half_y = -0.5 * dvy, 0.5 * dvx
+            after_x, after_y = after_x - half_x, after_y - half_y
+            left_x, left_y = left_x - left * half_x, left_y - left * half_y
+            turn = unknown_turn * dt
+            if step.yaw_known:
+                turn = (step.yaw_variance + n.heading_drift**2 * dt) * heading_scale
+            g = np.array((left_x, left_y, 1.0, after_x, after_y))
+            Q_turn += turn * np.multiply.outer(g, g)
+            after_x, after_y = after_x - half_x, after_y - half_y
+            left_x, left_y = left_x - left * half_x, left_y - left * half_y
+        Q[:5, :5] = Q_turn
         for p, v in ((0, 3), (1, 4)):
-            Q[v, v] = speed.sum()
-            Q[p, v] = Q[v, p] = speed @ left
-            Q[p, p] = speed @ (left * left + dt * dt / 12.0)
-        unknown = n.coasting_yaw_rate**2 * COASTING_TIME * dt
-        known_turn = (imu.yaw_variance + n.heading_drift**2 * dt) * heading_scale
-        turn = np.where(imu.yaw_known, known_turn, unknown)
-        # a turn in one step turns the accelerations of all later ones
-        turned = np.column_stack([-dv[:, 1], dv[:, 0]])
-        G = np.zeros((len(dt), 5))
-        G[:, 3:5] = _after(turned)
-        G[:, 0:2] = _after(left[:, None] * turned)
-        G[:, 2] = 1.0
-        Q[:5, :5] += (G * turn[:, None]).T @ G
-        T = dt.sum()
+            Q[v, v] += speed
+            Q[p, v] += mixed
+            Q[v, p] += mixed
+            Q[p, p] += place
+        T = moved.duration
         Q[5, 5] = n.gyro_drift**2 * T
         Q[6, 6] = Q[7, 7] = n.accel_drift**2 * position_scale * T
         return Q
-
-
-def _after(values: Array) -> Array:
-    """For each row, the sum of the rows after it and of half of it."""
-    total = np.cumsum(values[::-1], axis=0)[::-1]
-    return total - 0.5 * values
 
 
 def pose_residual(z: Array, predicted: Array) -> Array:

@@ -4,6 +4,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fish_control.imu_history import CAPACITY, ImuHistory, InertialSample
 
@@ -16,43 +18,59 @@ def history():
 
 
 def test_between_samples_it_is_linear():
-    part = history().between(1.0025, 1.0075)
-    np.testing.assert_allclose(part.time, [1.0025, 1.0075])
-    np.testing.assert_allclose(part.yaw, [0.505, 0.515])
-    np.testing.assert_allclose(part.accel, [[1.5, 1.5], [2.5, 0.5]])
-    np.testing.assert_allclose(part.yaw_variance, [1e-6])  # half of a step
-    assert part.yaw_known.all()
-    assert part.accel_known.all()
+    (step,) = history().between(1.0025, 1.0075)
+    # yaw 0.505 to 0.515, forward 1.5 to 2.5, left 1.5 to 0.5; half of the variance
+    assert step == pytest.approx((0.005, 0.01, 1e-6, 2.0, 1.0, True, True))
 
 
 def test_an_interval_is_cut_at_the_samples():
     imu = history()
     imu.add(1.02, InertialSample(0.5, 0.0, 0.0, 0.0, yaw_known=False, accel_known=False))
-    part = imu.between(1.0, 1.015)
-    np.testing.assert_allclose(part.time, [1.0, 1.01, 1.015])
-    np.testing.assert_array_equal(part.yaw_known, [True, False])
-    np.testing.assert_array_equal(part.accel_known, [True, False])
+    steps = imu.between(1.0, 1.015)
+    assert [step.dt for step in steps] == pytest.approx([0.01, 0.005])
+    assert [step.yaw_known for step in steps] == [True, False]
+    assert [step.accel_known for step in steps] == [True, False]
 
 
 def test_beyond_the_newest_its_rate_holds_as_far_as_it_reaches():
-    part = history().between(1.01, 1.05)
-    np.testing.assert_allclose(np.diff(part.yaw), 3.0 * 0.04)
-    assert part.yaw_known.all()
-    assert not history().between(1.01, 1.2).yaw_known.any()
+    for begin in (1.01, 1.02):
+        (step,) = history().between(begin, 1.05)
+        assert step.turn == pytest.approx(3.0 * (1.05 - begin))
+        assert step.yaw_known
+    assert not history().between(1.01, 1.2)[0].yaw_known
+
+
+def test_before_the_first_its_values_hold():
+    before, after = history().between(0.95, 1.005)
+    assert before == pytest.approx((0.05, 0.0, 1e-6, 1.0, 2.0, True, True))
+    assert after == pytest.approx((0.005, 0.01, 1e-6, 1.5, 1.5, True, True))
+
+
+@given(st.floats(0.99, 1.06), st.floats(1e-4, 0.05), st.floats(0.0, 1.0))
+def test_two_parts_make_the_whole(start, length, share):
+    imu = history()
+    imu.add(1.03, InertialSample(0.6, -1.0, 0.5, 0.3, 3e-6))
+    cut = start + share * length
+    whole = imu.between(start, start + length)
+    parts = (
+        [*imu.between(start, cut), *imu.between(cut, start + length)] if 0 < share < 1 else whole
+    )
+    for name in ("dt", "turn"):
+        total = sum(getattr(step, name) for step in whole)
+        assert sum(getattr(step, name) for step in parts) == pytest.approx(total, abs=1e-12)
 
 
 def test_a_gap_longer_than_the_reach_is_unknown():
     imu = history()
     imu.add(2.0, InertialSample(5.0, 0.0, 0.0, 0.0))
-    np.testing.assert_array_equal(imu.between(1.005, 2.0).yaw_known, [True, False])
+    assert [step.yaw_known for step in imu.between(1.005, 2.0)] == [True, False]
     assert imu.yaw_rate(1.5) is None
     assert imu.yaw_rate(1.95) == 0.0
 
 
 def test_without_samples_nothing_is_known():
-    part = ImuHistory(reach=0.1).between(1.0, 2.0)
-    assert not part.yaw_known.any()
-    assert not part.accel_known.any()
+    (step,) = ImuHistory(reach=0.1).between(1.0, 2.0)
+    assert step == (1.0, 0.0, 0.0, 0.0, 0.0, False, False)
 
 
 def test_the_newest_of_the_forgotten_stays():

@@ -5,8 +5,9 @@
 import numpy as np
 import pytest
 
-from fish_control.imu_history import Interval
-from fish_control.strapdown import SIZE, MotionNoise, StrapdownFilter, pose_residual
+from fish_control.imu_history import Step
+from fish_control.preintegration import SIZE
+from fish_control.strapdown import MotionNoise, StrapdownFilter, pose_residual
 
 
 def started(x):
@@ -18,10 +19,12 @@ def started(x):
 def interval(T, yaw, accel, steps=200, known=True):
     """`yaw` and `accel` are functions of the time since the start."""
     t = np.linspace(0.0, T, steps + 1)
-    flags = np.full(steps, known)
-    force = np.array([accel(s) for s in t])
-    variance = np.full(steps, 1e-8)
-    return Interval(t, np.array([yaw(s) for s in t]), force, variance, flags, flags)
+    psi, force = [yaw(s) for s in t], np.array([accel(s) for s in t])
+    mean = 0.5 * (force[1:] + force[:-1])
+    return [
+        Step(T / steps, psi[k + 1] - psi[k], 1e-8, *map(float, mean[k]), known, known)
+        for k in range(steps)
+    ]
 
 
 def wild(T=0.5, steps=50):
@@ -57,16 +60,8 @@ def test_all_samples_at_once_are_as_one_after_the_other():
     stepwise.set(x, P)
     whole = wild()
     together.advance(whole)
-    for k in range(len(whole.time) - 1):
-        part = slice(k, k + 2)
-        stepwise.advance(
-            Interval(
-                whole.time[part],
-                whole.yaw[part],
-                whole.accel[part],
-                *(v[k : k + 1] for v in whole[3:]),
-            )
-        )
+    for step in whole:
+        stepwise.advance([step])
     np.testing.assert_allclose(together.x, stepwise.x, atol=1e-9)
     np.testing.assert_allclose(together.P, stepwise.P, rtol=2e-2, atol=1e-6)
 

@@ -19,7 +19,8 @@ from fish_control.watchdog import EstimateHealth
 
 NOT_MEASURED = -1.0  # first covariance of what an Imu message does not measure
 PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
-PLANAR_VARIANCES = np.array([7 * k for k in PLANAR])  # their places among its 36 numbers
+PLANAR_BLOCK = np.array([6 * i + k for i in PLANAR for k in PLANAR])  # places among its 36 numbers
+PLANAR_VARIANCES = np.array([7 * k for k in PLANAR])  # and of their variances
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -86,7 +87,7 @@ def motion_of(message: Odometry) -> Motion:
 
 def planar_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """(36,) of a message to (3, 3) of x, y and yaw."""
-    return np.reshape(covariance, (6, 6))[np.ix_(PLANAR, PLANAR)]
+    return np.reshape(covariance[PLANAR_BLOCK], (3, 3))
 
 
 def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
@@ -101,9 +102,9 @@ def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
 
 def to_covariance(planar: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 3) of x, y and yaw to (36,); the rest is known to be zero."""
-    full = np.zeros((6, 6))
-    full[np.ix_(PLANAR, PLANAR)] = planar
-    return full.ravel()
+    full = np.zeros(36)
+    full[PLANAR_BLOCK] = planar.ravel()
+    return full
 
 
 def diagnostics(
