@@ -55,7 +55,8 @@ def rollout(
     Differentiable in all three. generic=True, another device or float32 runs the equations as torch operations.
     """
     if not generic and start.device.type == "cpu" and start.dtype == torch.float64:
-        lead = torch.broadcast_shapes(start.shape[:-1], commands.shape[1:-1], parameters.shape[:-1])
+        # numpy's, as the first call of torch's loads sympy, which takes seconds
+        lead = np.broadcast_shapes(start.shape[:-1], commands.shape[1:-1], parameters.shape[:-1])
         states: Tensor = _Rollout.apply(start, _for_all(commands, lead), parameters, stepper)
         return states
     steps = [start]
