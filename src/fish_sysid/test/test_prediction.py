@@ -13,6 +13,7 @@ import pytest
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment, Frames
+from fish_sysid.dataset.marker_place import forward
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import FilterResult, Noise
@@ -95,6 +96,7 @@ def test_a_filter_that_diverges_begins_anew(
 CAMERA_ERRORS = {
     "camera_heading_offset": ("offset", 0.1, lambda f: Frames(f.t, f.pose + [0.0, 0.0, 0.1])),
     "camera_scale": ("factor", 1.05, lambda f: Frames(f.t, f.pose * [1.05, 1.05, 1.0])),
+    "camera_marker": ("ahead", -0.03, lambda f: Frames(f.t, forward(f.pose, -0.03))),
     "camera_latency": ("delay", 0.2, lambda f: Frames(f.t + 0.2, f.pose)),
 }
 
