@@ -120,6 +120,27 @@ def test_camera_errors_of_the_model_are_in_what_it_predicts(
         )
 
 
+def test_a_baseline_predicts_what_the_camera_shows(quiet: Experiment) -> None:
+    """Where the camera is wrong and the model knows it, the baselines' errors are those of a camera that is right."""
+    found = []
+    for robot, frames in (
+        (ROBOT, quiet.frames),
+        (
+            ROBOT.with_effect("camera_marker", ahead=-0.03).with_effect(
+                "camera_heading_offset", offset=0.1
+            ),
+            tuple(
+                Frames(f.t, forward(f.pose, -0.03) + np.array([0.0, 0.0, 0.1]))
+                for f in quiet.frames
+            ),
+        ),
+    ):
+        seen = replace(quiet, frames=frames)
+        made = predict_baseline(constant(), predict(seen, robot, QUIET, 1.0, 1.0, 1.0))
+        found.append(prediction_errors(made, (1.0,)).rms[0, 1])
+    assert found[1] == pytest.approx(found[0], rel=1e-3)
+
+
 def test_an_unexplained_force_dies_away_with_the_waters_time(quiet: Experiment) -> None:
     """Against a force that is told to the simulator anew at every step."""
     noise, push, start = replace(Noise(), wrench_time=0.3), np.array([0.05, -0.04, 1e-3]), 100
