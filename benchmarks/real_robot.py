@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs left out of the fit, predicted: ratios to the bilinear baseline on the same windows, and seconds.
 
-python benchmarks/real_robot.py POOL [--leave-out 1] [--effects tip_slip,rudder_gain | choose] [--links 1]
+python benchmarks/real_robot.py POOL [--leave-out 1] [--effects tip_slip,rudder_gain | choose] [--links 1] [--out DIR]
 
 Every fold of runs is predicted by a robot fitted to the others, from nominal values, and by the baseline fitted to the same;
-all know what was measured before the start of a prediction. Intervals: 95 %, bootstrap over runs.
+all know what was measured before the start of a prediction. Intervals: 95 %, bootstrap over runs. DIR keeps every fold's
+result, so that a run that was stopped goes on with the next fold.
 """
 
 from __future__ import annotations
@@ -46,31 +47,50 @@ def main() -> None:
     parser.add_argument("--effects", default="", help="NAME,NAME or choose (anew in every fold)")
     parser.add_argument("--links", default=",".join(map(str, LINKS)), help="candidates")
     parser.add_argument("--only", default="", help="numbers of folds, from 0 (default: all)")
-    parser.add_argument("--out", type=Path, help="JSON file")
+    parser.add_argument("--out", type=Path, help="folder for the folds' results")
     args = parser.parse_args()
     experiment, _ = read_experiment(args.dataset)
-    count, chosen = len(experiment.names), args.effects == "choose"
-    effects = tuple(n for n in args.effects.split(",") if n and not chosen)
-    candidates = tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else ()
-    links = tuple(map(int, args.links.split(",")))
-    folds = -(-count // args.leave_out)
+    count, folds = len(experiment.names), -(-len(experiment.names) // args.leave_out)
     squares = np.zeros((2, count, len(HORIZONS), 3))
-    numbers, began, fits = np.zeros((2, count, len(HORIZONS))), time.process_time(), []
+    numbers = np.zeros((2, count, len(HORIZONS)))
     for fold in [int(n) for n in args.only.split(",") if n] or range(folds):
         left_out = [m for m in range(count) if m % folds == fold]
-        rest = [m for m in range(count) if m % folds != fold]
-        lag = align(experiment.select(rest)).delay
-        training = moved_back(experiment, lag).select(rest)
-        fit = fit_predictions(training, Robot(), NOMINAL_FREE, effects, candidates, print, links)
-        fits.append(described(fit))
-        print(json.dumps(fits[-1]), flush=True)
-        squares[:, left_out], numbers[:, left_out] = judged(experiment, rest, left_out, lag, fit)
-        seconds = time.process_time() - began
-        print(f"without {[experiment.names[m] for m in left_out]}: {seconds:.0f} s of CPU so far")
+        kept = args.out / f"fold_{fold}.json" if args.out else None
+        if kept and kept.exists():
+            content = json.loads(kept.read_text())
+        else:
+            content = one_fold(experiment, left_out, args.effects, args.links)
+            if kept:
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                kept.write_text(json.dumps(content))
+        squares[:, left_out], numbers[:, left_out] = content["squares"], content["numbers"]
+        names = ", ".join(experiment.names[m] for m in left_out)
+        print(f"without {names}: {content['seconds']:.0f} s of CPU", flush=True)
+        print(json.dumps(content["fit"]), flush=True)
         report(squares, numbers)
-        if args.out:
-            content = {"squares": squares.tolist(), "numbers": numbers.tolist(), "fits": fits}
-            args.out.write_text(json.dumps(content))
+
+
+def one_fold(
+    experiment: Experiment, left_out: list[int], effects: str, links: str
+) -> dict[str, object]:
+    """Errors on the runs left out of the delay, the fit and the baseline, the fit, and processor seconds."""
+    began, chosen = time.process_time(), effects == "choose"
+    rest = [m for m in range(len(experiment.names)) if m not in left_out]
+    given = tuple(n for n in effects.split(",") if n and not chosen)
+    candidates = tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else ()
+    lag = align(experiment.select(rest)).delay
+    training = moved_back(experiment, lag).select(rest)
+    counts = tuple(map(int, links.split(",")))
+    fit = fit_predictions(training, Robot(), NOMINAL_FREE, given, candidates, print, counts)
+    squares, numbers = judged(experiment, rest, left_out, lag, fit)
+    return {
+        "squares": squares.tolist(),
+        "numbers": numbers.tolist(),
+        "fit": described(fit),
+        "z": fit.found.z.tolist(),
+        "lag": lag,
+        "seconds": time.process_time() - began,
+    }
 
 
 def described(fit: PredictionFit) -> dict[str, object]:
@@ -97,7 +117,7 @@ def judged(
     moved = imu_moved_back(
         moved_back(experiment, camera), max(fit.sensors["imu_latency.delay"], 0.0)
     )
-    hypothesis, theta, _ = fit.with_camera_offset()
+    hypothesis, theta, _ = fit.with_camera()
     noise = usual_noise(moved.select(rest))
     robot = with_noise(
         plain(Parametrization(hypothesis).robot(theta)), noise, "shooting", fit.found.trust

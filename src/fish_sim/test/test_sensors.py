@@ -21,6 +21,7 @@ from fish_sim.simulation_config import SimulatorConfig
 VOCABULARY = (
     "camera_latency",
     "camera_heading_offset",
+    "camera_marker",
     "camera_scale",
     "gyro_scale",
     "imu_misalignment",
@@ -66,8 +67,8 @@ def test_description_is_complete_and_zero_strength_is_the_truth(name):
 def test_camera_effects_are_idle_unless_the_camera_gives_poses():
     image = SimulatorConfig(robot_file="blue.yaml").idle_sensors(VOCABULARY)
     assert image == (
-        "sensors.camera_latency, sensors.camera_heading_offset, sensors.camera_scale of blue.yaml: without effect on"
-        " the camera node's pictures (camera:=image); with camera:=pose they act, on camera/pose"
+        "sensors.camera_latency, sensors.camera_heading_offset, sensors.camera_marker, sensors.camera_scale of blue.yaml: "
+        "without effect on the camera node's pictures (camera:=image); with camera:=pose they act, on camera/pose"
     )
     assert SimulatorConfig(camera="pose").idle_sensors(VOCABULARY) == ""
     assert SimulatorConfig().idle_sensors(("gyro_scale", "imu_misalignment")) == ""
@@ -84,6 +85,8 @@ def test_each_sensor_effect_does_what_its_name_says():
     np.testing.assert_allclose(distortion.pose(0.4, -0.2, 1.0), (0.42, -0.21, 1.06))
     # the IMU turned a quarter to the left sees what is left as ahead, what is ahead as right
     np.testing.assert_allclose(distortion.imu(0.3, 0.1, 0.7), (0.1, -0.3, 0.63))
+    turned = SensorDistortion({"camera_marker": {"ahead": -0.03}}).pose(0.4, -0.2, math.pi / 2)
+    np.testing.assert_allclose(turned, (0.4, -0.23, math.pi / 2))
     assert SensorDistortion({"camera_latency": {"delay": 0.05}}).pose_delay() == 0.05
 
 

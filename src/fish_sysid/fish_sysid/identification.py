@@ -20,6 +20,7 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.camera_time_offset import Alignment, align, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.imu_time_offset import imu_moved_back
+from fish_sysid.dataset.marker_place import ahead_of, at_centre_of_mass, with_marker
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.global_fit import refit_if_suspect
 from fish_sysid.estimation.initial_noise import initial_noise
@@ -90,11 +91,12 @@ class Identification:
     imu_delay: float = 0.0  # s, taken out of all trials above
     predicted: PredictionFit | None = None  # where the robot was fitted to predictions
     states: str = "filter"  # how the states that predictions start from are estimated
+    ahead: float = 0.0  # m, of the camera's point, taken out of all trials above
 
     @property
     def robot(self) -> Robot:
         """The identified robot, with the delays that its sensors have in the recordings as they are."""
-        robot = plain(self.fit.robot)
+        robot = with_marker(plain(self.fit.robot), self.ahead)
         if self.camera_delay:
             robot = robot.with_effect("camera_latency", delay=self.camera_delay)
         if self.imu_delay:
@@ -151,9 +153,10 @@ def identify(
     of these effects are added that let it predict training trials better when they are left out in turn. links: numbers of
     links of the tail that a robot fitted to predictions may have.
     A delay of the camera that the gyro shows is taken out of all trials first, so that horizons count from the moment an
-    image was taken, and goes into the robot that comes back.
+    image was taken, and goes into the robot that comes back; so does the place of the camera's point that the robot has.
     """
-    began = time.monotonic()
+    began, ahead = time.monotonic(), ahead_of(robot)
+    experiment, robot = at_centre_of_mass(experiment, ahead), with_marker(robot, -ahead)
     train, held = split(len(experiment.names), hold_out)
     lag = Alignment(0.0, np.nan, np.nan)
     if "camera_latency" not in (*robot.sensors, *effects):
@@ -176,7 +179,8 @@ def identify(
             experiment, train, lag, robot, noise, free, effects, choose_from, links, report
         )
         fitted = replace(fitted, statements=(why, *fitted.statements))
-    return concluded(experiment, train, held, lag, robot, fitted, report, began)
+    found = concluded(experiment, train, held, lag, robot, fitted, report, began)
+    return replace(found, ahead=ahead)
 
 
 def by_likelihood(
@@ -218,17 +222,18 @@ def by_predictions(
     found = fit_predictions(training, robot, free, moving, choose_from, report, links)
     aside = [name for name in effects if name not in moving]
     not_fitted = [
-        f"{', '.join(aside)}: not fitted; predictions fit the sensors' clocks and the camera's heading offset alone"
+        f"{', '.join(aside)}: not fitted; predictions fit the sensors' clocks, the camera's heading offset and its point alone"
     ]
     clocks = found.sensors
     camera = max(lag.delay + clocks["camera_latency.delay"], 0.0)
     imu = max(clocks["imu_latency.delay"], 0.0)
     moved = imu_moved_back(moved_back(experiment, camera), imu)
-    hypothesis, theta, covariance = found.with_camera_offset()
+    hypothesis, theta, covariance = found.with_camera()
     report("noise")
     found_robot = Parametrization(hypothesis).robot(theta)
-    own = initial_noise(moved.select(train), plain(found_robot), noise)
-    fit = evaluate(hypothesis, theta, moved.select(train), own)
+    centred = at_centre_of_mass(moved.select(train), ahead_of(found_robot))
+    own = initial_noise(centred, plain(found_robot), noise)
+    fit = evaluate(hypothesis, theta, centred, own)
     fit = replace(fit, information=np.asarray(np.linalg.inv(covariance), dtype=float))
     report("which states predict better")
     states = better_states(moved.select(train), plain(fit.robot), own, found.found.trust)

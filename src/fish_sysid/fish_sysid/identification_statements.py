@@ -12,7 +12,7 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import Parametrization, zeros
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
-from fish_sysid.estimation.shooting.prediction_fit import IMU_CLOCK, RANGE, PredictionFit
+from fish_sysid.estimation.shooting.prediction_fit import IMU_CLOCK, PLACE, RANGE, PredictionFit
 from fish_sysid.estimation.shooting.selection import Step, step_text
 from fish_sysid.prediction.held_out_errors import AHEAD, BASELINES, PEEK
 from fish_sysid.prediction.prediction import HORIZONS, WARM_UP, ErrorSizes
@@ -46,8 +46,12 @@ def prediction_statements(found: PredictionFit) -> list[str]:
     out += [
         f"{name}: {clocks[name]:+.3f} +- {deviation[name]:.3f} beyond what camera and gyro say, by predictions"
         for name in clocks
-        if name != IMU_CLOCK
+        if name not in (IMU_CLOCK, PLACE)
     ]
+    out.append(
+        f"the camera follows a point {clocks[PLACE]:+.3f} +- {deviation[PLACE]:.3f} m ahead of the head's centre of mass, "
+        "by predictions: measure where the markers sit"
+    )
     if RANGE in found.found.hypothesis.free:
         out.append(
             f"commands of the rudder go beyond rudder_range: the range is fitted ({found.robot.parameters[RANGE]:.2f} rad)"

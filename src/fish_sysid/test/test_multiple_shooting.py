@@ -12,6 +12,7 @@ import pytest
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, Headings
+from fish_sysid.dataset.marker_place import at_centre_of_mass
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import (
@@ -24,7 +25,7 @@ from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.multiple_shooting import Shooting
 from fish_sysid.estimation.shooting.multistep import Multistep
 from fish_sysid.estimation.shooting.prediction_fit import with_links
-from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE
+from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
 from fish_sysid.estimation.shooting.rollout import Directions, memories, poses_and_slopes
 from fish_sysid.estimation.shooting.schur import Blocks, eliminate
 from fish_sysid.estimation.shooting.start_states import shot_states
@@ -74,9 +75,19 @@ def test_known_parameters_and_the_imu_s_clock_come_back() -> None:
     found = shooting.coordinates.robot(guess.theta).parameters
     for name in FREE:
         assert found[name] == pytest.approx(TRUTH.parameters[name], rel=0.05)
-    late_camera, late_imu, offset = guess.sensors * SENSOR_SCALE
-    assert late_imu - late_camera == pytest.approx(0.03, abs=0.003)
+    _, lead, offset, ahead = guess.sensors * SENSOR_SCALE
+    assert lead == pytest.approx(0.03, abs=0.003)
     assert offset == pytest.approx(0.0, abs=0.01)
+    assert ahead == pytest.approx(0.0, abs=0.003)
+
+
+def test_the_camera_s_point_comes_back() -> None:
+    """Of a camera that follows a point 3 cm behind the centre of mass."""
+    experiment = at_centre_of_mass(recorded()[0], 0.03)
+    shooting = shooting_on(experiment)
+    guess = shooting.settle(shooting.first_guess(shooting.coordinates.origin()))
+    _, guess = shooting.fit(guess)
+    assert guess.sensors[3] * SENSOR_SCALE[3] == pytest.approx(-0.03, abs=0.003)
 
 
 def test_slopes_are_the_tangents_of_the_motion() -> None:
@@ -170,12 +181,13 @@ def test_predictions_have_the_slopes_of_finite_differences_and_improve() -> None
     coordinates = ShotParametrization(nominal_hypothesis(NOMINAL, FREE))
     starts = np.array([[m, k] for m in range(3) for k in (200, 300)])
     cost = Multistep(experiment, coordinates, starts)
-    z = np.zeros(len(FREE) + 3)
+    z = np.append(np.zeros(len(FREE) + len(SENSORS) - 1), 0.5)
     states = cost.states(z)
     e, J = cost.errors(z, states, slopes=True)
-    for j in (0, 1, 2, 3, 5):
+    for j in (0, 1, 2, 3, 5, 6):
         ahead, behind = z.copy(), z.copy()
-        ahead[j], behind[j] = 1e-4, -1e-4
+        ahead[j] += 1e-4
+        behind[j] -= 1e-4
         slope = (cost.errors(ahead, states)[0] - cost.errors(behind, states)[0]) / 2e-4
         assert J[..., j] == pytest.approx(slope, abs=2e-3 * max(np.abs(slope).max(), 1.0))
     reached, found = cost.improve(z)

@@ -13,6 +13,7 @@ import pytest
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment, Frames
+from fish_sysid.dataset.marker_place import forward
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import FilterResult, Noise
@@ -95,6 +96,7 @@ def test_a_filter_that_diverges_begins_anew(
 CAMERA_ERRORS = {
     "camera_heading_offset": ("offset", 0.1, lambda f: Frames(f.t, f.pose + [0.0, 0.0, 0.1])),
     "camera_scale": ("factor", 1.05, lambda f: Frames(f.t, f.pose * [1.05, 1.05, 1.0])),
+    "camera_marker": ("ahead", -0.03, lambda f: Frames(f.t, forward(f.pose, -0.03))),
     "camera_latency": ("delay", 0.2, lambda f: Frames(f.t + 0.2, f.pose)),
 }
 
@@ -116,6 +118,27 @@ def test_camera_errors_of_the_model_are_in_what_it_predicts(
         assert float(row["start"]) - 1e-9 <= float(row["time"]) - (
             0.2 if name == "camera_latency" else 0.0
         )
+
+
+def test_a_baseline_predicts_what_the_camera_shows(quiet: Experiment) -> None:
+    """Where the camera is wrong and the model knows it, the baselines' errors are those of a camera that is right."""
+    found = []
+    for robot, frames in (
+        (ROBOT, quiet.frames),
+        (
+            ROBOT.with_effect("camera_marker", ahead=-0.03).with_effect(
+                "camera_heading_offset", offset=0.1
+            ),
+            tuple(
+                Frames(f.t, forward(f.pose, -0.03) + np.array([0.0, 0.0, 0.1]))
+                for f in quiet.frames
+            ),
+        ),
+    ):
+        seen = replace(quiet, frames=frames)
+        made = predict_baseline(constant(), predict(seen, robot, QUIET, 1.0, 1.0, 1.0))
+        found.append(prediction_errors(made, (1.0,)).rms[0, 1])
+    assert found[1] == pytest.approx(found[0], rel=1e-3)
 
 
 def test_an_unexplained_force_dies_away_with_the_waters_time(quiet: Experiment) -> None:

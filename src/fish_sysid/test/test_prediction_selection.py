@@ -20,6 +20,7 @@ from fish_sysid.estimation.shooting.prediction_fit import (
     more_links,
     prediction_hypothesis,
 )
+from fish_sysid.estimation.shooting.residuals import SENSORS
 from fish_sysid.estimation.shooting.schedule import Found, multistep, polished
 from fish_sysid.estimation.shooting.selection import choose
 from fish_sysid.estimation.shooting.trust import trusted
@@ -39,7 +40,9 @@ def swum(truth: Robot) -> Experiment:
 
 def fitted(experiment: Experiment) -> Found:
     hypothesis = nominal_hypothesis(Robot(links=1), FREE)
-    return polished(experiment, Found(hypothesis, np.zeros(len(FREE) + 3), np.inf), 4.0, 2)
+    return polished(
+        experiment, Found(hypothesis, np.zeros(len(FREE) + len(SENSORS)), np.inf), 4.0, 2
+    )
 
 
 def test_a_concealed_effect_is_added() -> None:
@@ -55,7 +58,7 @@ def test_iterations_are_no_evidence_where_nothing_is_concealed() -> None:
     """A fit that has not converged gains by going on; the control gains as much."""
     experiment = swum(Robot(links=1).with_parameters(head_drag_surge=0.3))
     hypothesis = nominal_hypothesis(Robot(links=1), FREE)
-    unfinished = Found(hypothesis, np.zeros(len(FREE) + 3), np.inf)
+    unfinished = Found(hypothesis, np.zeros(len(FREE) + len(SENSORS)), np.inf)
     _, steps = choose(experiment, unfinished, ("rotor_lag", "rudder_gain"), most=1)
     assert all(step.gain < 0.1 for step in steps)
 
@@ -100,7 +103,9 @@ def test_start_states_trust_the_sensor_that_is_right() -> None:
         Frames(f.t, f.pose + [0.02, 0.02, 0.0] * random.standard_normal(f.pose.shape))
         for f in experiment.frames
     )
-    right = Found(nominal_hypothesis(Robot(links=1), FREE), np.zeros(len(FREE) + 3), np.inf)
+    right = Found(
+        nominal_hypothesis(Robot(links=1), FREE), np.zeros(len(FREE) + len(SENSORS)), np.inf
+    )
     clean, noisy = (
         trusted(e, right, 4.0) for e in (experiment, replace(experiment, frames=shaken))
     )

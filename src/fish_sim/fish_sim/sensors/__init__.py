@@ -4,6 +4,7 @@
 
 from fish_sim.sensors.camera_heading_offset import CameraHeadingOffset
 from fish_sim.sensors.camera_latency import CameraLatency
+from fish_sim.sensors.camera_marker import CameraMarker
 from fish_sim.sensors.camera_scale import CameraScale
 from fish_sim.sensors.gyro_scale import GyroScale
 from fish_sim.sensors.imu_latency import ImuLatency
@@ -13,6 +14,7 @@ from fish_sim.sensors.sensor_effect import SensorEffect
 SENSOR_EFFECTS: dict[str, type[SensorEffect]] = {
     "camera_latency": CameraLatency,
     "camera_heading_offset": CameraHeadingOffset,
+    "camera_marker": CameraMarker,
     "camera_scale": CameraScale,
     "gyro_scale": GyroScale,
     "imu_misalignment": ImuMisalignment,

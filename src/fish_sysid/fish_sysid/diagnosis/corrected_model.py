@@ -5,11 +5,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.thresholds import MOST_UNEXPLAINED, RATIO_REJECT
+from fish_sysid.prediction.prediction import EVERY, WARM_UP, predict, prediction_errors
+
+Array = NDArray[np.float64]
+
+AFTER = (1.0, 5.0)  # s
+WORSE = 1.05  # times the refitted nominal model's error; two models as good differ by as much
 
 
 def verdict(d: Diagnosis) -> str:
@@ -39,7 +47,32 @@ def unexplained_share(d: Diagnosis) -> float:
 
 
 def corrected(d: Diagnosis) -> Fit:
-    """The fit that model.yaml holds."""
+    """The fit that model.yaml holds: never one that predicts held-out trials worse than the refitted nominal model."""
     if d.surrogate is not None:
-        return d.surrogate
-    return d.final if named(d) else d.nominal
+        fit = d.surrogate
+    else:
+        fit = d.final if named(d) else d.nominal
+    return d.nominal if predicts_worse(fit, d.nominal, d.unseen) else fit
+
+
+def predicts_worse(fit: Fit, nominal: Fit, unseen: Experiment) -> bool:
+    """Whether positions after 1 and 5 s are further off than the nominal model's: their ratio's geometric mean is over WORSE.
+
+    So does one that diverges where the nominal model does not.
+    """
+    if fit is nominal:
+        return False
+    mine, its = (position_errors(f, unseen) for f in (fit, nominal))
+    known = np.isfinite(its)
+    if not known.any():
+        return False
+    if not np.isfinite(mine[known]).all():
+        return True
+    return bool(np.mean(np.log(mine[known] / its[known])) > np.log(WORSE))
+
+
+def position_errors(fit: Fit, unseen: Experiment) -> Array:
+    """(2,) rms errors of position [m] at AFTER; NaN where no trial is long enough or all predictions diverge."""
+    made = predict(unseen, fit.robot, fit.noise, max(AFTER), EVERY, WARM_UP)
+    sizes = prediction_errors(made, AFTER)
+    return np.where(sizes.counts.sum(axis=0) > 0, sizes.rms[:, 0], np.nan)

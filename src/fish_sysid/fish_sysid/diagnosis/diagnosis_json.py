@@ -13,6 +13,7 @@ from scipy.stats import t as student
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis import latent_force
 from fish_sysid.diagnosis.corrected_model import (
+    corrected,
     much_is_left,
     named,
     unexplained_share,
@@ -208,6 +209,7 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
         # the trials of every rms and density, `held_out_rms` of `refitted` included: too few trials hold none out
         "errors_are_of": "held_out" if d.task.split.held_out else "training",
         **entries,
+        "written": written(d),
         "model_yaml": surrogate,  # where no name fits: the structure that predicts best over seconds
         "tail_links": {"given": d.task.robot.links, "used": d.final.robot.links},
         "noise_floor": {
@@ -218,6 +220,14 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
         "improvement_ci95": mean_interval(gain if d.task.split.held_out else gain[:0]),
         "residual_whiteness_p": {"before": whiteness(d.nominal), "after": whiteness(d.final)},
     }
+
+
+def written(d: Diagnosis) -> str:
+    """Which model model.yaml holds: refitted, with_effects or model_yaml."""
+    fit = corrected(d)
+    if fit is d.nominal:
+        return "refitted"
+    return "model_yaml" if fit is d.surrogate else "with_effects"
 
 
 def held_out_errors(d: Diagnosis, robot: Robot, noise: Noise) -> dict[str, dict[str, float]]:

@@ -14,13 +14,14 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_types import Array, Noise
 from fish_sysid.estimation.map_fit import evaluate
-from fish_sysid.estimation.parametrization import Hypothesis, nominal_hypothesis
+from fish_sysid.estimation.parametrization import SENSOR_FIELDS, Hypothesis, nominal_hypothesis
 from fish_sysid.estimation.thresholds import UNIDENTIFIABLE
 
 
 def known_effects(robot: Robot) -> tuple[str, ...]:
-    """Effects and sensor errors of a robot itself, less the filter's latent wrench."""
-    return tuple(name for name in (*robot.effects, *robot.sensors) if name != "disturbance")
+    """Effects of a robot itself and its sensor errors that the filter models, less the filter's latent wrench."""
+    effects = (name for name in robot.effects if name != "disturbance")
+    return (*effects, *(name for name in robot.sensors if name in SENSOR_FIELDS))
 
 
 def known_parameters(robot: Robot) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ def diagnose(
     """
     task = make_task(experiment, robot, level, progress, names, effects, without)
     task.progress("testing symmetries")
-    symmetry = symmetry_findings(experiment, task.robot)
+    symmetry = symmetry_findings(task.experiment, task.robot)
     task.progress("fitting the nominal model")
     selection = select_effects(fit_nominal(task), task)
     state = on_training(selection, task)

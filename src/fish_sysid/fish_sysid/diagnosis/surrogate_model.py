@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.marker_place import AHEAD, MARKER, ahead_of, at_centre_of_mass
 from fish_sysid.estimation.ekf_types import SensorModel
 from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.sensor_noise import usual_noise
-from fish_sysid.estimation.shooting.prediction_fit import PredictionFit, fit_predictions
+from fish_sysid.estimation.shooting.prediction_fit import PLACE, PredictionFit, fit_predictions
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
 from fish_sysid.estimation.shooting.start_states import without_sensor_errors
 from fish_sysid.prediction.better_states import better_states, prediction_size
@@ -70,10 +71,12 @@ def _as_fit(found: PredictionFit, before: SensorModel, experiment: Experiment) -
         **hypothesis.robot.sensors,
         "camera_latency": {"delay": late},
         "camera_heading_offset": {"offset": offset},
+        MARKER: {AHEAD: found.sensors[PLACE]},
     }
     settled = replace(hypothesis.robot, sensors=sensors)
-    noise = initial_noise(experiment, _without_wrench(settled), usual_noise(experiment))
-    fit = evaluate(replace(hypothesis, robot=settled), found.theta, experiment, noise)
+    centred = at_centre_of_mass(experiment, ahead_of(settled))
+    noise = initial_noise(centred, _without_wrench(settled), usual_noise(centred))
+    fit = evaluate(replace(hypothesis, robot=settled), found.theta, centred, noise)
     states = better_states(experiment, _without_wrench(fit.robot), noise, found.found.trust)
     kept = with_noise(fit.robot, noise, states, found.found.trust)
     information = np.linalg.inv(found.covariance[:K, :K])

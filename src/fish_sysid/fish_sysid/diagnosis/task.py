@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.marker_place import ahead_of, at_centre_of_mass, with_marker
 from fish_sysid.diagnosis.significance import Level
 from fish_sysid.diagnosis.trial_split import Split, Trials, split_trials, trials_of
 from fish_sysid.diagnosis.vocabulary import NoCandidateError, candidates, known, not_judged
@@ -53,6 +54,7 @@ class Task:
     level: Level
     progress: Progress
     without: frozenset[str]  # stages that are switched off
+    ahead: float = 0.0  # m, of the camera's point; taken out of experiment and robot
 
     def runs(self, stage: str) -> bool:
         """Whether a stage of STAGES is on."""
@@ -86,7 +88,9 @@ def make_task(
     for stage in without:
         if stage not in STAGE_NAMES:
             raise ValueError(f"stage {stage!r}: expected one of {', '.join(sorted(STAGE_NAMES))}")
-    robot = replace(robot, table={**robot.table, **effects})
+    ahead = ahead_of(robot)
+    experiment = at_centre_of_mass(experiment, ahead)
+    robot = with_marker(replace(robot, table={**robot.table, **effects}), -ahead)
     split = split_trials(experiment)
     names = known(names or candidates(effects), effects)
     trials = trials_of(experiment, split)
@@ -105,4 +109,5 @@ def make_task(
         level or Level(),
         progress,
         frozenset(without),
+        ahead,
     )

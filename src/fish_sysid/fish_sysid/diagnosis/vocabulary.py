@@ -15,7 +15,8 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.parametrization import SENSOR_FIELDS, EffectTable
 from fish_sysid.estimation.thresholds import STILL
 
-NOT_A_NAME = ("disturbance",)  # the latent wrench itself
+# the latent wrench itself; where the camera's point lies, which fits to predictions find
+NOT_A_NAME = ("disturbance", "camera_marker")
 SEEN_STILL = ("rudder_offset",)  # acts on a rudder whose command stays at zero
 SEEN_MOVING = ("rudder_lag", "rudder_delay", "rudder_backlash")  # act when the command changes
 

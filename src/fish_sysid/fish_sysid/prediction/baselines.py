@@ -194,7 +194,9 @@ def predict_baseline(advance: Advance, like: Predictions, lead: float = 0.0) -> 
         pose[begin + 1 : begin + count + 1] = _travel(pose[begin], y_before, y)[:count]
     pose = pose[early:]
     pose[np.isnan(like.pose)] = np.nan
-    return replace(like, pose=pose)
+    # the baselines predict what the camera shows, its errors and its point included; only its clock is taken out
+    shown = replace(like.sensors, camera_heading_offset=0.0, camera_scale=1.0)
+    return replace(like, pose=pose, sensors=shown, ahead=0.0)
 
 
 def _travel(pose: Array, y: Array, y_next: Array) -> Array:

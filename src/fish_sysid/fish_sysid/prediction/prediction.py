@@ -19,6 +19,7 @@ from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.imu_time_offset import imu_moved_back
+from fish_sysid.dataset.marker_place import ahead_of, at_centre_of_mass, forward
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import WRENCH, Noise, SensorModel
 from fish_sysid.estimation.fixed_lag import smoothed
@@ -64,6 +65,7 @@ class Predictions:
     start: NDArray[np.int64]  # (S,) grid point
     pose: Array  # (L + 1, S, 3) true pose from the start on, every 10 ms
     horizon: float  # s
+    ahead: float = 0.0  # m, of the point that the camera follows
 
     def seen(self, m: int) -> Array:
         """(F, S_m, 3) what the camera should show at the frames of trial m: estimates before the start, then prediction."""
@@ -72,6 +74,7 @@ class Predictions:
         before = _interpolate(self.estimates.pose[:, m, None], position[:, None])
         after = _interpolate(self.pose[:, which], position[:, None] - self.start[which])
         pose = np.where((position[:, None] < self.start[which])[..., None], before, after)
+        pose = forward(pose, self.ahead)
         scale = self.sensors.camera_scale
         shown: Array = pose * np.array([scale, scale, 1.0]) + np.array(
             [0.0, 0.0, self.sensors.camera_heading_offset]
@@ -110,6 +113,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
     coordinates = nominal_hypothesis(robot, free=()).parametrization
     p, dp, sensors = coordinates.filter_inputs(np.zeros(0))
     stepper, nx = coordinates.stepper, len(coordinates.stepper.layout.motion)
+    given, experiment = experiment, at_centre_of_mass(experiment, ahead_of(robot))
     T, M = experiment.length, len(experiment.names)
     state, wrench = np.full((T, M, len(stepper.layout.state)), np.nan), np.full((T, M, 3), np.nan)
     bias, bias_std = np.zeros((M, 3)), np.zeros((M, 3))
@@ -145,7 +149,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
     beyond = np.arange(T)[:, None] >= experiment.steps
     state[beyond], wrench[beyond] = np.nan, np.nan
     return Estimates(
-        experiment, state, wrench, body_velocity(state, stepper.layout.links), bias, bias_std
+        given, state, wrench, body_velocity(state, stepper.layout.links), bias, bias_std
     )
 
 
@@ -177,7 +181,7 @@ def predict(
             f"horizon {horizon} s, start points every {every} s: expected at least {DT} s"
         )
     experiment = imu_moved_back(experiment, robot.sensors.get("imu_latency", {}).get("delay", 0.0))
-    estimates = estimate(experiment, robot, noise)
+    estimates, ahead_m = estimate(experiment, robot, noise), ahead_of(robot)
     starts = start_points(experiment, every, first)
     trial, start = starts[:, 0], starts[:, 1]
     sensors = nominal_hypothesis(robot, free=()).parametrization.filter_inputs(np.zeros(0))[2]
@@ -185,16 +189,17 @@ def predict(
     state, wrench = estimates.state[start, trial], estimates.wrench[start, trial]
     if ahead and len(starts):
         nx = len(nominal_hypothesis(robot, free=()).parametrization.stepper.layout.motion)
-        known = smoothed(experiment, robot, noise, starts, ahead)
+        centred = at_centre_of_mass(experiment, ahead_m)
+        known = smoothed(centred, robot, noise, starts, ahead)
         good = np.isfinite(known).all(axis=1)
         state[good, :nx], wrench[good] = known[good, :nx], known[good, nx : nx + 3]
     if uses_shooting(robot) and len(starts):
-        seen = without_sensor_errors(experiment, sensors)
+        seen = at_centre_of_mass(without_sensor_errors(experiment, sensors), ahead_m)
         shot = shot_states(seen, robot, starts, trust=kept_trust(robot), ahead=ahead)
         good = np.isfinite(shot).all(axis=1)
         state[good], wrench[good] = shot[good], 0.0
     pose = _simulate(experiment, robot, noise, starts, state, wrench, length)
-    return Predictions(estimates, sensors, trial, start, pose, horizon)
+    return Predictions(estimates, sensors, trial, start, pose, horizon, ahead_m)
 
 
 def start_points(experiment: Experiment, every: float, first: float) -> NDArray[np.int64]:

@@ -27,6 +27,10 @@ def sentence(content: Content) -> str:
         parts.append(
             f"The tail is modelled with {links['used']} links instead of {links['given']}."
         )
+    if content["fit"].get("written") == "refitted" and content["verdict"] != "no_mismatch":
+        parts.append(
+            "model.yaml is the refitted nominal model: nothing that was found predicts held-out positions better."
+        )
     return " ".join(parts)
 
 

@@ -61,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write the three files, print the verdict."""
+    from fish_sysid.dataset.marker_place import with_marker
     from fish_sysid.diagnosis.corrected_model import corrected
     from fish_sysid.diagnosis.diagnosis_json import answer
     from fish_sysid.diagnosis.pipeline import diagnose
@@ -96,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     write_json(args.out / "diagnosis.json", content)
     fit = corrected(result)
     save_robot(
-        without_wrench(fit.robot),
+        with_marker(without_wrench(fit.robot), result.task.ahead),
         args.out / "model.yaml",
         fit.standard_errors,
         notes=sentence(content),

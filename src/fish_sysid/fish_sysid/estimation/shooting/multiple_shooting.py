@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.marker_place import forward
 from fish_sysid.estimation.parametrization import Parametrization
 from fish_sysid.estimation.shooting.huber import huber, weight
 from fish_sysid.estimation.shooting.residuals import (
     SENSORS,
     Residuals,
     Scale,
+    ahead_in,
     residuals,
 )
 from fish_sysid.estimation.shooting.rollout import (
@@ -52,13 +54,13 @@ class Guess:
     """Where a fit stands."""
 
     theta: Array  # (K,)
-    sensors: Array  # (3,) SENSORS in units of their scale
+    sensors: Array  # (4,) SENSORS in units of their scale
     x: Array  # (W, NX) start motions
     zero: Array  # (W,) rad
 
     @property
     def z(self) -> Array:
-        """(K + 3,) what all windows share."""
+        """(K + 4,) what all windows share."""
         return np.concatenate([self.theta, self.sensors])
 
 
@@ -88,14 +90,16 @@ class Shooting:
     def first_guess(self, theta: Array, sensors: Array | None = None) -> Guess:
         """Start motions from the camera's poses and a run-in of the tail; they are the centre of their prior."""
         nq = self.coordinates.stepper.layout.links + 3
+        sensors = np.zeros(len(SENSORS)) if sensors is None else sensors
         x = self._run_in(theta)
         pose, rate = self._seen_at_start()
+        pose = forward(pose, -ahead_in(sensors))
         x[:, 3:nq] += pose[:, 2:] - x[:, 2:3]
         x[:, :3], x[:, nq : nq + 2] = pose, rate[:, :2]
         self.centre = np.column_stack([x, np.zeros(len(x))])
         zero = self._first_zero()
         self.centre[:, -1] = zero
-        return Guess(theta, np.zeros(len(SENSORS)) if sensors is None else sensors, x, zero)
+        return Guess(theta, sensors, x, zero)
 
     def _seen_at_start(self) -> tuple[Array, Array]:
         """(W, 3) pose and its rate at the windows' starts: a straight line through the frames around them."""
@@ -225,7 +229,7 @@ class Shooting:
         settled: float = SETTLED,
         moving: NDArray[np.bool_] | None = None,
     ) -> tuple[float, Guess]:
-        """(cost, guess) after damped Gauss-Newton from a guess. moving: (K + 3,) what moves, default everything."""
+        """(cost, guess) after damped Gauss-Newton from a guess. moving: (K + 4,) what moves, default everything."""
         moving = np.ones(len(self.prior), dtype=bool) if moving is None else moving
         free = np.flatnonzero(moving)
         damping, best = 1e-2, self.total(guess, self.errors(guess))

@@ -6,7 +6,7 @@
 
 (simulation error minimisation; Farina and Piroddi 2010). Start states come from `start_states` with the parameters as they
 are, and are held while Gauss-Newton moves the parameters; then they are found anew. The cost tells optima apart that
-windows with free start states do not.
+windows with free start states do not. The IMU's clock acts on start states alone, so that Gauss-Newton leaves it as it is.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fish_report.parallel import cores, on_all_cores
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.marker_place import forward
 from fish_sysid.estimation.parametrization import Parametrization
 from fish_sysid.estimation.shooting.huber import huber, weight
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS, Scale
@@ -59,19 +60,50 @@ class Multistep:
         self.starts = starts[used]
         self.targets = replace(self.targets, start=np.searchsorted(used, self.targets.start))
 
+    @property
+    def imu_clock(self) -> int:
+        """Place in z of the IMU's age beyond the camera's."""
+        return len(self.prior) - len(SENSORS) + SENSORS.index("imu_latency.delay")
+
     def states(self, z: Array) -> Array:
-        """(S, NS) start states with z; NaN where none was found."""
+        """(S, NS) start states with z as the camera has them: of its point, at its clock; NaN where none was found.
+
+        So they stay what the camera says when that point or that clock moves.
+        """
         K = len(self.prior) - len(SENSORS)
         robot = self.coordinates.robot(z[:K])
-        return shot_states(self.experiment, robot, self.starts, z[K:], self.past, self.trust)
+        found = shot_states(self.experiment, robot, self.starts, z[K:], self.past, self.trust)
+        late, _, _, ahead = z[K:] * SENSOR_SCALE
+        return self._carried(self._advanced(found, -late), ahead)
+
+    def _advanced(self, states: Array, seconds: float) -> Array:
+        """States (S, NS) whose coordinates go on as fast as they move."""
+        nq, out = self.coordinates.stepper.layout.links + 3, states.copy()
+        out[:, :nq] += seconds * states[:, nq : 2 * nq]
+        return out
+
+    def _carried(self, states: Array, ahead: float) -> Array:
+        """States (S, NS) with position and velocity of a point `ahead` [m] of the one that they are of."""
+        nq = self.coordinates.stepper.layout.links + 3
+        out, psi, r = states.copy(), states[:, 2], states[:, nq + 2]
+        out[:, 0] += ahead * np.cos(psi)
+        out[:, 1] += ahead * np.sin(psi)
+        out[:, nq] -= ahead * r * np.sin(psi)
+        out[:, nq + 1] += ahead * r * np.cos(psi)
+        return out
 
     def errors(self, z: Array, states: Array, slopes: bool = False) -> tuple[Array, Array]:
-        """Scaled errors (R, 4) and, if asked, slopes (R, 4, K + 3); those without a start state are 0."""
+        """Scaled errors (R, 4) and, if asked, slopes (R, 4, K + 4); those without a start state are 0."""
         K = len(z) - len(SENSORS)
         p, dp, _ = self.coordinates.filter_inputs(z[:K])
-        P = np.concatenate([p[None], p + STEP * dp]) if slopes else p[None]
-        pose = self._poses(P, states)
-        late, _, offset = z[K:] * SENSOR_SCALE
+        late, _, offset, ahead = z[K:] * SENSOR_SCALE
+        P, camera = p[None], np.array([[ahead, late]])
+        if slopes:  # one lane more for each parameter, the camera's point and its clock
+            P = np.concatenate([P, p + STEP * dp, P, P])
+            camera = np.repeat(camera, len(P), axis=0)
+            camera[-2, 0] += STEP
+            camera[-1, 1] += STEP
+        pose = self._poses(P, states, camera)
         e = self.targets.errors(pose, late, offset)
         value = self._cleaned(e[:, 0])
         found = np.asarray(np.isfinite(states).all(axis=1))
@@ -80,28 +112,39 @@ class Multistep:
         if not slopes:
             return value, np.zeros((*value.shape, 0))
         J = np.zeros((*value.shape, len(z)))
-        J[..., :K] = ((e[:, 1:] - e[:, :1]) / STEP).transpose(0, 2, 1)
-        later = self.targets.errors(pose[:, :, :1], late + STEP, offset)[:, 0]
-        J[..., K] = (later - e[:, 0]) / STEP * SENSOR_SCALE[0]
+        e[:, -1:] = self.targets.errors(pose[:, :, -1:], late + STEP, offset)
+        lanes = ((e[:, 1:] - e[:, :1]) / STEP).transpose(0, 2, 1)
+        J[..., :K] = lanes[..., :K]
+        J[..., K + 3], J[..., K] = (
+            lanes[..., K] * SENSOR_SCALE[3],
+            lanes[..., K + 1] * SENSOR_SCALE[0],
+        )
         J[:, 2, K + 2] = SENSOR_SCALE[2] / self.targets.scale[:, 2]
         wild = ~np.isfinite(J).all(axis=2) | (np.abs(J) > STEEPEST).any(axis=2)
         J[wild | missing[:, None]] = 0.0
         return value, J
 
-    def _poses(self, P: Array, states: Array) -> Array:
-        """(T, S, C, 3) poses from states (S, NS) with parameters (C, NP)."""
+    def _poses(self, P: Array, states: Array, camera: Array) -> Array:
+        """(T, S, C, 3) poses of the camera's point from states (S, NS) with parameters (C, NP).
+
+        camera: (C, 2) how far that point lies ahead [m] and how old images are [s].
+        """
         T = int(np.ceil((max(HORIZONS) + HALF_WINDOW) / DT)) + 1
         stepper, C = self.coordinates.stepper, len(P)
         m, k = self.starts.T
         rows = np.minimum(k + np.arange(T)[:, None], self.experiment.steps[m] - 1)
-        told, start = self.experiment.commands[rows, m], np.nan_to_num(states)
+        told, known = self.experiment.commands[rows, m], np.nan_to_num(states)
+        start = np.stack(
+            [self._advanced(self._carried(known, -ahead), late) for ahead, late in camera], axis=1
+        )
 
         def share(own: Index) -> Array:
-            lanes = np.repeat(start[own], C, axis=0)
+            lanes = start[own].reshape(len(own) * C, -1)
             moved = stepper.rollout(
                 lanes, np.repeat(told[:, own], C, axis=1), np.tile(P, (len(own), 1))
             )
-            return moved[..., :3].reshape(T + 1, len(own), C, 3)
+            pose = moved[..., :3].reshape(T + 1, len(own), C, 3)
+            return forward(pose, camera[:, 0])
 
         shares = np.array_split(np.arange(len(start)), max(1, min(2 * cores(), len(start))))
         return np.concatenate(on_all_cores(share, shares), axis=1)
@@ -128,9 +171,11 @@ class Multistep:
         return mean
 
     def clip(self, z: Array) -> Array:
-        """Into the physical ranges."""
-        K = len(z) - len(SENSORS)
-        return np.concatenate([self.coordinates.clip(z[:K]) if K else z[:0], z[K:]])
+        """Into the physical ranges; an IMU's sample is not younger than its stamp."""
+        K, out = len(z) - len(SENSORS), z.copy()
+        out[:K] = self.coordinates.clip(z[:K]) if K else z[:K]
+        out[self.imu_clock] = max(z[self.imu_clock], -z[K])
+        return out
 
     def minimise(self, z: Array, states: Array, iterations: int) -> Array:
         """Damped Gauss-Newton with the start states as they are."""
@@ -141,6 +186,7 @@ class Multistep:
             for _ in range(5):
                 damped = normal + damping * np.diag(np.diag(normal))
                 step = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
+                step[self.imu_clock] = 0.0
                 tried = self.clip(z + step)
                 cost = self.total(tried, self.errors(tried, states)[0])
                 if cost < best:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fish_sim.robot import Robot, nominal_parameters
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.marker_place import AHEAD, MARKER
 from fish_sysid.estimation.parametrization import Hypothesis, nominal_hypothesis
 from fish_sysid.estimation.shooting.clustered_errors import clustered_covariance, scores_by_trial
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
@@ -36,7 +37,8 @@ LINKS = (1, 2, 3)
 HELD = ("servo_rate_limit",)  # takes the place of any delay of the rudder
 RANGE = "rudder_range"  # free where commands go beyond it
 BEYOND = 0.95  # of the largest command: where the range starts, so that the data can move it
-IMU_CLOCK = "imu_latency.delay"  # free in windows alone: predictions hardly feel it, and leave it at its prior's 0
+PLACE = f"{MARKER}.{AHEAD}"  # of the camera's point
+IMU_CLOCK = "imu_latency.delay"  # free in windows alone: predictions hardly feel it
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,9 @@ class PredictionFit:
 
     @property
     def sensors(self) -> dict[str, float]:
-        """Ages of images and IMU samples beyond what was taken out before [s], and the camera's heading offset [rad]."""
+        """Ages of images and IMU samples beyond what was taken out before [s], the camera's heading offset and point [rad, m]."""
         values = self.found.z[-len(SENSORS) :] * SENSOR_SCALE
+        values[1] += values[0]  # the IMU's counts from the camera's
         return dict(zip(SENSORS, values.tolist(), strict=True))
 
     @property
@@ -78,15 +81,16 @@ class PredictionFit:
         spread = self.spread[: len(slope)] * slope
         return dict(zip(self.found.hypothesis.free, spread.tolist(), strict=True))
 
-    def with_camera_offset(self) -> tuple[Hypothesis, Array, Array]:
-        """(hypothesis, theta (K,), covariance (K, K)) with the camera's heading offset among the robot's sensors."""
+    def with_camera(self) -> tuple[Hypothesis, Array, Array]:
+        """(hypothesis, theta (K,), covariance (K, K)), the camera's point and heading offset among the robot's sensors."""
         hypothesis, K = self.found.hypothesis, len(self.theta)
         robot = ShotParametrization(hypothesis).robot(self.theta)
         offset = self.sensors["camera_heading_offset.offset"]
-        settled = replace(
-            hypothesis.robot,
-            sensors={**robot.sensors, "camera_heading_offset": {"offset": offset}},
-        )
+        camera = {
+            "camera_heading_offset": {"offset": offset},
+            MARKER: {AHEAD: self.sensors[PLACE]},
+        }
+        settled = replace(hypothesis.robot, sensors={**robot.sensors, **camera})
         return replace(hypothesis, robot=settled), self.theta, self.covariance[:K, :K]
 
 

@@ -4,10 +4,13 @@
 
 Of a window that starts with the motion x and whose IMU counts headings from an unknown zero b:
 
-    e = ((p(t - d_c) - p_camera) / s_p,  (psi(t - d_c) + h - psi_camera) / s_psi,  (psi(t - d_i) + b - psi_imu) / s_imu)
+    e = ((p(t - d_c) + a e(psi) - p_camera) / s_p,  (psi(t - d_c) + h - psi_camera) / s_psi,
+         (psi(t - d_i) + b - psi_imu) / s_imu)
 
-d_c, d_i: ages of images and IMU samples beyond what was taken out before [s]; h: the camera's heading offset [rad]. The IMU's
-integrated orientation is used, not its gyro: the rate samples of real ones do not integrate to the turn that was made.
+e(psi) = (cos psi, sin psi); a: how far the point that the camera follows lies ahead of the head's centre of mass [m]; h: the
+camera's heading offset [rad]; d_c, d_i: ages of images and IMU samples beyond what was taken out before [s]. d_i counts from d_c,
+so that camera and IMU, which agree about when the fish turns, move together against the commands. The IMU's integrated
+orientation is used, not its gyro: the rate samples of real ones do not integrate to the turn that was made.
 """
 
 from __future__ import annotations
@@ -18,13 +21,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
+from fish_sysid.dataset.marker_place import forward
 from fish_sysid.estimation.shooting.windows import Samples, Windows
 
 Array = NDArray[np.float64]
 
-# parameters of the sensors, and what counts as one: s, s, rad
-SENSORS = ("camera_latency.delay", "imu_latency.delay", "camera_heading_offset.offset")
-SENSOR_SCALE = np.array([0.02, 0.02, 0.03])
+# parameters of the sensors, and what counts as one: s, s (beyond the camera's), rad, m
+SENSORS = (
+    "camera_latency.delay",
+    "imu_latency.delay",
+    "camera_heading_offset.offset",
+    "camera_marker.ahead",
+)
+SENSOR_SCALE = np.array([0.02, 0.02, 0.03, 0.02])
+
+
+def ahead_in(sensors: Array) -> float:
+    """How far the point that the camera follows lies ahead [m], of sensors (4,) in units of SENSOR_SCALE."""
+    return float(sensors[3] * SENSOR_SCALE[3])
+
+
 LOST = 200.0  # a scaled error of motion that diverged
 STEEPEST = 3e4  # slope beyond which the motion is unstable and its slope says nothing
 
@@ -62,13 +78,14 @@ def residuals(
 ) -> Residuals:
     """Errors of simulated poses (steps + 1, W, 3) with slopes (steps + 1, W, 3, K + NX) or None.
 
-    sensors (3,) in units of SENSOR_SCALE; zero (W,) [rad].
+    sensors (4,) in units of SENSOR_SCALE; zero (W,) [rad].
     """
-    late_camera, late_imu, offset = sensors * SENSOR_SCALE
+    late_camera, lead, offset, ahead = sensors * SENSOR_SCALE
+    late_imu = late_camera + lead
     seen, felt = windows.poses, windows.headings
     at, rate = _interpolated(pose, seen, late_camera)
     turned, turning = _interpolated(pose[..., 2:], felt, late_imu)
-    apart = at - seen.value
+    apart = forward(at, ahead) - seen.value
     apart[:, 2] += offset
     e = [
         (apart[:, :2] / scale.position).ravel(),
@@ -83,6 +100,9 @@ def residuals(
         nothing = np.zeros((len(joined), 0))
         return Residuals(window, joined, nothing, nothing)
     d_pose, _ = _interpolated(slope, seen, late_camera)
+    cos, sin = np.cos(at[:, 2]), np.sin(at[:, 2])
+    d_pose[:, 0] -= ahead * sin[:, None] * d_pose[:, 2]
+    d_pose[:, 1] += ahead * cos[:, None] * d_pose[:, 2]
     d_turned, _ = _interpolated(slope[:, :, 2:], felt, late_imu)
     J = np.concatenate(
         [
@@ -93,7 +113,7 @@ def residuals(
     )
     J *= trust[:, None]
     J = np.where(np.isfinite(J) & (np.abs(J) < STEEPEST), J, 0.0)
-    Js, zero_slope = _sensor_slopes(scale, rate, turning)
+    Js, zero_slope = _sensor_slopes(scale, rate, turning, np.column_stack([cos, sin]))
     return Residuals(
         window,
         joined,
@@ -111,14 +131,15 @@ def _trust(windows: Windows, scale: Scale) -> Array:
     return np.concatenate([np.repeat(seen, 2), seen, felt])
 
 
-def _sensor_slopes(scale: Scale, rate: Array, turning: Array) -> tuple[Array, Array]:
-    """(R, 3) along the sensors' parameters and (R,) along the heading zero."""
+def _sensor_slopes(scale: Scale, rate: Array, turning: Array, along: Array) -> tuple[Array, Array]:
+    """(R, 4) along the sensors' parameters and (R,) along the heading zero."""
     F, Q = len(rate), len(turning)
     Js = np.zeros((3 * F + Q, len(SENSORS)))
     Js[: 2 * F, 0] = -rate[:, :2].ravel() / scale.position
+    Js[: 2 * F, 3] = along.ravel() / scale.position
     Js[2 * F : 3 * F, 0] = -rate[:, 2] / scale.heading
     Js[2 * F : 3 * F, 2] = 1.0 / scale.heading
-    Js[3 * F :, 1] = -turning[:, 0] / scale.orientation
+    Js[3 * F :, :2] = -turning[:, :1] / scale.orientation
     zero_slope = np.zeros(3 * F + Q)
     zero_slope[3 * F :] = 1.0 / scale.orientation
     return np.nan_to_num(np.clip(Js * SENSOR_SCALE, -STEEPEST, STEEPEST)), zero_slope

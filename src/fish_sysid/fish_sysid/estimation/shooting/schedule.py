@@ -44,7 +44,7 @@ class Found:
     """An optimum."""
 
     hypothesis: Hypothesis
-    z: Array  # (K + 3,) theta and the sensors' parameters
+    z: Array  # (K + 4,) theta and the sensors' parameters
     cost: float  # of predictions
     trust: Scale = START_TRUST  # of start states in the sensors
 

@@ -56,7 +56,7 @@ def shot_states(
     """(S, NS) states at starts (S, 2) of trial and grid point by what was measured in the `past` [s] before each.
 
     trust: how far which sensor and an old sample are trusted.
-    ahead: s after each start whose measurements may be known too; sensors: (3,) in units of SENSOR_SCALE. NaN where the camera
+    ahead: s after each start whose measurements may be known too; sensors: (4,) in units of SENSOR_SCALE. NaN where the camera
     hardly saw the fish or the motion diverged.
     """
     coordinates = ShotParametrization(nominal_hypothesis(robot, free=()))

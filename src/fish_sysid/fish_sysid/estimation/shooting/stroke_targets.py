@@ -48,7 +48,10 @@ class Targets:
         return len(self.start)
 
     def errors(self, pose: Array, late: float, offset: float) -> Array:
-        """(R, ..., 4) scaled errors of poses (T, S, ..., 3): images `late` [s], heading seen `offset` [rad] too large."""
+        """(R, ..., 4) scaled errors of poses (T, S, ..., 3) of the point that the camera follows.
+
+        Images are `late` [s], headings seen `offset` [rad] too large.
+        """
         position = np.clip(self.position - late / DT, 0.0, len(pose) - 1.001)
         low = position.astype(int)
         share = (position - low).reshape(*low.shape, *([1] * (pose.ndim - 2)))
