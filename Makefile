@@ -114,15 +114,22 @@ train evaluate paper:
 	@$(ROBOFISH) $@ --out '$(or $(OUT),out/$@)' $(ARGS)
 
 # --- tests ----------------------------------------------------------------------------------------------------------------
-# The longest tests run beside all the others: both cores stay busy.
-LONGEST := fish_sysid fish_study fish_sim
+# Parts that run two at a time: whoever is free takes the next, the longest first, and both cores stay busy to the end.
+# Tests that start nodes are one part, one after the other: two would draw the same ROS domain now and then.
+WITHOUT_NODES := fish_sysid fish_study fish_sim fish_train
+PARTS := with_nodes $(WITHOUT_NODES)
 test: setup install/.studies
-	@$(WORKSPACE); status=0; \
-		colcon --log-base log/longest test $(WITH_STUDIES) --packages-select $(LONGEST) --executor sequential --return-code-on-test-failure & \
-		colcon test $(WITH_STUDIES) --packages-skip $(LONGEST) --executor sequential --return-code-on-test-failure || status=1; \
-		python -m pytest test || status=1; \
-		wait $$! || status=1; colcon test-result --all --verbose || status=1; \
+	@status=0; $(MAKE) --jobs=2 --keep-going $(PARTS:%=.test/%) || status=1; \
+		$(ACTIVATE); colcon test-result --all --verbose || status=1; \
 		if python3.12 -c '' 2>/dev/null; then $(MAKE) test-noble || status=1; fi; exit $$status
+
+COLCON_TEST = colcon --log-base log/$(@F) test $(WITH_STUDIES) --executor sequential --return-code-on-test-failure
+.PHONY: $(PARTS:%=.test/%)
+.test/with_nodes:
+	@$(WORKSPACE); status=0; $(COLCON_TEST) --packages-skip $(WITHOUT_NODES) || status=1; \
+		python -m pytest test || status=1; exit $$status
+$(WITHOUT_NODES:%=.test/%): .test/%:
+	@$(WORKSPACE); $(COLCON_TEST) --packages-select $*
 
 # Ubuntu 24.04's versions of Python and of every library that rosdep installs there; all packages but training.
 NOBLE := .noble

@@ -15,6 +15,7 @@ import pytest
 from ament_index_python.packages import get_package_prefix
 
 from fish_node.domain import choose_domain, discovery_port, domain_in_use
+from fish_report import robofish as command
 
 ROOT = Path(__file__).parents[1]
 PROGRAM = f"{get_package_prefix('fish_report')}/lib/fish_report/robofish"
@@ -110,9 +111,10 @@ BAD_INPUT = {
 
 
 @pytest.mark.parametrize(("arguments", "expected"), BAD_INPUT.values(), ids=BAD_INPUT)
-def test_bad_input_is_one_line(arguments, expected, tmp_path):
+def test_bad_input_is_one_line(arguments, expected, tmp_path, monkeypatch, capsys):
     (tmp_path / BROKEN).write_text(json.dumps("not weights"))
-    assert_one_line(demo(tmp_path, *arguments), expected)
+    monkeypatch.chdir(tmp_path)
+    assert_one_line(in_this_process("demo", *arguments, capsys=capsys), expected)
 
 
 def test_an_unknown_make_variable_is_one_line():
@@ -130,10 +132,20 @@ def test_a_domain_in_use_is_one_line(tmp_path):
         assert_one_line(demo(tmp_path, "--domain", domain), f"ROS domain {domain} is in use")
 
 
-def test_an_output_folder_with_something_in_it_is_kept(tmp_path):
+def test_an_output_folder_with_something_in_it_is_kept(tmp_path, monkeypatch, capsys):
     (tmp_path / "precious").write_text("mine")
-    assert_one_line(demo(tmp_path, "--out", "."), "not empty")
+    monkeypatch.chdir(tmp_path)
+    assert_one_line(in_this_process("demo", "--out", ".", capsys=capsys), "not empty")
     assert os.listdir(tmp_path) == ["precious"]
+
+
+def in_this_process(*words, capsys):
+    """What `robofish` with these words would return and print; a process of its own needs two seconds to start."""
+    try:
+        status = command.main([str(word) for word in words])
+    except SystemExit as ended:
+        status = ended.code
+    return subprocess.CompletedProcess(words, status, *capsys.readouterr())
 
 
 def assert_one_line(result, expected):

@@ -7,7 +7,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from test_demo import PROGRAM, assert_one_line
+from test_demo import PROGRAM, assert_one_line, in_this_process
 
 from fish_bag import read_dataset
 from fish_node.domain import choose_domain, domain_in_use
@@ -89,14 +89,17 @@ def test_how_it_ended_is_said_and_nothing_is_left_running(swum):
         (json.dumps(ROWS), ["--out", "."], "not empty"),
     ],
 )
-def test_bad_input_is_one_line(tmp_path, content, arguments, said):
+def test_bad_input_is_one_line(tmp_path, monkeypatch, capsys, content, arguments, said):
     (tmp_path / "program.json").write_text(content)
-    assert_one_line(excite(tmp_path, "program.json", *arguments), said)
+    monkeypatch.chdir(tmp_path)
+    result = in_this_process("excite", "program.json", *arguments, capsys=capsys)
+    assert_one_line(result, said)
 
 
-def test_the_plan_lists_the_swims_without_swimming(tmp_path):
+def test_the_plan_lists_the_swims_without_swimming(tmp_path, monkeypatch, capsys):
     (tmp_path / "program.json").write_text(json.dumps(ROWS))
-    result = excite(tmp_path, "program.json", "--plan")
+    monkeypatch.chdir(tmp_path)
+    result = in_this_process("excite", "program.json", "--plan", capsys=capsys)
     assert result.returncode == 0
     assert "heading, rad" in result.stdout
     assert [file.name for file in tmp_path.iterdir()] == ["program.json"]

@@ -14,9 +14,9 @@ from fish_node.domain import choose_domain
 
 SHARED = ("/diagnostics", "/parameter_events", "/rosout", "/tf", "/tf_static")
 SECOND = "/fish_2"
-LENGTH = "{length: 1.6}"
+LENGTH = "{length: 1.2}"
 SINE, SINE_START = "{amplitude: 0.15, length: 1.2}", (-0.6, 0.0, math.atan(0.15 * math.pi / 0.6))
-FACTOR, LOCKSTEP = 0.5, 5.0  # as in test_closed_loop
+FACTOR, LOCKSTEP = 1.0, 60.0  # as in test_demo
 
 
 def heard_by(watch, namespace):
@@ -33,7 +33,7 @@ def heard_by(watch, namespace):
 def pair(tmp_path_factory):
     """Recordings of both, and what the nodes of each subscribe to."""
     domain, folders = choose_domain(), [tmp_path_factory.mktemp(name) for name in ("one", "two")]
-    first = parameters(folders[0], "straight", LENGTH, (-0.8, 0.0, 0.0), FACTOR, LOCKSTEP)
+    first = parameters(folders[0], "straight", LENGTH, (-0.6, 0.0, 0.0), FACTOR, LOCKSTEP)
     second = parameters(folders[1], "sinusoid", SINE, SINE_START, FACTOR, LOCKSTEP)
     with (
         running(folders[0], first, domain=domain) as one,

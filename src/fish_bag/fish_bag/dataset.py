@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from fish_bag.problem import Problem, RecordingError
 from fish_bag.reader import read_trial
@@ -94,13 +93,24 @@ def _read_all(
 
 def _shown(results: Iterable[Trial | str], total: int, progress: bool) -> Iterator[Trial | str]:
     """The results as they come, with a progress bar if asked for."""
+    if not progress:
+        yield from results
+        return
+    from rich.progress import (  # nodes that read recordings have no terminal
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
     columns = (
         TextColumn("reading trials"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, disable=not progress, transient=True) as bar:
+    with Progress(*columns, transient=True) as bar:
         yield from bar.track(results, total=total)
 
 

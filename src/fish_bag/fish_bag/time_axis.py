@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from fish_bag.clock import ClockEstimate, estimate_clock, robust_line
 
@@ -37,6 +36,8 @@ class Stamps:
         delay = self.arrival_ns - self.stamp_ns
         d = (delay - int(np.median(delay))) * 1e-9
         if not self.steady:
+            from scipy.ndimage import median_filter  # rarely needed, and slow to import
+
             return np.asarray(np.abs(d - median_filter(d, NEIGHBOURS, mode="nearest")) < OUTLIER_S)
         x = (self.arrival_ns - self.arrival_ns[0]) * 1e-9
         return np.asarray(np.abs(d - robust_line(x, d)) < OUTLIER_S)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from fish_control.strapdown import MotionNoise
+from fish_control.motion_noise import MotionNoise
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -29,27 +28,13 @@ from numpy.typing import NDArray
 
 from fish_control.imu_heading import COASTING_TIME, SAMPLE_PERIOD
 from fish_control.imu_history import Step
+from fish_control.motion_noise import MotionNoise
 from fish_control.noise_scale import NoiseScale
 from fish_control.preintegration import SIZE, Preintegration
 
 Array = NDArray[np.float64]
 POSE = slice(0, 3)
 H_CAMERA = np.eye(3, SIZE)
-
-
-@dataclass(frozen=True)
-class MotionNoise:
-    """Standard deviations of the motion model; per sample means per sample at 100 Hz."""
-
-    gyro_noise: float = 0.006  # rad/s per sample
-    accel_noise: float = 0.05  # m/s^2 per sample
-    gyro_drift: float = 1e-4  # rad/s per sqrt(s), of the bias
-    accel_drift: float = 1e-3  # m/s^2 per sqrt(s), of the biases
-    heading_drift: float = 0.001  # rad per sqrt(s), of the IMU's heading against the camera's
-    coasting_yaw_rate: float = (
-        2.0  # rad/s, unknown yaw rate without IMU (the head swings at up to 4 rad/s)
-    )
-    coasting_accel: float = 1.0  # m/s^2, unknown acceleration without IMU
 
 
 class StrapdownFilter:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fish_control.imu_history import Step
+from fish_control.motion_noise import MotionNoise
 from fish_control.preintegration import SIZE
-from fish_control.strapdown import MotionNoise, StrapdownFilter, pose_residual
+from fish_control.strapdown import StrapdownFilter, pose_residual
 
 
 def started(x):

@@ -7,13 +7,17 @@ Texts from files and from other nodes are shown by `printable.plain` and never t
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table as TerminalTable
 from rich.text import Text
 
-from fish_report.page import Table
 from fish_report.printable import LONGEST, plain
+
+if TYPE_CHECKING:  # a page needs plotly, which a node does without
+    from fish_report.page import Table
 
 __all__ = ["PARAGRAPH", "cell", "plain", "print_table", "say", "terminal"]
 

@@ -40,8 +40,10 @@ FLAGS = (
     "-std=gnu11",
     "-w",
 )
+# gcc's search for registers to spill grows with the square of what it considers: half of the time of a large kernel
+FEW_SPILLS = ("--param", "lra-max-considered-reload-pseudos=30")
 # tried in this order until a library computes what it should
-OPTIMISATION = (("-O3",), ("-O3", "-fno-tree-vectorize"), ("-O1",))
+OPTIMISATION = (("-O3", *FEW_SPILLS), ("-O3", "-fno-tree-vectorize", *FEW_SPILLS), ("-O1",))
 # The loop vectoriser of gcc 12.2 for AVX-512 gets a scalar adjoint wrong, and it makes no kernel of one fish faster. gcc
 # and clang both know the flag.
 SCALAR_OPTIMISATION = OPTIMISATION[1:]

@@ -29,7 +29,7 @@ from fish_bag.qos import Qos
 from fish_bag.recorder_config import RecorderConfig, common_qos, is_selected
 from fish_node.nodes.start import read_parameters, run
 from fish_report.errors import UserError
-from fish_report.terminal import plain
+from fish_report.printable import plain
 
 
 class RecorderNode(Node):

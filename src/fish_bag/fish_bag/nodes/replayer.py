@@ -30,7 +30,7 @@ from fish_bag.problem import RecordingError
 from fish_bag.qos import parse_qos
 from fish_node.nodes.start import read_parameters, run
 from fish_report.errors import UserError
-from fish_report.terminal import plain
+from fish_report.printable import plain
 
 LINGER = Duration(seconds=2)  # for the last messages to be received before the node ends
 

@@ -38,14 +38,17 @@ from fish_bringup.run_watch import Robot, SwimEnd
 from fish_bringup.score import score_trial, what_is_missing
 from fish_bringup.score_table import error_table
 from fish_bringup.view_state import ViewConfig
+from fish_control.gains_file import read_gains_file
+from fish_control.node_configs import PlannerConfig
 from fish_control.paths import make_path, read_arguments
-from fish_control.reference_path import PathError
+from fish_control.pool import check_inside_pool
 from fish_node.domain import choose_domain
 from fish_report.errors import UserError, user_errors
 from fish_report.interruption import Interruption
 from fish_report.output_folder import new_folder
 from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
+from fish_sim.robot_argument import read_model
 
 VIEW_PORT = ViewConfig().port
 LOCKSTEP = 60.0  # s of real time that simulated time waits for a node
@@ -105,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
         )
     with user_errors():
         domain = choose_domain(args.domain)
-    start = start_pose(args.letter, args.path_args)
+    start = checked_start(args)
     folder = new_folder(args.out, "demo_" + "".join(c if c.isalnum() else "_" for c in args.letter))
     console = terminal()
     say(
@@ -155,16 +158,19 @@ def node_parameters(
     return changed
 
 
-def start_pose(name: str, path_args: str) -> Parameters:
-    """The fish waits at the beginning of the path, along it.
+def checked_start(args: argparse.Namespace) -> Parameters:
+    """The fish waits at the beginning of the path, along it; the nodes will take what they are given.
 
     Raises:
-        UserError: no such path.
+        UserError: what a node would refuse, seconds after all of them were started.
     """
-    try:
-        path = make_path(name, **read_arguments(path_args, "path-args"))
-    except PathError as error:
-        raise UserError(str(error)) from error
+    with user_errors():
+        path = make_path(args.letter, **read_arguments(args.path_args, "path-args"))
+        planner = PlannerConfig(path=args.letter, path_args=args.path_args, speed=args.speed)
+        check_inside_pool(path, planner.margin)
+        if args.weights:
+            read_gains_file(args.weights)
+    read_model(args.robot)
     (x, y), heading = path.point(0.0), float(path.heading_at(0.0))
     return {"start_x": float(x), "start_y": float(y), "start_heading": heading}
 

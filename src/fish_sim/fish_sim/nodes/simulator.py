@@ -53,6 +53,7 @@ from fish_sim.simulation_config import SimulatorConfig
 QUEUE = 10
 RESENT = 1000  # messages that lockstep keeps for a recorder that lags: 10 s
 SAY_AGAIN = 0.5  # s of real time that lockstep waits before it says the newest IMU sample again
+CLOCK_AGAIN = 0.1  # s of real time, likewise of /clock: every node wakes up for it, and a busy computer would be busier
 COMMAND = "joint_command"  # source of the arming state
 SLOW = 0.95  # share of the asked pace below which the node says that it lags
 
@@ -87,7 +88,7 @@ class SimulatorNode(Node):
         self._refusal = ""
         self._lockstep = Lockstep(config.lockstep)
         self._felt: Imu | None = None  # newest sample
-        self._felt_said = 0.0
+        self._felt_said = self._clock_said = 0.0  # s of real time
         self._create_interfaces(config.camera == "pose")
         self._start_ns = time.time_ns()
         self._pacer = Pacer(config.real_time_factor, DT, time.monotonic())
@@ -187,8 +188,10 @@ class SimulatorNode(Node):
 
     def _say_again(self) -> None:
         """Who missed the newest message, which nobody sends again, would wait for the time that waits for it."""
-        self._clock_publisher.publish(ClockMessage(clock=self._stamp(self._simulation.time)))
         now = time.monotonic()
+        if min(self._lockstep.waited(now), now - self._clock_said) > CLOCK_AGAIN:
+            self._clock_said = now
+            self._clock_publisher.publish(ClockMessage(clock=self._stamp(self._simulation.time)))
         if (
             self._felt is not None
             and min(self._lockstep.waited(now), now - self._felt_said) > SAY_AGAIN

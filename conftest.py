@@ -1,14 +1,21 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures that the tests of several packages use."""
+"""What the tests of all packages have in common: one thread for each, and fixtures that several use."""
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+# Matrices here are small: a second thread only waits for the first, and takes the processor from what runs beside the test.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(
+        name, "1"
+    )  # read when NumPy is imported, and by processes that a test starts
 
 
 @pytest.fixture
