@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of a folder of cases against their right answers; the folder is not a part of the project.
+"""Recordings, drawings and camera files of a folder of cases against their right answers; the folder is no part of the project.
 
     python test/check_cases.py FOLDER
 
@@ -27,6 +27,8 @@ from fish_bag.playback import Playback, ReplayerConfig
 from fish_bag.recover import recover
 from fish_control.fusion import Fusion
 from fish_control.nodes.messages import inertial_values
+from fish_control.paths import polyline
+from fish_control.reference_path import PathError, ReferencePath
 from fish_node.camera_file import read_camera_file
 from fish_vision.calibration import read_lens
 
@@ -112,6 +114,47 @@ def fusion_not_measured() -> None:
     assert np.std(errors) < 0.02, f"heading rms {np.std(errors):.3f} rad, {dict(fusion.counts)}"
 
 
+def swum(path: Path) -> ReferencePath:
+    return polyline(str(path), size=1.0) if path.suffix == ".svg" else polyline(str(path))
+
+
+def not_swum(path: Path, words: str) -> None:
+    said = ""
+    try:
+        swum(path)
+    except PathError as error:
+        said = str(error)
+    assert words in said, said or "it is swum"
+
+
+def csv_columns(folder: Path) -> None:
+    """Columns by their names; a row that is neither numbers nor names is an error of its line."""
+    columns = np.genfromtxt(folder / "y_x.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(
+        swum(folder / "y_x.csv").points[0], [columns["x"][0], columns["y"][0]]
+    )
+    not_swum(folder / "first_row.csv", "line 1")
+
+
+def svg_not_drawn(folder: Path) -> None:
+    """The line m 40,60 h 60 v 30 h -40 v 40 of which the longer side is 1 m; y points up."""
+    corners = np.array([[40, -60], [100, -60], [100, -90], [60, -90], [60, -130]], float)
+    ends = (corners[[0, -1]] - [70, -95]) / 70.0
+    for name in ("marker.svg", "hidden.svg"):
+        np.testing.assert_allclose(swum(folder / name).points[[0, -1]], ends, atol=1e-6)
+    not_swum(folder / "two_lines.svg", "2 visible parts")
+
+
+def svg_transform(folder: Path) -> None:
+    """The drawings differ by a mirror and by a quarter of a turn; their middles lie at the pool's."""
+    plain, mirrored, turned = (
+        swum(folder / f"{name}.svg").points[[0, -1]] for name in ("plain", "mirrored", "turned")
+    )
+    np.testing.assert_allclose(mirrored, plain * [-1, 1], atol=1e-6)
+    quarter = [plain[:, ::-1] * [s, -s] for s in (1, -1)]
+    assert any(np.allclose(turned, points, atol=1e-6) for points in quarter), (plain, turned)
+
+
 def foreign_topic(folder: Path) -> None:
     for file in sorted(folder.glob("*.mcap")):
         for trial in (read_trial(file), recovered(file)):
@@ -194,6 +237,7 @@ def two_publishers(folder: Path) -> None:
 
 CASES: tuple[Callable[[Path], None], ...] = (
     calibration_files,
+    csv_columns,
     foreign_topic,
     fusion_frame,
     imu_not_measured,
@@ -207,6 +251,8 @@ CASES: tuple[Callable[[Path], None], ...] = (
     ros1_active,
     sqlite_parts,
     sqlite_wal,
+    svg_not_drawn,
+    svg_transform,
     two_publishers,
 )
 

@@ -19,7 +19,7 @@ from fish_bag.mcap_scan import scan_mcap
 from fish_bag.problem import RecordingError
 from fish_bag.recording_files import RecordingFiles, bare_name, file_kind, find_files
 from fish_bag.ros1_scan import scan_ros1
-from fish_bag.sqlite_scan import scan_sqlite
+from fish_bag.sqlite_scan import companions, scan_sqlite
 from fish_bag.stated_metadata import parse_metadata
 from fish_bag.storage import Buffer, Contents, Keep, StoredTopic
 
@@ -113,6 +113,8 @@ def _scan_file(path: Path, keep: Keep) -> Contents:
     """Contents of one storage file."""
     try:
         size = path.stat().st_size
+        if not size and companions(path):
+            return scan_sqlite(path, keep)
         if not size:
             return Contents(lost=["the file is empty (0 bytes)"])
         with path.open("rb") as file:
@@ -221,3 +223,6 @@ def _complete_metadata(bag: RawBag, found: RecordingFiles, contents: list[Conten
                 bag.notes.append(
                     f"{topic[0]}: {have} messages were read, metadata.yaml says {said}"
                 )
+    differs = found.stated.total not in (None, bag.count)
+    if differs and found.stated.counts in (None, {k: n for k, n in read.items() if n}):
+        bag.notes.append(f"{bag.count} messages were read, metadata.yaml says {found.stated.total}")

@@ -25,6 +25,12 @@ from fish_bag.storage import Buffer, StoredTopic
 
 HEAD = struct.Struct("<BQ")  # opcode, length
 FOOTER_BYTES = HEAD.size + 20
+OF_DATA = frozenset(
+    {
+        *(Opcode.HEADER, Opcode.FOOTER, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX),
+        *(Opcode.ATTACHMENT, Opcode.METADATA, Opcode.DATA_END),
+    }
+)  # records that no summary has
 DAMAGE = (McapError, struct.error, ValueError)  # of parsing a damaged record
 
 
@@ -36,6 +42,7 @@ class Summary:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     counts: dict[int, int] | None = None  # channel -> messages; None: not said
+    total: int | None = None  # messages; None: not said
     sure: bool = False  # it has a checksum, which holds
 
 
@@ -52,11 +59,9 @@ class _WholeReads(BytesIO):
 def topics_of(
     channels: dict[int, Channel], schemas: dict[int, Schema]
 ) -> Iterator[tuple[int, StoredTopic]]:
-    """The channels of which the type is known."""
+    """The channels; the type is "" where the file does not say it."""
     for channel in channels.values():
-        schema = schemas.get(channel.schema_id)
-        if schema is None and channel.schema_id:
-            continue
+        schema = schemas.get(channel.schema_id)  # None: it has none, or its record is lost
         name, encoding, definition = (
             (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
         )
@@ -113,6 +118,8 @@ def read_summary(data: Buffer) -> Summary | None:
 
 
 def _take_summary(summary: Summary, opcode: int, body: bytes) -> None:
+    if opcode in OF_DATA:
+        raise ValueError("the summary begins inside the data")
     if opcode == Opcode.SCHEMA:
         schema = whole_record(Schema, body)
         summary.schemas[schema.id] = schema
@@ -121,5 +128,6 @@ def _take_summary(summary: Summary, opcode: int, body: bytes) -> None:
         summary.channels[channel.id] = channel
     elif opcode == Opcode.STATISTICS:
         statistics = whole_record(Statistics, body)
+        summary.total = statistics.message_count
         if not statistics.message_count or statistics.channel_message_counts:
             summary.counts = statistics.channel_message_counts

@@ -13,6 +13,8 @@ Source: MCAP specification (mcap.dev/spec).
 from __future__ import annotations
 
 import struct
+import zlib
+from collections import Counter
 from typing import Any
 
 from mcap.opcode import Opcode
@@ -41,6 +43,7 @@ RECORDS: dict[int, type[Any]] = {
 }
 OPCODES = frozenset(Opcode)
 MESSAGE = int(Opcode.MESSAGE)
+PRIVATE = 0x80  # from here on opcodes of applications
 
 
 def scan_mcap(data: Buffer, keep: Keep = keep_whole) -> Contents:
@@ -70,6 +73,8 @@ class _Scan:
         self.latest_loose: Messages | None = None
         self.chunks = 0
         self.ended = False  # the record DataEnd was found
+        self.checksum, self.data_end = 0, 0  # of the data, 0: none; byte after them
+        self.strange: Counter[int] = Counter()  # opcode -> records of a kind that is not known
         self.summary = read_summary(data)
         self.end = self.summary.start if self.summary else len(data)
 
@@ -95,8 +100,33 @@ class _Scan:
             self.lost.append("no whole message, but the file ends before its index")
         elif (not self.ended or summary is None) and not self.lost:
             self.contents.notes.append("the index is cut off or damaged; no message is lost")
-        if summary is not None and summary.counts is not None:
-            self.contents.compare_counts(summary.counts, "its statistics")
+        self._compare()
+
+    def _compare(self) -> None:
+        """Compare what was read with the statistics and with the checksum of the data."""
+        counts, total = (self.summary.counts, self.summary.total) if self.summary else (None, None)
+        if counts is not None:
+            self.contents.compare_counts(counts, "its statistics")
+        agree = counts == {c: len(m) for c, m in self.contents.messages.items() if len(m)}
+        if total not in (None, self.contents.count) and (counts is None or agree):
+            self.contents.notes.append(
+                f"{self.contents.count} messages are in the file, its statistics say {total}"
+            )
+        if self.strange:
+            kinds = ", ".join(f"{opcode:#04x} ({n})" for opcode, n in sorted(self.strange.items()))
+            sure = agree or min(self.strange) >= PRIVATE
+            said = self.contents.notes if sure else self.lost
+            said.append(f"records of kinds that MCAP does not define: {kinds}; they are left out")
+        if self.checksum and self.loose and not self.lost and not self._data_are_whole():
+            self.lost.append(
+                "the checksum of its data does not hold; a message is changed, and no other sign says which"
+            )
+
+    def _data_are_whole(self) -> bool:
+        """Whether the checksum of the data holds; writers begin it at the file, after the magic, or after the header."""
+        _, length = HEAD.unpack_from(self.data, len(MCAP0_MAGIC))
+        starts = (0, len(MCAP0_MAGIC), len(MCAP0_MAGIC) + HEAD.size + length)
+        return any(zlib.crc32(self.data[k : self.data_end]) == self.checksum for k in starts)
 
     def step(self, position: int) -> int | None:
         """Read the record at `position`; where the next one is, None at the end."""
@@ -110,16 +140,29 @@ class _Scan:
         opcode, length = HEAD.unpack_from(data, position)
         if opcode == Opcode.CHUNK:
             return self.chunk(position, length)
-        if body + length > self.end or (opcode not in OPCODES and opcode < 0x80):
+        if body + length > self.end or not opcode:
             return self.nonsense(position)
         following = int(body + length)
+        if opcode not in OPCODES:
+            if opcode < PRIVATE and not self._begins_record(following):
+                return self.nonsense(position)
+            self.strange[opcode] += 1
+            return following
         if opcode == Opcode.MESSAGE:
             return self.loose_message(position, following)
         try:
             self.take(opcode, data[body:following])
         except DAMAGE:
             return self.nonsense(position)
+        self.data_end = position
         return None if self.ended else following
+
+    def _begins_record(self, position: int) -> bool:
+        """Whether a record of a known kind that fits into the file begins there."""
+        if position + HEAD.size > self.end:
+            return position == self.end
+        opcode, length = HEAD.unpack_from(self.data, position)
+        return opcode in OPCODES and position + HEAD.size + length <= self.end
 
     def take(self, opcode: int, body: bytes) -> None:
         """Take one record that is no message; one of DAMAGE if it makes no sense."""
@@ -135,6 +178,7 @@ class _Scan:
             if len(body) != (4 if opcode == Opcode.DATA_END else 20):
                 raise ValueError("wrong length")
             self.ended = True
+            self.checksum = struct.unpack("<I", body)[0] if len(body) == 4 else 0
         elif opcode == Opcode.MESSAGE_INDEX:
             if len(body) < 6 or struct.unpack_from("<I", body, 2)[0] != len(body) - 6:
                 raise ValueError("wrong length")
@@ -226,6 +270,8 @@ class _Scan:
                 found.raws.append(raw)
             elif opcode == 0 or following > content_end:
                 return
+            elif opcode not in OPCODES:
+                self.strange[opcode] += 1
             else:
                 try:
                     self.take(opcode, data[position + HEAD.size : following])

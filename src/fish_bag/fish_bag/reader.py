@@ -47,6 +47,7 @@ from fish_bag.trial import (
 )
 
 MEASURED = ("commands", "encoder", "imu", "camera", "tail")  # roles with a steady rate
+KNOWN = ("cdr", "ros1")  # serialisations that are decoded
 LONGEST_NS = 30 * 24 * 3600 * 10**9  # of a recording; arrivals farther from the median are wrong
 
 
@@ -66,6 +67,20 @@ def read_trial(path: Path | str, topics: TopicMap | None = None) -> Trial:
     return _Assembly(bag, topics).trial()
 
 
+def _has_role(raw: RawTopic, topics: TopicMap) -> bool:
+    """Whether a topic is, by its name, type and serialisation, one of a robot's in any namespace."""
+    return raw.stored.serialization in KNOWN and any(
+        f"/{raw.topic}".endswith(f"/{rule.topic.lstrip('/')}")
+        and raw.type == (PATH_TYPE if role == PATH_ROLE else ROLES[role].type)
+        for role, rule in topics.rules.items()
+    )
+
+
+def _serialization(raw: RawTopic) -> Problem:
+    text = f"{len(raw.raws)} messages serialised as {raw.stored.serialization!r}; expected cdr"
+    return Problem("error", "serialization", raw.topic, text, len(raw.raws))
+
+
 @dataclass(frozen=True)
 class _Mapped:
     """One role's topic, decoded."""
@@ -82,9 +97,10 @@ class _Assembly:
         self.bag, self.topics = bag, topics
         self.problems = [Problem("warning", "storage", "", note) for note in bag.notes]
         names = [raw.topic for raw in bag.topics]
+        fitting = [raw.topic for raw in bag.topics if _has_role(raw, topics)]
         try:
             found = topics.namespace
-            self.namespace = find_namespace(names, topics) if found is None else found
+            self.namespace = find_namespace(fitting or names, topics) if found is None else found
         except RecordingError as error:
             raise RecordingError(f"{bag.path}: {error}") from error
         truth = topics.rules.get("truth")  # where a simulator speaks, all stamps are of its clock
@@ -128,7 +144,7 @@ class _Assembly:
         """A note on every topic that cannot be decoded and need not be."""
         known = {full_name(self.namespace, rule.topic) for rule in self.topics.rules.values()}
         for raw in self.bag.topics:
-            usual = raw.stored.serialization in ("cdr", "ros1")
+            usual = raw.stored.serialization in KNOWN
             if raw.topic in known or (usual and raw.type in typestore(raw.ros1).fielddefs):
                 continue
             kind = f"{raw.type or 'an unknown type'} ({raw.stored.serialization or 'no encoding'})"
@@ -145,11 +161,17 @@ class _Assembly:
         there = [raw for raw in self.bag.topics if raw.topic == name and raw.raws]
         for raw in there:
             if raw.type != expected:
-                text = f"{len(raw.raws)} messages of type {raw.type}, expected {expected}"
+                kind = raw.type or "that the file does not say"
+                text = f"{len(raw.raws)} messages of type {kind}, expected {expected}"
                 self.problems.append(Problem("error", "wrong_type", name, text, len(raw.raws)))
         if not there:
             self.problems += checks.missing(role, name, rule.required)
-        return next((raw for raw in there if raw.type == expected), None)
+        fitting = [raw for raw in there if raw.type == expected]
+        known = [raw for raw in fitting if raw.stored.serialization in KNOWN]
+        for raw in fitting if known else ():
+            if raw not in known:
+                self.problems.append(_serialization(raw))
+        return next(iter(known or fitting), None)
 
     def arrivals(self) -> np.ndarray:
         """(N,) plausible times of arrival of the topics that have a role, or of all topics; int64 ns."""
@@ -181,9 +203,8 @@ class _Assembly:
         if wrong:
             text = f"{raw.type}: {wrong}; the usual definition of that name is used"
             self.problems.append(Problem("warning", "definition", raw.topic, text))
-        if raw.stored.serialization not in ("cdr", "ros1"):
-            text = f"serialised as {raw.stored.serialization!r}; expected cdr"
-            self.problems.append(Problem("error", "serialization", raw.topic, text))
+        if raw.stored.serialization not in KNOWN:
+            self.problems.append(_serialization(raw))
 
     def stamps(self, rule: TopicRule, decoded: Decoded) -> Stamps | None:
         """Stamps to go by; None where the map says arrival, there is no header, or stamps were never set."""

@@ -11,13 +11,13 @@ from typing import Any
 
 from fish_bag.compression import name_by_magic
 from fish_bag.problem import RecordingError
-from fish_bag.stated_metadata import FILE_NAME, StatedMetadata, read_metadata
+from fish_bag.stated_metadata import FILE_NAME, LFS_START, StatedMetadata, read_metadata
 
 PARTS = (".mcap", ".db3")  # of files in a rosbag2 folder
 PACKED = (".zstd", ".zst", ".lz4")  # a whole file compressed, as rosbag2's mode `file` leaves it
 SUFFIXES = (*PARTS, ".bag", ".bag.active")
 MAGICS = {b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite3", b"#ROSBAG V": "ros1"}
-LFS_MAGIC = b"version https://git-lfs"
+LFS_MAGIC = LFS_START.encode()
 KINDS = {".mcap": "mcap", ".db3": "sqlite3", ".bag": "ros1", ".active": "ros1"}  # by the name
 PART_NAME = re.compile(r"(?P<stem>.*?)_?(?P<number>\d+)")
 
@@ -95,19 +95,42 @@ def find_files(path: Path) -> RecordingFiles:
     files = [p for p in path.iterdir() if is_storage_file(p)]
     found = parts(path) or (files if len(files) == 1 else [])
     if not found:
+        logs = [p for p in path.iterdir() if p.name.endswith((".db3-wal", ".db3-journal"))]
         advice = "give one of the recordings in it" if files else "there is no recording in it"
+        if logs and not files:
+            advice = f"{_names(logs)} belongs to a database that is not there; bring it back"
         raise RecordingError(
             f"{path}: no {FILE_NAME} and {len(files)} storage files, which are not the parts {path.name}_0, "
             f"{path.name}_1 and so on of one recording; {advice}"
         )
+    found, twice = _once(found)
     notes = [f"no {FILE_NAME}; {_names(found)} read in this order"] if len(found) > 1 else []
+    if twice:
+        notes.append(f"{_names(twice)} not read, as another file is the same part")
+    if gaps := _missing_parts(found):
+        notes.append(f"part {', '.join(map(str, gaps))} is not there")
     return RecordingFiles(path, found, None, notes)
+
+
+def _once(files: list[Path]) -> tuple[list[Path], list[Path]]:
+    """The files in their order, each part once, and those that are a part again: unpacked or in another format."""
+    once: dict[tuple[str, int], Path] = {}
+    for file in files:
+        stem, number, _ = part_order(file)
+        once.setdefault((stem if number >= 0 else bare_name(file.name), number), file)
+    return list(once.values()), [file for file in files if file not in once.values()]
+
+
+def _missing_parts(files: list[Path]) -> list[int]:
+    """Numbers of parts that are absent between the first part, 0, and the last."""
+    numbers = {part_order(file)[1] for file in files}
+    return sorted(set(range(max(numbers) + 1)) - numbers) if min(numbers) >= 0 else []
 
 
 def _stated_files(path: Path, stated: StatedMetadata) -> RecordingFiles:
     """The files that metadata.yaml names, and others where it names none or too few."""
     there = {p.name: p for p in sorted(path.iterdir(), key=part_order) if is_storage_file(p)}
-    listed = [there[name] for name in stated.files if name in there]
+    listed = [there[name] for name in dict.fromkeys(stated.files) if name in there]
     missing = [name for name in stated.files if name not in there]
     others = [file for name, file in there.items() if name not in stated.files]
     notes = list(stated.notes)
@@ -118,11 +141,14 @@ def _stated_files(path: Path, stated: StatedMetadata) -> RecordingFiles:
     else:  # a recorder that was killed has not named its last part yet
         stems = {part_order(file)[0] for file in listed if part_order(file)[1] >= 0}
         taken = [f for f in others if part_order(f)[1] >= 0 and part_order(f)[0] in stems]
+    taken = [file for file in _once(listed + taken)[0] if file in taken]
     if taken and stated.files:
         notes.append(f"{_names(taken)} read though {FILE_NAME} does not name it")
     left = [file for file in others if file not in taken]
     if left:
         notes.append(f"{_names(left)} not read, as {FILE_NAME} does not name it")
+    if len(set(stated.files)) < len(stated.files):
+        notes.append(f"{FILE_NAME} names a file twice; it is read once")
     files = listed + taken
     if not files:
         held = ", ".join(sorted(p.name for p in path.iterdir())) or "nothing"

@@ -16,6 +16,7 @@ import numpy as np
 from fish_bag.problem import Problem
 from fish_bag.trial import JUMP, Camera, Commands, Encoder, Imu, Trial
 
+STILL = 1.0  # rad/s, change of the commanded rotor speed from which the robot moves
 GRAVITY = 9.81  # m/s^2
 SLOPES = (0.6, 1.6)  # of records in the same unit; a sensor of the real world is a few per cent off
 FOLLOWS = 0.9  # correlation from which one record follows the other
@@ -36,6 +37,7 @@ UNITS = {57.3: "deg", 9.549: "rpm", 0.1592: "revolutions", 1000.0: "thousandths"
 def check_sensors(trial: Trial) -> Iterator[Problem]:
     """Problems between the sensors of one trial, on its unflagged samples."""
     clean = trial.clean()
+    yield from _stuck(clean)
     if clean.imu is not None:
         yield from _accelerometer(clean.imu)
         if clean.camera is not None:
@@ -51,6 +53,27 @@ def check_sensors(trial: Trial) -> Iterator[Problem]:
             yield from _rotor(clean.commands, clean.encoder)
     if clean.encoder is not None:
         yield from _encoder(clean.encoder)
+
+
+def _stuck(trial: Trial) -> Iterator[Problem]:
+    """Sensors that give one value throughout, which no sensor of a moving robot does."""
+    imu, camera, encoder = trial.imu, trial.camera, trial.encoder
+    moves = trial.commands is not None and np.ptp(trial.commands.rotor_speed) > STILL
+    if not moves:
+        return
+    held = []
+    if imu is not None and len(imu) >= FEWEST:
+        held += [(imu.topic, "gyro", imu.gyro), (imu.topic, "accelerometer", imu.accel)]
+    if encoder is not None and len(encoder) >= FEWEST:
+        held += [(encoder.topic, "rotor speed", encoder.speed)]
+        held += [(encoder.topic, "rotor angle", encoder.angle)]
+    if camera is not None and len(camera) >= FEWEST:
+        held.append((camera.topic, "pose", camera.pose))
+    for topic, name, values in held:
+        if not np.ptp(values, axis=0).any():
+            value = np.array2string(np.atleast_1d(values[0]), precision=3)
+            text = f"{name} is {value} throughout while the rotor is commanded to move; is the sensor alive?"
+            yield Problem("warning", "stuck", topic, text)
 
 
 def _gyro(imu: Imu, camera: Camera) -> Iterator[Problem]:
@@ -129,7 +152,7 @@ def _camera(camera: Camera) -> Iterator[Problem]:
     if abs(apart.mean()) > 0.8 and abs(turned) > np.pi / 4:
         text = f"the heading lies {np.degrees(turned):.0f} deg from the direction of motion; expected 0"
         yield Problem("error", "camera_heading", camera.topic, text)
-    elif abs(apart.mean()) < STRAYS and abs(together.mean()) > 0.8:
+    elif abs(together.mean()) > 0.8 and (abs(apart.mean()) < STRAYS or _against(course, heading)):
         text = "the heading turns against the direction of motion: x and y are mirrored or swapped"
         yield Problem("error", "camera_axes", camera.topic, text)
 
@@ -146,6 +169,13 @@ def _courses(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(0), np.zeros(0)
     heading = [np.angle(np.exp(1j * camera.psi[a : b + 1]).mean()) for a, b in pairwise(picked)]
     return np.arctan2(steps[:, 1], steps[:, 0]), np.array(heading)
+
+
+def _against(course: np.ndarray, heading: np.ndarray) -> bool:
+    """Whether the direction of motion turns against the heading, also where both turn only a little."""
+    course, heading = np.unwrap(course), np.unwrap(heading)
+    wide = np.std(heading) > TURN_RAD and np.std(course) > TURN_RAD
+    return bool(wide and _correlation(course, heading) < -FOLLOWS)
 
 
 def _median_speed(camera: Camera) -> float:

@@ -17,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fish_bag.message_types import ros2_type_name
+from fish_bag.sqlite_log import Log, read_log
 from fish_bag.sqlite_pages import Row, rows
 from fish_bag.storage import (
     ENOUGH_OTHERS,
@@ -30,8 +31,9 @@ from fish_bag.storage import (
 )
 
 MAGIC = b"SQLite format 3\0"
+LOG = "-wal"
 COMPANIONS = (
-    "-wal",
+    LOG,
     "-journal",
 )  # files in which sqlite3 keeps what is not yet, or no more, in the database
 TOPIC_COLUMNS = ("serialization_format", "offered_qos_profiles", "type_description_hash")
@@ -45,9 +47,11 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
         path: the database; its companions (-wal, -shm) lie in the same folder.
         keep: how many bytes of the messages of a topic are kept.
     """
-    with _settled(path) as (database, notes):
+    with _settled(path) as (database, notes, lost):
         contents = Contents(notes=notes)
         try:
+            if lost:
+                raise sqlite3.DatabaseError(lost)
             _read(database, contents, keep)
             head = path.read_bytes()  # the database without its companions
             content_end = end_of_content(head)
@@ -55,35 +59,46 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
                 _drop_zeroed(database.read_bytes(), content_end, contents)
         except (sqlite3.Error, UnicodeDecodeError) as error:
             contents = Contents(notes=notes)
-            contents.lost.append(
-                f"the database is damaged ({error}); its pages are read one by one"
-            )
+            said = " ".join(str(error).split())
+            contents.lost.append(f"the database is damaged ({said}); its pages are read one by one")
             _read_pages(database.read_bytes(), contents)
     contents.drop_undefined()
     return contents
 
 
+def companions(path: Path) -> list[Path]:
+    """Files with something in them that belong to the database."""
+    files = [Path(f"{path}{end}") for end in COMPANIONS]
+    return [file for file in files if file.exists() and file.stat().st_size]
+
+
 @contextmanager
-def _settled(path: Path) -> Iterator[tuple[Path, list[str]]]:
-    """The database with everything that its companions hold, and what is worth a note of that."""
-    companions = [Path(f"{path}{end}") for end in COMPANIONS]
-    companions = [file for file in companions if file.exists() and file.stat().st_size]
-    if not companions:
-        yield path, []
+def _settled(path: Path) -> Iterator[tuple[Path, list[str], str]]:
+    """The database with everything that its companions hold, what is worth a note of that, and what is lost of it."""
+    found = companions(path)
+    if not found:
+        yield path, [], ""
         return
-    names = ", ".join(file.name for file in companions)
+    names = ", ".join(file.name for file in found)
+    log_file = Path(f"{path}{LOG}")
+    log = read_log(log_file.read_bytes()) if log_file in found else Log()
     with TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
-        for file in (path, *companions):
-            target = Path(folder) / file.name
-            shutil.copyfile(file, target)
-        notes = [f"the recorder did not close it; what stands in {names} is read as well"]
+        if log.lost or not path.stat().st_size:  # sqlite3 throws away the log of an empty database
+            copy.write_bytes(log.applied(path.read_bytes()))
+            lost = f"{log_file.name}: {log.lost}" if log.lost else ""
+            yield copy, [] if lost else [f"empty; what stands in {names} is read"], lost
+            return
+        for file in (path, *found):
+            shutil.copyfile(file, Path(folder) / file.name)
+        notes = [f"the recorder did not close it; {names} is taken in as sqlite3 does it"]
+        lost = ""
         try:
             with closing(sqlite3.connect(copy)) as connection:
                 connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
         except sqlite3.Error as error:
-            notes = [f"{names} cannot be read ({error}); what stands in it is missing"]
-        yield copy, notes
+            lost = f"{names} cannot be read ({error}); what stands in it is missing"
+        yield copy, notes, lost
 
 
 def _read(path: Path, contents: Contents, keep: Keep) -> None:
@@ -127,11 +142,17 @@ def _read_messages(
 ) -> None:
     messages = contents.messages
     query = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
+    strange = 0
     for topic, time_ns, raw in connection.execute(query):
+        if not isinstance(topic, int) or not isinstance(time_ns, int):
+            strange += 1
+            continue
         if topic not in messages:
             messages[topic] = Messages()
         data = raw if isinstance(raw, bytes) else str(raw or "").encode()
         messages[topic].add(time_ns, data[: kept.get(topic)])
+    if strange:
+        contents.lost.append(f"{strange} messages whose topic or time is no whole number")
 
 
 def _columns(connection: sqlite3.Connection, table: str) -> set[str]:

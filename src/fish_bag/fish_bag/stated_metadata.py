@@ -19,6 +19,7 @@ from fish_bag.message_types import ros2_type_name
 
 FILE_NAME = "metadata.yaml"
 TOP = "rosbag2_bagfile_information"
+LFS_START = "version https://git-lfs"
 
 
 @dataclass
@@ -27,6 +28,7 @@ class StatedMetadata:
 
     files: tuple[str, ...] = ()  # names of the storage files
     counts: dict[tuple[str, str], int] | None = None  # (topic, type) -> messages; None: not said
+    total: int | None = None  # messages of the whole recording; None: not said
     custom: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
@@ -45,6 +47,8 @@ def read_metadata(folder: Path) -> StatedMetadata | None:
 
 def parse_metadata(text: str) -> StatedMetadata:
     """Read the text of a metadata.yaml."""
+    if text.startswith(LFS_START):
+        return StatedMetadata(notes=[f"{FILE_NAME} is a Git LFS pointer; run 'git lfs pull'"])
     if not text.strip("\0 \t\r\n"):
         return StatedMetadata(notes=[f"{FILE_NAME} is empty"])
     try:
@@ -64,6 +68,8 @@ def parse_metadata(text: str) -> StatedMetadata:
     custom = given.get("custom_data")
     if isinstance(custom, dict):
         stated.custom = {str(key): str(value) for key, value in custom.items()}
+    total = given.get("message_count")
+    stated.total = total if isinstance(total, int) else None
     topics = given.get("topics_with_message_count")
     if isinstance(topics, list):
         counts: Counter[tuple[str, str]] = Counter()

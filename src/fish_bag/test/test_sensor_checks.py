@@ -83,6 +83,38 @@ def test_a_fault_is_an_error(tmp_path, fault, expected):
     assert found == expected
 
 
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ({"gyro": lambda r: 0 * r}, "gyro is"),
+        ({"accel": lambda a: 0 * a + [0, 0, 9.81]}, "accelerometer is"),
+        ({"encoder": lambda a, s: (a, 0.0)}, "rotor speed is"),
+        ({"encoder": lambda a, s: (1.5, s)}, "rotor angle is"),
+        ({"pose": lambda p: 0 * p + 0.3}, "pose is"),
+    ],
+)
+def test_a_sensor_that_gives_one_value_is_named(tmp_path, fault, words):
+    trial = read_trial(samples.write_mcap(tmp_path / "trial", swim(**fault)))
+    assert [words in p.text for p in trial.problems if p.kind == "stuck"] == [True]
+
+
+def test_a_mirrored_camera_of_a_fish_that_turns_a_little(tmp_path):
+    t = np.arange(0, DURATION, 0.03)
+    psi = 0.35 * np.sin(0.9 * t)
+    x, y = 0.006 * np.cumsum(np.cos(psi)), 0.006 * np.cumsum(np.sin(psi))
+    for sign, expected in ((1, set()), (-1, {("error", "camera_axes")})):
+        messages = [
+            (
+                samples.ns(now),
+                "/fish/camera/pose",
+                build.camera_pose(samples.ns(now), "pool", p, (1e-6,) * 3),
+            )
+            for now, *p in zip(t, x, sign * y, psi, strict=True)
+        ]
+        found = kinds(tmp_path / str(sign), messages)
+        assert {p for p in found if p[1] != "missing_topic"} == expected
+
+
 @pytest.mark.parametrize("every", [1, 5], ids=["100 Hz", "20 Hz"])
 def test_two_publishers_on_one_topic(tmp_path, every):
     messages = swim()

@@ -49,6 +49,8 @@ def test_one_path_in_many_dialects(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        ("x,y\n0,0\n1,5,2,5\n", "line 3 is '1,5,2,5'"),
+        ("t,x,y\n0,0,0\n1,1,0,5\n", "line 3 is '1,1,0,5', expected two numbers x,y in 3 columns"),
         ("0.7.00,0.0\n1,0\n", "line 1 is '0.7.00,0.0', expected two numbers"),
         ("east,north\n0,0\n1,0\n", "line 1 is 'east,north', expected .* one column x and one y"),
         ("x,y,x\n0,0,1\n1,0,1\n", "one column x and one y"),

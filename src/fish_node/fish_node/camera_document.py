@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import yaml
 
+LFS_START = "version https://git-lfs"
 YAML_LINE = "%YAML:1.0"  # OpenCV's first line, which is no YAML 1.1 directive
 # headings of the oST text and the names of their numbers
 OST = {
@@ -35,6 +36,11 @@ def _matrix(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
 
 
 _Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
+_Loader.add_implicit_resolver(  # 1e-05, as C++ writes it: a number in YAML 1.2, a text in 1.1
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+"),
+    list("-+0123456789"),
+)
 
 
 def parse(text: str) -> object:
@@ -44,6 +50,8 @@ def parse(text: str) -> object:
         one of WRONG: the text is nothing of the kind.
     """
     start = text.lstrip("\ufeff \t\r\n")
+    if start.startswith(LFS_START):
+        raise ValueError("a Git LFS pointer; 'git lfs pull' brings the file")
     if start.startswith("<"):
         document: object = _xml(start)
     elif re.match(r"(#[^\n]*\n|\s)*\[image\]", start):

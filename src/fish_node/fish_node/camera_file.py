@@ -61,10 +61,20 @@ def read_camera_file(path: Path) -> CameraFile:
         raise fields.wrong(
             "camera_matrix", f"has focal lengths {K[0]:g}, {K[4]:g}", "those of a calibrated camera"
         )
+    size = fields.whole("image_width"), fields.whole("image_height")
+    if (K[3], *K[6:9]) != (0.0, 0.0, 0.0, 1.0):
+        raise fields.wrong(
+            "camera_matrix", f"is {_short(str(K))}", "fx 0 cx, 0 fy cy, 0 0 1 row by row"
+        )
+    if not (0.0 < K[2] < size[0] and 0.0 < K[5] < size[1]):
+        raise fields.wrong(
+            "camera_matrix",
+            f"has its centre at {K[2]:g}, {K[5]:g}",
+            f"one inside the image of {size[0]} x {size[1]}; calibrate at the image size that is used",
+        )
     plain = (*K[0:3], 0.0, *K[3:6], 0.0, *K[6:9], 0.0)
     return CameraFile(
-        fields.whole("image_width"),
-        fields.whole("image_height"),
+        *size,
         model,
         distortion,
         K,

@@ -184,3 +184,31 @@ def test_a_broken_file_of_any_form_is_one_line(tmp_path, text):
     with pytest.raises(CameraFileError, match="no camera file") as refusal:
         read_camera_file(written(tmp_path, text))
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("small", ["1e-05", "1E-5", "-1e-05", "+1e-5", "1.e-05"])
+def test_numbers_as_c_writes_them(tmp_path, small):
+    text = yaml.safe_dump(FILE).replace("0.002", small)
+    assert read_camera_file(written(tmp_path, text)).distortion[2] == float(small)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "said"),
+    [
+        ([538.63, 0, 0, 0, 539.723, 0, 457.698, 297.003, 1], "expected fx 0 cx, 0 fy cy, 0 0 1"),
+        ([538.63, 0, 457.698, 0, 539.723, 297.003, 0, 0, 2], "0 0 1 row by row"),
+        ([1077.26, 0, 915.396, 0, 1079.446, 594.006, 0, 0, 1], "inside the image of 800 x 600"),
+        ([538.63, 0, 457.698, 0, 539.723, -297.003, 0, 0, 1], "inside the image"),
+    ],
+    ids=["column by column", "scaled", "of a larger image", "mirrored"],
+)
+def test_a_matrix_that_is_none_of_this_camera(tmp_path, matrix, said):
+    file = FILE | {"camera_matrix": {"rows": 3, "cols": 3, "data": matrix}}
+    with pytest.raises(CameraFileError, match=said):
+        read_camera_file(written(tmp_path, file))
+
+
+def test_a_pointer_in_place_of_the_file_is_named(tmp_path):
+    text = "version https://git-lfs.github.com/spec/v1\noid sha256:aa\nsize 130\n"
+    with pytest.raises(CameraFileError, match="Git LFS pointer"):
+        read_camera_file(written(tmp_path, text))

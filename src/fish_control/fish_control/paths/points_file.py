@@ -40,7 +40,7 @@ class _Columns:
     x: int
     y: int
     metres: float = 1.0
-    named: bool = False
+    named: int = 0  # columns of the heading, 0 without one
 
 
 def read_points(file: Path) -> NDArray[np.float64]:
@@ -145,7 +145,7 @@ def _heading(row: list[str], file: Path, number: int, comment: bool) -> _Columns
         raise PathError(
             f"{file}: line {number} has x in {units[0]!r} and y in {units[1]!r}, expected both in m, cm or mm"
         )
-    return _Columns(x, y, METRES[units[0].lower()], named=True)
+    return _Columns(x, y, METRES[units[0].lower()], named=len(row))
 
 
 def _without_heading(row: list[str], file: Path, number: int) -> _Columns:
@@ -161,10 +161,13 @@ def _point(row: list[str], columns: _Columns, file: Path, number: int) -> tuple[
     fields = [row[k] for k in (columns.x, columns.y) if k < len(row)]
     if (
         len(fields) < 2
-        or (not columns.named and len(row) != 2)
+        or len(row) > (columns.named or 2)
         or not all(map(_NUMBER.fullmatch, fields))
     ):
-        raise PathError(f"{file}: line {number} is {_shown(row)}, expected two numbers x,y")
+        raise PathError(
+            f"{file}: line {number} is {_shown(row)}, expected two numbers x,y"
+            + (f" in {columns.named} columns" if columns.named > 2 else "")
+        )
     x, y = (float(field.replace(",", ".")) * columns.metres for field in fields)
     if not (math.isfinite(x) and math.isfinite(y)):
         raise PathError(f"{file}: line {number} has a coordinate that is not finite")

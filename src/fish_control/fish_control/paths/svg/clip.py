@@ -18,6 +18,8 @@ from fish_control.reference_path import PathError
 
 Array = NDArray[np.float64]
 
+STEPS = 500  # places along a line as long as the clip that are looked at
+
 
 @dataclass(frozen=True)
 class Clip:
@@ -65,14 +67,26 @@ def check_unclipped(points: Array, clips: tuple[Clip, ...], where: str) -> None:
     """Refuse an outline of which a clip hides a part.
 
     Raises:
-        PathError: points outside every polygon of a clip.
+        PathError: a place of it lies outside every polygon of a clip.
 
     """
     for clip in clips:
-        if not any(_inside(polygon, points).all() for polygon in clip.polygons):
+        close = _closer(points, max(float(np.ptp(p, axis=0).max()) for p in clip.polygons) / STEPS)
+        if not any(_inside(polygon, close).all() for polygon in clip.polygons):
             raise PathError(
                 f"{where} is cut off by {clip.name}; draw only what is to be swum, or release the clip"
             )
+
+
+def _closer(points: Array, step: float) -> Array:
+    """The points with others between them, so that none are farther apart than `step`."""
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    counts = np.clip(np.ceil(lengths / max(step, 1e-300)), 1, STEPS).astype(int)
+    pieces = [
+        start + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (end - start)
+        for start, end, count in zip(points[:-1], points[1:], counts, strict=True)
+    ]
+    return np.vstack([*pieces, points[-1:]])
 
 
 def _inside(polygon: Array, points: Array) -> NDArray[np.bool_]:

@@ -118,7 +118,7 @@ class _Document:
         inner = self._inner(element, replace(context, style=style, depth=context.depth + 1), where)
         if tag in GROUPS:
             yield from self._children(element, inner, where)
-        elif painted(style, where) and _has_content(element, inner.viewport, where):
+        elif painted(style, where, self.by_id) and _has_content(element, inner.viewport, where):
             yield Part(
                 element, inner.ids, _name(element), inner.matrix, inner.viewport, inner.clips, where
             )
@@ -253,10 +253,11 @@ def _is_svg(element: Element) -> bool:
 
 def _holds(element: Element, where: str) -> bool:
     """Whether a viewer without extensions draws the element."""
-    if element.get("systemLanguage"):
-        raise PathError(
-            f"{where}: {_name(element)} depends on the viewer's language; remove systemLanguage"
-        )
+    for condition in ("systemLanguage", "requiredFeatures"):
+        if element.get(condition):
+            raise PathError(
+                f"{where}: {_name(element)} is shown by some viewers only; remove {condition}"
+            )
     return not element.get("requiredExtensions", "").strip()
 
 

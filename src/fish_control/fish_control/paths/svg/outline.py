@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fish_control.paths.svg.commands import absolute_commands
 from fish_control.paths.svg.style import local_name
-from fish_control.paths.svg.units import NUMBER, finite, pixels
+from fish_control.paths.svg.units import JOINT, NUMBER, finite, pixels
 from fish_control.reference_path import PathError
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ def _path(element: Element, _: Viewport, where: str) -> svgelements.Path:
 
 
 def _vertices(element: Element, _: Viewport, where: str) -> svgelements.Path:
-    numbers = re.split(r"\s*,\s*|\s+", element.get("points", "").strip())
+    numbers = re.split(rf"\s*,\s*|\s+|{JOINT}", element.get("points", "").strip())
     numbers = [] if numbers == [""] else numbers
     strange = [n for n in numbers if not re.fullmatch(NUMBER, n)]
     if strange or len(numbers) % 2:

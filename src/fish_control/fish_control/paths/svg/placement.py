@@ -11,7 +11,7 @@ import numpy as np
 import svgelements
 from numpy.typing import NDArray
 
-from fish_control.paths.svg.units import NUMBER, finite
+from fish_control.paths.svg.units import JOINT, NUMBER, finite
 from fish_control.reference_path import PathError
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def transform(text: str, where: str) -> Array:
     rest = _FUNCTION.sub("", text).strip()
     calls = []
     for match in matched:
-        numbers = re.split(r"\s*,\s*|\s+|(?<=[\d.])(?=[-+])(?<![eE])", match[2].strip())
+        numbers = re.split(rf"\s*,\s*|\s+|{JOINT}", match[2].strip())
         numbers = [re.sub(r"(?<=\d)(deg|px)$", "", n) for n in numbers]
         if len(numbers) not in _COUNTS.get(match[1], ()) or not all(
             re.fullmatch(NUMBER, n) for n in numbers

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
@@ -35,7 +36,11 @@ INITIAL: Style = {"fill": "black", "stroke": "none", "visibility": "visible", "c
 
 _SELECTOR = re.compile(r"(\*|[\w-]+)?((?:[#.][\w-]+)*)")
 _RULE = re.compile(r"([^{}]*)\{([^{}]*)\}")
+_SERVER = re.compile(r"url\(\s*['\"]?#(.+?)['\"]?\s*\)\s*(.*)")
 _ABSENT = ("none", "")
+_BLACK = 0x000000FF
+# colours with numbers; those of CSS Color 4, which svgelements does not know, have their transparency after a slash
+_COLOURS = ("#", "rgb", "hsl", "hwb(", "lab(", "lch(", "oklab(", "oklch(", "color(")
 
 
 @dataclass(frozen=True)
@@ -145,23 +150,42 @@ def removed(style: Style, where: str) -> bool:
     return bool(style.get("opacity")) and ratio(style["opacity"], f"{where}: opacity") <= 0.0
 
 
-def painted(style: Style, where: str) -> bool:
-    """Whether the element itself leaves a mark: visible, and filled or stroked with something not transparent."""
+def painted(style: Style, where: str, known: Collection[str]) -> bool:
+    """Whether the element itself leaves a mark: visible, and filled or stroked with something not transparent.
+
+    Args:
+        known: ids of the drawing, for gradients and patterns.
+
+    """
     if style.get("visibility", "visible").lower() in ("hidden", "collapse"):
         return False
     width = style.get("stroke-width") or "1"
-    return _opaque("fill", style, where) or (
-        _opaque("stroke", style, where) and pixels(width, f"{where}: stroke-width", 100.0) > 0.0
+    return _opaque("fill", style, where, known) or (
+        _opaque("stroke", style, where, known)
+        and pixels(width, f"{where}: stroke-width", 100.0) > 0.0
     )
 
 
-def _opaque(paint: str, style: Style, where: str) -> bool:
+def _opaque(paint: str, style: Style, where: str, known: Collection[str]) -> bool:
     opacity = style.get(f"{paint}-opacity") or "1"
     colour = style.get(paint, INITIAL[paint])
+    if server := _SERVER.fullmatch(colour):  # without its gradient, what follows it is shown
+        colour = "black" if server[1] in known else server[2] or "none"
     if colour.lower() == "currentcolor":
         colour = style.get("color", "black")
     if colour.lower() in _ABSENT or ratio(opacity, f"{where}: {paint}-opacity") <= 0.0:
         return False
     if alpha := re.search(r"/\s*([\d.]+%?)\s*\)$", colour):
         return ratio(alpha[1], f"{where}: {paint}") > 0.0
-    return colour.startswith("url") or svgelements.Color(colour).alpha != 0
+    return _alpha(colour, f"{where}: {paint}") > 0
+
+
+def _alpha(colour: str, where: str) -> int:
+    """Opacity of a colour, 0 to 255."""
+    found = svgelements.Color(colour)
+    unknown = found.value == _BLACK and colour.lower() != "black"  # svgelements takes it for black
+    if unknown and not colour.lower().startswith(_COLOURS):
+        raise PathError(
+            f"{where} {colour[:40]!r} is no colour, so that nobody knows whether it is seen; give it a colour"
+        )
+    return 0 if found.alpha is None else int(found.alpha)

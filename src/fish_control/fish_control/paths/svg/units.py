@@ -21,6 +21,7 @@ PIXELS = {
     "pc": 16.0,
 }  # pixels in a unit, CSS Values and Units 3
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+JOINT = r"(?<=[\d.])(?=[-+])"  # between two numbers of which the second has a sign
 _LENGTH = re.compile(rf"({NUMBER})([a-zA-Z]*|%)")
 
 

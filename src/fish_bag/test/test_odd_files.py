@@ -1,0 +1,259 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Files that lie about themselves: nothing is lost, doubled or mixed up in silence."""
+
+import shutil
+import sqlite3
+import struct
+from collections import Counter
+
+import pytest
+import yaml
+from mcap.opcode import Opcode
+from mcap.writer import Writer
+
+from fish_bag import RecordingError, read_trial
+from fish_bag import sample_formats as formats
+from fish_bag import sample_recordings as samples
+from fish_bag.bag import salvage_bag
+from fish_bag.message_types import message_type, typestore
+from fish_bag.recover import recover
+
+POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:aa\nsize 130\n"
+MESSAGES = samples.robot_messages(0.3)
+ROBOT = Counter(topic for _, topic, _ in MESSAGES)
+FOREIGN = "/other/thing"
+
+
+def write(path, foreign=None, **options):
+    """An MCAP file of the mcap package; `foreign` is topic, type, encoding and bytes of one message."""
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=2048, **options)
+        writer.start("ros2", "sample")
+        channels = {}
+        if foreign is not None:
+            topic, kind, encoding, raw = foreign
+            schema = writer.register_schema(kind, "odd", b"odd")
+            channel = writer.register_channel(topic, encoding, schema)
+            writer.add_message(channel, MESSAGES[0][0], raw, MESSAGES[0][0])
+        for time_ns, topic, message in MESSAGES:
+            kind = message_type(message.__msgtype__)
+            if topic not in channels:
+                schema = writer.register_schema(kind.name, kind.encoding, kind.definition)
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            raw = bytes(typestore().serialize_cdr(message, kind.name))
+            writer.add_message(channels[topic], time_ns, raw, time_ns)
+        writer.finish()
+    return path
+
+
+def records(data):
+    """Place, opcode and body of every record."""
+    position = 8
+    while position < len(data) - 8:
+        opcode, length = struct.unpack_from("<BQ", data, position)
+        yield position, opcode, data[position + 9 : position + 9 + length]
+        position += 9 + length
+
+
+def rewritten(path, change):
+    """The file with `change(opcode, body)` in place of every record."""
+    data, out = path.read_bytes(), []
+    for _, opcode, body in records(data):
+        for kind, new in change(opcode, body):
+            out.append(struct.pack("<BQ", kind, len(new)) + new)
+    path.write_bytes(data[:8] + b"".join(out) + data[-8:])
+    return path
+
+
+def holds_the_robot(trial):
+    found = {topic.topic: topic.count for topic in trial.topics}
+    assert {topic: found.get(topic) for topic in ROBOT} == ROBOT
+    return " ".join(problem.text for problem in trial.problems)
+
+
+def test_a_summary_that_begins_inside_the_data_hides_nothing(tmp_path):
+    path = write(tmp_path / "a.mcap", enable_crcs=False)
+    data = bytearray(path.read_bytes())
+    third = [place for place, opcode, _ in records(data) if opcode == Opcode.CHUNK][2]
+    struct.pack_into("<Q", data, len(data) - 8 - 20, third)  # summary_start of the footer
+    path.write_bytes(data)
+    holds_the_robot(read_trial(path))
+
+
+@pytest.mark.parametrize("by_channel", [True, False])
+def test_a_total_that_does_not_fit_is_said(tmp_path, by_channel):
+    def change(opcode, body):
+        if opcode != Opcode.STATISTICS:
+            return [(opcode, body)]
+        times = body[:42]  # all up to the counts of the channels
+        return [(opcode, struct.pack("<Q", 7) + (body[8:] if by_channel else times[8:] + bytes(4)))]
+
+    path = rewritten(write(tmp_path / "a.mcap", enable_crcs=False), change)
+    assert "its statistics say 7" in holds_the_robot(read_trial(path))
+
+
+def test_records_of_unknown_kinds_are_left_out_and_said(tmp_path):
+    def change(opcode, body):
+        return [(0x91, b"x" * 50), (opcode, body)] if opcode == Opcode.CHUNK else [(opcode, body)]
+
+    path = rewritten(write(tmp_path / "a.mcap"), change)
+    assert "0x91" in holds_the_robot(read_trial(path))
+
+
+def test_a_channel_without_its_schema_harms_no_other(tmp_path):
+    options = {"use_chunking": False, "repeat_schemas": False, "use_statistics": False}
+    foreign = (FOREIGN, "a/msg/Odd", "cdr", b"\0\1\0\0abcd")
+    path = write(tmp_path / "a.mcap", foreign, enable_crcs=False, **options)
+    rewritten(path, lambda o, b: [] if o == Opcode.SCHEMA and b"a/msg/Odd" in b else [(o, b)])
+    assert "1 messages of an unknown type" in holds_the_robot(read_trial(path))
+    recover(path, tmp_path / "out")
+    holds_the_robot(read_trial(tmp_path / "out"))
+
+
+def test_the_checksum_of_data_without_chunks(tmp_path):
+    path = write(tmp_path / "a.mcap", use_chunking=False, enable_data_crcs=True)
+    holds_the_robot(read_trial(path))
+    data = bytearray(path.read_bytes())
+    place = [place for place, opcode, _ in records(data) if opcode == Opcode.MESSAGE][40]
+    data[place + 70] ^= 4
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match="checksum of its data"):
+        read_trial(path)
+    assert recover(path, tmp_path / "out").lost
+
+
+@pytest.mark.parametrize("topic", ["/other/imu/data", "/other/joint_command"])
+def test_a_foreign_topic_with_a_robots_name_is_no_second_robot(tmp_path, topic):
+    trial = read_trial(write(tmp_path / "a.mcap", (topic, "foxglove.Imu", "protobuf", b"\x08\x01")))
+    assert trial.namespace == "/fish"
+    holds_the_robot(trial)
+
+
+def test_the_same_topic_in_another_serialisation_hides_nothing(tmp_path):
+    foreign = ("/fish/imu/data", "sensor_msgs/msg/Imu", "protobuf", b"\x08\x01")
+    trial = read_trial(write(tmp_path / "a.mcap", foreign))
+    assert len(trial.imu) == ROBOT["/fish/imu/data"]
+    assert [p.kind for p in trial.problems if p.severity == "error"] == ["serialization"]
+
+
+def stated(path, **changes):
+    """A sqlite3 recording with changed fields in metadata.yaml."""
+    formats.write_rosbag2(path, MESSAGES, formats.SQLITE)
+    document = yaml.safe_load((path / "metadata.yaml").read_text())
+    document["rosbag2_bagfile_information"] |= changes
+    (path / "metadata.yaml").write_text(yaml.safe_dump(document))
+    return path
+
+
+def test_a_file_that_is_named_twice_is_read_once(tmp_path):
+    path = stated(tmp_path / "a", relative_file_paths=["a.db3", "a/a.db3"])
+    assert "names a file twice" in holds_the_robot(read_trial(path))
+
+
+def test_the_total_of_metadata_is_compared(tmp_path):
+    path = stated(tmp_path / "a", message_count=7)
+    assert "metadata.yaml says 7" in holds_the_robot(read_trial(path))
+
+
+@pytest.mark.parametrize("named", [["a_0.db3"], None])
+def test_a_part_in_two_formats_is_read_once(tmp_path, named):
+    path = stated(tmp_path / "a", relative_file_paths=named)
+    (path / "a.db3").rename(path / "a_0.db3")
+    write(path / "a_0.mcap")
+    if named is None:
+        (path / "metadata.yaml").unlink()
+    assert "a_0.mcap not read" in holds_the_robot(read_trial(path))
+
+
+def test_a_missing_part_is_said(tmp_path):
+    (tmp_path / "a").mkdir()
+    write(tmp_path / "a" / "a_0.mcap")
+    shutil.copy(tmp_path / "a" / "a_0.mcap", tmp_path / "a" / "a_2.mcap")
+    assert any(
+        "part 1 is not there" in problem.text for problem in read_trial(tmp_path / "a").problems
+    )
+
+
+def test_metadata_that_is_a_pointer_is_named(tmp_path):
+    path = stated(tmp_path / "a")
+    (path / "metadata.yaml").write_text(POINTER)
+    assert "Git LFS pointer" in holds_the_robot(read_trial(path))
+
+
+def with_log(folder, change=lambda data: data):
+    """A recording in a write-ahead log that is damaged, and its messages without damage."""
+    path = formats.write_sqlite_with_log(folder / "a", MESSAGES)
+    log = next(path.glob("*-wal"))
+    log.write_bytes(change(log.read_bytes()))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda data: POINTER.encode(), "Git LFS pointer"),
+        (lambda data: data[: len(data) // 2], "are damaged"),
+        (lambda data: data[:-1], "are damaged"),
+        (lambda data: data[: len(data) // 2] + bytes(len(data) - len(data) // 2), "are damaged"),
+        (lambda data: data[:9000] + bytes([data[9000] ^ 1]) + data[9001:], "are damaged"),
+        (lambda data: data[:17] + bytes([data[17] ^ 1]) + data[18:], "its head is damaged"),
+        (lambda data: data[:20], "its head is cut"),
+    ],
+    ids=["pointer", "half", "last byte", "zeros", "flip", "salt", "head"],
+)
+def test_what_a_damaged_log_takes_is_said(tmp_path, change, words):
+    whole = salvage_bag(with_log(tmp_path / "whole"))
+    path = with_log(tmp_path / "damaged", change)
+    with pytest.raises(RecordingError, match=words):
+        read_trial(path)
+    assert words in recover(path, tmp_path / "out").lost[0]
+    left = salvage_bag(tmp_path / "out")
+    before, after = (
+        Counter((raw.topic, message) for raw in bag.topics for message in raw.raws)
+        for bag in (whole, left)
+    )
+    assert not after - before, "a message is invented"
+    assert after.total() >= before.total() // 2
+
+
+def test_what_is_whole_in_a_cut_log_is_saved(tmp_path):
+    path = with_log(tmp_path, lambda data: data[:-1])
+    assert recover(path, tmp_path / "out").count > 0.8 * len(MESSAGES)
+
+
+def test_a_log_without_its_database_is_named(tmp_path):
+    path = with_log(tmp_path)
+    (path / "a.db3").unlink()
+    with pytest.raises(RecordingError, match=r"a\.db3-wal belongs to a database that is not there"):
+        read_trial(path)
+
+
+def test_old_pages_behind_the_log_are_no_damage(tmp_path):
+    path = formats.write_rosbag2(tmp_path / "a", MESSAGES, formats.SQLITE)
+    file = path / "a.db3"
+    connection = sqlite3.connect(file)
+    connection.execute("PRAGMA journal_mode=WAL")
+    insert = "INSERT INTO messages (topic_id, timestamp, data) SELECT topic_id, timestamp, data FROM messages"
+    connection.execute(f"{insert} WHERE id <= 100")
+    connection.commit()
+    connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
+    connection.execute(f"{insert} WHERE id <= 1")
+    connection.commit()
+    kept = {end: (path / f"a.db3{end}").read_bytes() for end in ("", "-wal")}
+    connection.close()
+    for end, data in kept.items():
+        (path / f"a.db3{end}").write_bytes(data)
+    assert salvage_bag(path).count == len(MESSAGES) + 101
+
+
+def test_rows_whose_time_is_no_number_are_said(tmp_path):
+    path = stated(tmp_path / "a")
+    connection = sqlite3.connect(path / "a.db3")
+    connection.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (1, 'soon', x'00')")
+    connection.commit()
+    connection.close()
+    with pytest.raises(RecordingError, match="no whole number"):
+        read_trial(path)
+    recover(path, tmp_path / "out")
+    holds_the_robot(read_trial(tmp_path / "out"))
