@@ -78,7 +78,9 @@ def print_colours(picture: np.ndarray, config: TrackerConfig, calibration: Calib
     for marker in MARKERS:
         inside = hsv[config.colour(marker).mask(hsv) > 0]
         middle = np.median(inside, axis=0).astype(int).tolist() if len(inside) else "none"
-        spots = [np.round(spot.position, 3).tolist() for spot in finder.find(hsv, marker, (0, 0))]
+        spots = [
+            np.round(spot.position, 3).tolist() for spot in finder.find(hsv, [marker], (0, 0))[0]
+        ]
         print(
             f"{marker:9s} {len(inside):6d} pixels in range, middle HSV {middle}, spots at {spots}"
         )
