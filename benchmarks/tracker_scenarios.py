@@ -45,6 +45,7 @@ class Scene:
     below: list[Thing]
     above: list[Thing]
     drawn: bool = True  # False: the own fish is not in the pool
+    light: tuple[float, float, float] = (1.0, 1.0, 1.0)  # gains of blue, green, red
 
 
 def swim(t: float, phase: float) -> FishPose:
@@ -80,6 +81,11 @@ def disc(x: float, y: float, diameter: float, colour: tuple[int, int, int]) -> P
 def clean(t: float, phase: float, _: np.random.Generator) -> Scene:
     """The fish alone."""
     return Scene(exposure(t, phase), [], [])
+
+
+def warm(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """The fish alone under a warm light from the start."""
+    return Scene(exposure(t, phase), [], [], light=(0.65, 1.0, 1.25))
 
 
 def bars_near(t: float, phase: float) -> list[tuple[float, float]]:
@@ -178,6 +184,7 @@ ALONE: dict[str, tuple[Scenario, float]] = {  # name -> scenario, strength of th
     "clean": (clean, 0.0),
     "glare": (clean, 1.0),
     "bars": (bars, 0.0),
+    "warm": (warm, 0.0),
 }
 RIVALS: dict[str, tuple[Scenario, float]] = {
     "twin": (twin, 0.0),
@@ -222,7 +229,9 @@ class Studio:
                 noise = self.random.normal(0.0, 3.0, part.shape)
                 noisy = np.clip(np.round(part + noise), 0, 255).astype(np.uint8)
                 result[top:bottom, left:right] = self._sent(noisy)
-        return result
+        return (
+            result if scene.light == (1.0, 1.0, 1.0) else cv2.multiply(result, (*scene.light, 1.0))
+        )
 
     def _blocks(self, outline: np.ndarray) -> tuple[int, int, int, int]:
         """Box around an outline that ends between JPEG's blocks of 16 pixels."""

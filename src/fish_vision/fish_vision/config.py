@@ -37,6 +37,9 @@ class TrackerConfig:
     rear_colour: tuple[int, ...] = (136, 166, 90, 80)  # magenta
     tail_odd_colour: tuple[int, ...] = (172, 12, 110, 80)  # red: links 1, 3, ...
     tail_even_colour: tuple[int, ...] = (46, 76, 90, 70)  # green: links 2, 4, ...
+    hue_shift_max: int = (
+        20  # by which the light may shift a colour's hues, half degrees; 0 = ranges stay as given
+    )
     front_marker: tuple[float, ...] = (0.045, 0.0)  # base_link x, y, m
     rear_marker: tuple[float, ...] = (-0.045, 0.0)  # base_link x, y, m
     marker_diameter: float = 0.030  # of the head's markers, m
@@ -128,6 +131,7 @@ _LISTS = (
 )
 _RANGES = (  # field, lowest, highest
     ("marker_height", -1.0, 1.0),
+    ("hue_shift_max", 0, 30),
     ("marker_diameter", 0.002, 0.5),
     ("tail_marker_diameter", 0.002, 0.5),
     ("tail_links", 0, 10),

@@ -108,6 +108,7 @@ class HeadFinder:
         behind = ahead = 0
         foreign = False
         if tail:
+            tail = [[s for s in spots if self._apart(s, front, rear)] for spots in tail]
             links = [tail[i % 2] for i in range(config.tail_links)]
             angles = tail_angles(pose, links, layout, config.tail_tolerance)
             every = [spot for spots in tail for spot in spots]
@@ -117,4 +118,11 @@ class HeadFinder:
                 foreign = len(tail_angles(pose, other, layout, config.tail_tolerance)) > 1
         return Head(
             pose, front, rear, distance / layout.spacing, misfit, angles, behind, ahead, foreign
+        )
+
+    def _apart(self, spot: Spot, front: Spot, rear: Spot) -> bool:
+        """Whether a spot of a tail colour is no part of the head's markers: their edges show every hue in some light."""
+        return all(
+            hypot(*(spot.position - other.position)) > self._config.marker_diameter / 2
+            for other in (front, rear)
         )

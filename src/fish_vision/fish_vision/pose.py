@@ -152,3 +152,15 @@ def tail_sides(
         for end in (centre - ahead, centre + ahead)
     )
     return behind, before
+
+
+def link_ends(pose: HeadPose, tail: Sequence[float], layout: MarkerLayout) -> list[Array]:
+    """Far ends (2,) of the tail's links in the pool, m, where their markers sit."""
+    angle = pose.heading
+    place = np.array([pose.x, pose.y]) - layout.hinge_offset * np.array([cos(angle), sin(angle)])
+    result = []
+    for relative in tail:
+        angle += relative
+        place = place - layout.link_length * np.array([cos(angle), sin(angle)])
+        result.append(place)
+    return result

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_vision.calibration import Calibration
+from fish_vision.colours import Colours
 from fish_vision.config import TrackerConfig
 from fish_vision.disc import fit_disc
 from fish_vision.pose import Spot
@@ -27,6 +28,7 @@ class SpotFinder:
 
     def __init__(self, config: TrackerConfig, calibration: Calibration) -> None:
         self._config, self._calibration = config, calibration
+        self.colours = Colours(config)
         _, scale = calibration.place_and_scale(calibration.pool_to_pixel([[0.0, 0.0]]))
         self._pixel = float(
             abs(np.linalg.det(scale[0]))
@@ -41,7 +43,7 @@ class SpotFinder:
         for number, marker in enumerate(markers):
             disc = pi / 4 * self._diameter(marker) ** 2
             limits = (0.5 * config.area_min * disc / pixel, 2.0 * config.area_max * disc / pixel)
-            blobs = find_blobs(hsv, config.colour(marker), limits)
+            blobs = find_blobs(hsv, self.colours.range(marker), limits)
             found += [(number, _enlarged(blob, origin, step)) for blob in blobs]
         result: list[list[Spot]] = [[] for _ in markers]
         if found:
@@ -51,6 +53,15 @@ class SpotFinder:
                 if spot is not None:
                     result[number].append(spot)
         return [sorted(s, key=lambda spot: abs(log(spot.share)))[:CANDIDATES] for s in result]
+
+    def learn(self, hsv: Image, origin: tuple[int, int], marker: str, place: Array) -> None:
+        """Take the colour in the middle of a marker at a place (2,), m, as that of its kind in today's light."""
+        u, v = self._calibration.pool_to_pixel([place])[0] - np.array(origin)
+        column, row = round(float(u)), round(float(v))
+        part = hsv[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2].reshape(-1, 3)
+        if len(part):
+            hue, _, value = part[len(part) // 2]
+            self.colours.learn(marker, float(hue), float(value))
 
     def _diameter(self, marker: str) -> float:
         config = self._config

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from fish_vision.calibration import Calibration
 from fish_vision.choice import Choice, Reason
+from fish_vision.colours import CASTS, Colours
 from fish_vision.config import TrackerConfig
 from fish_vision.heads import Head, HeadFinder
-from fish_vision.pose import HeadPose
+from fish_vision.pose import HeadPose, link_ends
 from fish_vision.segmentation import Box, Image, around, hsv_of
 from fish_vision.spots import SpotFinder
 
@@ -20,6 +21,8 @@ Array = NDArray[Any]  # float64
 
 COARSE = 2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
 PLACES = 4  # places of the whole image that are measured
+LEARN_EVERY = 5  # detections of which one teaches the colours of today's light
+CAST_AFTER = 10  # images without the fish after which other lights are tried
 SAME = 0.05  # m, pairs so near to each other are measured together
 HEAD, TAIL = ("front", "rear"), ("tail_odd", "tail_even")
 
@@ -59,6 +62,13 @@ class Tracker:
         self._spots, self._heads = SpotFinder(config, calibration), HeadFinder(config)
         self._choice = Choice(config)
         self._tails = TAIL if config.tail_links else ()
+        self._hsv: Image = np.zeros((0, 0, 3), np.uint8)  # of the box measured last
+        self._seen, self._missed = 0, 0  # detections; images without the fish since the last one
+
+    @property
+    def hue_shifts(self) -> dict[str, float]:
+        """By how much the light moved each marker's hues, half degrees."""
+        return dict(self._spots.colours.shifts)
 
     def track(self, image: Image, stamp: float) -> Detection | Lost:
         """Pose in an image (h, w, 3; blue, green, red) of the calibration's size taken at stamp (s)."""
@@ -69,9 +79,33 @@ class Tracker:
             own = self._choice.near(heads, stamp, nothing)
             if isinstance(own, Head):
                 return self._detection(own, stamp, box, False)
-        return self._look_everywhere(image, stamp)
+        found = self._look_everywhere(image, stamp)
+        self._missed = 0 if isinstance(found, Detection) else self._missed + 1
+        if (
+            last is None
+            and self._missed > CAST_AFTER
+            and self._tails
+            and self._config.hue_shift_max
+        ):
+            return self._look_in_another_light(image, stamp, found)
+        return found
 
-    def _look_everywhere(self, image: Image, stamp: float) -> Detection | Lost:
+    def _look_in_another_light(
+        self, image: Image, stamp: float, found: Detection | Lost
+    ) -> Detection | Lost:
+        """Try one light; it is believed only where head and whole tail are seen in its colours."""
+        colours = self._spots.colours
+        self._spots.colours = Colours(self._config, CASTS[self._missed % len(CASTS)])
+        other = self._look_everywhere(image, stamp, whole_tail=True)
+        if isinstance(other, Detection):
+            self._missed = 0
+            return other
+        self._spots.colours = colours
+        return found
+
+    def _look_everywhere(
+        self, image: Image, stamp: float, whole_tail: bool = False
+    ) -> Detection | Lost:
         """Find the head's markers at low resolution, then measure around them."""
         box = (0, 0, image.shape[1], image.shape[0])
         hsv = hsv_of(np.ascontiguousarray(image[::COARSE, ::COARSE]), box)
@@ -89,6 +123,8 @@ class Tracker:
             box = self._box(place[0], place[1])
             near, nothing = self._measure(image, box)
             for head in near:
+                if whole_tail and len(head.tail) < self._config.tail_links:
+                    continue
                 if all(
                     np.hypot(head.pose.x - h.pose.x, head.pose.y - h.pose.y) > 1e-3 for h in heads
                 ):
@@ -103,7 +139,7 @@ class Tracker:
         """Heads in a part of the image, and the reason if there is none."""
         if box[0] >= box[2] or box[1] >= box[3]:
             return [], Reason.OUTSIDE
-        hsv = hsv_of(image, box)
+        hsv = self._hsv = hsv_of(image, box)
         front, rear, *tail = self._spots.find(hsv, (*HEAD, *self._tails), box[:2])
         return self._heads.heads(front, rear, tail)[0], _nothing(front, rear)
 
@@ -115,7 +151,22 @@ class Tracker:
     def _detection(self, own: Head, stamp: float, box: Box, whole_image: bool) -> Detection:
         links = self._config.tail_links
         tail = own.tail if links and len(own.tail) == links else None
+        self._seen += 1
+        if tail is not None and not whole_image and self._seen % LEARN_EVERY == 0:
+            self._learn(own, box)
         return Detection(stamp, own.pose, tail, own.spacing, box, whole_image)
+
+    def _learn(self, own: Head, box: Box) -> None:
+        """Colours of a fish that is ours for certain: head and whole tail are seen."""
+        if not self._config.hue_shift_max:
+            return
+        links = link_ends(own.pose, own.tail, self._heads.layout)
+        for marker, place in (
+            ("front", own.front.position),
+            ("rear", own.rear.position),
+            *zip(TAIL, links, strict=False),
+        ):
+            self._spots.learn(self._hsv, box[:2], marker, place)
 
 
 def _nothing(front: list[Any], rear: list[Any]) -> Reason:

@@ -285,3 +285,43 @@ def test_the_annotated_picture_says_why_there_is_no_pose(tracker: Tracker) -> No
     drawn = annotated(picture, tracker.track(picture, 0.0), CONFIG, calibration())
     text = drawn[:34].astype(int)
     assert np.any(text[..., 2] - text[..., 1] > 150)  # in red
+
+
+def cast(picture: np.ndarray, red: float, blue: float, level: float = 1.0) -> np.ndarray:
+    """The picture under a light with these gains."""
+    return np.clip(picture * np.array([blue, 1.0, red]) * level, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("red", "blue"), [(1.25, 0.65), (1.3, 0.6), (0.7, 1.3)])
+def test_a_light_of_another_colour_is_found_within_a_second(
+    tracker: Tracker, red: float, blue: float
+) -> None:
+    picture = cast(draw(discs_of_fish(0.3, 0.2, 1.0, (0.2, 0.1, 0.0))), red, blue)
+    found = [tracker.track(picture, k / 30) for k in range(30)]
+    assert all(isinstance(f, Detection) for f in found[20:])
+    assert seen(found[-1]).head.x == pytest.approx(0.3, abs=1e-3)
+
+
+def test_colours_follow_a_light_that_turns_warm_and_dark(tracker: Tracker) -> None:
+    picture = draw(discs_of_fish(0.3, 0.2, 1.0))
+    for k in range(240):
+        warm = k / 240
+        light = cast(picture, 1.0 + 0.3 * warm, 1.0 - 0.5 * warm, 1.0 - 0.5 * warm)
+        seen(tracker.track(light, k / 30))
+    assert tracker.hue_shifts["rear"] > 5.0
+
+
+def test_colours_go_no_further_than_they_may() -> None:
+    config = replace(CONFIG, hue_shift_max=4)
+    tracker = Tracker(config, calibration())
+    picture = draw(discs_of_fish(0.3, 0.2, 1.0))
+    for k in range(240):
+        tracker.track(cast(picture, 1.0 + 0.5 * k / 240, 1.0 - 0.6 * k / 240), k / 30)
+    assert max(map(abs, tracker.hue_shifts.values())) <= 4.0
+
+
+def test_another_light_is_not_found_in_toys(tracker: Tracker) -> None:
+    """A head without a tail teaches no colours."""
+    picture = cast(draw(discs_of_fish(0.3, 0.2, 1.0)[:2]), 1.25, 0.65)
+    assert all(isinstance(tracker.track(picture, k / 30), Lost) for k in range(30))
+    assert set(tracker.hue_shifts.values()) == {0.0}

@@ -165,6 +165,9 @@ class TrackerNode(Node):
         status.values = [
             KeyValue(key=key, value=value) for key, value in self._statistics.values().items()
         ]
+        if self._tracker is not None:
+            shifts = " ".join(f"{name} {v:+.0f}" for name, v in self._tracker.hue_shifts.items())
+            status.values.append(KeyValue(key="hue_shifts", value=shifts))
         stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
 
