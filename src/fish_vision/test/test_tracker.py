@@ -325,3 +325,20 @@ def test_another_light_is_not_found_in_toys(tracker: Tracker) -> None:
     picture = cast(draw(discs_of_fish(0.3, 0.2, 1.0)[:2]), 1.25, 0.65)
     assert all(isinstance(tracker.track(picture, k / 30), Lost) for k in range(30))
     assert set(tracker.hue_shifts.values()) == {0.0}
+
+
+def test_two_fish_of_ours_are_told_apart_by_their_colours() -> None:
+    """One tracker each; the second fish has a blue front and an orange rear marker."""
+    first = Tracker(CONFIG, calibration())
+    second = Tracker(
+        replace(CONFIG, front_colour=(108, 120, 150, 90), rear_colour=(10, 19, 110, 90)),
+        calibration(),
+    )
+    names = {"front": "blue", "rear": "orange"}
+    for k in range(20):  # they pass each other 0.1 m apart
+        x = 0.03 * (k - 10)
+        other = discs_of_fish(-x, 0.1, pi)
+        both = discs_of_fish(x, 0.0, 0.0) + [(*d[:3], names.get(d[3], d[3])) for d in other]
+        picture = draw(both)
+        assert seen(first.track(picture, k / 30)).head.x == pytest.approx(x, abs=5e-4)
+        assert seen(second.track(picture, k / 30)).head.x == pytest.approx(-x, abs=5e-4)
