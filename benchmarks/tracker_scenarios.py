@@ -120,8 +120,6 @@ def hidden(t: float, phase: float, _: np.random.Generator) -> Scene:
     """The own fish goes under a board for 2 s of every 5 s while another of the same look swims in view."""
     own, other = swim(t, phase), swim(t, phase + 1.7)
     board = [rectangle(own.x, own.y, 0.5, 0.5, WHITE)] if (t % 5.0) > 3.0 else []
-    if hypot(own.x - other.x, own.y - other.y) < 0.6:  # seen beside the board
-        other = FishPose(own.x + (1.0 if own.x < 0 else -1.0), other.y, other.heading, other.tail)
     return Scene(exposure(t, phase), [patches(other, SHAPE)] if t > ALONE_S else [], board)
 
 
