@@ -19,7 +19,7 @@ MAY_IMPORT = {
     "fish_node": set(),
     "fish_report": set(),
     "fish_sim": {"fish_report"},
-    "fish_vision": set(),
+    "fish_vision": {"fish_report"},
     "fish_description": set(),
     "fish_control": {"fish_report"},
     "fish_hw": set(),

@@ -160,10 +160,14 @@ def commands(page):
 
 
 def options(verb):
-    """All option names of a verb."""
+    """All option names of a verb and of its sub-commands."""
     parser = argparse.ArgumentParser()
     importlib.import_module(f"{BROUGHT_BY[verb]}.verbs.{verb}").add_arguments(parser)
-    return set(re.findall(r"--[a-z][a-z-]*", parser.format_help()))
+    text = parser.format_help()
+    for action in parser._actions:
+        if isinstance(action.choices, dict):
+            text += "".join(sub.format_help() for sub in action.choices.values())
+    return set(re.findall(r"--[a-z][a-z-]*", text))
 
 
 def flags(text):

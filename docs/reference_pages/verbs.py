@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import re
+from typing import Any
 
 from fish_report.robofish import BROUGHT_BY
 from reference_pages.markdown import HEADER, cell, escaped, table
@@ -22,13 +23,19 @@ your own adds verbs through the entry-point group `robofish.verbs`. Exit status:
 class ArgumentList(argparse.ArgumentParser):
     """A parser that keeps what it declares."""
 
-    def __init__(self) -> None:
+    def __init__(self, **_: object) -> None:  # the parsers of sub-commands are made with a prog
         self.declared: list[argparse.Action] = []
         super().__init__(add_help=False)
 
     def _add_action(self, action: argparse.Action) -> argparse.Action:
         self.declared.append(action)
         return super()._add_action(action)
+
+    def add_subparsers(self, **options: Any) -> Any:
+        """Keep the sub-commands as well; argparse puts them into a group of their own."""
+        action = super().add_subparsers(**options)
+        self.declared.append(action)
+        return action
 
 
 def declared_by(verb: str) -> tuple[str, list[argparse.Action]]:
@@ -52,9 +59,20 @@ def page() -> str:
 def section(verb: str) -> str:
     """One verb."""
     text, arguments = declared_by(verb)
-    rows = [row(action) for action in arguments]
+    rows = [line for action in arguments for line in rows_of(action)]
     body = table(("argument", "meaning", "default"), rows)
     return f"## {verb}\n\nPackage `{BROUGHT_BY[verb]}`. {escaped(text.strip())}\n\n{body}"
+
+
+def rows_of(action: argparse.Action) -> list[tuple[str, str, str]]:
+    """The row of an argument, or those of all sub-commands."""
+    if not isinstance(action.choices, dict):
+        return [row(action)]
+    rows = []
+    for name, parser in action.choices.items():
+        rows.append((f"**{name}**", "", ""))
+        rows += [row(declared) for declared in parser.declared]
+    return rows
 
 
 def row(action: argparse.Action) -> tuple[str, str, str]:

@@ -5,6 +5,7 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "fish_vision"
+VERBS = ("calibrate", "track")
 
 setup(
     name=NAME,
@@ -25,9 +26,11 @@ setup(
     license="Apache-2.0",
     extras_require={"test": ["pytest"]},
     entry_points={
+        "robofish.verbs": [f"{verb} = {NAME}.verbs.{verb}" for verb in VERBS],
         "console_scripts": [
             "tracker = fish_vision.nodes.entry:tracker",
             "calibrate = fish_vision.commands.calibrate:main",
+            "track = fish_report.robofish:track",
             "check_image = fish_vision.commands.check_image:main",
         ],
     },

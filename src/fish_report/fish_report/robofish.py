@@ -33,6 +33,8 @@ BROUGHT_BY = {
     "view": "fish_bringup",
     "drive": "fish_bringup",
     "loopback": "fish_bringup",
+    "calibrate": "fish_vision",
+    "track": "fish_vision",
     "inspect": "fish_bag",
     "recover": "fish_bag",
     "import_pool": "fish_bag",

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fish_sim.camera import CameraConfig, FishPose, Look, PoolRenderer
+from fish_sim.camera import CameraConfig, FishPose, FishShape, Look, Patch, PoolRenderer, patches
 from fish_sim.camera.fish import markers
 
 CONFIG = CameraConfig()
@@ -60,6 +60,21 @@ def test_a_fish_at_or_beyond_the_edge_is_drawn_without_complaint(
     picture = clean.render([FishPose(*place, 0.3)], 0.0)
     assert picture.shape == (720, 1280, 3)
     assert picture.dtype == np.uint8
+
+
+def test_another_fish_is_drawn_in_its_own_colours_below_and_a_board_above(
+    clean: PoolRenderer,
+) -> None:
+    green = (30, 200, 30)
+    other, shape = FishPose(-0.7, 0.4, 0.0), FishShape(front_colour=green)
+    corners = np.array([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
+    board = [Patch(np.array([POSE.x, POSE.y]) + corners, (10, 20, 200))]
+    picture = clean.render([POSE], 0.0, below=[patches(other, shape)], above=[board]).astype(int)
+    (front, _, colour), *_ = markers(other, shape)
+    assert colour == green
+    for place, shown in ((front, green), ((POSE.x, POSE.y), (10, 20, 200))):
+        u, v = np.round(clean.camera.project([[*place, 0.0]])[0]).astype(int)
+        assert np.abs(picture[v, u] - shown).max() < 40
 
 
 def test_without_a_fish_the_pool_is_empty(clean: PoolRenderer) -> None:

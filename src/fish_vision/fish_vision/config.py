@@ -37,6 +37,9 @@ class TrackerConfig:
     rear_colour: tuple[int, ...] = (136, 166, 90, 80)  # magenta
     tail_odd_colour: tuple[int, ...] = (172, 12, 110, 80)  # red: links 1, 3, ...
     tail_even_colour: tuple[int, ...] = (46, 76, 90, 70)  # green: links 2, 4, ...
+    hue_shift_max: int = (
+        20  # by which the light may shift a colour's hues, half degrees; 0 = ranges stay as given
+    )
     front_marker: tuple[float, ...] = (0.045, 0.0)  # base_link x, y, m
     rear_marker: tuple[float, ...] = (-0.045, 0.0)  # base_link x, y, m
     marker_diameter: float = 0.030  # of the head's markers, m
@@ -45,13 +48,18 @@ class TrackerConfig:
     hinge_offset: float = 0.075  # head's centre of mass to the tail's hinge, m
     link_length: float = 0.07 / 3  # hinge to the marker at the far end of a link, m
     area_min: float = 0.35  # least area of a blob, share of the marker's
-    area_max: float = 2.5  # greatest area of a blob, share of the marker's
-    spacing_tolerance: float = 0.15  # misfit of the head markers' distance, share
+    area_max: float = 1.6  # greatest area of a blob, share of the marker's
+    spacing_tolerance: float = (
+        0.03  # misfit of the head markers' distance beyond its uncertainty, share
+    )
     tail_tolerance: float = 0.008  # misfit of a tail marker's distance from its hinge, m
     roi_radius: float = 0.25  # half side of the part of the image searched around the last pose, m
     max_speed: float = 1.5  # m/s, faster is a jump
     max_yaw_rate: float = 15.0  # rad/s, faster is a jump
-    reacquire_s: float = 0.5  # a jump that lasts so long is believed, s
+    reacquire_s: float = 0.5  # after so long without a pose the fish may be anywhere, s
+    rival_memory_s: float = (
+        30.0  # a fish seen elsewhere while ours was in view or just lost is not ours for so long, s
+    )
     pixel_std: float = 0.06  # standard deviation of a whole marker's middle, pixels
     pool_margin: float = 0.10  # a pose so far outside the walls is refused, m
     camera_frame: str = "overhead_optical"  # of the camera; its place goes to /tf_static
@@ -123,6 +131,7 @@ _LISTS = (
 )
 _RANGES = (  # field, lowest, highest
     ("marker_height", -1.0, 1.0),
+    ("hue_shift_max", 0, 30),
     ("marker_diameter", 0.002, 0.5),
     ("tail_marker_diameter", 0.002, 0.5),
     ("tail_links", 0, 10),
@@ -136,6 +145,7 @@ _RANGES = (  # field, lowest, highest
     ("max_speed", 0.01, 20.0),
     ("max_yaw_rate", 0.1, 200.0),
     ("reacquire_s", 0.0, 10.0),
+    ("rival_memory_s", 0.0, 3600.0),
     ("pixel_std", 0.001, 5.0),
     ("pool_margin", 0.0, 5.0),
 )

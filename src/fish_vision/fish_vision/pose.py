@@ -34,6 +34,7 @@ class Spot:
 
     position: Array
     covariance: Array
+    share: float = 1.0  # of a whole marker's area
 
 
 @dataclass(frozen=True)
@@ -51,49 +52,50 @@ def wrap(angle: float) -> float:
     return (angle + pi) % (2 * pi) - pi
 
 
-def pick_head(
-    front: Sequence[Spot], rear: Sequence[Spot], spacing: float, tolerance: float
-) -> tuple[Spot, Spot] | None:
-    """The pair whose distance fits best, or None if none fits within tolerance (share of spacing)."""
-    pairs = [
-        (abs(float(np.hypot(*(f.position - r.position))) / spacing - 1.0), i, j)
-        for i, f in enumerate(front)
-        for j, r in enumerate(rear)
-    ]
-    if not pairs:
-        return None
-    error, i, j = min(pairs)
-    return (front[i], rear[j]) if error <= tolerance else None
-
-
 def head_pose(front: Spot, rear: Spot, layout: MarkerLayout) -> HeadPose:
-    """Pose of the head from its two markers.
+    """Pose of the head from its two markers, which a rigid body holds at a known distance.
 
-        heading = angle(p_f - p_r) - angle(m_f - m_r),  p = (p_f + p_r) / 2 - R(heading) (m_f + m_r) / 2
+        minimise sum_i (p + R(heading) m_i - z_i)^T Sigma_i^-1 (p + R(heading) m_i - z_i),  i = front, rear
 
-    p: markers in the pool, m: in base_link. The covariance follows by the chain rule from those of the two
-    spots.
+    z: markers seen in the pool, m: their places in base_link. Gauss-Newton from the middle of the line between
+    them; the covariance is the inverse of the information. A marker that is partly hidden pulls less.
     """
-    m_f, m_r = np.array(layout.front), np.array(layout.rear)
-    line, mounted = front.position - rear.position, m_f - m_r
-    heading = wrap(atan2(line[1], line[0]) - atan2(mounted[1], mounted[0]))
-    R = np.array([[cos(heading), -sin(heading)], [sin(heading), cos(heading)]])
-    middle = R @ (m_f + m_r) / 2
-    x, y = (front.position + rear.position) / 2 - middle
-    across = np.array([-line[1], line[0]]) / float(
-        line @ line
-    )  # d heading / d p_f = - d heading / d p_r
-    turn = np.array([middle[1], -middle[0]])  # d p / d heading
-    J_f = np.vstack([np.eye(2) / 2 + np.outer(turn, across), across])
-    J_r = np.vstack([np.eye(2) / 2 - np.outer(turn, across), -across])
-    covariance = J_f @ front.covariance @ J_f.T + J_r @ rear.covariance @ J_r.T
-    return HeadPose(float(x), float(y), heading, covariance)
+    m = np.array([layout.front, layout.rear], float)
+    z = np.array([front.position, rear.position])
+    line, mounted = z[0] - z[1], m[0] - m[1]
+    heading = atan2(line[1], line[0]) - atan2(mounted[1], mounted[0])
+    W = [_inverse(front.covariance), _inverse(rear.covariance)]
+    p = z.mean(axis=0) - _turned(heading, m.mean(axis=0))
+    for _ in range(2):
+        information, gradient = np.zeros((3, 3)), np.zeros(3)
+        for m_i, z_i, W_i in zip(m, z, W, strict=True):
+            arm = _turned(heading, m_i)
+            J = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]]])
+            weighted = J.T @ W_i
+            information += weighted @ J
+            gradient += weighted @ (z_i - p - arm)
+        covariance = np.linalg.inv(information)
+        step = covariance @ gradient
+        p, heading = p + step[:2], heading + float(step[2])
+    return HeadPose(float(p[0]), float(p[1]), wrap(heading), covariance)
+
+
+def _turned(angle: float, v: Array) -> Array:
+    c, s = cos(angle), sin(angle)
+    return np.array([c * v[0] - s * v[1], s * v[0] + c * v[1]])
+
+
+def _inverse(S: Array) -> Array:
+    """Of a (2, 2) covariance."""
+    (a, b), (c, d) = S.tolist()
+    det = a * d - b * c
+    return np.array([[d / det, -b / det], [-c / det, a / det]])
 
 
 def tail_angles(
     head: HeadPose, spots: Sequence[Sequence[Spot]], layout: MarkerLayout, tolerance: float
-) -> tuple[float, ...] | None:
-    """Relative angles of the tail's links, from the head backwards, rad, counter-clockwise positive.
+) -> tuple[float, ...]:
+    """Relative angles of the tail's links that are seen, from the head backwards, rad, counter-clockwise positive.
 
         theta_i = angle(h_{i-1} - m_i),  h_i = h_{i-1} - link_length e(theta_i),  result theta_i - theta_{i-1}
 
@@ -104,8 +106,7 @@ def tail_angles(
         tolerance: greatest misfit of the distance, m.
 
     Returns:
-        One angle per link, or None if a link's marker is missing (a chain with a hole has no angles after
-        it).
+        One angle per link up to the first whose marker is missing (a chain with a hole has no angles after it).
     """
     hinge = np.array([head.x, head.y]) - layout.hinge_offset * np.array(
         [cos(head.heading), sin(head.heading)]
@@ -114,7 +115,7 @@ def tail_angles(
     for candidates in spots:
         marker = _fitting(hinge, before, candidates, layout.link_length, tolerance)
         if marker is None:
-            return None
+            break
         theta = atan2(hinge[1] - marker[1], hinge[0] - marker[0])
         result.append(wrap(theta - before))
         hinge = hinge - layout.link_length * np.array([cos(theta), sin(theta)])
@@ -137,15 +138,29 @@ def _fitting(
     return candidates[min(fits)[1]].position
 
 
-def tail_is_ahead(head: HeadPose, tail: Sequence[Spot], layout: MarkerLayout, reach: float) -> bool:
-    """Whether the tail's spots are in front of the head: then front and rear are confused.
+def tail_sides(
+    head: HeadPose, tail: Sequence[Spot], layout: MarkerLayout, reach: float
+) -> tuple[int, int]:
+    """How many of the tail's spots lie where the tail is, and ahead, where it would be of a head turned round.
 
-    Compares the spots within reach (m) of the tail's hinge with those within reach of its mirror image ahead.
+    Counts the spots within reach (m) of the tail's hinge and of its mirror image ahead.
     """
     ahead = layout.hinge_offset * np.array([cos(head.heading), sin(head.heading)])
     centre = np.array([head.x, head.y])
-    near = [
+    behind, before = (
         sum(float(np.hypot(*(s.position - end))) < reach for s in tail)
         for end in (centre - ahead, centre + ahead)
-    ]
-    return near[1] > near[0]
+    )
+    return behind, before
+
+
+def link_ends(pose: HeadPose, tail: Sequence[float], layout: MarkerLayout) -> list[Array]:
+    """Far ends (2,) of the tail's links in the pool, m, where their markers sit."""
+    angle = pose.heading
+    place = np.array([pose.x, pose.y]) - layout.hinge_offset * np.array([cos(angle), sin(angle)])
+    result = []
+    for relative in tail:
+        angle += relative
+        place = place - layout.link_length * np.array([cos(angle), sin(angle)])
+        result.append(place)
+    return result

@@ -3,7 +3,7 @@
 """Colour segmentation: which pixels have a marker's colour, and where the middle of each blob is."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
@@ -50,6 +50,9 @@ class Blob:
     u: float
     v: float
     area: float
+    corner: tuple[int, int] = (0, 0)  # first pixel of weight
+    # (h, w) how much of each pixel has the marker's colour
+    weight: Image | None = field(default=None, repr=False, compare=False)
 
 
 def hsv_of(image: Image, box: Box) -> Image:
@@ -96,7 +99,7 @@ def _measure(hsv: Image, mask: Image, colour: ColourRange, box: Box) -> Blob:
     area = float(weight.sum())
     u = float(weight.sum(axis=0) @ np.arange(left, right)) / area
     v = float(weight.sum(axis=1) @ np.arange(top, bottom)) / area
-    return Blob(u, v, area)
+    return Blob(u, v, area, (left, top), weight)
 
 
 def around(points: NDArray[np.float64], size: Sequence[int]) -> Box:

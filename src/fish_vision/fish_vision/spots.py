@@ -3,61 +3,114 @@
 """From colours in an image to spots in the pool: blobs of a marker's colour and size."""
 
 from collections.abc import Sequence
-from math import pi
+from math import log, pi
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fish_vision.calibration import Calibration
+from fish_vision.colours import Colours
 from fish_vision.config import TrackerConfig
+from fish_vision.disc import fit_disc
 from fish_vision.pose import Spot
 from fish_vision.segmentation import Blob, Image, find_blobs
 
-CANDIDATES = 6  # blobs of a colour that are considered, largest first
+Array = NDArray[Any]  # float64
+
+CANDIDATES = 16  # blobs of a colour that are considered, those of a whole marker's size first
+PARTLY = 0.96  # share of its area below which a marker counts as partly hidden
+COARSE_STD = 0.15  # standard deviation of a middle in a thinned image, pixels of that image
 
 
 class SpotFinder:
-    """Finds the spots of one marker, `front`, `rear`, `tail_odd` or `tail_even`."""
+    """Finds the spots of the markers `front`, `rear`, `tail_odd` and `tail_even`."""
 
     def __init__(self, config: TrackerConfig, calibration: Calibration) -> None:
         self._config, self._calibration = config, calibration
+        self.colours = Colours(config)
         _, scale = calibration.place_and_scale(calibration.pool_to_pixel([[0.0, 0.0]]))
         self._pixel = float(
             abs(np.linalg.det(scale[0]))
         )  # m^2 of water that a pixel shows in the middle
 
-    def find(self, hsv: Image, marker: str, origin: tuple[int, int], step: int = 1) -> list[Spot]:
-        """Spots of a marker in a part of an image: first pixel at origin, every step-th pixel."""
-        config = self._config
-        diameter = (
-            config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
-        )
-        disc = pi / 4 * diameter**2
-        pixel = self._pixel * step**2
-        limits = (0.5 * config.area_min * disc / pixel, 2.0 * config.area_max * disc / pixel)
-        blobs = find_blobs(hsv, config.colour(marker), limits)[:CANDIDATES]
-        return self._of_size(_enlarged(blobs, origin, step), disc)
+    def find(
+        self, hsv: Image, markers: Sequence[str], origin: tuple[int, int], step: int = 1
+    ) -> list[list[Spot]]:
+        """Spots of each marker in a part of an image: first pixel at origin, every step-th pixel."""
+        config, pixel = self._config, self._pixel * step**2
+        found: list[tuple[int, Blob]] = []
+        for number, marker in enumerate(markers):
+            disc = pi / 4 * self._diameter(marker) ** 2
+            limits = (0.5 * config.area_min * disc / pixel, 2.0 * config.area_max * disc / pixel)
+            blobs = find_blobs(hsv, self.colours.range(marker), limits)
+            found += [(number, _enlarged(blob, origin, step)) for blob in blobs]
+        result: list[list[Spot]] = [[] for _ in markers]
+        if found:
+            diameters = np.array([self._diameter(markers[number]) for number, _ in found])
+            spots = self._of_size([blob for _, blob in found], diameters, step)
+            for (number, _), spot in zip(found, spots, strict=True):
+                if spot is not None:
+                    result[number].append(spot)
+        return [sorted(s, key=lambda spot: abs(log(spot.share)))[:CANDIDATES] for s in result]
 
-    def _of_size(self, blobs: Sequence[Blob], disc: float) -> list[Spot]:
-        """Blobs as spots, without those whose area does not fit a disc (m^2) at their place.
+    def learn(self, hsv: Image, origin: tuple[int, int], marker: str, place: Array) -> None:
+        """Take the colour in the middle of a marker at a place (2,), m, as that of its kind in today's light."""
+        u, v = self._calibration.pool_to_pixel([place])[0] - np.array(origin)
+        column, row = round(float(u)), round(float(v))
+        part = hsv[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2].reshape(-1, 3)
+        if len(part):
+            hue, _, value = part[len(part) // 2]
+            self.colours.learn(marker, float(hue), float(value))
+
+    def _diameter(self, marker: str) -> float:
+        config = self._config
+        return config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
+
+    def _of_size(
+        self, blobs: Sequence[Blob], diameters: NDArray[np.float64], step: int
+    ) -> list[Spot | None]:
+        """Blobs as spots; None for those whose area does not fit a disc of their diameter (m) at their place.
 
             std = pixel_std / sqrt(share) + diameter (1 - share) / 3,  share = area / disc area, at most 1
 
-        in pixels; the second term is how far a partly hidden disc's middle moves (half hidden: 0.21).
+        in pixels; the second term is how far a partly hidden disc's middle moves (half hidden: 0.21). Where enough
+        of a partly hidden head marker's rim is seen, the rim gives its middle instead (fit_disc).
         """
-        if not blobs:
-            return []
         places, J = self._calibration.place_and_scale([[b.u, b.v] for b in blobs])
         areas = np.array([b.area for b in blobs])
-        shares = areas * np.abs(np.linalg.det(J)) / disc
+        pixels = np.abs(J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0])  # m^2 of one
+        shares = areas * pixels / (pi / 4 * diameters**2)
         whole = np.minimum(shares, 1.0)
-        std = self._config.pixel_std / np.sqrt(whole) + np.sqrt(4 / pi * areas) * (1.0 - whole) / 3
-        return [
-            Spot(places[i], std[i] ** 2 * J[i] @ J[i].T)
-            for i in range(len(blobs))
-            if self._config.area_min <= shares[i] <= self._config.area_max
-        ]
+        own = self._config.pixel_std if step == 1 else COARSE_STD * step
+        std = own / np.sqrt(whole) + np.sqrt(4 / pi * areas) * (1.0 - whole) / 3
+        result: list[Spot | None] = []
+        for i, blob in enumerate(blobs):
+            if not self._config.area_min <= shares[i] <= self._config.area_max:
+                result.append(None)
+                continue
+            place, deviation = places[i], float(std[i])
+            if step == 1 and shares[i] < PARTLY and diameters[i] == self._config.marker_diameter:
+                radius = diameters[i] / 2 / np.sqrt(pixels[i])
+                place, deviation = self._partly_hidden(blob, place, J[i], deviation, radius)
+            result.append(Spot(place, deviation**2 * J[i] @ J[i].T, float(shares[i])))
+        return result
+
+    def _partly_hidden(
+        self, blob: Blob, place: Array, J: Array, std: float, radius: float
+    ) -> tuple[Array, float]:
+        """Place, m, and deviation, pixels, of a marker of which a part is hidden."""
+        fit = None if blob.weight is None else fit_disc(blob.weight, radius)
+        if fit is None:
+            return place, std
+        shift = np.array([fit[0] + blob.corner[0] - blob.u, fit[1] + blob.corner[1] - blob.v])
+        if np.hypot(*shift) > radius:
+            return place, std
+        return place + J @ shift, max(fit[2], self._config.pixel_std)
 
 
-def _enlarged(blobs: Sequence[Blob], origin: tuple[int, int], step: int) -> list[Blob]:
-    """Blobs in pixels of the whole image; column i of a thinned image is column i step of the whole one."""
-    return [Blob(b.u * step + origin[0], b.v * step + origin[1], b.area * step**2) for b in blobs]
+def _enlarged(blob: Blob, origin: tuple[int, int], step: int) -> Blob:
+    """A blob in pixels of the whole image; column i of a thinned image is column i step of the whole one."""
+    corner = (blob.corner[0] + origin[0], blob.corner[1] + origin[1])
+    u, v = blob.u * step + origin[0], blob.v * step + origin[1]
+    return Blob(u, v, blob.area * step**2, corner, blob.weight if step == 1 else None)

@@ -2,36 +2,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tracker: one image in, one pose out, or the reason why there is none."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_vision.calibration import POOL, Calibration
+from fish_vision.calibration import Calibration
+from fish_vision.choice import Choice, Reason
+from fish_vision.colours import CASTS, Colours
 from fish_vision.config import TrackerConfig
-from fish_vision.pose import HeadPose, Spot, head_pose, pick_head, tail_angles, tail_is_ahead, wrap
+from fish_vision.heads import Head, HeadFinder
+from fish_vision.pose import HeadPose, link_ends
 from fish_vision.segmentation import Box, Image, around, hsv_of
 from fish_vision.spots import SpotFinder
 
 Array = NDArray[Any]  # float64
 
 COARSE = 2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
-JUMP_DISTANCE = 0.03  # m, never counted as a jump
-JUMP_TURN = 0.3  # rad, never counted as a jump
-
-
-class Reason(Enum):
-    """Why an image gave no pose."""
-
-    NO_FRONT = "no front marker"
-    NO_REAR = "no rear marker"
-    NO_PAIR = "front and rear marker not the right distance apart"
-    SWAPPED = "tail markers ahead of the head: markers or colours swapped"
-    OUTSIDE = "pose outside the pool"
-    JUMP = "jump: too far from the last pose"
+PLACES = 4  # places of the whole image that are measured
+LEARN_EVERY = 5  # detections of which one teaches the colours of today's light
+CAST_AFTER = 10  # images without the fish after which other lights are tried
+SAME = 0.05  # m, pairs so near to each other are measured together
+HEAD, TAIL = ("front", "rear"), ("tail_odd", "tail_even")
 
 
 @dataclass(frozen=True)
@@ -52,109 +45,130 @@ class Lost:
 
     stamp: float  # s, of the image
     reason: Reason
+    spacing: float | None = (
+        None  # misfit of the head markers' distance, of the pair that fits best, share
+    )
 
 
 class Tracker:
     """Follows one fish: looks around the last pose first, in the whole image if that fails.
 
-    A pose is believed if the head's two colours are the right distance apart, the tail is behind, the place
-    is in the pool, and it can be reached from the last pose. After `reacquire_s` without a believed pose the
-    last one is forgotten.
+    The picture gives all heads that its spots may be (HeadFinder); which of them is ours, or that none surely is,
+    says Choice.
     """
 
     def __init__(self, config: TrackerConfig, calibration: Calibration) -> None:
         self._config, self._calibration = config, calibration
-        self._layout = config.layout()
-        self._finder = SpotFinder(config, calibration)
-        self._last: Detection | None = None
+        self._spots, self._heads = SpotFinder(config, calibration), HeadFinder(config)
+        self._choice = Choice(config)
+        self._tails = TAIL if config.tail_links else ()
+        self._hsv: Image = np.zeros((0, 0, 3), np.uint8)  # of the box measured last
+        self._seen, self._missed = 0, 0  # detections; images without the fish since the last one
+
+    @property
+    def hue_shifts(self) -> dict[str, float]:
+        """By how much the light moved each marker's hues, half degrees."""
+        return dict(self._spots.colours.shifts)
 
     def track(self, image: Image, stamp: float) -> Detection | Lost:
         """Pose in an image (h, w, 3; blue, green, red) of the calibration's size taken at stamp (s)."""
+        last = self._choice.last(stamp)
+        if last is not None:
+            box = self._box(last.x, last.y)
+            heads, nothing = self._measure(image, box)
+            own = self._choice.near(heads, stamp, nothing)
+            if isinstance(own, Head):
+                return self._detection(own, stamp, box, False)
+        found = self._look_everywhere(image, stamp)
+        self._missed = 0 if isinstance(found, Detection) else self._missed + 1
         if (
-            self._last is not None
-            and not 0.0 <= stamp - self._last.stamp <= self._config.reacquire_s
+            last is None
+            and self._missed > CAST_AFTER
+            and self._tails
+            and self._config.hue_shift_max
         ):
-            self._last = None
-        found = (
-            Lost(stamp, Reason.NO_FRONT)
-            if self._last is None
-            else self._look_near_last(image, stamp)
-        )
-        if isinstance(found, Lost):
-            found = self._look_everywhere(image, stamp)
-        if isinstance(found, Detection):
-            self._last = found
+            return self._look_in_another_light(image, stamp, found)
         return found
 
-    def _look_near_last(self, image: Image, stamp: float) -> Detection | Lost:
-        assert self._last is not None
-        return self._measure(image, stamp, self._last.head.x, self._last.head.y, False)
+    def _look_in_another_light(
+        self, image: Image, stamp: float, found: Detection | Lost
+    ) -> Detection | Lost:
+        """Try one light; it is believed only where head and whole tail are seen in its colours."""
+        colours = self._spots.colours
+        self._spots.colours = Colours(self._config, CASTS[self._missed % len(CASTS)])
+        other = self._look_everywhere(image, stamp, whole_tail=True)
+        if isinstance(other, Detection):
+            self._missed = 0
+            return other
+        self._spots.colours = colours
+        return found
 
-    def _look_everywhere(self, image: Image, stamp: float) -> Detection | Lost:
+    def _look_everywhere(
+        self, image: Image, stamp: float, whole_tail: bool = False
+    ) -> Detection | Lost:
         """Find the head's markers at low resolution, then measure around them."""
         box = (0, 0, image.shape[1], image.shape[0])
         hsv = hsv_of(np.ascontiguousarray(image[::COARSE, ::COARSE]), box)
-        head = self._pick(*(self._finder.find(hsv, m, (0, 0), COARSE) for m in ("front", "rear")))
-        if isinstance(head, Reason):
-            return Lost(stamp, head)
-        middle = (head[0].position + head[1].position) / 2
-        return self._measure(image, stamp, middle[0], middle[1], True)
+        front, rear = self._spots.find(hsv, HEAD, (0, 0), COARSE)
+        found, spacing = self._heads.pairs(front, rear)
+        nothing = _nothing(front, rear)
+        places: list[Array] = []
+        for i, j in found:
+            middle = (front[i].position + rear[j].position) / 2
+            if all(np.hypot(*(middle - place)) > SAME for place in places):
+                places.append(middle)
+        heads: list[Head] = []
+        boxes: list[Box] = []
+        for place in places[:PLACES]:
+            box = self._box(place[0], place[1])
+            near, nothing = self._measure(image, box)
+            for head in near:
+                if whole_tail and len(head.tail) < self._config.tail_links:
+                    continue
+                if all(
+                    np.hypot(head.pose.x - h.pose.x, head.pose.y - h.pose.y) > 1e-3 for h in heads
+                ):
+                    heads.append(head)
+                    boxes.append(box)
+        own = self._choice.anywhere(heads, stamp, nothing)
+        if isinstance(own, Reason):
+            return Lost(stamp, own, spacing)
+        return self._detection(own, stamp, boxes[[h is own for h in heads].index(True)], True)
 
-    def _measure(
-        self, image: Image, stamp: float, x: float, y: float, whole_image: bool
-    ) -> Detection | Lost:
-        """Pose from the part of the image within roi_radius of a place in the pool."""
-        box = self._box(x, y)
+    def _measure(self, image: Image, box: Box) -> tuple[list[Head], Reason]:
+        """Heads in a part of the image, and the reason if there is none."""
         if box[0] >= box[2] or box[1] >= box[3]:
-            return Lost(stamp, Reason.OUTSIDE)
-        hsv = hsv_of(image, box)
-        pair = self._pick(*(self._finder.find(hsv, m, box[:2]) for m in ("front", "rear")))
-        if isinstance(pair, Reason):
-            return Lost(stamp, pair)
-        head = head_pose(*pair, self._layout)
-        tail = (
-            [self._finder.find(hsv, m, box[:2]) for m in ("tail_odd", "tail_even")]
-            if self._config.tail_links
-            else []
-        )
-        refused = self._refuse(head, [spot for spots in tail for spot in spots], stamp)
-        if refused is not None:
-            return Lost(stamp, refused)
-        spacing = float(np.hypot(*(pair[0].position - pair[1].position))) / self._layout.spacing
-        return Detection(stamp, head, self._tail(head, tail), spacing, box, whole_image)
+            return [], Reason.OUTSIDE
+        hsv = self._hsv = hsv_of(image, box)
+        front, rear, *tail = self._spots.find(hsv, (*HEAD, *self._tails), box[:2])
+        return self._heads.heads(front, rear, tail)[0], _nothing(front, rear)
 
     def _box(self, x: float, y: float) -> Box:
         r = self._config.roi_radius
         corners = np.array([x, y]) + r * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
         return around(self._calibration.pool_to_pixel(corners), self._calibration.lens.size)
 
-    def _pick(self, front: Sequence[Spot], rear: Sequence[Spot]) -> tuple[Spot, Spot] | Reason:
-        if not front:
-            return Reason.NO_FRONT
-        if not rear:
-            return Reason.NO_REAR
-        pair = pick_head(front, rear, self._layout.spacing, self._config.spacing_tolerance)
-        return Reason.NO_PAIR if pair is None else pair
+    def _detection(self, own: Head, stamp: float, box: Box, whole_image: bool) -> Detection:
+        links = self._config.tail_links
+        tail = own.tail if links and len(own.tail) == links else None
+        self._seen += 1
+        if tail is not None and not whole_image and self._seen % LEARN_EVERY == 0:
+            self._learn(own, box)
+        return Detection(stamp, own.pose, tail, own.spacing, box, whole_image)
 
-    def _tail(self, head: HeadPose, tail: Sequence[Sequence[Spot]]) -> tuple[float, ...] | None:
-        links = [tail[i % 2] for i in range(self._config.tail_links)]
-        return (
-            tail_angles(head, links, self._layout, self._config.tail_tolerance) if links else None
-        )
+    def _learn(self, own: Head, box: Box) -> None:
+        """Colours of a fish that is ours for certain: head and whole tail are seen."""
+        if not self._config.hue_shift_max:
+            return
+        links = link_ends(own.pose, own.tail, self._heads.layout)
+        for marker, place in (
+            ("front", own.front.position),
+            ("rear", own.rear.position),
+            *zip(TAIL, links, strict=False),
+        ):
+            self._spots.learn(self._hsv, box[:2], marker, place)
 
-    def _refuse(self, head: HeadPose, tail: Sequence[Spot], stamp: float) -> Reason | None:
-        """Why a pose is not believed, or None."""
-        margin = self._config.pool_margin
-        if abs(head.x) > POOL[0] / 2 + margin or abs(head.y) > POOL[1] / 2 + margin:
-            return Reason.OUTSIDE
-        reach = self._config.tail_links * self._layout.link_length + self._config.tail_tolerance
-        if tail_is_ahead(head, tail, self._layout, reach):
-            return Reason.SWAPPED
-        if self._last is None:
-            return None
-        dt, last = stamp - self._last.stamp, self._last.head
-        far = (
-            np.hypot(head.x - last.x, head.y - last.y) > self._config.max_speed * dt + JUMP_DISTANCE
-        )
-        turned = abs(wrap(head.heading - last.heading)) > self._config.max_yaw_rate * dt + JUMP_TURN
-        return Reason.JUMP if far or turned else None
+
+def _nothing(front: list[Any], rear: list[Any]) -> Reason:
+    """Why spots give no head."""
+    return Reason.NO_FRONT if not front else Reason.NO_REAR if not rear else Reason.NO_PAIR

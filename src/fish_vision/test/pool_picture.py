@@ -16,6 +16,8 @@ COLOURS = {
     "rear": (210, 20, 235),
     "odd": (35, 55, 240),
     "even": (40, 205, 45),
+    "blue": (200, 60, 20),
+    "orange": (0, 140, 255),
 }
 HEIGHT = 3.0  # m; with 900 pixels of focal length gives SCALE
 CONFIG = TrackerConfig(camera_position=(0.0, 0.0, HEIGHT), camera_tilt=(0.0, 0.0, 0.0))

@@ -3,6 +3,7 @@
 """The commands calibrate and check_image, called as from the shell."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -17,6 +18,7 @@ from pool_picture import CONFIG, calibration, discs_of_fish, draw
 from fish_vision.calibration import lens_document
 from fish_vision.commands import calibrate, check_image
 from fish_vision.config import config_from_file
+from fish_vision.tracker import Detection, Tracker
 
 
 def call(command, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
@@ -240,3 +242,39 @@ def test_calibrate_lens_refuses_pictures_without_a_board(files: Path, monkeypatc
         == 1
     )
     assert "expected like 8x6" in capsys.readouterr().err
+
+
+def test_calibrate_colours_proposes_ranges_in_which_the_fish_is_seen(
+    files: Path, monkeypatch, capsys
+) -> None:
+    """The head's markers are dark blue and orange; the parameters' ranges fit neither."""
+    names = {"front": "blue", "rear": "orange"}
+    fish = discs_of_fish(0.5, 0.2, 1.0, (0.2, 0.0, -0.2))
+    other = [(x, y, diameter, names.get(colour, colour)) for x, y, diameter, colour in fish]
+    cv2.imwrite(str(files / "other.png"), draw(other))
+    given = ("--lens", files / "lens.yaml", "--params", files / "params.yaml")
+    assert (
+        call(check_image, monkeypatch, files / "other.png", *given, "--out", files / "a.png") == 1
+    )
+    written = ("--out", files / "colours.yaml", "--picture", files / "colours.png")
+    assert call(calibrate, monkeypatch, "colours", files / "other.png", *given, *written) == 0
+    assert "fish found in 1 of 1 pictures" in capsys.readouterr().out
+    config = config_from_file(files / "colours.yaml")
+    tuned = replace(
+        CONFIG, **{n: getattr(config, n) for n in vars(config) if n.endswith("_colour")}
+    )
+    found = Tracker(tuned, calibration()).track(cv2.imread(str(files / "other.png")), 0.0)
+    assert isinstance(found, Detection)
+    assert found.head.x == pytest.approx(0.5, abs=1e-3)
+    assert cv2.imread(str(files / "colours.png")).shape == (720, 1280, 3)
+
+
+def test_calibrate_colours_says_that_no_picture_shows_the_fish(
+    files: Path, monkeypatch, capsys
+) -> None:
+    cv2.imwrite(str(files / "empty.png"), draw([]))
+    given = ("--lens", files / "lens.yaml", "--params", files / "params.yaml")
+    written = ("--out", files / "colours.yaml", "--picture", files / "colours.png")
+    assert call(calibrate, monkeypatch, "colours", files / "empty.png", *given, *written) == 1
+    assert "none of 1 pictures shows one fish" in capsys.readouterr().err
+    assert not (files / "colours.yaml").exists()

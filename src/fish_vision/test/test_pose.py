@@ -12,9 +12,8 @@ from fish_vision.pose import (
     MarkerLayout,
     Spot,
     head_pose,
-    pick_head,
     tail_angles,
-    tail_is_ahead,
+    tail_sides,
     wrap,
 )
 
@@ -64,17 +63,11 @@ def test_spacing_is_the_distance_of_the_markers_however_they_sit() -> None:
     assert ODD.spacing == pytest.approx(float(np.linalg.norm(front.position - rear.position)))
 
 
-def test_the_pair_with_the_right_distance_is_picked() -> None:
-    front, rear = seen((0.0, 0.0, 0.0), LAYOUT)
-    stray, almost = spot(1.0, 1.0), spot(-0.036, 0.0)  # almost: 10 % too near to the front marker
-    assert pick_head([stray, front], [almost, rear, spot(1.0, 1.05)], LAYOUT.spacing, 0.15) == (
-        front,
-        rear,
-    )
-    assert pick_head([front], [almost], LAYOUT.spacing, 0.15) == (front, almost)
-    assert pick_head([front], [almost], LAYOUT.spacing, 0.09) is None
-    assert pick_head([stray], [rear], LAYOUT.spacing, 0.15) is None
-    assert pick_head([], [rear], LAYOUT.spacing, 0.15) is None
+def test_an_uncertain_marker_pulls_the_head_less() -> None:
+    """The markers are seen 2 mm too far apart; the rear one is ten times as uncertain."""
+    front, rear = spot(0.046, 0.0, 1e-4), spot(-0.046, 0.0, 1e-3)
+    head = head_pose(front, rear, LAYOUT)
+    assert head.x == pytest.approx(0.001 - 0.002 / 101, abs=1e-7)
 
 
 def chain(pose: tuple[float, float, float], relative: list[float]) -> list[Spot]:
@@ -102,26 +95,24 @@ def test_a_tail_marker_to_the_left_counts_negative() -> None:
     assert tail_angles(HeadPose(0, 0, 0, np.eye(3)), left, LAYOUT, 0.008) == pytest.approx([-0.5])
 
 
-def test_a_chain_with_a_hole_has_no_angles() -> None:
+def test_a_chain_with_a_hole_ends_there() -> None:
     pose = (0.5, 0.1, 1.0)
     one, _, three = chain(pose, [0.1, 0.1, 0.1])
-    assert (
-        tail_angles(HeadPose(*pose, np.eye(3)), [[one, three], [], [one, three]], LAYOUT, 0.008)
-        is None
-    )
+    links = [[one, three], [], [one, three]]
+    assert tail_angles(HeadPose(*pose, np.eye(3)), links, LAYOUT, 0.008) == pytest.approx([0.1])
 
 
 @pytest.mark.parametrize("share", [1.0 - 0.009 / 0.0233, 1.0 + 0.009 / 0.0233])
 def test_a_marker_at_the_wrong_distance_is_no_link(share: float) -> None:
     stray = [[spot(-0.075 - share * 0.0233, 0.0)]]
     head = HeadPose(0.0, 0.0, 0.0, np.eye(3))
-    assert tail_angles(head, stray, LAYOUT, 0.008) is None
+    assert tail_angles(head, stray, LAYOUT, 0.008) == ()
     assert tail_angles(head, stray, LAYOUT, 0.010) == pytest.approx([0.0])
 
 
 def test_swapped_head_markers_are_seen_by_the_tail() -> None:
     pose = (0.5, 0.1, 1.0)
     tail = chain(pose, [0.2, 0.1, 0.1])
-    assert not tail_is_ahead(HeadPose(*pose, np.eye(3)), tail, LAYOUT, 0.08)
-    assert tail_is_ahead(HeadPose(0.5, 0.1, 1.0 - pi, np.eye(3)), tail, LAYOUT, 0.08)
-    assert not tail_is_ahead(HeadPose(*pose, np.eye(3)), [], LAYOUT, 0.08)
+    assert tail_sides(HeadPose(*pose, np.eye(3)), tail, LAYOUT, 0.08) == (3, 0)
+    assert tail_sides(HeadPose(0.5, 0.1, 1.0 - pi, np.eye(3)), tail, LAYOUT, 0.08) == (0, 3)
+    assert tail_sides(HeadPose(*pose, np.eye(3)), [], LAYOUT, 0.08) == (0, 0)

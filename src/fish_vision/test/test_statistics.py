@@ -5,9 +5,10 @@
 import numpy as np
 import pytest
 
+from fish_vision.choice import Reason
 from fish_vision.pose import HeadPose
 from fish_vision.statistics import SPACINGS, Statistics
-from fish_vision.tracker import Detection, Lost, Reason
+from fish_vision.tracker import Detection, Lost
 
 
 def detection(spacing: float, whole_image: bool = False) -> Detection:
@@ -34,7 +35,7 @@ def test_results_and_refusals_are_counted_by_kind() -> None:
 
 
 @pytest.mark.parametrize(
-    ("spacing", "wrong"), [(1.0, False), (1.049, False), (1.051, True), (0.949, True)]
+    ("spacing", "wrong"), [(1.0, False), (1.014, False), (1.016, True), (0.984, True)]
 )
 def test_a_wrong_marker_spacing_shows_after_enough_poses(spacing: float, wrong: bool) -> None:
     statistics = Statistics()
@@ -43,3 +44,19 @@ def test_a_wrong_marker_spacing_shows_after_enough_poses(spacing: float, wrong: 
     assert statistics.spacing_error() is None
     statistics.add(detection(spacing), 0.0, 0.0)
     assert statistics.spacing_error() == (pytest.approx(spacing - 1.0) if wrong else None)
+
+
+def test_images_refused_for_one_scale_say_so() -> None:
+    statistics = Statistics()
+    for _ in range(SPACINGS):
+        statistics.add(Lost(0.0, Reason.NO_PAIR, 0.05), 0.0, 0.0)
+    assert statistics.refused_spacing() == pytest.approx(0.05)
+    statistics.add(detection(1.0), 0.0, 0.0)
+    assert statistics.refused_spacing() is None
+
+
+def test_images_refused_for_many_spacings_show_no_scale() -> None:
+    statistics = Statistics()
+    for k in range(SPACINGS):
+        statistics.add(Lost(0.0, Reason.NO_PAIR, 0.1 if k % 2 else -0.1), 0.0, 0.0)
+    assert statistics.refused_spacing() is None

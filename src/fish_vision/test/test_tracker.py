@@ -12,10 +12,12 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pool_picture import CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw
+from pool_picture import CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw, lens_fields
 
 from fish_vision.annotate import annotated, tail_points
-from fish_vision.tracker import Detection, Lost, Reason, Tracker
+from fish_vision.calibration import Calibration, Lens
+from fish_vision.choice import Reason
+from fish_vision.tracker import Detection, Lost, Tracker
 
 
 @pytest.fixture
@@ -82,12 +84,111 @@ def test_spots_of_the_wrong_size_are_not_markers(tracker: Tracker) -> None:
     assert (found.head.x, found.head.y) == pytest.approx((0.5, 0.2), abs=5e-4)
 
 
-def test_a_jump_is_refused_at_first_and_believed_when_it_lasts(tracker: Tracker) -> None:
+def test_a_fish_that_is_elsewhere_at_once_is_another() -> None:
+    tracker = Tracker(replace(CONFIG, rival_memory_s=2.0), calibration())
     near, far = draw(discs_of_fish(0.0, 0.0, 0.0)), draw(discs_of_fish(1.0, 0.5, 1.0))
     seen(tracker.track(near, 0.0))
     assert reason(tracker.track(far, 0.03)) == Reason.JUMP
-    assert reason(tracker.track(far, 0.4)) == Reason.JUMP
-    assert seen(tracker.track(far, 0.6)).head.x == pytest.approx(1.0, abs=5e-4)
+    for stamp in (0.4, 0.8, 1.2, 1.6):
+        assert reason(tracker.track(far, stamp)) in (Reason.JUMP, Reason.AMBIGUOUS)
+    assert seen(tracker.track(far, 2.1)).head.x == pytest.approx(1.0, abs=5e-4)
+
+
+def test_a_fish_that_was_out_of_sight_may_be_anywhere(tracker: Tracker) -> None:
+    seen(tracker.track(draw(discs_of_fish(0.0, 0.0, 0.0)), 0.0))
+    for stamp in (0.2, 0.4, 0.6):
+        assert isinstance(tracker.track(draw([]), stamp), Lost)
+    assert seen(tracker.track(draw(discs_of_fish(1.0, 0.5, 1.0)), 0.8)).head.x == pytest.approx(
+        1.0, abs=5e-4
+    )
+
+
+def test_two_fish_of_the_same_look_give_no_pose_at_first(tracker: Tracker) -> None:
+    both = draw(discs_of_fish(0.0, 0.0, 0.0) + discs_of_fish(0.6, 0.3, 2.0))
+    assert reason(tracker.track(both, 0.0)) == Reason.AMBIGUOUS
+    one = draw(discs_of_fish(0.0, 0.0, 0.0))
+    for stamp in (0.1, 10.0, 20.0, 30.0):
+        assert reason(tracker.track(one, stamp)) == Reason.AMBIGUOUS
+    assert isinstance(tracker.track(one, 31.0), Detection)
+
+
+def test_the_own_fish_is_followed_past_one_of_the_same_look(tracker: Tracker) -> None:
+    """The other crosses 0.1 m beside ours, the other way."""
+    seen(tracker.track(draw(discs_of_fish(-0.3, 0.0, 0.0)), 0.0))
+    for k in range(1, 20):
+        x = -0.3 + 0.03 * k
+        both = draw(discs_of_fish(-x, 0.1, pi) + discs_of_fish(x, 0.0, 0.0))
+        assert seen(tracker.track(both, k / 30)).head.x == pytest.approx(x, abs=5e-4)
+
+
+@pytest.mark.parametrize("hidden_s", [0.2, 0.7, 3.0])
+def test_while_ours_is_hidden_another_in_view_is_not_ours(
+    tracker: Tracker, hidden_s: float
+) -> None:
+    ours = discs_of_fish(0.0, 0.0, 0.0)
+    stamp = 0.0
+    seen(tracker.track(draw(ours), stamp))
+    while stamp < hidden_s:
+        stamp += 0.05
+        found = tracker.track(draw(discs_of_fish(0.6 - 0.1 * stamp, 0.3, 2.0)), stamp)
+        assert isinstance(found, Lost)
+    other = discs_of_fish(0.6 - 0.1 * stamp, 0.3, 2.0)
+    found = seen(tracker.track(draw(ours + other), stamp + 0.05))
+    assert found.head.x == pytest.approx(0.0, abs=5e-4)
+
+
+def test_swapped_markers_with_the_tail_hidden_are_not_believed(tracker: Tracker) -> None:
+    names = {"front": "rear", "rear": "front"}
+    head = [(x, y, d, names[c]) for x, y, d, c in discs_of_fish(0.0, 0.0, 0.0)[:2]]
+    assert reason(tracker.track(draw(head), 0.0)) == Reason.NO_TAIL
+
+
+def test_once_known_the_fish_is_followed_with_its_tail_hidden(tracker: Tracker) -> None:
+    seen(tracker.track(draw(discs_of_fish(0.0, 0.0, 0.0)), 0.0))
+    found = seen(tracker.track(draw(discs_of_fish(0.005, 0.0, 0.0)[:2]), 0.033))
+    assert found.tail is None
+    assert found.head.x == pytest.approx(0.005, abs=5e-4)
+
+
+def test_a_fish_with_its_tail_colours_in_another_order_is_another(tracker: Tracker) -> None:
+    names = {"odd": "even", "even": "odd"}
+    other = [(x, y, d, names.get(c, c)) for x, y, d, c in discs_of_fish(0.0, 0.0, 0.0)]
+    assert reason(tracker.track(draw(other), 0.0)) == Reason.FOREIGN
+
+
+def test_markers_a_tenth_nearer_to_each_other_are_another_fish(tracker: Tracker) -> None:
+    front, rear, *tail = discs_of_fish(0.0, 0.0, 0.0)
+    other = [(front[0] - 0.009, *front[1:]), rear, *tail]
+    found = tracker.track(draw(other), 0.0)
+    assert reason(found) == Reason.NO_PAIR
+    assert found.spacing == pytest.approx(-0.1, abs=0.005)
+
+
+@pytest.mark.parametrize("factor", [0.95, 1.05])
+def test_a_wrong_focal_length_is_refused_and_measured(factor: float) -> None:
+    """Poses would be 5 % of the distance from the middle off: 95 mm at x = 1.9 m."""
+    width, height, model, k, d = lens_fields()
+    k = [k[0] * factor, *k[1:4], k[4] * factor, *k[5:]]
+    wrong = Calibration(Lens.from_camera_info(width, height, model, k, d), CONFIG.mount())
+    found = Tracker(CONFIG, wrong).track(draw(discs_of_fish(1.5, 0.5, 1.0)), 0.0)
+    assert reason(found) == Reason.NO_PAIR
+    assert found.spacing == pytest.approx(1 / factor - 1, abs=0.01)
+
+
+def test_toys_of_the_right_colours_beside_the_fish_are_not_taken_for_it(tracker: Tracker) -> None:
+    toys = [(0.7, 0.3, 0.03, "front"), (0.79, 0.3, 0.03, "rear"), (0.0, 0.1, 0.03, "front")]
+    fish = discs_of_fish(0.0, 0.0, 0.3)
+    assert seen(tracker.track(draw(toys + fish), 0.0)).head.x == pytest.approx(0.0, abs=5e-4)
+    assert isinstance(tracker.track(draw(toys), 0.03), Lost)
+    assert isinstance(tracker.track(draw(toys), 1.0), Lost)
+
+
+def test_a_mirror_image_in_the_wall_is_not_the_fish(tracker: Tracker) -> None:
+    """The wall stands at y = 1.065 m."""
+    ours = discs_of_fish(0.4, 1.02, 0.3)
+    image = [(x, 2.13 - y, d, c) for x, y, d, c in ours]
+    assert seen(tracker.track(draw(ours + image), 0.0)).head.y == pytest.approx(1.02, abs=5e-4)
+    assert isinstance(tracker.track(draw(image), 0.03), Lost)
 
 
 @pytest.mark.parametrize(
@@ -129,14 +230,16 @@ def test_a_fish_without_marked_tail() -> None:
     assert seen(tracker.track(draw(discs_of_fish(0.3, 0.3, 2.0, ())), 0.0)).tail is None
 
 
-def test_a_half_hidden_marker_makes_the_pose_less_certain(tracker: Tracker) -> None:
+@pytest.mark.parametrize("edge", [0.045, 0.043, 0.050])
+def test_the_rim_gives_the_middle_of_a_half_hidden_marker(tracker: Tracker, edge: float) -> None:
+    """A white board over the front marker, whose middle is 0.045 m ahead, from `edge` on."""
     picture = draw(discs_of_fish(0.0, 0.0, 0.0))
-    free = seen(tracker.track(picture, 0.0))
-    picture[:360, 640:] = 255  # white over the upper half of the front marker
-    half = seen(tracker.track(picture, 0.0))
-    assert half.head.covariance[2, 2] > 9 * free.head.covariance[2, 2]
-    error = abs(half.head.heading - free.head.heading)
-    assert 0.005 < error < 3.5 * np.sqrt(half.head.covariance[2, 2])
+    seen(tracker.track(picture, 0.0))
+    picture[:, 640 + round(SCALE * edge) :] = 255
+    half = seen(tracker.track(picture, 0.033))
+    assert half.head.x == pytest.approx(0.0, abs=6e-4)
+    assert abs(half.head.heading) < 4.0 * np.sqrt(half.head.covariance[2, 2])
+    assert half.head.heading == pytest.approx(0.0, abs=0.02)
 
 
 def test_a_pose_outside_the_pool_is_refused() -> None:
@@ -182,3 +285,60 @@ def test_the_annotated_picture_says_why_there_is_no_pose(tracker: Tracker) -> No
     drawn = annotated(picture, tracker.track(picture, 0.0), CONFIG, calibration())
     text = drawn[:34].astype(int)
     assert np.any(text[..., 2] - text[..., 1] > 150)  # in red
+
+
+def cast(picture: np.ndarray, red: float, blue: float, level: float = 1.0) -> np.ndarray:
+    """The picture under a light with these gains."""
+    return np.clip(picture * np.array([blue, 1.0, red]) * level, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("red", "blue"), [(1.25, 0.65), (1.3, 0.6), (0.7, 1.3)])
+def test_a_light_of_another_colour_is_found_within_a_second(
+    tracker: Tracker, red: float, blue: float
+) -> None:
+    picture = cast(draw(discs_of_fish(0.3, 0.2, 1.0, (0.2, 0.1, 0.0))), red, blue)
+    found = [tracker.track(picture, k / 30) for k in range(30)]
+    assert all(isinstance(f, Detection) for f in found[20:])
+    assert seen(found[-1]).head.x == pytest.approx(0.3, abs=1e-3)
+
+
+def test_colours_follow_a_light_that_turns_warm_and_dark(tracker: Tracker) -> None:
+    picture = draw(discs_of_fish(0.3, 0.2, 1.0))
+    for k in range(240):
+        warm = k / 240
+        light = cast(picture, 1.0 + 0.3 * warm, 1.0 - 0.5 * warm, 1.0 - 0.5 * warm)
+        seen(tracker.track(light, k / 30))
+    assert tracker.hue_shifts["rear"] > 5.0
+
+
+def test_colours_go_no_further_than_they_may() -> None:
+    config = replace(CONFIG, hue_shift_max=4)
+    tracker = Tracker(config, calibration())
+    picture = draw(discs_of_fish(0.3, 0.2, 1.0))
+    for k in range(240):
+        tracker.track(cast(picture, 1.0 + 0.5 * k / 240, 1.0 - 0.6 * k / 240), k / 30)
+    assert max(map(abs, tracker.hue_shifts.values())) <= 4.0
+
+
+def test_another_light_is_not_found_in_toys(tracker: Tracker) -> None:
+    """A head without a tail teaches no colours."""
+    picture = cast(draw(discs_of_fish(0.3, 0.2, 1.0)[:2]), 1.25, 0.65)
+    assert all(isinstance(tracker.track(picture, k / 30), Lost) for k in range(30))
+    assert set(tracker.hue_shifts.values()) == {0.0}
+
+
+def test_two_fish_of_ours_are_told_apart_by_their_colours() -> None:
+    """One tracker each; the second fish has a blue front and an orange rear marker."""
+    first = Tracker(CONFIG, calibration())
+    second = Tracker(
+        replace(CONFIG, front_colour=(108, 120, 150, 90), rear_colour=(10, 19, 110, 90)),
+        calibration(),
+    )
+    names = {"front": "blue", "rear": "orange"}
+    for k in range(20):  # they pass each other 0.1 m apart
+        x = 0.03 * (k - 10)
+        other = discs_of_fish(-x, 0.1, pi)
+        both = discs_of_fish(x, 0.0, 0.0) + [(*d[:3], names.get(d[3], d[3])) for d in other]
+        picture = draw(both)
+        assert seen(first.track(picture, k / 30)).head.x == pytest.approx(x, abs=5e-4)
+        assert seen(second.track(picture, k / 30)).head.x == pytest.approx(-x, abs=5e-4)

@@ -51,6 +51,9 @@ class FishShape:
     rear_marker: float = -0.045
     marker_diameter: float = 0.030
     tail_marker_diameter: float = 0.016
+    front_colour: Colour = FRONT
+    rear_colour: Colour = REAR
+    tail_colours: tuple[Colour, ...] = TAIL_COLOURS  # of links 1, 2, ...; repeated
 
 
 @dataclass(frozen=True)
@@ -83,12 +86,12 @@ def markers(pose: FishPose, shape: FishShape) -> list[tuple[Array, float, Colour
     """Centre (2,) in the pool frame, m, diameter, m, colour: front, rear, then the far end of each link."""
     origin, ahead = np.array([pose.x, pose.y]), np.array([cos(pose.heading), sin(pose.heading)])
     head = [
-        (origin + shape.front_marker * ahead, shape.marker_diameter, FRONT),
-        (origin + shape.rear_marker * ahead, shape.marker_diameter, REAR),
+        (origin + shape.front_marker * ahead, shape.marker_diameter, shape.front_colour),
+        (origin + shape.rear_marker * ahead, shape.marker_diameter, shape.rear_colour),
     ]
     hinges, _ = joints(pose, shape)
     return head + [
-        (h, shape.tail_marker_diameter, TAIL_COLOURS[i % len(TAIL_COLOURS)])
+        (h, shape.tail_marker_diameter, shape.tail_colours[i % len(shape.tail_colours)])
         for i, h in enumerate(hinges[1:])
     ]
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.camera.fish import FishPose, FishShape, patches, silhouette
+from fish_sim.camera.fish import FishPose, FishShape, Patch, patches, silhouette
 from fish_sim.camera.model import CameraModel
 from fish_sim.camera.water import DEPTH, moving_light, still_pool, vignette
 
@@ -53,19 +53,41 @@ class PoolRenderer:
         self._picture, self._light = np.empty_like(self._pool), np.empty_like(self._pool)
         self._grey = np.empty(self._pool.shape[:2], np.uint8)
 
-    def render(self, poses: Sequence[FishPose], time: float) -> Image:
+    def render(
+        self,
+        poses: Sequence[FishPose],
+        time: float,
+        below: Sequence[Sequence[Patch]] = (),
+        above: Sequence[Sequence[Patch]] = (),
+    ) -> Image:
         """(height, width, 3) picture, blue green red.
 
         Args:
             poses: the fish at equal parts of the exposure (one pose = no motion blur, none = empty pool).
             time: s, moves the light on the water.
+            below: other things in the water, drawn under the fish: another fish, a toy.
+            above: things over the fish, such as a bar that hides part of it.
         """
         picture = self._picture
         self._add_light(self._pool, self._caustics.at(time), picture)
-        if poses:
-            self._draw_fish(picture, poses)
+        self.draw(picture, poses, below, above)
         self._add_light(picture, self._glare.at(time), picture)
         return self._with_noise(picture)
+
+    def draw(
+        self,
+        picture: Image,
+        poses: Sequence[FishPose],
+        below: Sequence[Sequence[Patch]] = (),
+        above: Sequence[Sequence[Patch]] = (),
+    ) -> None:
+        """Draw the fish and other things into a picture of this camera, without glare and noise."""
+        for thing in below:
+            self._draw_thing(picture, thing)
+        if poses:
+            self._draw_fish(picture, poses)
+        for thing in above:
+            self._draw_thing(picture, thing)
 
     def _add_light(self, picture: Image, coarse: Image, result: Image) -> None:
         cv2.resize(coarse, self.camera.size, dst=self._grey)
@@ -98,6 +120,26 @@ class PoolRenderer:
             one_colour, one_cover = _fill(fish, box)
             colour += one_colour / len(shapes)
             cover += one_cover / len(shapes)
+        self._lay(picture, view, colour, cover, box)
+
+    def _draw_thing(self, picture: Image, thing: Sequence[Patch]) -> None:
+        """The patches of one thing at rest, without a shadow."""
+        outlines = [(self._pixels(patch.outline, 0.0), patch.colour) for patch in thing]
+        box = _box(np.vstack([outline for outline, _ in outlines]), self.camera.size)
+        if box is not None:
+            view = picture[box[1] : box[3], box[0] : box[2]].astype(np.float32)
+            self._lay(picture, view, *_fill(outlines, box), box)
+
+    def _lay(
+        self,
+        picture: Image,
+        view: Array,
+        colour: Array,
+        cover: Array,
+        box: tuple[int, int, int, int],
+    ) -> None:
+        """Put colour (h, w, 3), weighted with its cover (h, w), over a view of the picture in a box."""
+        left, top, right, bottom = box
         light = self._light_share[top:bottom, left:right, None]
         view = view * (1.0 - cover[..., None]) + colour * light
         picture[top:bottom, left:right] = np.clip(view + 0.5, 0, 255).astype(np.uint8)
@@ -148,7 +190,7 @@ def _canvas(box: tuple[int, int, int, int], *channels: int) -> Image:
 
 
 def _fill(
-    fish: list[tuple[Array, tuple[int, int, int]]], box: tuple[int, int, int, int]
+    fish: Sequence[tuple[Array, tuple[int, int, int]]], box: tuple[int, int, int, int]
 ) -> tuple[Array, Array]:
     """Colour times cover (h, w, 3) and cover (h, w) of the fish in the patch, antialiased."""
     colour, cover = _canvas(box, 3), _canvas(box)

@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""calibrate lens | mount: make the two files that tell the tracker about its camera."""
+"""calibrate lens | mount | colours: make the files that tell the tracker about its camera and its light."""
 
 import argparse
 import csv
@@ -13,7 +13,9 @@ import numpy as np
 import yaml
 
 from fish_vision.calibrate import lens_from_chessboards, mount_from_points
-from fish_vision.calibration import CalibrationError, lens_document, read_lens
+from fish_vision.calibration import Calibration, CalibrationError, lens_document, read_lens
+from fish_vision.colour_ranges import drawn, propose
+from fish_vision.config import TrackerConfig, config_from_file
 
 RMS_LIMIT = 5.0  # pixels; worse points are swapped or mistyped
 
@@ -21,6 +23,12 @@ RMS_LIMIT = 5.0  # pixels; worse points are swapped or mistyped
 def arguments() -> argparse.ArgumentParser:
     """Command line."""
     parser = argparse.ArgumentParser(prog="calibrate", description=__doc__)
+    add_verbs(parser)
+    return parser
+
+
+def add_verbs(parser: argparse.ArgumentParser) -> None:
+    """Sub-commands of calibrate; each sets `calibrate`, the function to call."""
     verbs = parser.add_subparsers(required=True)
     lens = verbs.add_parser("lens", help="camera matrix and distortion from chessboard pictures")
     lens.add_argument("pictures", nargs="+", type=Path)
@@ -29,7 +37,7 @@ def arguments() -> argparse.ArgumentParser:
     lens.add_argument(
         "--out", type=Path, default=Path("lens.yaml"), help="calibration_file of the camera node"
     )
-    lens.set_defaults(run=calibrate_lens)
+    lens.set_defaults(calibrate=calibrate_lens)
     mount = verbs.add_parser(
         "mount", help="position and tilt of the camera from known points of the pool"
     )
@@ -41,8 +49,20 @@ def arguments() -> argparse.ArgumentParser:
     mount.add_argument(
         "--out", type=Path, default=Path("mount.yaml"), help="params file for the tracker"
     )
-    mount.set_defaults(run=calibrate_mount)
-    return parser
+    mount.set_defaults(calibrate=calibrate_mount)
+    colours = verbs.add_parser(
+        "colours", help="colour ranges from pictures that show the fish with all its markers"
+    )
+    colours.add_argument("pictures", nargs="+", type=Path)
+    colours.add_argument("--lens", required=True, type=Path, help="camera calibration file (YAML)")
+    colours.add_argument("--params", type=Path, help="params file of the tracker with the mount")
+    colours.add_argument(
+        "--out", type=Path, default=Path("colours.yaml"), help="params file for the tracker"
+    )
+    colours.add_argument(
+        "--picture", type=Path, default=Path("colours.png"), help="the first fish found, marked"
+    )
+    colours.set_defaults(calibrate=calibrate_colours)
 
 
 def new_file(path: Path) -> Path:
@@ -92,6 +112,44 @@ def calibrate_mount(args: argparse.Namespace) -> None:
     )
 
 
+def calibrate_colours(args: argparse.Namespace) -> None:
+    """Write a params file with the four colours, and a picture of what they were taken from."""
+    out, marked = new_file(args.out), new_file(args.picture)
+    try:
+        config = config_from_file(args.params) if args.params else TrackerConfig()
+    except ValueError as error:
+        raise CalibrationError(str(error)) from error
+    lens = read_lens(args.lens)
+    calibration = Calibration(lens, config.mount(), config.marker_height)
+    pictures = [read_picture(path) for path in args.pictures]
+    for path, picture in zip(args.pictures, pictures, strict=True):
+        if picture.shape[1::-1] != lens.size:
+            raise CalibrationError(
+                f"{path}: size {picture.shape[1::-1]}, but {args.lens} says {lens.size}"
+            )
+    ranges, sightings = propose(pictures, config, calibration)
+    first = next(i for i, sighting in enumerate(sightings) if sighting)
+    write_picture(marked, drawn(pictures[first], sightings[first]))
+    values = {f"{marker}_colour": colour for marker, colour in ranges.items()}
+    out.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
+    for name, colour in values.items():
+        print(f"{name:17s} {colour}")
+    found = sum(sighting is not None for sighting in sightings)
+    print(f"{out}: fish found in {found} of {len(pictures)} pictures; {marked} shows the first")
+
+
+def write_picture(path: Path, picture: np.ndarray) -> None:
+    """Picture to a file; CalibrationError if that cannot be."""
+    try:
+        written = cv2.imwrite(str(path), picture)
+    except cv2.error as error:
+        raise CalibrationError(
+            f"{path}: no name of a picture, expected like checked.png ({error.err})"
+        ) from error
+    if not written:
+        raise CalibrationError(f"{path}: cannot be written")
+
+
 def read_picture(path: Path) -> np.ndarray:
     """Picture from a file."""
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
@@ -124,7 +182,7 @@ def main() -> int:
     """Entry point."""
     args = arguments().parse_args()
     try:
-        args.run(args)
+        args.calibrate(args)
     except (CalibrationError, OSError) as error:
         print(f"calibrate: {error}", file=sys.stderr)
         return 1

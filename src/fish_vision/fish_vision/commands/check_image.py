@@ -6,12 +6,11 @@ import argparse
 import sys
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, read_lens
-from fish_vision.commands.calibrate import read_picture
+from fish_vision.commands.calibrate import read_picture, write_picture
 from fish_vision.config import TrackerConfig, config_from_file
 from fish_vision.segmentation import hsv_of
 from fish_vision.spots import SpotFinder
@@ -59,18 +58,6 @@ def check(args: argparse.Namespace) -> int:
     return 1 if isinstance(found, Lost) else 0
 
 
-def write_picture(path: Path, picture: np.ndarray) -> None:
-    """Picture to a file; ValueError if that cannot be."""
-    try:
-        written = cv2.imwrite(str(path), picture)
-    except cv2.error as error:
-        raise ValueError(
-            f"{path}: no name of a picture, expected like checked.png ({error.err})"
-        ) from error
-    if not written:
-        raise ValueError(f"{path}: cannot be written")
-
-
 def print_colours(picture: np.ndarray, config: TrackerConfig, calibration: Calibration) -> None:
     """For each marker colour: pixels in range, their middle colour, spots of the right size."""
     hsv = hsv_of(picture, (0, 0, picture.shape[1], picture.shape[0]))
@@ -78,7 +65,9 @@ def print_colours(picture: np.ndarray, config: TrackerConfig, calibration: Calib
     for marker in MARKERS:
         inside = hsv[config.colour(marker).mask(hsv) > 0]
         middle = np.median(inside, axis=0).astype(int).tolist() if len(inside) else "none"
-        spots = [np.round(spot.position, 3).tolist() for spot in finder.find(hsv, marker, (0, 0))]
+        spots = [
+            np.round(spot.position, 3).tolist() for spot in finder.find(hsv, [marker], (0, 0))[0]
+        ]
         print(
             f"{marker:9s} {len(inside):6d} pixels in range, middle HSV {middle}, spots at {spots}"
         )

@@ -165,6 +165,9 @@ class TrackerNode(Node):
         status.values = [
             KeyValue(key=key, value=value) for key, value in self._statistics.values().items()
         ]
+        if self._tracker is not None:
+            shifts = " ".join(f"{name} {v:+.0f}" for name, v in self._tracker.hue_shifts.items())
+            status.values.append(KeyValue(key="hue_shifts", value=shifts))
         stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
 
@@ -183,6 +186,11 @@ class TrackerNode(Node):
             return DiagnosticStatus.ERROR, self._calibration_error
         if refused:
             return DiagnosticStatus.ERROR, refused
+        if (error := statistics.refused_spacing()) is not None:
+            return DiagnosticStatus.ERROR, (
+                f"no poses: the head's markers seem {100 * error:+.1f} % too far apart in every image: the focal length "
+                "of camera_info, the height of camera_position or the markers' places are wrong by so much; run calibrate"
+            )
         if images == 0:
             return DiagnosticStatus.WARN, "no image in the last second"
         if (error := statistics.spacing_error()) is not None:

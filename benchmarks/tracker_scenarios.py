@@ -1,0 +1,386 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Accuracy, wrong poses and speed of the tracker, 1920 x 1080 over 4.27 m, with rival fish, toys and reflections.
+
+    python benchmarks/tracker_scenarios.py [--frames 1000] [--speed 600] [--only NAME ...]
+
+A pose is wrong if it is more than 20 mm or 10 degrees from the own fish, also while that is hidden. Every scenario runs
+in episodes of 10 s with a new tracker. Prints for each the share of frames with a right pose, the wrong poses, and the
+errors of the right ones; then frames a second of processor time beside a plain OpenCV pipeline on the same pictures.
+"""
+
+import argparse
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import cos, degrees, hypot, pi, radians, sin
+from time import thread_time
+
+import cv2
+import numpy as np
+
+from fish_sim.camera import CameraConfig, FishPose, FishShape, Patch, PoolRenderer, patches
+from fish_sim.pool import WIDTH
+from fish_vision.calibration import Calibration, Lens
+from fish_vision.config import TrackerConfig
+from fish_vision.picture import from_compressed
+from fish_vision.pose import wrap
+from fish_vision.tracker import Detection, Tracker
+
+HD = CameraConfig(width=1920, height=1080, focal=(1500.0, 1500.0), centre=(951.0, 549.0))
+TRACKER = TrackerConfig()
+SHAPE = FishShape()
+RATE, EPISODE = 30.0, 300  # frames/s, frames of one tracker
+ALONE_S = 0.5  # s until the other fish of the same look comes
+FAR, TURNED = 0.020, radians(10.0)  # a pose further off is wrong
+DARK, WHITE = (58, 56, 54), (215, 215, 212)
+Thing = Sequence[Patch]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What one frame shows: the own fish over the exposure, things below and above it."""
+
+    poses: list[FishPose]
+    below: list[Thing]
+    above: list[Thing]
+    drawn: bool = True  # False: the own fish is not in the pool
+    light: tuple[float, float, float] = (1.0, 1.0, 1.0)  # gains of blue, green, red
+
+
+def swim(t: float, phase: float) -> FishPose:
+    """A fish that swims to and fro, its head swinging at 2 Hz."""
+    t = t + 40.0 * phase
+    course = 0.47 * t + phase
+    heading = course + 0.25 * sin(4 * pi * t)
+    x, y = 1.6 * sin(0.11 * t + phase), 0.65 * sin(0.23 * t + 2.0 * phase)
+    return FishPose(x, y, wrap(heading), tuple(0.2 * sin(9 * t - i) for i in range(3)))
+
+
+def exposure(t: float, phase: float) -> list[FishPose]:
+    """Two poses in an exposure of 4 ms."""
+    return [swim(t - 0.001, phase), swim(t + 0.001, phase)]
+
+
+def rectangle(x: float, y: float, wide: float, high: float, colour: tuple[int, int, int]) -> Thing:
+    """A board at rest, middle at x, y, m."""
+    a, b = wide / 2, high / 2
+    return [
+        Patch(np.array([[x - a, y - b], [x + a, y - b], [x + a, y + b], [x - a, y + b]]), colour)
+    ]
+
+
+def disc(x: float, y: float, diameter: float, colour: tuple[int, int, int]) -> Patch:
+    """A disc, m."""
+    angles = np.linspace(0.0, 2 * pi, 24, endpoint=False)
+    return Patch(
+        np.array([x, y]) + diameter / 2 * np.column_stack([np.cos(angles), np.sin(angles)]), colour
+    )
+
+
+def clean(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """The fish alone."""
+    return Scene(exposure(t, phase), [], [])
+
+
+def warm(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """The fish alone under a warm light from the start."""
+    return Scene(exposure(t, phase), [], [], light=(0.65, 1.0, 1.25))
+
+
+def bars_near(t: float, phase: float) -> list[tuple[float, float]]:
+    """Middles of those bars that may lie over the fish."""
+    own = swim(t, phase)
+    return [(0.13 * k, own.y) for k in range(-16, 17) if abs(0.13 * k - own.x) < 0.2]
+
+
+def bars(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """Dark bars of 18 mm across the pool, which hide parts of the markers."""
+    return Scene(
+        exposure(t, phase),
+        [],
+        [rectangle(x, y, 0.018, 0.3, DARK) for x, y in bars_near(t, phase)],
+    )
+
+
+def twin(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """Another fish of the same look crosses the own one's way every few seconds, at the least distance 0.11 m."""
+    own, other = swim(t, phase), swim(t, phase + 1.7)
+    s = 0.5 - 0.5 * cos(1.3 * t)  # 1: where they meet
+    meeting = FishPose(
+        own.x + (1 - s) * (other.x - own.x) + 0.11 * sin(2.1 * t),
+        own.y + (1 - s) * (other.y - own.y) + 0.11 * cos(2.1 * t),
+        other.heading,
+        other.tail,
+    )
+    return Scene(exposure(t, phase), [patches(meeting, SHAPE)] if t > ALONE_S else [], [])
+
+
+def hidden(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """The own fish goes under a board for 2 s of every 5 s while another of the same look swims in view."""
+    own, other = swim(t, phase), swim(t, phase + 1.7)
+    board = [rectangle(own.x, own.y, 0.5, 0.5, WHITE)] if (t % 5.0) > 3.0 else []
+    return Scene(exposure(t, phase), [patches(other, SHAPE)] if t > ALONE_S else [], board)
+
+
+def lookalike(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """A fish with markers 80 mm apart and none on its tail; ours is in the pool after 5 s only."""
+    other = FishShape(front_marker=0.040, rear_marker=-0.040, tail_colours=((62, 62, 62),))
+    return Scene(exposure(t, phase), [patches(swim(t, phase + 1.7), other)], [], drawn=t > 5.0)
+
+
+def toys(t: float, phase: float, random: np.random.Generator) -> Scene:
+    """Discs of the markers' colours all over the pool, some about as far apart as the head's; bars over the fish."""
+    things: list[Thing] = []
+    for _ in range(12):
+        x, y, turn = random.uniform([-1.9, -0.9, -pi], [1.9, 0.9, pi])
+        gap = random.uniform(0.06, 0.14)
+        things.append(
+            [
+                disc(x, y, 0.05, DARK),
+                disc(x, y, random.uniform(0.02, 0.04), SHAPE.front_colour),
+                disc(x + gap * cos(turn), y + gap * sin(turn), 0.05, DARK),
+                disc(
+                    x + gap * cos(turn),
+                    y + gap * sin(turn),
+                    random.uniform(0.02, 0.04),
+                    SHAPE.rear_colour,
+                ),
+            ]
+        )
+    own = swim(t, phase)
+    board = [rectangle(own.x, own.y, 0.5, 0.5, WHITE)] if (t % 5.0) > 4.0 else []
+    return Scene(exposure(t, phase), things, board)
+
+
+def reflection(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """The fish swims along a wall that mirrors it; a board hides it at times, the mirror image stays."""
+    poses = [
+        FishPose(p.x, WIDTH / 2 - 0.06 + 0.03 * sin(0.9 * t + phase), 0.3 * sin(3 * t), p.tail)
+        for p in exposure(t, phase)
+    ]
+    image = [
+        Patch(patch.outline * [1.0, -1.0] + [0.0, WIDTH], tuple(int(0.8 * c) for c in patch.colour))
+        for patch in patches(poses[0], SHAPE)
+    ]
+    own = poses[0]
+    above = [rectangle(own.x, own.y - 0.2, 0.5, 0.46, WHITE)] if (t % 4.0) > 3.0 else []
+    return Scene(poses, [image], above)
+
+
+def swapped(t: float, phase: float, _: np.random.Generator) -> Scene:
+    """Front and rear marker mistaken for each other; the tail is under water weed."""
+    own = swim(t, phase)
+    end = np.array([own.x, own.y]) - 0.115 * np.array([cos(own.heading), sin(own.heading)])
+    mistaken = replace(SHAPE, front_colour=SHAPE.rear_colour, rear_colour=SHAPE.front_colour)
+    fish = [*patches(own, mistaken), disc(end[0], end[1], 0.09, DARK)]
+    return Scene([own], [fish], [], drawn=False)
+
+
+Scenario = Callable[[float, float, np.random.Generator], Scene]
+ALONE: dict[str, tuple[Scenario, float]] = {  # name -> scenario, strength of the glare
+    "clean": (clean, 0.0),
+    "glare": (clean, 1.0),
+    "bars": (bars, 0.0),
+    "warm": (warm, 0.0),
+}
+RIVALS: dict[str, tuple[Scenario, float]] = {
+    "twin": (twin, 0.0),
+    "hidden": (hidden, 0.0),
+    "lookalike": (lookalike, 0.0),
+    "toys": (toys, 0.0),
+    "reflection": (reflection, 0.0),
+    "swapped": (swapped, 0.0),
+}
+
+
+class Studio:
+    """The camera with what it takes to track in its pictures.
+
+    One picture of the still pool serves all frames: only what is drawn gets fresh noise and JPEG, which costs a tenth
+    of whole pictures. With glare, which moves, every picture is whole.
+    """
+
+    def __init__(self, glare: float) -> None:
+        config = replace(HD, glare=glare)
+        self.calibration, self.renderer = camera(config)
+        self.whole = glare > 0.0
+        self.random = np.random.default_rng(0)
+        pool = PoolRenderer(config.model(), config.shape(), replace(config.look(), noise_std=0.0))
+        self.still = pool.render([], 0.0).copy()
+        self.taken = self._sent(self.renderer.render([], 0.0))
+
+    def picture(self, scene: Scene, time: float) -> np.ndarray:
+        """What the tracker gets."""
+        poses = scene.poses if scene.drawn else []
+        if self.whole:
+            return self._sent(self.renderer.render(poses, time, scene.below, scene.above))
+        clean, result = self.still.copy(), self.taken.copy()
+        self.renderer.draw(clean, poses, scene.below, scene.above)
+        outlines = [patch.outline for pose in poses for patch in patches(pose, SHAPE)]
+        things = [outlines] if outlines else []
+        things += [[patch.outline for patch in thing] for thing in (*scene.below, *scene.above)]
+        for thing in things:
+            left, top, right, bottom = self._blocks(np.vstack(thing))
+            part = clean[top:bottom, left:right]
+            if part.size:
+                noise = self.random.normal(0.0, 3.0, part.shape)
+                noisy = np.clip(np.round(part + noise), 0, 255).astype(np.uint8)
+                result[top:bottom, left:right] = self._sent(noisy)
+        return (
+            result if scene.light == (1.0, 1.0, 1.0) else cv2.multiply(result, (*scene.light, 1.0))
+        )
+
+    def _blocks(self, outline: np.ndarray) -> tuple[int, int, int, int]:
+        """Box around an outline that ends between JPEG's blocks of 16 pixels."""
+        pixels = self.calibration.pool_to_pixel(outline)
+        low = np.maximum(np.floor((pixels.min(axis=0) - 6) / 16).astype(int) * 16, 0)
+        high = np.ceil((pixels.max(axis=0) + 6) / 16).astype(int) * 16
+        right, bottom = np.clip(high, 0, self.calibration.lens.size)
+        return int(low[0]), int(low[1]), int(right), int(bottom)
+
+    def _sent(self, picture: np.ndarray) -> np.ndarray:
+        """The picture after JPEG."""
+        return from_compressed(self.renderer.jpeg(picture), picture.shape[1::-1])
+
+    def frames(self, scenario: Scenario, count: int) -> Iterator[tuple[int, Scene, np.ndarray]]:
+        """Number in its episode, scene and picture of each frame."""
+        for k in range(count):
+            episode, frame = divmod(k, EPISODE)
+            scene = scenario(frame / RATE, 0.37 * episode, np.random.default_rng(episode))
+            yield frame, scene, self.picture(scene, k / RATE)
+
+
+def camera(config: CameraConfig) -> tuple[Calibration, PoolRenderer]:
+    """The tracker's and the renderer's side of a camera."""
+    model = config.model()
+    lens = Lens.from_camera_info(
+        *model.size, "plumb_bob", model.K.ravel().tolist(), model.D.tolist()
+    )
+    return (
+        Calibration(lens, TRACKER.mount()),
+        PoolRenderer(model, config.shape(), config.look()),
+    )
+
+
+@dataclass
+class Score:
+    """Right and wrong poses of a scenario and the errors of the right ones (N, 2): m, rad."""
+
+    frames: int
+    wrong: int
+    errors: np.ndarray
+    lost: Counter[str]
+
+    def line(self, name: str) -> str:
+        """One row of the table."""
+        head = f"{name:11s} {self.frames:6d} {100 * len(self.errors) / self.frames:7.2f} % {self.wrong:6d}"
+        if not len(self.errors):
+            return f"{head}   {dict(self.lost)}"
+        rms = np.sqrt(np.mean(self.errors**2, axis=0))
+        most = np.percentile(np.abs(self.errors), 99, axis=0)
+        return (
+            f"{head} {1e3 * rms[0]:7.2f} {1e3 * most[0]:7.2f} {degrees(rms[1]):8.3f} "
+            f"{degrees(most[1]):8.3f}   {dict(self.lost)}"
+        )
+
+
+def score(studio: Studio, scenario: Scenario, count: int) -> Score:
+    """Run one scenario."""
+    errors, wrong, lost, tracker = [], 0, Counter[str](), Tracker(TRACKER, studio.calibration)
+    for frame, scene, picture in studio.frames(scenario, count):
+        if frame == 0:
+            tracker = Tracker(TRACKER, studio.calibration)
+        found = tracker.track(picture, frame / RATE)
+        if not isinstance(found, Detection):
+            lost[found.reason.value] += 1
+            continue
+        x, y = np.mean([[p.x, p.y] for p in scene.poses], axis=0)
+        heading = (
+            scene.poses[0].heading + wrap(scene.poses[-1].heading - scene.poses[0].heading) / 2
+        )
+        off = hypot(found.head.x - x, found.head.y - y), wrap(found.head.heading - heading)
+        if off[0] > FAR or abs(off[1]) > TURNED or (not scene.drawn and scenario is not swapped):
+            wrong += 1
+        else:
+            errors.append(off)
+    return Score(count, wrong, np.array(errors), lost)
+
+
+class PlainPipeline:
+    """What a first program with OpenCV does: undistort, HSV, four masks, largest contours, their moments."""
+
+    def __init__(self, calibration: Calibration) -> None:
+        lens = calibration.lens
+        self.maps = cv2.initUndistortRectifyMap(
+            lens.K, lens.D, None, lens.K, lens.size, cv2.CV_16SC2
+        )
+        self.H = np.linalg.inv(calibration.H)
+
+    def pose(self, picture: np.ndarray) -> tuple[np.ndarray, float] | None:
+        """Middle of the head's markers (2,), m, and heading, rad."""
+        flat = cv2.remap(picture, *self.maps, cv2.INTER_LINEAR)
+        hsv = cv2.cvtColor(flat, cv2.COLOR_BGR2HSV)
+        middles = []
+        for marker in ("front", "rear", "tail_odd", "tail_even"):
+            mask = TRACKER.colour(marker).mask(hsv)
+            contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+            if not contours:
+                return None
+            m = cv2.moments(max(contours, key=cv2.contourArea))
+            if not m["m00"]:
+                return None
+            middles.append(self.H @ [m["m10"] / m["m00"], m["m01"] / m["m00"], 1.0])
+        front, rear, *_ = (place[:2] / place[2] for place in middles)
+        return (front + rear) / 2, float(np.arctan2(*(front - rear)[::-1]))
+
+
+def speed(count: int) -> None:
+    """Frames a second of processor time in the region of interest, and of the plain pipeline, for two sizes."""
+    for config in (CameraConfig(), HD):
+        calibration, renderer = camera(replace(config, glare=0.0))
+        tracker, plain, times = Tracker(TRACKER, calibration), PlainPipeline(calibration), []
+        for frame in range(count):
+            picture = renderer.render(exposure(frame / RATE, 0.0), frame / RATE)
+            start = thread_time()
+            found = tracker.track(picture, frame / RATE)
+            between = thread_time()
+            plain.pose(picture)
+            if isinstance(found, Detection) and not found.whole_image:
+                times.append((between - start, thread_time() - between))
+        own, other = np.median(times, axis=0)
+        print(
+            f"{config.width} x {config.height}: tracker {1 / own:.0f} frames/s, plain OpenCV pipeline "
+            f"{1 / other:.0f} frames/s, ratio {other / own:.1f} (medians of {len(times)} frames)"
+        )
+
+
+def main() -> None:
+    """Run what is asked and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--frames", type=int, default=1000, help="of each scenario")
+    parser.add_argument("--speed", type=int, default=600, help="frames of the speed measurement")
+    parser.add_argument("--only", nargs="*", default=[*ALONE, *RIVALS], help="scenarios")
+    args = parser.parse_args()
+    cv2.setNumThreads(1)
+    if args.speed:
+        speed(args.speed)
+    print(f"{'scenario':11s} frames    right  wrong  mm rms     p99  deg rms      p99   lost")
+    studios: dict[float, Studio] = {}
+    total = Counter[str]()
+    for name in args.only:
+        scenario, glare = (ALONE | RIVALS)[name]
+        studio = studios.get(glare) or studios.setdefault(glare, Studio(glare))
+        result = score(studio, scenario, args.frames)
+        print(result.line(name), flush=True)
+        if name in RIVALS:
+            total["frames"] += result.frames
+            total["wrong"] += result.wrong
+    if total["frames"]:
+        print(f"wrong poses with rivals: {total['wrong']} of {total['frames']}")
+
+
+if __name__ == "__main__":
+    main()

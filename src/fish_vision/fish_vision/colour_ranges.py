@@ -1,0 +1,130 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Colour ranges of the markers proposed from pictures: the fish is found by the places of its markers, whatever their colours."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from fish_vision.calibration import Calibration, CalibrationError
+from fish_vision.colours import MARKERS
+from fish_vision.config import TrackerConfig
+from fish_vision.heads import Head, HeadFinder
+from fish_vision.pose import link_ends
+from fish_vision.segmentation import HUES, Image, hsv_of
+from fish_vision.spots import SpotFinder
+
+WATER_WIDTH = 12  # half degrees around the commonest hue that count as water
+SATURATION_LEAST, VALUE_LEAST = 80, 70  # of a marker
+MIDDLE = 0.35  # share of a marker's diameter around its middle whose pixels are measured
+HUE_MARGIN = 8  # half degrees beyond the hues seen
+LEVEL_SHARE = 0.6  # share of the least saturation and value seen
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """Where a picture shows the markers: pixels (u, v) and radius, in the order of MARKERS; links repeat."""
+
+    marks: tuple[tuple[str, float, float, float], ...]  # marker, u, v, radius
+
+
+def propose(
+    pictures: Sequence[Image], config: TrackerConfig, calibration: Calibration
+) -> tuple[dict[str, list[int]], list[Sighting | None]]:
+    """Ranges of each marker's colour, and where each picture shows the fish (None: not found).
+
+    Raises:
+        CalibrationError: no picture shows the fish with its whole tail, or the config marks no tail.
+    """
+    if not config.tail_links:
+        raise CalibrationError(
+            "tail_links = 0: expected a marked tail, by which the fish is found; set the colours by hand with check_image"
+        )
+    sightings = [_sighting(picture, config, calibration) for picture in pictures]
+    pixels: dict[str, list[Image]] = {marker: [] for marker in MARKERS}
+    for picture, sighting in zip(pictures, sightings, strict=True):
+        for marker, u, v, radius in sighting.marks if sighting else ():
+            pixels[marker].append(_inside(picture, u, v, radius))
+    if not any(sightings):
+        raise CalibrationError(
+            f"none of {len(pictures)} pictures shows one fish with all its markers: check sizes and places of the markers, "
+            "the lens and the mount; every marker must be in view"
+        )
+    return {m: _range(np.vstack(p)) for m, p in pixels.items() if p}, sightings
+
+
+def _sighting(picture: Image, config: TrackerConfig, calibration: Calibration) -> Sighting | None:
+    """The one head with the whole tail behind it, of discs of any hue but the water's."""
+    hsv = hsv_of(picture, (0, 0, picture.shape[1], picture.shape[0]))
+    water = int(np.argmax(np.bincount(hsv[::4, ::4, 0].ravel(), minlength=HUES)))
+    low, high = (water + WATER_WIDTH) % HUES, (water - WATER_WIDTH) % HUES
+    any_hue = (low, high, SATURATION_LEAST, VALUE_LEAST)
+    wide = replace(
+        config,
+        front_colour=any_hue,
+        rear_colour=any_hue,
+        tail_odd_colour=any_hue,
+        tail_even_colour=any_hue,
+    )
+    discs, links = SpotFinder(wide, calibration).find(hsv, ("front", "tail_odd"), (0, 0))
+    finder = HeadFinder(wide)
+    heads = [
+        head
+        for head in finder.heads(discs, discs, [links, links])[0]
+        if len(head.tail) == config.tail_links and not head.swapped
+    ]
+    if not heads:
+        return None
+    best = min(heads, key=lambda head: abs(head.misfit))
+    return _marks(best, finder, config, calibration)
+
+
+def _marks(
+    head: Head, finder: HeadFinder, config: TrackerConfig, calibration: Calibration
+) -> Sighting:
+    places = [("front", head.front.position), ("rear", head.rear.position)]
+    ends = link_ends(head.pose, head.tail, finder.layout)
+    places += [("tail_even" if i % 2 else "tail_odd", end) for i, end in enumerate(ends)]
+    pixels = calibration.pool_to_pixel(np.array([place for _, place in places]))
+    marks = []
+    for (marker, _), (u, v), scale in zip(
+        places, pixels, calibration.place_and_scale(pixels)[1], strict=True
+    ):
+        size = config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
+        radius = size / 2 / float(np.sqrt(abs(np.linalg.det(scale))))
+        marks.append((marker, float(u), float(v), radius))
+    return Sighting(tuple(marks))
+
+
+def _inside(picture: Image, u: float, v: float, radius: float) -> Image:
+    """(N, 3) HSV of the pixels in a marker's middle."""
+    rows, columns = np.ogrid[: picture.shape[0], : picture.shape[1]]
+    near = (columns - u) ** 2 + (rows - v) ** 2 <= max(2 * MIDDLE * radius, 0.8) ** 2
+    return cv2.cvtColor(picture[near].reshape(-1, 1, 3), cv2.COLOR_BGR2HSV).reshape(-1, 3)
+
+
+def _range(hsv: Image) -> list[int]:
+    """[hue low, hue high, least saturation, least value] that holds pixels (N, 3) with a margin."""
+    angle = hsv[:, 0] * (2 * np.pi / HUES)
+    middle = np.arctan2(np.sin(angle).mean(), np.cos(angle).mean()) * HUES / (2 * np.pi)
+    off = (hsv[:, 0] - middle + HUES / 2) % HUES - HUES / 2
+    low, high = np.percentile(off, [5, 95]) + middle + np.array([-HUE_MARGIN, HUE_MARGIN])
+    levels = LEVEL_SHARE * np.percentile(hsv[:, 1:], 5, axis=0)
+    return [round(low) % HUES, round(high) % HUES, *np.round(levels).astype(int).tolist()]
+
+
+def drawn(picture: Image, sighting: Sighting | None) -> Image:
+    """Copy of a picture with rings and names at the markers, or the word that none was found."""
+    result = picture.copy()
+    if sighting is None:
+        cv2.putText(
+            result, "no fish found", (12, 30), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (0, 0, 255), 2
+        )
+    for marker, u, v, radius in sighting.marks if sighting else ():
+        centre = round(u), round(v)
+        cv2.circle(result, centre, round(radius) + 2, (255, 255, 255), 1, cv2.LINE_AA)
+        place = centre[0] + round(radius) + 5, centre[1] - 5
+        cv2.putText(result, marker, place, cv2.FONT_HERSHEY_SIMPLEX, 0.4, (255, 255, 255), 1)
+    return result

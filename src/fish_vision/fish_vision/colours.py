@@ -1,0 +1,79 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The markers' colour ranges as the light shifts them, within limits."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from fish_vision.config import TrackerConfig
+from fish_vision.segmentation import HUES, ColourRange
+
+MARKERS = ("front", "rear", "tail_odd", "tail_even")
+SHARE = 0.05  # of the way to what is seen, per picture that teaches
+DARKER = 0.5  # share of a marker's value at which its range begins, where that is lower than the parameter
+VALUE_LEAST = 40.0  # no range begins below
+CASTS = (  # gains of red and blue of a light that the ranges were not made for, the nearest first
+    (1.15, 0.85),
+    (0.85, 1.15),
+    (1.25, 0.70),
+    (0.75, 1.25),
+    (1.35, 0.55),
+    (0.65, 1.35),
+    (1.50, 0.45),
+)
+
+
+class Colours:
+    """Ranges of the parameters, each moved in hue by at most `hue_shift_max`, and begun at lower values in the dark.
+
+    cast: gains of red and blue of the light, from which the hues start.
+    """
+
+    def __init__(self, config: TrackerConfig, cast: tuple[float, float] = (1.0, 1.0)) -> None:
+        self._most = float(config.hue_shift_max)
+        self._given = {marker: config.colour(marker) for marker in MARKERS}
+        self.shifts = dict.fromkeys(MARKERS, 0.0)  # half degrees
+        self._value_min = {m: float(r.value_min) for m, r in self._given.items()}
+        if cast != (1.0, 1.0):
+            for marker, given in self._given.items():
+                hue = middle(given)
+                seen = _hue_under(hue, (given.saturation_min + 255) / 2, (cast[1], 1.0, cast[0]))
+                self._move(marker, (seen - hue + HUES / 2) % HUES - HUES / 2)
+
+    def range(self, marker: str) -> ColourRange:
+        """The range in which a marker is looked for now."""
+        given, shift = self._given[marker], round(self.shifts[marker])
+        return replace(
+            given,
+            hue_low=(given.hue_low + shift) % HUES,
+            hue_high=(given.hue_high + shift) % HUES,
+            value_min=round(self._value_min[marker]),
+        )
+
+    def learn(self, marker: str, hue: float, value: float) -> None:
+        """Move a range a little to the hue (half degrees) and value that its marker shows."""
+        shift = (hue - middle(self._given[marker]) + HUES / 2) % HUES - HUES / 2
+        if abs(shift) > self._most + 10.0:  # glare or something else lies over the marker
+            return
+        self._move(marker, self.shifts[marker] + SHARE * (shift - self.shifts[marker]))
+        least = min(float(self._given[marker].value_min), max(DARKER * value, VALUE_LEAST))
+        self._value_min[marker] += SHARE * (least - self._value_min[marker])
+
+    def _move(self, marker: str, shift: float) -> None:
+        self.shifts[marker] = float(np.clip(shift, -self._most, self._most))
+
+
+def middle(colour: ColourRange) -> float:
+    """Middle hue of a range, half degrees."""
+    return (colour.hue_low + ((colour.hue_high - colour.hue_low) % HUES) / 2) % HUES
+
+
+def _hue_under(hue: float, saturation: float, gains: Sequence[float]) -> float:
+    """Hue of a colour after its blue, green and red are multiplied with gains."""
+    pixel = np.array([[[round(hue) % HUES, round(saturation), 200]]], np.uint8)
+    light = cv2.cvtColor(pixel, cv2.COLOR_HSV2BGR).astype(float) * np.array(gains)
+    light *= 255.0 / max(float(light.max()), 255.0)
+    return float(cv2.cvtColor(light.astype(np.uint8), cv2.COLOR_BGR2HSV)[0, 0, 0])

@@ -1,0 +1,104 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""robofish track: a video or a folder of pictures to poses."""
+
+import argparse
+import csv
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from pool_picture import CONFIG, SIZE, calibration, discs_of_fish, draw
+
+from fish_report.errors import UserError
+from fish_vision.calibration import lens_document
+from fish_vision.verbs import track
+
+POSES = [(0.02 * k, 0.1, 0.3 + 0.05 * k) for k in range(6)]
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """Folder with lens.yaml, params.yaml and frames/ that show POSES after one empty picture."""
+    lens = lens_document(calibration().lens, "overhead")
+    (tmp_path / "lens.yaml").write_text(yaml.safe_dump(lens))
+    mount = {
+        "camera_position": list(CONFIG.camera_position),
+        "camera_tilt": list(CONFIG.camera_tilt),
+    }
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump({"/**": {"ros__parameters": mount}}))
+    (tmp_path / "frames").mkdir()
+    pictures = [draw([]), *(draw(discs_of_fish(*pose)) for pose in POSES)]
+    for k, picture in enumerate(pictures):
+        cv2.imwrite(str(tmp_path / "frames" / f"{k:03d}.png"), picture)
+    return tmp_path
+
+
+def run(files: Path, source: str, *more: str) -> int:
+    parser = argparse.ArgumentParser()
+    track.add_arguments(parser)
+    given = ["--lens", str(files / "lens.yaml"), "--params", str(files / "params.yaml")]
+    written = ["--out", str(files / "poses.csv"), "--picture", str(files / "tracked.png")]
+    return track.run(parser.parse_args([str(files / source), *given, *written, *more]))
+
+
+def rows(files: Path) -> list[dict[str, str]]:
+    with (files / "poses.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_folder_of_pictures_gives_poses_in_time(files: Path, capsys) -> None:
+    assert run(files, "frames", "--rate", "20") == 0
+    found = rows(files)
+    np.testing.assert_allclose([float(r["t"]) for r in found], np.arange(1, 7) / 20)
+    poses = [[float(r[name]) for name in ("x", "y", "heading")] for r in found]
+    np.testing.assert_allclose(poses, POSES, atol=5e-3)
+    printed = capsys.readouterr().out
+    assert "fish seen in 6 of 7 frames" in printed
+    assert "lost in 1: no front marker" in printed
+    assert cv2.imread(str(files / "tracked.png")).shape[1::-1] == SIZE
+
+
+def test_a_video_file_brings_its_own_rate(files: Path) -> None:
+    video = cv2.VideoWriter(str(files / "fish.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    for pose in POSES:
+        video.write(draw(discs_of_fish(*pose)))
+    video.release()
+    assert run(files, "fish.avi") == 0
+    found = rows(files)
+    np.testing.assert_allclose([float(r["t"]) for r in found], np.arange(6) / 25)
+    np.testing.assert_allclose([float(r["x"]) for r in found], [p[0] for p in POSES], atol=1e-3)
+
+
+def test_a_video_without_the_fish_ends_with_status_1(files: Path, capsys) -> None:
+    for file in sorted((files / "frames").iterdir())[1:]:
+        file.unlink()
+    assert run(files, "frames", "--rate", "20") == 1
+    assert "fish seen in 0 of 1 frames" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "said"),
+    [
+        ("nothing.avi", (), "no such video or folder"),
+        ("lens.yaml", (), "not a video"),
+        ("frames", (), "expected --rate"),
+        ("frames", ("--rate", "nan"), "expected a positive number"),
+        ("empty", ("--rate", "20"), "no pictures in it"),
+        ("small", ("--rate", "20"), "the lens file says"),
+    ],
+)
+def test_what_is_no_video_of_this_camera_is_said(
+    files: Path, source: str, more: tuple[str, ...], said: str
+) -> None:
+    (files / "empty").mkdir()
+    (files / "small").mkdir()
+    cv2.imwrite(str(files / "small" / "1.png"), np.zeros((20, 30, 3), np.uint8))
+    with pytest.raises(UserError, match=said):
+        run(files, source, *more)
