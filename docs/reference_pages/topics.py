@@ -72,6 +72,7 @@ MEANING = {
     "resume": "lets the controller go on after its watchdog stopped the fish",
     "arm": "true arms the robot, false disarms it; refused with everything that speaks against it",
     "~/clear_faults": "erases the rotor module's faults",
+    "camera/set_camera_info": "saves a calibration in calibration_file and uses it; camera_calibration's COMMIT",
     "~/pause": "stops and continues a replay",
 }
 INTRODUCTION = """# Topics, services, frames
