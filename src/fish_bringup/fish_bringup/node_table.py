@@ -101,7 +101,11 @@ FAKE = (
 HARDWARE = ("sim", "fake")  # what a run of this computer alone can swim with
 VIEW = NodeSpec("fish_bringup", "live_view", "view.yaml")
 
-ROBOTS = {"sim": (*SIMULATED, *CONTROL, RECORDER), "real": (*REAL, *CONTROL, RECORDER)}
+ROBOTS = {
+    "sim": (*SIMULATED, *CONTROL, RECORDER),
+    "fake": (*FAKE, *REAL, *CONTROL, RECORDER),
+    "real": (*REAL, *CONTROL, RECORDER),
+}
 
 IN_THE_FISH = REAL[:3]  # the camera hangs on the computer at the pool
 PARTS = ("all", "fish", "shore", "drivers")  # what a launch file starts of a robot
@@ -122,7 +126,7 @@ def robot_of(hardware: str) -> tuple[NodeSpec, ...]:
     """
     if hardware not in HARDWARE:
         raise UserError(f"hardware is {hardware!r}, expected one of {', '.join(HARDWARE)}")
-    return ROBOTS["sim"] if hardware == "sim" else (*FAKE, *ROBOTS["real"])
+    return ROBOTS[hardware]
 
 
 def fake_parameters(devices: Path) -> dict[NodeSpec, dict[str, object]]:
