@@ -81,6 +81,7 @@ BEHIND = tuple(
         "arm",
         "arming/state",
         "arming/disarm",
+        "arming/pause",
     )
 )
 FAKE = (

@@ -63,7 +63,7 @@ def test_a_fake_robot_leaves_the_robots_topics_to_the_drivers(installed):
     behind = {spec.executable: spec for spec in node_table.robot_of("fake") if spec.remaps}
     moved = {rule.partition(":=")[0] for spec in behind.values() for rule in spec.remaps}
     assert {"joint_command", "joint_states", "imu/data", "camera/image_raw/compressed"} <= moved
-    assert {"arm", "arming/state", "arming/disarm", "battery_state"} <= moved
+    assert {"arm", "arming/state", "arming/disarm", "arming/pause", "battery_state"} <= moved
     line = node_table.command(
         NodeSpec("fish_sim", "camera", "camera.yaml", remaps=("a:=b", "c:=d"))
     )

@@ -235,6 +235,7 @@ def test_rotor_moves_only_while_a_person_has_armed_it(graph, vertiq_emulator):
     [
         (Bool, "operator/estop", True, "emergency stop is pressed"),
         (String, "arming/disarm", "the planner is silent", "the planner is silent"),
+        (String, "arming/pause", "controller: target is stale", "controller: target is stale"),
         (String, "rudder/trouble", "output lost", "rudder: output lost"),
     ],
 )
