@@ -26,7 +26,6 @@ def main() -> int:
         run = FaultRun(Path(folder), args.seed)
         for _ in range(args.faults):
             run.fault()
-    run.judge()
     counts = run.counts
     print(f"{args.faults} faults, {run.robot.clock.now - 100.0:.0f} s of swimming and waiting")
     print(f"{'fault':16} {'times':>5} {'disarmed':>8}")

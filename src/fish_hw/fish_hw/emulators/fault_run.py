@@ -42,7 +42,7 @@ class FaultRun:
 
     Attributes:
         robot: swims, or is broken.
-        counts: complete after judge().
+        counts: of all faults so far.
 
     Args:
         folder: for the robot's files.
@@ -56,18 +56,19 @@ class FaultRun:
 
     def fault(self, name: str = "") -> None:
         """Let a fault happen to the swimming robot, mend it, arm the robot and see it swim; none named: a random one."""
+        self._happen(name or self.robot.chance.choice(sorted(self.robot.faults)))
+        self._judge()
+
+    def _happen(self, name: str) -> None:
         robot, chance = self.robot, self.robot.chance
-        name = name or chance.choice(sorted(robot.faults))
         if not self._swim_again():
             self.counts.not_recovered.append(f"before {name}")
             return
         self._run(chance.uniform(0.3, 1.0))
         self.counts.done[name] += 1
-        armed = robot.driver.arming.count
         robot.faults[name]()
         self._run(chance.uniform(1.0, 3.0))
-        restarted = name == "kill rotor"
-        if restarted or not robot.driver.arming.armed or robot.driver.arming.count > armed:
+        if name == "kill rotor" or not robot.driver.arming.armed:
             self.counts.disarmed[name] += 1
         robot.mend()
         self._run(0.3)
@@ -95,16 +96,19 @@ class FaultRun:
                 self.counts.crashes.append(traceback.format_exc(limit=-3))
                 return
 
-    def judge(self) -> None:
-        """Count what moved while it must not, and what moved too far or too fast."""
-        sent, settings = self.robot.module.commanded_at, self.robot.settings
-        self.counts.moved_disarmed = moved_while_disarmed(self.robot.states, sent)
+    def _judge(self) -> None:
+        """Count what moved while it must not, and what moved too far or too fast; what was judged is forgotten."""
+        robot, settings = self.robot, self.robot.settings
+        sent = robot.module.commanded_at
         most = settings.max_acceleration * LATE / settings.rate_hz + AT_REST
-        self.counts.over_limits = (
+        self.counts.moved_disarmed += moved_while_disarmed(robot.states, sent)
+        self.counts.over_limits += (
             sum(abs(v) > settings.max_velocity + 0.01 for _, v in sent)
             + sum(change > most for change in speed_changes(sent))
             + self._rudder_over_limits()
         )
+        for record in (sent, robot.states, robot.angles):
+            del record[:-1]
 
     def _rudder_over_limits(self) -> int:
         servo, angles = self.robot.servo, self.robot.angles
@@ -134,7 +138,7 @@ def moved_while_disarmed(states: list[tuple[float, bool]], sent: list[tuple[floa
         states: s, and whether the robot was armed, in order.
         sent: s, and rad/s, in order.
     """
-    count, disarmed_s = 0, -math.inf
+    count, disarmed_s = 0, math.inf
     events = sorted([*((t, 0, float(armed)) for t, armed in states), *((t, 1, v) for t, v in sent)])
     for time_s, kind, value in events:
         if kind == 0:
