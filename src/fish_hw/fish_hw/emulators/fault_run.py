@@ -16,7 +16,8 @@ RAMP_S = 0.13  # s, in which a disarmed rotor is at rest: ramp_s and a late cycl
 ARMED_WITHIN_S = 30.0  # s; a lost device is looked for every 5 s
 SWIMS_WITHIN_S = 2.0
 AT_REST = 1e-6  # rad/s
-SILENCE_S = 0.2  # s without a command; the driver says coast before
+ROUNDING = 0.01  # rad/s, of single precision
+SILENCE_S = 0.25  # s without a command, after which the module coasts by itself: module_timeout_s
 LATE = 1.5  # periods, that a late cycle earns
 
 
@@ -100,10 +101,10 @@ class FaultRun:
         """Count what moved while it must not, and what moved too far or too fast; what was judged is forgotten."""
         robot, settings = self.robot, self.robot.settings
         sent = robot.module.commanded_at
-        most = settings.max_acceleration * LATE / settings.rate_hz + AT_REST
+        most = settings.max_acceleration * LATE / settings.rate_hz + ROUNDING
         self.counts.moved_disarmed += moved_while_disarmed(robot.states, sent)
         self.counts.over_limits += (
-            sum(abs(v) > settings.max_velocity + 0.01 for _, v in sent)
+            sum(abs(v) > settings.max_velocity + ROUNDING for _, v in sent)
             + sum(change > most for change in speed_changes(sent))
             + self._rudder_over_limits()
         )
