@@ -49,6 +49,7 @@ MEANING = {
     "description/joint_states": "every joint for robot_state_publisher: rotor, rudder, tail [rad]; 30 Hz",
     "arming/state": "level OK: armed, else the message is the reason; 20 Hz and on change",
     "arming/disarm": "a node's reason to disarm; when it has one",
+    "arming/pause": "why a node pauses its commands, repeated while it does; empty: it goes on",
     "operator/estop": "true while the emergency stop is pressed; on change",
     "operator/deadman": "true while the operator holds it; 10 Hz, where deadman_timeout_s is set",
     "rudder/trouble": "empty, or why the rudder does not work; 20 Hz",
@@ -72,6 +73,7 @@ MEANING = {
     "resume": "lets the controller go on after its watchdog stopped the fish",
     "arm": "true arms the robot, false disarms it; refused with everything that speaks against it",
     "~/clear_faults": "erases the rotor module's faults",
+    "camera/set_camera_info": "saves a calibration in calibration_file and uses it; camera_calibration's COMMIT",
     "~/pause": "stops and continues a replay",
 }
 INTRODUCTION = """# Topics, services, frames

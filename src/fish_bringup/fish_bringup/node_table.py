@@ -81,6 +81,7 @@ BEHIND = tuple(
         "arm",
         "arming/state",
         "arming/disarm",
+        "arming/pause",
     )
 )
 FAKE = (
@@ -98,10 +99,17 @@ FAKE = (
     ),
 )
 
+# s, of a robot that hurts nobody: as the node simulator
+BORNE = {"odometry_timeout_s": 0.5, "camera_timeout_s": 1.0, "pause_s": 1.0, "stale_s": 1.0}
+
 HARDWARE = ("sim", "fake")  # what a run of this computer alone can swim with
 VIEW = NodeSpec("fish_bringup", "live_view", "view.yaml")
 
-ROBOTS = {"sim": (*SIMULATED, *CONTROL, RECORDER), "real": (*REAL, *CONTROL, RECORDER)}
+ROBOTS = {
+    "sim": (*SIMULATED, *CONTROL, RECORDER),
+    "fake": (*FAKE, *REAL, *CONTROL, RECORDER),
+    "real": (*REAL, *CONTROL, RECORDER),
+}
 
 IN_THE_FISH = REAL[:3]  # the camera hangs on the computer at the pool
 PARTS = ("all", "fish", "shore", "drivers")  # what a launch file starts of a robot
@@ -122,18 +130,21 @@ def robot_of(hardware: str) -> tuple[NodeSpec, ...]:
     """
     if hardware not in HARDWARE:
         raise UserError(f"hardware is {hardware!r}, expected one of {', '.join(HARDWARE)}")
-    return ROBOTS["sim"] if hardware == "sim" else (*FAKE, *ROBOTS["real"])
+    return ROBOTS[hardware]
 
 
 def fake_parameters(devices: Path) -> dict[NodeSpec, dict[str, object]]:
-    """What the nodes of a fake robot need to find its devices, which lie in a folder with a short name."""
+    """What the nodes of a fake robot need to find its devices, which lie in a folder with a short name.
+
+    Nothing real moves, so that lateness of a busy computer is borne for as long as in simulation.
+    """
     fake_robot, simulator, _ = FAKE
     rotor, rudder, imu, camera = REAL
     lens = Path(get_package_share_directory("fish_vision")) / "config" / "simulated_camera.yaml"
     return {
         fake_robot: {"folder": str(devices)},
         simulator: {"estimate": "ignored"},
-        rotor: {"port": str(devices / "rotor"), "battery_cells": 3},
+        rotor: {"port": str(devices / "rotor"), "battery_cells": 3, **BORNE},
         rudder: {"chip": str(devices / "pwmchip0")},
         imu: {"bus": f"unix:{devices / 'i2c'}"},
         camera: {"device": f"unix:{devices / 'camera'}", "calibration_file": str(lens)},

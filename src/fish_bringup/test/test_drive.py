@@ -12,7 +12,8 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState, Joy
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
+from std_srvs.srv import SetBool
 
 from fish_bringup.keyboard import Keyboard
 from fish_bringup.nodes.hand_drive import Pad, driving
@@ -70,6 +71,46 @@ def test_a_gamepad_drives_while_its_deadman_is_held(robot):
     assert node.rivals == 0
     other.create_publisher(JointState, "joint_command", 10)
     until(lambda: node.rivals == 1)
+
+
+DEADMAN, ARM, STOP = Pad.deadman, Pad.arm, Pad.stop
+
+
+def joy(*pressed, throttle=0.0):
+    buttons = [int(number in pressed) for number in range(8)]
+    return Joy(axes=[0.0, throttle], buttons=buttons)
+
+
+def test_a_button_arms_while_the_deadman_is_held_and_the_throttle_at_rest(robot):
+    other, node, until = robot
+    asked, disarmed = [], []
+
+    def on_arm(request, response):
+        asked.append(request.data)
+        response.success, response.message = len(asked) > 1, "water in the hull"
+        return response
+
+    other.create_service(SetBool, "arm", on_arm)
+    other.create_subscription(String, "arming/disarm", disarmed.append, 10)
+    pad = other.create_publisher(Joy, "joy", 10)
+    until(lambda: pad.get_subscription_count() and other.count_publishers("arming/disarm"))
+
+    def press(*pressed, throttle=0.0):
+        pad.publish(joy())
+        pad.publish(joy(*pressed, throttle=throttle))
+        return True
+
+    press(ARM)  # without the deadman
+    press(DEADMAN, ARM, throttle=0.5)
+    until(lambda: node.answer == "not armed: let the throttle go first")
+    assert asked == []
+    until(lambda: press(DEADMAN, ARM) and node.answer == "not armed: water in the hull")
+    refused = len(asked)
+    assert all(asked)
+    until(lambda: press(DEADMAN, ARM) and len(asked) > refused and node.answer != "")
+    assert disarmed == []
+    until(lambda: press(STOP) and disarmed)
+    assert disarmed[0].data == "stopped by a button of the gamepad"
 
 
 def test_arrow_keys_come_as_words_and_others_as_characters():

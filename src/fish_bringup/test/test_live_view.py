@@ -15,6 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from fish_bringup.nodes.live_view import LiveViewNode
@@ -116,14 +117,18 @@ def test_the_page_gets_pose_path_and_health(robot):
     assert r.shown()["control"] is False
 
 
-def test_with_control_the_buttons_call_the_service(robot):
+def test_with_control_stop_disarms_and_arm_asks_the_owner(robot):
     r = robot(control=True)
-    r.until(lambda: r.node._arm.service_is_ready())
+    stopped = []
+    r.other.create_subscription(String, "arming/disarm", lambda m: stopped.append(m.data), 10)
+    r.until(lambda: r.node._arm.service_is_ready() and r.node._disarm.get_subscription_count())
     r.press("disarm")
-    r.until(lambda: r.asked)
+    r.until(lambda: stopped)
+    assert stopped == ["STOP was pressed in the live view"]
+    assert r.asked == []
     r.press("arm")
-    r.until(lambda: len(r.asked) > 1)
-    assert r.asked == [False, True]
+    r.until(lambda: r.asked)
+    assert r.asked == [True]
 
 
 def test_foxglove_s_port_in_use_leaves_the_page_alone(robot):

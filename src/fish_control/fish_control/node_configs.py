@@ -116,12 +116,12 @@ class ControllerConfig:
     lookahead: float = TrackerConfig.lookahead  # m, must be the weights file's and the planner's
     robot_hash: str = ""  # refuse weights trained for another robot; empty: accept any
     odometry_timeout: float = 0.15  # s
-    target_timeout: float = 0.2  # s
+    target_timeout: float = 0.15  # s
     largest_variance: float = LARGEST_VARIANCE  # of an estimate that is not lost
     resume: str = (
         "auto"  # after a stop: auto when all is well; manual when service resume is called
     )
-    resume_delay: float = 0.5  # s, how long all must be well before auto resumes
+    resume_delay: float = 0.2  # s, how long all must be well before auto resumes
     gains_lowest: tuple[float, ...] = (
         *(0.0,) * 6,  # least gains: steering Kp, Ki, Kd, then speed Kp, Ki, Kd
     )

@@ -39,6 +39,9 @@ class Watchdog:
     """Stops on the first fault; goes on after all faults have been gone for `resume_delay`, or when asked to.
 
     Before the first motion, and while the robot is disarmed, it waits without calling it a fault.
+
+    Attributes:
+        fault: what is wrong now, of a fish that was stopped by it; empty when all is well again.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
@@ -48,10 +51,12 @@ class Watchdog:
         self.state: Literal["waiting", "swimming", "stopped"] = "waiting"
         self.reason = "waiting for odometry"
         self.stops = 0
+        self.fault = ""
 
     def check(self, now: float, signs: Health) -> bool:
         """Whether the fish may swim at `now` [s]; `reason` says why not."""
         fault = self._fault(signs)
+        self.fault = ""
         if fault is None and signs.disarmed:
             self.state, self.reason = "waiting", f"disarmed: {signs.disarmed}"
             return False
@@ -62,6 +67,7 @@ class Watchdog:
             if self.state == "swimming":
                 self.state = "stopped"
                 self.stops += 1
+            self.fault = fault if self.state == "stopped" else ""
             return False
         self._good_since = min(self._good_since, now)
         if self.state == "stopped" and not self._may_resume(now):

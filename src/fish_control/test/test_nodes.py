@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Float64, Float64MultiArray
+from std_msgs.msg import Float64, Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 from fish_control.estimate import LOST_VARIANCE
@@ -693,14 +693,17 @@ def test_controller_streams_named_commands_and_labelled_gains(bench):
 )
 def test_controller_stops_on_every_fault_and_swims_again_when_it_has_passed(bench, fault, said):
     b = controller_bench(bench, resume_delay=0.1)
+    b.listen("arming/pause", String)
     drive(b, 0.6)
     assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
     drive(b, 1.0, **fault)
     assert b.said(b"\x02", said)
     np.testing.assert_allclose(commands(b, 5)[:, 1:], 0.0, atol=1e-6)
+    assert b.heard["arming/pause"][-1].data.startswith(f"controller: {said}")
     drive(b, 0.8)
     assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
     assert b.said(b"\x00", "swimming")
+    assert b.heard["arming/pause"][-1].data == ""
 
 
 def test_controller_with_manual_resume_waits_for_its_service(bench):

@@ -39,6 +39,7 @@ def test_it_waits_for_odometry_and_target_without_calling_it_a_stop():
     dog = Watchdog(ControllerConfig())
     assert not dog.check(0.0, Health(None, None))
     assert dog.reason == "waiting for odometry"
+    assert dog.fault == ""
     assert not dog.check(0.1, replace(GOOD, target_age=None))
     assert (dog.state, dog.stops) == ("waiting", 0)
     assert dog.check(0.2, GOOD)
@@ -52,6 +53,9 @@ def test_every_fault_stops_at_once_and_is_said(said):
     assert dog.state == "stopped"
     assert dog.reason.startswith(said)
     assert dog.stops == 1
+    assert dog.fault == dog.reason
+    assert not dog.check(0.02, GOOD)  # all is well, and it waits a little
+    assert dog.fault == ""
 
 
 def test_a_disarmed_robot_is_waited_for_without_calling_it_a_stop():

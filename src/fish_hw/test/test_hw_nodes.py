@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes: topics, units, frames, stamps and refusals in one process; signals with real processes."""
 
+import math
 import os
 import signal
 import subprocess
@@ -17,6 +18,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import BatteryState, CameraInfo, CompressedImage, Image, Imu, JointState
+from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 from waiting import wait_until
@@ -35,7 +37,7 @@ from fish_hw.nodes.rotor import RotorNode
 from fish_hw.nodes.rudder import RudderNode
 from fish_hw.nodes.worker import Worker
 from fish_hw.transport.sysfs_pwm import SysfsPwm
-from fish_node.camera_file import CameraFileError
+from fish_node.camera_file import CameraFileError, read_camera_file
 
 pytestmark = pytest.mark.ros
 DOMAIN = 145 + os.getpid() % 50  # tests of other packages, at 141 to 144, run beside this one
@@ -233,6 +235,7 @@ def test_rotor_moves_only_while_a_person_has_armed_it(graph, vertiq_emulator):
     [
         (Bool, "operator/estop", True, "emergency stop is pressed"),
         (String, "arming/disarm", "the planner is silent", "the planner is silent"),
+        (String, "arming/pause", "controller: target is stale", "controller: target is stale"),
         (String, "rudder/trouble", "output lost", "rudder: output lost"),
     ],
 )
@@ -379,6 +382,53 @@ def test_a_calibration_of_another_size_is_refused(graph, tmp_path):
     path.write_text(CALIBRATION)
     with pytest.raises(CameraFileError, match="is for 160x120 px, the camera is set to 320x240"):
         graph(CameraNode, device="emulator", width=320, height=240, calibration_file=str(path))
+
+
+def set_camera_info(g, **changed):
+    """The answer of the service to a calibration of the emulated camera."""
+    info = CameraInfo(width=160, height=120, distortion_model="plumb_bob", d=[-0.1, 0, 0, 0, 0])
+    info.k, info.r = [90.0, 0, 80, 0, 91, 60, 0, 0, 1], np.eye(3).ravel()
+    info.p = [90.0, 0, 80, 0, 0, 91, 60, 0, 0, 0, 1, 0]
+    for name, value in changed.items():
+        setattr(info, name, value)
+    return g.call(SetCameraInfo, "camera/set_camera_info", SetCameraInfo.Request(camera_info=info))
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_calibration_of_camera_calibration_is_saved_and_used(graph, tmp_path, monkeypatch, named):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    path = tmp_path / "camera.yaml" if named else tmp_path / "camera_info" / "overhead_optical.yaml"
+    if named:
+        path.write_text(CALIBRATION)
+    given = {"calibration_file": str(path)} if named else {}
+    g = graph(CameraNode, device="emulator", width=160, height=120, **given)
+    infos = g.listen(CameraInfo, "camera/camera_info")
+    answer = set_camera_info(g)
+    assert answer.success
+    assert answer.status_message.startswith(f"saved in {path}")
+    assert ("set calibration_file" in answer.status_message) == (not named)
+    assert g.spin(lambda: infos and infos[-1].k[0] == 90.0)
+    assert read_camera_file(path).camera_matrix[0] == 90.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"width": 320}, "is for 320x120 px, the camera is set to 160x120"),
+        ({"k": [0.0] * 9}, "focal lengths 0, 0"),
+        ({"distortion_model": "curved"}, "expected one of plumb_bob"),
+        ({"d": [math.nan] * 5}, "expected 5 or 4 or 0 finite numbers"),
+    ],
+)
+def test_an_impossible_calibration_is_refused_and_the_file_kept(graph, tmp_path, changed, said):
+    path = tmp_path / "camera.yaml"
+    path.write_text(CALIBRATION)
+    g = graph(CameraNode, device="emulator", width=160, height=120, calibration_file=str(path))
+    answer = set_camera_info(g, **changed)
+    assert not answer.success
+    assert said in answer.status_message
+    assert path.read_text() == CALIBRATION
+    assert [file.name for file in tmp_path.iterdir()] == ["camera.yaml"]
 
 
 def test_a_step_that_raises_ends_the_node_and_leaves_the_device_safe(graph, tmp_path, monkeypatch):

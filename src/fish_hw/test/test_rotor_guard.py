@@ -38,6 +38,19 @@ class Bench:
         return actions
 
 
+def test_after_a_stall_in_which_the_module_coasted_the_speed_starts_from_rest():
+    guard = RotorGuard(RotorSettings())
+    guard.command(100.0)
+    now = 0.0
+    while guard.step(now, armed=True).velocity != 100.0:
+        now += 0.01
+    kept = guard.step(now + 0.2, armed=True).velocity
+    assert kept == 100.0
+    again = guard.step(now + 0.2 + 0.3, armed=True).velocity
+    assert again is not None
+    assert 0.0 < again <= 2200.0 * 0.015
+
+
 def test_follows_the_paper_oscillation_unchanged():
     actions = Bench().run(1.0, oscillation)
     sent = [a.velocity for a in actions]

@@ -4,6 +4,9 @@
 
 Disarmed is the state that nothing but `arm` ends: neither a fresh command nor a device that is back. No ROS and no
 clock of its own; times are in s of one clock that is never set.
+
+A trouble disarms when it has lasted for its source's `patience_s`. Most have none. A doubt about the estimate, and a node that
+pauses its commands, are borne for `pause_s`, so that one late message needs no person.
 """
 
 from __future__ import annotations
@@ -26,8 +29,11 @@ class ArmingSettings:
     """
 
     estimate: str = "required"  # required | watched | ignored: odometry/filtered and camera/pose
-    odometry_timeout_s: float = 0.15  # s without new odometry/filtered until the robot is disarmed
+    odometry_timeout_s: float = 0.2  # s without new odometry/filtered until the robot is disarmed
     camera_timeout_s: float = 0.2  # s without a new camera/pose until the robot is disarmed
+    pause_s: float = (
+        0.06  # s that a pause of the controller, or a doubt of fusion, may last until then
+    )
     largest_variance: float = 1.0  # m^2, rad^2 and their rates; fusion marks what it lost with 1e4
     deadman_timeout_s: float = 0.0  # s without `true` on operator/deadman; 0: no deadman is used
 
@@ -37,6 +43,7 @@ class ArmingSettings:
         for name, low, high in (
             ("odometry_timeout_s", 0.02, 5.0),
             ("camera_timeout_s", 0.05, 5.0),
+            ("pause_s", 0.0, 5.0),
             ("largest_variance", 1e-6, 1e3),
             ("deadman_timeout_s", 0.0, 5.0),
         ):
@@ -53,19 +60,24 @@ class Source:
         name: what it is in messages, such as joint_command.
         timeout_s: silence [s] that disarms; infinite where silence is no trouble.
         required: whether the robot can be armed without having heard it.
+        patience_s: how long [s] its trouble may last until it disarms.
+        forgotten_s: a trouble that was not repeated for so long [s] does not count when the robot is armed.
     """
 
     name: str
     timeout_s: float = math.inf
     required: bool = True
+    patience_s: float = 0.0
+    forgotten_s: float = math.inf
 
 
 @dataclass
 class _Heard:
-    """The newest word of a source."""
+    """The newest word of a source, and since when it has been in trouble."""
 
     time_s: float | None = None
     trouble: str = ""
+    since_s: float = 0.0
 
 
 class Arming:
@@ -93,12 +105,13 @@ class Arming:
         """Note that a source spoke at `now` [s], and what its trouble is; an unknown name has no timeout."""
         with self._lock:
             self._sources.setdefault(name, Source(name, required=False))
-            self._heard[name] = _Heard(now, trouble)
+            before = self._heard.get(name, _Heard())
+            self._heard[name] = _Heard(now, trouble, before.since_s if before.trouble else now)
 
-    def troubles(self, now: float) -> list[str]:
-        """Everything that forbids to move at `now` [s], in words."""
+    def troubles(self, now: float, patient: bool = False) -> list[str]:
+        """Everything that forbids to move at `now` [s], in words; patient: without what may last a little longer."""
         with self._lock:
-            found = [self._trouble(source, now) for source in self._sources.values()]
+            found = [self._trouble(source, now, patient) for source in self._sources.values()]
         return [trouble for trouble in found if trouble]
 
     def arm(self, now: float) -> str:
@@ -121,43 +134,50 @@ class Arming:
     def check(self, now: float) -> bool:
         """Whether the motors may move at `now` [s]; disarms at the first trouble."""
         with self._lock:
-            if self._armed and (troubles := self.troubles(now)):
+            if self._armed and (troubles := self.troubles(now, patient=True)):
                 self.disarm("; ".join(troubles))
             return self._armed
 
     def _forget_silent(self, now: float) -> None:
         """What is not required and fell silent is not waited for."""
         for name, source in self._sources.items():
-            time_s = self._heard[name].time_s
-            if not source.required and time_s is not None and now - time_s > source.timeout_s:
+            heard = self._heard[name]
+            limit_s = source.forgotten_s if heard.trouble else source.timeout_s
+            if not source.required and heard.time_s is not None and now - heard.time_s > limit_s:
                 self._heard[name] = _Heard()
 
-    def _trouble(self, source: Source, now: float) -> str:
+    def _trouble(self, source: Source, now: float, patient: bool) -> str:
         heard = self._heard[source.name]
         if heard.time_s is None:
             return f"no {source.name} yet" if source.required else ""
         if heard.trouble:
-            return heard.trouble
+            bearable = patient and now - heard.since_s < source.patience_s
+            return "" if bearable else heard.trouble
         if now - heard.time_s > source.timeout_s:
             return f"no {source.name} for {source.timeout_s:g} s"
         return ""
 
 
-ODOMETRY, CAMERA, DEADMAN, ESTOP = (
+ODOMETRY, CAMERA, DEADMAN, ESTOP, PAUSE = (
     "odometry/filtered",
     "camera/pose",
     "operator/deadman",
     "operator/estop",
+    "arming/pause",
 )
+PAUSE_FORGOTTEN_S = 1.0  # s; a node that pauses repeats it more often
 
 
 def operator_and_estimate(settings: ArmingSettings) -> tuple[Source, ...]:
-    """The sources that every owner of the arming state has: the estimate of the motion, and the deadman if one is used."""
-    sources: list[Source] = []
+    """The sources that every owner of the arming state has: pauses, the estimate, and the deadman if one is used."""
+    pause = Source(
+        PAUSE, required=False, patience_s=settings.pause_s, forgotten_s=PAUSE_FORGOTTEN_S
+    )
+    sources = [pause]
     if settings.estimate != "ignored":
         required = settings.estimate == "required"
         sources += [
-            Source(ODOMETRY, settings.odometry_timeout_s, required),
+            Source(ODOMETRY, settings.odometry_timeout_s, required, settings.pause_s),
             Source(CAMERA, settings.camera_timeout_s, required),
         ]
     if settings.deadman_timeout_s > 0.0:

@@ -9,9 +9,12 @@ XML or JSON, or as the text ost.txt. OpenCV's files and ost.txt name no distorti
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import yaml
 
 from fish_node.camera_document import WRONG, parse
 
@@ -81,6 +84,45 @@ def read_camera_file(path: Path) -> CameraFile:
         fields.numbers("rectification_matrix", (9,), IDENTITY),
         fields.numbers("projection_matrix", (12,), plain),
     )
+
+
+def write_camera_file(path: Path, camera: CameraFile, name: str) -> None:
+    """Write a camera file as camera_info_manager does; what was there stays if the camera cannot be read back.
+
+    Args:
+        path: of the file; its folder is made.
+        camera: what is written.
+        name: of the camera, as the file says it.
+
+    Raises:
+        CameraFileError: a field is impossible, or the file cannot be written; the message says which.
+    """
+    document = {
+        "image_width": camera.width,
+        "image_height": camera.height,
+        "camera_name": name,
+        "camera_matrix": _matrix(3, camera.camera_matrix),
+        "distortion_model": camera.model,
+        "distortion_coefficients": _matrix(1, camera.distortion),
+        "rectification_matrix": _matrix(3, camera.rectification),
+        "projection_matrix": _matrix(3, camera.projection),
+    }
+    draft = path.with_name(f"{path.name}.new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+        read_camera_file(draft)
+        os.replace(draft, path)
+    except OSError as error:
+        raise CameraFileError(
+            f"{path}: cannot be written: {error.strerror or error}; give the node another calibration_file"
+        ) from error
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def _matrix(rows: int, values: tuple[float, ...]) -> dict[str, Any]:
+    return {"rows": rows, "cols": len(values) // rows, "data": [float(value) for value in values]}
 
 
 class _Fields:

@@ -12,6 +12,8 @@ from fish_node.arming import (
     DEADMAN,
     ESTOP,
     ODOMETRY,
+    PAUSE,
+    PAUSE_FORGOTTEN_S,
     Arming,
     ArmingSettings,
     Source,
@@ -61,7 +63,7 @@ def test_arming_is_refused_with_every_reason():
 
 
 @pytest.mark.parametrize(
-    ("silent", "limit_s"), [(COMMAND.name, 0.15), (ODOMETRY, 0.15), (CAMERA, 0.2), (DEADMAN, 0.3)]
+    ("silent", "limit_s"), [(COMMAND.name, 0.15), (ODOMETRY, 0.2), (CAMERA, 0.2), (DEADMAN, 0.3)]
 )
 def test_silence_of_a_source_disarms_after_its_timeout(silent, limit_s):
     arming, now = armed(), 0.0
@@ -79,7 +81,6 @@ def test_silence_of_a_source_disarms_after_its_timeout(silent, limit_s):
         ("leak sensor", "leak: water in the hull"),
         (ESTOP, "emergency stop is pressed"),
         (DEADMAN, "the operator let the deadman go"),
-        (ODOMETRY, "IMU lost: fusion does not vouch for the velocity"),
     ],
 )
 def test_a_trouble_disarms_at_once_and_its_end_does_not_arm_again(name, trouble):
@@ -93,6 +94,35 @@ def test_a_trouble_disarms_at_once_and_its_end_does_not_arm_again(name, trouble)
     assert arming.reason == trouble
     assert arming.arm(0.03) == ""
     assert arming.check(0.04)
+
+
+@pytest.mark.parametrize("name", [ODOMETRY, PAUSE])
+def test_a_doubt_that_passes_needs_no_person_and_one_that_lasts_is_latched(name):
+    arming, now = armed(), 0.0
+    for _ in range(20):  # twice as often doubted as not, each time anew
+        now += 0.05
+        hear_all_but(arming, name, now)
+        arming.heard(name, now, "IMU lost")
+        assert arming.check(now + 0.04)
+        arming.heard(name, now + 0.04)
+    begin = now = now + 0.05
+    while arming.check(now):
+        hear_all_but(arming, name, now)
+        arming.heard(name, now, f"IMU lost for {now - begin:.2f} s")  # the words may change
+        now += 0.01
+    assert now - begin == pytest.approx(SETTINGS.pause_s, abs=0.011)
+    assert arming.reason.startswith("IMU lost")
+    assert "IMU lost" in arming.arm(now)  # no patience with it when a person arms
+    arming.heard(name, now)
+    assert not arming.check(now)
+    assert arming.arm(now) == ""
+
+
+def test_the_pause_of_a_node_that_is_gone_does_not_keep_the_robot_disarmed():
+    arming = Arming(operator_and_estimate(ArmingSettings(estimate="ignored")))
+    arming.heard(PAUSE, 0.0, "controller: target is stale")
+    assert arming.arm(0.5) == "controller: target is stale"
+    assert arming.arm(PAUSE_FORGOTTEN_S + 0.1) == ""
 
 
 def test_the_first_reason_is_kept():
@@ -117,7 +147,8 @@ def test_what_is_only_watched_is_not_needed_but_disarms_when_it_ceases():
 
 
 def test_an_ignored_estimate_has_no_say():
-    assert operator_and_estimate(ArmingSettings(estimate="ignored")) == ()
+    sources = operator_and_estimate(ArmingSettings(estimate="ignored"))
+    assert [source.name for source in sources] == [PAUSE]
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,9 @@ class SimulatorConfig(SimulationConfig, ArmingSettings):
     """
 
     estimate: str = "watched"  # required | watched | ignored: odometry/filtered and camera/pose
+    pause_s: float = (
+        1.0  # s that a pause of the controller, or a doubt of fusion, may last until then
+    )
     odometry_timeout_s: float = 0.5  # s without new odometry/filtered until the robot is disarmed
     camera_timeout_s: float = 1.0  # s without a new camera/pose until the robot is disarmed
     real_time_factor: float = 1.0  # simulated per real second; 0 = as fast as possible

@@ -166,7 +166,7 @@ def test_silence_of_the_commands_disarms_for_good(bench):
         bench.command(100.0, 0.0)
         bench.collect("sim/odometry", 1)
     bench.until(lambda: not bench.armed())
-    assert bench.got["arming/state"][-1].status[0].message == "no joint_command for 0.25 s"
+    assert bench.got["arming/state"][-1].status[0].message == "no joint_command for 1.25 s"
     bench.collect("sim/odometry", 20)
     for _ in range(50):
         bench.command(100.0, 0.0)

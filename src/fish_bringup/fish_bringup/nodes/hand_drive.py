@@ -1,9 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""joy -> joint_command, operator/deadman: rotor and rudder by hand. Lives in the command `robofish drive`.
+"""joy -> joint_command, operator/deadman, arming/disarm: rotor and rudder by hand. Lives in the command `robofish drive`.
 
 joint_command (100 Hz) as the controller's; joy (sensor_msgs/Joy): the deadman's button must be held, axes give throttle and
-rudder. operator/deadman (std_msgs/Bool, 10 Hz) is true while the operator holds the deadman.
+rudder. operator/deadman (std_msgs/Bool, 10 Hz) is true while the operator holds the deadman. A button arms the robot (service
+arm) while the deadman is held and the throttle is at rest; another one disarms it at any time.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from sensor_msgs.msg import JointState, Joy
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
+from std_srvs.srv import SetBool
 
 from fish_bringup.node_table import middleware
 from fish_control.manual_drive import ManualDrive
@@ -30,6 +33,7 @@ from fish_node.nodes.arming import ArmingListener
 PERIOD = 0.01  # s, of joint_command
 DEADMAN_EVERY = 10  # commands
 RUN_DOWN = 0.6  # s, from full throttle to rest
+AT_REST = 0.05  # of full throttle
 
 
 @dataclass(frozen=True)
@@ -37,17 +41,27 @@ class Pad:
     """Which button and axes of a gamepad do what."""
 
     deadman: int = 5  # button
+    arm: int = 7  # button
+    stop: int = 1  # button
     throttle: int = 1  # axis, forward is positive
     rudder: int = 0  # axis, left is positive
 
 
 class HandDrive(Node):
-    """ManualDrive's command into messages; a gamepad's into ManualDrive."""
+    """ManualDrive's command into messages; a gamepad's into ManualDrive.
+
+    Attributes:
+        answer: what came of the arm button last; empty before it is pressed.
+    """
 
     def __init__(self, context: Context, namespace: str, drive: ManualDrive, pad: Pad) -> None:
         super().__init__("hand_drive", namespace=namespace, context=context)
         self.drive, self._pad, self._ticks = drive, pad, 0
+        self.answer = ""
+        self._pressed: set[int] = set()
         self.arming = ArmingListener(self)
+        self._arm = self.create_client(SetBool, "arm")
+        self._disarm = self.create_publisher(String, "arming/disarm", 10)
         self._command = self.create_publisher(JointState, "joint_command", 10)
         self._deadman = self.create_publisher(Bool, "operator/deadman", 10)
         self.create_subscription(Joy, "joy", self._on_joy, 10)
@@ -61,13 +75,30 @@ class HandDrive(Node):
     def _on_joy(self, message: Joy) -> None:
         pad = self._pad
         buttons, axes = message.buttons, message.axes
-        if len(axes) <= max(pad.throttle, pad.rudder) or len(buttons) <= pad.deadman:
-            return
-        if not buttons[pad.deadman]:
+        down = {number for number, value in enumerate(buttons) if value}
+        new, self._pressed = down - self._pressed, down
+        if pad.stop in new:
+            self._disarm.publish(String(data="stopped by a button of the gamepad"))
+        if len(axes) <= max(pad.throttle, pad.rudder) or pad.deadman not in down:
             self.drive.release()
             return
         self.drive.hold(time.monotonic())
         self.drive.wish(axes[pad.throttle], axes[pad.rudder])
+        if pad.arm in new:
+            self._ask_to_arm()
+
+    def _ask_to_arm(self) -> None:
+        if self.drive.throttle > AT_REST:
+            self.answer = "not armed: let the throttle go first"
+        elif not self._arm.service_is_ready():
+            self.answer = "not armed: the service arm is not there"
+        else:
+            self._arm.call_async(SetBool.Request(data=True)).add_done_callback(self._on_answer)
+
+    def _on_answer(self, future: Future) -> None:
+        answer = future.result()
+        if answer is not None:
+            self.answer = answer.message if answer.success else f"not armed: {answer.message}"
 
     def _tick(self) -> None:
         now = time.monotonic()

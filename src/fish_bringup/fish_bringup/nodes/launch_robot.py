@@ -6,6 +6,7 @@ A node that ends, ends the launch with it, so that nothing swims half: with resp
 recorder and the live view may end without the rest.
 """
 
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -18,12 +19,14 @@ from launch_ros.parameter_descriptions import ParameterValue
 from fish_bringup.node_table import (
     CONTROL,
     EXCITER,
+    FAKE,
     NAMESPACE,
     PARTS,
     RECORDER,
     ROBOTS,
     VIEW,
     NodeSpec,
+    fake_parameters,
     frame_prefix,
     in_part,
     is_usual,
@@ -37,7 +40,10 @@ RESPAWN_DELAY = 1.0  # s
 IN_FILE = "; without it what planner.yaml says"
 IN_PROGRAM = "; without it what exciter.yaml says"
 ARGUMENTS = {
-    "robot": ("sim", "sim or real"),
+    "robot": (
+        "sim",
+        "sim, fake (the real drivers on emulated devices, the simulator behind them), or real",
+    ),
     "part": ("all", "all, or of the real robot: fish, shore (two computers), drivers"),
     "config": ("", "folder of parameter files that override the installed ones of the same name"),
     "namespace": (
@@ -123,26 +129,41 @@ def _chosen(chosen: Mapping[str, str]) -> list[NodeSpec]:
 
 def _node(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> Node:
     """One node; `full` is its namespace with what was pushed around it."""
-    respawn, given = _yes(chosen["respawn"]), _given(spec, chosen)
+    respawn = _yes(chosen["respawn"])
     second = not is_usual(full)
-    prefix = [{"frame_prefix": frame_prefix(full)}] if spec.frames and second else []
     ends_all = spec not in DISPENSABLE and not respawn
     return Node(
         package=spec.package,
         executable=spec.executable,
         namespace=chosen["namespace"],
-        parameters=[
-            str(parameter_path(spec)),
-            *prefix,
-            *_own(spec, chosen["config"]),
-            *([given] if given else []),
+        parameters=_parameters(spec, chosen, full),
+        remappings=[
+            *([("/clock", "clock")] if second else []),
+            *(tuple(rule.split(":=")) for rule in spec.remaps),
         ],
-        remappings=[("/clock", "clock")] if second else [],
         respawn=respawn,
         respawn_delay=RESPAWN_DELAY,
         output="screen",
         on_exit=Shutdown(reason=f"{spec.name} ended") if ends_all else None,
     )
+
+
+def _parameters(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> list[object]:
+    """Files and single values of a node; what comes later overrides what comes before.
+
+    A robot's own file must not lead the drivers of a fake robot to real devices.
+    """
+    prefixed = spec.frames and not is_usual(full)
+    devices = Path(tempfile.gettempdir()) / f"{full.strip('/').replace('/', '_')}_devices"
+    fake = fake_parameters(devices).get(spec) if chosen["robot"] == "fake" else None
+    given = _given(spec, chosen)
+    return [
+        str(parameter_path(spec)),
+        *([{"frame_prefix": frame_prefix(full)}] if prefixed else []),
+        *_own(spec, chosen["config"]),
+        *([fake] if fake else []),
+        *([given] if given else []),
+    ]
 
 
 def _given(spec: NodeSpec, chosen: Mapping[str, str]) -> dict[str, ParameterValue]:
@@ -155,9 +176,9 @@ def _given(spec: NodeSpec, chosen: Mapping[str, str]) -> dict[str, ParameterValu
 
 
 def _own(spec: NodeSpec, config: str) -> list[str]:
-    """The robot's own file for a node, if there is one."""
+    """The robot's own file for a node, if there is one; a file camera.yaml is the driver's, not the drawn picture's."""
     file = Path(config).expanduser() / spec.parameter_file
-    return [str(file)] if config and file.exists() else []
+    return [str(file)] if config and file.exists() and spec not in FAKE else []
 
 
 def _yes(text: str) -> bool:

@@ -3,8 +3,9 @@
 """odometry/filtered, reference/path, tracking/error, control/gains, camera/tail, arming/state, /diagnostics -> a page.
 
 A page in a browser shows pool, path, fish, errors, gains, health and arming state; Foxglove gets every topic over a websocket.
-It only reads, unless `control` is set: then the page's buttons call the service arm. Without the package foxglove-sdk, or
-with its port in use, the page is served alone. It is served on this computer only, unless another address is given.
+It only reads, unless `control` is set: then the page's button Arm calls the service arm, and STOP publishes arming/disarm,
+which needs no answer. Without the package foxglove-sdk, or with its port in use, the page is served alone. It is served on
+this computer only, unless another address is given.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool
 
 from fish_bringup.nodes.foxglove_bridge import FoxgloveBridge
@@ -44,7 +45,9 @@ class LiveViewNode(Node):
         )
         config = read_parameters(self, ViewConfig)
         self._state = ViewState(config.control)
-        self._arm = self.create_client(SetBool, "arm") if config.control else None
+        if config.control:
+            self._arm = self.create_client(SetBool, "arm")
+            self._disarm = self.create_publisher(String, "arming/disarm", 10)
         self._server = ViewServer(
             config.address, config.port, self._ask if config.control else None
         )
@@ -71,8 +74,10 @@ class LiveViewNode(Node):
 
     def _ask(self, armed: bool) -> None:
         """Called by the server's thread; the answer shows in arming/state."""
-        if self._arm is not None:
-            self._arm.call_async(SetBool.Request(data=armed))
+        if armed:
+            self._arm.call_async(SetBool.Request(data=True))
+        else:
+            self._disarm.publish(String(data="STOP was pressed in the live view"))
 
     def _on_odometry(self, message: Odometry) -> None:
         p, q, stamp = (

@@ -4,14 +4,16 @@
 
 Keyboard: the arrow keys change throttle and rudder; keep pressing them: after --timeout without a key the rotor stops and the
 rudder goes to the centre, as with any other key; q ends. Gamepad (topic joy, node joy_node of the full ROS): hold the button
---deadman. Planner and controller must not run meanwhile. The robot must be armed: `robofish arm`. operator/deadman is true
-while the deadman is held; a robot with deadman_timeout_s is disarmed when it is released.
+--deadman. Planner and controller must not run meanwhile. The robot must be armed: by `robofish arm`, or by the button --arm
+while --deadman is held and the throttle is at rest; the button --stop disarms it. operator/deadman is true while the deadman
+is held; a robot with deadman_timeout_s is disarmed when it is released.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import astuple, fields
 
 from fish_bringup.keyboard import Keyboard, keyboard
 from fish_bringup.node_table import NAMESPACE
@@ -24,6 +26,7 @@ from fish_report.terminal import say, terminal
 TIMEOUT = 1.0  # s; a terminal repeats a key after half a second
 DISCOVERY = 1.0  # s, until other publishers are known
 LOOK = 0.02  # s between looks at the keyboard
+AXES = ("throttle", "rudder")  # of the gamepad; the rest of Pad are buttons
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,14 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--timeout", type=float, default=TIMEOUT, help=f"s without a word until rest ({TIMEOUT:g})"
     )
-    for name, default in (
-        ("deadman", Pad.deadman),
-        ("throttle", Pad.throttle),
-        ("rudder", Pad.rudder),
-    ):
-        kind = "button" if name == "deadman" else "axis"
+    for field in fields(Pad):
+        kind = "axis" if field.name in AXES else "button"
         parser.add_argument(
-            f"--{name}", type=int, default=default, help=f"{kind} of the gamepad ({default})"
+            f"--{field.name}",
+            type=int,
+            default=field.default,
+            help=f"{kind} of the gamepad ({field.default})",
         )
     parser.add_argument("--namespace", default=NAMESPACE, help=f"of the robot ({NAMESPACE})")
     parser.add_argument("--domain", type=int, help="ROS domain (ROS_DOMAIN_ID)")
@@ -48,11 +50,13 @@ def run(args: argparse.Namespace) -> int:
     """Drive until q or Ctrl-C."""
     if args.domain is not None and not 0 <= args.domain <= 232:
         raise UserError(f"domain is {args.domain}, expected 0 to 232")
-    if min(args.deadman, args.throttle, args.rudder) < 0:
+    pad = Pad(**{field.name: getattr(args, field.name) for field in fields(Pad)})
+    if min(astuple(pad)) < 0:
         raise UserError("buttons and axes are counted from 0")
+    if len({pad.deadman, pad.arm, pad.stop}) < 3:
+        raise UserError("--deadman, --arm and --stop must be three buttons")
     with user_errors():
         drive = ManualDrive(args.timeout)
-    pad = Pad(args.deadman, args.throttle, args.rudder)
     with (
         Interruption() as interruption,
         keyboard() as keys,
@@ -65,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
             )
         ways = "arrow keys, any other key is rest, q ends" if keys else "no keyboard here, only joy"
         say(terminal(), f"driving {args.namespace} by hand: {ways}")
-        said = None
+        said = ""
         while not interruption.asked and _heed(keys, drive):
             spin(LOOK)
             if (now := _armed(node)) != said:
@@ -88,6 +92,7 @@ def _armed(node: HandDrive) -> str:
     """What the robot says of its arming state."""
     if node.arming.armed is None:
         return "nothing heard of the robot's arming state yet"
-    return (
-        "armed" if node.arming.armed else f"disarmed ({node.arming.reason}); robofish arm arms it"
-    )
+    if node.arming.armed:
+        return "armed"
+    refused = f"; {node.answer}" if node.answer.startswith("not") else ""
+    return f"disarmed ({node.arming.reason}); robofish arm or the arm button arms it{refused}"

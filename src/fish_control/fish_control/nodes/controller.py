@@ -4,9 +4,9 @@
 
 joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder:
 position = alpha (rad). control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy of the
-weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog stops rotor and rudder on
-stale or bad odometry, lost sensors and a stale target, and disarms the robot (arming/disarm); service
-resume (std_srvs/Trigger) lets the fish swim again where resume is manual. Decisions are
+weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog pauses them on stale or bad
+odometry, lost sensors and a stale target: they go to rest until all is well, and arming/pause says why. How long that may last,
+the owner of the arming state decides. Service resume (std_srvs/Trigger) ends a pause where resume is manual. Decisions are
 in Controller and Watchdog.
 """
 
@@ -73,6 +73,7 @@ class ControllerNode(Node):
         self._ticks = 0
         self._latency = Latency()
         self._said = ""
+        self._paused = False
         self._create_interfaces()
 
     def _change(self, _: ControllerConfig, after: ControllerConfig) -> Callable[[], None]:
@@ -82,7 +83,7 @@ class ControllerNode(Node):
     def _create_interfaces(self) -> None:
         self._command = self.create_publisher(JointState, "joint_command", 10)
         self._gains = self.create_publisher(Float64MultiArray, "control/gains", 10)
-        self._disarm = self.create_publisher(String, "arming/disarm", 10)
+        self._pause = self.create_publisher(String, "arming/pause", 10)
         self._arming = ArmingListener(self)
         self._reporter = Reporter(self, self._command)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
@@ -128,10 +129,8 @@ class ControllerNode(Node):
         dt = 1.0 / self._config.command_rate_hz if math.isnan(self._now) else now - self._now
         dt = min(max(dt, 0.0), LONGEST_PERIOD)
         self._now = now
-        stops = self._watchdog.stops
         may_swim = self._watchdog.check(now, self._signs(now))
-        if self._watchdog.stops > stops:
-            self._disarm.publish(String(data=f"controller: {self._watchdog.reason}"))
+        self._say_pause()
         if not may_swim:
             self._controller.rest()
         elif self._wanted.speed <= 0.0:
@@ -145,6 +144,13 @@ class ControllerNode(Node):
             self._latency.add(now - self._odometry_time)
         if self._watchdog.state != self._said:
             self._report()
+
+    def _say_pause(self) -> None:
+        """Say why the commands are at rest, again and again, and once that they need not be any more."""
+        fault = self._watchdog.fault
+        if fault or self._paused:
+            self._pause.publish(String(data=f"controller: {fault}" if fault else ""))
+        self._paused = bool(fault)
 
     def _signs(self, now: float) -> Health:
         return Health(

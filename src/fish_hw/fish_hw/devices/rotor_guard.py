@@ -83,6 +83,8 @@ class RotorGuard:
             return self._ramp_down(now, min(since, LONGEST_RAMP_STEP_S))
         if not armed:
             return Action(ask=True)
+        if since > self._settings.module_timeout_s:  # the module coasted by itself meanwhile
+            self.velocity = 0.0
         return self._follow(min(since, LATE_PERIODS / self._settings.rate_hz))
 
     def _follow(self, dt: float) -> Action:

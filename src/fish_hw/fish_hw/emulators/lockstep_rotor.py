@@ -96,12 +96,8 @@ class LockstepRotor:
         self.module = VertiqModule(settings.module_id, 0.02, self.clock)
         self.line = Line(self.module, self.clock)
         self.wire = Wire()
-        self.driver = RotorDriver(
-            settings,
-            lambda: self.line,
-            self.clock,
-            leak=LeakSensor(lambda: self.wire, wet_is_low=True),
-        )
+        self.settings = settings
+        self.driver = self.new_driver()
         self.silent: set[str] = set()
         self.troubles: dict[str, str] = {}
         self.dead = False
@@ -112,14 +108,18 @@ class LockstepRotor:
         self._heard = dict.fromkeys(PERIODS_S, -math.inf)
         self._due = self.clock.now
 
+    def new_driver(self) -> RotorDriver:
+        """A driver that was started now."""
+        leak = LeakSensor(lambda: self.wire, wet_is_low=True)
+        return RotorDriver(self.settings, lambda: self.line, self.clock, leak=leak)
+
     def run(self, duration_s: float) -> None:
         """Let the time pass."""
         end = self.clock.now + duration_s
         while self.clock.now < end:
             self._happen()
             self._hear()
-            if not self.dead:
-                self.driver.step()
+            self._step_driver()
             self._due = max(self._due + DT, self.clock.now)
             self.clock.now = self._due
             self.module.move()
@@ -131,6 +131,10 @@ class LockstepRotor:
     def at(self, delay_s: float, what: Callable[[], None]) -> None:
         """Let something happen after a while."""
         self.later.append((self.clock.now + delay_s, what))
+
+    def _step_driver(self) -> None:
+        if not self.dead:
+            self.driver.step()
 
     def _happen(self) -> None:
         due = [entry for entry in self.later if entry[0] <= self.clock.now]

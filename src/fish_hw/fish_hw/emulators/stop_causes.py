@@ -11,13 +11,13 @@ from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.rotor_driver import RUDDER
 from fish_hw.emulators.lockstep_rotor import LockstepRotor
 from fish_hw.emulators.vertiq_module import DRIVEN_MODES
-from fish_node.arming import CAMERA, DEADMAN, ESTOP, ODOMETRY
+from fish_node.arming import CAMERA, DEADMAN, ESTOP, ODOMETRY, PAUSE
 
 LIMIT_S = 0.35
 DEAD_BATTERY_S = 1.2  # filtered for 1 s: the load ripples
 MOVING = 0.5  # rad/s, a command that is not zero
 FUSION_IMU_S, POSE_S = 0.1, 1 / 30  # fusion's imu_timeout; it says the loss with the next pose
-TARGET_S = 0.2  # the controller's target_timeout
+TARGET_S = 0.15  # the controller's target_timeout
 WAIT_S = 3.0
 
 Cause = Callable[[LockstepRotor, random.Random], None]
@@ -66,7 +66,9 @@ def _imu_lost(robot: LockstepRotor, chance: random.Random) -> None:
 
 
 def _planner_killed(robot: LockstepRotor, _: random.Random) -> None:
-    robot.at(TARGET_S, lambda: robot.driver.arming.disarm("controller: target is stale"))
+    """The controller says so; that its commands are at rest from then on is not counted on."""
+    arming, text = robot.driver.arming, "controller: target is stale"
+    robot.at(TARGET_S, lambda: arming.heard(PAUSE, robot.clock.now, text))
 
 
 def _nan(robot: LockstepRotor, _: random.Random) -> None:

@@ -5,9 +5,8 @@
 Out: camera/image_raw/compressed (JPEG), camera/camera_info (same stamp and frame), camera/image_raw on
      request,
      /diagnostics
+Service: camera/set_camera_info (sensor_msgs/SetCameraInfo), see calibration.py
 """
-
-from pathlib import Path
 
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
@@ -15,11 +14,11 @@ from std_msgs.msg import Header
 
 from fish_hw.devices.usb_camera import FrameSource, Picture, UsbCamera, decode_jpeg
 from fish_hw.emulators.walking_square import WalkingSquare
+from fish_hw.nodes.calibration import Calibration
 from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.settings.camera import CameraSettings
 from fish_hw.transport.unix_socket import PREFIX, SocketCamera
 from fish_hw.transport.video_capture import VideoCapture
-from fish_node.camera_file import CameraFileError, read_camera_file
 
 
 class CameraNode(DeviceNode):
@@ -28,7 +27,7 @@ class CameraNode(DeviceNode):
     def __init__(self) -> None:
         super().__init__("camera", CameraSettings)
         settings = self.settings
-        self._info = self._camera_info()
+        self._calibration = Calibration(self, settings)
         self._compressed = self.create_publisher(
             CompressedImage, "camera/image_raw/compressed", QoSProfile(depth=2)
         )
@@ -50,31 +49,6 @@ class CameraNode(DeviceNode):
             return SocketCamera(self.settings.device)
         return VideoCapture(self.settings)
 
-    def _camera_info(self) -> CameraInfo:
-        """Calibration from the file; without one K[0] = 0 says "not calibrated" (sensor_msgs/CameraInfo)."""
-        settings = self.settings
-        if not settings.calibration_file:
-            self.get_logger().warning(
-                "no calibration_file: camera_info is published without calibration"
-            )
-            return CameraInfo(width=settings.width, height=settings.height)
-        calibration = read_camera_file(Path(settings.calibration_file).expanduser())
-        if (calibration.width, calibration.height) != (settings.width, settings.height):
-            raise CameraFileError(
-                f"calibration {settings.calibration_file} is for {calibration.width}x{calibration.height} px,"
-                f" the camera is set to {settings.width}x{settings.height}:"
-                " calibrate again or change the size"
-            )
-        return CameraInfo(
-            width=calibration.width,
-            height=calibration.height,
-            distortion_model=calibration.model,
-            d=calibration.distortion,
-            k=calibration.camera_matrix,
-            r=calibration.rectification,
-            p=calibration.projection,
-        )
-
     def _cycle(self) -> None:
         cycle = self._camera.step()
         self.log_events(cycle.events)
@@ -86,12 +60,13 @@ class CameraNode(DeviceNode):
             stamp=self.stamp(picture.time_s),
             frame_id=self.settings.frame_prefix + self.settings.frame_id,
         )
-        self._info.header = header
+        info = self._calibration.info
+        info.header = header
         self.publish(
             self._compressed,
             CompressedImage(header=header, format="bgr8; jpeg compressed bgr8", data=picture.jpeg),
         )
-        self.publish(self._camera_info_publisher, self._info)
+        self.publish(self._camera_info_publisher, info)
         if self._raw is not None:
             self._publish_raw(picture, header)
 

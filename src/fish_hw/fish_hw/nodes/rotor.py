@@ -6,7 +6,8 @@ It owns the arming state of the robot (fish_node.nodes.arming): what must stop t
 driven, without a way through another process.
 
 In:  joint_command (joint rotor: velocity [rad/s]), rudder/trouble (std_msgs/String: empty, or why the rudder does not
-     work), odometry/filtered, camera/pose, operator/deadman, operator/estop, arming/disarm
+     work), odometry/filtered, camera/pose, operator/deadman, operator/estop, arming/disarm,
+     arming/pause
 Out: joint_states (joint rotor: position [rad], velocity [rad/s]; stamped when measured), battery_state,
      arming/state, /diagnostics
 Services: arm (std_srvs/SetBool: true arms, false disarms), ~/clear_faults (std_srvs/Trigger)

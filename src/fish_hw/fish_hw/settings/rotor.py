@@ -26,7 +26,7 @@ class RotorSettings(ArmingSettings):
     sign: int = 1  # -1 if positive speed of the motor turns the rotor clockwise seen from above
     max_velocity: float = 160.0  # rad/s; full throttle at 2 Hz needs 150.8
     max_acceleration: float = 2200.0  # rad/s^2; full throttle at 2 Hz needs 1895
-    stale_s: float = 0.15  # s without a command until the robot is disarmed; 3 / rate_hz at least
+    stale_s: float = 0.2  # s without a command until the robot is disarmed; 3 / rate_hz at least
     ramp_s: float = (
         0.1  # s from the last speed to zero, then coast; longer if max_acceleration says so
     )

@@ -13,6 +13,12 @@ from fish_hw.transport.errors import TransportError, unavailable
 EXPORT_WAIT_S = 0.5  # udev needs some tenths of a second to hand the new files to the group
 RETRY_S = 0.01
 HINT = "enable it: dtoverlay=pwm-2chan"
+REASONS = {
+    errno.EACCES: "no permission (add the user to group gpio and install 99-fish.rules of fish_hw)",
+    errno.ENOENT: "its files period, duty_cycle and enable did not appear",
+    errno.ENODEV: "the chip has no such channel",
+    errno.EBUSY: "another program holds it",
+}
 
 
 class SysfsPwm:
@@ -42,7 +48,8 @@ class SysfsPwm:
             self._export()
             self._wait_until_writable()
         except OSError as error:
-            raise unavailable(f"PWM channel {self._pwm}", str(error), self._exported()) from error
+            reason = REASONS.get(error.errno or 0, str(error))
+            raise unavailable(f"PWM channel {self._pwm}", reason, self._exported()) from error
 
     def start(self, pulse_ns: int) -> None:
         """Set period and pulse, then switch the pulses on.
@@ -83,22 +90,16 @@ class SysfsPwm:
     def _wait_until_writable(self) -> None:
         """Wait for udev: right after the export the files belong to root only."""
         for _ in range(round(EXPORT_WAIT_S / RETRY_S)):
-            if self._writable():
-                return
-            self._sleep(RETRY_S)
-        raise OSError(
-            errno.EACCES,
-            "period, duty_cycle and enable did not become writable (udev rule for group gpio?)",
-        )
+            try:
+                return self._require_writable()
+            except OSError:
+                self._sleep(RETRY_S)
+        self._require_writable()
 
-    def _writable(self) -> bool:
-        try:
-            for name in ("period", "duty_cycle", "enable"):
-                with open(self._pwm / name, "r+"):
-                    pass
-        except OSError:
-            return False
-        return True
+    def _require_writable(self) -> None:
+        for name in ("period", "duty_cycle", "enable"):
+            with open(self._pwm / name, "r+"):
+                pass
 
     def _exported(self) -> list[str]:
         return sorted(path.name for path in self._chip.glob("pwm[0-9]*"))

@@ -5,7 +5,8 @@
 Owner (node rotor on the robot, node simulator in simulation). Service arm (std_srvs/SetBool: true arms, false disarms).
 Out: arming/state (diagnostic_msgs/DiagnosticArray: level OK is armed, the message is the reason), 20 Hz and on change.
 In: odometry/filtered, camera/pose, operator/estop and operator/deadman (std_msgs/Bool), arming/disarm (std_msgs/String:
-another node's reason to disarm).
+another node's reason to disarm), arming/pause (std_msgs/String: why a node pauses its commands, repeated while it does; empty:
+it goes on).
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from fish_node.arming import (
     DEADMAN,
     ESTOP,
     ODOMETRY,
+    PAUSE,
     Arming,
     ArmingSettings,
     estimate_trouble,
@@ -64,7 +66,8 @@ class ArmingServer:
             )
         if settings.deadman_timeout_s > 0.0:
             node.create_subscription(Bool, "operator/deadman", self._on_deadman, 1)
-        node.create_subscription(Bool, "operator/estop", self._on_estop, 1)
+        node.create_subscription(Bool, "operator/estop", self._on_estop, 10)
+        node.create_subscription(String, "arming/pause", self._on_pause, 10)
         node.create_subscription(String, "arming/disarm", self._on_disarm, 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(STATE_PERIOD_S, self.publish, clock=steady)
@@ -137,6 +140,9 @@ class ArmingServer:
     def _on_disarm(self, message: String) -> None:
         self._arming.disarm(message.data or "a node asked for it without a reason")
         self.say_change()
+
+    def _on_pause(self, message: String) -> None:
+        self._arming.heard(PAUSE, self._clock(), message.data)
 
     def _is_new(self, source: str, stamp: Time) -> bool:
         """Whether a message is not the one before again: one that repeats a stamp says nothing new."""

@@ -75,9 +75,8 @@ class SimulatorNode(Node):
             and not config.lockstep
             and not self.get_parameter("use_sim_time").value
         )
-        self._arming = Arming(
-            (Source(COMMAND, config.command_timeout), *operator_and_estimate(config))
-        )
+        command = Source(COMMAND, config.command_timeout + config.pause_s)  # the rotor rests before
+        self._arming = Arming((command, *operator_and_estimate(config)))
         self._paused = config.paused
         self._frames = (
             config.pool_frame,
