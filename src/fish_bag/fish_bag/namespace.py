@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fish_bag.decode import ROLES
+from fish_bag.decode import PATH_ROLE, PATH_TYPE, ROLES
 from fish_bag.problem import RecordingError
-from fish_bag.topic_map import TopicMap
+from fish_bag.topic_map import DEFAULT_RULES, TopicMap
 
 SIGNS_OF_A_ROBOT = (
     "commands",
@@ -19,6 +19,14 @@ SIGNS_OF_A_ROBOT = (
 def full_name(namespace: str, topic: str) -> str:
     """Absolute topic name."""
     return topic if topic.startswith("/") else f"{namespace.rstrip('/')}/{topic}"
+
+
+def message_types(namespace: str) -> dict[str, str]:
+    """Message type of each default topic of the robot in `namespace`, by the topic's full name."""
+    return {
+        full_name(namespace, rule.topic): PATH_TYPE if role == PATH_ROLE else ROLES[role].type
+        for role, rule in DEFAULT_RULES.items()
+    }
 
 
 def find_namespace(recorded: Iterable[str], topics: TopicMap) -> str:

@@ -141,24 +141,34 @@ def test_killed_recorder_loses_at_most_a_second(peer, tmp_path):
     assert imu.raws == raws[: len(imu.raws)]
 
 
-def test_a_second_type_on_a_topic_leaves_the_recorder_alive(peer, tmp_path):
-    """A foreign node announces another type on a recorded topic, and one topic has a type that nobody knows here."""
+@pytest.mark.parametrize("stranger_is_first", [True, False])
+def test_a_second_type_on_a_topic_hides_no_message_of_the_robot(peer, tmp_path, stranger_is_first):
+    """A foreign node announces another type on the IMU's topic, before the IMU or after it."""
     recorder = peer.start("recorder", output=tmp_path, name="run")
     other = Context()
     rclpy.init(context=other, domain_id=peer.domain)
     stranger = Node("stranger", context=other)
+    early = peer.node.create_publisher(Imu, "imu/data", LOSSY)
+    if stranger_is_first:
+        peer.node.destroy_publisher(early)
+    else:
+        assert peer.spin_until(early.get_subscription_count)
     wrong = stranger.create_publisher(Float64, "/fish/imu/data", 10)
     wrong.publish(Float64(data=1.0))
-    publish_all(peer, 100)
+    if stranger_is_first:
+        assert peer.spin_until(wrong.get_subscription_count)
+    raws, _ = publish_all(peer, 100)
     peer.spin_until(lambda: False, limit=0.3)
     stranger.destroy_node()
     rclpy.try_shutdown(context=other)
     recorder.send_signal(signal.SIGTERM)
     out, _ = recorder.communicate(timeout=30)
     assert recorder.returncode == 0, out
-    recorded = {raw.topic: raw for raw in read_bag(tmp_path / "run", lambda *_: True).topics}
+    topics = read_bag(tmp_path / "run", lambda *_: True).topics
+    recorded = {raw.topic: raw for raw in topics if raw.type != "std_msgs/msg/Float64"}
     assert len(recorded["/fish/joint_command"].raws) == 100
-    assert "is not recorded" in out
+    assert recorded["/fish/imu/data"].raws == raws
+    assert "/fish/imu/data (std_msgs/msg/Float64) is not recorded" in out
 
 
 @pytest.mark.parametrize(

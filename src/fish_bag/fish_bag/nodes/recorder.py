@@ -24,6 +24,7 @@ from rclpy.subscription import Subscription
 
 from fish_bag.mcap_writer import McapRecording, Topic
 from fish_bag.message_types import message_type
+from fish_bag.namespace import message_types
 from fish_bag.nodes.raw_topics import from_profile, message_class, to_profile
 from fish_bag.qos import Qos
 from fish_bag.recorder_config import RecorderConfig, common_qos, is_selected
@@ -45,6 +46,7 @@ class RecorderNode(Node):
         self.recording = McapRecording(directory, custom, self._config.chunk_s)
         self._subscriptions_of: dict[tuple[str, str], tuple[Subscription, Qos, list[Topic]]] = {}
         self._refused: set[tuple[str, str]] = set()
+        self._expected = message_types(self.get_namespace())
         self._patterns = [self._resolved(pattern) for pattern in self._config.topics]
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -80,8 +82,9 @@ class RecorderNode(Node):
         if current is not None and current[1] == wanted:
             return
         if current is not None:
-            self.destroy_subscription(current[0])
-            del self._subscriptions_of[key]
+            self._unsubscribe(key)
+        if self._expected.get(topic) == msgtype:
+            self._give_way(topic, msgtype)
         try:
             message, kind = message_class(msgtype), message_type(msgtype)
             target: list[Topic] = []  # announced once the subscription stands
@@ -91,13 +94,26 @@ class RecorderNode(Node):
         except (
             Exception
         ) as error:  # rclpy has errors of its own, for example for a second type on a topic
-            self._refused.add(key)
-            said = " ".join(str(error).split())
-            self.get_logger().error(plain(f"{topic} ({msgtype}) is not recorded: {said}"))
+            self._refuse(key, " ".join(str(error).split()))
             return
         self._subscriptions_of[key] = (subscription, wanted, target)
         target.append(self.recording.add_topic(topic, kind, offered[0]))
         self.get_logger().info(plain(f"recording {topic} ({msgtype})"))
+
+    def _unsubscribe(self, key: tuple[str, str]) -> None:
+        self.destroy_subscription(self._subscriptions_of.pop(key)[0])
+
+    def _refuse(self, key: tuple[str, str], reason: str) -> None:
+        self._refused.add(key)
+        self.get_logger().error(plain(f"{key[0]} ({key[1]}) is not recorded: {reason}"))
+
+    def _give_way(self, topic: str, msgtype: str) -> None:
+        """A node hears one type on a topic: where a foreign node came first, the robot's own type takes its place."""
+        for key in [key for key in self._subscriptions_of if key[0] == topic]:
+            self._unsubscribe(key)
+            self._refuse(
+                key, f"the robot publishes {msgtype} there; give the other node another topic"
+            )
 
     def _store(self, topic: list[Topic], data: bytes, about: dict[str, Any]) -> None:
         self.recording.write(topic[0], about["received_timestamp"] or time.time_ns(), data)
