@@ -126,7 +126,7 @@ test: setup install/.studies
 COLCON_TEST = colcon --log-base log/$(@F) test $(WITH_STUDIES) --executor sequential --return-code-on-test-failure
 .PHONY: $(PARTS:%=.test/%)
 .test/with_nodes:
-	@$(WORKSPACE); status=0; $(COLCON_TEST) --packages-skip $(WITHOUT_NODES) || status=1; \
+	@unset MAKEFLAGS MFLAGS; $(WORKSPACE); status=0; $(COLCON_TEST) --packages-skip $(WITHOUT_NODES) || status=1; \
 		python -m pytest test || status=1; exit $$status
 $(WITHOUT_NODES:%=.test/%): .test/%:
 	@$(WORKSPACE); $(COLCON_TEST) --packages-select $*

@@ -124,7 +124,9 @@ def test_diagnose_of_the_folder_one_is_in_is_called_after_it(tmp_path, monkeypat
     """The diagnosis itself takes a minute, and is not what names the page."""
     titles, robot = [], SimpleNamespace(robot=Robot(), standard_errors={})
     for name, stand_in in {
-        "fish_sysid.diagnosis.pipeline.diagnose": lambda *_, **__: None,
+        "fish_sysid.diagnosis.pipeline.diagnose": lambda *_, **__: SimpleNamespace(
+            task=SimpleNamespace(ahead=0.0)
+        ),
         "fish_sysid.diagnosis.diagnosis_json.answer": lambda _: {},
         "fish_sysid.diagnosis.corrected_model.corrected": lambda _: robot,
         "fish_sysid.reports.verdict_sentence.sentence": lambda _: "nothing",

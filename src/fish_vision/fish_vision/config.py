@@ -48,7 +48,10 @@ class TrackerConfig:
     hinge_offset: float = 0.075  # head's centre of mass to the tail's hinge, m
     link_length: float = 0.07 / 3  # hinge to the marker at the far end of a link, m
     area_min: float = 0.35  # least area of a blob, share of the marker's
-    area_max: float = 1.6  # greatest area of a blob, share of the marker's
+    area_max: float = 1.6  # greatest area of a blob of the head's colours, share of the marker's
+    tail_area_max: float = (
+        2.5  # and of the tail's: of few pixels, whose rim counts much, share of the marker's
+    )
     spacing_tolerance: float = (
         0.03  # misfit of the head markers' distance beyond its uncertainty, share
     )
@@ -139,6 +142,7 @@ _RANGES = (  # field, lowest, highest
     ("link_length", 0.002, 1.0),
     ("area_min", 0.01, 1.0),
     ("area_max", 1.0, 100.0),
+    ("tail_area_max", 1.0, 100.0),
     ("spacing_tolerance", 0.01, 0.5),
     ("tail_tolerance", 0.0005, 0.1),
     ("roi_radius", 0.05, 5.0),

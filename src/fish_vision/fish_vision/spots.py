@@ -42,13 +42,15 @@ class SpotFinder:
         found: list[tuple[int, Blob]] = []
         for number, marker in enumerate(markers):
             disc = pi / 4 * self._diameter(marker) ** 2
-            limits = (0.5 * config.area_min * disc / pixel, 2.0 * config.area_max * disc / pixel)
+            most = self._area_max(marker)
+            limits = (0.5 * config.area_min * disc / pixel, 2.0 * most * disc / pixel)
             blobs = find_blobs(hsv, self.colours.range(marker), limits)
             found += [(number, _enlarged(blob, origin, step)) for blob in blobs]
         result: list[list[Spot]] = [[] for _ in markers]
         if found:
             diameters = np.array([self._diameter(markers[number]) for number, _ in found])
-            spots = self._of_size([blob for _, blob in found], diameters, step)
+            largest = np.array([self._area_max(markers[number]) for number, _ in found])
+            spots = self._of_size([blob for _, blob in found], diameters, largest, step)
             for (number, _), spot in zip(found, spots, strict=True):
                 if spot is not None:
                     result[number].append(spot)
@@ -67,10 +69,15 @@ class SpotFinder:
         config = self._config
         return config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
 
+    def _area_max(self, marker: str) -> float:
+        return self._config.tail_area_max if marker.startswith("tail") else self._config.area_max
+
     def _of_size(
-        self, blobs: Sequence[Blob], diameters: NDArray[np.float64], step: int
+        self, blobs: Sequence[Blob], diameters: Array, largest: Array, step: int
     ) -> list[Spot | None]:
         """Blobs as spots; None for those whose area does not fit a disc of their diameter (m) at their place.
+
+        largest: greatest area of each, share of its disc's.
 
             std = pixel_std / sqrt(share) + diameter (1 - share) / 3,  share = area / disc area, at most 1
 
@@ -86,7 +93,7 @@ class SpotFinder:
         std = own / np.sqrt(whole) + np.sqrt(4 / pi * areas) * (1.0 - whole) / 3
         result: list[Spot | None] = []
         for i, blob in enumerate(blobs):
-            if not self._config.area_min <= shares[i] <= self._config.area_max:
+            if not self._config.area_min <= shares[i] <= largest[i]:
                 result.append(None)
                 continue
             place, deviation = places[i], float(std[i])
