@@ -21,6 +21,7 @@ class Listener:
         self._path = path
         self._server: socket.socket | None = None
         self._connection: socket.socket | None = None
+        self._lock = threading.Lock()  # a connection may be accepted while the plug is pulled
         self.plug()
 
     def plug(self) -> None:
@@ -35,13 +36,14 @@ class Listener:
 
     def unplug(self) -> None:
         """End the connection and listen no more, as pulling the plug does."""
-        server, self._server = self._server, None
+        with self._lock:
+            server, self._server = self._server, None
+            connection, self._connection = self._connection, None
         if server is not None:
             # a thread that waits in accept() keeps the socket alive unless it is shut down first
             server.shutdown(socket.SHUT_RDWR)
             server.close()
         self._path.unlink(missing_ok=True)
-        connection, self._connection = self._connection, None
         if connection is not None:
             close(connection)
 
@@ -55,7 +57,13 @@ class Listener:
                 connection, _ = server.accept()
             except OSError:  # unplugged
                 return
-            self._connection = connection
+            with self._lock:
+                plugged = self._server is server
+                if plugged:
+                    self._connection = connection
+            if not plugged:
+                close(connection)
+                return
             try:
                 self.serve(connection)
             except OSError:

@@ -15,7 +15,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.duration import Duration
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from fish_hw.devices.errors import DeviceError
@@ -23,6 +23,7 @@ from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.status import WARN, Status
 from fish_hw.nodes.worker import Worker
 from fish_hw.transport.errors import TransportError
+from fish_node.nodes.executor import KeptWaitSetExecutor
 from fish_node.nodes.start import read_parameters, shut_down
 from fish_node.nodes.status_log import StatusLog
 
@@ -196,7 +197,7 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
     node: DeviceNode | None = None
     try:
         executor = (
-            SingleThreadedExecutor()
+            KeptWaitSetExecutor()
         )  # before the node: a signal while it is made upsets rclpy.spin
         node = make_node()
         node.begin()
