@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-# Matrices here are small: a second thread only waits for the first, and takes the processor from what runs beside the test.
+# Matrices here are small: a second thread only waits for the first, and takes the processor from other processes.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(
         name, "1"

@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Jitter of the rotor's 100 Hz commands beside a bare loop's, and the processor time of node rotor.
+"""Jitter of the rotor's 100 Hz commands compared with that of a bare loop, and the processor time of node rotor.
 
     python src/fish_hw/benchmarks/stream_jitter.py [--seconds 60]
 

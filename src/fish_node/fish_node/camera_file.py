@@ -97,7 +97,25 @@ def write_camera_file(path: Path, camera: CameraFile, name: str) -> None:
     Raises:
         CameraFileError: a field is impossible, or the file cannot be written; the message says which.
     """
-    document = {
+    draft = path.with_name(f"{path.name}.new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft.write_text(
+            yaml.safe_dump(to_document(camera, name), sort_keys=False), encoding="utf-8"
+        )
+        read_camera_file(draft)
+        os.replace(draft, path)
+    except OSError as error:
+        raise CameraFileError(
+            f"{path}: cannot be written: {error.strerror or error}; give the node another calibration_file"
+        ) from error
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def to_document(camera: CameraFile, name: str) -> dict[str, Any]:
+    """The content of a camera file, as camera_info_manager writes it; name: of the camera."""
+    return {
         "image_width": camera.width,
         "image_height": camera.height,
         "camera_name": name,
@@ -107,18 +125,6 @@ def write_camera_file(path: Path, camera: CameraFile, name: str) -> None:
         "rectification_matrix": _matrix(3, camera.rectification),
         "projection_matrix": _matrix(3, camera.projection),
     }
-    draft = path.with_name(f"{path.name}.new")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-        read_camera_file(draft)
-        os.replace(draft, path)
-    except OSError as error:
-        raise CameraFileError(
-            f"{path}: cannot be written: {error.strerror or error}; give the node another calibration_file"
-        ) from error
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def _matrix(rows: int, values: tuple[float, ...]) -> dict[str, Any]:

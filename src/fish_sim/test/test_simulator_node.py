@@ -31,7 +31,7 @@ from fish_sim.robot_file import save_robot
 from fish_sim.simulation_config import SimulatorConfig
 
 pytestmark = pytest.mark.ros
-DOMAIN = 139  # of no other test: those of fish_node run beside this one, at 143
+DOMAIN = 139  # no other test uses it; the tests of fish_node run at the same time, in 143
 FAST = {"real_time_factor": 0.0, "disturbance": 0.0}
 TOPICS = {
     "joint_states": JointState,

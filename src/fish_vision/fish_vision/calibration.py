@@ -12,7 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fish_node.camera_file import CameraFileError, read_camera_file
+from fish_node.camera_file import (
+    IDENTITY,
+    CameraFile,
+    CameraFileError,
+    read_camera_file,
+    to_document,
+)
 
 Array = NDArray[Any]  # float64
 
@@ -230,19 +236,6 @@ def read_lens(path: Path) -> Lens:
 
 def lens_document(lens: Lens, camera_name: str) -> Mapping[str, Any]:
     """The lens in the form that `read_lens` and camera_info_manager read."""
-    P = np.column_stack([lens.K, np.zeros(3)])
-    return {
-        "image_width": lens.size[0],
-        "image_height": lens.size[1],
-        "camera_name": camera_name,
-        "camera_matrix": _matrix(lens.K),
-        "distortion_model": lens.model,
-        "distortion_coefficients": _matrix(lens.D.reshape(1, -1)),
-        "rectification_matrix": _matrix(np.eye(3)),
-        "projection_matrix": _matrix(P),
-    }
-
-
-def _matrix(values: Array) -> dict[str, Any]:
-    rows, cols = values.shape
-    return {"rows": rows, "cols": cols, "data": [float(v) for v in values.ravel()]}
+    matrices = lens.K, lens.D, np.column_stack([lens.K, np.zeros(3)])
+    K, D, P = (tuple(map(float, np.ravel(values))) for values in matrices)
+    return to_document(CameraFile(*lens.size, lens.model, D, K, IDENTITY, P), camera_name)

@@ -113,7 +113,7 @@ def test_two_fish_of_the_same_look_give_no_pose_at_first(tracker: Tracker) -> No
 
 
 def test_the_own_fish_is_followed_past_one_of_the_same_look(tracker: Tracker) -> None:
-    """The other crosses 0.1 m beside ours, the other way."""
+    """The other fish passes ours at a distance of 0.1 m, in the opposite direction."""
     seen(tracker.track(draw(discs_of_fish(-0.3, 0.0, 0.0)), 0.0))
     for k in range(1, 20):
         x = -0.3 + 0.03 * k
