@@ -30,3 +30,9 @@ def test_without_it_nodes_follow_their_own_clocks() -> None:
     given = changed()
     assert "lockstep" not in given[SIMULATED[0]]
     assert not any("use_sim_time" in values for values in given.values())
+
+
+def test_a_computer_that_the_nodes_fill_is_named_with_what_to_do() -> None:
+    shares = [0.3] * 6  # of a core
+    assert "--lockstep" in demo.too_slow(shares, cores=2)
+    assert demo.too_slow(shares, cores=4) == ""

@@ -12,8 +12,9 @@ Times are the simulator's.
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -51,6 +52,7 @@ from fish_report.terminal import print_table, say, terminal
 from fish_sim.robot_argument import read_model
 
 VIEW_PORT = ViewConfig().port
+FULL = 0.75  # share of all cores from which on messages wait for a processor
 LOCKSTEP = 60.0  # s of real time that simulated time waits for a node
 LONGEST = 600.0  # s, a run that does not end by itself
 PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
@@ -128,9 +130,22 @@ def run(args: argparse.Namespace) -> int:
     write_run_page(page, f"Path {args.letter} at {args.speed:g} m/s", trial, score, tables)
     say(console, f"recording: {folder / 'recording'}")
     say(console, f"page: {page}")
+    if args.hardware == "sim" and not args.lockstep and (hint := too_slow(end.cpu.values())):
+        say(console, hint)
     if missing := what_is_missing(score):
         raise UserError(missing)
     return 0
+
+
+def too_slow(shares: Iterable[float], cores: int | None = None) -> str:
+    """What to try where the nodes, with these shares of a core, fill most of the computer; empty where they do not."""
+    used, all_cores = sum(shares), cores or os.cpu_count() or 1
+    if used < FULL * all_cores:
+        return ""
+    return (
+        f"the nodes used {100 * used:.0f} % of a core, this computer has {all_cores}: messages were late, and the errors "
+        "are those of a busy computer; make demo ARGS=--lockstep waits for the nodes"
+    )
 
 
 def node_parameters(
