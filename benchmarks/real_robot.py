@@ -29,7 +29,6 @@ from fish_sysid.diagnosis.vocabulary import NOT_A_NAME
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
-from fish_sysid.identification import plain
 from fish_sysid.prediction.baselines import fit_baselines, predict_baseline
 from fish_sysid.prediction.kept_noise import with_noise
 from fish_sysid.prediction.prediction import EVERY, HORIZONS, WARM_UP, predict, prediction_errors
@@ -120,7 +119,10 @@ def judged(
     hypothesis, theta, _ = fit.with_camera()
     noise = usual_noise(moved.select(rest))
     robot = with_noise(
-        plain(Parametrization(hypothesis).robot(theta)), noise, "shooting", fit.found.trust
+        Parametrization(hypothesis).robot(theta).without_effect("disturbance"),
+        noise,
+        "shooting",
+        fit.found.trust,
     )
     made = predict(moved.select(left_out), robot, noise, max(HORIZONS), EVERY, WARM_UP)
     bilinear = fit_baselines(moved.select(rest))["bilinear"]

@@ -143,6 +143,14 @@ class Robot:
             return replace(self, sensors={**self.sensors, name: values})
         return replace(self, effects={**self.effects, name: values})
 
+    def without_effect(self, name: str) -> Robot:
+        """The same robot less one effect or sensor error; itself where it has none of that name."""
+        effects, sensors = (
+            {key: values for key, values in table.items() if key != name}
+            for table in (self.effects, self.sensors)
+        )
+        return replace(self, effects=effects, sensors=sensors)
+
     def digest(self) -> str:
         """Hash of everything that changes its motion; weights files carry it."""
         content = {

@@ -30,6 +30,13 @@ def test_tail_keeps_length_mass_and_total_stiffness_whatever_the_number_of_links
     assert r["tail_stiffness"] / links == pytest.approx(0.1 / 3)
 
 
+def test_an_effect_or_a_sensor_error_can_be_taken_away_again():
+    robot = Robot().with_effect("tip_slip", mobility=0.2)
+    more = robot.with_effect("current", x=0.1, y=0.0).with_effect("gyro_scale", factor=1.1)
+    assert more.without_effect("current").without_effect("gyro_scale") == robot
+    assert robot.without_effect("current") == robot
+
+
 def test_a_file_gives_back_the_robot_with_effects_and_sensors(tmp_path):
     robot = Robot(links=2, name="blue").with_parameters(head_drag_surge=0.25)
     robot = robot.with_effect("tip_slip", mobility=0.2).with_effect("camera_latency", delay=0.05)

@@ -30,10 +30,9 @@ from fish_sysid.estimation.refit import ANNEAL_HELD, refit
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
-from fish_sysid.estimation.shooting.residuals import Scale
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
-from fish_sysid.estimation.shooting.start_states import START_TRUST
 from fish_sysid.estimation.thresholds import INNOVATION_RMS_REJECT, RATIO_REJECT
+from fish_sysid.identification_result import Identification, trust_of
 from fish_sysid.identification_statements import (
     data_statements,
     fit_statements,
@@ -41,13 +40,12 @@ from fish_sysid.identification_statements import (
     lost_statements,
     prediction_statements,
     start_statements,
-    undetermined,
     verdict,
 )
 from fish_sysid.prediction.better_states import better_states
 from fish_sysid.prediction.held_out_errors import judge
 from fish_sysid.prediction.kept_noise import with_noise
-from fish_sysid.prediction.prediction import ErrorSizes, Estimates, Predictions, estimate
+from fish_sysid.prediction.prediction import estimate
 
 Array = NDArray[np.float64]
 
@@ -70,56 +68,6 @@ TOO_SHORT = (
 )
 NOT_CHOSEN = "no effects looked for: the model follows the fish, and its likelihood can be believed; `robofish diagnose` asks it"
 Report = Callable[[str], None]  # told what is being done
-
-
-@dataclass(frozen=True)
-class Identification:
-    """What came out."""
-
-    fit: Fit
-    start: Robot
-    training: Experiment
-    held_out: Experiment | None  # None: a single trial
-    judged: Predictions  # of the held-out trials, or of the only trial
-    estimates: Estimates  # of the training trials
-    errors: dict[str, ErrorSizes]  # "start", "identified", then the baselines that could be fitted
-    statements: tuple[
-        str, ...
-    ]  # what is wrong with the data or the result, and what can still be said
-    seconds: float
-    camera_delay: float = 0.0  # s, taken out of all trials above
-    imu_delay: float = 0.0  # s, taken out of all trials above
-    predicted: PredictionFit | None = None  # where the robot was fitted to predictions
-    states: str = "filter"  # how the states that predictions start from are estimated
-    ahead: float = 0.0  # m, of the camera's point, taken out of all trials above
-
-    @property
-    def robot(self) -> Robot:
-        """The identified robot, with the delays that its sensors have in the recordings as they are."""
-        robot = with_marker(plain(self.fit.robot), self.ahead)
-        if self.camera_delay:
-            robot = robot.with_effect("camera_latency", delay=self.camera_delay)
-        if self.imu_delay:
-            robot = robot.with_effect("imu_latency", delay=self.imu_delay)
-        return with_noise(robot, self.fit.noise, self.states, trust_of(self.predicted))
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Parameters whose uncertainty is about the prior's: the data do not determine them."""
-        return undetermined(self.fit, self.predicted)
-
-    @property
-    def correlation(self) -> Array:
-        """(K, K) of the parameters' errors."""
-        deviation = np.sqrt(np.diag(self.fit.covariance))
-        matrix: Array = self.fit.covariance / np.outer(deviation, deviation)
-        return matrix
-
-
-def plain(robot: Robot) -> Robot:
-    """The robot without the wrench that the filter drives."""
-    kept = {name: values for name, values in robot.effects.items() if name != "disturbance"}
-    return replace(robot, effects=kept)
 
 
 @dataclass(frozen=True)
@@ -232,11 +180,13 @@ def by_predictions(
     report("noise")
     found_robot = Parametrization(hypothesis).robot(theta)
     centred = at_centre_of_mass(moved.select(train), ahead_of(found_robot))
-    own = initial_noise(centred, plain(found_robot), noise)
+    own = initial_noise(centred, found_robot.without_effect("disturbance"), noise)
     fit = evaluate(hypothesis, theta, centred, own)
     fit = replace(fit, information=np.asarray(np.linalg.inv(covariance), dtype=float))
     report("which states predict better")
-    states = better_states(moved.select(train), plain(fit.robot), own, found.found.trust)
+    states = better_states(
+        moved.select(train), fit.robot.without_effect("disturbance"), own, found.found.trust
+    )
     return Fitted(
         fit,
         moved,
@@ -262,7 +212,12 @@ def concluded(
     fit, moved = fitted.fit, fitted.experiment
     training, held_out = moved.select(train), moved.select(held) if held else None
     report("predicting trials left out")
-    robot = with_noise(plain(fit.robot), fit.noise, fitted.states, trust_of(fitted.predicted))
+    robot = with_noise(
+        fit.robot.without_effect("disturbance"),
+        fit.noise,
+        fitted.states,
+        trust_of(fitted.predicted),
+    )
     judged, errors, lacking = judge(training, held_out, start, robot, fit.noise)
     statements = (
         *data_statements(experiment, held_out),
@@ -280,7 +235,7 @@ def concluded(
         training,
         held_out,
         judged,
-        estimate(training, plain(fit.robot), fit.noise),
+        estimate(training, fit.robot.without_effect("disturbance"), fit.noise),
         errors,
         statements,
         time.monotonic() - began,
@@ -289,11 +244,6 @@ def concluded(
         fitted.predicted,
         fitted.states,
     )
-
-
-def trust_of(predicted: PredictionFit | None) -> Scale:
-    """How far start states trust the sensors."""
-    return START_TRUST if predicted is None else predicted.found.trust
 
 
 def is_wrong(fit: Fit, noise: Noise) -> bool:

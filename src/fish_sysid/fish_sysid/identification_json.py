@@ -14,7 +14,7 @@ import numpy as np
 from fish_report.json_file import write_json
 from fish_sim.robot_file import save_robot
 from fish_sysid.estimation.shooting.selection import Step
-from fish_sysid.identification import Identification
+from fish_sysid.identification_result import Identification
 
 
 def write_identification(folder: Path, result: Identification, left_out: Sequence[str]) -> None:

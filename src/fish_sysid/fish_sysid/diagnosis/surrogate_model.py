@@ -16,7 +16,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.marker_place import AHEAD, MARKER, ahead_of, at_centre_of_mass
 from fish_sysid.estimation.ekf_types import SensorModel
@@ -47,9 +46,7 @@ def surrogate_model(
     if not can_be_predicted(experiment):
         return nominal
     report("no name fits: fitting predictions over seconds")
-    given = nominal.hypothesis.robot
-    effects = {name: values for name, values in given.effects.items() if name != "disturbance"}
-    robot = replace(given, effects=effects)
+    robot = nominal.hypothesis.robot.without_effect("disturbance")
     free = [name for name in nominal.hypothesis.free if "." not in name]
     sensors = nominal.hypothesis.parametrization.filter_inputs(nominal.theta)[2]
     moving = [name for name in candidates if name in robot.table]  # a sensor moves no fish
@@ -75,17 +72,15 @@ def _as_fit(found: PredictionFit, before: SensorModel, experiment: Experiment) -
     }
     settled = replace(hypothesis.robot, sensors=sensors)
     centred = at_centre_of_mass(experiment, ahead_of(settled))
-    noise = initial_noise(centred, _without_wrench(settled), usual_noise(centred))
+    noise = initial_noise(centred, settled.without_effect("disturbance"), usual_noise(centred))
     fit = evaluate(replace(hypothesis, robot=settled), found.theta, centred, noise)
-    states = better_states(experiment, _without_wrench(fit.robot), noise, found.found.trust)
+    states = better_states(
+        experiment, fit.robot.without_effect("disturbance"), noise, found.found.trust
+    )
     kept = with_noise(fit.robot, noise, states, found.found.trust)
     information = np.linalg.inv(found.covariance[:K, :K])
     return replace(fit, robot=kept, information=np.asarray(information, dtype=float))
 
 
 def _with_filter(fit: Fit) -> Fit:
-    return replace(fit, robot=_without_wrench(fit.robot))
-
-
-def _without_wrench(robot: Robot) -> Robot:
-    return replace(robot, effects={k: v for k, v in robot.effects.items() if k != "disturbance"})
+    return replace(fit, robot=fit.robot.without_effect("disturbance"))

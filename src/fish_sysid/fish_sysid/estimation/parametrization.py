@@ -137,10 +137,8 @@ class Hypothesis:
 
     def without(self, name: str) -> Hypothesis:
         """The hypothesis less one effect."""
-        effects = {k: v for k, v in self.robot.effects.items() if k != name}
-        sensors = {k: v for k, v in self.robot.sensors.items() if k != name}
         free = tuple(f for f in self.free if not f.startswith(name + "."))
-        return Hypothesis(replace(self.robot, effects=effects, sensors=sensors), free)
+        return Hypothesis(self.robot.without_effect(name), free)
 
     def fixing(self, held: Collection[str], theta: Array) -> Hypothesis:
         """The hypothesis with the free parameters `held` fixed at what they are at theta (K,)."""

@@ -13,7 +13,7 @@ from fish_report.page import (
     Text,
     write_page,
 )
-from fish_sysid.identification import Identification
+from fish_sysid.identification_result import Identification
 from fish_sysid.reports.identify_page_figures import correlations, motion_figures, residual_figures
 from fish_sysid.reports.identify_tables import (
     bias_table,

@@ -18,7 +18,7 @@ from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.ekf_types import ROWS
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.identification import Identification
+from fish_sysid.identification_result import Identification
 from fish_sysid.prediction.prediction import WARM_UP, Predictions, predict
 from fish_sysid.prediction.stroke_average import stroke_mean
 

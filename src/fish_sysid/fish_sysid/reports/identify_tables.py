@@ -11,7 +11,7 @@ import numpy as np
 from fish_report.page import Table
 from fish_sim.robot import nominal_parameters
 from fish_sysid.estimation.shooting.prediction_fit import with_links
-from fish_sysid.identification import Identification
+from fish_sysid.identification_result import Identification
 from fish_sysid.identification_statements import entangled
 from fish_sysid.prediction.held_out_errors import AHEAD, PEEK
 from fish_sysid.prediction.prediction import ErrorSizes

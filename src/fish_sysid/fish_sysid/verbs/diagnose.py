@@ -14,7 +14,6 @@ from fish_report.json_file import write_json
 from fish_report.named_path import named_path
 from fish_report.terminal import PARAGRAPH, cell, say, terminal
 from fish_report.writable import writable_folder
-from fish_sim.robot import Robot
 from fish_sim.robot_argument import read_model
 from fish_sim.robot_file import save_robot
 from fish_sysid.dataset.read import read_days, read_experiment
@@ -97,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     write_json(args.out / "diagnosis.json", content)
     fit = corrected(result)
     save_robot(
-        with_marker(without_wrench(fit.robot), result.task.ahead),
+        with_marker(fit.robot.without_effect("disturbance"), result.task.ahead),
         args.out / "model.yaml",
         fit.standard_errors,
         notes=sentence(content),
@@ -149,10 +148,3 @@ def _compare(args: argparse.Namespace) -> int:
 def left_out_stages(given: str | None) -> frozenset[str]:
     """The stages that --without names, separated by commas."""
     return frozenset(given.split(",")) if given else frozenset()
-
-
-def without_wrench(robot: Robot) -> Robot:
-    """The robot less the filter's latent wrench."""
-    from dataclasses import replace
-
-    return replace(robot, effects={k: v for k, v in robot.effects.items() if k != "disturbance"})

@@ -37,7 +37,6 @@ from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
 from fish_sysid.estimation.shooting.prediction_fit import fit_predictions
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
-from fish_sysid.identification import plain
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -138,7 +137,8 @@ def model_of(old: Experiment, robot: Robot) -> Robot:
     """The robot that predicts OLD best; the given one where no trial is long enough."""
     if not can_be_predicted(old):
         return robot
-    return plain(fit_predictions(old, robot, NOMINAL_FREE, links=(robot.links,)).robot)
+    found = fit_predictions(old, robot, NOMINAL_FREE, links=(robot.links,))
+    return found.robot.without_effect("disturbance")
 
 
 def _named(change: Change, case: _Case, swapped: Swapped) -> Change:
