@@ -28,6 +28,7 @@ from fish_sysid.dataset.read import read_experiment
 from fish_sysid.diagnosis.vocabulary import NOT_A_NAME
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization
 from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.shooting.elimination import INTRINSIC
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
 from fish_sysid.prediction.baselines import fit_baselines, predict_baseline
 from fish_sysid.prediction.kept_noise import with_noise
@@ -80,7 +81,9 @@ def one_fold(
     lag = align(experiment.select(rest)).delay
     training = moved_back(experiment, lag).select(rest)
     counts = tuple(map(int, links.split(",")))
-    fit = fit_predictions(training, Robot(), NOMINAL_FREE, given, candidates, print, counts)
+    fit = fit_predictions(
+        training, Robot(), NOMINAL_FREE, given, candidates, print, counts, together=INTRINSIC
+    )
     squares, numbers = judged(experiment, rest, left_out, lag, fit)
     return {
         "squares": squares.tolist(),

@@ -47,6 +47,8 @@ OPTIMISATION = (("-O3", *FEW_SPILLS), ("-O3", "-fno-tree-vectorize", *FEW_SPILLS
 # The loop vectoriser of gcc 12.2 for AVX-512 gets a scalar adjoint wrong, and it makes no kernel of one fish faster. gcc
 # and clang both know the flag.
 SCALAR_OPTIMISATION = OPTIMISATION[1:]
+# Half of the compiler's time for a text with derivatives of several lanes, whose kernel is a twentieth slower.
+DERIVATIVE_OPTIMISATION = (("-O2", *FEW_SPILLS), *OPTIMISATION)
 
 log = logging.getLogger(__name__)
 
@@ -116,8 +118,10 @@ def has_libmvec() -> bool:
     return platform.machine() in ("x86_64", "AMD64")
 
 
-def library(source: str, check: Check, width: int) -> ctypes.CDLL | None:
+def library(source: str, check: Check, width: int, derivatives: bool = False) -> ctypes.CDLL | None:
     """The loaded library for a C text of `width` lanes; None where the caller should use the interpreted form.
+
+    derivatives: the text has tangents or adjoints, so that compiling it takes long.
 
     A text that is not in the cache is compiled and its library given to `check`. One whose errors exceed TOLERANCE is
     compiled with safer flags; where none helps, or no compiler works, a warning says so.
@@ -125,7 +129,7 @@ def library(source: str, check: Check, width: int) -> ctypes.CDLL | None:
     cc = compiler()
     if cc is None:
         return None
-    levels = SCALAR_OPTIMISATION if width == 1 else OPTIMISATION
+    levels = _levels(width, derivatives)
     key = _digest(
         "\n".join(
             [source, cc, _processor(), *FLAGS, str(levels), str(TOLERANCE), str(CHECKED)]
@@ -149,6 +153,12 @@ def library(source: str, check: Check, width: int) -> ctypes.CDLL | None:
     except (OSError, subprocess.CalledProcessError) as error:
         log.warning("no compiled kernel (%s); the slower interpreted form is used", _detail(error))
     return None
+
+
+def _levels(width: int, derivatives: bool) -> tuple[tuple[str, ...], ...]:
+    if width == 1:
+        return SCALAR_OPTIMISATION
+    return DERIVATIVE_OPTIMISATION if derivatives else OPTIMISATION
 
 
 def compile_library(cc: str, source: str, flags: tuple[str, ...], path: Path) -> None:

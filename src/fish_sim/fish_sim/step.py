@@ -283,7 +283,8 @@ def kernel(
     loaded = None
     if compiled:
         check = functools.partial(kernel_errors, structure, scheme, width, part)
-        loaded = library(kernel_source(structure, scheme, width, part), check, width)
+        source = kernel_source(structure, scheme, width, part)
+        loaded = library(source, check, width, derivatives=part != "values")
     if loaded is None:
         return InterpretedKernel(structure, METHODS[scheme.method], scheme.substeps)
     return CompiledKernel(loaded)

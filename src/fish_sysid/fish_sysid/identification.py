@@ -28,6 +28,7 @@ from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization, nominal_hypothesis
 from fish_sysid.estimation.refit import ANNEAL_HELD, refit
 from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.shooting.elimination import INTRINSIC
 from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
@@ -167,7 +168,9 @@ def by_predictions(
     """The robot that predicts best over seconds, and the clocks that it finds."""
     training = moved_back(experiment, lag.delay).select(train)
     moving = tuple(name for name in effects if name in EFFECTS)
-    found = fit_predictions(training, robot, free, moving, choose_from, report, links)
+    found = fit_predictions(
+        training, robot, free, moving, choose_from, report, links, together=INTRINSIC
+    )
     aside = [name for name in effects if name not in moving]
     not_fitted = [
         f"{', '.join(aside)}: not fitted; predictions fit the sensors' clocks, the camera's heading offset and its point alone"

@@ -13,7 +13,7 @@ import numpy as np
 
 from fish_report.json_file import write_json
 from fish_sim.robot_file import save_robot
-from fish_sysid.estimation.shooting.selection import Step
+from fish_sysid.estimation.shooting.left_out import Step
 from fish_sysid.identification_result import Identification
 
 

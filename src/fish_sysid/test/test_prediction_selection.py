@@ -15,6 +15,9 @@ from fish_sysid.dataset.experiment import Experiment, Frames, Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
+from fish_sysid.estimation.shooting.elimination import eliminate, without
+from fish_sysid.estimation.shooting.fold_steps import fold_steps
+from fish_sysid.estimation.shooting.multistep import LARGEST_STEP
 from fish_sysid.estimation.shooting.prediction_fit import (
     fit_predictions,
     more_links,
@@ -61,6 +64,47 @@ def test_iterations_are_no_evidence_where_nothing_is_concealed() -> None:
     unfinished = Found(hypothesis, np.zeros(len(FREE) + len(SENSORS)), np.inf)
     _, steps = choose(experiment, unfinished, ("rotor_lag", "rudder_gain"), most=1)
     assert all(step.gain < 0.1 for step in steps)
+
+
+def test_an_effect_that_is_there_stays_and_one_that_is_not_earns_nothing() -> None:
+    experiment = swum(Robot(links=1).with_effect("rudder_gain", factor=0.6))
+    hypothesis = nominal_hypothesis(Robot(links=1), FREE)
+    for name in ("tail_hardening", "rudder_gain"):
+        hypothesis = hypothesis.with_effect(name, 0.3)
+    z = np.concatenate([hypothesis.parametrization.origin(), np.zeros(len(SENSORS))])
+    start = polished(experiment, Found(hypothesis, z, np.inf), 4.0, 2)
+    found, steps = eliminate(experiment, start, ("tail_hardening", "rudder_gain"))
+    said = {step.name: step for step in steps}
+    assert said["rudder_gain"].added
+    assert said["rudder_gain"].gain > 2.0 * said["rudder_gain"].deviation
+    assert said["tail_hardening"].gain < 2.0 * said["tail_hardening"].deviation
+    assert ("tail_hardening" in found.hypothesis.names) == said["tail_hardening"].added
+
+
+def test_without_an_effect_all_else_is_as_it_was() -> None:
+    hypothesis = nominal_hypothesis(Robot(links=1), FREE).with_effect("rudder_offset", 0.3)
+    hypothesis = hypothesis.with_effect("tip_slip", 0.3)
+    z = np.arange(1.0, len(hypothesis.free) + len(SENSORS) + 1.0)
+    less = without(Found(hypothesis, z, 1.0), "rudder_offset")
+    assert less.hypothesis.free == (*FREE, "tip_slip.mobility")
+    assert less.z.tolist() == [1.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+
+
+def test_a_step_without_a_fold_is_the_fit_without_it_where_errors_are_linear() -> None:
+    random = np.random.default_rng(3)
+    J, target, prior = random.standard_normal((40, 4, 3)), random.random(3), np.full(3, 2.0)
+    z = random.random(3)
+    e = np.einsum("rsp,p->rs", J, z - target) + 0.01 * random.standard_normal((40, 4))
+    fold = np.arange(40) % 4
+    rows, flat = J.reshape(-1, 3), e.ravel()
+    normal = rows.T @ rows + np.diag(1.0 / prior**2)
+    steps = fold_steps(e, J, rows.T @ flat + z / prior**2, normal, fold)
+    for f, step in enumerate(steps):
+        rest = fold != f
+        A = np.vstack([J[rest].reshape(-1, 3), np.diag(1.0 / prior)])
+        b = np.concatenate([e[rest].ravel(), z / prior])
+        right = -np.linalg.lstsq(A, b, rcond=None)[0]
+        assert step == pytest.approx(np.clip(right, -LARGEST_STEP, LARGEST_STEP), abs=1e-9)
 
 
 @pytest.mark.parametrize("true", [1, 2])

@@ -84,9 +84,8 @@ def settings(stepper: Stepper, sensors: SensorModel, noise: Noise) -> Settings:
 def filter_library(structure: Structure, method: str) -> ctypes.CDLL | None:
     """The compiled and checked filter of a structure under an integrator, or None where it is that of NumPy."""
     width = lanes()
-    return library(
-        filter_text(structure, method, width), filter_check(structure, method, width), width
-    )
+    source, check = filter_text(structure, method, width), filter_check(structure, method, width)
+    return library(source, check, width, derivatives=True)
 
 
 def filter_text(structure: Structure, method: str, width: int) -> str:

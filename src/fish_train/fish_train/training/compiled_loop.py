@@ -89,7 +89,8 @@ def loop_check(stepper: Stepper, law: Law, width: int) -> Check:
 
 def loop_library(stepper: Stepper, law: Law, width: int) -> ctypes.CDLL | None:
     """The compiled and checked kernel of a loop, or None where it is `TorchLoop`."""
-    return library(loop_source(stepper, law, width), loop_check(stepper, law, width), width)
+    source, check = loop_source(stepper, law, width), loop_check(stepper, law, width)
+    return library(source, check, width, derivatives=True)
 
 
 class CompiledLoop:

@@ -16,18 +16,13 @@ from fish_sysid.dataset.marker_place import AHEAD, MARKER
 from fish_sysid.estimation.parametrization import Hypothesis, nominal_hypothesis
 from fish_sysid.estimation.shooting.clustered_errors import clustered_covariance, scores_by_trial
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
+from fish_sysid.estimation.shooting.elimination import eliminate
+from fish_sysid.estimation.shooting.fold_steps import FOLDS, without_folds
 from fish_sysid.estimation.shooting.huber import weight
+from fish_sysid.estimation.shooting.left_out import EVERY, Step, judged, left_out_costs
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
 from fish_sysid.estimation.shooting.schedule import Found, best_start, multistep, polished
-from fish_sysid.estimation.shooting.selection import (
-    EVERY,
-    FOLDS,
-    GLANCE,
-    Step,
-    choose,
-    judged,
-    left_out_costs,
-)
+from fish_sysid.estimation.shooting.selection import GLANCE, choose
 from fish_sysid.estimation.shooting.trust import trusted
 
 Array = NDArray[np.float64]
@@ -130,19 +125,26 @@ def fit_predictions(
     report: Report = lambda _: None,
     links: Sequence[int] = LINKS,
     start: float = 0.3,
+    together: Sequence[str] = (),
 ) -> PredictionFit:
     """The robot that predicts these trials best, with `effects` and those of `choose_from` that left-out trials ask for.
 
-    start: strength in typical ones, at which the fit of `effects` starts.
+    together: those of `choose_from` that are fitted from the start and must then earn their place; the others must earn it one
+    after the other. start: strength in typical ones, at which the fit of `effects` and `together` starts.
     """
     first, *more = sorted(links)
-    hypothesis = prediction_hypothesis(with_links(robot, first), experiment, free, effects, start)
+    at_once = [name for name in together if name in choose_from and name not in effects]
+    begun = (*effects, *at_once)
+    hypothesis = prediction_hypothesis(with_links(robot, first), experiment, free, begun, start)
     found = best_start(experiment, hypothesis, report)
     report("trust in the sensors at start points")
     found = trusted(experiment, found, EVERY)
     steps: tuple[Step, ...] = ()
     if choose_from:
-        found, steps = choose(experiment, found, choose_from, report)
+        found, kept = eliminate(experiment, found, at_once, report)
+        rest = [name for name in choose_from if name not in at_once]
+        found, added = choose(experiment, found, rest, report)
+        steps = (*kept, *added)
     found, judged = more_links(experiment, found, robot, free, more, report)
     report("predictions over 0.5 to 5 s, last steps")
     found = polished(experiment, trusted(experiment, polished(experiment, found)))
@@ -164,7 +166,7 @@ def more_links(
     if len(experiment.names) < FOLDS:
         return found, ()
     for count in more:
-        control = left_out_costs(experiment, found)
+        found, control = left_out_costs(experiment, found)
         names = tuple(
             name for name in found.hypothesis.names if name in found.hypothesis.robot.table
         )
@@ -173,7 +175,8 @@ def more_links(
         )
         longer = replace(best_start(experiment, hypothesis, report), trust=found.trust)
         report(f"{count} links: leaving trials out")
-        step = judged(f"{count} links", control, left_out_costs(experiment, longer))
+        longer, costs = left_out_costs(experiment, longer)
+        step = judged(f"{count} links", control, costs)
         better = step.gain > step.deviation
         steps.append(replace(step, added=better))
         if not better:
@@ -188,17 +191,13 @@ def uncertainty(experiment: Experiment, found: Found) -> tuple[Array, Array]:
     The folds' fits are one Gauss-Newton step from the optimum, without a fold's trials each; the spread is the jackknife's.
     """
     cost = multistep(experiment, found)
-    e, J = cost.errors(found.z, cost.states(found.z), slopes=True)
+    states = cost.states(found.z)
+    e, J = cost.errors(found.z, states, slopes=True)
     _, normal = cost.normal(found.z, e, J)
     flat, rows = e.ravel(), J.reshape(e.size, -1)
     trial = np.repeat(cost.targets.trial, e.shape[1])
-    weighted = weight(flat)
-    scores = scores_by_trial(flat, weighted, rows, trial)
-    moved = []
-    for fold in range(min(FOLDS, len(scores))):
-        out = trial % FOLDS == fold
-        without = normal - (rows[out].T * weighted[out]) @ rows[out]
-        moved.append(np.linalg.solve(without, scores[fold::FOLDS].sum(axis=0)))
-    count = max(len(moved), 1)
-    spread = np.sqrt((count - 1) / count * np.sum((moved - np.mean(moved, axis=0)) ** 2, axis=0))
+    scores = scores_by_trial(flat, weight(flat), rows, trial)
+    moved = without_folds(cost, found.z, states)
+    count = len(moved)
+    spread = np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0))
     return clustered_covariance(scores, normal, cost.prior), spread

@@ -1,0 +1,70 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Effects fitted together from the start, then taken out while trials left out are predicted as well without them.
+
+Several things that a model lacks bend a fit that has none of them, and none of them helps such a fit alone. So what a fish's
+body and actuators may have at all times and places is fitted at once, and each effect must then earn its place by trials left
+out (`left_out`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.estimation.shooting.fold_steps import FOLDS
+from fish_sysid.estimation.shooting.left_out import Step, judged, left_out_costs, step_text
+from fish_sysid.estimation.shooting.residuals import SENSORS
+from fish_sysid.estimation.shooting.schedule import Found
+
+Report = Callable[[str], None]
+
+# no memory, no delay, no place in the pool
+INTRINSIC = (
+    "quadratic_drag",
+    "tip_slip",
+    "hull_asymmetry",
+    "tail_hardening",
+    "tail_joint_damping",
+    "rotor_imbalance",
+    "rudder_gain",
+    "rudder_offset",
+    "rudder_placement",
+)
+
+
+def eliminate(
+    experiment: Experiment, found: Found, names: Sequence[str], report: Report = lambda _: None
+) -> tuple[Found, tuple[Step, ...]]:
+    """(the fit with those of `names` that trials left out ask for, what each of them does).
+
+    The effect that gains least goes while its mean gain is not above 0. One that gains more than a standard error stays and is
+    not judged again.
+    """
+    steps: dict[str, Step] = {}
+    unsure = list(names) if len(experiment.names) >= FOLDS else []
+    while unsure:
+        report(f"leaving trials out, without {', '.join(unsure)} in turn")
+        further, control = left_out_costs(experiment, found)
+        fits = {}
+        for name in unsure:
+            fits[name], costs = left_out_costs(experiment, without(found, name))
+            steps[name] = replace(judged(name, costs, control), added=True)
+            report(f"{name}: {step_text(steps[name])}")
+        worst = min(unsure, key=lambda name: steps[name].gain)
+        if steps[worst].gain > 0.0:
+            return further, tuple(steps.values())
+        found, steps[worst] = fits[worst], replace(steps[worst], added=False)
+        unsure = [
+            name for name in unsure if name != worst and steps[name].gain < steps[name].deviation
+        ]
+    return found, tuple(steps.values())
+
+
+def without(found: Found, name: str) -> Found:
+    """The fit less one effect, everything else as it is."""
+    stays = np.concatenate([~found.hypothesis.own(name), np.ones(len(SENSORS), dtype=bool)])
+    return replace(found, hypothesis=found.hypothesis.without(name), z=found.z[stays], cost=np.inf)

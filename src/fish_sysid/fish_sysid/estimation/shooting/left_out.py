@@ -1,0 +1,66 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What an effect does to trials that the model was not fitted to, against a control.
+
+A fit goes on for a few iterations from where it stands and predicts every fold of trials by its parameters without that fold
+(`fold_steps`). The control is the same fit without the effect, with as many iterations, so that iterations are not taken for
+evidence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.estimation.shooting.fold_steps import fold_of, without_folds
+from fish_sysid.estimation.shooting.schedule import Found, multistep
+
+Array = NDArray[np.float64]
+
+EVERY = 4.0  # s between start points
+ROUNDS, ITERATIONS = 2, 4  # of a fit and its control alike
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one effect does to trials left out."""
+
+    name: str
+    gain: float  # mean over trials of the logarithm of the cost without it over that with it
+    deviation: float  # its standard error over trials
+    added: bool
+    alike: tuple[str, ...] = ()  # of its family, that gain as much within a standard error
+
+
+def step_text(step: Step) -> str:
+    """What it does, in words."""
+    return (
+        f"predictions of trials left out cost {np.exp(-step.gain) - 1.0:+.0%} against as many iterations without it "
+        f"(a standard error: {step.deviation:.0%})"
+    )
+
+
+def left_out_costs(experiment: Experiment, found: Found) -> tuple[Found, Array]:
+    """(the fit a few iterations on, (M,) cost per prediction of each trial by its parameters without the trial's fold)."""
+    cost = multistep(experiment, found, EVERY)
+    size, z = cost.improve(found.z, ROUNDS, ITERATIONS)
+    fold, costs = fold_of(len(experiment.names)), np.full(len(experiment.names), np.nan)
+    for f, without in enumerate(without_folds(cost, z, cost.states(z))):
+        left_out = np.flatnonzero(fold == f).tolist()
+        unseen = multistep(experiment.select(left_out), replace(found, z=without), EVERY)
+        costs[left_out] = unseen.costs_by_trial(without)
+    return replace(found, z=z, cost=size), costs
+
+
+def judged(name: str, control: Array, costs: Array) -> Step:
+    """Costs (M,) of trials left out with an effect against those of the control without it.
+
+    Logarithms, so that no trial outweighs all others.
+    """
+    ratio = np.log(control / costs)
+    ratio = ratio[np.isfinite(ratio)]
+    deviation = float(np.std(ratio, ddof=1) / np.sqrt(len(ratio))) if len(ratio) > 1 else np.inf
+    return Step(name, float(ratio.mean()) if len(ratio) else 0.0, deviation, False)
