@@ -19,13 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.camera_time_offset import align, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.imu_time_offset import imu_moved_back
 from fish_sysid.dataset.read import read_experiment
-from fish_sysid.diagnosis.vocabulary import NOT_A_NAME
+from fish_sysid.diagnosis.vocabulary import choosable
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.elimination import INTRINSIC
@@ -77,7 +76,7 @@ def one_fold(
     began, chosen = time.process_time(), effects == "choose"
     rest = [m for m in range(len(experiment.names)) if m not in left_out]
     given = tuple(n for n in effects.split(",") if n and not chosen)
-    candidates = tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else ()
+    candidates = choosable() if chosen else ()
     lag = align(experiment.select(rest)).delay
     training = moved_back(experiment, lag).select(rest)
     counts = tuple(map(int, links.split(",")))

@@ -53,7 +53,7 @@ Array = NDArray[np.float64]
 EFFECT_START = 0.3  # typical strengths, at which the fit of an effect starts
 SO_FITTED = (
     "it lacks something, so that it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors are "
-    "clustered by trial; `robofish diagnose` looks for what is missing"
+    "clustered by trial; `--effects choose` adds what predictions ask for, and `robofish diagnose` looks for what is missing"
 )
 FITTED_FOR_OUTLOOK = (
     "the model needs sensors far noisier than they are, or water far stronger than in any pool: "

@@ -13,7 +13,7 @@ from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.parametrization import SENSOR_FIELDS, EffectTable
-from fish_sysid.estimation.thresholds import STILL
+from fish_sysid.estimation.thresholds import LARGE_EFFECT, STILL
 
 # the latent wrench itself; where the camera's point lies, which fits to predictions find
 NOT_A_NAME = ("disturbance", "camera_marker")
@@ -42,6 +42,15 @@ def known(names: Sequence[str], effects: EffectTable = EFFECTS) -> tuple[str, ..
 def kind_of(name: str, effects: EffectTable = EFFECTS) -> str:
     """physics, actuator or sensor."""
     return "sensor" if name in SENSOR_EFFECTS else effects[name].kind
+
+
+def choosable() -> tuple[str, ...]:
+    """Effects that `identify --effects choose` looks for: all but maps of a pool's flow, which serve no other pool."""
+    return tuple(
+        name
+        for name, effect in EFFECTS.items()
+        if name not in NOT_A_NAME and len(effect.parameters) <= LARGE_EFFECT
+    )
 
 
 def not_judged(experiment: Experiment, robot: Robot) -> dict[str, str]:

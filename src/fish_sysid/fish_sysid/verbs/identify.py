@@ -55,8 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Identify, print, write."""
     from fish_report.terminal import print_table
-    from fish_sim.effects import EFFECTS
-    from fish_sysid.diagnosis.vocabulary import NOT_A_NAME
+    from fish_sysid.diagnosis.vocabulary import choosable
     from fish_sysid.identification import identify
     from fish_sysid.identification_json import write_identification
     from fish_sysid.reports.identify_page import write_identify_page
@@ -81,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
             hold_out=args.hold_out,
             report=progress,
             effects=() if chosen else tuple(name for name in args.effects.split(",") if name),
-            choose_from=tuple(n for n in EFFECTS if n not in NOT_A_NAME) if chosen else (),
+            choose_from=choosable() if chosen else (),
         )
     write_identification(args.out, result, left_out)
     write_identify_page(args.out / "report.html", result, left_out)

@@ -4,7 +4,7 @@
 
 Every round each candidate is looked at where the fit stands: what would trials left out cost after one Gauss-Newton step along
 its own slope and those of the fit? The most promising are fitted from where the fit stands and judged (`left_out`). The one that
-gains most joins the model if it gains more than a standard error over the trials (Breiman et al. 1984, ch. 3.4).
+gains most joins the model if it gains more than SURE standard errors over the trials.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
 MOST_EFFECTS = 6
+SURE = 2.0  # standard errors; the best of many gains one by chance
 JUDGED = 4  # candidates a round that are cross-validated
 GLANCE = 0.1  # strength in typical ones, at which a candidate is looked at
 SCALE = 0.3  # strength at which a hypothesis is written down; sets the coordinates only
@@ -58,7 +59,7 @@ def choose(
         for name in promising:
             fits[name], costs = left_out_costs(experiment, extended(found, name))
             tried.append(judged(name, control, costs))
-        good = [step for step in tried if step.gain > step.deviation]
+        good = [step for step in tried if step.gain > SURE * step.deviation]
         best = max(good, key=lambda step: step.gain, default=None)
         steps += [
             replace(s, added=s is best, alike=_alike(s, tried) if s is best else ())
