@@ -1,0 +1,176 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Four records of one turn: gyro z, the camera's heading, the rotor (which turns the hull against itself) and the rudder.
+
+Two that disagree do not say which of them is wrong; a third does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fish_bag.felt_acceleration import MIRRORED, RECORDED, SURE, FeltAcceleration
+from fish_bag.problem import Problem
+from fish_bag.record_comparison import (
+    FEWEST,
+    FOLLOWS,
+    STRAYS,
+    Array,
+    correlation,
+    integral,
+    unit_problem,
+    without_trend,
+)
+from fish_bag.rotor_response import RotorResponse, rotor_response
+from fish_bag.rudder_checks import rudder_follows
+from fish_bag.trial import Camera, Commands, Imu, Trial
+
+TURN_RAD = 0.05  # standard deviation of the heading from which it can be compared
+STRAY_TURN_RAD = 0.3  # from which a gyro must show it
+RUDDER_FOLLOWS = 0.6  # correlation; a controller acts against disturbances, which lowers it
+ANSWERS = 0.8  # coherence of the yaw rate with the rotor
+STROKES = 0.3  # share of the yaw rate's power at the frequency of the strokes
+WITH_ROTOR_RAD = np.pi / 4  # phase of a hull that turns with the rotor; it lies near pi
+LEAST_GAIN = (
+    0.004  # (rad/s) / (rad/s); simulated fish have 0.027 to 0.054, a real one has 0.005 to 0.018
+)
+SMALL_GAIN = 0.01  # that makes one doubt where the rotor also swings far
+LARGEST_SWING_RAD = 20.0  # of the rotor to either side; the motor of the paper swings by 12
+LARGEST_GAIN = 0.5  # the hull is heavier than its rotor
+
+
+def check_yaw(
+    trial: Trial, camera: Camera | None, felt: FeltAcceleration | None
+) -> Iterator[Problem]:
+    """Problems of a clean trial; `camera` are its poses, None where they are not usable."""
+    commands, imu = trial.commands, trial.imu
+    follows = (
+        rudder_follows(commands, camera) if commands is not None and camera is not None else None
+    )
+    answer = _answer(trial)
+    headings = None if imu is None or camera is None else _headings(imu, camera)
+    if imu is not None and camera is not None and headings is not None:
+        psi, angles = headings
+        found = list(_gyro(imu, psi, angles))
+        against = correlation(psi, angles[2]) < -FOLLOWS
+        if against:
+            found = [_which_is_mirrored(imu, camera, answer, felt, follows)]
+        yield from found
+        if against and found[0].kind == "camera_axes":
+            return
+    if commands is not None:
+        sure = headings is None or correlation(headings[0], headings[1][2]) > FOLLOWS
+        if sure and imu is not None:
+            yield from _rotor(commands, answer, alone=headings is None)
+        if follows is not None and follows < -RUDDER_FOLLOWS:
+            text = (
+                f"the fish turns against the rudder (correlation {follows:.2f}); expected a left turn for a "
+                "positive angle: change the sign of the rudder"
+            )
+            yield Problem("error", "rudder_sign", commands.topic, text)
+
+
+def _answer(trial: Trial) -> RotorResponse | None:
+    """How gyro z answers the rotor, as measured or else as commanded; None where no strokes show it."""
+    imu, commands, encoder = trial.imu, trial.commands, trial.encoder
+    if imu is None or commands is None or min(len(imu), len(commands)) < FEWEST:
+        return None
+    t, speed = commands.t, commands.rotor_speed
+    if encoder is not None and len(encoder) >= FEWEST:
+        wanted = np.interp(encoder.t, t, speed)
+        if correlation(wanted, encoder.speed) > FOLLOWS:
+            t, speed = encoder.t, encoder.speed
+    answer = rotor_response(t, speed, imu.t, imu.gyro[:, 2])
+    sure = answer is not None and answer.coherence > ANSWERS and answer.share > STROKES
+    return answer if sure else None
+
+
+def _headings(imu: Imu, camera: Camera) -> tuple[Array, list[Array]] | None:
+    """The camera's heading and the three integrated angular velocities at its times, all without trend; None: no turn."""
+    inside = (camera.t >= imu.t[0]) & (camera.t <= imu.t[-1])
+    t, psi = camera.t[inside], np.unwrap(camera.psi[inside])
+    if len(t) < FEWEST or len(imu) < FEWEST:
+        return None
+    psi = without_trend(t, psi)
+    if np.std(psi) < TURN_RAD:
+        return None
+    turned = [np.interp(t, imu.t, integral(imu.t, imu.gyro[:, axis])) for axis in range(3)]
+    return psi, [without_trend(t, angle) for angle in turned]
+
+
+def _gyro(imu: Imu, psi: Array, angles: list[Array]) -> Iterator[Problem]:
+    """Axis and unit of the angular velocity."""
+    followed = [correlation(psi, angle) for angle in angles]
+    best = int(np.argmax(np.abs(followed)))
+    if abs(followed[2]) < STRAYS and abs(followed[best]) > FOLLOWS:
+        text = (
+            f"its axis {'xyz'[best]} follows the camera's heading (correlation {followed[best]:.2f}), expected z: "
+            "axes are swapped; turn them where the IMU is published"
+        )
+        yield Problem("error", "gyro_axes", imu.topic, text)
+    elif abs(followed[2]) < STRAYS and np.std(psi) > STRAY_TURN_RAD:
+        text = f"gyro z does not follow the camera's heading (correlation {followed[2]:.2f})"
+        yield Problem("warning", "gyro", imu.topic, text)
+    elif followed[2] > FOLLOWS:
+        text = "gyro z, integrated, is {} times the camera's heading"
+        slope = float(np.std(angles[2]) / np.std(psi))
+        yield from unit_problem("gyro_unit", imu.topic, text, "rad/s", slope)
+
+
+def _which_is_mirrored(
+    imu: Imu,
+    camera: Camera,
+    answer: RotorResponse | None,
+    felt: FeltAcceleration | None,
+    follows: float | None,
+) -> Problem:
+    """Gyro and camera turn against each other: which of the two, by rotor, accelerometer and rudder."""
+    camera_by, gyro_by = [], []
+    if answer is not None:
+        if abs(answer.phase) < WITH_ROTOR_RAD:
+            gyro_by.append("the rotor's strokes")
+        elif np.pi - abs(answer.phase) < WITH_ROTOR_RAD:
+            camera_by.append("the rotor's strokes")
+    if felt is not None:
+        others = sorted(felt.likelihood.values())[-2]
+        if felt.likelihood[felt.best] - others > SURE and felt.best in (MIRRORED, RECORDED):
+            (camera_by if felt.best == MIRRORED else gyro_by).append("the accelerometer")
+    if follows is not None and abs(follows) > RUDDER_FOLLOWS:
+        (camera_by if follows < 0 else gyro_by).append("the rudder")
+    if camera_by and not gyro_by:
+        text = (
+            f"the heading turns against gyro z, which {' and '.join(camera_by)} confirm: the camera's frame is "
+            "left-handed; expected x along the pool, y left of it, z up: mirror the camera's calibration"
+        )
+        return Problem("error", "camera_axes", camera.topic, text)
+    sure = f", which {' and '.join(gyro_by)} confirm" if gyro_by and not camera_by else ""
+    which = "change the sign of gyro z" if sure else "one of them is mirrored"
+    text = f"gyro z turns against the camera's heading{sure}; expected the same sign: {which}"
+    return Problem("error", "gyro_sign", imu.topic, text)
+
+
+def _rotor(commands: Commands, answer: RotorResponse | None, alone: bool) -> Iterator[Problem]:
+    """Sign and size of the hull's answer to the rotor; `alone`: no camera says that the gyro is right."""
+    if answer is None:
+        return
+    if abs(answer.phase) < WITH_ROTOR_RAD:
+        which = "gyro z or the rotor has" if alone else "the rotor has"
+        text = (
+            f"the hull turns with the rotor (phase {np.degrees(answer.phase):.0f} deg, coherence "
+            f"{answer.coherence:.2f}); expected against it: {which} the wrong sign"
+        )
+        yield Problem("error", "rotor_sign", commands.topic, text)
+    elif answer.gain < (SMALL_GAIN if answer.swing > LARGEST_SWING_RAD else LEAST_GAIN):
+        text = (
+            f"the hull turns by {answer.gain:.2g} of the rotor's speed, which swings by {answer.swing:.3g} rad; "
+            "expected 0.005 to 0.06, and swings below 20 rad: rotor speed in rpm or deg/s? publish rad/s"
+        )
+        yield Problem("warning", "rotor_unit", commands.topic, text)
+    elif answer.gain > LARGEST_GAIN and alone:
+        text = (
+            f"the hull turns by {answer.gain:.2g} of the rotor's speed; expected 0.005 to 0.06: "
+            "gyro in deg/s? publish rad/s"
+        )
+        yield Problem("warning", "gyro_unit", commands.topic, text)
