@@ -7,7 +7,7 @@
 A pose is wrong if it is more than 20 mm or 10 degrees from the own fish, also while that is hidden. Every scenario runs
 in episodes of 10 s with a new tracker. Prints for each the share of frames with a right pose, the wrong poses, and the
 errors of the right ones. Then it prints how many frames the tracker takes in a second of processor time, and how many a
-plain OpenCV pipeline takes of the same pictures.
+plain OpenCV pipeline takes of the same pictures. The fish of the scenarios tags_* carries a coded tag of 50 mm.
 """
 
 import argparse
@@ -24,17 +24,21 @@ from fish_sim.camera import CameraConfig, FishPose, FishShape, Patch, PoolRender
 from fish_sim.pool import WIDTH
 from fish_vision.calibration import Calibration, Lens
 from fish_vision.config import TrackerConfig
+from fish_vision.follower import make_follower
 from fish_vision.picture import from_compressed
 from fish_vision.pose import wrap
+from fish_vision.tags import tag_picture
 from fish_vision.tracker import Detection, Tracker
 
 HD = CameraConfig(width=1920, height=1080, focal=(1500.0, 1500.0), centre=(951.0, 549.0))
 TRACKER = TrackerConfig()
+TAGS = replace(TRACKER, marker_kind="tags", tail_links=0)
 SHAPE = FishShape()
 RATE, EPISODE = 30.0, 300  # frames/s, frames of one tracker
 ALONE_S = 0.5  # s until the other fish of the same look comes
 FAR, TURNED = 0.020, radians(10.0)  # a pose further off is wrong
 DARK, WHITE = (58, 56, 54), (215, 215, 212)
+PAPER, INK = (235, 235, 235), (20, 20, 20)  # of a printed tag
 Thing = Sequence[Patch]
 
 
@@ -185,6 +189,13 @@ ALONE: dict[str, tuple[Scenario, float]] = {  # name -> scenario, strength of th
     "bars": (bars, 0.0),
     "warm": (warm, 0.0),
 }
+TAGGED: dict[str, tuple[Scenario, float]] = {
+    "tags_clean": (clean, 0.0),
+    "tags_glare": (clean, 1.0),
+    "tags_bars": (bars, 0.0),
+    "tags_warm": (warm, 0.0),
+    "tags_twin": (twin, 0.0),
+}
 RIVALS: dict[str, tuple[Scenario, float]] = {
     "twin": (twin, 0.0),
     "hidden": (hidden, 0.0),
@@ -202,12 +213,13 @@ class Studio:
     of whole pictures. With glare, which moves, every picture is whole.
     """
 
-    def __init__(self, glare: float) -> None:
+    def __init__(self, glare: float, shape: FishShape = SHAPE) -> None:
         config = replace(HD, glare=glare)
-        self.calibration, self.renderer = camera(config)
+        self.shape = shape
+        self.calibration, self.renderer = camera(config, shape)
         self.whole = glare > 0.0
         self.random = np.random.default_rng(0)
-        pool = PoolRenderer(config.model(), config.shape(), replace(config.look(), noise_std=0.0))
+        pool = PoolRenderer(config.model(), shape, replace(config.look(), noise_std=0.0))
         self.still = pool.render([], 0.0).copy()
         self.taken = self._sent(self.renderer.render([], 0.0))
 
@@ -218,7 +230,7 @@ class Studio:
             return self._sent(self.renderer.render(poses, time, scene.below, scene.above))
         clean, result = self.still.copy(), self.taken.copy()
         self.renderer.draw(clean, poses, scene.below, scene.above)
-        outlines = [patch.outline for pose in poses for patch in patches(pose, SHAPE)]
+        outlines = [patch.outline for pose in poses for patch in patches(pose, self.shape)]
         things = [outlines] if outlines else []
         things += [[patch.outline for patch in thing] for thing in (*scene.below, *scene.above)]
         for thing in things:
@@ -252,7 +264,26 @@ class Studio:
             yield frame, scene, self.picture(scene, k / RATE)
 
 
-def camera(config: CameraConfig) -> tuple[Calibration, PoolRenderer]:
+def tagged(dictionary: str, size: float) -> FishShape:
+    """The fish with tag 0 of a dictionary on its head; size: of the black square, m."""
+    picture = tag_picture(dictionary, 0)
+    cells = len(picture)
+    edge = size / cells
+
+    def square(row: float, column: float, side: float, colour: tuple[int, int, int]) -> Patch:
+        corners = np.array([[column, -row], [column + side, -row]] * 2)
+        corners[2:] = corners[1::-1] - [0.0, side]
+        return Patch(edge * (corners + [-cells / 2, cells / 2]), colour)
+
+    plates = [square(-1, -1, cells + 2, PAPER), square(0, 0, cells, INK)]
+    plates += [square(i, j, 1, PAPER) for i, j in np.argwhere(picture)]
+    return replace(SHAPE, plates=tuple(plates))
+
+
+TAG_FISH = tagged(TAGS.tag_dictionary, TAGS.tag_size)
+
+
+def camera(config: CameraConfig, shape: FishShape = SHAPE) -> tuple[Calibration, PoolRenderer]:
     """The tracker's and the renderer's side of a camera."""
     model = config.model()
     lens = Lens.from_camera_info(
@@ -260,7 +291,7 @@ def camera(config: CameraConfig) -> tuple[Calibration, PoolRenderer]:
     )
     return (
         Calibration(lens, TRACKER.mount()),
-        PoolRenderer(model, config.shape(), config.look()),
+        PoolRenderer(model, shape, config.look()),
     )
 
 
@@ -288,10 +319,12 @@ class Score:
 
 def score(studio: Studio, scenario: Scenario, count: int) -> Score:
     """Run one scenario."""
-    errors, wrong, lost, tracker = [], 0, Counter[str](), Tracker(TRACKER, studio.calibration)
+    config = TAGS if studio.shape.plates else TRACKER
+    errors, wrong, lost = [], 0, Counter[str]()
+    tracker = make_follower(config, studio.calibration)
     for frame, scene, picture in studio.frames(scenario, count):
         if frame == 0:
-            tracker = Tracker(TRACKER, studio.calibration)
+            tracker = make_follower(config, studio.calibration)
         found = tracker.track(picture, frame / RATE)
         if not isinstance(found, Detection):
             lost[found.reason.value] += 1
@@ -363,17 +396,20 @@ def main() -> None:
     )
     parser.add_argument("--frames", type=int, default=1000, help="of each scenario")
     parser.add_argument("--speed", type=int, default=600, help="frames of the speed measurement")
-    parser.add_argument("--only", nargs="*", default=[*ALONE, *RIVALS], help="scenarios")
+    parser.add_argument("--only", nargs="*", default=[*ALONE, *TAGGED, *RIVALS], help="scenarios")
     args = parser.parse_args()
     cv2.setNumThreads(1)
     if args.speed:
         speed(args.speed)
     print(f"{'scenario':11s} frames    right  wrong  mm rms     p99  deg rms      p99   lost")
-    studios: dict[float, Studio] = {}
+    studios: dict[tuple[float, bool], Studio] = {}
     total = Counter[str]()
     for name in args.only:
-        scenario, glare = (ALONE | RIVALS)[name]
-        studio = studios.get(glare) or studios.setdefault(glare, Studio(glare))
+        scenario, glare = (ALONE | TAGGED | RIVALS)[name]
+        key = glare, name in TAGGED
+        if key not in studios:
+            studios[key] = Studio(glare, TAG_FISH if name in TAGGED else SHAPE)
+        studio = studios[key]
         result = score(studio, scenario, args.frames)
         print(result.line(name), flush=True)
         if name in RIVALS:

@@ -39,6 +39,8 @@ class Reason(Enum):
     OUTSIDE = "pose outside the pool"
     JUMP = "jump: too far from the last pose"
     AMBIGUOUS = "more than one fish has these markers"
+    NO_TAG = "no tag of the head"
+    TAG_SIZE = "tag of the head not of its size"
 
 
 class Choice:
@@ -96,10 +98,9 @@ class Choice:
 
     def _able(self, heads: Sequence[Head], reason: Reason) -> tuple[list[Head], Reason]:
         """Heads that can be a fish of ours in this pool, and the reason why the others are not."""
-        x, y = (side / 2 + self._config.pool_margin for side in POOL)
         result = []
         for head in heads:
-            if abs(head.pose.x) > x or abs(head.pose.y) > y:
+            if not in_pool(head.pose, self._config.pool_margin):
                 reason = Reason.OUTSIDE
             elif head.swapped:
                 reason = Reason.SWAPPED
@@ -137,7 +138,9 @@ class Choice:
             return reason
         assert self._own is not None
         tracks = [self._own, *self._rivals]
-        allowed = np.array([[self._reaches(t, h.pose, stamp) for h in heads] for t in tracks])
+        allowed = np.array(
+            [[reaches(t, h.pose, stamp, self._config) for h in heads] for t in tracks]
+        )
         given = assign(tracks, heads, stamp, allowed)
         if 0 not in given:
             return Reason.AMBIGUOUS if allowed[0].any() else Reason.JUMP
@@ -162,18 +165,6 @@ class Choice:
                 return Reason.AMBIGUOUS
         return own
 
-    def _reaches(self, track: Track, pose: HeadPose, stamp: float) -> bool:
-        """Whether a fish can have got from a track's end to a pose."""
-        dt, config = stamp - track.stamp, self._config
-        if dt > config.reacquire_s:
-            return True
-        far = hypot(pose.x - track.pose.x, pose.y - track.pose.y)
-        turn = abs(wrap(pose.heading - track.pose.heading))
-        return (
-            far <= config.max_speed * dt + JUMP_DISTANCE
-            and turn <= config.max_yaw_rate * dt + JUMP_TURN
-        )
-
     def _believe(self, own: Head, heads: Sequence[Head], stamp: float) -> None:
         self._own = (
             Track(own.pose, stamp) if self._own is None else self._own.after(own.pose, stamp)
@@ -184,7 +175,9 @@ class Choice:
         """Take over where the other fish are; a head where none was is one more."""
         if not heads:
             return
-        allowed = np.array([[self._reaches(t, h.pose, stamp) for h in heads] for t in self._rivals])
+        allowed = np.array(
+            [[reaches(t, h.pose, stamp, self._config) for h in heads] for t in self._rivals]
+        )
         given = assign(self._rivals, heads, stamp, allowed) if self._rivals else {}
         rivals = list(self._rivals)
         for i, j in given.items():
@@ -196,12 +189,30 @@ class Choice:
             reachable = (
                 self._own is not None
                 and self._own.stamp < stamp
-                and self._reaches(self._own, head.pose, stamp)
+                and reaches(self._own, head.pose, stamp, self._config)
             )
             if not reachable:  # else it may be ours
                 rivals.append(Track(head.pose, stamp))
                 taken.append(head)
         self._rivals = sorted(rivals, key=lambda rival: -rival.stamp)[:RIVALS_MOST]
+
+
+def reaches(track: Track, pose: HeadPose, stamp: float, config: TrackerConfig) -> bool:
+    """Whether a fish can have got from a track's end to a pose."""
+    dt = stamp - track.stamp
+    if dt > config.reacquire_s:
+        return True
+    far = hypot(pose.x - track.pose.x, pose.y - track.pose.y)
+    turn = abs(wrap(pose.heading - track.pose.heading))
+    return (
+        far <= config.max_speed * dt + JUMP_DISTANCE
+        and turn <= config.max_yaw_rate * dt + JUMP_TURN
+    )
+
+
+def in_pool(pose: HeadPose, margin: float) -> bool:
+    """Whether a pose is in the pool, or at most margin (m) outside its walls."""
+    return abs(pose.x) <= POOL[0] / 2 + margin and abs(pose.y) <= POOL[1] / 2 + margin
 
 
 def _mirror_image(pose: HeadPose, other: HeadPose) -> bool:

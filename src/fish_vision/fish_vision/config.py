@@ -11,8 +11,10 @@ from fish_node.parameter_file import read_settings
 from fish_vision.calibration import Mount
 from fish_vision.pose import MarkerLayout
 from fish_vision.segmentation import HUES, ColourRange
+from fish_vision.tags import tags_in
 
 NODE = "/fish/tracker"
+KINDS = ("colours", "tags")
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class TrackerConfig:
         0.010,
     )  # about the optical axes, rad; 0 = straight down
     marker_height: float = 0.0  # of the markers above the pool frame's origin, m
+    marker_kind: str = "colours"  # colours: four kinds of coloured discs; tags: coded squares
     front_colour: tuple[int, ...] = (20, 36, 110, 90)  # yellow
     rear_colour: tuple[int, ...] = (136, 166, 90, 80)  # magenta
     tail_odd_colour: tuple[int, ...] = (172, 12, 110, 80)  # red: links 1, 3, ...
@@ -45,6 +48,19 @@ class TrackerConfig:
     marker_diameter: float = 0.030  # of the head's markers, m
     tail_marker_diameter: float = 0.016  # m
     tail_links: int = 3  # marked links; 0 = no tail markers
+    tag_dictionary: str = (
+        "4X4_50"  # OpenCV's name of the tags' family without DICT_, such as APRILTAG_36h11
+    )
+    head_tag: int = 0  # number of the head's tag
+    tag_size: float = 0.05  # side of the head's black square, m
+    head_tag_pose: tuple[float, ...] = (
+        0.0,
+        0.0,
+        0.0,
+    )  # base_link x, y, m, and turn of its picture's right to base_link x, rad
+    first_tail_tag: int = 1  # number of the first link's tag, its picture's right ahead; the next links have the next numbers
+    tail_tag_size: float = 0.03  # side of a tail tag's black square, m
+    corner_std: float = 0.1  # standard deviation of a tag's corner, pixels
     hinge_offset: float = 0.075  # head's centre of mass to the tail's hinge, m
     link_length: float = 0.07 / 3  # hinge to the marker at the far end of a link, m
     area_min: float = 0.35  # least area of a blob, share of the marker's
@@ -64,6 +80,8 @@ class TrackerConfig:
         30.0  # a fish seen elsewhere while ours was in view or just lost is not ours for so long, s
     )
     pixel_std: float = 0.06  # standard deviation of a whole marker's middle, pixels
+    lowpass_hz: float = 0.0  # cutoff of a low-pass over pose and tail, Hz; 0 = off.
+    # It delays by 1 / (2 pi lowpass_hz), and the stamps are earlier by as much
     pool_margin: float = 0.10  # a pose so far outside the walls is refused, m
     camera_frame: str = "overhead_optical"  # of the camera; its place goes to /tf_static
     frame_prefix: str = ""  # before every frame but the pool's, such as fish_2/ for a second fish
@@ -88,10 +106,34 @@ class TrackerConfig:
                 raise ValueError(
                     f"{name} = {list(value)}: expected two hues 0 to 179 and two levels 0 to 255"
                 )
+        if self.marker_kind not in KINDS:
+            raise ValueError(f"marker_kind = {self.marker_kind!r}: expected {' or '.join(KINDS)}")
+        self._check_tags()
         if self.layout().spacing < self.marker_diameter:
             raise ValueError(
                 f"front_marker = {list(self.front_marker)}, rear_marker = {list(self.rear_marker)}: "
                 f"expected to be more than marker_diameter = {self.marker_diameter} m apart"
+            )
+
+    def _check_tags(self) -> None:
+        """Dictionary and numbers."""
+        try:
+            count = tags_in(self.tag_dictionary)
+        except ValueError as error:
+            raise ValueError(f"tag_dictionary: {error}") from error
+        if not 0 <= self.head_tag < count:
+            raise ValueError(
+                f"head_tag = {self.head_tag}: expected 0 to {count - 1}, as tag_dictionary {self.tag_dictionary} has"
+            )
+        last = self.first_tail_tag + self.tail_links
+        if not 0 <= self.first_tail_tag <= last <= count:
+            raise ValueError(
+                f"first_tail_tag = {self.first_tail_tag}: expected 0 to {count - self.tail_links}, as tag_dictionary "
+                f"{self.tag_dictionary} has {count} tags and the tail {self.tail_links}"
+            )
+        if self.first_tail_tag <= self.head_tag < last:
+            raise ValueError(
+                f"head_tag = {self.head_tag}: expected another number than the tail's, {self.first_tail_tag} to {last - 1}"
             )
 
     def mount(self) -> Mount:
@@ -131,6 +173,7 @@ _LISTS = (
     ("tail_even_colour", 4),
     ("front_marker", 2),
     ("rear_marker", 2),
+    ("head_tag_pose", 3),
 )
 _RANGES = (  # field, lowest, highest
     ("marker_height", -1.0, 1.0),
@@ -138,6 +181,9 @@ _RANGES = (  # field, lowest, highest
     ("marker_diameter", 0.002, 0.5),
     ("tail_marker_diameter", 0.002, 0.5),
     ("tail_links", 0, 10),
+    ("tag_size", 0.005, 0.5),
+    ("tail_tag_size", 0.005, 0.5),
+    ("corner_std", 0.001, 5.0),
     ("hinge_offset", 0.0, 1.0),
     ("link_length", 0.002, 1.0),
     ("area_min", 0.01, 1.0),
@@ -151,5 +197,6 @@ _RANGES = (  # field, lowest, highest
     ("reacquire_s", 0.0, 10.0),
     ("rival_memory_s", 0.0, 3600.0),
     ("pixel_std", 0.001, 5.0),
+    ("lowpass_hz", 0.0, 1000.0),
     ("pool_margin", 0.0, 5.0),
 )

@@ -53,18 +53,28 @@ def wrap(angle: float) -> float:
 
 
 def head_pose(front: Spot, rear: Spot, layout: MarkerLayout) -> HeadPose:
-    """Pose of the head from its two markers, which a rigid body holds at a known distance.
+    """Pose of the head from its two markers, which a rigid body holds at a known distance (see rigid_pose)."""
+    mounted = np.array([layout.front, layout.rear], float)
+    return rigid_pose(mounted, [front, rear])
 
-        minimise sum_i (p + R(heading) m_i - z_i)^T Sigma_i^-1 (p + R(heading) m_i - z_i),  i = front, rear
 
-    z: markers seen in the pool, m: their places in base_link. Gauss-Newton from the middle of the line between
-    them; the covariance is the inverse of the information. A marker that is partly hidden pulls less.
+def rigid_pose(mounted: Array, seen: Sequence[Spot]) -> HeadPose:
+    """Pose of a rigid body from points of it that are seen.
+
+        minimise sum_i (p + R(heading) m_i - z_i)^T Sigma_i^-1 (p + R(heading) m_i - z_i)
+
+    z: points seen in the pool, m: their places on the body, Sigma: covariance of z. Gauss-Newton from the line between
+    the first and the last point; the covariance is the inverse of the information. A marker that is partly hidden pulls
+    less.
+
+    Args:
+        mounted: (N, 2) places in base_link, m, N >= 2; the first and the last differ.
+        seen: as many points in the pool.
     """
-    m = np.array([layout.front, layout.rear], float)
-    z = np.array([front.position, rear.position])
-    line, mounted = z[0] - z[1], m[0] - m[1]
-    heading = atan2(line[1], line[0]) - atan2(mounted[1], mounted[0])
-    W = [_inverse(front.covariance), _inverse(rear.covariance)]
+    m, z = mounted, np.array([spot.position for spot in seen])
+    line, along = z[0] - z[-1], m[0] - m[-1]
+    heading = atan2(line[1], line[0]) - atan2(along[1], along[0])
+    W = [_inverse(spot.covariance) for spot in seen]
     p = z.mean(axis=0) - _turned(heading, m.mean(axis=0))
     for _ in range(2):
         information, gradient = np.zeros((3, 3)), np.zeros(3)

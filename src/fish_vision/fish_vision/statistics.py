@@ -39,7 +39,7 @@ class Statistics:
         if isinstance(found, Lost):
             self.last_reason = found.reason.value
             self.lost[self.last_reason] += 1
-            if found.reason == Reason.NO_PAIR and found.spacing is not None:
+            if found.reason in (Reason.NO_PAIR, Reason.TAG_SIZE) and found.spacing is not None:
                 self._refused_spacings.append(found.spacing)
             return
         self._refused_spacings.clear()

@@ -73,3 +73,31 @@ def _disc(
     cover = inside.reshape(bottom - top, fine, right - left, fine).mean(axis=(1, 3))[..., None]
     part = picture[top:bottom, left:right]
     part[:] = part * (1 - cover) + np.array(colour) * cover
+
+
+def with_tag(
+    picture: np.ndarray, tag: np.ndarray, x: float, y: float, turn: float, size: float
+) -> np.ndarray:
+    """Copy of a picture with a printed tag and its white rim of one cell, 8 x 8 subpixels per pixel.
+
+    tag: (cells, cells) 0 or 255. turn: of the tag's right against pool x, rad. size: of the black square, m.
+    """
+    result, fine = picture.copy(), 8
+    printed, cells = np.pad(tag, 1, constant_values=255), len(tag)
+    reach = SCALE * size * (1 + 2 / cells) * 0.75 + 2
+    u_0, v_0 = 640.0 + SCALE * x, 360.0 - SCALE * y
+    left, right = int(u_0 - reach), int(u_0 + reach)
+    top, bottom = int(v_0 - reach), int(v_0 + reach)
+    u = (np.arange(left * fine, right * fine) + 0.5) / fine - 0.5 - u_0
+    v = (np.arange(top * fine, bottom * fine) + 0.5) / fine - 0.5 - v_0
+    ahead, up = u[None, :] / SCALE, -v[:, None] / SCALE
+    column = (cos(turn) * ahead + sin(turn) * up) * cells / size + cells / 2 + 1
+    row = (sin(turn) * ahead - cos(turn) * up) * cells / size + cells / 2 + 1
+    inside = (np.minimum(row, column) >= 0) & (np.maximum(row, column) < cells + 2)
+    index = np.clip(np.stack([row, column]), 0, cells + 1).astype(int)
+    grey = np.where(inside, printed[index[0], index[1]] * 0.85 + 15.0, 0.0)
+    shape = (bottom - top, fine, right - left, fine)
+    cover = inside.astype(float).reshape(shape).mean(axis=(1, 3))[..., None]
+    part = result[top:bottom, left:right]
+    part[:] = np.round(part * (1 - cover) + grey.reshape(shape).mean(axis=(1, 3))[..., None])
+    return result

@@ -35,6 +35,12 @@ def test_file_has_exactly_the_parameters_and_their_defaults() -> None:
         ("area_min", 0.0),
         ("tail_links", 20),
         ("front_marker", (-0.03, 0.0)),
+        ("marker_kind", "barcodes"),
+        ("tag_dictionary", "9X9"),
+        ("head_tag", 50),
+        ("head_tag", 2),  # the tail's
+        ("first_tail_tag", 48),
+        ("lowpass_hz", -1.0),
     ],
 )
 def test_a_bad_value_is_refused_with_its_name(field: str, value: object) -> None:

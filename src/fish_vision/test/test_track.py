@@ -102,3 +102,17 @@ def test_what_is_no_video_of_this_camera_is_said(
     cv2.imwrite(str(files / "small" / "1.png"), np.zeros((20, 30, 3), np.uint8))
     with pytest.raises(UserError, match=said):
         run(files, source, *more)
+
+
+def test_a_low_pass_delays_the_poses_and_says_so(files: Path) -> None:
+    """The fish of POSES moves steadily: a pose is right at its own time."""
+    text = (files / "params.yaml").read_text() + "    lowpass_hz: 3.0\n"
+    (files / "params.yaml").write_text(text)
+    assert run(files, "frames", "--rate", "20") == 0
+    found = rows(files)
+    assert float(found[-1]["t"]) < 6 / 20 - 0.02
+    for row in found:
+        frame = 20 * float(row["t"]) - 1
+        expected = [0.02 * frame, 0.1, 0.3 + 0.05 * frame]
+        values = [float(row[name]) for name in ("x", "y", "heading")]
+        np.testing.assert_allclose(values, expected, atol=5e-3)

@@ -5,7 +5,7 @@
 import os
 import sys
 from collections.abc import Iterator
-from math import atan2
+from math import atan2, exp, pi
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from pool_picture import CONFIG, discs_of_fish, draw, lens_fields
+from pool_picture import CONFIG, discs_of_fish, draw, lens_fields, with_tag
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
@@ -26,6 +26,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from fish_vision.config import config_from_file
 from fish_vision.nodes.tracker import TrackerNode
 from fish_vision.picture import to_jpeg
+from fish_vision.tags import tag_picture
 
 pytestmark = pytest.mark.ros
 DOMAIN = 142
@@ -194,6 +195,31 @@ def test_raw_images_which_are_many_packets_each_come_reliably(
     assert tracker.qos_profile.reliability == reliability
     [own] = [s for s in bench.tracker.subscriptions if s.topic_name == f"/fish/{topic}"]
     assert own.qos_profile.depth == 1  # a late image is worse than a lost one
+
+
+@pytest.mark.parametrize(
+    "bench", [{"marker_kind": "tags", "tag_size": 0.08, "head_tag": 5}], indirect=True
+)
+def test_a_fish_with_tags_has_the_same_topics(bench: Bench) -> None:
+    bench.send_info()
+    bench.send_jpeg(to_jpeg(with_tag(draw([]), tag_picture("4X4_50", 5), *POSE, 0.08), 95))
+    assert bench.spin_until(lambda: bool(bench.got["pose"]))
+    check_pose(bench.got["pose"][0])
+    assert bench.says("fish seen in all 1 images")
+    assert "hue_shifts" not in [v.key for v in bench.got["diagnostics"][-1].status[0].values]
+
+
+@pytest.mark.parametrize("bench", [{"lowpass_hz": 2.0}], indirect=True)
+def test_a_low_pass_stamps_its_poses_earlier_than_their_images(bench: Bench) -> None:
+    bench.send_info()
+    for count in (1, 2):
+        bench.send_jpeg(to_jpeg(PICTURE, 95))
+        assert bench.spin_until(lambda n=count: len(bench.got["pose"]) == n)
+    stamps = [p.header.stamp.nanosec for p in bench.got["pose"]]
+    assert stamps[0] == (bench.frame - 1) * 33_000_000
+    weight = 1 - exp(-2 * pi * 2.0 * 0.033)
+    assert stamps[1] == pytest.approx(stamps[0] + weight * 33_000_000, abs=2000)
+    check_pose(bench.got["pose"][1])
 
 
 def test_bad_images_are_said_and_the_next_good_one_is_tracked(bench: Bench) -> None:

@@ -37,6 +37,14 @@ class FishPose:
 
 
 @dataclass(frozen=True)
+class Patch:
+    """One filled outline: points (N, 2), m, in the pool frame or, of a plate, in base_link."""
+
+    outline: Array
+    colour: Colour
+
+
+@dataclass(frozen=True)
 class FishShape:
     """Lengths in metres. Source: MODEL.md of the project's specification; widths and markers: own choice."""
 
@@ -54,14 +62,9 @@ class FishShape:
     front_colour: Colour = FRONT
     rear_colour: Colour = REAR
     tail_colours: tuple[Colour, ...] = TAIL_COLOURS  # of links 1, 2, ...; repeated
-
-
-@dataclass(frozen=True)
-class Patch:
-    """One filled outline: points (N, 2) in the pool frame, m."""
-
-    outline: Array
-    colour: Colour
+    plates: tuple[
+        Patch, ...
+    ] = ()  # flat things on the head, outlines in base_link, such as a coded tag
 
 
 def joints(pose: FishPose, shape: FishShape) -> tuple[Array, Array]:
@@ -97,7 +100,7 @@ def markers(pose: FishPose, shape: FishShape) -> list[tuple[Array, float, Colour
 
 
 def patches(pose: FishPose, shape: FishShape) -> list[Patch]:
-    """Everything to fill, from the bottom up: fin, tail, head, markers."""
+    """Everything to fill, from the bottom up: fin, tail, head, markers, plates."""
     hinges, theta = joints(pose, shape)
     fin_end = hinges[-1] - shape.fin_length * np.array([cos(theta[-1]), sin(theta[-1])])
     widths = np.linspace(shape.tail_width, shape.tail_width / 2, shape.links + 1)
@@ -113,7 +116,7 @@ def patches(pose: FishPose, shape: FishShape) -> list[Patch]:
     result += [
         Patch(_disc(centre, diameter), colour) for centre, diameter, colour in markers(pose, shape)
     ]
-    return result
+    return result + [Patch(_placed(pose, plate.outline), plate.colour) for plate in shape.plates]
 
 
 def silhouette(pose: FishPose, shape: FishShape) -> Sequence[Array]:
@@ -149,6 +152,11 @@ def _head(pose: FishPose, shape: FishShape, scale: float, points: int = 40) -> A
     angles = np.arange(points) * (2 * pi / points)
     along = 0.5 * shape.head_length * np.cos(angles)
     across = 0.5 * shape.head_width * np.sin(angles) * (1.0 + 0.18 * np.cos(angles))
+    return _placed(pose, scale * np.column_stack([along, across]))
+
+
+def _placed(pose: FishPose, points: Array) -> Array:
+    """Points (N, 2) of base_link in the pool frame, m."""
     c, s = cos(pose.heading), sin(pose.heading)
-    turned: Array = np.column_stack([along, across]) @ np.array([[c, s], [-s, c]])
-    return np.array([pose.x, pose.y]) + scale * turned
+    turned: Array = points @ np.array([[c, s], [-s, c]])
+    return np.array([pose.x, pose.y]) + turned

@@ -12,9 +12,10 @@ from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, read_lens
 from fish_vision.commands.calibrate import read_picture, write_picture
 from fish_vision.config import TrackerConfig, config_from_file
+from fish_vision.follower import make_follower
 from fish_vision.segmentation import hsv_of
 from fish_vision.spots import SpotFinder
-from fish_vision.tracker import Lost, Tracker
+from fish_vision.tracker import Lost
 
 MARKERS = ("front", "rear", "tail_odd", "tail_even")
 
@@ -40,8 +41,9 @@ def check(args: argparse.Namespace) -> int:
             f"{args.picture} has size {picture.shape[1::-1]}, {args.lens} says {lens.size}"
         )
     calibration = Calibration(lens, config.mount(), config.marker_height)
-    print_colours(picture, config, calibration)
-    found = Tracker(config, calibration).track(picture, 0.0)
+    if config.marker_kind == "colours":
+        print_colours(picture, config, calibration)
+    found = make_follower(config, calibration).track(picture, 0.0)
     if isinstance(found, Lost):
         print(f"lost: {found.reason.value}")
     else:
@@ -49,7 +51,7 @@ def check(args: argparse.Namespace) -> int:
         print(
             f"head {head.x:+.4f} {head.y:+.4f} m, heading {head.heading:+.4f} rad, std {std.round(5)}"
         )
-        print(f"spacing of the head markers {found.spacing:.4f} of the true one")
+        print(f"size of what is on the head {found.spacing:.4f} of the true one")
         print(
             f"tail {'not seen' if found.tail is None else [round(angle, 3) for angle in found.tail]}"
         )

@@ -19,8 +19,10 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
@@ -31,10 +33,12 @@ from fish_node.nodes.status_log import StatusLog
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, CalibrationError, Lens
 from fish_vision.config import TrackerConfig
+from fish_vision.follower import Follower, make_follower
+from fish_vision.lowpass import PoseLowPass
 from fish_vision.nodes.heap import keep_freed_memory
 from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
 from fish_vision.statistics import Statistics
-from fish_vision.tracker import Detection, Tracker
+from fish_vision.tracker import Detection
 
 SETTABLE = ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour")
 NO_INFO = "no camera/camera_info yet"
@@ -60,7 +64,8 @@ class TrackerNode(Node):
         self._info: tuple[Any, ...] | None = None  # fields of the camera_info in use
         self._calibration: Calibration | None = None
         self._calibration_error = NO_INFO
-        self._tracker: Tracker | None = None
+        self._tracker: Follower | None = None
+        self._lowpass = PoseLowPass(self._config.lowpass_hz, self._config.reacquire_s)
         self._statistics = Statistics()
         self._images_before = self._tracked_before = 0
         self._mounted = publish_static_frame(
@@ -94,7 +99,7 @@ class TrackerNode(Node):
         def take_over() -> None:
             self._config = after
             if self._calibration is not None:
-                self._tracker = Tracker(after, self._calibration)
+                self._tracker = make_follower(after, self._calibration)
 
         return take_over
 
@@ -108,7 +113,7 @@ class TrackerNode(Node):
             self._calibration = Calibration(
                 Lens.from_camera_info(*info), self._config.mount(), self._config.marker_height
             )
-            self._tracker = Tracker(self._config, self._calibration)
+            self._tracker = make_follower(self._config, self._calibration)
         except CalibrationError as error:
             self._calibration_error = str(error)
 
@@ -125,7 +130,8 @@ class TrackerNode(Node):
         stamp = msg.header.stamp.sec + msg.header.stamp.nanosec * 1e-9
         found = self._tracker.track(picture, stamp)
         if isinstance(found, Detection):
-            self._publish(found, msg.header)
+            filtered = self._lowpass.filtered(found)
+            self._publish(filtered, _earlier(msg.header, stamp - filtered.stamp))
         age = self.get_clock().now().nanoseconds * 1e-9 - stamp
         self._statistics.add(found, perf_counter() - start, age)
         if self._debug is not None:
@@ -165,7 +171,7 @@ class TrackerNode(Node):
         status.values = [
             KeyValue(key=key, value=value) for key, value in self._statistics.values().items()
         ]
-        if self._tracker is not None:
+        if self._tracker is not None and self._tracker.hue_shifts:
             shifts = " ".join(f"{name} {v:+.0f}" for name, v in self._tracker.hue_shifts.items())
             status.values.append(KeyValue(key="hue_shifts", value=shifts))
         stamp = self.get_clock().now().to_msg()
@@ -204,6 +210,14 @@ class TrackerNode(Node):
                 f"fish seen in {tracked} of {images} images: {statistics.last_reason}",
             )
         return DiagnosticStatus.OK, f"fish seen in all {images} images"
+
+
+def _earlier(header: Header, delay: float) -> Header:
+    """A header with a stamp that is delay (s) before that of another one."""
+    if not delay:
+        return header
+    stamp = Time.from_msg(header.stamp) - Duration(nanoseconds=round(delay * 1e9))
+    return Header(stamp=stamp.to_msg(), frame_id=header.frame_id)
 
 
 def main() -> int:

@@ -43,19 +43,22 @@ def _track(args: argparse.Namespace) -> int:
     from fish_vision.calibration import Calibration, read_lens
     from fish_vision.commands.calibrate import write_picture
     from fish_vision.config import TrackerConfig, config_from_file
-    from fish_vision.tracker import Detection, Tracker
+    from fish_vision.follower import make_follower
+    from fish_vision.lowpass import PoseLowPass
+    from fish_vision.tracker import Detection
     from fish_vision.video import frames
 
     config = config_from_file(args.params) if args.params else TrackerConfig()
     calibration = Calibration(read_lens(args.lens), config.mount(), config.marker_height)
-    tracker, lost, spacings = Tracker(config, calibration), Counter[str](), []
+    tracker, lost, spacings = make_follower(config, calibration), Counter[str](), []
+    lowpass = PoseLowPass(config.lowpass_hz, config.reacquire_s)
     with args.out.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow([*HEADER, *(f"tail_{i + 1}" for i in range(config.tail_links))])
         for stamp, picture in frames(args.video, args.rate, calibration.lens.size):
             found = tracker.track(picture, stamp)
             if isinstance(found, Detection):
-                rows.writerow(_row(found))
+                rows.writerow(_row(lowpass.filtered(found)))
                 spacings.append(found.spacing)
             else:
                 lost[found.reason.value] += 1
@@ -68,7 +71,12 @@ def _track(args: argparse.Namespace) -> int:
         print(f"lost in {number}: {reason}")
     if spacings:
         off = 100 * (sum(spacings) / len(spacings) - 1)
-        print(f"distance of the head's markers {off:+.2f} % off on average: the scale's error")
+        what = (
+            "side of the head's tag"
+            if config.marker_kind == "tags"
+            else "distance of the head's markers"
+        )
+        print(f"{what} {off:+.2f} % off on average: the scale's error")
     print(f"annotated picture: {args.picture}")
     return 0 if spacings else 1
 
