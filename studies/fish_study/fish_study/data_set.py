@@ -44,13 +44,22 @@ def write_trial(directory: Path, r: Readings, m: int, start_ns: int, encoder: bo
     batches = [_commands(r, m, start_ns), _imu(r, m, start_ns), _poses(r, m, start_ns)]
     if encoder:
         batches.append(_encoder(r, m, start_ns))
-    arrivals = [
-        (start_ns + np.round(1e9 * (t + LATENCY[topic]))).astype(np.int64)
-        for topic, t, _ in batches
-    ]
-    order = np.argsort(np.concatenate(arrivals), kind="stable")
-    which = np.repeat(np.arange(len(batches)), [len(a) for a in arrivals])[order]
-    place = np.concatenate([np.arange(len(a)) for a in arrivals])[order]
+    write_batches(
+        directory,
+        [
+            (topic, (start_ns + np.round(1e9 * (t + LATENCY[topic]))).astype(np.int64), raw)
+            for topic, t, raw in batches
+        ],
+    )
+
+
+def write_batches(
+    directory: Path, batches: Sequence[tuple[str, NDArray[np.int64], list[bytes]]]
+) -> None:
+    """One recording of raw messages, in order of arrival: topic of LATENCY, arrivals [ns since epoch], messages."""
+    order = np.argsort(np.concatenate([a for _, a, _ in batches]), kind="stable")
+    which = np.repeat(np.arange(len(batches)), [len(a) for _, a, _ in batches])[order]
+    place = np.concatenate([np.arange(len(a)) for _, a, _ in batches])[order]
     types = {"joint_command": "JointState", "joint_states": "JointState", "imu/data": "Imu"}
     with McapRecording(directory, {"robot": "fish"}, chunk_s=5.0, compress=True) as recording:
         topics = [
@@ -63,7 +72,7 @@ def write_trial(directory: Path, r: Readings, m: int, start_ns: int, encoder: bo
             for name, _, _ in batches
         ]
         for b, i in zip(which.tolist(), place.tolist(), strict=True):
-            recording.write(topics[b], int(arrivals[b][i]), batches[b][2][i])
+            recording.write(topics[b], int(batches[b][1][i]), batches[b][2][i])
 
 
 def serialise(

@@ -41,14 +41,29 @@ CONCEALED: dict[str, Concealed] = {
     "viscosity": Concealed((), {"factor": 300.0}, "times the viscosity of water"),
 }
 ORDER = ("", *CONCEALED)  # "" conceals nothing
+# of a pair of days: what a name of the vocabulary says, alone and two at once
+CHANGES: tuple[tuple[str, ...], ...] = (
+    ("wind",),
+    ("servo_filter",),
+    ("servo_trim",),
+    ("wind", "servo_trim"),
+    ("image_age",),
+    ("ballast",),
+    ("joint_damping",),
+    ("image_age", "joint_damping"),
+    ("ballast", "wind"),
+)
 
 
 def draw(number: int, random: np.random.Generator) -> tuple[str, dict[str, float]]:
     """(name or "", values) of scenario `number`."""
     name = ORDER[number % len(ORDER)]
-    if not name:
-        return name, {}
+    return name, drawn(name, random) if name else {}
+
+
+def drawn(name: str, random: np.random.Generator) -> dict[str, float]:
+    """Values near the typical ones, of either sign where a sign is possible."""
     concealed = CONCEALED[name]
     sign = float(random.choice([-1.0, 1.0])) if concealed.signed else 1.0
     factor = sign * random.uniform(0.85, 1.15)
-    return name, {k: float(factor * v) for k, v in concealed.typical.items()}
+    return {k: float(factor * v) for k, v in concealed.typical.items()}

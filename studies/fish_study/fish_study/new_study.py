@@ -30,6 +30,7 @@ class Asked:
     duration: float  # s
     seed: int | None  # None: drawn now
     given: frozenset[str] = frozenset()
+    recordings: str = ""  # folder of a user's recordings, for the group "injected"
 
     def values(self) -> dict[str, Any]:
         """Of all but `given`, as study.json has them."""
@@ -39,12 +40,26 @@ class Asked:
             "trials": self.trials,
             "duration": self.duration,
             "seed": self.seed,
+            **({"recordings": self.recordings} if self.recordings else {}),
         }
 
     def draw(self, seed: int) -> list[Scenario]:
         """The scenarios of a seed. Raises ValueError for groups or numbers that no study can have."""
         drawn = draw_scenarios(self.scenarios, list(self.groups), seed)
-        return [replace(s, count=self.trials, duration=self.duration) for s in drawn]
+        return [self._sized(s) for s in drawn]
+
+    def _sized(self, scenario: Scenario) -> Scenario:
+        """With the trials asked for; a pair of days has its own unless they are given, and twice as many of OLD."""
+        if scenario.plant == "recordings":
+            return replace(scenario, recordings=self.recordings)
+        if not scenario.pair:
+            return replace(scenario, count=self.trials, duration=self.duration)
+        asked: dict[str, Any] = {}
+        if "trials" in self.given:
+            asked |= {"count": self.trials, "old": 2 * self.trials}
+        if "duration" in self.given:
+            asked["duration"] = self.duration
+        return replace(scenario, **asked)
 
 
 def begin_or_go_on(folder: Path, asked: Asked, more: Mapping[str, Any] | None = None) -> Study:

@@ -25,6 +25,7 @@ from fish_study.group_tables import failure_table, group_table, name_table
 from fish_study.information_criteria import criterion_table
 from fish_study.nulls import null_table
 from fish_study.oracle_tables import OracleScores, competitor_table, oracle_table
+from fish_study.pair_table import pair_tables
 from fish_study.power import Power, power, power_table
 from fish_study.score import Score
 
@@ -34,6 +35,7 @@ def tables(scores: Sequence[Score], oracle: OracleScores | None = None) -> list[
     steps = power(scores, oracle.detected if oracle else None)
     nulls = null_table(scores)
     shown = [
+        *pair_tables(scores),
         asked_table(scores),
         group_table(scores),
         calibration_table(scores),
@@ -88,7 +90,8 @@ def write_prove_page(
 HOW = (
     "Each scenario is a fish whose parameters differ from the nominal ones by up to 25 %, with something hidden in it, in its "
     "water, its actuators or its sensors. Its recordings were given to the tool as a process of its own, which gets nothing but "
-    "the folder."
+    "the folder. A pair of days is given as two folders, of which OLD is the baseline; what a user recorded is not changed but "
+    "for the concealed effect."
 )
 
 

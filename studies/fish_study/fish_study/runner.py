@@ -22,6 +22,7 @@ from typing import Any
 from fish_report.json_file import write_json
 from fish_report.worker_pool import at_end_of_worker, worker_pool
 from fish_study.build import make_recordings
+from fish_study.pair_recordings import NEW, OLD, make_pair
 from fish_study.scenario import Scenario, ScenarioError
 from fish_study.study import Study, StudyError, read_json
 from fish_study.tool_version import checked_version
@@ -57,7 +58,8 @@ def run_scenario(job: Job) -> str:
     error = ""
     at_wall: dict[str, float] = {}
     try:
-        at_wall = make_recordings(job.scenario, recordings)
+        make = make_pair if job.scenario.pair else make_recordings
+        at_wall = make(job.scenario, recordings)
     except ScenarioError as problem:  # would happen again
         error = f"no scenario: {problem}"
     version = checked_version(job.version, job.name)
@@ -83,7 +85,10 @@ def _run_tool(job: Job, recordings: Path, out: Path) -> dict[str, Any]:
         **os.environ,
         **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), str(job.threads)),
     }
-    command = [*job.tool, str(recordings), "--out", str(out)]
+    given = [str(recordings)]
+    if job.scenario.pair:
+        given = [str(recordings / NEW), "--baseline", str(recordings / OLD)]
+    command = [*job.tool, *given, "--out", str(out)]
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as tool:

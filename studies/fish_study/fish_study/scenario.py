@@ -35,6 +35,8 @@ class Scenario:
     method: str = "dop853"  # not the integrator that the tool uses
     substeps: int = 2
     parameters: Mapping[str, float] = field(default_factory=dict)  # factors on nominal parameters
+    old: int = 0  # trials of a baseline without what is concealed; 0: there is none
+    recordings: str = ""  # folder of a user's recordings, in some of which it is put; "": a plant
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -44,6 +46,11 @@ class Scenario:
     def label(self) -> dict[str, Any]:
         """Plain data."""
         return asdict(self)
+
+    @property
+    def pair(self) -> bool:
+        """Whether the tool is asked what changed against a baseline."""
+        return self.old > 0 or bool(self.recordings)
 
     @classmethod
     def of(cls, label: Mapping[str, Any]) -> Scenario:

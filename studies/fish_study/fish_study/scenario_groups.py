@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -58,6 +58,18 @@ SIGNED = (
     "compass",
     "jet",
     "vortex",
+)
+# what can be put into recordings exactly
+INJECTED = (
+    "current",
+    "camera_latency",
+    "camera_scale",
+    "camera_heading_offset",
+    "gyro_scale",
+    "imu_misalignment",
+    "rudder_gain",
+    "rudder_offset",
+    "rudder_delay",
 )
 LIMITS = ("rudder_saturation", "rotor_saturation")  # act by being small
 HIDDEN_BY_THE_ENCODER = ("rotor_lag", "rotor_saturation", "battery_sag")
@@ -199,10 +211,44 @@ def mujoco(random: Random, number: int) -> Scenario:
     )
 
 
+def injected(random: Random, number: int) -> Scenario:
+    """A user's recordings, some of which get one of nine effects exactly, or nothing; the others are the baseline."""
+    name = _or_nothing(INJECTED, number)
+    effects = {name: draw_effect(name, 1.0, random)} if name else {}
+    return Scenario("injected", int(random.integers(2**62)), effects, plant="recordings")
+
+
+def mujoco_pair(random: Random, number: int) -> Scenario:
+    """The second plant yesterday and today: one or two of its things changed, or nothing."""
+    from fish_study.mujoco_effects import CHANGES, drawn
+
+    changed = _or_nothing(CHANGES, number, ())
+    world = _world("mujoco-pair", random, ())
+    effects = {name: drawn(name, random) for name in changed}
+    return replace(
+        world,
+        effects=effects,
+        plant="mujoco",
+        links=5,
+        encoder=True,
+        old=18,
+        count=9,
+        duration=12.0,
+    )
+
+
+def _or_nothing(items: Sequence[Item], number: int, nothing: Any = "") -> Any:
+    """The items in turn, after every four of them nothing."""
+    return nothing if number % 5 == 4 else _turn(items, number - number // 5)
+
+
 GROUPS: dict[str, Callable[[Random, int], Scenario]] = {
-    f.__name__: f
-    for f in (single, absorbed, feedback, noise, ladder, two, sensor, outside, null, mujoco)
-}
+    f.__name__.replace("_", "-"): f
+    for f in (
+        single, absorbed, feedback, noise, ladder, two, sensor, outside, null, mujoco, mujoco_pair, injected
+    )
+}  # fmt: skip
+PAIRS_OF_DAYS = ("mujoco-pair", "injected")  # what changed against a baseline is asked
 # share of a study's scenarios
 SHARES = {
     "single": 0.22,
@@ -215,6 +261,8 @@ SHARES = {
     "outside": 0.08,
     "null": 0.14,
     "mujoco": 0.06,
+    "mujoco-pair": 0.06,
+    "injected": 0.06,
 }
 
 

@@ -19,6 +19,7 @@ from fish_study.study import Study
 CONFIDENT = 0.9  # stated probability from which a wrong name counts as given with confidence; fixed before any run
 NOTHING = "no_mismatch"
 FAILED = "failed"  # in place of a verdict
+CHANGED = {"changed": True, "unchanged": False}
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,11 @@ class Score:
     ]  # name -> numbers it took in the ranking; empty in answers that do not tell
     seconds: float
     error: str = ""  # why there is no answer
+    changed: bool | None = (
+        None  # whether NEW differs from a baseline; None: not asked, or not comparable
+    )
+    # of each effect (names that it and its family give, probability of the first)
+    stated: tuple[tuple[frozenset[str], float], ...] = ()
     # refitted name -> position error 2 s ahead on held-out trials [m]
     held_out: Mapping[str, float] = field(default_factory=dict)
 
@@ -96,6 +102,18 @@ class Score:
         return bool(self.named) and not self.top1 and self.probability >= CONFIDENT
 
     @property
+    def in_family(self) -> bool:
+        """Every hidden name is in an effect's stated family."""
+        return bool(self.truth) and all(
+            any(t in names for names, _ in self.stated) for t in self.truth
+        )
+
+    @property
+    def wrong_alone(self) -> bool:
+        """An effect that is stated with confidence and has no hidden name in its family."""
+        return any(p >= CONFIDENT and not names & set(self.truth) for names, p in self.stated)
+
+    @property
     def called_physics(self) -> bool:
         """A physics name was given."""
         return "physics" in self.kinds
@@ -133,7 +151,7 @@ def score_scenario(
         )
     effects = d["effects"]
     rivals = {rival["name"] for e in effects for rival in e["rivals"]}
-    fit = d["fit"]
+    fit = d.get("fit", {})
     return Score(
         scenario=scenario,
         truth=names,
@@ -151,7 +169,15 @@ def score_scenario(
         },
         seconds=result["seconds"],
         held_out={r["name"]: _position(r["held_out_rms"]) for r in d.get("refitted", ())},
+        changed=CHANGED.get(d.get("change", {}).get("verdict", "")),
+        stated=tuple(_stated(e) for e in effects),
     )
+
+
+def _stated(effect: Mapping[str, Any]) -> tuple[frozenset[str], float]:
+    """The names that an effect of an answer gives, and how sure the first is."""
+    rivals = {rival["name"] for rival in effect["rivals"]}
+    return frozenset({effect["name"], *rivals}), float(effect["evidence"]["probability"])
 
 
 def _position(rms: Mapping[str, Any]) -> float:

@@ -41,6 +41,14 @@ class Share:
         return float(np.nan_to_num(low)), float(high)
 
     @property
+    def wilson(self) -> str:
+        """K/n with the 95 % interval of Wilson (1927)."""
+        if not self.n:
+            return "–"
+        low, high = proportion_confint(self.k, self.n, method="wilson")
+        return f"{self.k}/{self.n} ({low:.0%} to {high:.0%})"
+
+    @property
     def short(self) -> str:
         """k/n alone."""
         return f"{self.k}/{self.n}" if self.n else "–"

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from fish_study.study import Study
 
 GROUPS = ("single", "absorbed", "feedback", "noise", "ladder", "two", "sensor", "outside", "null")
+INJECTED = "injected"
 # of what makes a study; None until the command line is read, as a study that goes on must not be asked for other things
 DEFAULTS: dict[str, Any] = {
     "scenarios": 300,
@@ -53,8 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     number = f"number of data sets (default: {DEFAULTS['scenarios']})"
     add("--scenarios", "--worlds", type=int, help=number)
-    groups = f"{', '.join(GROUPS)}, mujoco (needs mujoco); default: all but mujoco"
+    groups = f"{', '.join(GROUPS)}, mujoco, mujoco-pair (need mujoco); default: all but mujoco's"
     add("--groups", nargs="+", metavar="GROUP", help=groups)
+    recordings = (
+        "a robot's own recordings: effects are put into a third of them exactly, the others are the baseline; "
+        "the only group, `injected`"
+    )
+    add("--recordings", type=Path, metavar="FOLDER", help=recordings)
     add("--trials", type=int, help=f"per data set (default: {DEFAULTS['trials']})")
     add("--duration", type=float, help=f"s of each trial (default: {DEFAULTS['duration']:g})")
     add("--seed", type=int, help="of all scenarios (default: drawn now); recorded in study.json")
@@ -92,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
 
     given = frozenset(name for name in DEFAULTS if getattr(args, name) is not None)
     vars(args).update({name: value for name, value in DEFAULTS.items() if name not in given})
+    recordings = _recordings(args, given)
     _check(args)
     console = terminal()
     if args.close_loop:
@@ -100,7 +107,9 @@ def run(args: argparse.Namespace) -> int:
         from fish_study.archive import opened_studies
         from fish_study.new_study import Asked
 
-        asked = Asked(args.scenarios, args.groups, args.trials, args.duration, args.seed, given)
+        asked = Asked(
+            args.scenarios, args.groups, args.trials, args.duration, args.seed, given, recordings
+        )
         if args.without:
             return _ablation(args, asked, console)
         if not args.pool:
@@ -109,13 +118,28 @@ def run(args: argparse.Namespace) -> int:
             return _report(args, studies, console)
 
 
+def _recordings(args: argparse.Namespace, given: frozenset[str]) -> str:
+    """The folder of --recordings, whose only group is `injected`; "" without it. Raises UserError for other groups."""
+    if args.recordings is None and INJECTED not in args.groups:
+        return ""
+    if args.recordings is None or not args.recordings.is_dir():
+        raise UserError(f"--recordings: got {args.recordings}; expected a folder of recordings")
+    if "groups" in given and set(args.groups) != {INJECTED}:
+        raise UserError(
+            f"--groups: got {' '.join(args.groups)} with --recordings; expected {INJECTED}"
+        )
+    args.groups = [INJECTED]
+    return str(args.recordings.resolve())
+
+
 def _check(args: argparse.Namespace) -> None:
     """Of numbers and optional packages, before anything starts."""
     few = min(args.jobs, args.search, args.trainings) < 1
     if few or args.trials < 3 or not args.duration >= 4.0:
         raise UserError("expected at least one job, search and training, three trials and 4 s")
     _need("pysindy", "--oracle", args.oracle and not args.pool)
-    _need("mujoco", "the second plant", bool(args.close_loop) or "mujoco" in args.groups)
+    second = bool(args.close_loop) or any(g.startswith("mujoco") for g in args.groups)
+    _need("mujoco", "the second plant", second)
     _need("distributed", "--cluster", bool(args.cluster))
     _need("torch", "--close-loop", bool(args.close_loop), "requirements-train.txt")
 
