@@ -70,7 +70,6 @@ MEANING = {
     "path/start": "follows the path from its beginning",
     "path/cancel": "gives the path up: the fish glides to a stop",
     "reset": "puts the simulated fish back to its start",
-    "resume": "lets the controller go on after its watchdog stopped the fish",
     "arm": "true arms the robot, false disarms it; refused with everything that speaks against it",
     "~/clear_faults": "erases the rotor module's faults",
     "camera/set_camera_info": "saves a calibration in calibration_file and uses it; camera_calibration's COMMIT",

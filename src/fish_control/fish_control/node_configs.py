@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 from fish_control.fusion_config import FusionConfig
 from fish_control.line_of_sight import GuidanceConfig
@@ -15,7 +15,6 @@ from fish_control.planner import FASTEST, SLOWEST
 from fish_control.reference_path import End
 from fish_node.frames import BODY, IMU, POOL, require_frame, require_frame_prefix
 
-Resume = Literal["auto", "manual"]
 LARGEST_GAIN = 10.0
 LARGEST_VARIANCE = 0.01  # m^2, rad^2, of a pose; it grows while the camera is lost
 
@@ -118,10 +117,7 @@ class ControllerConfig:
     odometry_timeout: float = 0.15  # s
     target_timeout: float = 0.15  # s
     largest_variance: float = LARGEST_VARIANCE  # of an estimate that is not lost
-    resume: str = (
-        "auto"  # after a stop: auto when all is well; manual when service resume is called
-    )
-    resume_delay: float = 0.2  # s, how long all must be well before auto resumes
+    resume_delay: float = 0.2  # s, how long all must be well until the fish swims on after a pause
     gains_lowest: tuple[float, ...] = (
         *(0.0,) * 6,  # least gains: steering Kp, Ki, Kd, then speed Kp, Ki, Kd
     )
@@ -145,7 +141,6 @@ class ControllerConfig:
         require_range("odometry_timeout", self.odometry_timeout, 0.02, 5.0, "s")
         require_range("target_timeout", self.target_timeout, 0.02, 5.0, "s")
         require_range("largest_variance", self.largest_variance, 1e-6, 1e3, "")
-        require_one_of("resume", self.resume, get_args(Resume))
         require_range("resume_delay", self.resume_delay, 0.0, 60.0, "s")
         self._check_gains()
 

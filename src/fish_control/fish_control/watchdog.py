@@ -36,7 +36,9 @@ class Health:
 
 
 class Watchdog:
-    """Stops on the first fault; goes on after all faults have been gone for `resume_delay`, or when asked to.
+    """Pauses on the first fault; goes on after all faults have been gone for `resume_delay`.
+
+    Whether a pause needs a person is not decided here: the owner of the arming state disarms after `pause_s`.
 
     Before the first motion, and while the robot is disarmed, it waits without calling it a fault.
 
@@ -47,7 +49,6 @@ class Watchdog:
     def __init__(self, config: ControllerConfig) -> None:
         self._config = config
         self._good_since = math.inf
-        self._released = False
         self.state: Literal["waiting", "swimming", "stopped"] = "waiting"
         self.reason = "waiting for odometry"
         self.stops = 0
@@ -62,7 +63,6 @@ class Watchdog:
             return False
         if fault is not None:
             self._good_since = math.inf
-            self._released = False
             self.reason = fault
             if self.state == "swimming":
                 self.state = "stopped"
@@ -70,28 +70,10 @@ class Watchdog:
             self.fault = fault if self.state == "stopped" else ""
             return False
         self._good_since = min(self._good_since, now)
-        if self.state == "stopped" and not self._may_resume(now):
+        if self.state == "stopped" and now - self._good_since < self._config.resume_delay:
             return False
         self.state, self.reason = "swimming", "swimming"
         return True
-
-    def release(self) -> str | None:
-        """Allow motion again after a stop; None, or why not."""
-        if self.state != "stopped":
-            return f"not stopped but {self.state}"
-        if self._good_since == math.inf:
-            return self.reason
-        self._released = True
-        return None
-
-    def _may_resume(self, now: float) -> bool:
-        if self._released:
-            self._released = False
-            return True
-        if self._config.resume == "auto":
-            return now - self._good_since >= self._config.resume_delay
-        self.reason = "all is well again; call resume"
-        return False
 
     def _fault(self, signs: Health) -> str | None:
         config = self._config

@@ -57,7 +57,6 @@ def test_shipped_weights_fit_the_shipped_controller():
         (PlannerConfig, "end", "bounce", "known: , stop, loop"),
         (PlannerConfig, "start", "middle", "known: beginning, nearest"),
         (PlannerConfig, "lookahead", 0.0, "lookahead"),
-        (ControllerConfig, "resume", "never", "known: auto, manual"),
         (ControllerConfig, "command_rate_hz", 120.0, "a multiple of rate_hz"),
         (ControllerConfig, "odometry_timeout", 0.0, "0.02 to 5"),
         (ExciterConfig, "begin", -1.0, "0 to 3600 s"),

@@ -706,26 +706,6 @@ def test_controller_stops_on_every_fault_and_swims_again_when_it_has_passed(benc
     assert b.heard["arming/pause"][-1].data == ""
 
 
-def test_controller_with_manual_resume_waits_for_its_service(bench):
-    b = controller_bench(bench, resume="manual")
-    client = b.other.create_client(Trigger, "resume")
-
-    def resume():
-        future = client.call_async(Trigger.Request())
-        b.until(future.done)
-        return future.result()
-
-    drive(b, 0.5)
-    drive(b, 0.7, odometry={"variance": LOST_VARIANCE})
-    assert not resume().success
-    drive(b, 1.0)
-    np.testing.assert_allclose(commands(b, 5)[:, 1:], 0.0, atol=1e-6)
-    drive(b, 0.1)
-    assert resume().success
-    drive(b, 0.8)
-    assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
-
-
 @pytest.mark.parametrize("lost", ["variance", "twist_variance"])
 def test_controller_learns_nothing_of_the_water_from_an_estimate_that_fusion_has_lost(bench, lost):
     node = bench(ControllerNode).node

@@ -91,7 +91,7 @@ def test_what_is_lost_is_lost_at_any_age(variance):
 
 
 @pytest.mark.parametrize("said", FAULTS)
-def test_auto_resumes_after_the_delay(said):
+def test_it_goes_on_after_the_delay(said):
     dog = swimming(resume_delay=0.5)
     dog.check(0.1, FAULTS[said])
     assert not dog.check(0.2, GOOD)
@@ -106,27 +106,3 @@ def test_the_delay_starts_again_with_every_fault():
     dog.check(0.6, FAULTS["camera lost"])
     assert not dog.check(0.8, GOOD)
     assert dog.stops == 1
-
-
-def test_manual_resumes_only_when_told_and_all_is_well():
-    dog = swimming(resume="manual")
-    dog.check(0.1, FAULTS["camera lost"])
-    assert dog.release() is not None
-    assert "camera lost" in dog.release()
-    assert not dog.check(100.0, GOOD)
-    assert dog.reason == "all is well again; call resume"
-    assert dog.release() is None
-    assert dog.check(100.1, GOOD)
-
-
-def test_a_release_does_not_outlive_the_next_fault():
-    dog = swimming(resume="manual")
-    dog.check(0.1, FAULTS["camera lost"])
-    dog.check(0.2, GOOD)
-    dog.release()
-    dog.check(0.3, FAULTS["camera lost"])
-    assert not dog.check(0.4, GOOD)
-
-
-def test_release_while_swimming_says_so():
-    assert swimming().release() == "not stopped but swimming"

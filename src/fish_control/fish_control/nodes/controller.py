@@ -6,8 +6,7 @@ joint_command (100 Hz): rotor: position = phase of the oscillation (rad), veloci
 position = alpha (rad). control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy of the
 weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog pauses them on stale or bad
 odometry, lost sensors and a stale target: they go to rest until all is well, and arming/pause says why. How long that may last,
-the owner of the arming state decides. Service resume (std_srvs/Trigger) ends a pause where resume is manual. Decisions are
-in Controller and Watchdog.
+the owner of the arming state decides. Decisions are in Controller and Watchdog.
 """
 
 import math
@@ -22,7 +21,6 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
-from std_srvs.srv import Trigger
 
 from fish_control.control_law import Gains
 from fish_control.controller import LONGEST_PERIOD, Controller, Reference
@@ -90,7 +88,6 @@ class ControllerNode(Node):
         self.create_subscription(TwistStamped, "control/twist", self._on_twist, 10)
         self.create_subscription(Vector3Stamped, "tracking/error", self._on_error, 10)
         self.create_subscription(PoseStamped, "control/target", self._on_target, 10)
-        self.create_service(Trigger, "resume", self._on_resume)
         self.create_timer(1.0 / self._config.command_rate_hz, self._tick)
         self.create_timer(1.0, self._report)
 
@@ -116,11 +113,6 @@ class ControllerNode(Node):
         if math.isfinite(course):
             self._wanted = replace(self._wanted, course=course)
             self._target_time = seconds(message.header.stamp)
-
-    def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        refusal = self._watchdog.release()
-        response.success, response.message = refusal is None, refusal or "swimming again"
-        return response
 
     def _tick(self) -> None:
         """One period of the command; every so many, one of control."""
