@@ -41,8 +41,7 @@ def eliminate(
 ) -> tuple[Found, tuple[Step, ...]]:
     """(the fit with those of `names` that trials left out ask for, what each of them does).
 
-    The effect that gains least goes while its mean gain is not above 0. One that gains more than a standard error stays and is
-    not judged again.
+    The effect that gains least goes while one gains less than SURE standard errors.
     """
     steps: dict[str, Step] = {}
     unsure = list(names) if len(experiment.names) >= FOLDS else []
@@ -54,13 +53,12 @@ def eliminate(
             fits[name], costs = left_out_costs(experiment, without(found, name))
             steps[name] = replace(judged(name, costs, control), added=True)
             report(f"{name}: {step_text(steps[name])}")
-        worst = min(unsure, key=lambda name: steps[name].gain)
-        if steps[worst].gain > 0.0:
+        unsure = [name for name in unsure if not steps[name].sure]
+        if not unsure:
             return further, tuple(steps.values())
+        worst = min(unsure, key=lambda name: steps[name].gain)
         found, steps[worst] = fits[worst], replace(steps[worst], added=False)
-        unsure = [
-            name for name in unsure if name != worst and steps[name].gain < steps[name].deviation
-        ]
+        unsure.remove(worst)
     return found, tuple(steps.values())
 
 

@@ -21,6 +21,7 @@ from fish_sysid.estimation.shooting.schedule import Found, multistep
 Array = NDArray[np.float64]
 
 EVERY = 4.0  # s between start points
+SURE = 2.0  # standard errors; the best of many effects gains one by chance
 ROUNDS, ITERATIONS = 2, 4  # of a fit and its control alike
 
 
@@ -33,6 +34,11 @@ class Step:
     deviation: float  # its standard error over trials
     added: bool
     alike: tuple[str, ...] = ()  # of its family, that gain as much within a standard error
+
+    @property
+    def sure(self) -> bool:
+        """Whether it gains more than chance."""
+        return self.gain > SURE * self.deviation
 
 
 def step_text(step: Step) -> str:

@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
 MOST_EFFECTS = 6
-SURE = 2.0  # standard errors; the best of many gains one by chance
 JUDGED = 4  # candidates a round that are cross-validated
 GLANCE = 0.1  # strength in typical ones, at which a candidate is looked at
 SCALE = 0.3  # strength at which a hypothesis is written down; sets the coordinates only
@@ -59,7 +58,7 @@ def choose(
         for name in promising:
             fits[name], costs = left_out_costs(experiment, extended(found, name))
             tried.append(judged(name, control, costs))
-        good = [step for step in tried if step.gain > SURE * step.deviation]
+        good = [step for step in tried if step.sure]
         best = max(good, key=lambda step: step.gain, default=None)
         steps += [
             replace(s, added=s is best, alike=_alike(s, tried) if s is best else ())
