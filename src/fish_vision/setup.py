@@ -17,7 +17,7 @@ setup(
         ("share/" + NAME + "/config", glob("config/*")),
         ("share/" + NAME + "/launch", glob("launch/*")),
     ],
-    package_data={NAME: ["py.typed"]},
+    package_data={NAME: ["py.typed", "picking_page.html"]},
     install_requires=["setuptools"],
     zip_safe=False,
     maintainer="Robot fish maintainers",

@@ -21,8 +21,7 @@ def annotated(
     image: Image, found: Detection | Lost, config: TrackerConfig, calibration: Calibration
 ) -> Image:
     """Copy of an image with the pool's outline, box, head, heading, tail, numbers (or the reason)."""
-    picture = image.copy()
-    _line(picture, calibration, _outline(), WHITE, closed=True)
+    picture = drawn_pool(image, calibration)
     if isinstance(found, Lost):
         return _text(picture, f"lost: {found.reason.value}", RED)
     head = found.head
@@ -34,6 +33,13 @@ def annotated(
     if found.tail is not None:
         numbers += "  tail " + " ".join(f"{angle:+.2f}" for angle in found.tail)
     return _text(picture, numbers, WHITE)
+
+
+def drawn_pool(image: Image, calibration: Calibration) -> Image:
+    """Copy of an image with the pool's outline."""
+    picture = image.copy()
+    _line(picture, calibration, _outline(), WHITE, closed=True)
+    return picture
 
 
 def tail_points(found: Detection, config: TrackerConfig) -> np.ndarray:

@@ -3,6 +3,8 @@
 """Calibrating a camera: its lens from chessboard pictures, its mount from known points of the pool."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -26,21 +28,32 @@ FOCAL_STD_MAX = 0.03  # share of the focal length; a usual set of pictures gives
 POINTS_MIN = 4
 
 
-def lens_from_chessboards(
-    pictures: Sequence[Image], corners: tuple[int, int], square: float
-) -> tuple[Lens, float, list[int]]:
-    """Camera matrix and plumb_bob distortion from pictures of a chessboard (Zhang's method, OpenCV).
+@dataclass(frozen=True)
+class LensFit:
+    """A lens and how well it fits: root mean square reprojection error, and for each board found its corners (N, 2) as
+    they were seen and as the lens shows them, pixels; numbers of the pictures with a board.
+    """
 
-    k3 stays zero, as in ROS camera_calibration: it runs wild where no board was seen.
+    lens: Lens
+    rms: float
+    seen: tuple[Array, ...]
+    shown: tuple[Array, ...]
+    used: tuple[int, ...]
+
+
+def lens_from_chessboards(
+    pictures: Sequence[Image], corners: tuple[int, int], square: float, fisheye: bool = False
+) -> LensFit:
+    """Camera matrix and distortion from pictures of a chessboard (Zhang's method, OpenCV).
+
+    The distortion model is plumb_bob, where k3 stays zero, as in ROS camera_calibration: it runs wild where no board
+    was seen. With fisheye it is equidistant (Kannala and Brandt 2006).
 
     Args:
         pictures: same size, board in different places and tilts, also near the edges.
         corners: inner corners along the board's two sides.
         square: side of one square, m.
-
-    Returns:
-        Lens, root mean square reprojection error (pixels), numbers of the pictures in which the board was
-        found.
+        fisheye: whether the lens is one of about 120 degrees or more.
 
     Raises:
         CalibrationError: pictures of different sizes, the board in fewer than BOARDS_MIN of them, or boards
@@ -51,7 +64,9 @@ def lens_from_chessboards(
         raise CalibrationError(
             f"pictures of different sizes {sorted(sizes)}: expected one camera and one size"
         )
-    found = {i: seen for i, p in enumerate(pictures) if (seen := _board(p, corners)) is not None}
+    found = {
+        i: seen for i, p in enumerate(pictures) if (seen := find_board(p, corners)) is not None
+    }
     if len(found) < BOARDS_MIN:
         raise CalibrationError(
             f"a board of {corners[0]} x {corners[1]} inner corners was found in {len(found)} of "
@@ -59,22 +74,57 @@ def lens_from_chessboards(
             "whole board is visible"
         )
     grid = np.mgrid[0 : corners[0], 0 : corners[1]].T.reshape(-1, 2) * square
-    board = np.column_stack([grid, np.zeros(len(grid))]).astype(np.float32)
-    size = sizes.pop()
-    boards, places = [board] * len(found), list(found.values())
-    rms, K, D, rotations, _, deviations, *_ = cv2.calibrateCameraExtended(
+    board = np.column_stack([grid, np.zeros(len(grid))])
+    places, size = list(found.values()), sizes.pop()
+    fit = _fisheye if fisheye else _plumb_bob
+    lens, rotations, shifts = fit(board, places, size)
+    shown = tuple(project(board, r, t, lens) for r, t in zip(rotations, shifts, strict=True))
+    at = tuple(place.reshape(-1, 2).astype(float) for place in places)
+    off = np.vstack(at) - np.vstack(shown)
+    rms = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+    return LensFit(lens, rms, at, shown, tuple(found))
+
+
+def _plumb_bob(
+    board: Array, places: Sequence[Array], size: tuple[int, int]
+) -> tuple[Lens, Sequence[Array], Sequence[Array]]:
+    """Lens and each board's rotation and translation."""
+    boards = [board.astype(np.float32)] * len(places)
+    _, K, D, rotations, shifts, deviations, *_ = cv2.calibrateCameraExtended(
         boards, places, size, np.eye(3), np.zeros(5), flags=cv2.CALIB_FIX_K3
     )
     lens = Lens(size, np.asarray(K, float), np.asarray(D, float).ravel()[:5])
-    _check_determined(lens.K, np.asarray(deviations, float).ravel(), rotations)
-    return lens, float(rms), list(found)
+    _check_tilts(rotations)
+    _check_focal_length(lens.K, np.asarray(deviations, float).ravel())
+    return lens, rotations, shifts
 
 
-def _check_determined(K: Array, deviations: Array, rotations: Sequence[Array]) -> None:
-    """Refuse boards that are all tilted alike, or too little for the focal length to be known.
+def _fisheye(
+    board: Array, places: Sequence[Array], size: tuple[int, int]
+) -> tuple[Lens, Sequence[Array], Sequence[Array]]:
+    """Lens and each board's rotation and translation. OpenCV gives no uncertainty for it."""
+    boards = [board.reshape(1, -1, 3)] * len(places)
+    seen = [place.reshape(1, -1, 2).astype(float) for place in places]
+    flag: Any = cv2.fisheye if hasattr(cv2.fisheye, "CALIB_FIX_SKEW") else cv2  # OpenCV before 5
+    flags = flag.CALIB_RECOMPUTE_EXTRINSIC | flag.CALIB_FIX_SKEW
+    try:
+        _, K, D, rotations, shifts = cv2.fisheye.calibrate(
+            boards, seen, size, np.eye(3), np.zeros((4, 1)), flags=flags
+        )
+    except cv2.error as error:
+        raise CalibrationError(
+            f"no fisheye lens fits these boards ({error.err}): leave --fisheye out for a usual lens, or take more pictures "
+            "with the board also near the edges"
+        ) from error
+    _check_tilts(rotations)
+    return Lens(size, np.asarray(K, float), np.asarray(D, float).ravel(), True), rotations, shifts
 
-    The standard deviations alone do not show the first: copies of one picture, or boards square to the camera,
-    lead into a narrow minimum far from the lens, with a small error and a small deviation.
+
+def _check_tilts(rotations: Sequence[Array]) -> None:
+    """Refuse boards that are all tilted alike.
+
+    Standard deviations do not show it: copies of one picture, or boards square to the camera, lead into a narrow
+    minimum far from the lens, with a small error and a small deviation.
     """
     normals = np.array([cv2.Rodrigues(rotation)[0][:, 2] for rotation in rotations])
     tilt = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0).min())))
@@ -83,6 +133,10 @@ def _check_determined(K: Array, deviations: Array, rotations: Sequence[Array]) -
             f"the boards' tilts differ by {tilt:.1f} deg at most: expected {TILT_MIN:.0f} or more; tilt the board, "
             "20 to 45 deg, to another side in every picture"
         )
+
+
+def _check_focal_length(K: Array, deviations: Array) -> None:
+    """Refuse boards that are tilted too little for the focal length to be known."""
     share = float(np.max(deviations[:2] / np.diag(K)[:2]))  # of fx, fy
     if not share <= FOCAL_STD_MAX:
         raise CalibrationError(
@@ -91,7 +145,8 @@ def _check_determined(K: Array, deviations: Array, rotations: Sequence[Array]) -
         )
 
 
-def _board(picture: Image, corners: tuple[int, int]) -> np.ndarray | None:
+def find_board(picture: Image, corners: tuple[int, int]) -> np.ndarray | None:
+    """(N, 1, 2) inner corners of the chessboard in a picture, pixels, or None."""
     grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     found, places = cv2.findChessboardCornersSB(grey, corners, flags=cv2.CALIB_CB_ACCURACY)
     return places.astype(np.float32) if found else None

@@ -3,7 +3,7 @@
 """Pixels to metres in the pool's plane: lens, camera pose, and the files that hold them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,12 @@ class Lens:
         if self.fisheye:
             return "equidistant"
         return "plumb_bob" if len(self.D) == 5 else "rational_polynomial"
+
+    def scaled(self, factor: float) -> "Lens":
+        """The lens with focal lengths times a factor."""
+        return replace(
+            self, K=self.K * np.array([[factor, 1.0, 1.0], [1.0, factor, 1.0], [1.0] * 3])
+        )
 
     @classmethod
     def from_camera_info(

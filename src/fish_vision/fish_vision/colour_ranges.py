@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Colour ranges of the markers proposed from pictures: the fish is found by the places of its markers, whatever their colours."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -13,7 +13,7 @@ from fish_vision.colours import MARKERS
 from fish_vision.config import TrackerConfig
 from fish_vision.heads import Head, HeadFinder
 from fish_vision.pose import link_ends
-from fish_vision.segmentation import HUES, Image, hsv_of
+from fish_vision.segmentation import HUES, ColourRange, Image, hsv_of
 from fish_vision.spots import SpotFinder
 
 WATER_WIDTH = 12  # half degrees around the commonest hue that count as water
@@ -43,16 +43,40 @@ def propose(
             "tail_links = 0: expected a marked tail, by which the fish is found; set the colours by hand with check_image"
         )
     sightings = [_sighting(picture, config, calibration) for picture in pictures]
-    pixels: dict[str, list[Image]] = {marker: [] for marker in MARKERS}
-    for picture, sighting in zip(pictures, sightings, strict=True):
-        for marker, u, v, radius in sighting.marks if sighting else ():
-            pixels[marker].append(_inside(picture, u, v, radius))
     if not any(sightings):
         raise CalibrationError(
             f"none of {len(pictures)} pictures shows one fish with all its markers: check sizes and places of the markers, "
             "the lens and the mount; every marker must be in view"
         )
-    return {m: _range(np.vstack(p)) for m, p in pixels.items() if p}, sightings
+    return ranges(pictures, sightings), sightings
+
+
+def ranges(pictures: Sequence[Image], sightings: Sequence[Sighting | None]) -> dict[str, list[int]]:
+    """Marker -> [hue low, hue high, least saturation, least value] that holds its pixels in all pictures."""
+    pixels: dict[str, list[Image]] = {marker: [] for marker in MARKERS}
+    for picture, sighting in zip(pictures, sightings, strict=True):
+        for marker, u, v, radius in sighting.marks if sighting else ():
+            pixels[marker].append(_inside(picture, u, v, radius))
+    return {m: _range(np.vstack(p)) for m, p in pixels.items() if p}
+
+
+def clicked(
+    points: Mapping[str, tuple[float, float]], config: TrackerConfig, calibration: Calibration
+) -> Sighting:
+    """The markers at pixels that a person clicked, name -> u, v."""
+    pixels = np.array([points[name] for name in points]).reshape(-1, 2)
+    return _at(list(points), pixels, config, calibration)
+
+
+def tinted(picture: Image, found: Mapping[str, Sequence[int]]) -> Image:
+    """Copy of a picture, grey but for the pixels in the ranges found."""
+    hsv = hsv_of(picture, (0, 0, picture.shape[1], picture.shape[0]))
+    masks = [ColourRange(*colour).mask(hsv) > 0 for colour in found.values()]
+    grey = cv2.cvtColor(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+    held = np.any(masks, axis=0)
+    result: Image = grey // 2
+    result[held] = picture[held]
+    return result
 
 
 def _sighting(picture: Image, config: TrackerConfig, calibration: Calibration) -> Sighting | None:
@@ -88,10 +112,16 @@ def _marks(
     ends = link_ends(head.pose, head.tail, finder.layout)
     places += [("tail_even" if i % 2 else "tail_odd", end) for i, end in enumerate(ends)]
     pixels = calibration.pool_to_pixel(np.array([place for _, place in places]))
+    return _at([marker for marker, _ in places], pixels, config, calibration)
+
+
+def _at(
+    markers: Sequence[str], pixels: np.ndarray, config: TrackerConfig, calibration: Calibration
+) -> Sighting:
+    """Markers at pixels (N, 2) with the radius that each has there."""
     marks = []
-    for (marker, _), (u, v), scale in zip(
-        places, pixels, calibration.place_and_scale(pixels)[1], strict=True
-    ):
+    scales = calibration.place_and_scale(pixels)[1]
+    for marker, (u, v), scale in zip(markers, pixels, scales, strict=True):
         size = config.tail_marker_diameter if marker.startswith("tail") else config.marker_diameter
         radius = size / 2 / float(np.sqrt(abs(np.linalg.det(scale))))
         marks.append((marker, float(u), float(v), radius))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fish_node.frames import require_frame, require_frame_prefix
 from fish_node.parameter_file import read_settings
-from fish_vision.calibration import Mount
+from fish_vision.calibration import Calibration, Lens, Mount
 from fish_vision.pose import MarkerLayout
 from fish_vision.segmentation import HUES, ColourRange
 from fish_vision.tags import tags_in
@@ -34,6 +34,7 @@ class TrackerConfig:
         0.018,
         0.010,
     )  # about the optical axes, rad; 0 = straight down
+    focal_scale: float = 1.0  # corrects the focal length of camera_info by this factor, where the diagnostics ask for it
     marker_height: float = 0.0  # of the markers above the pool frame's origin, m
     marker_kind: str = "colours"  # colours: four kinds of coloured discs; tags: coded squares
     front_colour: tuple[int, ...] = (20, 36, 110, 90)  # yellow
@@ -140,6 +141,10 @@ class TrackerConfig:
         """Where the camera hangs."""
         return Mount(self.camera_position, self.camera_tilt)
 
+    def calibration(self, lens: Lens) -> Calibration:
+        """The map from pixels to the markers' plane; CalibrationError if lens and mount do not belong together."""
+        return Calibration(lens.scaled(self.focal_scale), self.mount(), self.marker_height)
+
     def layout(self) -> MarkerLayout:
         """Where the markers sit on the fish."""
         return MarkerLayout(
@@ -176,6 +181,7 @@ _LISTS = (
     ("head_tag_pose", 3),
 )
 _RANGES = (  # field, lowest, highest
+    ("focal_scale", 0.5, 2.0),
     ("marker_height", -1.0, 1.0),
     ("hue_shift_max", 0, 30),
     ("marker_diameter", 0.002, 0.5),

@@ -22,8 +22,8 @@ class PictureError(ValueError):
     """Bytes that are no usable picture; the message says what came and what was expected."""
 
 
-def from_compressed(data: bytes, size: tuple[int, int]) -> Image:
-    """Picture from JPEG or PNG bytes.
+def from_compressed(data: bytes, size: tuple[int, int] | None) -> Image:
+    """Picture from JPEG or PNG bytes; without a size any is taken.
 
     Raises:
         PictureError: not an image, or not of the expected size (width, height).
@@ -37,7 +37,7 @@ def from_compressed(data: bytes, size: tuple[int, int]) -> Image:
         raise PictureError(f"{packed.size} bytes that cannot be decoded: {error.err}") from error
     if picture is None:
         raise PictureError(f"{packed.size} bytes that are no JPEG or PNG picture, or a broken one")
-    return _of_size(picture, size)
+    return picture if size is None else _of_size(picture, size)
 
 
 def from_raw(

@@ -41,11 +41,6 @@ def tags_in(dictionary: str) -> int:
     return len(_dictionary(dictionary).bytesList)
 
 
-def dictionaries() -> list[str]:
-    """Names of OpenCV's dictionaries."""
-    return sorted(name[len(PREFIX) :] for name in dir(aruco) if name.startswith(PREFIX))
-
-
 def tag_picture(dictionary: str, number: int, cell: int = 1) -> Image:
     """Tag to print, (side, side) grey, `cell` pixels for each of its cells; needs a white rim of one cell."""
     table = _dictionary(dictionary)
@@ -133,6 +128,8 @@ class TagDetector:
 def _dictionary(name: str) -> Any:
     number = getattr(aruco, PREFIX + name, None)
     if number is None:
-        raise ValueError(f"no dictionary {name!r}: expected one of {', '.join(dictionaries())}")
+        raise ValueError(
+            f"no dictionary {name!r}: expected a name of OpenCV's, such as 4X4_50 or APRILTAG_36h11"
+        )
     get = aruco.Dictionary_get if OLD else aruco.getPredefinedDictionary
     return get(number)

@@ -68,17 +68,52 @@ def pictures(rays: np.ndarray) -> list[np.ndarray]:
 
 
 def test_lens_is_recovered_from_chessboards(pictures: list[np.ndarray]) -> None:
-    lens, rms, used = lens_from_chessboards(
-        [*pictures, np.zeros_like(pictures[0])], CORNERS, SQUARE
-    )
-    assert used == list(range(6))
-    assert rms < 0.15
+    fit = lens_from_chessboards([*pictures, np.zeros_like(pictures[0])], CORNERS, SQUARE)
+    lens = fit.lens
+    assert fit.used == tuple(range(6))
+    assert fit.rms < 0.15
     assert lens.size == SIZE
+    assert np.abs(np.vstack(fit.seen) - np.vstack(fit.shown)).max() < 1.0
     u, v = np.meshgrid(np.linspace(60, 420, 9), np.linspace(50, 310, 7))  # where boards were
     pixels = np.column_stack([u.ravel(), v.ravel()])
     error = (undistort(pixels, lens) - undistort(pixels, TRUE)) * 400  # in pixels
     assert np.std(error, axis=0).max() < 0.3  # a common shift is taken up by the mount
     assert np.abs(error.mean(axis=0)).max() < 1.0
+
+
+def test_a_fisheye_is_recovered_from_chessboards() -> None:
+    """Rays of the equidistant formula r = f (theta + k1 theta^3), inverted by repeated substitution."""
+    f, k1, fine = 170.0, 0.03, 3
+    u, v = np.meshgrid(np.arange(SIZE[0] * fine), np.arange(SIZE[1] * fine))
+    x, y = (u.ravel() + 0.5) / fine - 0.5 - 243.0, (v.ravel() + 0.5) / fine - 0.5 - 176.0
+    r = np.hypot(x, y)
+    theta = r / f
+    for _ in range(30):
+        theta = r / f / (1 + k1 * theta**2)
+    sine = np.sin(theta) / np.maximum(r, 1e-9)
+    rays = np.column_stack([x * sine, y * sine, np.cos(theta)])
+    rays[:, 2] = np.maximum(rays[:, 2], 1e-3)
+    poses = [
+        ((0.0, 0.0, 0.0), (-0.15, -0.1, 0.2)),
+        ((0.5, 0.0, 0.1), (-0.25, -0.15, 0.25)),
+        ((-0.5, 0.1, 0.0), (-0.05, -0.12, 0.25)),
+        ((0.1, 0.5, 0.0), (-0.30, -0.02, 0.25)),
+        ((0.0, -0.5, 0.2), (-0.00, -0.20, 0.25)),
+        ((0.4, 0.4, -0.2), (-0.15, -0.05, 0.2)),
+    ]
+    pictures = [board_picture(rays, fine, *pose) for pose in poses]
+    fit = lens_from_chessboards(pictures, CORNERS, SQUARE, fisheye=True)
+    assert fit.lens.model == "equidistant"
+    assert len(fit.used) >= 5
+    assert fit.rms < 0.4
+    assert fit.lens.K[0, 0] == pytest.approx(f, rel=0.01)
+    mount, _ = mount_from_points(fit.lens, *corners_and_pixels_of(fit.lens))
+    np.testing.assert_allclose(mount.position, MOUNT.position, atol=1e-4)
+
+
+def corners_and_pixels_of(lens: Lens) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array([[2.0, 1.0], [-2.0, 1.0], [-2.0, -1.0], [2.0, -1.0]])
+    return np.column_stack([points, np.zeros(4)]), Calibration(lens, MOUNT).pool_to_pixel(points)
 
 
 def test_too_few_boards_are_refused(pictures: list[np.ndarray]) -> None:
@@ -116,8 +151,8 @@ def test_a_usual_set_of_pictures_is_far_from_being_refused(
 ) -> None:
     monkeypatch.setattr(calibrate, "FOCAL_STD_MAX", calibrate.FOCAL_STD_MAX / 20)
     monkeypatch.setattr(calibrate, "TILT_MIN", 3 * calibrate.TILT_MIN)
-    _, _, found = lens_from_chessboards(pictures, CORNERS, SQUARE)
-    assert found == list(range(len(pictures)))
+    fit = lens_from_chessboards(pictures, CORNERS, SQUARE)
+    assert fit.used == tuple(range(len(pictures)))
 
 
 def test_pictures_of_different_sizes_are_refused(pictures: list[np.ndarray]) -> None:

@@ -2,7 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands calibrate and check_image, called as from the shell."""
 
+import json
+import re
+import subprocess
 import sys
+import urllib.request
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +17,12 @@ import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pool_picture import CONFIG, calibration, discs_of_fish, draw
+from pool_picture import CONFIG, calibration, discs_of_fish, draw, with_tag
 
 from fish_vision.calibration import lens_document
 from fish_vision.commands import calibrate, check_image
 from fish_vision.config import config_from_file
+from fish_vision.tags import tag_picture
 from fish_vision.tracker import Detection, Tracker
 
 
@@ -27,8 +32,9 @@ def call(command, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 
 
 @pytest.fixture
-def files(tmp_path: Path) -> Path:
-    """A folder with lens.yaml, points.csv, params.yaml and fish.png that belong together."""
+def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working directory, with lens.yaml, points.csv, params.yaml and fish.png that belong together."""
+    monkeypatch.chdir(tmp_path)
     lens = lens_document(calibration().lens, "overhead")
     (tmp_path / "lens.yaml").write_text(yaml.safe_dump(lens))
     points = np.array([[2.0, 1.0], [-2.0, 1.0], [-2.0, -1.0], [2.0, -1.0]])
@@ -129,7 +135,16 @@ def test_calibrate_overwrites_no_parameters_of_the_user(files: Path, monkeypatch
 def test_calibrate_lens_refuses_a_square_without_a_size(
     files: Path, monkeypatch, capsys, square: str
 ) -> None:
-    arguments = ("lens", files / "fish.png", "--corners", "7x5", "--square", square)
+    arguments = (
+        "lens",
+        files / "fish.png",
+        "--corners",
+        "7x5",
+        "--square",
+        square,
+        "--out",
+        "new.yaml",
+    )
     assert call(calibrate, monkeypatch, *arguments) == 1
     assert "expected like 8x6" in capsys.readouterr().err
 
@@ -147,13 +162,97 @@ def test_calibrate_mount_writes_params_of_the_tracker(files: Path, monkeypatch, 
     config = config_from_file(files / "mount.yaml")
     assert config.camera_position == pytest.approx(CONFIG.camera_position, abs=1e-4)
     assert config.camera_tilt == pytest.approx(CONFIG.camera_tilt, abs=1e-4)
+    printed = capsys.readouterr().out
+    assert "4 points, error 0.00 pixels rms, 0.0 mm on the water plane" in printed
+    assert cv2.imread(str(files / "mount.png")).shape == (720, 1280, 3)
+
+
+def test_calibrate_mount_finds_tags_at_known_places(files: Path, monkeypatch, capsys) -> None:
+    places = [(7, 1.5, 0.8), (3, -1.5, 0.8), (4, -1.5, -0.8), (9, 1.5, -0.8), (20, 0.0, 0.0)]
+    pond = draw([])
+    for number, x, y in places[:4]:
+        pond = with_tag(pond, tag_picture("4X4_50", number), x, y, 0.2 * number, 0.12)
+    cv2.imwrite(str(files / "tags.png"), pond)
+    rows = "".join(f"{n},{x},{y}\n" for n, x, y in places)
+    (files / "tags.csv").write_text("id,x,y\n" + rows)
+    given = ("mount", "tags.csv", "--lens", "lens.yaml", "--image", "tags.png")
+    assert call(calibrate, monkeypatch, *given) == 0
+    config = config_from_file(files / "mount.yaml")
+    assert config.camera_position == pytest.approx(CONFIG.camera_position, abs=5e-3)
     assert "4 points" in capsys.readouterr().out
+    again = (*given, "--dictionary", "5X5_50", "--out", "other.yaml", "--picture", "other.png")
+    assert call(calibrate, monkeypatch, *again) == 1
+    assert "tags none of 7, 3, 4, 9, 20 were found: expected 4" in capsys.readouterr().err
+
+
+class Person:
+    """Runs a command that serves a page, and clicks there."""
+
+    def __init__(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "fish_vision.commands.calibrate", *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        line = self.process.stdout.readline()
+        self.address = re.search(r"http://127\.0\.0\.1:\d+/", line)[0]
+
+    def ask(self, where: str, points: dict[str, list[float]] | None = None) -> bytes:
+        data = None if points is None else json.dumps(points).encode()
+        with urllib.request.urlopen(self.address + where, data, timeout=60) as answer:
+            return answer.read()
+
+    def ends(self) -> str:
+        """What the command prints after the page."""
+        printed, _ = self.process.communicate(timeout=120)
+        assert self.process.returncode == 0
+        return printed
+
+
+def test_calibrate_mount_lets_a_person_click_points_of_the_pool(files: Path) -> None:
+    (files / "places.csv").write_text("x,y\n2,1\n-2,1\n-2,-1\n2,-1\n")
+    person = Person("mount", "places.csv", "--lens", "lens.yaml", "--image", "fish.png")
+    page = person.ask("").decode()
+    names = json.loads(re.search(r"const names = (\[.*?\])", page)[1])
+    assert len(names) == 4
+    corners = {name: [float(v) for v in name.split()] for name in names}
+    pixels = {n: calibration().pool_to_pixel([xy])[0].tolist() for n, xy in corners.items()}
+    few = json.loads(person.ask("preview", dict(list(pixels.items())[:3])))
+    assert few == {"text": "3 of 4 points or more", "picture": ""}
+    whole = json.loads(person.ask("preview", pixels))
+    assert whole["text"] == "error 0.00 pixels rms, 0.0 mm on the water plane"
+    assert whole["picture"]
+    person.ask("done", pixels)
+    assert "camera 3.000 m high" in person.ends()
+    assert cv2.imread(str(files / "mount.png")).shape == (720, 1280, 3)
+    config = config_from_file(files / "mount.yaml")
+    assert config.camera_position == pytest.approx(CONFIG.camera_position, abs=1e-4)
+
+
+def test_calibrate_colours_lets_a_person_click_the_markers(files: Path) -> None:
+    place = {"front": (0.045, 0.0), "rear": (-0.045, 0.0)}
+    place |= {"tail_odd": (-0.075 - 0.07 / 3, 0.0), "tail_even": (-0.075 - 2 * 0.07 / 3, 0.0)}
+    cv2.imwrite(str(files / "ahead.png"), draw(discs_of_fish(0.5, 0.2, 0.0)))
+    points = {
+        name: calibration().pool_to_pixel([[0.5 + x, 0.2 + y]])[0].tolist()
+        for name, (x, y) in place.items()
+    }
+    given = ("--lens", "lens.yaml", "--params", "params.yaml", "--page")
+    person = Person("colours", "ahead.png", *given)
+    shown = json.loads(person.ask("preview", {"front": points["front"]}))
+    assert shown["text"].startswith("front: [")
+    assert shown["picture"]
+    person.ask("done", points)
+    printed = person.ends()
+    assert "the tracker sees the fish in 1 of 1 pictures" in printed
+    assert re.search(r"[\d.]+ pixels rms, [\d.]+ mm on the water plane", printed)
+    config = config_from_file(files / "colours.yaml")
+    low, high, *_ = config.front_colour
+    assert low < 25 < high  # hue of the drawn yellow
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("x,y\n1,2\n", "header x,y,u,v"),
+        ("x,y\n1,2\n", "no pixels: expected --image or --topic"),
+        ("a,b\n1,2\n", "header x,y,u,v or id,x,y or x,y"),
         ("x,y,u,v\n1,2,3,a\n", "header x,y,u,v"),
         ("x,y,u,v\n", "at least 4"),
     ],
@@ -232,12 +331,30 @@ def test_calibrate_mount_refuses_mistaken_points(files: Path, monkeypatch, capsy
 
 
 def test_calibrate_lens_refuses_pictures_without_a_board(files: Path, monkeypatch, capsys) -> None:
-    arguments = ("lens", files / "fish.png", "--corners", "7x5", "--square", "0.05")
+    arguments = (
+        "lens",
+        files / "fish.png",
+        "--corners",
+        "7x5",
+        "--square",
+        "0.05",
+        "--out",
+        "new.yaml",
+    )
     assert call(calibrate, monkeypatch, *arguments) == 1
     assert "found in 0 of 1" in capsys.readouterr().err
     assert (
         call(
-            calibrate, monkeypatch, "lens", files / "fish.png", "--corners", "7", "--square", "0.05"
+            calibrate,
+            monkeypatch,
+            "lens",
+            files / "fish.png",
+            "--corners",
+            "7",
+            "--square",
+            "0.05",
+            "--out",
+            "new.yaml",
         )
         == 1
     )

@@ -3,6 +3,7 @@
 """The tracker node in this process: messages in and out, and bad input of every kind."""
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from math import atan2, exp, pi
@@ -269,6 +270,35 @@ def test_bad_calibrations_are_said_and_a_good_one_mends_it(
     bench.send_info()
     bench.send_jpeg(to_jpeg(PICTURE, 95))
     assert bench.spin_until(lambda: bool(bench.got["pose"]))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.053])
+def test_a_wrong_focal_length_is_named_with_the_one_that_fits(scale: float) -> None:
+    """camera_info has a focal length 5 % short: refused and named, or corrected by focal_scale."""
+    bench = Bench(MOUNT | {"focal_scale": scale})
+    try:
+        bench.send_info(k=[855.0, 0.0, 640.0, 0.0, 855.0, 360.0, 0.0, 0.0, 1.0])
+        jpeg = to_jpeg(PICTURE, 95)
+        if scale != 1.0:
+            bench.send_jpeg(jpeg)
+            assert bench.spin_until(lambda: bool(bench.got["pose"]))
+            check_pose(bench.got["pose"][0])
+            return
+        for count in range(1, 61):
+            bench.send_jpeg(jpeg)
+            assert bench.spin_until(lambda n=count: bench.tracker._statistics.images == n)
+        assert bench.says("no poses: what is on the head seems +5.")
+        message = bench.got["diagnostics"][-1].status[0].message
+        assert float(re.search(r"focal_scale ([\d.]+)", message)[1]) == pytest.approx(
+            1.053, abs=5e-3
+        )
+        assert float(re.search(r"corrects it to (\d+) pixels", message)[1]) == pytest.approx(
+            900, abs=5
+        )
+        assert re.search(r"hangs 2\.8\d m above the markers and not 3\.00 m", message)
+        assert not bench.got["pose"]
+    finally:
+        bench.close()
 
 
 def test_bad_parameters_are_refused_with_their_name() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, read_lens
-from fish_vision.commands.calibrate import read_picture, write_picture
+from fish_vision.commands.pictures import read_picture, write_picture
 from fish_vision.config import TrackerConfig, config_from_file
 from fish_vision.follower import make_follower
 from fish_vision.segmentation import hsv_of
@@ -40,7 +40,7 @@ def check(args: argparse.Namespace) -> int:
         raise ValueError(
             f"{args.picture} has size {picture.shape[1::-1]}, {args.lens} says {lens.size}"
         )
-    calibration = Calibration(lens, config.mount(), config.marker_height)
+    calibration = config.calibration(lens)
     if config.marker_kind == "colours":
         print_colours(picture, config, calibration)
     found = make_follower(config, calibration).track(picture, 0.0)

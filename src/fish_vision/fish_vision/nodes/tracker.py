@@ -110,9 +110,7 @@ class TrackerNode(Node):
             return
         self._info, self._calibration, self._tracker = info, None, None
         try:
-            self._calibration = Calibration(
-                Lens.from_camera_info(*info), self._config.mount(), self._config.marker_height
-            )
+            self._calibration = self._config.calibration(Lens.from_camera_info(*info))
             self._tracker = make_follower(self._config, self._calibration)
         except CalibrationError as error:
             self._calibration_error = str(error)
@@ -193,23 +191,28 @@ class TrackerNode(Node):
         if refused:
             return DiagnosticStatus.ERROR, refused
         if (error := statistics.refused_spacing()) is not None:
-            return DiagnosticStatus.ERROR, (
-                f"no poses: the head's markers seem {100 * error:+.1f} % too far apart in every image: the focal length "
-                "of camera_info, the height of camera_position or the markers' places are wrong by so much; run calibrate"
-            )
+            return DiagnosticStatus.ERROR, f"no poses: {self._scale(error)}"
         if images == 0:
             return DiagnosticStatus.WARN, "no image in the last second"
         if (error := statistics.spacing_error()) is not None:
-            return (
-                DiagnosticStatus.WARN,
-                f"head markers seem {100 * error:+.1f} % too far apart: check calibration and marker places",
-            )
+            return DiagnosticStatus.WARN, self._scale(error)
         if tracked < images:
             return (
                 DiagnosticStatus.WARN,
                 f"fish seen in {tracked} of {images} images: {statistics.last_reason}",
             )
         return DiagnosticStatus.OK, f"fish seen in all {images} images"
+
+    def _scale(self, error: float) -> str:
+        """What a misfit (share) of the markers' known distance means, and what mends it."""
+        assert self._calibration is not None
+        size, height = 1.0 + error, self._config.camera_position[2] - self._config.marker_height
+        focal = size * float(self._calibration.lens.K[0, 0])
+        return (
+            f"what is on the head seems {100 * error:+.1f} % too large: the focal length of camera_info is wrong "
+            f"(focal_scale {size * self._config.focal_scale:.3f} corrects it to {focal:.0f} pixels), or the camera hangs "
+            f"{height / size:.2f} m above the markers and not {height:.2f} m, or the markers' places are wrong"
+        )
 
 
 def _earlier(header: Header, delay: float) -> Header:

@@ -40,8 +40,8 @@ def run(args: argparse.Namespace) -> int:
 def _track(args: argparse.Namespace) -> int:
     """Write poses and a picture; 1 if the fish is seen nowhere."""
     from fish_vision.annotate import annotated
-    from fish_vision.calibration import Calibration, read_lens
-    from fish_vision.commands.calibrate import write_picture
+    from fish_vision.calibration import read_lens
+    from fish_vision.commands.pictures import write_picture
     from fish_vision.config import TrackerConfig, config_from_file
     from fish_vision.follower import make_follower
     from fish_vision.lowpass import PoseLowPass
@@ -49,7 +49,7 @@ def _track(args: argparse.Namespace) -> int:
     from fish_vision.video import frames
 
     config = config_from_file(args.params) if args.params else TrackerConfig()
-    calibration = Calibration(read_lens(args.lens), config.mount(), config.marker_height)
+    calibration = config.calibration(read_lens(args.lens))
     tracker, lost, spacings = make_follower(config, calibration), Counter[str](), []
     lowpass = PoseLowPass(config.lowpass_hz, config.reacquire_s)
     with args.out.open("w", newline="", encoding="utf-8") as file:

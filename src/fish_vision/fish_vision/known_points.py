@@ -1,0 +1,70 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Points of the pool whose places are known, for the camera's mount."""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fish_vision.calibration import POOL, Array, CalibrationError
+
+FORMATS = (("x", "y", "u", "v"), ("id", "x", "y"), ("x", "y"))
+
+
+@dataclass(frozen=True)
+class KnownPoints:
+    """Names, places (N, 2) in the pool frame, m, and pixels (N, 2) where they are known; tags: the names are numbers."""
+
+    names: tuple[str, ...]
+    places: Array
+    pixels: Array | None = None
+    tags: bool = False
+
+    def at(self, pixels: Mapping[str, tuple[float, float]]) -> "KnownPoints":
+        """Those points that are seen, name -> u, v, with their pixels."""
+        chosen = [i for i, name in enumerate(self.names) if name in pixels]
+        names = tuple(self.names[i] for i in chosen)
+        seen = np.array([pixels[name] for name in names]).reshape(-1, 2)
+        return KnownPoints(names, self.places[chosen], seen, self.tags)
+
+
+def pool_corners() -> KnownPoints:
+    """The corners of the walls' inner faces at the water."""
+    x, y = POOL[0] / 2, POOL[1] / 2
+    places = np.array([[x, y], [-x, y], [-x, -y], [x, -y]])
+    return KnownPoints(tuple(_name(place) for place in places), places)
+
+
+def read_points(path: Path) -> KnownPoints:
+    """Points from a CSV file with header x,y,u,v or id,x,y or x,y.
+
+    Raises:
+        CalibrationError: no such file, another header, or a value that is no finite number.
+    """
+    try:
+        with path.open(newline="") as file:
+            table = csv.DictReader(file)
+            header = tuple(table.fieldnames or ())
+            form = next((f for f in FORMATS if set(f) <= set(header)), None)
+            if form is None:
+                raise ValueError(f"header {','.join(header)}")
+            rows = [[float(row[key]) for key in form] for row in table]
+    except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+        raise CalibrationError(
+            f"{path}: expected CSV with header x,y,u,v or id,x,y or x,y and numbers ({error})"
+        ) from error
+    values = np.array(rows).reshape(-1, len(form))
+    if not np.isfinite(values).all():
+        line = int(np.argmin(np.isfinite(values).all(axis=1))) + 2  # after the header, from 1
+        raise CalibrationError(f"{path}: line {line} has {rows[line - 2]}: expected finite numbers")
+    if form[0] == "id":
+        return KnownPoints(tuple(str(int(v)) for v in values[:, 0]), values[:, 1:], tags=True)
+    pixels = values[:, 2:] if len(form) == 4 else None
+    return KnownPoints(tuple(_name(place) for place in values[:, :2]), values[:, :2], pixels)
+
+
+def _name(place: Array) -> str:
+    return f"{place[0]:+.3f} {place[1]:+.3f}"
