@@ -38,7 +38,7 @@ def test_millimetres_are_true_and_y_points_up(tmp_path):
         ('width="2in" height="2in" viewBox="0 0 100 100"', 0.508),
         ('width="10cm" viewBox="0 0 100 200"', 1.0),
         ('height="10cm" viewBox="0 0 100 200"', 0.5),
-        ('width="72pt" height="72pt" viewBox="0 0 1 1"', 25.4),
+        ('width="72pt" height="72pt" viewBox="0 0 4 4"', 6.35),
         ('width="100mm" height="200mm" viewBox="0 0 10 10" preserveAspectRatio="xMinYMin"', 10.0),
         ("", 25.4 / 96),
     ],
@@ -83,6 +83,8 @@ def test_an_uneven_viewbox_is_stretched_as_it_says(tmp_path):
         '<style>#h{visibility:hidden} path{visibility:visible}</style><path id="h" d="M0 0 L5 5"/>',
         '<other xmlns="http://x"><path d="M0 0 L5 5"/></other>',
         '<path d=""/>',
+        '<path d="M-20 5 L-10 200"/>',
+        '<g transform="translate(0 300)"><path d="M5 5 L50 50"/></g>',
         '<path d="M5 5 Z"/>',
         "<text> </text>",
         '<g requiredExtensions="http://ns.adobe.com/x"><path d="M0 0 L5 5"/></g>',
@@ -116,6 +118,10 @@ def test_what_no_viewer_shows_is_not_swum(tmp_path, hidden):
         f'<path {LINE} fill="url(#absent) oklch(0.5 0.1 20)"/>',
         f'<path {LINE} marker-end="url(#a)" clip-path="none"/>',
         f'<clipPath id="c"><rect x="0" y="0" width="210" height="297"/></clipPath><g clip-path="url(#c)"><path {LINE}/></g>',
+        f'<path {LINE} fill="none" stroke="red" style="stroke-dasharray:4,2"/>',
+        f'<g stroke="red" stroke-dasharray="1"><path {LINE} fill="none"/></g>',
+        f'<path {LINE} fill="none" stroke="red" stroke-dasharray="0 0"/>',
+        f'<path {LINE} stroke-dasharray="0 900"/>',
         f'<a><path {LINE} stroke="currentColor" fill="none" color="blue"/></a>',
     ],
 )
@@ -179,6 +185,10 @@ def test_what_a_viewer_shows_is_swum(tmp_path, shown):
             "cut off by the clip path",
         ),
         (f'<svg width="50" height="50"><path {LINE}/></svg>', "cut off by the frame"),
+        ('<path d="M200 10 L220 20"/>', "cut off by the edge of the page; .* make the page larger"),
+        ('<path d="M-5 10 L5 20 L-5 30"/>', "cut off by the edge of the page"),
+        (f'<path {LINE} stroke="red" stroke-dasharray="5 90"/>', "gaps longer than a tenth"),
+        (f'<path {LINE} stroke="red" stroke-dasharray="0 5"/>', "draw it without dashes"),
         (f'<path fill="none" stroke="context-stroke" {LINE}/>', "'context-stroke' is no colour"),
         (f'<switch><path requiredFeatures="x" d="M0 0H1"/><path {LINE}/></switch>', "some viewers"),
         (f'<path clip-path="circle(3px)" {LINE}/>', "not supported; release the clip"),
@@ -264,7 +274,7 @@ def test_commands_absolute_and_relative_draw_the_same(tmp_path):
 def test_smooth_commands_mirror_only_a_curve_of_their_kind(tmp_path):
     t = np.linspace(0.0, 1.0, 101)
     smooth = read(
-        tmp_path, '<path d="M0 0 C0 20 10 20 10 0 S20 -20 20 0 Q25 9 30 0 S 35 5 40 0 T 50 0"/>'
+        tmp_path, '<path d="M0 0 C0 20 10 20 10 0 S20 -20 20 0 Q25 9 30 0 S 35 5 40 0 T 50 0"/>', ""
     ).points
     truth = np.vstack(
         [
@@ -276,7 +286,7 @@ def test_smooth_commands_mirror_only_a_curve_of_their_kind(tmp_path):
             ),  # no cubic before: its own start is the control point
             bezier([(40, 0), (40, 0), (50, 0)], t),
         ]
-    ) * [MM, -MM]
+    ) * [25.4 / 96 * MM, -25.4 / 96 * MM]
     assert distance(truth, smooth) < 1e-6
 
 
@@ -338,20 +348,24 @@ def folder(tmp_path_factory):
     start=POINT,
     curves=st.lists(CURVES, min_size=1, max_size=4),
     groups=st.lists(st.lists(TRANSFORMS, max_size=3), max_size=3),
-    box=st.tuples(NUMBERS, NUMBERS, SIZES, SIZES),
+    margins=st.tuples(SIZES, SIZES, SIZES, SIZES),
 )
-def test_random_transforms_agree_with_an_independent_renderer(folder, start, curves, groups, box):
+def test_random_transforms_agree_with_an_independent_renderer(
+    folder, start, curves, groups, margins
+):
     d, points = drawn(start, curves)
     body = f'<path d="{d}"/>'
     for calls in reversed(groups):
         text = " ".join(f"{name}({' '.join(map(str, values))})" for name, values in calls)
         body = f'<g transform="{text}">{body}</g>'
-    x, y, width, height = box
+    calls = [matrix(*call) for calls in groups for call in calls]
+    inside = placed(calls, points)
+    x, y = (inside.min(axis=0) - margins[:2]).tolist()
+    width, height = (inside.max(axis=0) + margins[2:] - [x, y]).tolist()
     page = f'width="100mm" height="100mm" viewBox="{x} {y} {width} {height}" preserveAspectRatio="none"'
     scale = matrix("scale", (100 * MM / width, 100 * MM / height))
     matrices = [matrix("scale", (1.0, -1.0)), scale, matrix("translate", (-x, -y))]
-    matrices += [matrix(*call) for calls in groups for call in calls]
-    truth = placed(matrices, points)
+    truth = placed([*matrices, *calls], points)
     size = np.ptp(truth, axis=0).max()
     if size < 1e-12:
         with pytest.raises(PathError, match="no visible line"):

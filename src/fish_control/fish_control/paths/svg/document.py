@@ -14,13 +14,15 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.paths.svg.clip import Clip, check_unclipped, read_clip
-from fish_control.paths.svg.outline import SHAPES, Outline, Viewport, outlines
+from fish_control.paths.svg.clip import Clip, is_outside, read_clip
+from fish_control.paths.svg.outline import SHAPES, Viewport, outlines
+from fish_control.paths.svg.part import NO_LINE, Part, page_frame
 from fish_control.paths.svg.placement import place, transform, viewbox_transform
 from fish_control.paths.svg.style import (
     INITIAL,
     Rule,
     Style,
+    check_dashes,
     computed,
     local_name,
     painted,
@@ -32,43 +34,10 @@ from fish_control.reference_path import PathError
 
 SVG = "http://www.w3.org/2000/svg"
 GROUPS = ("g", "a", "svg", "switch", "use")
-NO_LINE = ("text", "image", "foreignObject")  # seen, but without a line that could be swum
 MOVING = ("animate", "animateTransform", "animateMotion", "set")
 DEEPEST = 100  # nested elements
 MOST_ELEMENTS = 100_000  # drawn, those of <use> counted each time
 _HREF = ("href", "{http://www.w3.org/1999/xlink}href")
-
-
-@dataclass(frozen=True)
-class Part:
-    """A visible element with everything that its place and its outline depend on."""
-
-    element: Element
-    ids: tuple[str, ...]  # its own id and those of the groups around it
-    name: str
-    matrix: NDArray[np.float64]  # (3, 3) from its own units to the page [px]
-    viewport: Viewport
-    clips: tuple[Clip, ...]
-    where: str
-
-    def outlines(self) -> list[Outline]:
-        """Points (M, 2) on the page [px, y down] of everything that is drawn without lifting the pen.
-
-        Raises:
-            PathError: an element without an outline, or an outline that is clipped.
-
-        """
-        tag = local_name(self.element)
-        if tag in NO_LINE:
-            raise PathError(
-                f"{self.where}: {tag} has no line to swim; turn it into a path (Inkscape: Path > Object to Path)"
-            )
-        drawn = [
-            (place(self.matrix, p), c) for p, c in outlines(self.element, self.viewport, self.where)
-        ]
-        for points, _ in drawn:
-            check_unclipped(points, self.clips, self.where)
-        return drawn
 
 
 @dataclass(frozen=True)
@@ -87,8 +56,9 @@ class _Context:
 class _Document:
     """The tree of a file, its ids and its style sheets."""
 
-    def __init__(self, file: Path, root: Element) -> None:
+    def __init__(self, file: Path, root: Element, page: Clip | None) -> None:
         self.where = str(file)
+        self.page = page
         self.rules: list[Rule] = read_rules(root, self.where)
         self.by_id: dict[str, Element] = {}
         self.drawn = 0
@@ -119,9 +89,18 @@ class _Document:
         if tag in GROUPS:
             yield from self._children(element, inner, where)
         elif painted(style, where, self.by_id) and _has_content(element, inner.viewport, where):
-            yield Part(
+            part = Part(
                 element, inner.ids, _name(element), inner.matrix, inner.viewport, inner.clips, where
             )
+            if not self._off_page(part):
+                check_dashes(style, part.lengths(), where)
+                yield part
+
+    def _off_page(self, part: Part) -> bool:
+        """Whether the whole of a shape lies off the page, where no viewer shows it."""
+        if self.page is None or local_name(part.element) in NO_LINE:
+            return False
+        return all(is_outside(points, self.page) for points, _ in part.drawn())
 
     def _inner(self, element: Element, context: _Context, where: str) -> _Context:
         """The context with the element's own transform, id and clip path."""
@@ -217,8 +196,10 @@ def read_parts(file: Path) -> tuple[list[Part], bool]:
         )
     size, has_size = _page(root, str(file))
     matrix, viewport = viewbox_transform(root, size, str(file))
-    document = _Document(file, root)
-    return list(document.parts(root, _Context(matrix, viewport))), has_size
+    frame = page_frame(size)
+    clips = () if frame is None else (frame,)
+    document = _Document(file, root, frame)
+    return list(document.parts(root, _Context(matrix, viewport, clips=clips))), has_size
 
 
 def _page(root: Element, where: str) -> tuple[Viewport, bool]:

@@ -23,6 +23,7 @@ INHERITED = (
     "fill-opacity",
     "stroke-opacity",
     "stroke-width",
+    "stroke-dasharray",
     "color",
 )
 OWN = ("display", "opacity", "transform", "clip-path", "mask", "filter", "overflow")
@@ -33,6 +34,8 @@ UNREAD = (
     *("clip", "content-visibility", "all", "animation", "animation-name", "mask-image"),
 )  # CSS that moves, shapes or hides what is drawn and that is not understood here
 INITIAL: Style = {"fill": "black", "stroke": "none", "visibility": "visible", "color": "black"}
+
+LONGEST_GAP = 0.1  # of a dashed line, of its length
 
 _SELECTOR = re.compile(r"(\*|[\w-]+)?((?:[#.][\w-]+)*)")
 _RULE = re.compile(r"([^{}]*)\{([^{}]*)\}")
@@ -164,6 +167,27 @@ def painted(style: Style, where: str, known: Collection[str]) -> bool:
         _opaque("stroke", style, where, known)
         and pixels(width, f"{where}: stroke-width", 100.0) > 0.0
     )
+
+
+def check_dashes(style: Style, lengths: list[float], where: str) -> None:
+    """Take a dashed line for the line along its dashes; `lengths` are those of the outlines in the element's units.
+
+    Raises:
+        PathError: gaps that are longer than a part of the line, so that a viewer shows pieces or nothing.
+
+    """
+    given = style.get("stroke-dasharray", "none").lower()
+    numbers = [part for part in re.split(r"[\s,]+", given) if part]
+    if given in ("none", "") or style.get("stroke", "none").lower() == "none" or not lengths:
+        return
+    dashes = [pixels(number, f"{where}: stroke-dasharray", max(lengths)) for number in numbers]
+    dashes *= 1 + len(dashes) % 2  # an odd number of them is repeated
+    if not any(dashes) or min(dashes) < 0.0:  # then a viewer draws without dashes
+        return
+    if not any(dashes[::2]) or max(dashes[1::2]) > LONGEST_GAP * max(lengths):
+        raise PathError(
+            f"{where} has dashes {given!r} with gaps longer than a tenth of the line; draw it without dashes"
+        )
 
 
 def _opaque(paint: str, style: Style, where: str, known: Collection[str]) -> bool:
