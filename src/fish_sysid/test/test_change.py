@@ -18,13 +18,12 @@ from fish_sysid.diagnosis.change import comparable
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import answer, with_change
 from fish_sysid.diagnosis.change.channels import swims
-from fish_sysid.diagnosis.change.compare import compare
+from fish_sysid.diagnosis.change.compare import compare, days_of
 from fish_sysid.diagnosis.change.harmonics import StrokeWeights
 from fish_sysid.diagnosis.change.naming import judge_all
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, look, trial_rows
 from fish_sysid.diagnosis.change.shared_fit import regression
-from fish_sysid.diagnosis.change.strength import degenerate
-from fish_sysid.diagnosis.change.swap_test import exchanges, swap_test
+from fish_sysid.diagnosis.change.swap_test import exchanges, single_days, swap_test
 
 NAMES = ("current", "camera_latency", "camera_heading_offset", "gyro_scale", "imu_misalignment")
 OLD, NEW = 10, 5  # trials
@@ -138,19 +137,38 @@ def test_a_trial_that_swims_backwards_is_named_and_left_out(days) -> None:
     assert told == ["OLD swim_2: swims backwards in the mean"]
 
 
+def test_a_change_that_old_makes_from_day_to_day_is_none(days) -> None:
+    old, new = days
+    flow = {"x": 0.03, "y": -0.02}
+    first, second = old.select(range(5)), old.select(range(5, OLD))
+    changed = with_injection(new, "current", flow)
+
+    def p_value(*olds) -> float:
+        both = [
+            look(trial_rows(Robot(), e, swims(e), NAMES), MEAN_MOTION) for e in (*olds, changed)
+        ]
+        fit = regression([row for rows in both[:-1] for row in rows], both[-1])
+        of = days_of(olds, joined(olds).names, NEW)
+        return swap_test(fit, [0] * (OLD + NEW), 100, days=of).p_value
+
+    assert p_value(first, second) <= 0.01
+    assert p_value(with_injection(first, "current", flow), second) > 0.01
+    assert single_days([0, 0, 0, 1], 3) == []
+
+
+def test_kinds_leave_enough_exchanges(days) -> None:
+    old, new = days
+    few = swims(old)[:6], swims(new)[:3]
+    kind = comparable.kinds(*few)
+    assert len(kind) == 9
+    assert len(set(kind)) == 1  # six and three have 84 exchanges in all
+
+
 def test_days_are_joined_trial_by_trial(days) -> None:
     old, new = days
     both = joined([old, new])
     assert len(both.names) == len(set(both.names)) == OLD + NEW
     assert np.array_equal(both.commands[: new.length, OLD:], new.commands)
-
-
-def test_limits_of_an_effect_are_no_answer() -> None:
-    assert "range" in degenerate("rudder_delay", {"delay": 0.3})
-    assert "range" in degenerate("rudder_placement", {"tip_share": 1.0})
-    assert "no such effect" in degenerate("rudder_lag", {"time_constant": 0.0})
-    assert degenerate("rudder_lag", {"time_constant": 0.12}) == ""
-    assert degenerate("rudder_gain", {"factor": 0.8}) == ""
 
 
 def test_a_change_is_added_to_what_the_robot_has() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.degenerate import degenerate
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.map_fit import Fit
@@ -24,7 +25,7 @@ def verdict(d: Diagnosis) -> str:
     """no_mismatch, missing_physics, sensor_or_actuator or unexplained."""
     found = named(d)
     if not found:
-        return "unexplained" if much_is_left(d) else "no_mismatch"
+        return "unexplained" if much_is_left(d) or refused(d) else "no_mismatch"
     kinds = {kind_of(a.name, d.task.robot.table) for a in found}
     return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
 
@@ -36,7 +37,21 @@ def much_is_left(d: Diagnosis) -> bool:
 
 def named(d: Diagnosis) -> tuple[Accepted, ...]:
     """The accepted effects, or none where they leave more than they take away: nearest is not right."""
-    return () if much_is_left(d) and unexplained_share(d) > MOST_UNEXPLAINED else d.accepted
+    if much_is_left(d) and unexplained_share(d) > MOST_UNEXPLAINED:
+        return ()
+    return tuple(a for a in d.accepted if not limit_of(d, a.name))
+
+
+def refused(d: Diagnosis) -> list[str]:
+    """What the accepted effects are that lie in a limit where they are another effect or none."""
+    return [text for a in d.accepted if (text := limit_of(d, a.name))]
+
+
+def limit_of(d: Diagnosis, name: str) -> str:
+    """Why the values of an effect in the final model are not this effect; "" where they are."""
+    first = f"{name}."
+    values = {k.removeprefix(first): v for k, v in d.final.values.items() if k.startswith(first)}
+    return degenerate(name, values, d.task.robot.table)
 
 
 def unexplained_share(d: Diagnosis) -> float:
@@ -47,12 +62,18 @@ def unexplained_share(d: Diagnosis) -> float:
 
 
 def corrected(d: Diagnosis) -> Fit:
-    """The fit that model.yaml holds: never one that predicts held-out trials worse than the refitted nominal model."""
+    """The fit that model.yaml holds: never one that predicts held-out trials worse than the refitted nominal model.
+
+    What symmetry tests find is in it where that does not predict worse.
+    """
+    base = d.nominal
+    if d.settled is not None and not predicts_worse(d.settled, d.nominal, d.unseen):
+        base = d.settled
     if d.surrogate is not None:
         fit = d.surrogate
     else:
-        fit = d.final if named(d) else d.nominal
-    return d.nominal if predicts_worse(fit, d.nominal, d.unseen) else fit
+        fit = d.final if named(d) else base
+    return base if predicts_worse(fit, base, d.unseen) else fit
 
 
 def predicts_worse(fit: Fit, nominal: Fit, unseen: Experiment) -> bool:

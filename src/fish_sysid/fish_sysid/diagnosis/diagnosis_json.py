@@ -16,10 +16,12 @@ from fish_sysid.diagnosis.corrected_model import (
     corrected,
     much_is_left,
     named,
+    refused,
     unexplained_share,
     verdict,
 )
 from fish_sysid.diagnosis.effect_wrench import intervals, regimes
+from fish_sysid.diagnosis.families import family_of, separating
 from fish_sysid.diagnosis.next_experiment import next_experiment
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
 from fish_sysid.diagnosis.significance import p_value, p_value_unseen, probabilities
@@ -38,6 +40,7 @@ STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in sur
 def answer(d: Diagnosis) -> dict[str, Any]:
     """The dictionary written to diagnosis.json."""
     unexplained = unexplained_entry(d)
+    stated = [[a.name, *rivals_of(d, a)] for a in named(d)]
     grows_with = next((c["name"] for c in unexplained["where"].get("covariates", [])), None)
     return {
         "verdict": verdict(d),
@@ -47,7 +50,8 @@ def answer(d: Diagnosis) -> dict[str, Any]:
         "symmetry": symmetry_entry(d.symmetry),
         "unexplained": unexplained,
         "fit": fit_entry(d),
-        "next_experiment": next_experiment([a.name for a in named(d)], rivals(d), grows_with),
+        "next_experiment": separating(stated)
+        or next_experiment([a.name for a in named(d)], rivals(d), grows_with),
         "out_of_reach": d.task.not_judged,
         "ranking": [
             {"name": r.name, "gain": r.gain, "free_parameters": d.task.parameter_count(r.name)}
@@ -92,11 +96,8 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
             "probability": probability[name],
         },
         "share": gains[name] / sum(gains.values()),
-        "rivals": [
-            {"name": n, "probability": p}
-            for n, p in probability.items()
-            if n != name and p > PLAUSIBLE
-        ],
+        "rivals": [{"name": n, "probability": p} for n, p in rivals_of(d, accepted).items()],
+        "family": family_entry(d, accepted),
         "where": where_entry(d, name),
     }
 
@@ -111,12 +112,33 @@ def competition(accepted: Accepted, found: Sequence[Accepted]) -> dict[str, floa
 
 def rivals(d: Diagnosis) -> list[str]:
     """Names that the data do not distinguish from what was found."""
-    return [
-        n
-        for a in named(d)
-        for n, p in competition(a, d.accepted).items()
-        if n != a.name and p > PLAUSIBLE
-    ]
+    return [name for accepted in named(d) for name in rivals_of(d, accepted)]
+
+
+def rivals_of(d: Diagnosis, accepted: Accepted) -> dict[str, float]:
+    """Names that the data do not distinguish from one that was found, with their probabilities."""
+    probability = competition(accepted, d.accepted)
+    return {n: p for n, p in probability.items() if n != accepted.name and p > PLAUSIBLE}
+
+
+def family_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
+    """The name of the family and those of its members that tie, each with its probability and parameters."""
+    family = family_of(accepted.name)
+    alike = [n for n in rivals_of(d, accepted) if family and family_of(n) == family]
+    if not alike:
+        return {"name": "", "members": []}
+    probability = competition(accepted, d.accepted)
+    return {
+        "name": family,
+        "members": [
+            {
+                "name": n,
+                "probability": probability[n],
+                "parameters": effect_parameters(accepted.contest[n], n),
+            }
+            for n in (accepted.name, *alike)
+        ],
+    }
 
 
 def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:
@@ -150,12 +172,14 @@ def where_entry(d: Diagnosis, name: str) -> dict[str, Any]:
 
 def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
     """What no name explains: size, place, and a law of few terms."""
-    share = unexplained_share(d)
+    share, limits = unexplained_share(d), refused(d)
     if not much_is_left(d):
+        text = "the remaining force looks like water noise"
         return {
             "share": share,
             "where": {},
-            "description": "the remaining force looks like water noise",
+            "nearest": [],
+            "description": "; ".join(limits) or text,
         }
     scale, ratio = np.array(d.final.noise.wrench), d.final.process_noise_ratio
     return {
@@ -167,7 +191,9 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "place": latent_force.place_shares(d.remaining, scale),
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
-        "description": "; ".join(law(d, dof) for dof in d.state.law.lawful(d.task.level))
+        "description": "; ".join(
+            [*limits, *(law(d, dof) for dof in d.state.law.lawful(d.task.level))]
+        )
         or f"{STRONG.format(*ratio)}; {no_law(d)}",
     }
 
@@ -223,10 +249,12 @@ def fit_entry(d: Diagnosis) -> dict[str, Any]:
 
 
 def written(d: Diagnosis) -> str:
-    """Which model model.yaml holds: refitted, with_effects or model_yaml."""
+    """Which model model.yaml holds: refitted, with_symmetry, with_effects or model_yaml."""
     fit = corrected(d)
     if fit is d.nominal:
         return "refitted"
+    if fit is d.settled:
+        return "with_symmetry"
     return "model_yaml" if fit is d.surrogate else "with_effects"
 
 

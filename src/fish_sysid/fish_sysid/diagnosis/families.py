@@ -4,7 +4,17 @@
 
 from __future__ import annotations
 
-from fish_sysid.diagnosis.next_experiment import CIRCLES, COAST, RUDDER_STEPS, STROKES, Plan
+from collections.abc import Sequence
+from typing import Any
+
+from fish_sysid.diagnosis.next_experiment import (
+    CIRCLES,
+    COAST,
+    RUDDER_STEPS,
+    STROKES,
+    Plan,
+    written,
+)
 
 FAMILIES: dict[str, tuple[tuple[str, ...], Plan]] = {
     "rudder timing": (
@@ -24,3 +34,14 @@ FAMILIES: dict[str, tuple[tuple[str, ...], Plan]] = {
 def family_of(name: str) -> str:
     """The family of a name; "" for one that stands alone."""
     return next((family for family, (members, _) in FAMILIES.items() if name in members), "")
+
+
+def separating(families: Sequence[Sequence[str]]) -> dict[str, Any] | None:
+    """The manoeuvre that tells the members of the first of these families apart; None where no name has a rival in its family."""
+    for members in families:
+        family = family_of(members[0]) if members else ""
+        kin = [name for name in members if family_of(name) == family]
+        if family and len(kin) > 1:
+            why, program = FAMILIES[family][1]
+            return written(f"tell {', '.join(kin)} apart: {why}", program)
+    return None

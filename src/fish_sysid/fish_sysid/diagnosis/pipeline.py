@@ -20,10 +20,12 @@ from fish_sysid.diagnosis.model_order import better_order
 from fish_sysid.diagnosis.residual_regression import residual_law
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, State
 from fish_sysid.diagnosis.significance import Level
+from fish_sysid.diagnosis.symmetry.applied import with_findings
+from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.diagnosis.task import Progress, Task, make_task
 from fish_sysid.estimation.global_fit import global_fit
-from fish_sysid.estimation.map_fit import Fit
+from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.parametrization import EffectTable
 from fish_sysid.estimation.refit import refit, refit_on
 from fish_sysid.estimation.sensor_noise import usual_noise
@@ -58,7 +60,25 @@ def diagnose(
     if task.runs("backward elimination"):
         final, accepted = eliminate(state.final, state.accepted, task)
         state = with_final(state, final, accepted, task)
-    return replace(conclude(state, task), symmetry=symmetry)
+    settled = with_symmetry_found(state, symmetry, task)
+    return replace(conclude(state, task), symmetry=symmetry, settled=settled)
+
+
+def with_symmetry_found(
+    state: State, symmetry: Sequence[SymmetryFinding], task: Task
+) -> Fit | None:
+    """The nominal model refitted with what symmetry tests find and no fit has; None without any."""
+    nominal, final = state.nominal, state.final
+    lacking = [f for f in symmetry if f.name not in final.hypothesis.names]
+    robot = with_findings(nominal.hypothesis.robot, lacking)
+    if robot == nominal.hypothesis.robot:
+        return None
+    task.progress("refitting with what the symmetries show")
+    training = task.trials.training
+    start = evaluate(
+        replace(nominal.hypothesis, robot=robot), nominal.theta, training, nominal.noise
+    )
+    return refit_on(start, training, anneal=False)
 
 
 def fit_nominal(task: Task) -> Fit:

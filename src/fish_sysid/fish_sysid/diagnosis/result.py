@@ -88,6 +88,7 @@ class Diagnosis:
     held_out: dict[str, np.ndarray]  # log density per sample and trial: given, nominal, final
     surrogate: Fit | None = None  # where no name fits: the model that predicts best
     symmetry: tuple[SymmetryFinding, ...] = ()  # every test's answer, without a model of the fish
+    settled: Fit | None = None  # the nominal model refitted with what the symmetry tests find
 
     @property
     def nominal(self) -> Fit:

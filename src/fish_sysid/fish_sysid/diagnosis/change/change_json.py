@@ -9,8 +9,9 @@ from typing import Any
 
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis.change.change import Change, Member, Named
-from fish_sysid.diagnosis.families import FAMILIES, family_of
-from fish_sysid.diagnosis.next_experiment import next_experiment, written
+from fish_sysid.diagnosis.families import separating
+from fish_sysid.diagnosis.next_experiment import next_experiment
+from fish_sysid.diagnosis.symmetry.applied import with_findings
 from fish_sysid.diagnosis.symmetry.symmetry_json import stated, symmetry_entry
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.parametrization import effect_class
@@ -155,23 +156,18 @@ def _parameters(member: Member) -> Entry:
 
 def _next_experiment(change: Change) -> Entry:
     """The manoeuvre that separates the members of the first family."""
-    for named in change.named:
-        family = family_of(named.name)
-        if family and len(named.members) > 1:
-            why, program = FAMILIES[family][1]
-            names = ", ".join(m.name for m in named.members)
-            return written(f"tell {names} apart: {why}", program)
-    return next_experiment([named.name for named in change.named], [])
+    apart = separating([[m.name for m in named.members] for named in change.named])
+    return apart or next_experiment([named.name for named in change.named], [])
 
 
 def changed_robot(change: Change) -> Robot:
-    """OLD's best model with the change; what every recording lacks stays as it is.
+    """OLD's best model with the change, and with what symmetry tests find in OLD.
 
     Raises ValueError where OLD was not fitted.
     """
     if change.robot is None:
         raise ValueError("got a comparison without a model of OLD; expected one that was made")
-    robot = change.robot
+    robot = with_findings(change.robot, change.symmetry)
     if change.camera_delay > 0.0:
         robot = robot.with_effect("camera_latency", delay=change.camera_delay)
     for named in change.named:

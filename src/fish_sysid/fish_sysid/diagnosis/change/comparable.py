@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import comb, prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ UNITS = 8.0  # ratio of sizes that no change of a fish makes: degrees to radians
 NEAR = 0.5  # of a command's spread: commands within it are alike
 COMMON = 0.5  # share of NEW's stroke means with an OLD one nearby
 MOST_KINDS = 3
+FEWEST_EXCHANGES = 250  # different sets of trials that can stand for NEW
 FAR_OUT = 6.0  # times the median of the other trials' residuals, in mean squares
 
 
@@ -101,7 +103,8 @@ def far_out(names: Sequence[str], rest: Array, old: int) -> list[str]:
 def kinds(old: Sequence[Swim], new: Sequence[Swim]) -> list[int]:
     """Kind of each trial, OLD's first: by throttle, rudder and how the rudder moves.
 
-    As many kinds as leave at least as many of OLD as of NEW in each of NEW's.
+    As many kinds as leave at least as many of OLD as of NEW in each of NEW's, and FEWEST_EXCHANGES in all: with fewer no
+    change is rare among exchanged trials.
     """
     rows = []
     for swim in (*old, *new):
@@ -113,6 +116,8 @@ def kinds(old: Sequence[Swim], new: Sequence[Swim]) -> list[int]:
     for count in range(MOST_KINDS, 1, -1):
         kind = fcluster(tree, count, "maxclust")
         first, second = kind[: len(old)], kind[len(old) :]
-        if all((first == k).sum() >= (second == k).sum() for k in np.unique(second)):
+        sizes = [(int((kind == k).sum()), int((second == k).sum())) for k in np.unique(second)]
+        enough = prod(comb(both, own) for both, own in sizes) > FEWEST_EXCHANGES
+        if enough and all((first == k).sum() >= (second == k).sum() for k in np.unique(second)):
             return [int(k) for k in kind]
     return [1] * len(features)

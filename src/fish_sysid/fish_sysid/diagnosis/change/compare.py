@@ -32,10 +32,11 @@ from fish_sysid.diagnosis.change.shared_fit import Key, Regression, regression
 from fish_sysid.diagnosis.change.strength import Refitted, refit
 from fish_sysid.diagnosis.change.swap_test import Swapped, swap_test
 from fish_sysid.diagnosis.families import family_of
+from fish_sysid.diagnosis.symmetry.applied import in_still_water
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
-from fish_sysid.estimation.shooting.prediction_fit import fit_predictions
+from fish_sysid.estimation.shooting.prediction_fit import quick_robot
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
 
 Array = NDArray[np.float64]
@@ -65,6 +66,7 @@ class _Case:
     old: list[TrialRows]
     rows: list[TrialRows]  # of NEW
     strata: list[int]
+    day_of: list[int]  # of each trial
     robot: Robot
     new: Experiment
     days: tuple[Swim, ...]  # of NEW
@@ -104,12 +106,14 @@ def _compare(
     new_days, more = screened(swims(new), "NEW")
     check_counts(old_days, new_days)
     report("fitting OLD by predictions")
-    model = make_model(old.select([old.names.index(s.name) for s in old_days]), robot)
+    used = old.select([old.names.index(s.name) for s in old_days])
+    model = make_model(in_still_water(used, symmetry), robot)
     report("what each candidate would change")
     old_rows = trial_rows(model, old, old_days, NAMES)
     new_rows = trial_rows(model, new, new_days, NAMES)
     report("exchanging trials")
     strata, found = kinds(old_days, new_days), {}
+    day_of = days_of(olds, [s.name for s in old_days], len(new_days))
     for name, channels in LOOKS.items():
         kept_old, kept_new = look(old_rows, channels), look(new_rows, channels)
         fit = regression(kept_old, kept_new)
@@ -117,8 +121,8 @@ def _compare(
         told += [
             f"OLD {s}: out of the other trials' family" for s in strange if s not in " ".join(told)
         ]
-        case = _Case(channels, fit, kept_old, kept_new, strata, model, new, new_days)
-        found[name] = case, swap_test(fit, strata)
+        case = _Case(channels, fit, kept_old, kept_new, strata, day_of, model, new, new_days)
+        found[name] = case, swap_test(fit, strata, days=day_of)
         if found[name][1].p_value <= LEVEL:
             break
     seen = min(found, key=lambda name: found[name][1].p_value)
@@ -133,12 +137,18 @@ def _compare(
     return _named(replace(base, verdict="changed"), case, swapped)
 
 
+def days_of(olds: Sequence[Experiment], kept: Sequence[str], new: int) -> list[int]:
+    """The day of each of OLD's kept trials, in the order of `joined`, and one more day for `new` trials of NEW."""
+    counts = [len(day.names) for day in olds]
+    numbers = dict(zip(joined(olds).names, np.repeat(np.arange(len(olds)), counts), strict=True))
+    return [int(numbers[name]) for name in kept] + [len(olds)] * new
+
+
 def model_of(old: Experiment, robot: Robot) -> Robot:
-    """The robot that predicts OLD best; the given one where no trial is long enough."""
+    """A robot that predicts OLD well; the given one where no trial is long enough."""
     if not can_be_predicted(old):
         return robot
-    found = fit_predictions(old, robot, NOMINAL_FREE, links=(robot.links,))
-    return found.robot.without_effect("disturbance")
+    return quick_robot(old, robot, NOMINAL_FREE).without_effect("disturbance")
 
 
 def _named(change: Change, case: _Case, swapped: Swapped) -> Change:
@@ -159,7 +169,7 @@ def _named(change: Change, case: _Case, swapped: Swapped) -> Change:
         else:
             taken.append(key)
         named = merged(named, one)
-        swapped = swap_test(case.fit, case.strata, taken=taken)
+        swapped = swap_test(case.fit, case.strata, taken=taken, days=case.day_of)
     named, taken, swapped = needed(case, named, taken, swapped)
     left = swapped.p_value <= LEVEL
     suspects = sorted(swapped.ratio, key=lambda n: -swapped.ratio[n])[:SUSPECTS] if left else []
@@ -178,7 +188,7 @@ def needed(
     """The changes without those that the later ones make superfluous."""
     for key in list(taken[:-1]):
         others = [k for k in taken if k != key]
-        without = swap_test(case.fit, case.strata, taken=others)
+        without = swap_test(case.fit, case.strata, taken=others, days=case.day_of)
         if min(without.p_value, swapped.p_value) > LEVEL:
             taken, swapped = others, without
             named = [n for n in named if n.name != key[0]]

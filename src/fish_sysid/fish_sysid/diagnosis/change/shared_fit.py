@@ -52,24 +52,47 @@ class Regression:
         return len(self.precision)
 
 
-def regression(old: Sequence[TrialRows], new: Sequence[TrialRows]) -> Regression:
-    """The normal equations with noise and ridge from OLD."""
+@dataclass(frozen=True)
+class Settled:
+    """What OLD alone settles."""
+
+    noise: Array  # (CHANNELS,)
+    precision: Array  # (P,) of all columns, infinite where one is not shared
+
+
+def settled(old: Sequence[TrialRows]) -> Settled:
+    """Noise of the channels and the ridge, by leaving OLD's trials out."""
+    keys = list(old[0].candidates)
+    at, start = {}, old[0].black_box.shape[1]
+    for k in keys:
+        width = old[0].candidates[k].shape[1]
+        at[k] = np.arange(start, start + width)
+        start += width
+    shared_keys = [k for k in keys if k[0] != PARAMETER + "all drags"]
+    columns = [np.hstack([t.black_box, *(t.candidates[k] for k in keys)]) for t in old]
+    noise = FIRST_NOISE
+    groups = _groups(old[0].black_box.shape[1], start, at, shared_keys)
+    for _ in range(NOISE_ROUNDS):
+        scaled = [scaled_rows(t, x, noise) for t, x in zip(old, columns, strict=True)]
+        precision, residuals = _ridge(scaled, groups)
+        noise = noise * _spreads(old, residuals)
+    return Settled(noise, precision)
+
+
+def regression(
+    old: Sequence[TrialRows], new: Sequence[TrialRows], by_old: Settled | None = None
+) -> Regression:
+    """The normal equations with noise and ridge from OLD; by_old: these, where they are known."""
     trials = [*old, *new]
     keys = list(trials[0].candidates)
-    shared_keys = [k for k in keys if k[0] != PARAMETER + "all drags"]
     at, start = {}, trials[0].black_box.shape[1]
     for k in keys:
         width = trials[0].candidates[k].shape[1]
         at[k] = np.arange(start, start + width)
         start += width
-    box, P = trials[0].black_box.shape[1], start
     columns = [np.hstack([t.black_box, *(t.candidates[k] for k in keys)]) for t in trials]
-    noise = FIRST_NOISE
-    groups = _groups(box, P, at, shared_keys)
-    for _ in range(NOISE_ROUNDS):
-        scaled = [scaled_rows(t, x, noise) for t, x in zip(old, columns, strict=False)]
-        precision, residuals = _ridge(scaled, groups)
-        noise = noise * _spreads(old, residuals)
+    by_old = settled(old) if by_old is None else by_old
+    noise, precision = by_old.noise, by_old.precision
     scaled = [scaled_rows(t, x, noise) for t, x in zip(trials, columns, strict=True)]
     order = np.flatnonzero(np.isfinite(precision))
     weights, rest = _robust(scaled, order, precision[order])

@@ -18,6 +18,7 @@ from fish_sysid.diagnosis.change.naming import Judged
 from fish_sysid.diagnosis.change.rows import TrialRows
 from fish_sysid.diagnosis.change.shared_fit import CHANGE, Regression, scaled_rows
 from fish_sysid.diagnosis.change.simulation import Variant, simulate
+from fish_sysid.diagnosis.degenerate import degenerate
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.diagnosis.symmetry.place import MEAN, TERMS
 from fish_sysid.diagnosis.symmetry.regression import jackknife
@@ -27,7 +28,6 @@ Array = NDArray[np.float64]
 
 ROUNDS = 3  # of linearisation
 STEP = 0.1  # of a typical strength, for differences
-AT_AN_END = 0.02  # of a range, or of a typical strength from neutral
 PLACED = {
     "payload": ("mass", "forward", "left")
 }  # parameters beside the strengths that the data determine
@@ -202,25 +202,3 @@ def _refitted(
     effect = effect_class(name)
     found = {k: Estimate(v, errors[k], effect.parameters[k].unit) for k, v in values.items()}
     return Refitted(found, degenerate(name, values), by_trial)
-
-
-def degenerate(name: str, values: dict[str, float]) -> str:
-    """Why these values are not this effect; "" where they are.
-
-    A strength at an end of its range, or at neutral, is another effect or none.
-    """
-    effect = effect_class(name)
-    at_neutral = []
-    for key in effect.strength:
-        if key not in values:
-            continue
-        p, value = effect.parameters[key], values[key]
-        near = AT_AN_END * scale_of(p)
-        if p.value not in (p.lowest, p.highest) and min(value - p.lowest, p.highest - value) < near:
-            return f"{name}: {key} is at an end of its range ({value:.3g} {p.unit})"
-        if p.value == p.lowest and p.highest - value < near:
-            return f"{name}: {key} is at the upper end of its range ({value:.3g} {p.unit})"
-        at_neutral.append(abs(value - p.value) < near)
-    if at_neutral and all(at_neutral):
-        return f"{name}: its strength is that of no such effect"
-    return ""

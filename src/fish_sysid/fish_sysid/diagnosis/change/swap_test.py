@@ -22,7 +22,8 @@ Index = NDArray[np.int64]
 
 SWAPS = 300
 USUAL = 0.9  # quantile of exchanged trials' gains that a gain is compared with
-LEAST_USUAL = 1.0  # nats
+SMALLEST = 0.5  # nats of one trial
+LEAST_USUAL = 0.1
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,9 @@ class Swapped:
     """What the test says."""
 
     p_value: float
-    gains: dict[str, float]  # nats of each name or parameter in NEW
-    ratio: dict[str, float]  # of that gain to the USUAL quantile of exchanged trials
+    ratio: dict[
+        str, float
+    ]  # of a name's F in NEW to the USUAL quantile of that of exchanged trials
 
 
 def swap_test(
@@ -40,8 +42,13 @@ def swap_test(
     swaps: int = SWAPS,
     seed: int = 0,
     taken: Sequence[Key] = (),
+    days: Sequence[int] = (),
 ) -> Swapped:
-    """strata (M,): trials are exchanged within them; taken: candidates that NEW has beyond doubt, in the null too."""
+    """strata (M,): trials are exchanged within them; taken: candidates that NEW has beyond doubt, in the null too.
+
+    days (M,): of several days of OLD the number of each trial's day. Each day of OLD then stands for NEW in turn, and a change
+    must be larger than that from any of these days to the others.
+    """
     random = np.random.default_rng(seed)
     gains = _Gains(fit, taken)
     observed = gains.of(gains.new)
@@ -51,8 +58,11 @@ def swap_test(
     largest = (observed / usual)[asked].max()
     under_null = (null / usual)[:, asked].max(axis=1)
     p = (1.0 + float((under_null >= largest).sum())) / (1.0 + len(null))
-    found = dict(zip(gains.names, observed.tolist(), strict=True))
-    return Swapped(p, found, dict(zip(gains.names, (observed / usual).tolist(), strict=True)))
+    of_days = np.array([gains.of(rows) for rows in single_days(days, fit.old)])
+    if len(of_days):
+        as_large = int(((of_days / usual)[:, asked].max(axis=1) >= largest).sum())
+        p = max(p, as_large / len(of_days))
+    return Swapped(p, dict(zip(gains.names, (observed / usual).tolist(), strict=True)))
 
 
 def exchanges(
@@ -73,37 +83,66 @@ def exchanges(
     return list(found.values())
 
 
+def single_days(days: Sequence[int], old: int) -> list[Index]:
+    """The trials of each day of OLD, whose trials come first; none where OLD is one day."""
+    of_old = np.asarray(days, dtype=np.int64)[:old]
+    found = [np.flatnonzero(of_old == day) for day in np.unique(of_old)]
+    return found if len(found) > 1 else []
+
+
 class _Gains:
     """What each name gains when it acts in some trials alone, beside what is shared and the names taken."""
 
     def __init__(self, fit: Regression, taken: Sequence[Key]) -> None:
         keys = [k for k in fit.at if k not in taken]
-        self._at = [(k[0], fit.at[k]) for k in keys]
-        self.names = tuple(dict.fromkeys(name for name, _ in self._at))
+        self.names = tuple(dict.fromkeys(name for name, _ in keys))
         self.new = np.arange(fit.old, len(fit.names))
-        self._own = np.unique(np.concatenate([i for _, i in self._at]))
-        self._place = {int(i): n for n, i in enumerate(self._own)}
         S, fixed = fit.shared, np.array([i for k in taken for i in fit.at[k]], dtype=int)
         G, h = fit.gram.sum(axis=0)[:S, :S] + np.diag(fit.precision), fit.moment.sum(axis=0)[:S]
         N, g = fit.gram[self.new].sum(axis=0), fit.moment[self.new].sum(axis=0)
         cross, prior = N[:S, fixed], np.eye(len(fixed)) / CHANGE**2
         G = np.block([[G, cross], [cross.T, N[np.ix_(fixed, fixed)] + prior]])
-        self._inverse, self._h = np.linalg.inv(G), np.concatenate([h, g[fixed]])
-        own = self._own
-        self._with_shared, self._with_fixed = fit.gram[:, own, :S], fit.gram[:, own][:, :, fixed]
-        self._gram, self._moment = fit.gram[:, own][:, :, own], fit.moment[:, own]
+        inverse, right = np.linalg.inv(G), np.concatenate([h, g[fixed]])
+        is_new = np.isin(np.arange(len(fit.names)), self.new)
+        self._columns = []
+        for key in keys:
+            i = fit.at[key]
+            beside = fit.gram[:, i][:, :, fixed] * is_new[:, None, None]
+            both = np.concatenate([fit.gram[:, i, :S], beside], axis=2)
+            own = fit.gram[:, i][:, :, i]
+            self._columns.append((key[0], _Column(both, own, fit.moment[:, i], inverse, right)))
 
     def of(self, rows: Index) -> Array:
-        """Nats (names,), the best form of each."""
-        both = np.intersect1d(rows, self.new)
-        B = np.hstack([self._with_shared[rows].sum(axis=0), self._with_fixed[both].sum(axis=0)])
-        W = B @ self._inverse
-        left = self._gram[rows].sum(axis=0) - W @ B.T
-        score = self._moment[rows].sum(axis=0) - W @ self._h
+        """F (names,) of `_Column`, the best form of each."""
         best = dict.fromkeys(self.names, 0.0)
-        for name, columns in self._at:
-            i = [self._place[int(c)] for c in columns]
-            normal = left[np.ix_(i, i)] + np.eye(len(i)) / CHANGE**2
-            gain = 0.5 * float(score[i] @ np.linalg.solve(normal, score[i]))
-            best[name] = max(best[name], gain)
+        for name, column in self._columns:
+            best[name] = max(best[name], column.ratio(rows))
         return np.array(list(best.values()))
+
+
+class _Column:
+    """One candidate: its gain in some trials against what it gains in each trial alone once that is taken out.
+
+    The ratio is that of an analysis of variance with trials as units. A trial on the wrong side makes what is left of the
+    trials larger, so that exchanged sets which share most trials with NEW do not look as changed as NEW does.
+    """
+
+    def __init__(
+        self, both: Array, own: Array, moment: Array, inverse: Array, right: Array
+    ) -> None:
+        K = own.shape[1]
+        self._both, self._own, self._inverse = both, own, inverse  # (M, K, B), (M, K, K), (B, B)
+        self._score = moment - both @ (inverse @ right)  # (M, K)
+        self._each = np.linalg.inv(own + np.eye(K) / CHANGE**2)
+        self._prior = np.eye(K) / CHANGE**2
+
+    def ratio(self, rows: Index) -> float:
+        """Gain [nats] when it acts in the trials `rows` over the mean of what is left of each trial, SMALLEST at least."""
+        B = self._both[rows].sum(axis=0)
+        W = B @ self._inverse
+        score = self._score[rows].sum(axis=0)
+        strength = np.linalg.solve(self._own[rows].sum(axis=0) - W @ B.T + self._prior, score)
+        left = self._score + self._both @ (W.T @ strength)
+        left[rows] -= self._own[rows] @ strength
+        each = 0.5 * np.einsum("mi,mij,mj->m", left, self._each, left)
+        return 0.5 * float(score @ strength) / max(float(each.mean()), SMALLEST)
