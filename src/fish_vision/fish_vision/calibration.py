@@ -162,11 +162,8 @@ class Calibration:
         corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], float)
         if self.lens.fisheye:
             corners = 0.5 * (corners + np.array([width, height]) / 2.0)
-        try:
-            with np.errstate(all="ignore"):
-                rays = undistort(corners, self.lens)
-        except np.linalg.LinAlgError:
-            rays = np.full((4, 2), np.nan)
+        with np.errstate(all="ignore"):
+            rays = undistort(corners, self.lens)
         if not np.isfinite(rays).all():
             raise CalibrationError(
                 f"camera_info has focal lengths {self.lens.K[0, 0]}, {self.lens.K[1, 1]} and distortion "
@@ -209,8 +206,11 @@ def undistort(pixels: Array, lens: Lens) -> Array:
     shifts = np.array([[0.0, 0.0], [h, 0.0], [0.0, h]])[:, None]
     for _ in range(2):
         at, du, dv = _distort((flat + shifts).reshape(-1, 2), lens).reshape(3, -1, 2)
-        J = np.stack([du - at, dv - at], axis=-1) / h
-        flat = flat - np.linalg.solve(J, (at - pixels)[..., None])[..., 0]
+        (a, c), (b, d), (y_1, y_2) = (du - at).T / h, (dv - at).T / h, (at - pixels).T
+        flat = (
+            flat
+            - np.stack([d * y_1 - b * y_2, a * y_2 - c * y_1], axis=1) / (a * d - b * c)[:, None]
+        )
     return flat
 
 

@@ -35,6 +35,7 @@ class Colours:
     def __init__(self, config: TrackerConfig, cast: tuple[float, float] = (1.0, 1.0)) -> None:
         self._most = float(config.hue_shift_max)
         self._given = {marker: config.colour(marker) for marker in MARKERS}
+        self._ranges: dict[str, ColourRange] = {}  # as they are now
         self.shifts = dict.fromkeys(MARKERS, 0.0)  # half degrees
         self._value_min = {m: float(r.value_min) for m, r in self._given.items()}
         if cast != (1.0, 1.0):
@@ -45,6 +46,11 @@ class Colours:
 
     def range(self, marker: str) -> ColourRange:
         """The range in which a marker is looked for now."""
+        if marker not in self._ranges:
+            self._ranges[marker] = self._range(marker)
+        return self._ranges[marker]
+
+    def _range(self, marker: str) -> ColourRange:
         given, shift = self._given[marker], round(self.shifts[marker])
         return replace(
             given,
@@ -60,9 +66,11 @@ class Colours:
             return
         self._move(marker, self.shifts[marker] + SHARE * (shift - self.shifts[marker]))
         least = min(float(self._given[marker].value_min), max(DARKER * value, VALUE_LEAST))
+        self._ranges.pop(marker, None)
         self._value_min[marker] += SHARE * (least - self._value_min[marker])
 
     def _move(self, marker: str, shift: float) -> None:
+        self._ranges.pop(marker, None)
         self.shifts[marker] = float(np.clip(shift, -self._most, self._most))
 
 

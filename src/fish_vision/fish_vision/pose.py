@@ -75,7 +75,7 @@ def rigid_pose(mounted: Array, seen: Sequence[Spot]) -> HeadPose:
     line, along = z[0] - z[-1], m[0] - m[-1]
     heading = atan2(line[1], line[0]) - atan2(along[1], along[0])
     W = [_inverse(spot.covariance) for spot in seen]
-    p = z.mean(axis=0) - _turned(heading, m.mean(axis=0))
+    p = z.sum(axis=0) / len(z) - _turned(heading, m.sum(axis=0) / len(m))
     for _ in range(2):
         information, gradient = np.zeros((3, 3)), np.zeros(3)
         for m_i, z_i, W_i in zip(m, z, W, strict=True):

@@ -4,6 +4,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -39,8 +40,14 @@ class ColourRange:
 
     def near(self, hue: Image) -> NDArray[np.bool_]:
         """Where the hue is in the range or within HUE_SLACK of it."""
+        return self._near_hues[hue]
+
+    @cached_property
+    def _near_hues(self) -> NDArray[np.bool_]:
+        """(256,) for every hue whether it is near."""
         width = (self.hue_high - self.hue_low) % HUES + 2 * HUE_SLACK
-        return (hue.astype(np.int16) - self.hue_low + HUE_SLACK) % HUES <= width
+        near: NDArray[np.bool_] = (np.arange(256) - self.hue_low + HUE_SLACK) % HUES <= width
+        return near
 
 
 @dataclass(frozen=True)
@@ -91,14 +98,15 @@ def _measure(hsv: Image, mask: Image, colour: ColourRange, box: Box) -> Blob:
     left, top = max(box[0] - PAD, 0), max(box[1] - PAD, 0)
     right, bottom = min(box[2] + PAD, hsv.shape[1]), min(box[3] + PAD, hsv.shape[0])
     part = hsv[top:bottom, left:right]
-    inside = mask[top:bottom, left:right] > 0
-    colourful = part[..., 1].astype(np.float32) * part[..., 2]
-    full = float(np.median(colourful[inside]))
-    weight = np.clip(colourful / full, 0.0, 1.0) * colour.near(part[..., 0])
+    colourful = np.multiply(part[..., 1], part[..., 2], dtype=np.float32)
+    inside = colourful[mask[top:bottom, left:right] != 0]
+    full = float(np.partition(inside, len(inside) // 2)[len(inside) // 2])  # the median
+    weight = np.minimum(colourful / full, 1.0) * colour.near(part[..., 0])
     weight[weight < FAINT] = 0.0
-    area = float(weight.sum())
-    u = float(weight.sum(axis=0) @ np.arange(left, right)) / area
-    v = float(weight.sum(axis=1) @ np.arange(top, bottom)) / area
+    columns, rows = weight.sum(axis=0), weight.sum(axis=1)
+    area = float(columns.sum())
+    u = float(columns @ np.arange(left, right)) / area
+    v = float(rows @ np.arange(top, bottom)) / area
     return Blob(u, v, area, (left, top), weight)
 
 
