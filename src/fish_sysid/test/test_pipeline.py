@@ -26,7 +26,6 @@ from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.refit import REFIT, refit
 from fish_sysid.reports.diagnosis_page import write_diagnosis_page
 from fish_sysid.reports.verdict_sentence import sentence
-from fish_sysid.verbs.diagnose import without_wrench
 
 pytestmark = pytest.mark.timeout(1200)  # of a loaded computer; seconds each on a quiet one
 
@@ -70,7 +69,7 @@ def test_a_hidden_current_is_named_with_its_size(tmp_path):
     for title in ("What is missing: current", "The water with current"):
         assert f"<h2>{title}</h2>" in page
     assert "When current acts" not in page  # it acts all the time
-    saved = without_wrench(result.final.robot), tmp_path / "model.yaml"
+    saved = result.final.robot.without_effect("disturbance"), tmp_path / "model.yaml"
     save_robot(*saved, result.final.standard_errors, sentence(content))
     loaded = load_robot(tmp_path / "model.yaml").effects["current"]
     assert loaded["x"] == pytest.approx(found["x"]["value"])
