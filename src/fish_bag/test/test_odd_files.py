@@ -157,6 +157,14 @@ def test_the_total_of_metadata_is_compared(tmp_path):
     assert "metadata.yaml says 7" in holds_the_robot(read_trial(path))
 
 
+def test_the_count_of_every_file_is_compared(tmp_path):
+    files = [{"path": "a.db3", "message_count": 7}, {"path": "gone.db3", "message_count": 3}]
+    said = holds_the_robot(read_trial(stated(tmp_path / "a", files=files)))
+    assert f"a.db3: {len(MESSAGES)} messages were read, metadata.yaml says 7" in said
+    odd = [None, {"path": 3}, {"message_count": "many"}]
+    assert "were read" not in holds_the_robot(read_trial(stated(tmp_path / "b", files=odd)))
+
+
 @pytest.mark.parametrize("named", [["a_0.db3"], None])
 def test_a_part_in_two_formats_is_read_once(tmp_path, named):
     path = stated(tmp_path / "a", relative_file_paths=named)
