@@ -226,3 +226,9 @@ def _complete_metadata(bag: RawBag, found: RecordingFiles, contents: list[Conten
     differs = found.stated.total not in (None, bag.count)
     if differs and found.stated.counts in (None, {k: n for k, n in read.items() if n}):
         bag.notes.append(f"{bag.count} messages were read, metadata.yaml says {found.stated.total}")
+    for file, part in zip(found.files, contents, strict=True):
+        said = found.stated.file_counts.get(file.name, part.count)
+        repeated = len(contents) == 1 and said == found.stated.total
+        if said != part.count and not repeated:
+            text = f"{file.name}: {part.count} messages were read, metadata.yaml says {said}"
+            bag.notes.append(text)

@@ -79,11 +79,15 @@ def topics_of(
         )
 
 
-def whole_record(kind: type[Any], body: bytes) -> Any:
-    """Parse a record that fills its body to the last byte."""
+def whole_record(kind: type[Any], body: bytes, extended: bool = False) -> Any:
+    """Parse a record that fills its body to the last byte.
+
+    Args:
+        extended: fields of a later MCAP version may follow; the specification has readers ignore them.
+    """
     stream = ReadDataStream(_WholeReads(body))
     record = kind.read(stream)
-    if stream.count != len(body):
+    if stream.count != len(body) and not extended:
         raise ValueError(f"{len(body) - stream.count} bytes too many")
     return record
 
@@ -121,13 +125,13 @@ def _take_summary(summary: Summary, opcode: int, body: bytes) -> None:
     if opcode in OF_DATA:
         raise ValueError("the summary begins inside the data")
     if opcode == Opcode.SCHEMA:
-        schema = whole_record(Schema, body)
+        schema = whole_record(Schema, body, summary.sure)
         summary.schemas[schema.id] = schema
     elif opcode == Opcode.CHANNEL:
-        channel = whole_record(Channel, body)
+        channel = whole_record(Channel, body, summary.sure)
         summary.channels[channel.id] = channel
     elif opcode == Opcode.STATISTICS:
-        statistics = whole_record(Statistics, body)
+        statistics = whole_record(Statistics, body, summary.sure)
         summary.total = statistics.message_count
         if not statistics.message_count or statistics.channel_message_counts:
             summary.counts = statistics.channel_message_counts

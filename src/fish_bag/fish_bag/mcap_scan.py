@@ -151,7 +151,7 @@ class _Scan:
         if opcode == Opcode.MESSAGE:
             return self.loose_message(position, following)
         try:
-            self.take(opcode, data[body:following])
+            self.take(opcode, data[body:following], self._begins_record(following))
         except DAMAGE:
             return self.nonsense(position)
         self.data_end = position
@@ -164,10 +164,10 @@ class _Scan:
         opcode, length = HEAD.unpack_from(self.data, position)
         return opcode in OPCODES and position + HEAD.size + length <= self.end
 
-    def take(self, opcode: int, body: bytes) -> None:
-        """Take one record that is no message; one of DAMAGE if it makes no sense."""
+    def take(self, opcode: int, body: bytes, extended: bool) -> None:
+        """Take one record that is no message; one of DAMAGE if it makes no sense. `extended`: its length is sure."""
         if opcode in RECORDS:
-            record = whole_record(RECORDS[opcode], body)
+            record = whole_record(RECORDS[opcode], body, extended)
             if isinstance(record, Metadata):
                 self.metadata(record)
             elif isinstance(record, Schema):
@@ -175,12 +175,14 @@ class _Scan:
             else:
                 self.define(record)
         elif opcode in (Opcode.DATA_END, Opcode.FOOTER):
-            if len(body) != (4 if opcode == Opcode.DATA_END else 20):
+            least = 4 if opcode == Opcode.DATA_END else 20
+            if len(body) != least and not (extended and len(body) > least):
                 raise ValueError("wrong length")
             self.ended = True
-            self.checksum = struct.unpack("<I", body)[0] if len(body) == 4 else 0
+            self.checksum = struct.unpack_from("<I", body)[0] if opcode == Opcode.DATA_END else 0
         elif opcode == Opcode.MESSAGE_INDEX:
-            if len(body) < 6 or struct.unpack_from("<I", body, 2)[0] != len(body) - 6:
+            said = 6 + struct.unpack_from("<I", body, 2)[0] if len(body) >= 6 else len(body) + 1
+            if said > len(body) or (said < len(body) and not extended):
                 raise ValueError("wrong length")
 
     def metadata(self, record: Metadata) -> None:
@@ -228,8 +230,10 @@ class _Scan:
         whole = whole_chunk(self.data, position, self.end, self.content_end)
         if whole is not None:
             records, following = whole
-            self.records(records, len(records))
-            return following
+            self.records(records, len(records), whole=True)
+            end = position + HEAD.size + length
+            extended = following < end <= self.end and not self._begins_record(following)
+            return end if extended and self._begins_record(end) else following
         head = chunk_head(self.data, position, self.content_end)
         if head is None or head.end - position - HEAD.size != length:
             if position + HEAD.size + length > self.content_end:
@@ -247,8 +251,8 @@ class _Scan:
         )
         return head.end
 
-    def records(self, data: bytes, content_end: int) -> None:
-        """Take the records of a chunk as far as they are whole."""
+    def records(self, data: bytes, content_end: int, whole: bool = False) -> None:
+        """Take the records of a chunk as far as they are whole; all are where the chunk is."""
         position, end = 0, len(data)
         data += bytes(MESSAGE_HEAD.size)  # so that the head of a short last record can be unpacked
         kept, messages, unpack_head = self.kept, self.contents.messages, MESSAGE_HEAD.unpack_from
@@ -274,7 +278,7 @@ class _Scan:
                 self.strange[opcode] += 1
             else:
                 try:
-                    self.take(opcode, data[position + HEAD.size : following])
+                    self.take(opcode, data[position + HEAD.size : following], whole)
                 except DAMAGE:
                     return
             position = following

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -32,6 +33,7 @@ from fish_bag.storage import (
 
 MAGIC = b"SQLite format 3\0"
 LOG = "-wal"
+ROLLBACK = b"\1\1"  # file format versions of a database without a write-ahead log
 COMPANIONS = (
     LOG,
     "-journal",
@@ -62,8 +64,47 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
             said = " ".join(str(error).split())
             contents.lost.append(f"the database is damaged ({said}); its pages are read one by one")
             _read_pages(database.read_bytes(), contents)
+        alone = _alone(path, keep) if notes or lost else None
+    if alone is not None and (sign := _sign_of_another(path, alone, contents)):
+        alone.lost.append(
+            f"{path.name}{LOG} belongs to another database: {sign}; this one is read without it, and what stands in it"
+            " is left out"
+        )
+        contents = alone
     contents.drop_undefined()
     return contents
+
+
+def _alone(path: Path, keep: Keep) -> Contents | None:
+    """What the database holds without its companions; None where it cannot be read so, or holds nothing."""
+    contents = Contents()
+    try:
+        _read(path, contents, keep)
+    except (sqlite3.Error, UnicodeDecodeError):
+        return None
+    return contents if contents.count else None
+
+
+def _sign_of_another(path: Path, alone: Contents, contents: Contents) -> str:
+    """By what one sees that the log is not that of the database; "" where it may be."""
+    log = Path(f"{path}{LOG}")
+    if not (log.exists() and log.stat().st_size):
+        return ""
+    with path.open("rb") as file:
+        head = file.read(20)
+    if head[18:20] == ROLLBACK:
+        return "the database keeps no write-ahead log"
+    before, after = (
+        Counter(
+            (part.topics[channel].name, time)
+            for channel, messages in part.messages.items()
+            if channel in part.topics
+            for time in messages.times
+        )
+        for part in (alone, contents)
+    )
+    gone = (before - after).total()  # a recorder changes and deletes none
+    return f"with it {gone} of {alone.count} messages are gone" if gone else ""
 
 
 def companions(path: Path) -> list[Path]:

@@ -28,6 +28,7 @@ class StatedMetadata:
 
     files: tuple[str, ...] = ()  # names of the storage files
     counts: dict[tuple[str, str], int] | None = None  # (topic, type) -> messages; None: not said
+    file_counts: dict[str, int] = field(default_factory=dict)  # name of a storage file -> messages
     total: int | None = None  # messages of the whole recording; None: not said
     custom: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -62,7 +63,7 @@ def parse_metadata(text: str) -> StatedMetadata:
     stated = StatedMetadata()
     paths = given.get("relative_file_paths")
     if isinstance(paths, list):
-        stated.files = tuple(PurePosixPath(str(p).replace("\\", "/")).name for p in paths)
+        stated.files = tuple(map(_name, paths))
     else:
         stated.notes.append(f"{FILE_NAME} has no list relative_file_paths")
     custom = given.get("custom_data")
@@ -70,6 +71,10 @@ def parse_metadata(text: str) -> StatedMetadata:
         stated.custom = {str(key): str(value) for key, value in custom.items()}
     total = given.get("message_count")
     stated.total = total if isinstance(total, int) else None
+    files = given.get("files")
+    for entry in files if isinstance(files, list) else ():
+        if isinstance(entry, dict) and isinstance(entry.get("message_count"), int):
+            stated.file_counts[_name(entry.get("path"))] = entry["message_count"]
     topics = given.get("topics_with_message_count")
     if isinstance(topics, list):
         counts: Counter[tuple[str, str]] = Counter()
@@ -79,6 +84,11 @@ def parse_metadata(text: str) -> StatedMetadata:
     else:
         stated.notes.append(f"{FILE_NAME} has no list topics_with_message_count")
     return stated
+
+
+def _name(path: Any) -> str:
+    """The name of a file whose path metadata.yaml gives."""
+    return PurePosixPath(str(path).replace("\\", "/")).name
 
 
 def _topics(entries: list[Any]) -> Iterator[tuple[tuple[str, str], int]]:

@@ -5,12 +5,13 @@
 import shutil
 import sqlite3
 import struct
+import zlib
 from collections import Counter
 
 import pytest
 import yaml
 from mcap.opcode import Opcode
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 
 from fish_bag import RecordingError, read_trial
 from fish_bag import sample_formats as formats
@@ -156,6 +157,14 @@ def test_the_total_of_metadata_is_compared(tmp_path):
     assert "metadata.yaml says 7" in holds_the_robot(read_trial(path))
 
 
+def test_the_count_of_every_file_is_compared(tmp_path):
+    files = [{"path": "a.db3", "message_count": 7}, {"path": "gone.db3", "message_count": 3}]
+    said = holds_the_robot(read_trial(stated(tmp_path / "a", files=files)))
+    assert f"a.db3: {len(MESSAGES)} messages were read, metadata.yaml says 7" in said
+    odd = [None, {"path": 3}, {"message_count": "many"}]
+    assert "were read" not in holds_the_robot(read_trial(stated(tmp_path / "b", files=odd)))
+
+
 @pytest.mark.parametrize("named", [["a_0.db3"], None])
 def test_a_part_in_two_formats_is_read_once(tmp_path, named):
     path = stated(tmp_path / "a", relative_file_paths=named)
@@ -220,6 +229,51 @@ def test_what_a_damaged_log_takes_is_said(tmp_path, change, words):
 def test_what_is_whole_in_a_cut_log_is_saved(tmp_path):
     path = with_log(tmp_path, lambda data: data[:-1])
     assert recover(path, tmp_path / "out").count > 0.8 * len(MESSAGES)
+
+
+@pytest.mark.parametrize("logged", [True, False])
+@pytest.mark.parametrize("cut", [0, 3000])
+def test_a_log_of_another_recording_is_named_and_left_out(tmp_path, logged, cut):
+    foreign = [(time_ns + 10**12, topic, message) for time_ns, topic, message in MESSAGES]
+    other = formats.write_sqlite_with_log(tmp_path / "other", foreign)
+    path = formats.write_rosbag2(tmp_path / "mine", MESSAGES, formats.SQLITE)
+    if logged:
+        connection = sqlite3.connect(path / "mine.db3")
+        connection.execute("PRAGMA journal_mode=WAL")
+        connection.close()
+    log = next(other.glob("*-wal")).read_bytes()
+    (path / "mine.db3-wal").write_bytes(log[: len(log) - cut])
+    with pytest.raises(RecordingError, match=r"mine\.db3-wal belongs to another database"):
+        read_trial(path)
+    recover(path, tmp_path / "out")
+    holds_the_robot(read_trial(tmp_path / "out"))
+
+
+def test_fields_of_a_later_mcap_version_are_ignored(tmp_path):
+    """The specification has new fields at a record's end, which readers ignore."""
+
+    def longer(opcode, body):
+        return [(opcode, body if opcode == Opcode.MESSAGE else body + b"new!")]
+
+    def inside(opcode, body):
+        if opcode != Opcode.CHUNK:
+            return longer(opcode, body)
+        packed = struct.unpack_from("<Q", body, 32)[0]
+        assert len(body) == 40 + packed
+        held = b"".join(
+            struct.pack("<BQ", kind, len(new)) + new
+            for _, o, b in records(bytes(8) + body[40:] + bytes(8))
+            for kind, new in longer(o, b)
+        )
+        head = body[:16] + struct.pack("<QIIQ", len(held), zlib.crc32(held), 0, len(held))
+        return longer(opcode, head + held)
+
+    for name, change, options in (
+        ("outside", longer, {"use_chunking": False}),
+        ("inside", inside, {"compression": CompressionType.NONE}),
+    ):
+        path = rewritten(write(tmp_path / f"{name}.mcap", enable_crcs=False, **options), change)
+        holds_the_robot(read_trial(path))
 
 
 def test_a_log_without_its_database_is_named(tmp_path):

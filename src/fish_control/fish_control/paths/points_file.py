@@ -48,8 +48,8 @@ def read_points(file: Path) -> NDArray[np.float64]:
 
     Columns named x and y are used wherever they stand; their unit may follow, as in `x [mm]`. A file without a heading
     has exactly the two columns x, y. Fields are separated by commas, semicolons or tabs; with semicolons, tabs or
-    quotes the decimal sign may be a comma. Empty lines and lines that begin with # are no rows, but a comment that
-    names the columns, as NumPy writes it, is a heading.
+    quotes the decimal sign may be a comma. Empty lines and lines that begin with # are no rows, but a comment before
+    the first point that names the columns, as NumPy writes it, is a heading where there is no other.
 
     Raises:
         PathError: a line that is no point, or columns that do not say which is x and which is y.
@@ -58,14 +58,20 @@ def read_points(file: Path) -> NDArray[np.float64]:
     text = _decode(file)
     delimiter = _delimiter(text, file)
     columns: _Columns | None = None
+    remarks: dict[_Columns | None, str] = {}  # what comments say of the columns
     points: list[tuple[float, float]] = []
     signs: set[str] = set()
     for number, row, comment in _rows(text, delimiter, file):
+        if comment:
+            found = _heading(row, file, number, comment)
+            if not points and (found or _speaks_of_columns(row)):
+                remarks.setdefault(found, f"line {number}, the comment {_shown(row)},")
+            continue
         heading = columns is None and _heading(row, file, number, comment)
         if heading:
             columns = heading
-        elif not comment:
-            columns = columns or _without_heading(row, file, number)
+        else:
+            columns = columns or _by_remark(remarks, file) or _without_heading(row, file, number)
             points.append(_point(row, columns, file, number))
             signs |= {sign for k in (columns.x, columns.y) for sign in ".," if sign in row[k]}
     if len(signs) > 1:
@@ -146,6 +152,23 @@ def _heading(row: list[str], file: Path, number: int, comment: bool) -> _Columns
             f"{file}: line {number} has x in {units[0]!r} and y in {units[1]!r}, expected both in m, cm or mm"
         )
     return _Columns(x, y, METRES[units[0].lower()], named=len(row))
+
+
+def _speaks_of_columns(row: list[str]) -> bool:
+    """Whether the fields of a comment begin with the names x and y, so that it may mean columns."""
+    words = [re.split(r"\W", field, maxsplit=1)[0].lower() for field in row]
+    return len(row) > 1 and {"x", "y"} <= set(words)
+
+
+def _by_remark(remarks: dict[_Columns | None, str], file: Path) -> _Columns | None:
+    """The columns that the comments give, if they give any and agree."""
+    if len(remarks) > 1 or None in remarks:
+        said = remarks.get(None) or list(remarks.values())[1]
+        raise PathError(
+            f"{file}: {said} seems to name the columns and is not understood; write the heading x,y or x [mm],y [mm]"
+            " in a line of its own, without #"
+        )
+    return next(iter(remarks), None)
 
 
 def _without_heading(row: list[str], file: Path, number: int) -> _Columns:
