@@ -176,7 +176,7 @@ def more_links(
     more: Sequence[int],
     report: Report = lambda _: None,
 ) -> tuple[Found, tuple[Step, ...]]:
-    """(the fit, or one of more links that predicts trials left out better by more than a standard error, what was judged)."""
+    """(the fit, or one of more links that trials left out ask for, what was judged)."""
     steps: list[Step] = []
     if len(experiment.names) < FOLDS:
         return found, ()
@@ -192,7 +192,7 @@ def more_links(
         report(f"{count} links: leaving trials out")
         longer, costs = left_out_costs(experiment, longer)
         step = judged(f"{count} links", control, costs)
-        better = step.gain > step.deviation
+        better = step.sure
         steps.append(replace(step, added=better))
         if not better:
             break
