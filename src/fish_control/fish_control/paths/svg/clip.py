@@ -27,7 +27,6 @@ class Clip:
 
     polygons: tuple[Array, ...]
     name: str
-    remedy: str = "release the clip"
 
 
 def read_clip(
@@ -75,14 +74,8 @@ def check_unclipped(points: Array, clips: tuple[Clip, ...], where: str) -> None:
         close = _closer(points, max(float(np.ptp(p, axis=0).max()) for p in clip.polygons) / STEPS)
         if not any(_inside(polygon, close).all() for polygon in clip.polygons):
             raise PathError(
-                f"{where} is cut off by {clip.name}; draw only what is to be swum, or {clip.remedy}"
+                f"{where} is cut off by {clip.name}; draw only what is to be swum, or release the clip"
             )
-
-
-def is_outside(points: Array, clip: Clip) -> bool:
-    """Whether nothing of an outline is shown."""
-    close = _closer(points, max(float(np.ptp(p, axis=0).max()) for p in clip.polygons) / STEPS)
-    return not any(_inside(polygon, close).any() for polygon in clip.polygons)
 
 
 def _closer(points: Array, step: float) -> Array:

@@ -14,9 +14,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.paths.svg.clip import Clip, is_outside, read_clip
+from fish_control.paths.svg.clip import Clip, read_clip
 from fish_control.paths.svg.outline import SHAPES, Viewport, outlines
-from fish_control.paths.svg.part import NO_LINE, Part, page_frame
+from fish_control.paths.svg.part import NO_LINE, Part
 from fish_control.paths.svg.placement import place, transform, viewbox_transform
 from fish_control.paths.svg.style import (
     INITIAL,
@@ -56,9 +56,8 @@ class _Context:
 class _Document:
     """The tree of a file, its ids and its style sheets."""
 
-    def __init__(self, file: Path, root: Element, page: Clip | None) -> None:
+    def __init__(self, file: Path, root: Element) -> None:
         self.where = str(file)
-        self.page = page
         self.rules: list[Rule] = read_rules(root, self.where)
         self.by_id: dict[str, Element] = {}
         self.drawn = 0
@@ -92,15 +91,8 @@ class _Document:
             part = Part(
                 element, inner.ids, _name(element), inner.matrix, inner.viewport, inner.clips, where
             )
-            if not self._off_page(part):
-                check_dashes(style, part.lengths(), where)
-                yield part
-
-    def _off_page(self, part: Part) -> bool:
-        """Whether the whole of a shape lies off the page, where no viewer shows it."""
-        if self.page is None or local_name(part.element) in NO_LINE:
-            return False
-        return all(is_outside(points, self.page) for points, _ in part.drawn())
+            check_dashes(style, part.lengths(), where)
+            yield part
 
     def _inner(self, element: Element, context: _Context, where: str) -> _Context:
         """The context with the element's own transform, id and clip path."""
@@ -196,10 +188,9 @@ def read_parts(file: Path) -> tuple[list[Part], bool]:
         )
     size, has_size = _page(root, str(file))
     matrix, viewport = viewbox_transform(root, size, str(file))
-    frame = page_frame(size)
-    clips = () if frame is None else (frame,)
-    document = _Document(file, root, frame)
-    return list(document.parts(root, _Context(matrix, viewport, clips=clips))), has_size
+    parts = list(_Document(file, root).parts(root, _Context(matrix, viewport)))
+    on_page = [part for part in parts if not part.lies_off(size)]
+    return on_page or parts, has_size
 
 
 def _page(root: Element, where: str) -> tuple[Viewport, bool]:

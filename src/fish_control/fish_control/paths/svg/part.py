@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A visible shape with its place on the page, and the edge of the page, at which every viewer cuts."""
+"""A visible shape with its place on the page."""
 
 from __future__ import annotations
 
@@ -53,18 +53,16 @@ class Part:
         found = outlines(self.element, self.viewport, self.where)
         return [(place(self.matrix, points), closed) for points, closed in found]
 
+    def lies_off(self, page: Viewport) -> bool:
+        """Whether the whole of it lies beside a page of (width, height) [px]; a page of no size has no beside."""
+        if min(page) <= 0.0 or local_name(self.element) in NO_LINE:
+            return False
+        ends = np.array([(p.min(axis=0), p.max(axis=0)) for p, _ in self.drawn()])  # (N, 2, 2)
+        return bool(((ends[:, 1] < 0.0) | (ends[:, 0] > page)).any(axis=1).all())
+
     def lengths(self) -> list[float]:
         """Lengths of the outlines in the element's own units; none for an element without an outline."""
         if local_name(self.element) in NO_LINE:
             return []
         found = outlines(self.element, self.viewport, self.where)
         return [float(np.hypot(*np.diff(points, axis=0).T).sum()) for points, _ in found]
-
-
-def page_frame(size: Viewport) -> Clip | None:
-    """The edge of the page, at which every viewer cuts; None where the page does not say its width and height."""
-    width, height = size
-    if min(width, height) <= 0.0:
-        return None
-    corners = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-    return Clip((corners,), "the edge of the page", "make the page larger")
