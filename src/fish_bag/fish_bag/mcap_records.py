@@ -135,3 +135,15 @@ def _take_summary(summary: Summary, opcode: int, body: bytes) -> None:
         summary.total = statistics.message_count
         if not statistics.message_count or statistics.channel_message_counts:
             summary.counts = statistics.channel_message_counts
+
+
+def checksum_holds(data: Buffer, data_end: int, checksum: int) -> bool:
+    """Whether the checksum of the data holds; writers begin it at the file, after the magic, or after the header."""
+    _, length = HEAD.unpack_from(data, len(MCAP0_MAGIC))
+    starts = (0, len(MCAP0_MAGIC), len(MCAP0_MAGIC) + HEAD.size + length)
+    return any(zlib.crc32(data[k:data_end]) == checksum for k in starts)
+
+
+def another_file(data: Buffer, after: int) -> int:
+    """The byte from `after` on at which a second file begins, as joining two files leaves it; 0: none."""
+    return max(0, data.find(MCAP0_MAGIC + bytes([Opcode.HEADER]), after))

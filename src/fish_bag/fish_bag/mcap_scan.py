@@ -13,7 +13,6 @@ Source: MCAP specification (mcap.dev/spec).
 from __future__ import annotations
 
 import struct
-import zlib
 from collections import Counter
 from typing import Any
 
@@ -22,7 +21,15 @@ from mcap.records import Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from fish_bag.mcap_chunk import CHUNK_START, chunk_head, cut_chunk, whole_chunk
-from fish_bag.mcap_records import DAMAGE, HEAD, read_summary, topics_of, whole_record
+from fish_bag.mcap_records import (
+    DAMAGE,
+    HEAD,
+    another_file,
+    checksum_holds,
+    read_summary,
+    topics_of,
+    whole_record,
+)
 from fish_bag.storage import (
     CUSTOM_NAMES,
     ROSBAG2_NAME,
@@ -32,6 +39,7 @@ from fish_bag.storage import (
     Messages,
     end_of_content,
     ends_like_others,
+    filled,
     keep_whole,
 )
 
@@ -98,6 +106,8 @@ class _Scan:
         self.contents.drop_undefined()
         if not self.ended and summary is None and not self.lost:
             self.lost.append("no whole message, but the file ends before its index")
+        elif self.ended and summary is None and (another := another_file(self.data, self.data_end)):
+            self.lost.append(f"another MCAP file begins at byte {another}; it is left out")
         elif (not self.ended or summary is None) and not self.lost:
             self.contents.notes.append("the index is cut off or damaged; no message is lost")
         self._compare()
@@ -117,16 +127,15 @@ class _Scan:
             sure = agree or min(self.strange) >= PRIVATE
             said = self.contents.notes if sure else self.lost
             said.append(f"records of kinds that MCAP does not define: {kinds}; they are left out")
-        if self.checksum and self.loose and not self.lost and not self._data_are_whole():
+        if (
+            self.checksum
+            and self.loose
+            and not self.lost
+            and not checksum_holds(self.data, self.data_end, self.checksum)
+        ):
             self.lost.append(
                 "the checksum of its data does not hold; a message is changed, and no other sign says which"
             )
-
-    def _data_are_whole(self) -> bool:
-        """Whether the checksum of the data holds; writers begin it at the file, after the magic, or after the header."""
-        _, length = HEAD.unpack_from(self.data, len(MCAP0_MAGIC))
-        starts = (0, len(MCAP0_MAGIC), len(MCAP0_MAGIC) + HEAD.size + length)
-        return any(zlib.crc32(self.data[k : self.data_end]) == self.checksum for k in starts)
 
     def step(self, position: int) -> int | None:
         """Read the record at `position`; where the next one is, None at the end."""
@@ -216,6 +225,12 @@ class _Scan:
             latest.raws.pop()  # its length may be what is damaged
             latest.times.pop()
             self.lost.append(f"the message before byte {position}, which may be damaged")
+        if latest and latest.raws and filled(latest.raws[-1], self.data, position):
+            latest.raws.pop()
+            latest.times.pop()
+            self.lost.append(
+                f"the message before byte {position}, which reaches into empty storage"
+            )
         for found in CHUNK_START.finditer(self.data, position + 1, self.end):
             if whole_chunk(self.data, found.start(), self.end, self.content_end) is not None:
                 gap = found.start() - position

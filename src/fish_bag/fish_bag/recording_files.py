@@ -18,6 +18,16 @@ PACKED = (".zstd", ".zst", ".lz4")  # a whole file compressed, as rosbag2's mode
 SUFFIXES = (*PARTS, ".bag", ".bag.active")
 MAGICS = {b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite3", b"#ROSBAG V": "ros1"}
 LFS_MAGIC = LFS_START.encode()
+STRANGERS = {
+    b"\x1f\x8b": ("a gzip file", "gunzip it"),
+    b"BZh": ("a bzip2 file", "bunzip2 it"),
+    b"\xfd7zXZ": ("an xz file", "unxz it"),
+    b"PK\3\4": ("a zip archive", "unzip it"),
+    b"7z\xbc\xaf": ("a 7z archive", "unpack it"),
+    b"/annex/objects": ("a git-annex pointer", "'git annex get' brings the recording"),
+    b"<!DOCTYPE": ("a web page", "download the file itself"),
+    b"<html": ("a web page", "download the file itself"),
+}  # first bytes of files that are given the name of a recording
 KINDS = {".mcap": "mcap", ".db3": "sqlite3", ".bag": "ros1", ".active": "ros1"}  # by the name
 PART_NAME = re.compile(r"(?P<stem>.*?)_?(?P<number>\d+)")
 
@@ -33,14 +43,15 @@ class RecordingFiles:
 
 
 def is_storage_file(path: Path) -> bool:
-    """Whether the name is one of a storage file."""
-    return bare_name(path.name).endswith(SUFFIXES)
+    """Whether the name is one of a storage file; macOS leaves others with ._ before the name."""
+    return bare_name(path.name).lower().endswith(SUFFIXES) and not path.name.startswith("._")
 
 
 def bare_name(name: str) -> str:
     """A file's name without the ending of a compression."""
     for end in PACKED:
-        name = name.removesuffix(end)
+        if name.lower().endswith(end):
+            name = name[: -len(end)]
     return name
 
 
@@ -67,7 +78,7 @@ def parts(folder: Path) -> list[Path]:
 
 
 def _is_part(path: Path) -> bool:
-    return bare_name(path.name).endswith(PARTS)
+    return is_storage_file(path) and bare_name(path.name).lower().endswith(PARTS)
 
 
 def part_order(path: Path) -> tuple[str, int, str]:
@@ -107,7 +118,7 @@ def find_files(path: Path) -> RecordingFiles:
     notes = [f"no {FILE_NAME}; {_names(found)} read in this order"] if len(found) > 1 else []
     if twice:
         notes.append(f"{_names(twice)} not read, as another file is the same part")
-    if gaps := _missing_parts(found):
+    if gaps := _missing_parts(found, path.name):
         notes.append(f"part {', '.join(map(str, gaps))} is not there")
     return RecordingFiles(path, found, None, notes)
 
@@ -121,10 +132,13 @@ def _once(files: list[Path]) -> tuple[list[Path], list[Path]]:
     return list(once.values()), [file for file in files if file not in once.values()]
 
 
-def _missing_parts(files: list[Path]) -> list[int]:
-    """Numbers of parts that are absent between the first part, 0, and the last."""
-    numbers = {part_order(file)[1] for file in files}
-    return sorted(set(range(max(numbers) + 1)) - numbers) if min(numbers) >= 0 else []
+def _missing_parts(files: list[Path], folder: str) -> list[int]:
+    """Numbers of parts that are absent between the first part, 0, and the last; a name of another stem has no part number."""
+    order = [part_order(file) for file in files]
+    if any(stem != folder or number < 0 for stem, number, _ in order):
+        return []
+    numbers = {number for _, number, _ in order}
+    return sorted(set(range(max(numbers) + 1)) - numbers)
 
 
 def _stated_files(path: Path, stated: StatedMetadata) -> RecordingFiles:
@@ -181,7 +195,10 @@ def file_kind(path: Path, data: Any) -> str:
     packed = name_by_magic(head)
     if packed:
         return packed
-    kind = KINDS.get(Path(bare_name(path.name)).suffix, "")
+    for magic, (name, remedy) in STRANGERS.items():
+        if head.lstrip().lower().startswith(magic.lower()):
+            raise RecordingError(f"{path}: {name}, not a recording; {remedy}")
+    kind = KINDS.get(Path(bare_name(path.name)).suffix.lower(), "")
     if not kind:
         raise RecordingError(
             f"{path}: not a recording; expected a rosbag2 directory or a file {', '.join(SUFFIXES)}"

@@ -109,3 +109,9 @@ def ends_like_others(raw: bytes, others: list[bytes]) -> bool:
         and own < len(raw)
         and own <= min(len(o) - len(o.rstrip(b"\0")) for o in others[-100:])
     )
+
+
+def filled(raw: bytes, data: Buffer, position: int) -> bool:
+    """Whether only one byte value follows from `position` on, as in flash memory that was erased, and `raw` ends in it."""
+    fill = bytes(data[-1:])
+    return raw.endswith(fill) and not bytes(data[position:]).strip(fill)

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that lie about themselves: nothing is lost, doubled or mixed up in silence."""
 
+import bz2
+import gzip
+import lzma
 import shutil
 import sqlite3
 import struct
@@ -155,6 +158,62 @@ def test_a_file_that_is_named_twice_is_read_once(tmp_path):
 def test_the_total_of_metadata_is_compared(tmp_path):
     path = stated(tmp_path / "a", message_count=7)
     assert "metadata.yaml says 7" in holds_the_robot(read_trial(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("a.mcap", gzip.compress(b"mcap"), "a gzip file, not a recording; gunzip it"),
+        ("a.mcap.gz", gzip.compress(b"mcap"), "a gzip file"),
+        ("a.db3", bz2.compress(b"db3"), "a bzip2 file"),
+        ("a.mcap", lzma.compress(b"mcap"), "an xz file"),
+        ("a.zip", b"PK\3\4" + bytes(40), "a zip archive"),
+        ("a.bag", b"/annex/objects/SHA256E-s1--aa.bag\n", "a git-annex pointer"),
+        ("a.mcap", b"\n<!doctype html><html>404</html>", "a web page"),
+    ],
+)
+def test_a_file_that_is_something_else_is_named(tmp_path, name, data, said):
+    (tmp_path / name).write_bytes(data)
+    for read in (read_trial, salvage_bag):
+        with pytest.raises(RecordingError, match=said):
+            read(tmp_path / name)
+
+
+def test_a_second_file_behind_the_first_is_said(tmp_path):
+    path = write(tmp_path / "a.mcap")
+    path.write_bytes(2 * path.read_bytes())
+    with pytest.raises(RecordingError, match="another MCAP file begins at byte"):
+        read_trial(path)
+    recover(path, tmp_path / "out")
+    holds_the_robot(read_trial(tmp_path / "out"))
+
+
+def test_no_message_that_reaches_into_erased_flash_is_saved(tmp_path):
+    path = write(tmp_path / "a.mcap", use_chunking=False)
+    data = path.read_bytes()
+    held = Counter(body[22:] for _, o, body in records(data) if o == Opcode.MESSAGE)
+    places = [place for place, opcode, _ in records(data) if opcode == Opcode.MESSAGE][40:44]
+    for cut in range(places[0], places[-1]):
+        path.write_bytes(data[:cut] + b"\xff" * 4096)
+        saved = salvage_bag(path)
+        assert not Counter(raw for topic in saved.topics for raw in topic.raws) - held
+        assert saved.lost
+
+
+@pytest.mark.parametrize("name", ["trial_03", "SQLITE3", "2026_11_27"])
+def test_a_number_in_a_name_is_no_part(tmp_path, name):
+    path = formats.write_rosbag2(tmp_path / name, MESSAGES, formats.SQLITE)
+    (path / "metadata.yaml").unlink()
+    assert holds_the_robot(read_trial(path)) == ""
+
+
+def test_names_in_capitals_and_files_of_macos(tmp_path):
+    path = stated(tmp_path / "a", relative_file_paths=["a.DB3"])
+    (path / "a.db3").rename(path / "a.DB3")
+    (path / "._a.db3").write_bytes(b"\0\5\x16\7" + bytes(100))
+    assert holds_the_robot(read_trial(path)) == ""
+    (path / "metadata.yaml").unlink()
+    holds_the_robot(read_trial(path))
 
 
 def test_the_count_of_every_file_is_compared(tmp_path):
