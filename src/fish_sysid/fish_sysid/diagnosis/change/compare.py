@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.camera_time_offset import align, fine_delay, moved_back
@@ -26,8 +25,11 @@ from fish_sysid.diagnosis.change.comparable import (
     kinds,
     screened,
 )
+from fish_sysid.diagnosis.change.contest import apart, mean_gain, tie
 from fish_sysid.diagnosis.change.naming import Judged, judge_all
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, STROKES, TrialRows, look, trial_rows
+from fish_sysid.diagnosis.change.rudder_change import RudderChange, rudder_change
+from fish_sysid.diagnosis.change.servos import with_servo
 from fish_sysid.diagnosis.change.shared_fit import Key, Regression, regression
 from fish_sysid.diagnosis.change.strength import Refitted, refit
 from fish_sysid.diagnosis.change.swap_test import Swapped, swap_test
@@ -43,7 +45,7 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
 LOOKS = {"mean motion": MEAN_MOTION, "strokes": STROKES}
-LEVEL = 0.01  # of each look: at most 2 % of nulls
+LEVEL = 0.02 / 3  # of each look, the rudder's answer among them: at most 2 % of nulls
 MOST_CHANGES = 3
 CONTENDS = 0.5  # of the largest ratio to the null that a contender has
 REFITTED = 3  # contenders of any family
@@ -52,8 +54,6 @@ SPECIAL_CASE = {"nonuniform_current": "current", "wake_memory": "tip_slip"}
 KIN = 6  # further members of the best one's family
 SUSPECTS = 4  # of a remainder without a name
 FEW_SWAPS = 150  # of a member's remainder
-# standard errors by which one contender predicts left-out trials better than another
-SEPARATE = 2.0
 NAMES = tuple(dict.fromkeys((*POOL_AND_SENSORS, *COLUMNS, *SIMULATED)))
 
 
@@ -105,14 +105,19 @@ def _compare(
     old_days, told = screened(swims(old), "OLD")
     new_days, more = screened(swims(new), "NEW")
     check_counts(old_days, new_days)
+    report("the rudder's answer")
+    strata = kinds(old_days, new_days)
+    used, moved = _of(old, old_days), _of(new, new_days)
+    servo = rudder_change(used, moved, strata, LEVEL)
+    if servo is not None:
+        new, new_days = _as_passed_on(new, new_days, servo)
     report("fitting OLD by predictions")
-    used = old.select([old.names.index(s.name) for s in old_days])
     model = make_model(in_still_water(used, symmetry), robot)
     report("what each candidate would change")
     old_rows = trial_rows(model, old, old_days, NAMES)
     new_rows = trial_rows(model, new, new_days, NAMES)
     report("exchanging trials")
-    strata, found = kinds(old_days, new_days), {}
+    found: dict[str, tuple[_Case, Swapped]] = {}
     day_of = days_of(olds, [s.name for s in old_days], len(new_days))
     for name, channels in LOOKS.items():
         kept_old, kept_new = look(old_rows, channels), look(new_rows, channels)
@@ -131,10 +136,31 @@ def _compare(
         "unchanged", p_value=swapped.p_value, look=seen, left_out=(*told, *more), robot=model, old=old, new=new,
         camera_delay=delay, symmetry=symmetry, ratios=swapped.ratio,
     )  # fmt: skip
+    if servo is not None:
+        base = replace(
+            base, verdict="changed", p_value=servo.p_value, look="the rudder's answer", named=(servo.named,),
+            remainder_p_value=swapped.p_value,
+        )  # fmt: skip
     if swapped.p_value > LEVEL:
         return base
     report("naming what changed")
     return _named(replace(base, verdict="changed"), case, swapped)
+
+
+def _of(experiment: Experiment, days: Sequence[Swim]) -> Experiment:
+    """The trials of these swims."""
+    return experiment.select([experiment.names.index(swim.name) for swim in days])
+
+
+def _as_passed_on(
+    new: Experiment, days: Sequence[Swim], servo: RudderChange
+) -> tuple[Experiment, tuple[Swim, ...]]:
+    """NEW with its commands as the changed servo passed them on, and the swims of these trials."""
+    first = servo.named.members[0]
+    (value,) = first.refitted.parameters.values()
+    kept = {swim.name for swim in days}
+    passed = with_servo(new, first.name, value.value)
+    return passed, tuple(swim for swim in swims(passed) if swim.name in kept)
 
 
 def days_of(olds: Sequence[Experiment], kept: Sequence[str], new: int) -> list[int]:
@@ -154,7 +180,7 @@ def model_of(old: Experiment, robot: Robot) -> Robot:
 def _named(change: Change, case: _Case, swapped: Swapped) -> Change:
     """Names one at a time, until what is left looks like exchanged trials. An age of the images is taken out exactly."""
     taken: list[Key] = []
-    named: list[Named] = []
+    named = list(change.named)
     refused: list[str] = []
     for _ in range(MOST_CHANGES):
         if swapped.p_value > LEVEL:
@@ -257,25 +283,4 @@ def _next(
     for (j, values), weight in zip(alike, weights, strict=True):
         left = swap_test(case.fit, case.strata, FEW_SWAPS, taken=(*taken, j.key)).p_value
         members.append(Member(j.name, weight / sum(weights), values.by_trial.mean(), left, values))
-    return Named(tuple(members), family_of(best.name), *_mean(first.by_trial)), best.key
-
-
-def apart(best: Array, other: Array) -> bool:
-    """Whether the best predicts left-out trials (M,) clearly better."""
-    return _lead(best, other) > SEPARATE
-
-
-def tie(best: Array, other: Array) -> float:
-    """Weight of a contender against the best one: 1 for equal gains, small for one that predicts worse."""
-    return float(2.0 * norm.sf(max(_lead(best, other), 0.0)))
-
-
-def _lead(best: Array, other: Array) -> float:
-    """Mean difference of gains on left-out trials in its standard errors."""
-    mean, std = _mean(best - other)
-    return mean / max(std, 1e-9) if mean else 0.0
-
-
-def _mean(gains: Array) -> tuple[float, float]:
-    """Mean of (M,) and its standard error."""
-    return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains)))
+    return Named(tuple(members), family_of(best.name), *mean_gain(first.by_trial)), best.key
