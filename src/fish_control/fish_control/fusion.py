@@ -53,7 +53,7 @@ class Fusion:
 
     def _clear(self) -> None:
         c = self.config
-        self._imu = ImuHistory(c.imu_timeout)
+        self._imu = ImuHistory(c.imu_timeout, (c.imu_x, c.imu_y))
         noise = HeadingNoise(c.gyro_noise, c.gyro_drift, c.coasting_yaw_rate, c.imu_timeout)
         self._heading = ImuHeading(noise)
         self.camera_clock = CameraClock(c.camera_offset, c.camera_offset_std)

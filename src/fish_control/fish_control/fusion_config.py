@@ -27,6 +27,8 @@ class FusionConfig(MotionNoise):
         1.0  # s of poses that agree, but not with the estimate: start anew from them
     )
     start_frames: int = 3  # poses that must agree before the first estimate
+    imu_x: float = 0.0  # m, place of the IMU ahead of the head's centre of mass
+    imu_y: float = 0.0  # m, and to the left of it
     camera_offset: float = (
         0.0  # s, added to camera stamps (negative if images are older than their stamps)
     )
@@ -42,7 +44,7 @@ class FusionConfig(MotionNoise):
             value = getattr(self, f.name)
             if isinstance(value, bool):
                 continue
-            any_sign = f.name == "camera_offset"
+            any_sign = f.name in ("camera_offset", "imu_x", "imu_y")
             if not (math.isfinite(value) and (any_sign or value > 0.0)):
                 expected = "a finite number" if any_sign else "a finite number > 0"
                 raise ValueError(f"{f.name} is {value!r}, expected {expected}")

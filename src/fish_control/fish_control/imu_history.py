@@ -44,10 +44,19 @@ class Step(NamedTuple):
 
 
 class ImuHistory:
-    """Samples in the order of their stamps."""
+    """Samples in the order of their stamps.
 
-    def __init__(self, reach: float) -> None:
-        self.reach = reach  # s, a sample says nothing about moments farther away
+    Args:
+        reach: s, a sample says nothing about moments farther away.
+        place: x, y of the IMU in base_link [m]. The steps give the specific force of the centre of mass:
+
+            f = f_imu - alpha x r - omega x (omega x r)
+
+            in the plane, with yaw rate omega and its change alpha. Source: rigid-body kinematics.
+    """
+
+    def __init__(self, reach: float, place: tuple[float, float] = (0.0, 0.0)) -> None:
+        self.reach, self._place = reach, place
         self._rows = np.zeros((CAPACITY, COLUMNS))
         self._begin = self._end = 0
 
@@ -147,21 +156,24 @@ class ImuHistory:
         else:
             share = min(max(dt / apart, 0.0), 1.0)
         near = apart <= self.reach + 1e-9
+        x, y = self._place
+        alpha = (after.rate - before.rate) / dt if dt > 0.0 else 0.0
+        square = (before.rate**2 + before.rate * after.rate + after.rate**2) / 3.0
         return Step(
             dt,
             after.yaw - before.yaw,
             b[SPREAD] * share,
-            0.5 * (before.forward + after.forward),
-            0.5 * (before.left + after.left),
+            0.5 * (before.forward + after.forward) + alpha * y + square * x,
+            0.5 * (before.left + after.left) - alpha * x + square * y,
             near and b[YAW_KNOWN] > 0.0,
             near and a[ACCEL_KNOWN] * b[ACCEL_KNOWN] > 0.0,
         )
 
 
 class _Knot:
-    """Heading and specific force at a time [s], linear between samples k - 1 and k; beyond the last one its rate holds."""
+    """Heading, its rate and specific force at a time [s], linear between samples k - 1 and k; beyond the last the rate holds."""
 
-    __slots__ = ("forward", "left", "time", "yaw")
+    __slots__ = ("forward", "left", "rate", "time", "yaw")
 
     def __init__(self, time: float, rows: list[list[float]], k: int) -> None:
         self.time = time
@@ -169,10 +181,11 @@ class _Knot:
         if k >= len(rows) or time <= a[TIME]:  # beyond the last, or before the first
             beyond = max(time - a[TIME], 0.0)
             self.yaw = a[YAW] + a[RATE] * beyond
-            self.forward, self.left = a[FORWARD], a[LEFT]
+            self.forward, self.left, self.rate = a[FORWARD], a[LEFT], a[RATE]
             return
         b = rows[k]
         share = (time - a[TIME]) / (b[TIME] - a[TIME])
         self.yaw = a[YAW] + share * (b[YAW] - a[YAW])
         self.forward = a[FORWARD] + share * (b[FORWARD] - a[FORWARD])
         self.left = a[LEFT] + share * (b[LEFT] - a[LEFT])
+        self.rate = a[RATE] + share * (b[RATE] - a[RATE])

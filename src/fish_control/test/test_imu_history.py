@@ -90,3 +90,20 @@ def test_the_memory_has_an_end(count):
     assert imu.last_time == pytest.approx(0.01 * (count - 1))
     np.testing.assert_allclose(np.diff(imu.times), 0.01, atol=1e-9)
     np.testing.assert_allclose(imu.heading(imu.times), 2.0 * imu.times, atol=1e-9)
+
+
+def test_an_imu_away_from_the_centre_of_mass_gives_the_centre_s_acceleration():
+    """A head that swings about a centre of mass at rest: all that the IMU feels is its own motion on the lever."""
+    place, w, swing = np.array([0.06, -0.02]), 2.0 * np.pi * 2.0, 0.3  # m, rad/s, rad
+    imu = ImuHistory(reach=0.1, place=tuple(place))
+    bare = ImuHistory(reach=0.1)
+    for t in np.arange(0.0, 1.0, 0.01):
+        yaw, rate = swing * np.sin(w * t), swing * w * np.cos(w * t)
+        alpha = -swing * w**2 * np.sin(w * t)
+        felt = alpha * np.array([-place[1], place[0]]) - rate**2 * place
+        for history in (imu, bare):
+            history.add(float(t), InertialSample(float(yaw), float(rate), *map(float, felt)))
+    forces = np.array([step[3:5] for step in imu.between(0.1, 0.9)])
+    felt = np.array([step[3:5] for step in bare.between(0.1, 0.9)])
+    assert np.abs(felt).max() > 2.0
+    assert np.abs(forces).max() < 0.01 * np.abs(felt).max()
