@@ -96,6 +96,10 @@ class Choice:
             self._remember(able, stamp)
         return own
 
+    def others(self, heads: Sequence[Head], stamp: float) -> None:
+        """Heads that are seen elsewhere while the own fish is in view are other fish."""
+        self._remember(self._able(heads, Reason.NO_PAIR)[0], stamp)
+
     def _able(self, heads: Sequence[Head], reason: Reason) -> tuple[list[Head], Reason]:
         """Heads that can be a fish of ours in this pool, and the reason why the others are not."""
         result = []

@@ -80,6 +80,9 @@ class TrackerConfig:
     rival_memory_s: float = (
         30.0  # a fish seen elsewhere while ours was in view or just lost is not ours for so long, s
     )
+    look_around_s: float = (
+        1.0  # while the fish is followed the whole image is searched so often for other fish, s
+    )
     pixel_std: float = 0.06  # standard deviation of a whole marker's middle, pixels
     lowpass_hz: float = 0.0  # cutoff of a low-pass over pose and tail, Hz; 0 = off.
     # It delays by 1 / (2 pi lowpass_hz), and the stamps are earlier by as much
@@ -202,6 +205,7 @@ _RANGES = (  # field, lowest, highest
     ("max_yaw_rate", 0.1, 200.0),
     ("reacquire_s", 0.0, 10.0),
     ("rival_memory_s", 0.0, 3600.0),
+    ("look_around_s", 0.0, 3600.0),
     ("pixel_std", 0.001, 5.0),
     ("lowpass_hz", 0.0, 1000.0),
     ("pool_margin", 0.0, 5.0),

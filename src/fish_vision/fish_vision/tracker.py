@@ -3,6 +3,7 @@
 """The tracker: one image in, one pose out, or the reason why there is none."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -50,8 +51,20 @@ class Lost:
     )
 
 
+@dataclass(frozen=True)
+class _Seen:
+    """What a search of the whole image gives."""
+
+    heads: list[Head]
+    boxes: list[Box]  # of each head
+    nothing: Reason  # if there is none
+    spacing: float | None  # of the pair that fits best
+
+
 class Tracker:
     """Follows one fish: looks around the last pose first, in the whole image if that fails.
+
+    The whole image is searched once in `look_around_s` anyway, so that other fish are known before the own one is lost.
 
     The picture gives all heads that its spots may be (HeadFinder); which of them is ours, or that none surely is,
     says Choice.
@@ -64,6 +77,7 @@ class Tracker:
         self._tails = TAIL if config.tail_links else ()
         self._hsv: Image = np.zeros((0, 0, 3), np.uint8)  # of the box measured last
         self._seen, self._missed = 0, 0  # detections; images without the fish since the last one
+        self._looked = -inf  # s, stamp of the image that was last searched as a whole
 
     @property
     def hue_shifts(self) -> dict[str, float]:
@@ -78,7 +92,11 @@ class Tracker:
             heads, nothing = self._measure(image, box)
             own = self._choice.near(heads, stamp, nothing)
             if isinstance(own, Head):
-                return self._detection(own, stamp, box, False)
+                detection = self._detection(own, stamp, box, False)
+                if not 0.0 <= stamp - self._looked < self._config.look_around_s:
+                    elsewhere = self._everywhere(image, stamp, besides=box)
+                    self._choice.others(elsewhere.heads, stamp)
+                return detection
         found = self._look_everywhere(image, stamp)
         self._missed = 0 if isinstance(found, Detection) else self._missed + 1
         if (
@@ -106,7 +124,20 @@ class Tracker:
     def _look_everywhere(
         self, image: Image, stamp: float, whole_tail: bool = False
     ) -> Detection | Lost:
-        """Find the head's markers at low resolution, then measure around them."""
+        """The own head among all of the image."""
+        seen = self._everywhere(image, stamp, whole_tail)
+        own = self._choice.anywhere(seen.heads, stamp, seen.nothing)
+        if isinstance(own, Reason):
+            return Lost(stamp, own, seen.spacing)
+        return self._detection(
+            own, stamp, seen.boxes[[h is own for h in seen.heads].index(True)], True
+        )
+
+    def _everywhere(
+        self, image: Image, stamp: float, whole_tail: bool = False, besides: Box | None = None
+    ) -> "_Seen":
+        """Find the heads' markers at low resolution, then measure around them; besides: a box that is left out."""
+        self._looked = stamp
         box = (0, 0, image.shape[1], image.shape[0])
         hsv = hsv_of(np.ascontiguousarray(image[::COARSE, ::COARSE]), box)
         front, rear = self._spots.find(hsv, HEAD, (0, 0), COARSE)
@@ -119,7 +150,9 @@ class Tracker:
                 places.append(middle)
         heads: list[Head] = []
         boxes: list[Box] = []
-        for place in places[:PLACES]:
+        for place in [p for p in places if besides is None or not self._inside(p, besides)][
+            :PLACES
+        ]:
             box = self._box(place[0], place[1])
             near, nothing = self._measure(image, box)
             for head in near:
@@ -130,10 +163,11 @@ class Tracker:
                 ):
                     heads.append(head)
                     boxes.append(box)
-        own = self._choice.anywhere(heads, stamp, nothing)
-        if isinstance(own, Reason):
-            return Lost(stamp, own, spacing)
-        return self._detection(own, stamp, boxes[[h is own for h in heads].index(True)], True)
+        return _Seen(heads, boxes, nothing, spacing)
+
+    def _inside(self, place: Array, box: Box) -> bool:
+        u, v = self._calibration.pool_to_pixel(place[None])[0]
+        return bool(box[0] <= u < box[2] and box[1] <= v < box[3])
 
     def _measure(self, image: Image, box: Box) -> tuple[list[Head], Reason]:
         """Heads in a part of the image, and the reason if there is none."""

@@ -121,6 +121,25 @@ def test_the_own_fish_is_followed_past_one_of_the_same_look(tracker: Tracker) ->
         assert seen(tracker.track(both, k / 30)).head.x == pytest.approx(x, abs=5e-4)
 
 
+@pytest.mark.parametrize(("look_around_s", "taken_for_ours"), [(0.5, False), (1000.0, True)])
+def test_a_fish_seen_before_ours_was_lost_is_not_ours_when_it_comes_back_first(
+    look_around_s: float, taken_for_ours: bool
+) -> None:
+    """Both go out of sight. Without a look around the other one was never seen: it lies outside the followed part."""
+    tracker = Tracker(replace(CONFIG, look_around_s=look_around_s), calibration())
+    ours, other = discs_of_fish(0.0, 0.0, 0.0), discs_of_fish(0.9, 0.3, 2.0)
+    seen(tracker.track(draw(ours), 0.0))
+    for k in range(1, 10):
+        seen(tracker.track(draw(ours + other), k / 10))
+    for k in range(10, 18):
+        assert isinstance(tracker.track(draw([]), k / 10), Lost)
+    found = tracker.track(draw(discs_of_fish(0.3, 0.1, 2.0)), 1.9)
+    assert isinstance(found, Detection) == taken_for_ours
+    if not taken_for_ours:
+        back = draw(discs_of_fish(0.33, 0.1, 2.0) + discs_of_fish(0.05, 0.0, 0.3))
+        assert seen(tracker.track(back, 2.0)).head.x == pytest.approx(0.05, abs=5e-4)
+
+
 @pytest.mark.parametrize("hidden_s", [0.2, 0.7, 3.0])
 def test_while_ours_is_hidden_another_in_view_is_not_ours(
     tracker: Tracker, hidden_s: float
