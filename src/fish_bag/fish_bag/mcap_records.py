@@ -137,6 +137,15 @@ def _take_summary(summary: Summary, opcode: int, body: bytes) -> None:
             summary.counts = statistics.channel_message_counts
 
 
+def check_length(opcode: int, body: bytes, extended: bool) -> None:
+    """ValueError where the length of a record that is not parsed is wrong; `extended` as in `whole_record`."""
+    least = {Opcode.DATA_END: 4, Opcode.FOOTER: 20, Opcode.MESSAGE_INDEX: 6}.get(Opcode(opcode))
+    if least == 6 and len(body) >= 6:
+        least += struct.unpack_from("<I", body, 2)[0]
+    if least is not None and (len(body) < least or (len(body) > least and not extended)):
+        raise ValueError("wrong length")
+
+
 def checksum_holds(data: Buffer, data_end: int, checksum: int) -> bool:
     """Whether the checksum of the data holds; writers begin it at the file, after the magic, or after the header."""
     _, length = HEAD.unpack_from(data, len(MCAP0_MAGIC))

@@ -25,11 +25,13 @@ from fish_bag.mcap_records import (
     DAMAGE,
     HEAD,
     another_file,
+    check_length,
     checksum_holds,
     read_summary,
     topics_of,
     whole_record,
 )
+from fish_bag.mcap_statistics import PRIVATE, compare_statistics
 from fish_bag.storage import (
     CUSTOM_NAMES,
     ROSBAG2_NAME,
@@ -51,7 +53,6 @@ RECORDS: dict[int, type[Any]] = {
 }
 OPCODES = frozenset(Opcode)
 MESSAGE = int(Opcode.MESSAGE)
-PRIVATE = 0x80  # from here on opcodes of applications
 
 
 def scan_mcap(data: Buffer, keep: Keep = keep_whole) -> Contents:
@@ -114,19 +115,7 @@ class _Scan:
 
     def _compare(self) -> None:
         """Compare what was read with the statistics and with the checksum of the data."""
-        counts, total = (self.summary.counts, self.summary.total) if self.summary else (None, None)
-        if counts is not None:
-            self.contents.compare_counts(counts, "its statistics")
-        agree = counts == {c: len(m) for c, m in self.contents.messages.items() if len(m)}
-        if total not in (None, self.contents.count) and (counts is None or agree):
-            self.contents.notes.append(
-                f"{self.contents.count} messages are in the file, its statistics say {total}"
-            )
-        if self.strange:
-            kinds = ", ".join(f"{opcode:#04x} ({n})" for opcode, n in sorted(self.strange.items()))
-            sure = agree or min(self.strange) >= PRIVATE
-            said = self.contents.notes if sure else self.lost
-            said.append(f"records of kinds that MCAP does not define: {kinds}; they are left out")
+        compare_statistics(self.contents, self.summary, self.strange)
         if (
             self.checksum
             and self.loose
@@ -183,16 +172,11 @@ class _Scan:
                 self.schemas[record.id] = record
             else:
                 self.define(record)
-        elif opcode in (Opcode.DATA_END, Opcode.FOOTER):
-            least = 4 if opcode == Opcode.DATA_END else 20
-            if len(body) != least and not (extended and len(body) > least):
-                raise ValueError("wrong length")
+            return
+        check_length(opcode, body, extended)
+        if opcode in (Opcode.DATA_END, Opcode.FOOTER):
             self.ended = True
             self.checksum = struct.unpack_from("<I", body)[0] if opcode == Opcode.DATA_END else 0
-        elif opcode == Opcode.MESSAGE_INDEX:
-            said = 6 + struct.unpack_from("<I", body, 2)[0] if len(body) >= 6 else len(body) + 1
-            if said > len(body) or (said < len(body) and not extended):
-                raise ValueError("wrong length")
 
     def metadata(self, record: Metadata) -> None:
         if record.name in CUSTOM_NAMES:

@@ -199,6 +199,7 @@ def test_what_a_viewer_shows_is_swum(tmp_path, shown):
         ),
         (f'<svg width="50" height="50"><path {LINE}/></svg>', "cut off by the frame"),
         (f'<path {LINE} stroke="red" stroke-dasharray="5 90"/>', "gaps longer than a tenth"),
+        (f'<path {LINE} stroke="red" pathLength="1" stroke-dasharray=".4"/>', "gaps longer"),
         (f'<path {LINE} stroke="red" stroke-dasharray="0 5"/>', "draw it without dashes"),
         (f'<path fill="none" stroke="context-stroke" {LINE}/>', "'context-stroke' is no colour"),
         (f'<switch><path requiredFeatures="x" d="M0 0H1"/><path {LINE}/></switch>', "some viewers"),
@@ -217,6 +218,7 @@ def test_what_cannot_be_swum_or_judged_is_refused(tmp_path, body, said):
     [
         ("not xml", "not an SVG drawing"),
         ('<?xml version="1.0" encoding="mine"?><svg/>', "not an SVG drawing"),
+        ('<?xml-stylesheet href="a.css"?><svg/>', "style sheet stands in another file"),
         ("<html><svg/></html>", "its first element is 'html'"),
         ('<svg width="0" height="5" viewBox="0 0 1 1"/>', "no width or no height"),
         (

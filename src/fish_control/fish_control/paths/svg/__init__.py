@@ -64,7 +64,8 @@ def _choose(parts: list[Part], file: Path, chosen: str | None) -> Part:
     names = ", ".join(part.name for part in (among or parts)[:12])
     if not parts:
         raise PathError(
-            f"{file}: no visible line in the drawing (hidden layers, definitions and transparent lines do not count)"
+            f"{file}: no visible line in the drawing (hidden layers, definitions, transparent lines and those off the page do"
+            " not count)"
         )
     if not among:
         raise PathError(f"{file}: no visible part with id {chosen!r}; visible: {names}")

@@ -182,6 +182,10 @@ def read_parts(file: Path) -> tuple[list[Part], bool]:
         ValueError,
     ) as error:  # the last two: an unknown encoding
         raise PathError(f"{file}: not an SVG drawing ({error})") from error
+    if b"<?xml-stylesheet" in file.read_bytes():
+        raise PathError(
+            f"{file}: its style sheet stands in another file, which is not read; use style attributes"
+        )
     if local_name(root) != "svg" or not _is_svg(root):
         raise PathError(
             f"{file}: not an SVG drawing (its first element is {root.tag!r}, expected svg)"

@@ -14,6 +14,7 @@ from fish_control.paths.svg.clip import Clip, check_unclipped
 from fish_control.paths.svg.outline import Outline, Viewport, outlines
 from fish_control.paths.svg.placement import place
 from fish_control.paths.svg.style import local_name
+from fish_control.paths.svg.units import pixels
 from fish_control.reference_path import PathError
 
 NO_LINE = ("text", "image", "foreignObject")  # seen, but without a line that could be swum
@@ -61,8 +62,10 @@ class Part:
         return bool(((ends[:, 1] < 0.0) | (ends[:, 0] > page)).any(axis=1).all())
 
     def lengths(self) -> list[float]:
-        """Lengths of the outlines in the element's own units; none for an element without an outline."""
+        """Lengths of the outlines in the units of its dashes; none for an element without an outline."""
         if local_name(self.element) in NO_LINE:
             return []
+        if stated := self.element.get("pathLength"):
+            return [pixels(stated, f"{self.where}: pathLength")]
         found = outlines(self.element, self.viewport, self.where)
         return [float(np.hypot(*np.diff(points, axis=0).T).sum()) for points, _ in found]
