@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random faults while the robot swims through the real drivers on a fake robot: crashes, forbidden motion, recoveries.
 
-    python benchmarks/fault_campaign.py [--faults 500] [--seed 0] [--out folder]
+    python benchmarks/fault_campaign.py [--faults 500] [--seed 0] [--real-time-factor 0.3] [--out folder]
 
 For each fault the robot is armed and swims open loop; a device is broken or a node is killed, and mended or started again after
 a while. Counted: nodes that ended by themselves, rotor commands while disarmed, commands over the limits, robots that could not
-be armed again. Status 1 if any count is not zero. About 15 s a fault on a quiet computer.
+be armed again. Status 1 if any count is not zero. All times are the robot's; simulated time runs as fast as the computer can
+keep, and waits for nodes that lag. Ctrl-C ends the campaign with the counts so far.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import random
 import signal
@@ -27,11 +29,12 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
-from fish_bringup.node_table import CONTROL, FAKE, REAL, NodeSpec, fake_parameters
+from fish_bringup.node_table import CONTROL, FAKE, LAGS, REAL, NodeSpec, fake_parameters
 from fish_bringup.nodes.watch import WatchNode, seconds, watching
 from fish_bringup.processes import NodeProcesses
+from fish_bringup.verbs.demo import pace
 from fish_node.domain import choose_domain
 
 ROTOR, RUDDER, IMU, CAMERA = REAL
@@ -47,15 +50,10 @@ AMPLITUDE, FREQUENCY = 60.0, 2.0 * np.pi * 2.0  # rad/s, rad/s
 LIMIT = 160.0  # rad/s, max_velocity of rotor.yaml
 STOPPED_S = 0.5  # s after the disarming, within which the rotor must be at rest
 STILL = 20.0  # rad/s; the rotor has an inertia of its own
-SLOW_ROTOR = {
-    "camera_timeout_s": 5.0,
-    "odometry_timeout_s": 2.0,
-    "stale_s": 1.0,
-    "rudder_timeout_s": 2.0,
-}
-SLOW_FUSION: dict[str, object] = {"camera_timeout": 5.0, "imu_timeout": 1.0}
 ARMED_WITHIN_S = 60.0
-PERIOD_S = 0.01
+LOOK_S = 0.05  # s of real time
+STANDS_S = 60.0  # s of real time without a word of the fake robot
+PATIENCE_S = 2.0  # s of real time that simulated time waits for who was silenced by a fault
 KEPT = 1000  # messages that wait for a busy computer
 
 
@@ -92,11 +90,11 @@ class Campaign:
         peer: Node = watch
         self._command = peer.create_publisher(JointState, "joint_command", 1)
         self._fault = peer.create_publisher(String, "fake/fault", 10)
+        self._now = 0.0  # s, the robot's time
         self._states: list[tuple[float, bool]] = []  # s, stamp; whether armed
         self._motion: list[tuple[float, float]] = []  # s, stamp; rad/s
         peer.create_subscription(JointState, "fake/joint_command", self._on_motion, KEPT)
         peer.create_subscription(DiagnosticArray, "arming/state", self._on_state, KEPT)
-        peer.create_timer(PERIOD_S, self._swim)
 
     def start(self, spec: NodeSpec) -> None:
         """Start a node, or start it again."""
@@ -107,7 +105,7 @@ class Campaign:
         if not self._arm():
             self.counts.not_armed.append(f"before {name}: {self._watch.refusal}")
             return
-        self._listen(random.uniform(0.5, 1.5))
+        self.listen(random.uniform(0.5, 1.5))
         self.counts.done[name] += 1
         killed = next((spec for spec in KILLED if name == f"kill {spec.name}"), None)
         if killed is not None:
@@ -116,28 +114,37 @@ class Campaign:
             process.wait(5.0)
         else:
             self._fault.publish(String(data=name))
-        self._listen(lasts_s)
+        self.listen(lasts_s)
         if not self._watch.disarmed:
             self.counts.not_disarmed[name] += 1
         if killed is not None:
             self.start(killed)
         self._fault.publish(String(data="mend"))
-        self._listen(0.3)
+        self.listen(0.3)
         for process in self._nodes.ended():
             self.counts.crashes.append(f"{name}: {process.spec.name}: {process.last_words()}")
             self.start(process.spec)
 
-    def _arm(self) -> bool:
-        end = time.monotonic() + ARMED_WITHIN_S
-        while self._watch.disarmed != "" and time.monotonic() < end:
-            self._watch.ask_to_arm()
-            self._listen(0.1)
-        return self._watch.disarmed == ""
+    def listen(self, seconds: float) -> None:
+        """Listen for so many seconds of the robot's time."""
+        begin, since = self._now, time.monotonic()
+        while self._now < begin + seconds and time.monotonic() < since + STANDS_S:
+            before = self._now
+            self._listen(LOOK_S)
+            since = time.monotonic() if self._now > before else since
 
-    def _swim(self) -> None:
+    def _arm(self) -> bool:
+        end = self._now + ARMED_WITHIN_S
+        while self._watch.disarmed != "" and self._now < end:
+            self._watch.ask_to_arm()
+            self.listen(0.1)
+        return bool(self._watch.disarmed == "")
+
+    def _swim(self, header: Header) -> None:
+        """A command for every word of the fake robot."""
         message = JointState(name=["rotor", "rudder"])
-        message.header.stamp = self._watch.get_clock().now().to_msg()
-        speed = AMPLITUDE * float(np.sin(FREQUENCY * time.monotonic()))
+        message.header.stamp = header.stamp
+        speed = AMPLITUDE * float(np.sin(FREQUENCY * self._now))
         message.velocity, message.position = [speed, 0.0], [0.0, 0.2]
         self._command.publish(message)
 
@@ -146,7 +153,9 @@ class Campaign:
         self._states.append((seconds(message.header), armed))
 
     def _on_motion(self, message: JointState) -> None:
-        self._motion.append((seconds(message.header), abs(message.velocity[0])))
+        self._now = seconds(message.header)
+        self._motion.append((self._now, abs(message.velocity[0])))
+        self._swim(message.header)
 
     def judge(self) -> None:
         """Count what moved too fast, or while disarmed; by stamps, as a busy computer delivers late."""
@@ -177,6 +186,15 @@ def moved_while_disarmed(
     return count
 
 
+def on_a_slow_clock(
+    parameters: dict[NodeSpec, dict[str, object]], factor: float
+) -> dict[NodeSpec, dict[str, object]]:
+    """The nodes' parameters with simulated time that runs `factor` times as fast as real time and waits for who lags."""
+    slowed = {spec: {**parameters.get(spec, {}), "use_sim_time": True} for spec in NODES}
+    slowed[FAKE[1]] |= {"real_time_factor": factor, **LAGS, "lockstep": PATIENCE_S}
+    return slowed
+
+
 def main() -> int:
     """Run the campaign and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -184,9 +202,10 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--domain", type=int, help="ROS domain (a free one)")
     parser.add_argument(
-        "--slow",
-        action="store_true",
-        help="timeouts of a computer that is too slow for cameras, so that its slowness is no fault",
+        "--real-time-factor",
+        type=float,
+        default=pace("fake"),
+        help="simulated seconds in a second (what this computer can keep)",
     )
     parser.add_argument("--out", type=Path, default=Path("out/fault_campaign"), help="logs")
     args = parser.parse_args()
@@ -198,21 +217,20 @@ def main() -> int:
         NodeProcesses(domain, args.out) as nodes,
         watching(domain) as (watch, listen),
     ):
-        parameters = fake_parameters(Path(devices))
-        if args.slow:
-            parameters[ROTOR] |= SLOW_ROTOR
-            parameters[FUSION] = SLOW_FUSION
+        parameters = on_a_slow_clock(fake_parameters(Path(devices)), args.real_time_factor)
         campaign = Campaign(nodes, watch, listen, parameters)
         for spec in NODES:
             campaign.start(spec)
-        listen(5.0)
-        for k in range(args.faults):
-            name = random.choice(names)
-            campaign.fault(name, random.uniform(1.0, 3.0))
-            print(f"{k + 1:4} {name:28} {watch.disarmed or 'armed'}", flush=True)
+        with contextlib.suppress(KeyboardInterrupt):
+            campaign.listen(1e-3)  # until the fake robot speaks
+            campaign.listen(3.0)
+            for k in range(args.faults):
+                name = random.choice(names)
+                campaign.fault(name, random.uniform(1.0, 3.0))
+                print(f"{k + 1:4} {name:28} {watch.disarmed or 'armed'}", flush=True)
         campaign.judge()
     counts = campaign.counts
-    print(f"faults: {dict(counts.done)}")
+    print(f"{counts.done.total()} faults: {dict(counts.done)}")
     print(f"nodes that ended by themselves: {len(counts.crashes)} {counts.crashes}")
     print(f"samples of motion while disarmed: {counts.moved_disarmed}")
     print(f"samples over {LIMIT:g} rad/s: {counts.over_limits}")

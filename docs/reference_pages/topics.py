@@ -31,6 +31,7 @@ CREATORS = {
 }
 MEANING = {
     "joint_command": "rotor: phase [rad] and speed [rad/s]; rudder: angle [rad]; 100 Hz",
+    "lockstep": "whom a simulator in lockstep waits for: how far somebody (frame_id) is (stamp)",
     "joint_states": "encoder of the rotor: angle [rad], speed [rad/s]; 100 Hz",
     "imu/data": "turn rate [rad/s], specific force [m/s^2], orientation, in imu_link; 100 Hz",
     "camera/image_raw/compressed": "the pool from above, JPEG; 30 Hz",
@@ -57,6 +58,7 @@ MEANING = {
     "fake/imu": "what the simulator feels, for the fake robot's IMU; 100 Hz",
     "fake/image/compressed": "what the simulator draws, for the fake robot's camera; 30 Hz",
     "fake/battery_state": "the simulator's battery, for the fake robot's rotor module; 1 Hz",
+    "fake/lockstep": "how far rotor driver, controller and tracker (frame_id) are (stamp), with simulated time",
     "fake/fault": "name of a fault of the fake robot, or mend",
     "battery_state": "voltage [V], current [A]; 1 Hz",
     "sim/odometry": "the simulator's true pose and velocity; 100 Hz",

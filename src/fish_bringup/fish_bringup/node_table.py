@@ -86,7 +86,12 @@ BEHIND = tuple(
 )
 FAKE = (
     NodeSpec("fish_hw", "fake_robot", "fake_robot.yaml"),
-    NodeSpec("fish_sim", "simulator", "simulator.yaml", remaps=(*BEHIND, "imu/data:=fake/imu")),
+    NodeSpec(
+        "fish_sim",
+        "simulator",
+        "simulator.yaml",
+        remaps=(*BEHIND, "imu/data:=fake/imu", "lockstep:=fake/lockstep"),
+    ),
     NodeSpec(
         "fish_sim",
         "camera",
@@ -101,6 +106,10 @@ FAKE = (
 
 # s, of a robot that hurts nobody: as the node simulator
 BORNE = {"odometry_timeout_s": 0.5, "camera_timeout_s": 1.0, "pause_s": 1.0, "stale_s": 1.0}
+
+# The simulator behind a fake robot whose clock it says: time waits for drivers, tracker and controller that lag by more than
+# slack [s of simulated time], for so long [s of real time].
+LAGS = {"lockstep": 5.0, "lockstep_slack": 0.035}
 
 HARDWARE = ("sim", "fake")  # what a run of this computer alone can swim with
 VIEW = NodeSpec("fish_bringup", "live_view", "view.yaml")

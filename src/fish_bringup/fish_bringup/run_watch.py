@@ -62,11 +62,13 @@ class SwimEnd:
 
     Attributes:
         seconds: wall time from the first odometry to the end.
-        cpu: share of one core each node used meanwhile.
+        robot_s: s of the robot's own time, that of its stamps, meanwhile.
+        cpu: processor time that each node used for a second of the robot's own time [s/s].
     """
 
     reason: str
     seconds: float
+    robot_s: float
     cpu: dict[NodeSpec, float]
 
 
@@ -115,11 +117,15 @@ class Robot:
     def swim(self, duration: float, console: Console) -> SwimEnd:
         """Watch for at most `duration` seconds of the robot's own time, with a line of progress."""
         begin, before = time.monotonic(), self.nodes.cpu_times()
+        first, _ = self._seen()
         with console.status("") as line:
             reason = self._follow(duration, line, console)
         seconds = time.monotonic() - begin
         used = {spec: spent - before[spec] for spec, spent in self.nodes.cpu_times().items()}
-        return SwimEnd(reason, seconds, {spec: cpu_s / seconds for spec, cpu_s in used.items()})
+        last, _ = self._seen()
+        robot_s = max(last.stamp - first.stamp, 1e-3)
+        cpu = {spec: spent_s / robot_s for spec, spent_s in used.items()}
+        return SwimEnd(reason, seconds, robot_s, cpu)
 
     def _follow(self, duration: float, line: Status, console: Console) -> str:
         """Until the end of the path, one lap of a closed one, the end of the time or Ctrl-C; the reason.

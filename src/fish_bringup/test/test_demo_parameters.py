@@ -5,16 +5,15 @@
 import argparse
 from pathlib import Path
 
-from fish_bringup.node_table import CONTROL, RECORDER, ROBOTS, SIMULATED
+from fish_bringup.node_table import CONTROL, FAKE, RECORDER, ROBOTS, SIMULATED
 from fish_bringup.verbs import demo
 
 
 def changed(*words: str) -> dict:
     parser = argparse.ArgumentParser()
     demo.add_arguments(parser)
-    return demo.node_parameters(
-        parser.parse_args(words), {"start_x": 0.0}, Path("folder"), Path("devices")
-    )
+    args = parser.parse_args(["--real-time-factor", "1", *words])
+    return demo.node_parameters(args, {"start_x": 0.0}, Path("folder"), Path("devices"))
 
 
 def test_in_lockstep_the_simulator_waits_and_every_node_follows_its_clock(tmp_path) -> None:
@@ -36,3 +35,18 @@ def test_a_computer_that_the_nodes_fill_is_named_with_what_to_do() -> None:
     shares = [0.3] * 6  # of a core
     assert "--lockstep" in demo.too_slow(shares, cores=2)
     assert demo.too_slow(shares, cores=4) == ""
+
+
+def test_on_a_slow_clock_every_node_of_a_fake_robot_follows_the_simulator() -> None:
+    given = changed("--hardware", "fake", "--real-time-factor", "0.2")
+    assert given[FAKE[1]]["real_time_factor"] == 0.2
+    assert given[FAKE[1]]["lockstep"] > 0.0
+    assert all(given[spec]["use_sim_time"] is True for spec in ROBOTS["fake"])
+
+
+def test_a_computer_with_few_cores_gets_a_slower_fake_robot_and_no_slower_simulation() -> None:
+    paces = [demo.pace("fake", cores) for cores in (1, 2, 4, 8, 64)]
+    assert paces == sorted(paces)
+    assert 0.0 < paces[0] < 0.3
+    assert paces[-1] == 1.0
+    assert demo.pace("sim", 1) == 1.0

@@ -268,6 +268,18 @@ def test_the_launch_file_hands_the_planner_its_path_and_arguments_as_text(launch
     assert parameters(planner) == [str(node_table.parameter_path(node_table.CONTROL[2])), given]
 
 
+@pytest.mark.parametrize(
+    ("robot", "simulator"), [("sim", "simulator"), ("fake", "fish_sim/simulator")]
+)
+def test_on_a_slow_clock_every_node_follows_the_simulator(launched, robot, simulator):
+    nodes = launched(robot=robot, real_time_factor="0.2")
+    assert all({"use_sim_time": True} in node.parameters for node in nodes.values())
+    slowed = [node for node in nodes.values() if "real_time_factor" in node.parameters[-1]]
+    assert slowed == [nodes[simulator]]
+    assert (node_table.LAGS in nodes[simulator].parameters) == (robot == "fake")
+    assert not any({"use_sim_time": True} in node.parameters for node in launched().values())
+
+
 def test_parts_of_the_robot_are_launched_alone(launched):
     drivers = ["rotor", "rudder", "imu", "camera"]
     assert list(launched(robot="real", part="drivers")) == drivers

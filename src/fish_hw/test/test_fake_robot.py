@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 from waiting import wait_until
 
+from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.imu_driver import ImuDriver
 from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.devices.usb_camera import UsbCamera
+from fish_hw.devices.vertiq import Vertiq
 from fish_hw.emulators.fake_robot import IMU_ADDRESS, FakeRobot
 from fish_hw.emulators.fed_bno085 import Felt
+from fish_hw.protocol.iquart import encode
 from fish_hw.settings.camera import CameraSettings
 from fish_hw.settings.imu import ImuSettings
 from fish_hw.settings.rudder import RudderSettings
@@ -155,3 +158,55 @@ def test_every_fault_can_be_made_and_mended(robot):
         assert robot.imu.alter(felt(0.0)) == felt(0.0), name
         assert robot.bus.fault() is None, name
         assert not robot.camera.frozen, name
+
+
+def test_a_camera_waits_for_no_driver_and_shows_it_the_newest_picture(robot):
+    name = str(robot.parameters()["camera"]["device"])
+    source = SocketCamera(name)
+    noise = np.random.default_rng(0).integers(0, 255, (480, 640, 3), np.uint8)
+    large = bytes(cv2.imencode(".png", noise)[1])  # more than a socket holds
+    for k in range(20):  # a driver that does not read would stop one that waits for it
+        robot.camera.show(large, float(k))
+    robot.camera.show(jpeg(50), 99.0)
+    frames = []
+
+    def newest() -> bool:
+        frame = source.read()
+        frames.extend([frame] if frame else [])
+        return bool(frames) and frames[-1].time_s == 99.0
+
+    assert wait_until(newest, TIMEOUT_S)
+    assert frames[-1].jpeg == jpeg(50)
+    source.close()
+
+
+def test_a_rotor_whose_answers_nobody_reads_obeys_its_own_watchdog(robot):
+    port = SerialPort(str(robot.parameters()["rotor"]["port"]), 115200)
+    port.write(encode(reg.CTRL_VELOCITY.set(0, 50.0)))
+    assert wait_until(lambda: robot.rotor_speed() > 40.0, TIMEOUT_S)
+    questions = b"".join(encode(reg.TELEMETRY.get(0)) for _ in range(100))
+    for _ in range(20):  # 46 kB of answers
+        port.write(questions)
+    assert wait_until(lambda: robot.rotor_speed() < 1.0, TIMEOUT_S)
+    assert robot.rotor.timeouts == 1
+    port.close()
+
+
+def test_devices_and_drivers_live_in_simulated_time(tmp_path):
+    """Time stands still on the wall clock's account, and the rotor with it."""
+    now = [1000.0]
+    robot = FakeRobot(tmp_path / "slow", RudderSettings(), clock=lambda: now[0])
+    vertiq = Vertiq(
+        SerialPort(str(robot.parameters()["rotor"]["port"]), 115200),
+        reply_timeout_s=TIMEOUT_S,
+        clock=lambda: now[0],
+    )
+    sample = vertiq.drive(50.0)
+    assert sample is not None
+    assert (sample.time_s, sample.velocity) == (1000.0, 0.0)
+    now[0] += 0.05
+    sample = vertiq.drive(50.0)
+    assert sample is not None
+    assert sample.velocity == pytest.approx(50.0, rel=0.01)
+    assert sample.angle == pytest.approx(2.5, rel=0.02)
+    robot.close()

@@ -98,3 +98,23 @@ def test_patience_0_waits_for_nobody():
     lockstep = Lockstep(0.0)
     lockstep.answered("controller", 0.0)
     assert lockstep.may_advance(100.0, 0.0)
+
+
+def test_with_slack_a_few_periods_are_no_reason_to_wait():
+    lockstep = Lockstep(5.0, slack=3.5 * DT)
+    for k in range(20):
+        lockstep.answered("rotor driver", DT * k)
+        assert all(lockstep.may_advance(DT * (k + behind), 0.1 * k) for behind in range(4))
+        assert not lockstep.may_advance(DT * (k + 4), 0.1 * k)
+
+
+def test_it_says_who_is_waited_for():
+    lockstep = Lockstep(5.0)
+    lockstep.answered("fusion", 1.0)
+    lockstep.answered("tracker", 0.0)
+    assert lockstep.awaited == ""
+    assert not lockstep.may_advance(1.0, 0.0)
+    assert lockstep.awaited == "tracker"
+    lockstep.answered("tracker", 1.0)
+    assert lockstep.may_advance(1.0, 0.1)
+    assert lockstep.awaited == ""

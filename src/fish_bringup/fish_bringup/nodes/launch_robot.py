@@ -20,10 +20,12 @@ from fish_bringup.node_table import (
     CONTROL,
     EXCITER,
     FAKE,
+    LAGS,
     NAMESPACE,
     PARTS,
     RECORDER,
     ROBOTS,
+    SIMULATED,
     VIEW,
     NodeSpec,
     fake_parameters,
@@ -60,6 +62,11 @@ ARGUMENTS = {
     "begin": ("", f"s of the program's time{IN_PROGRAM}"),
     "end": ("", f"s of the program's time; 0: its end{IN_PROGRAM}"),
     "use_sim_time": ("", "true: nodes follow /clock; without it what their files say"),
+    "real_time_factor": (
+        "",
+        "simulated seconds in a second, of robot:=sim and robot:=fake; every node follows /clock; without it what "
+        "simulator.yaml says",
+    ),
     "record": ("true", "false: no recorder"),
     "view": ("false", "true: the live view in a browser, on this computer"),
     "respawn": ("false", "true: a node that ends is started again; false: its end ends the launch"),
@@ -70,8 +77,11 @@ ARGUMENTS = {
 }
 # parameter of a node: argument that gives it, its type; every node has the first
 OF_EVERY_NODE = {"use_sim_time": ("use_sim_time", bool)}
+FACTOR: dict[str, tuple[str, type]] = {"real_time_factor": ("real_time_factor", float)}
 OF_NODE: dict[NodeSpec, dict[str, tuple[str, type]]] = {
     PLANNER: {"path": ("path", str), "path_args": ("path_args", str), "speed": ("speed", float)},
+    SIMULATED[0]: FACTOR,
+    FAKE[1]: FACTOR,
     EXCITER: {"program_file": ("program", str), "begin": ("begin", float), "end": ("end", float)},
 }
 DISPENSABLE = (RECORDER, VIEW)  # the robot swims on without them
@@ -162,6 +172,8 @@ def _parameters(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> list[ob
         *([{"frame_prefix": frame_prefix(full)}] if prefixed else []),
         *_own(spec, chosen["config"]),
         *([fake] if fake else []),
+        *([{"use_sim_time": True}] if chosen["real_time_factor"] else []),
+        *([LAGS] if chosen["real_time_factor"] and spec == FAKE[1] else []),
         *([given] if given else []),
     ]
 

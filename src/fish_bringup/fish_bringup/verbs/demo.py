@@ -24,6 +24,7 @@ from fish_bringup.node_table import (
     CONTROL,
     FAKE,
     HARDWARE,
+    LAGS,
     RECORDER,
     SIMULATED,
     VIEW,
@@ -53,6 +54,7 @@ from fish_sim.robot_argument import read_model
 
 VIEW_PORT = ViewConfig().port
 FULL = 0.75  # share of all cores from which on messages wait for a processor
+NEED = 5.0  # cores that the nodes of a fake robot fill in real time
 LOCKSTEP = 60.0  # s of real time that simulated time waits for a node
 LONGEST = 600.0  # s, a run that does not end by itself
 PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
@@ -89,6 +91,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="the simulator waits for the nodes: for a computer that is too slow or too busy for real time",
     )
+    parser.add_argument(
+        "--real-time-factor",
+        type=float,
+        help="simulated seconds in a second; every node follows /clock, the drivers of a fake robot too (1, or what this "
+        "computer can keep)",
+    )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
     parser.add_argument("--view", action="store_true", help="watch it live in a browser")
     parser.add_argument(
@@ -106,7 +114,13 @@ def run(args: argparse.Namespace) -> int:
     specs = robot_of(args.hardware)
     if args.lockstep and args.hardware != "sim":
         raise UserError(
-            "--lockstep is for the simulator alone: drivers and devices run in real time"
+            "--lockstep is for the simulator alone: with drivers say --real-time-factor"
+        )
+    if args.real_time_factor is None:
+        args.real_time_factor = pace(args.hardware)
+    if not args.real_time_factor > 0.0:
+        raise UserError(
+            f"real-time-factor is {args.real_time_factor:g}, expected a positive number"
         )
     with user_errors():
         domain = choose_domain(args.domain)
@@ -117,10 +131,12 @@ def run(args: argparse.Namespace) -> int:
         console,
         f"path {args.letter} at {args.speed:g} m/s, ROS domain {domain}, output in {folder}",
     )
+    if args.real_time_factor != 1.0:
+        say(console, f"simulated time runs {args.real_time_factor:g} times as fast as real time")
     with tempfile.TemporaryDirectory(prefix="fish_") as devices:
         changed = node_parameters(args, start, folder, Path(devices))
         end, latency = _swim(domain, specs, changed, folder, args.duration, console)
-    say(console, f"ended {end.reason}, {end.seconds:.1f} s after the first odometry")
+    say(console, f"ended {end.reason}, {end.robot_s:.1f} s after the first odometry")
     trial = read_trial(folder / "recording")
     score = score_trial(trial)
     tables = [error_table(score), latency, _cpu_table(end)]
@@ -148,6 +164,13 @@ def too_slow(shares: Iterable[float], cores: int | None = None) -> str:
     )
 
 
+def pace(hardware: str, cores: int | None = None) -> float:
+    """The real time factor of a run: of a fake robot what a computer with so many cores (this one's) can keep, 1 at most."""
+    if hardware != "fake":
+        return 1.0
+    return min(round(FULL * (cores or os.cpu_count() or 1) / NEED, 2), 1.0)
+
+
 def node_parameters(
     args: argparse.Namespace, start: Parameters, folder: Path, devices: Path
 ) -> dict[NodeSpec, dict[str, object]]:
@@ -162,7 +185,12 @@ def node_parameters(
     changed[simulator] = {**changed.get(simulator, {}), **start}
     if args.lockstep:
         changed[simulator]["lockstep"] = LOCKSTEP
-        for spec in robot_of("sim"):
+    elif fake and args.real_time_factor != 1.0:
+        changed[simulator] |= LAGS
+    if args.real_time_factor != 1.0:
+        changed[simulator]["real_time_factor"] = args.real_time_factor
+    if args.lockstep or args.real_time_factor != 1.0:
+        for spec in robot_of(args.hardware):
             changed[spec] = {**changed.get(spec, {}), "use_sim_time": True}
     if args.robot:
         changed[simulator]["robot_file"] = str(args.robot.resolve())
@@ -247,5 +275,8 @@ def _cpu_table(end: SwimEnd) -> Table:
     rows = [[spec.name, f"{100 * share:.0f} %"] for spec, share in end.cpu.items()]
     rows.append(["all nodes", f"{100 * sum(end.cpu.values()):.0f} %"])
     return Table(
-        "CPU", ["node", "of one core"], rows, f"Mean over {end.seconds:.0f} s of swimming."
+        "CPU",
+        ["node", "of one core"],
+        rows,
+        f"In real time; mean over {end.robot_s:.0f} s of swimming, which took {end.seconds:.0f} s.",
     )

@@ -22,6 +22,7 @@ from fish_hw.transport.interfaces import ByteStream
 COAST_REPEATS = 3  # a lost byte must not keep the rotor spinning
 CONFIGURE_TRIES = 3
 DRAIN_READS = 8
+MOST_READS = 200  # for the answers of one exchange, on a clock that stands still
 
 
 class NoAnswer(DeviceError):
@@ -247,12 +248,13 @@ class Vertiq:
         wanted = {(register.type, register.param): register for register in registers}
         answers: dict[Register, tuple[float, ...]] = {}
         deadline = self._clock() + self._reply_timeout_s
-        while len(answers) < len(wanted):
+        for _ in range(MOST_READS):
             left = deadline - self._clock()
-            if left <= 0:
-                self._take(self.parser.flush(), wanted, answers)
+            if len(answers) == len(wanted) or left <= 0:
                 break
             self._take(self.parser.feed(self._stream.read(left)), wanted, answers)
+        if len(answers) < len(wanted):
+            self._take(self.parser.flush(), wanted, answers)
         return answers
 
     def _take(

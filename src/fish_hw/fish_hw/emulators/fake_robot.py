@@ -10,6 +10,7 @@ camera    Unix socket of the camera
 
 import errno
 import random
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -33,13 +34,20 @@ class FakeRobot:
         folder: where the drivers find the devices.
         servo: geometry of the rudder servo.
         seed: of the noise that faults make.
+        clock: s, by which the devices move; the drivers' clock.
     """
 
-    def __init__(self, folder: Path, servo: RudderSettings, seed: int = 0) -> None:
-        self.folder, self._servo = folder, servo
+    def __init__(
+        self,
+        folder: Path,
+        servo: RudderSettings,
+        seed: int = 0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.folder, self._servo, self._clock = folder, servo, clock
         folder.mkdir(parents=True, exist_ok=True)
         self._random = random.Random(seed)
-        self.imu = FedBno085()
+        self.imu = FedBno085(clock)
         self.bus = SocketBus(folder / "i2c", {IMU_ADDRESS: self.imu})
         self.camera = SocketPictures(folder / "camera")
         chip = folder / "pwmchip0"
@@ -82,8 +90,7 @@ class FakeRobot:
 
     def rotor_speed(self) -> float:
         """Speed of the rotor [rad/s]; one whose cable is out runs on until its own watchdog coasts it."""
-        if not (self.folder / "rotor").is_symlink():
-            self.rotor.move()
+        self.rotor.move()
         return self.rotor.velocity
 
     def rudder_angle(self) -> float:
@@ -117,7 +124,7 @@ class FakeRobot:
         self.camera.unplug()
 
     def _plug_rotor(self) -> VertiqEmulator:
-        rotor = VertiqEmulator(lag_s=LAG_S)
+        rotor = VertiqEmulator(lag_s=LAG_S, clock=self._clock)
         link = self.folder / "rotor"
         link.unlink(missing_ok=True)
         link.symlink_to(rotor.port)

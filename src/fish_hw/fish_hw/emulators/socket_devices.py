@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fake robot's ends of the Unix sockets: an I2C bus with emulated devices, and a camera."""
 
+import contextlib
 import errno
 import os
 import socket
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 from fish_hw.emulators.i2c_bus import I2cDevice
 from fish_hw.transport.unix_socket import ANSWER, FRAME, READ, REQUEST, receive
+
+LOOK_S = 0.1  # s between looks at a driver that gets no picture
 
 
 class Listener:
@@ -107,29 +109,35 @@ class SocketBus(Listener):
 
 
 class SocketPictures(Listener):
-    """A camera; `frozen` sends the picture of the moment again and again, with new times."""
+    """A camera; `frozen` sends the picture of the moment again and again, with new times.
+
+    A camera waits for nobody: a driver that is slow gets the newest picture and misses those before.
+    """
 
     def __init__(self, path: Path) -> None:
         self.frozen = False
-        self._newest: bytes = b""
-        self._sent = threading.Lock()
+        self._newest: tuple[bytes, float] = (b"", 0.0)
+        self._shown = threading.Condition()
         super().__init__(path)
 
     def serve(self, connection: socket.socket) -> None:
-        """The driver only listens; whatever it says, and its end, end the connection."""
-        connection.recv(1)
-        raise ConnectionResetError(os.strerror(errno.ECONNRESET))
+        """Send what is shown until the driver is gone."""
+        sent = self._newest
+        while self._connection is connection:
+            with self._shown:
+                if self._newest is sent:
+                    self._shown.wait(LOOK_S)
+                newest = self._newest
+            if newest is not sent:
+                sent = newest
+                connection.sendall(FRAME.pack(len(sent[0]), sent[1]) + sent[0])
+            with contextlib.suppress(BlockingIOError):  # the driver says nothing but its end
+                connection.recv(1, socket.MSG_DONTWAIT)
+                raise ConnectionResetError(os.strerror(errno.ECONNRESET))
 
     def show(self, jpeg: bytes, taken_s: float) -> None:
-        """Send a picture taken at taken_s [s, monotonic clock] to the driver, if there is one."""
-        if not (self.frozen and self._newest):
-            self._newest = jpeg
-        connection = self._connection
-        if connection is None:
-            return
-        with self._sent:
-            try:
-                age_s = time.monotonic() - taken_s
-                connection.sendall(FRAME.pack(len(self._newest), age_s) + self._newest)
-            except OSError:
-                self._connection = None
+        """Send a picture taken at taken_s [s, the driver's clock] to the driver, if there is one."""
+        with self._shown:
+            before, _ = self._newest
+            self._newest = (before if self.frozen and before else jpeg, taken_s)
+            self._shown.notify()

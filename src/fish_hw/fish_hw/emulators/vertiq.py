@@ -1,7 +1,11 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A VertiqModule behind a pseudo-terminal: the real driver talks to it through a real port."""
+"""A VertiqModule behind a pseudo-terminal: the real driver talks to it through a real port.
 
+A module waits for nobody: replies that nobody takes are lost.
+"""
+
+import contextlib
 import os
 import pty
 import select
@@ -9,10 +13,11 @@ import termios
 import threading
 import time
 import tty
+from collections.abc import Callable
 
 from fish_hw.emulators.vertiq_module import VELOCITY_MODE, VertiqModule
 
-POLL_S = 0.002
+POLL_S = 0.02
 OUTPUT_SPEED = 5  # index in termios.tcgetattr
 NOISE = b"\xf8\x00\xfe"  # what bytes at another speed look like
 
@@ -26,14 +31,23 @@ class VertiqEmulator(VertiqModule):
         module: module id it answers to.
         lag_s: time constant of the rotor.
         speed: speed constant of termios that it runs at; a port that is set to another one reads noise. None: any.
+        clock: s, by which the rotor turns.
     """
 
-    def __init__(self, module: int = 0, lag_s: float = 0.01, speed: int | None = None) -> None:
+    def __init__(
+        self,
+        module: int = 0,
+        lag_s: float = 0.01,
+        speed: int | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._speed = speed
-        super().__init__(module, lag_s, time.monotonic)
+        super().__init__(module, lag_s, clock)
+        self._moving = threading.RLock()
         self._master, self._slave = pty.openpty()
         tty.setraw(self._master)
         tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
         self.port = os.ttyname(self._slave)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -48,6 +62,11 @@ class VertiqEmulator(VertiqModule):
         os.close(self._slave)
         os.close(self._master)
 
+    def move(self) -> None:
+        """As VertiqModule's; any thread may ask."""
+        with self._moving:
+            super().move()
+
     def _understands(self) -> bool:
         return self._speed is None or termios.tcgetattr(self._master)[OUTPUT_SPEED] == self._speed
 
@@ -57,6 +76,7 @@ class VertiqEmulator(VertiqModule):
             self.move()
             if readable:
                 data = os.read(self._master, 512)
-                replies = self.feed(data) if self._understands() else NOISE
-                if replies:
+                with self._moving:
+                    replies = self.feed(data) if self._understands() else NOISE
+                with contextlib.suppress(BlockingIOError):
                     os.write(self._master, replies)

@@ -69,6 +69,11 @@ class VertiqModule:
         }
 
     @property
+    def asked_s(self) -> float:
+        """When the newest valid message came [s]."""
+        return self._fed
+
+    @property
     def timeout_s(self) -> float:
         """The module's own watchdog."""
         return float(struct.unpack("<f", self.written[reg.TIMEOUT.type, reg.TIMEOUT.param])[0])

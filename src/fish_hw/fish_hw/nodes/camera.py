@@ -39,12 +39,12 @@ class CameraNode(DeviceNode):
             if settings.publish_raw
             else None
         )
-        self._camera = UsbCamera(settings, self._open_source)
+        self._camera = UsbCamera(settings, self._open_source, self.clock.now)
         self.use(self._camera, self._cycle, 0.5 / settings.rate_hz, settings.device == "emulator")
 
     def _open_source(self) -> FrameSource:
         if self.settings.device == "emulator":
-            return WalkingSquare(self.settings)
+            return WalkingSquare(self.settings, self.clock.now)
         if self.settings.device.startswith(PREFIX):
             return SocketCamera(self.settings.device)
         return VideoCapture(self.settings)

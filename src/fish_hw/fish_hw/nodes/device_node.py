@@ -14,7 +14,6 @@ import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy._rclpy_pybind11 import RCLError
-from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
@@ -24,12 +23,13 @@ from fish_hw.devices.status import WARN, Status
 from fish_hw.nodes.worker import Worker
 from fish_hw.transport.errors import TransportError
 from fish_node.nodes.executor import KeptWaitSetExecutor
+from fish_node.nodes.robot_clock import RobotClock
 from fish_node.nodes.start import read_parameters, shut_down
 from fish_node.nodes.status_log import StatusLog
 
 NAMESPACE = "fish"
 END_TIMEOUT_S = 2.0
-CLOCK_TRIES = 3
+CLOCK_WAIT_S = 0.01
 EXPECTED = (TransportError, DeviceError, ValueError)
 
 
@@ -67,6 +67,7 @@ class DeviceNode(Node):
             name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True
         )
         self.settings = read_parameters(self, settings_class)
+        self.clock = RobotClock(self)
         self.failure = ""
         self._device: Device | None = None
         self._repeat: tuple[Callable[[], None], float] | None = None  # step, period [s]
@@ -87,20 +88,22 @@ class DeviceNode(Node):
     def begin(self) -> None:
         """Connect and begin to repeat the step; a device that is absent is waited for as the settings say.
 
+        With simulated time the first step connects, once that time runs.
+
         Apart from the constructor: a signal may come at any moment, and only a node that its caller has can be closed.
         """
         assert self._device is not None
         assert self._repeat is not None
         device, (step, period_s) = self._device, self._repeat
-        try:
-            device.connect()
-        except (TransportError, DeviceError) as error:
-            limit_s = self.settings.startup_timeout_s
-            how_long = f"for {limit_s:g} s" if limit_s else "until it is there"
-            self.get_logger().error(f"{error}; trying {how_long}")
-        else:
-            self.get_logger().info("emulated device ready" if self._emulated else "device ready")
-        self._worker = Worker(lambda: self._step(device, step), period_s, self._on_failure)
+        if self.clock.runs:
+            self._connect(device)
+        self._worker = Worker(
+            lambda: self._step(device, step),
+            period_s,
+            self._on_failure,
+            self.clock.now,
+            self.clock.wall,
+        )
         self._worker.start()
 
     def close(self) -> None:
@@ -111,17 +114,8 @@ class DeviceNode(Node):
             self._device.close()
 
     def stamp(self, time_s: float) -> Time:
-        """ROS time of a moment on the monotonic clock.
-
-        The two clocks are read one after the other; of several tries the one that was interrupted least counts.
-        """
-        tries = []
-        for _ in range(CLOCK_TRIES):
-            before = time.monotonic()
-            now = self.get_clock().now()
-            after = time.monotonic()
-            tries.append((after - before, now - Duration(seconds=(before + after) / 2 - time_s)))
-        return min(tries, key=lambda entry: entry[0])[1].to_msg()
+        """ROS time of a moment on the node's clock."""
+        return self.clock.stamp(time_s)
 
     def publish(self, publisher: Any, message: Any) -> None:
         """Publish, unless the node is about to end (the device's thread lives a little longer than the
@@ -143,7 +137,20 @@ class DeviceNode(Node):
             else:
                 self.get_logger().info(event)
 
+    def _connect(self, device: Device) -> None:
+        try:
+            device.connect()
+        except (TransportError, DeviceError) as error:
+            limit_s = self.settings.startup_timeout_s
+            how_long = f"for {limit_s:g} s" if limit_s else "until it is there"
+            self.get_logger().error(f"{error}; trying {how_long}")
+        else:
+            self.get_logger().info("emulated device ready" if self._emulated else "device ready")
+
     def _step(self, device: Device, step: Callable[[], None]) -> None:
+        if not self.clock.runs:
+            time.sleep(CLOCK_WAIT_S)
+            return
         step()
         if device.connected:
             self._give_up_s = float("inf")  # from now on it is waited for without end

@@ -6,15 +6,16 @@ The drivers find rotor, rudder, IMU and camera in the parameter `folder`. What r
 what its IMU and camera sense comes back through the devices.
 
 In:  fake/imu (sensor_msgs/Imu), fake/image/compressed (sensor_msgs/CompressedImage), fake/battery_state, fake/fault
-     (std_msgs/String: the name of a fault, or `mend`)
-Out: fake/joint_command (joint rotor: velocity [rad/s], joint rudder: position [rad]), /diagnostics
+     (std_msgs/String: the name of a fault, or `mend`); with use_sim_time also joint_command and camera/pose
+Out: fake/joint_command (joint rotor: velocity [rad/s], joint rudder: position [rad]), /diagnostics; with use_sim_time also
+     fake/lockstep (std_msgs/Header: how far rotor driver, controller and tracker are), for a simulator in lockstep
 """
 
 import sys
-import time
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState, CompressedImage, Imu, JointState
@@ -25,8 +26,10 @@ from fish_hw.emulators.fake_robot import FakeRobot
 from fish_hw.emulators.fed_bno085 import Felt
 from fish_hw.settings.fake_robot import FakeRobotSettings
 from fish_hw.settings.rudder import RudderSettings
+from fish_node.nodes.robot_clock import RobotClock
 from fish_node.nodes.start import read_parameters, run
 
+CAMERA_S = 0.2  # s that a pose may be late: the camera's own delay, two lost pictures, the tracker
 NEWEST = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -38,9 +41,19 @@ class FakeRobotNode(Node):
             "fake_robot", namespace="fish", automatically_declare_parameters_from_overrides=True
         )
         settings = read_parameters(self, FakeRobotSettings)
-        self._robot = FakeRobot(Path(settings.folder), RudderSettings(), settings.seed)
+        self._time = RobotClock(self)
+        self._robot = FakeRobot(
+            Path(settings.folder), RudderSettings(), settings.seed, self._time.now
+        )
+        self._steps: dict[str, float] = {}  # s, how far who is
         self._fault = "none"
         self._command = self.create_publisher(JointState, "fake/joint_command", 10)
+        self._lockstep = self.create_publisher(Header, "fake/lockstep", 10)
+        if self._time.simulated:
+            self.create_subscription(JointState, "joint_command", self._on_command, 10)
+            self.create_subscription(
+                PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST
+            )
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_subscription(Imu, "fake/imu", self._on_imu, NEWEST)
         self.create_subscription(CompressedImage, "fake/image/compressed", self._on_picture, NEWEST)
@@ -64,12 +77,25 @@ class FakeRobotNode(Node):
         message.velocity = [self._robot.rotor_speed(), 0.0]
         message.position = [self._robot.rotor.angle, self._robot.rudder_angle()]
         self._command.publish(message)
+        self._say_step("rotor driver", self._robot.rotor.asked_s)
+
+    def _on_command(self, message: JointState) -> None:
+        self._say_step("controller", self._time.of(message.header.stamp))
+
+    def _on_camera(self, message: PoseWithCovarianceStamped) -> None:
+        self._say_step("tracker", self._time.of(message.header.stamp) + CAMERA_S)
+
+    def _say_step(self, who: str, time_s: float) -> None:
+        """How far somebody is, for a simulator in lockstep; the same again would be no news."""
+        if self._time.simulated and time_s > self._steps.get(who, 0.0):
+            self._steps[who] = time_s
+            self._lockstep.publish(Header(frame_id=who, stamp=self._time.stamp(time_s)))
 
     def _on_imu(self, message: Imu) -> None:
         q, w, a = message.orientation, message.angular_velocity, message.linear_acceleration
         self._robot.imu.feel(
             Felt(
-                self._monotonic(message.header),
+                self._time.of(message.header.stamp),
                 (q.x, q.y, q.z, q.w),
                 (w.x, w.y, w.z),
                 (a.x, a.y, a.z),
@@ -77,7 +103,7 @@ class FakeRobotNode(Node):
         )
 
     def _on_picture(self, message: CompressedImage) -> None:
-        self._robot.camera.show(bytes(message.data), self._monotonic(message.header))
+        self._robot.camera.show(bytes(message.data), self._time.of(message.header.stamp))
 
     def _on_battery(self, message: BatteryState) -> None:
         self._robot.rotor.volts = float(message.voltage)
@@ -94,12 +120,6 @@ class FakeRobotNode(Node):
             return
         self._fault = "none" if name == "mend" else name
         self.get_logger().info(f"fault: {name}")
-
-    def _monotonic(self, header: Header) -> float:
-        """Moment of a stamp on the monotonic clock [s]."""
-        stamp = header.stamp.sec + 1e-9 * header.stamp.nanosec
-        age_s: float = self.get_clock().now().nanoseconds * 1e-9 - stamp
-        return time.monotonic() - age_s
 
     def _report(self) -> None:
         if self._arm.service_is_ready():  # the simulated fish follows whatever the devices do

@@ -32,7 +32,11 @@ class ImuNode(DeviceNode):
         self._data = self.create_publisher(Imu, "imu/data", QoSProfile(depth=10))
         self._period_s = 1.0 / settings.rate_hz
         self._driver = ImuDriver(
-            settings, self._open_bus, self._open_line, lambda: SerialPort(settings.port, BAUD)
+            settings,
+            self._open_bus,
+            self._open_line,
+            lambda: SerialPort(settings.port, BAUD),
+            self.clock.now,
         )
         self._template = self._message_template()
         emulated = settings.interface == "i2c" and settings.bus == "emulator"
@@ -43,7 +47,7 @@ class ImuNode(DeviceNode):
 
     def _open_bus(self) -> I2cBus:
         if self.settings.bus == "emulator":
-            return I2cBusEmulator({self.settings.address: Bno085Emulator()})
+            return I2cBusEmulator({self.settings.address: Bno085Emulator(self.clock.now)})
         if self.settings.bus.startswith(PREFIX):
             return SocketI2c(self.settings.bus)
         return KernelI2c(self.settings.bus)

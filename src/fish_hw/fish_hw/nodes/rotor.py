@@ -14,7 +14,6 @@ Services: arm (std_srvs/SetBool: true arms, false disarms), ~/clear_faults (std_
 """
 
 import math
-import time
 
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import BatteryState, JointState
@@ -44,13 +43,15 @@ class RotorNode(DeviceNode):
         self._joint_states = self.create_publisher(JointState, "joint_states", 10)
         self._battery_state = self.create_publisher(BatteryState, "battery_state", 10)
         self._emulator = (
-            VertiqEmulator(self.settings.module_id) if self.settings.port == "emulator" else None
+            VertiqEmulator(self.settings.module_id, clock=self.clock.now)
+            if self.settings.port == "emulator"
+            else None
         )
         self._driver = RotorDriver(
-            self.settings, self._open_port, leak=self._leak_sensor(), open_at=self._open_at
+            self.settings, self._open_port, self.clock.now, self._leak_sensor(), self._open_at
         )
         self._telemetry: RotorTelemetry | None = None
-        self._arming = ArmingServer(self, self._driver.arming, self.settings, time.monotonic)
+        self._arming = ArmingServer(self, self._driver.arming, self.settings, self.clock.now)
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
         self.create_subscription(String, "rudder/trouble", self._on_rudder, QoSProfile(depth=1))
         self.create_service(Trigger, "~/clear_faults", self._on_clear_faults)
@@ -81,7 +82,7 @@ class RotorNode(DeviceNode):
 
     def _on_rudder(self, message: String) -> None:
         trouble = f"rudder: {message.data}" if message.data else ""
-        self._driver.arming.heard(RUDDER, time.monotonic(), trouble)
+        self._driver.arming.heard(RUDDER, self.clock.now(), trouble)
 
     def _on_clear_faults(
         self, _request: Trigger.Request, response: Trigger.Response

@@ -32,7 +32,7 @@ class RudderNode(DeviceNode):
     def __init__(self) -> None:
         super().__init__("rudder", RudderSettings)
         self._folder: tempfile.TemporaryDirectory[str] | None = None
-        self._driver = RudderDriver(self.settings, self._open_output)
+        self._driver = RudderDriver(self.settings, self._open_output, self.clock.now)
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
         self._arming = ArmingListener(self, self._on_state)
         self._trouble = self.create_publisher(String, "rudder/trouble", 10)

@@ -3,8 +3,10 @@
 """A serial port by pyserial, opened exclusively, with every failure turned into a TransportError."""
 
 import errno
+import os
 import select
 import termios
+import time
 from typing import Any
 
 from fish_hw.transport.errors import PortUnavailable, TransportError, unavailable
@@ -53,19 +55,41 @@ class SerialPort:
         self._ask_for_low_latency()
 
     def write(self, data: bytes) -> None:
-        """Send all of data; a write that takes longer than WRITE_TIMEOUT_S raises TransportError."""
+        """Send all of data; TransportError if the line does not take it within WRITE_TIMEOUT_S.
+
+        pyserial's own time-out also blames the line for a process that a busy computer let stand still.
+        """
+        end, rest = time.monotonic() + WRITE_TIMEOUT_S, memoryview(data)
         try:
-            self._serial.write(data)
-        except self._failures as error:
+            while rest := rest[self._write_some(rest) :]:
+                left = max(end - time.monotonic(), 0.0)
+                if not select.select([], [self._serial.fileno()], [], left)[1]:
+                    raise TransportError(
+                        f"serial port {self.port}: write failed: the line takes nothing for {WRITE_TIMEOUT_S:g} s"
+                    )
+        except (*self._failures, ValueError) as error:
             raise TransportError(f"serial port {self.port}: write failed: {error}") from error
 
     def read(self, timeout_s: float) -> bytes:
         """Bytes that arrived, waiting at most timeout_s for the first; empty if none came."""
         try:
-            readable, _, _ = select.select([self._serial.fileno()], [], [], timeout_s)
-            return bytes(self._serial.read(READ_BYTES)) if readable else b""
+            fd = self._serial.fileno()
+            if not select.select([fd], [], [], timeout_s)[0]:
+                return b""
+            if data := os.read(fd, READ_BYTES):
+                return data
+        except BlockingIOError:
+            return b""
         except (*self._failures, ValueError) as error:  # ValueError: select on a closed descriptor
             raise TransportError(f"serial port {self.port}: read failed: {error}") from error
+        raise TransportError(f"serial port {self.port}: read failed: the device is gone")
+
+    def _write_some(self, data: memoryview) -> int:
+        """Bytes that the line took at once."""
+        try:
+            return os.write(self._serial.fileno(), data)
+        except BlockingIOError:
+            return 0
 
     def close(self) -> None:
         """Close the port; errors of a port that is gone already do not matter."""

@@ -3,14 +3,14 @@
 """Ports of the fake robot (node fake_robot) as Unix sockets: an I2C bus and a camera, where the kernel has no emulation.
 
 A device name that begins with `unix:` names the socket. I2C: a request (operation, address, count, data) and its answer (errno,
-data). Camera: frames as (bytes, age [s]) and JPEG.
+data). Camera: frames as (bytes, time of the exposure [s] on the
+clock that both ends share: the computer's monotonic one, or simulated time) and JPEG.
 """
 
 import os
 import socket
 import struct
 import time
-from collections.abc import Callable
 
 from fish_hw.transport.errors import TransportError, unavailable
 from fish_hw.transport.video_capture import Frame, compressed_frame
@@ -82,8 +82,7 @@ class SocketI2c:
 class SocketCamera:
     """Frame source of the fake robot: JPEG as a camera sends it."""
 
-    def __init__(self, device: str, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(self, device: str) -> None:
         self._connection: socket.socket | None = connect(device, "camera")
 
     def read(self) -> Frame | None:
@@ -92,9 +91,8 @@ class SocketCamera:
             time.sleep(0.1)  # the camera was unplugged: the driver decides when to open it again
             return None
         try:
-            count, age_s = FRAME.unpack(receive(self._connection, FRAME.size))
-            arrived = self._clock()
-            return compressed_frame(arrived - age_s, receive(self._connection, count))
+            count, taken_s = FRAME.unpack(receive(self._connection, FRAME.size))
+            return compressed_frame(taken_s, receive(self._connection, count))
         except TimeoutError:
             return None
         except OSError:

@@ -18,22 +18,33 @@ class Lockstep:
     Who answers to every second one only shows it by silence (LOOSEN, or half the patience where that is less) and is
     then waited for in every second. Who stays silent for longer than `patience` [s of real time] is not waited for until
     heard again; with patience 0 nobody is.
+
+    Args:
+        patience: s of real time.
+        slack: s of simulated time that everybody may be behind; real drivers on emulated devices are behind by some periods.
     """
 
-    def __init__(self, patience: float) -> None:
+    def __init__(self, patience: float, slack: float = 0.0) -> None:
         self._patience = patience
+        self._least = max(slack, STRICT)
         self._loosen = min(LOOSEN, 0.5 * patience)
         self._answers: dict[str, float] = {}
         self._ahead: dict[str, float] = {}  # s that each may be behind
         self._since: float | None = None
+        self._awaited: list[str] = []
+
+    @property
+    def awaited(self) -> str:
+        """Who is waited for; empty while time runs."""
+        return ", ".join(self._awaited) if self._since is not None else ""
 
     def answered(self, who: str, stamp: float) -> None:
         """A message for this simulated time [s] came in."""
         if who in self._answers:
             between = max(stamp - self._answers[who], DT)
-            self._ahead[who] = min(self._ahead[who], between - STRICT)
+            self._ahead[who] = max(min(self._ahead[who], between - STRICT), self._least)
         else:
-            self._ahead[who] = STRICT
+            self._ahead[who] = self._least
         self._answers[who] = stamp
 
     def waited(self, now: float) -> float:
@@ -42,14 +53,14 @@ class Lockstep:
 
     def may_advance(self, simulated: float, now: float) -> bool:
         """Whether the simulation at `simulated` [s] may go on at the real time `now` [s]."""
-        late = self._late(simulated)
+        late = self._awaited = self._late(simulated)
         if late and self._patience > 0.0:
             if self._since is None:
                 self._since = now
             if self.waited(now) <= self._loosen:
                 return False
             for who in late:
-                self._ahead[who] = min(self._ahead[who] + DT, AHEAD)
+                self._ahead[who] = min(self._ahead[who] + DT, max(AHEAD, self._least))
             late = self._late(simulated)
             if late and self.waited(now) <= self._patience:
                 return False

@@ -17,8 +17,8 @@ wall_contacts.
 Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
 nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause, and after a step
 of the wall clock.
-With lockstep it stands still while joint_command or odometry/filtered are behind it (Lockstep), so that a run
-does not depend on how busy the computer is.
+With lockstep it stands still while joint_command, odometry/filtered or anybody who speaks on lockstep (std_msgs/Header:
+frame_id is who, stamp how far) is behind it (Lockstep), so that a run does not depend on how busy the computer is.
 """
 
 import math
@@ -54,6 +54,7 @@ QUEUE = 10
 RESENT = 1000  # messages that lockstep keeps for a recorder that lags: 10 s
 SAY_AGAIN = 0.5  # s of real time that lockstep waits before it says the newest IMU sample again
 CLOCK_AGAIN = 0.1  # s of real time, likewise of /clock: every node wakes up for it, and a busy computer would be busier
+WAIT_SAID = 1.0  # s of real time that lockstep waits before it says for whom
 COMMAND = "joint_command"  # source of the arming state
 SLOW = 0.95  # share of the asked pace below which the node says that it lags
 
@@ -85,7 +86,7 @@ class SimulatorNode(Node):
         )
         self._refused = self._divergences = self._contacts = 0
         self._refusal = ""
-        self._lockstep = Lockstep(config.lockstep)
+        self._lockstep = Lockstep(config.lockstep, config.lockstep_slack)
         self._felt: Imu | None = None  # newest sample
         self._felt_said = self._clock_said = 0.0  # s of real time
         self._create_interfaces(config.camera == "pose")
@@ -123,6 +124,7 @@ class SimulatorNode(Node):
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
             self.create_subscription(Odometry, "odometry/filtered", self._on_estimate, QUEUE)
+            self.create_subscription(Header, "lockstep", self._on_other, QUEUE)
         self._armed = ArmingServer(self, self._arming, self._config, lambda: self._simulation.time)
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Trigger, "reset", self._on_reset)
@@ -141,6 +143,9 @@ class SimulatorNode(Node):
 
     def _on_estimate(self, msg: Odometry) -> None:
         self._lockstep.answered("odometry/filtered", self._simulated(msg.header.stamp))
+
+    def _on_other(self, msg: Header) -> None:
+        self._lockstep.answered(msg.frame_id, self._simulated(msg.stamp))
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if self._paused and not request.data:
@@ -291,6 +296,8 @@ class SimulatorNode(Node):
                 DiagnosticStatus.WARN,
                 f"behind real time, {lost:.2f} s skipped in the last second",
             )
+        if self._lockstep.waited(time.monotonic()) > WAIT_SAID:
+            return DiagnosticStatus.WARN, f"waits for {self._lockstep.awaited}"
         if pace < SLOW * self._config.real_time_factor:
             return DiagnosticStatus.WARN, f"behind real time, running at {pace:.2f}"
         if not self._arming.armed:

@@ -1,0 +1,72 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The clock by which a node drives devices: the monotonic clock of the computer, or with use_sim_time that of /clock."""
+
+import time
+
+from builtin_interfaces.msg import Time
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time as RosTime
+from rosgraph_msgs.msg import Clock
+
+from fish_node.simulated_time import SimulatedTime
+
+TRIES = 3
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class RobotClock:
+    """Seconds for drivers and emulators, and their way to and from stamps.
+
+    Attributes:
+        simulated: whether time is that of /clock.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.simulated = bool(node.get_parameter("use_sim_time").value)
+        self._time = SimulatedTime()
+        if self.simulated:
+            node.create_subscription(Clock, "/clock", self._on_clock, NEWEST)
+
+    @property
+    def runs(self) -> bool:
+        """Whether there is a time: simulated time begins with the first message on /clock."""
+        return self._time.runs or not self.simulated
+
+    def now(self) -> float:
+        """The time [s]."""
+        return self._time.now() if self.simulated else time.monotonic()
+
+    def wall(self, duration_s: float) -> float:
+        """How long [s] to wait on the wall clock for a duration, before the time is looked at again."""
+        return self._time.wall(duration_s) if self.simulated else duration_s
+
+    def stamp(self, time_s: float) -> Time:
+        """The stamp of a time of this clock.
+
+        The monotonic and the ROS clock are read one after the other; of several tries the one that was interrupted least
+        counts.
+        """
+        if self.simulated:
+            return RosTime(nanoseconds=round(time_s * 1e9)).to_msg()
+        tries = []
+        for _ in range(TRIES):
+            before = time.monotonic()
+            now = self._node.get_clock().now()
+            after = time.monotonic()
+            tries.append((after - before, now - Duration(seconds=(before + after) / 2 - time_s)))
+        return min(tries, key=lambda entry: entry[0])[1].to_msg()
+
+    def of(self, stamp: Time) -> float:
+        """The time [s] on this clock of a stamp."""
+        stamp_s = float(stamp.sec + 1e-9 * stamp.nanosec)
+        if self.simulated:
+            return stamp_s
+        age_s: float = self._node.get_clock().now().nanoseconds * 1e-9 - stamp_s
+        return time.monotonic() - age_s
+
+    def _on_clock(self, message: Clock) -> None:
+        self._time.tick(message.clock.sec + 1e-9 * message.clock.nanosec)
