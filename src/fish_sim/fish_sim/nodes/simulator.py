@@ -45,6 +45,7 @@ from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.lockstep import Lockstep
 from fish_sim.nodes.pacer import MAX_LAG, Pacer
+from fish_sim.nodes.simulator_health import health
 from fish_sim.robot import Robot
 from fish_sim.robot_file import load_robot
 from fish_sim.simulation import Readings, Simulation
@@ -56,7 +57,6 @@ SAY_AGAIN = 0.5  # s of real time that lockstep waits before it says the newest 
 CLOCK_AGAIN = 0.1  # s of real time, likewise of /clock: every node wakes up for it, and a busy computer would be busier
 WAIT_SAID = 1.0  # s of real time that lockstep waits before it says for whom
 COMMAND = "joint_command"  # source of the arming state
-SLOW = 0.95  # share of the asked pace below which the node says that it lags
 
 
 class SimulatorNode(Node):
@@ -241,9 +241,8 @@ class SimulatorNode(Node):
         self._tail.publish(messages.tail(body, readings.truth))
         self._odometry.publish(messages.odometry(pool, body.frame_id, readings.truth))
         self._joints.publish(messages.rotor(body, readings.rotor))
-        self._felt = messages.imu(
-            Header(stamp=stamp, frame_id=self._frames[2]), readings.imu, self._config
-        )
+        sensor = Header(stamp=stamp, frame_id=self._frames[2])
+        self._felt = messages.imu(sensor, readings.imu, self._config)
         self._felt_said = time.monotonic()
         self._imu.publish(self._felt)
         if readings.battery is not None:
@@ -259,15 +258,23 @@ class SimulatorNode(Node):
         then, simulated_then, lost_then = self._reported
         self._reported = (now, simulated, lost)
         pace = (simulated - simulated_then) / (now - then)
-        level, text = self._judge(pace, lost - lost_then)
+        waits = self._lockstep.waited(now) > WAIT_SAID
+        level, text = health(
+            self._divergences,
+            self._refusal,
+            self._paused,
+            lost - lost_then,
+            self._lockstep.awaited if waits else "",
+            pace,
+            self._config.real_time_factor,
+            "" if self._arming.armed else self._arming.reason,
+        )
         self._log.say(level, text)
-        for warning in filter(None, [rivals.warning() for rivals in self._rivals]):
-            level, text = max(level, DiagnosticStatus.WARN), f"{text}; {warning}"
+        warnings = [rivals.warning() for rivals in self._rivals]
         if self._simulation.walls.touches(simulated):
-            level, text = (
-                max(level, DiagnosticStatus.WARN),
-                f"{text}; the fish is at the pool's wall",
-            )
+            warnings.append("the fish is at the pool's wall")
+        for warning in filter(None, warnings):
+            level, text = max(level, DiagnosticStatus.WARN), f"{text}; {warning}"
         values = {
             "real_time_factor": f"{pace:.3f}",
             "simulated_s": f"{simulated:.2f}",
@@ -278,31 +285,10 @@ class SimulatorNode(Node):
             "divergences": str(self._divergences),
             "wall_contacts": str(self._simulation.walls.contacts),
         }
-        status = messages.status(self.get_fully_qualified_name().lstrip("/"), level, text, values)
-        header = Header(stamp=self._stamp(simulated))
+        name, header = self.get_fully_qualified_name(), Header(stamp=self._stamp(simulated))
+        status = messages.status(name.lstrip("/"), level, text, values)
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
         self._refusal = ""
-
-    def _judge(self, pace: float, lost: float) -> tuple[bytes, str]:
-        """Worst news first."""
-        if self._divergences:
-            return DiagnosticStatus.ERROR, f"the motion diverged {self._divergences} times"
-        if self._refusal:
-            return DiagnosticStatus.WARN, f"joint_command refused: {self._refusal}"
-        if self._paused:
-            return DiagnosticStatus.OK, "paused"
-        if lost > 0.0:
-            return (
-                DiagnosticStatus.WARN,
-                f"behind real time, {lost:.2f} s skipped in the last second",
-            )
-        if self._lockstep.waited(time.monotonic()) > WAIT_SAID:
-            return DiagnosticStatus.WARN, f"waits for {self._lockstep.awaited}"
-        if pace < SLOW * self._config.real_time_factor:
-            return DiagnosticStatus.WARN, f"behind real time, running at {pace:.2f}"
-        if not self._arming.armed:
-            return DiagnosticStatus.WARN, f"disarmed: {self._arming.reason}"
-        return DiagnosticStatus.OK, "running"
 
 
 def main() -> int:
