@@ -52,7 +52,9 @@ def group_table(scores: Sequence[Score]) -> Table:
             ]
         )
     note = "; ".join(
-        f"{name}: {(f.__doc__ or '').strip().rstrip('.')}" for name, f in GROUPS.items()
+        f"{name}: {(f.__doc__ or '').strip().rstrip('.')}"
+        for name, f in GROUPS.items()
+        if any(row[0] == name for row in rows)
     )
     return Table("Groups", header, rows, note + ".")
 
