@@ -3,6 +3,7 @@
 """Which head is the own fish: the likeliest one, or none where another could be it as well."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import Enum
 from math import hypot, radians
 from typing import Any
@@ -39,6 +40,7 @@ class Reason(Enum):
     OUTSIDE = "pose outside the pool"
     JUMP = "jump: too far from the last pose"
     AMBIGUOUS = "more than one fish has these markers"
+    MIRRORED = "only the mirror image in a wall is seen"
     NO_TAG = "no tag of the head"
     TAG_SIZE = "tag of the head not of its size"
 
@@ -141,7 +143,10 @@ class Choice:
         if not heads:
             return reason
         assert self._own is not None
-        tracks = [self._own, *self._rivals]
+        real = [head for head in heads if not _reflected(head.pose, self._own, stamp)]
+        if not real:
+            return Reason.MIRRORED
+        heads, tracks = real, [self._own, *self._rivals]
         allowed = np.array(
             [[reaches(t, h.pose, stamp, self._config) for h in heads] for t in tracks]
         )
@@ -217,6 +222,22 @@ def reaches(track: Track, pose: HeadPose, stamp: float, config: TrackerConfig) -
 def in_pool(pose: HeadPose, margin: float) -> bool:
     """Whether a pose is in the pool, or at most margin (m) outside its walls."""
     return abs(pose.x) <= POOL[0] / 2 + margin and abs(pose.y) <= POOL[1] / 2 + margin
+
+
+def _reflected(pose: HeadPose, track: Track, stamp: float) -> bool:
+    """Whether a pose beyond a wall is the wall's image of a fish that continues a track better."""
+    for axis, side in enumerate(POOL):
+        place = (pose.x, pose.y)[axis]
+        if abs(place) <= side / 2:
+            continue
+        back = float(np.copysign(side, place)) - place
+        if axis == 0:
+            real = replace(pose, x=back, heading=wrap(np.pi - pose.heading))
+        else:
+            real = replace(pose, y=back, heading=-pose.heading)
+        if track.cost(real, stamp) < track.cost(pose, stamp):
+            return True
+    return False
 
 
 def _mirror_image(pose: HeadPose, other: HeadPose) -> bool:

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from pool_picture import CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw, lens_fields
 
 from fish_vision.annotate import annotated, tail_points
-from fish_vision.calibration import Calibration, Lens
+from fish_vision.calibration import POOL, Calibration, Lens
 from fish_vision.choice import Reason
 from fish_vision.tracker import Detection, Lost, Tracker
 
@@ -119,6 +119,17 @@ def test_the_own_fish_is_followed_past_one_of_the_same_look(tracker: Tracker) ->
         x = -0.3 + 0.03 * k
         both = draw(discs_of_fish(-x, 0.1, pi) + discs_of_fish(x, 0.0, 0.0))
         assert seen(tracker.track(both, k / 30)).head.x == pytest.approx(x, abs=5e-4)
+
+
+def test_the_walls_image_of_the_own_fish_is_not_the_fish(tracker: Tracker) -> None:
+    """The fish swims along the wall and its markers are hidden; its mirror image is as near as a fish can swim."""
+    y, heading, wall = POOL[1] / 2 - 0.035, 0.1, POOL[1] / 2
+    for k in range(5):
+        seen(tracker.track(draw(discs_of_fish(0.01 * k, y, heading)), k / 30))
+    image = draw(discs_of_fish(0.05, 2 * wall - y, -heading))
+    assert reason(tracker.track(image, 5 / 30)) == Reason.MIRRORED
+    again = seen(tracker.track(draw(discs_of_fish(0.06, y, heading)), 6 / 30))
+    assert again.head.y == pytest.approx(y, abs=5e-4)
 
 
 @pytest.mark.parametrize(("look_around_s", "taken_for_ours"), [(0.5, False), (1000.0, True)])
