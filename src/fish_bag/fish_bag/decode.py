@@ -91,7 +91,7 @@ def camera(block: Block) -> Arrays:
     covariance = block.values["pose.covariance"].reshape(-1, 6, 6)[:, POSE_ROWS[:, None], POSE_ROWS]
     position = vector(block, "pose.pose.position")
     pose = np.column_stack([position[:, :2], yaw(block, "pose.pose.orientation")])
-    absent = (np.diagonal(covariance, axis1=1, axis2=2) < 0.0).any(axis=1)
+    absent: np.ndarray = np.any(np.diagonal(covariance, axis1=1, axis2=2) < 0.0, axis=1)
     pose[absent] = np.nan
     x, y, psi = pose.T
     return {"x": x, "y": y, "psi": psi, "covariance": covariance, NOT_MEASURED: absent[:, None]}

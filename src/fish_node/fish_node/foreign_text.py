@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-LONGEST = 200  # characters
+LONGEST = 400  # characters
 
 
 def visible(text: str) -> str:

@@ -63,11 +63,11 @@ class FoxgloveBridge:
             ):
                 continue
             offered = self._node.get_publishers_info_by_topic(topic)
-            types = sorted({info.topic_type for info in offered})
+            types: list[str] = sorted({info.topic_type for info in offered})
             if (
                 types
             ):  # a topic that is only heard may still get a publisher of any quality of service
-                own = expected.get(topic)
+                own = expected.get(topic, "")
                 self._pass_on(topic, own if own in types else types[0], offered)
 
     def _pass_on(self, topic: str, name: str, offered: Iterable[TopicEndpointInfo]) -> None:
