@@ -224,6 +224,17 @@ def test_a_command_or_option_that_is_not_there_is_wrong(tmp_path):
     assert wrong_commands(page) == [*wrong, "make coffee"]
 
 
+STARTS_ONE_NODE = re.compile(r"^(ros2 run|install/\S+) .*--ros-args", re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", EVERY_PAGE)
+def test_single_nodes_are_started_on_the_loopback_interface(page):
+    """Whoever reaches the topics can drive the motor: no page opens ports to the network by the way."""
+    for _, code in FENCE.findall(page.read_text()):
+        node = STARTS_ONE_NODE.search(code)
+        assert node is None or 'eval "$(robofish loopback)"' in code[: node.start()], code
+
+
 def test_the_generated_pages_are_current():
     result = subprocess.run(
         [sys.executable, "docs/generate_reference.py", "--check"],

@@ -47,7 +47,7 @@ FLAG_TEXTS = {
     NOT_MEASURED: (
         "warning",
         "not_measured",
-        "messages say by a covariance of -1 that gyro or accelerometer are not measured; they are used nowhere",
+        "messages say by a covariance of -1 that gyro, accelerometer or pose are not measured; they are used nowhere",
     ),
     UNREADABLE: ("error", "unreadable", "messages cannot be decoded"),
 }
@@ -76,7 +76,7 @@ def flag_samples(
         if name not in ROLES[role].optional:
             bad = ~np.isfinite(values).reshape(len(t), -1).all(axis=1)
             if NOT_MEASURED_ARRAY in decoded.arrays and name in ABSENT_COLUMNS:
-                column = decoded.arrays[NOT_MEASURED_ARRAY][:, ABSENT_COLUMNS.index(name)]
+                column = decoded.arrays[NOT_MEASURED_ARRAY][:, ABSENT_COLUMNS[name]]
                 absent = column == 1
                 flags[absent] |= NOT_MEASURED
                 bad &= ~absent

@@ -26,8 +26,8 @@ from fish_bag.trial import (
 )
 
 POSE_ROWS = np.array([0, 1, 5])  # x, y, rotation about z in a 6x6 covariance (REP 103 order)
-NOT_MEASURED = "not_measured"  # an array of a stream of its own: (n, 2) for ABSENT_COLUMNS
-ABSENT_COLUMNS = ("gyro", "accel")
+NOT_MEASURED = "not_measured"  # an array of a stream of its own: (n, columns)
+ABSENT_COLUMNS = {"gyro": 0, "accel": 1, "x": 0, "y": 0, "psi": 0}  # its column for an array
 Arrays = dict[str, np.ndarray]
 
 
@@ -87,10 +87,14 @@ def _measured(block: Block, path: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def camera(block: Block) -> Arrays:
+    """A pose of which a variance is below 0, such as -1, is not measured: a part of a pose is used nowhere."""
     covariance = block.values["pose.covariance"].reshape(-1, 6, 6)[:, POSE_ROWS[:, None], POSE_ROWS]
     position = vector(block, "pose.pose.position")
-    psi = yaw(block, "pose.pose.orientation")
-    return {"x": position[:, 0], "y": position[:, 1], "psi": psi, "covariance": covariance}
+    pose = np.column_stack([position[:, :2], yaw(block, "pose.pose.orientation")])
+    absent: np.ndarray = np.any(np.diagonal(covariance, axis1=1, axis2=2) < 0.0, axis=1)
+    pose[absent] = np.nan
+    x, y, psi = pose.T
+    return {"x": x, "y": y, "psi": psi, "covariance": covariance, NOT_MEASURED: absent[:, None]}
 
 
 def tail(block: Block) -> Arrays:

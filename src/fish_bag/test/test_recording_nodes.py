@@ -169,6 +169,8 @@ def test_a_second_type_on_a_topic_hides_no_message_of_the_robot(peer, tmp_path, 
     assert len(recorded["/fish/joint_command"].raws) == 100
     assert recorded["/fish/imu/data"].raws == raws
     assert "/fish/imu/data (std_msgs/msg/Float64) is not recorded" in out
+    reason = "the robot publishes" if stranger_is_first else "sensor_msgs/msg/Imu came first"
+    assert reason in out
 
 
 @pytest.mark.parametrize(

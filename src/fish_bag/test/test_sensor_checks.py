@@ -142,3 +142,17 @@ def test_a_gyro_that_is_not_measured_is_used_nowhere(tmp_path):
     assert np.isfinite(trial.imu.accel).all()
     assert (trial.imu.flags == NOT_MEASURED).all()
     assert trial.clean().imu is None
+
+
+@pytest.mark.parametrize("place", [0, 7, 35], ids=["x", "y", "yaw"])
+def test_a_pose_of_which_a_part_is_not_measured_is_used_nowhere(tmp_path, place):
+    messages = swim()
+    poses = [message for _, topic, message in messages if topic == "/fish/camera/pose"]
+    for message in poses[:5]:
+        message.pose.covariance[place] = -1.0
+    trial = read_trial(samples.write_mcap(tmp_path / "trial", messages))
+    assert [(p.severity, p.kind, p.count) for p in trial.problems] == [
+        ("warning", "not_measured", 5)
+    ]
+    assert np.isnan(trial.camera.psi[:5]).all()
+    assert len(trial.clean().camera) == len(poses) - 5

@@ -18,6 +18,7 @@ from fish_bringup.run_limits import RunWatch, Seen
 from fish_control.path_tracker import PathTracker
 from fish_report.errors import UserError
 from fish_report.interruption import Interruption
+from fish_report.terminal import say
 
 FUSION = CONTROL[1]  # says odometry/filtered
 START_TIMEOUT = 30.0  # s in which each thing that is waited for must come
@@ -162,7 +163,7 @@ class Robot:
         if disarmed:
             self.watch.ask_to_arm()
             if disarmed != said:
-                console.print(f"{t:.1f} s: disarmed ({disarmed}); armed again by this command")
+                say(console, f"{t:.1f} s: disarmed ({disarmed}); armed again by this command")
         return disarmed
 
     def _seen(self) -> tuple[Sight, PathTracker]:

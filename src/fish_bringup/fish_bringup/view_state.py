@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fish_control.pool import HALF_LENGTH, HALF_WIDTH
+from fish_report.printable import plain
 
 TRAIL = 600  # poses: a minute of them
 TRAIL_PERIOD = 0.1  # s
@@ -73,7 +74,7 @@ class ViewState:
 
     def health(self, node: str, level: int, message: str) -> None:
         """Take what a node says of itself; level as in diagnostic_msgs."""
-        self._health[node] = (level, message)
+        self._health[plain(node)] = (level, plain(message))
 
     def document(self, now: float) -> str:
         """The JSON that the page reads; `now` [s] on the clock of the stamps. Numbers that are none become null."""

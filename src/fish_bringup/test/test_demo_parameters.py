@@ -50,3 +50,11 @@ def test_a_computer_with_few_cores_gets_a_slower_fake_robot_and_no_slower_simula
     assert 0.0 < paces[0] < 0.3
     assert paces[-1] == 1.0
     assert demo.pace("sim", 1) == 1.0
+
+
+def test_the_latency_is_the_robot_s_own_and_its_texts_can_do_no_harm():
+    said = {"latency [/x]\x1b[31m": "m" * 5000, "commands": "7"}
+    table = demo._latency_table({"evil/controller": {"latency": "1"}, "fish/controller": said})
+    ((key, value),) = table.rows
+    assert key == "latency [/x]\\x1b[31m"
+    assert len(value) < 500

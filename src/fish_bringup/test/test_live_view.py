@@ -11,6 +11,7 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry, Path
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -151,3 +152,36 @@ def test_foxglove_gets_a_channel_for_each_topic_of_the_robot(robot):
         assert not any(topic.startswith("/fish_2/") for topic in r.node._bridge._known)
     finally:
         stranger.destroy_node()
+
+
+@pytest.fixture
+def foreign(robot):
+    """A node in a process's context of its own, as one middleware participant has one type for a topic."""
+    context = Context()
+    rclpy.init(context=context)
+    node = Node("foreign", namespace="fish", context=context)
+    yield node
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def test_a_foreign_type_on_a_topic_of_the_robot_does_not_end_the_view(robot, foreign):
+    pytest.importorskip("foxglove")
+    foreign.create_publisher(DiagnosticArray, "odometry/filtered", 10)  # sorts before the own type
+    foreign.create_publisher(DiagnosticArray, "tracking/error", 10)
+    r = robot(foxglove_port=free_port())
+    topics = {"/fish/odometry/filtered", "/fish/tracking/error"}
+    r.until(lambda: topics <= r.node._bridge._known)
+    r.until(lambda: r.odometry.get_subscription_count() == 2)  # the page's and Foxglove's
+    r.until(lambda: r.swim(0.3) or r.shown()["pose"])
+
+
+def test_foxglove_hears_a_node_that_comes_after_the_view(robot):
+    pytest.importorskip("foxglove")
+    r = robot(foxglove_port=free_port())
+    r.until(lambda: "/fish/odometry/filtered" in r.node._bridge._known)
+    end = time.monotonic() + 2.5
+    while time.monotonic() < end:
+        r.executor.spin_once(timeout_sec=0.05)
+    said = r.other.create_publisher(DiagnosticArray, "/diagnostics", 10)
+    r.until(lambda: said.get_subscription_count() == 2)

@@ -97,6 +97,21 @@ def test_a_robot_that_is_disarmed_on_the_way_is_armed_again_and_it_is_said(
     assert capsys.readouterr().out.count("disarmed (camera lost); armed again") == 1
 
 
+def test_the_reason_of_a_foreign_node_is_shown_as_it_is_and_not_obeyed(nodes, interruption, capsys):
+    fish = Fish(make_path("straight", length=2.0))
+
+    def disarm():
+        fish.disarmed, fish.asked = "[/x] \x1b[31m" + "m" * 5000, 0
+
+    fish.events[3.0] = disarm
+    Robot(nodes, fish, fish.listen, interruption).arm()
+    Robot(nodes, fish, fish.listen, interruption).swim(600.0, Console())
+    out = capsys.readouterr().out
+    assert "disarmed ([/x] \\x1b[31mmm" in out
+    assert "\x1b" not in out
+    assert len(out) < 1000
+
+
 def test_a_run_ends_at_the_end_of_an_open_path(nodes, interruption):
     fish = Fish(make_path("straight", length=2.0))
     assert swim(fish, nodes, interruption).reason == "at the end of the path"

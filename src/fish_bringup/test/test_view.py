@@ -60,6 +60,14 @@ def test_the_document_holds_what_was_said_last():
     ]
 
 
+def test_texts_of_foreign_nodes_are_cut():
+    state = ViewState()
+    state.health("[/x]\x1b[31m", 2, "m" * 5000)
+    (shown,) = json.loads(state.document(0.0))["health"]
+    assert shown["node"] == "[/x]\\x1b[31m"
+    assert len(shown["message"]) < 500
+
+
 def test_numbers_that_are_none_are_valid_json():
     state = ViewState()
     state.errors = (math.nan, math.inf, 1.0)

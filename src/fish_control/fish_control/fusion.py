@@ -19,7 +19,7 @@ from fish_control.imu_history import ImuHistory, InertialSample
 from fish_control.measurement_buffer import CameraPose, Moment, Timeline, start_moment
 from fish_control.noise_scale import EVERY, HORIZON, NoiseScale
 from fish_control.pose_checks import AgreeingPoses, RepeatedPose, doubts_motion, is_near
-from fish_control.pose_weight import given_covariance, weighted
+from fish_control.pose_weight import given_covariance, not_measured, weighted
 from fish_control.strapdown import StrapdownFilter
 
 Array = NDArray[np.float64]
@@ -129,8 +129,9 @@ class Fusion:
 
     def add_pose(self, stamp: float, pose: ArrayLike, covariance: Array | None = None) -> bool:
         """A camera pose (x, y, psi) [m, m, rad] with its stamp [s]; False if it was not used."""
-        R = given_covariance(covariance, self.config)
-        camera = CameraPose(np.array(pose, dtype=float), R)
+        if covariance is not None and not_measured(covariance):
+            return self._refuse("pose_not_measured")
+        camera = CameraPose(np.array(pose, float), given_covariance(covariance, self.config))
         if not all(np.all(np.isfinite(v)) for v in (stamp, camera.pose, camera.R)):
             return self._refuse("pose_not_finite")
         if any(raw.stamp == stamp for raw in self._raw):

@@ -15,8 +15,13 @@ from fish_control.noise_scale import NoiseScale
 Array = NDArray[np.float64]
 
 
+def not_measured(covariance: Array) -> bool:
+    """Whether a variance of a camera pose's (3, 3) covariance, below 0 such as -1, says that a part is not measured."""
+    return bool(np.any(np.diagonal(covariance) < 0.0))
+
+
 def given_covariance(covariance: Array | None, config: FusionConfig) -> Array:
-    """R (3, 3) of a camera pose: what its message says, or the parameters where it says nothing."""
+    """R (3, 3) of a camera pose: what its message says, or the parameters where a variance is 0 and so says nothing."""
     deviations = [config.camera_position_noise] * 2 + [config.camera_heading_noise]
     given = np.diag(np.square(deviations))
     if covariance is None:

@@ -267,6 +267,18 @@ def test_values_that_are_not_finite_are_counted_and_dropped(bad):
     np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
 
 
+@pytest.mark.parametrize("place", range(3))
+def test_a_pose_of_which_a_part_is_not_measured_is_not_used(place):
+    fusion = Fusion()
+    feed(fusion, measurements(2.0))
+    before = fusion.estimate()
+    R = np.diag([1e-5, 1e-5, 1e-4])
+    R[place, place] = -1.0
+    assert not fusion.add_pose(2.0, [1.0, 1.0, 1.0], R)
+    assert fusion.counts["pose_not_measured"] == 1
+    np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
+
+
 @pytest.mark.parametrize(
     "wrong", [(60.5, 0, 0), (-12.5, 0, 0), (0, 136, 0), (0, 15, -15), (0, 3e38, 3e38)]
 )

@@ -132,7 +132,7 @@ def odometry(time, x=0.0, y=0.0, yaw=0.0, u=0.2, variance=1e-5, twist_variance=1
     return message
 
 
-def feed_fusion(bench, start, seconds, camera=True, imu=True, frame="pool"):
+def feed_fusion(bench, start, seconds, camera=True, imu=True, frame="pool", unmeasured=None):
     """A fish that swims ahead at 0.2 m/s, in stamps that run ahead of the clock as fast as they are said."""
     for k in range(int(seconds * 100)):
         t = start + 0.01 * k
@@ -150,6 +150,8 @@ def feed_fusion(bench, start, seconds, camera=True, imu=True, frame="pool"):
             pose.header.stamp, pose.header.frame_id = to_stamp(t), frame
             pose.pose.pose.position.x = 0.2 * (t - start)
             pose.pose.pose.orientation = to_quaternion(0.0)
+            if unmeasured is not None:
+                pose.pose.covariance[unmeasured] = -1.0
             bench.say("camera/pose", pose)
         bench.executor.spin_once(timeout_sec=0.001)
         bench.executor.spin_once(timeout_sec=0.001)
@@ -245,6 +247,15 @@ def test_fusion_refuses_poses_of_another_frame_and_names_it(bench):
     feed_fusion(b, start + 1.0, 1.0, frame="camera_optical")
     b.until(lambda: b.said(b"\x02", "camera_optical"))
     assert b.node._fusion.counts["pose_wrong_frame"] > 10
+
+
+@pytest.mark.parametrize("place", [0, 7, 35])
+def test_fusion_refuses_poses_of_which_a_part_is_not_measured(bench, place):
+    b = bench(FusionNode)
+    feed_fusion(b, b.now(), 0.5, unmeasured=place)
+    b.until(lambda: b.said(b"\x02", "not measured"))
+    assert b.node._fusion.counts["pose_not_measured"] > 10
+    assert b.node._fusion.counts["pose"] == b.node._fusion.counts["started"] == 0
 
 
 def test_fusion_uses_nothing_that_a_message_calls_not_measured(bench):

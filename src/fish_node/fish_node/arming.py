@@ -16,6 +16,8 @@ import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from fish_node.foreign_text import visible
+
 ESTIMATES = ("required", "watched", "ignored")
 AT_START = "not armed since the start"
 
@@ -106,7 +108,9 @@ class Arming:
         with self._lock:
             self._sources.setdefault(name, Source(name, required=False))
             before = self._heard.get(name, _Heard())
-            self._heard[name] = _Heard(now, trouble, before.since_s if before.trouble else now)
+            self._heard[name] = _Heard(
+                now, visible(trouble), before.since_s if before.trouble else now
+            )
 
     def troubles(self, now: float, patient: bool = False) -> list[str]:
         """Everything that forbids to move at `now` [s], in words; patient: without what may last a little longer."""
@@ -129,7 +133,7 @@ class Arming:
         """Disarm until `arm`; the first reason of a stop is kept."""
         with self._lock:
             if self._armed:
-                self._armed, self.reason = False, reason
+                self._armed, self.reason = False, visible(reason)
 
     def check(self, now: float) -> bool:
         """Whether the motors may move at `now` [s]; disarms at the first trouble."""

@@ -20,6 +20,8 @@ from fish_node.camera_document import WRONG, parse
 
 # numbers of coefficients that each model may have; none and four of plumb_bob are five with zeros
 COEFFICIENTS = {"plumb_bob": (5, 4, 0), "rational_polynomial": (8,), "equidistant": (4,)}
+# OpenCV's rational model gives 14: behind the 8 those of a thin prism and a tilted sensor, zero unless they were asked for
+LONGER = (8, 12, 14)
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 LONGEST = 100  # characters of a foreign text in a message
 
@@ -173,8 +175,8 @@ class _Fields:
         model = self._document.get("distortion_model")
         if model is None:
             fisheye = bool(self._document.get("fisheye_model"))
-            data = self.numbers(name, (4,) if fisheye else (5, 4, 8, 0))
-            model = {8: "rational_polynomial"}.get(len(data), "plumb_bob")
+            data = self.numbers(name, (4,) if fisheye else (5, 4, *LONGER, 0))
+            model = "rational_polynomial" if len(data) in LONGER else "plumb_bob"
             model = "equidistant" if fisheye else model
         if not isinstance(model, str) or model not in COEFFICIENTS:
             known = ", ".join(COEFFICIENTS)
@@ -183,7 +185,14 @@ class _Fields:
                 f"is {_short(repr(model))}",
                 f"one of {known}; calibrate with one of these",
             )
-        data = self.numbers(name, COEFFICIENTS[model])
+        data = self.numbers(name, LONGER if model == "rational_polynomial" else COEFFICIENTS[model])
+        if any(data[8:]):
+            raise self.wrong(
+                f"{name}.data",
+                f"is {_short(str(list(data)))}",
+                "zeros behind the first 8; calibrate without thin prism and tilted sensor",
+            )
+        data = data[:8]
         return model, (*data, *[0.0] * (COEFFICIENTS[model][0] - len(data)))
 
 

@@ -178,3 +178,15 @@ def test_what_fusion_does_not_vouch_for_is_lost(pose, twist, finite, said):
 def test_settings_that_cannot_be_are_refused(values, said):
     with pytest.raises(ValueError, match=said):
         ArmingSettings(**values)
+
+
+def test_texts_of_other_nodes_can_do_no_harm():
+    """A terminal obeys escape sequences, and a log of megabytes hides the rest."""
+    arming = Arming()
+    arming.arm(0.0)
+    arming.disarm("\x1b[31mred\x07\nnext " + "x" * 5000)
+    assert arming.reason.startswith("\\x1b[31mred\\x07\\nnext xxx")
+    assert arming.reason.isprintable()
+    assert len(arming.reason) < 500
+    arming.heard("rudder", 1.0, "\x1b]0;title\x07")
+    assert arming.arm(1.0) == "\\x1b]0;title\\x07"

@@ -43,6 +43,7 @@ def changed(model, data):
         ("plumb_bob", [-0.3, 0.1, 0.0, 0.0, 0.2], (-0.3, 0.1, 0.0, 0.0, 0.2)),
         ("plumb_bob", [], (0.0,) * 5),
         ("rational_polynomial", [0.1] * 8, (0.1,) * 8),
+        ("rational_polynomial", [0.1] * 8 + [0.0] * 6, (0.1,) * 8),
         ("equidistant", [0.05, 0.04, -0.02, 0.004], (0.05, 0.04, -0.02, 0.004)),
     ],
 )
@@ -212,3 +213,17 @@ def test_a_pointer_in_place_of_the_file_is_named(tmp_path):
     text = "version https://git-lfs.github.com/spec/v1\noid sha256:aa\nsize 130\n"
     with pytest.raises(CameraFileError, match="Git LFS pointer"):
         read_camera_file(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("model", ["rational_polynomial", None])
+@pytest.mark.parametrize("count", [12, 14])
+def test_the_rational_model_of_opencv_has_more_coefficients_which_are_zero(tmp_path, model, count):
+    """calibrateCamera with CALIB_RATIONAL_MODEL returns 14; a thin prism is another model."""
+    document = changed("rational_polynomial", [0.1] * 8 + [0.0] * (count - 8))
+    if model is None:
+        del document["distortion_model"]
+    camera = read_camera_file(written(tmp_path, document))
+    assert (camera.model, camera.distortion) == ("rational_polynomial", (0.1,) * 8)
+    document["distortion_coefficients"]["data"][-1] = 0.01
+    with pytest.raises(CameraFileError, match="thin prism"):
+        read_camera_file(written(tmp_path, document))

@@ -94,7 +94,11 @@ class RecorderNode(Node):
         except (
             Exception
         ) as error:  # rclpy has errors of its own, for example for a second type on a topic
-            self._refuse(key, " ".join(str(error).split()))
+            others = [name for there, name in self._subscriptions_of if there == topic]
+            reason = (
+                f"a node hears one type on a topic, and {others[0]} came first" if others else error
+            )
+            self._refuse(key, " ".join(str(reason).split()))
             return
         self._subscriptions_of[key] = (subscription, wanted, target)
         target.append(self.recording.add_topic(topic, kind, offered[0]))

@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 
 from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from fish_bag.message_types import message_type
+from fish_bag.namespace import message_types
 from fish_bag.nodes.raw_topics import from_profile, message_class, to_profile
-from fish_bag.problem import RecordingError
 from fish_bag.recorder_config import common_qos
+from fish_report.printable import plain
 
 LOOK_PERIOD = 1.0  # s between looks for new topics
 
@@ -52,26 +55,37 @@ class FoxgloveBridge:
         self._server.stop()
 
     def _look(self) -> None:
-        prefix = f"{self._node.get_namespace().rstrip('/')}/"
-        for topic, types in self._node.get_topic_names_and_types():
-            if topic not in self._known and (topic.startswith(prefix) or topic in self.SHARED):
-                self._pass_on(topic, types[0])
+        namespace = self._node.get_namespace()
+        expected = message_types(namespace)
+        for topic, _ in self._node.get_topic_names_and_types():
+            if topic in self._known or not (
+                topic.startswith(f"{namespace.rstrip('/')}/") or topic in self.SHARED
+            ):
+                continue
+            offered = self._node.get_publishers_info_by_topic(topic)
+            types: list[str] = sorted({info.topic_type for info in offered})
+            if (
+                types
+            ):  # a topic that is only heard may still get a publisher of any quality of service
+                own = expected.get(topic, "")
+                self._pass_on(topic, own if own in types else types[0], offered)
 
-    def _pass_on(self, topic: str, name: str) -> None:
-        """One channel and one raw subscription; a type that is not installed here is left out with a line."""
+    def _pass_on(self, topic: str, name: str, offered: Iterable[TopicEndpointInfo]) -> None:
+        """One channel and one raw subscription; a topic that cannot be heard here is left out with a line."""
         self._known.add(topic)
-        try:
-            kind, definition = message_class(name), message_type(name).definition
-        except RecordingError as error:
-            self._node.get_logger().warning(f"{topic} is not shown: {error}")
-            return
-        schema = self._foxglove.Schema(name=name, encoding="ros2msg", data=definition)
-        channel = self._foxglove.Channel(topic, schema=schema, message_encoding="cdr")
-        offered = self._node.get_publishers_info_by_topic(topic)
-        wanted = common_qos([from_profile(info.qos_profile) for info in offered])
-        self._node.create_subscription(
-            kind, topic, partial(_log, channel), to_profile(wanted), raw=True
+        wanted = common_qos(
+            [from_profile(info.qos_profile) for info in offered if info.topic_type == name]
         )
+        try:
+            schema = self._foxglove.Schema(
+                name=name, encoding="ros2msg", data=message_type(name).definition
+            )
+            channel = self._foxglove.Channel(topic, schema=schema, message_encoding="cdr")
+            self._node.create_subscription(
+                message_class(name), topic, partial(_log, channel), to_profile(wanted), raw=True
+            )
+        except Exception as error:  # rclpy has errors of its own, as for a second type on a topic
+            self._node.get_logger().warning(plain(f"{topic} ({name}) is not shown: {error}"))
 
 
 def _log(channel: object, data: bytes) -> None:

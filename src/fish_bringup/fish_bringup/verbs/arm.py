@@ -14,6 +14,7 @@ import argparse
 from fish_bringup.node_table import NAMESPACE
 from fish_bringup.nodes.operator import set_armed
 from fish_report.errors import UserError
+from fish_report.printable import plain
 
 TIMEOUT = 5.0  # s
 
@@ -45,5 +46,5 @@ def ask(armed: bool, args: argparse.Namespace) -> int:
     done, said = set_armed(armed, args.namespace, args.domain, args.timeout)
     if not done:
         raise UserError(f"not armed: {said}")
-    print(said)
+    print(plain(said))
     return 0

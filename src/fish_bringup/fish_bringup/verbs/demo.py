@@ -25,6 +25,7 @@ from fish_bringup.node_table import (
     FAKE,
     HARDWARE,
     LAGS,
+    NAMESPACE,
     RECORDER,
     SIMULATED,
     VIEW,
@@ -49,6 +50,7 @@ from fish_report.errors import UserError, user_errors
 from fish_report.interruption import Interruption
 from fish_report.output_folder import new_folder
 from fish_report.page import Table
+from fish_report.printable import plain
 from fish_report.terminal import print_table, say, terminal
 from fish_sim.robot_argument import read_model
 
@@ -259,10 +261,12 @@ def _say_view(
 
 def _latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:
     """What the controller says of its own latency and period."""
-    said = next(
-        (values for name, values in diagnostics.items() if name.endswith("/controller")), {}
-    )
-    rows = [[key, value] for key, value in said.items() if "latency" in key or "period" in key]
+    said = diagnostics.get(f"{NAMESPACE.strip('/')}/controller", {})
+    rows = [
+        [plain(key), plain(value)]
+        for key, value in said.items()
+        if "latency" in key or "period" in key
+    ]
     return Table(
         "Controller",
         ["value", "measured"],

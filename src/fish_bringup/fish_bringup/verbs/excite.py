@@ -55,7 +55,7 @@ from fish_report.errors import UserError, user_errors
 from fish_report.interruption import Interruption
 from fish_report.output_folder import new_folder
 from fish_report.page import Table
-from fish_report.terminal import print_table, say, terminal
+from fish_report.terminal import cell, print_table, say, terminal
 from fish_sim.robot import Robot
 from fish_sim.robot_argument import read_model
 from fish_sim.way import way_from_rest
@@ -229,10 +229,9 @@ def _swim(
                 patience.heed(at)
                 if at is not None:
                     end_if_due(run_watch, at.stamp, watch.seen)
-                line.update(
-                    f"{watch.diagnostics[EXCITER_NAME]['time_s']} s of the program   "
-                    + (f"x {at.x:+.2f} m  y {at.y:+.2f} m   speed {at.speed:.2f} m/s" if at else "")
-                )
+                where = f"x {at.x:+.2f} m  y {at.y:+.2f} m   speed {at.speed:.2f} m/s" if at else ""
+                time_s = watch.diagnostics[EXCITER_NAME]["time_s"]
+                line.update(cell(f"{time_s} s of the program   {where}"))
             listen(COAST)
         nodes.stop([EXCITER])
         nodes.stop([RECORDER])

@@ -3,9 +3,9 @@
 """camera/pose + imu/data -> odometry/filtered (100 Hz, pool -> base_link), /diagnostics.
 
 The variance of the pose grows while the camera is lost; a twist variance of 1e4 says that the IMU is lost. What a message
-calls not measured (first covariance -1, sensor_msgs) is used nowhere, and neither are poses of another frame than the
-pool's. The transform pool -> base_link and the static base_link -> imu_link are broadcast where tf2_msgs is
-installed. Decisions are in Fusion.
+calls not measured is used nowhere: an IMU's first covariance of -1 (sensor_msgs), a pose's variance of x, y or yaw below 0.
+Neither are poses of another frame than the pool's. The transform pool -> base_link and the static base_link -> imu_link are
+broadcast where tf2_msgs is installed. Decisions are in Fusion.
 """
 
 from typing import Any
@@ -34,6 +34,7 @@ from fish_control.nodes.messages import (
     yaw_of,
 )
 from fish_control.nodes.reporter import Reporter
+from fish_control.pose_weight import not_measured
 from fish_node.frames import BODY, POOL
 from fish_node.nodes.frame_broadcaster import FrameBroadcaster
 from fish_node.nodes.start import read_parameters, run
@@ -66,7 +67,8 @@ class FusionNode(Node):
         self.create_timer(1.0, lambda: self._report(self._estimate()))
         self._used = 0.0  # s on this node's clock, when a measurement was last used
         self._said = ""
-        self._wrong_frame = ""
+        self._refusal = ""  # why the poses since the last used one are not fused
+        self._logged: set[str] = set()  # remedies of refusals: each is logged once
 
     def _on_imu(self, message: Imu) -> None:
         if self._fusion.add_imu(seconds(message.header.stamp), *inertial_values(message)):
@@ -76,24 +78,32 @@ class FusionNode(Node):
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         frame = message.header.frame_id
         if frame not in ("", self._frames[0]):
-            self._refuse_frame(frame)
+            self._fusion.counts["pose_wrong_frame"] += 1
+            self._refuse(
+                f"its poses come in frame {frame[:60]!r}, not in {self._frames[0]!r}",
+                "set the tracker's frame or transform the poses",
+            )
             return
         time, p = seconds(message.header.stamp), message.pose.pose
         pose = np.array([p.position.x, p.position.y, yaw_of(p.orientation)])
-        if self._fusion.add_pose(time, pose, planar_covariance(message.pose.covariance)):
-            self._used = self._now()
+        covariance = planar_covariance(message.pose.covariance)
+        if not_measured(covariance):
+            self._refuse(
+                "its poses say by a variance below 0 that x, y or yaw is not measured",
+                "a tracker that does not know its noise leaves the variances at 0",
+            )
+        if self._fusion.add_pose(time, pose, covariance):
+            self._used, self._refusal = self._now(), ""
         estimate = self._estimate()
         if estimate is not None and estimate.imu_lost:  # no IMU message will publish it
             self._publish(estimate)
 
-    def _refuse_frame(self, frame: str) -> None:
-        self._fusion.counts["pose_wrong_frame"] += 1
-        if not self._wrong_frame:
-            self.get_logger().error(
-                f"camera/pose comes in frame {frame[:60]!r}, expected {self._frames[0]!r}: its poses are not fused; "
-                "set the tracker's frame or transform the poses"
-            )
-        self._wrong_frame = frame[:60]
+    def _refuse(self, reason: str, remedy: str) -> None:
+        """Note why a pose is not fused; the first of its kind is logged."""
+        self._refusal = reason
+        if remedy not in self._logged:
+            self._logged.add(remedy)
+            self.get_logger().error(f"camera/pose is not fused: {reason}; {remedy}")
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9
@@ -117,11 +127,8 @@ class FusionNode(Node):
 
     def _state(self, estimate: Estimate | None) -> tuple[bytes, str]:
         lost = [] if estimate is None else lost_sensors(estimate)
-        if self._wrong_frame and (estimate is None or estimate.camera_lost):
-            return (
-                ERROR,
-                f"camera lost: its poses come in frame {self._wrong_frame!r}, not in {self._frames[0]!r}",
-            )
+        if self._refusal and (estimate is None or estimate.camera_lost):
+            return ERROR, f"camera lost: {self._refusal}"
         if estimate is None:
             return WARN, "waiting for camera poses that agree"
         if lost:

@@ -22,7 +22,7 @@ def check_frames(frames: set[str], pool: str) -> None:
     """Raise PathError if a path and its poses are in another frame than the pool's; a message by hand often names none."""
     if wrong := sorted(frames.difference({"", pool})):
         raise PathError(
-            f"frame_id is {wrong[0]!r}, expected {pool!r} or none; transform the path before it is sent"
+            f"frame_id is {wrong[0][:60]!r}, expected {pool!r} or none; transform the path before it is sent"
         )
 
 

@@ -35,6 +35,7 @@ from fish_node.arming import (
     ArmingSettings,
     estimate_trouble,
 )
+from fish_node.foreign_text import visible
 
 STATE_PERIOD_S = 0.05
 PLANAR = (0, 7, 35)  # x, y and rotation about z on the diagonal of a covariance of 6
@@ -167,7 +168,7 @@ class ArmingListener:
     def _on_message(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.armed = status.level == DiagnosticStatus.OK
-            self.reason = "" if self.armed else status.message
+            self.reason = "" if self.armed else visible(status.message)
         self._on_state()
 
 
