@@ -92,7 +92,7 @@ def fusion_frame(folder: Path) -> None:
     found = dict(re.findall(r"^(\w+) x = (\S+)", said.stdout, flags=re.M))
     assert abs(float(found["pool"])) < 0.01, said.stdout
     assert abs(float(found["camera_optical"])) < 0.05, said.stdout
-    assert logged.count("come in frame") == 1, logged
+    assert logged.count("is not fused: its poses come in frame") == 1, logged
 
 
 def fusion_not_measured() -> None:
