@@ -28,9 +28,8 @@ class Course:
     rotor: float = 70.0  # rad/s, amplitude of the rotor's speed
 
 
-def stroke_swim(course=Course(), seed=5):
-    """The trial of a faultless robot."""
-    random = np.random.default_rng(seed)
+def motion(course):
+    """(t, rotor speed, rate of turn, yaw rate, heading, place, specific force) of a course; place and force are complex."""
     t = START + np.arange(0.0, course.duration, STEP)
     rotor = -course.rotor * np.sin(STROKE * t)
     turn_rate = 0.5 * course.turns * np.cos(0.5 * t)
@@ -40,7 +39,13 @@ def stroke_swim(course=Course(), seed=5):
     sway = 4e-4 * course.rotor * np.sin(STROKE * t + 0.4) - 0.02 * turn_rate
     velocity = (surge + 1j * sway) * np.exp(1j * psi)
     place = -0.5 - 0.5j + STEP * np.cumsum(velocity)
-    force = np.gradient(velocity, STEP) * np.exp(-1j * psi)
+    return t, rotor, turn_rate, rate, psi, place, np.gradient(velocity, STEP) * np.exp(-1j * psi)
+
+
+def stroke_swim(course=Course(), seed=5):
+    """The trial of a faultless robot."""
+    random = np.random.default_rng(seed)
+    t, rotor, turn_rate, rate, psi, place, force = motion(course)
     kept = random.random(len(t[::3])) > 0.02
 
     def noisy(values, sd):

@@ -174,6 +174,8 @@ def test_a_foreign_type_on_a_topic_of_the_robot_does_not_end_the_view(robot, for
     r.until(lambda: topics <= r.node._bridge._known)
     r.until(lambda: r.odometry.get_subscription_count() == 2)  # the page's and Foxglove's
     r.until(lambda: r.swim(0.3) or r.shown()["pose"])
+    assert r.shown()["pose"]
+    assert topics <= r.node._bridge._known
 
 
 def test_foxglove_hears_a_node_that_comes_after_the_view(robot):
@@ -185,3 +187,4 @@ def test_foxglove_hears_a_node_that_comes_after_the_view(robot):
         r.executor.spin_once(timeout_sec=0.05)
     said = r.other.create_publisher(DiagnosticArray, "/diagnostics", 10)
     r.until(lambda: said.get_subscription_count() == 2)
+    assert said.get_subscription_count() == 2

@@ -97,13 +97,13 @@ def test_what_no_viewer_shows_is_not_swum(tmp_path, hidden):
 
 
 @pytest.mark.parametrize(
-    "beside",
+    "outside",
     ['<path d="M-20 5 L-10 200"/>', '<g transform="translate(0 300)"><path d="M5 5 L50 50"/></g>'],
 )
-def test_what_lies_beside_the_page_is_swum_only_where_nothing_lies_on_it(tmp_path, beside):
-    for body in (f"{beside}<path {LINE}/>", f"<path {LINE}/>{beside}"):
+def test_a_shape_outside_the_page_is_swum_only_if_none_is_on_the_page(tmp_path, outside):
+    for body in (f"{outside}<path {LINE}/>", f"<path {LINE}/>{outside}"):
         np.testing.assert_allclose(read(tmp_path, body).points, CORNERS, atol=1e-9)
-    assert len(read(tmp_path, beside).points) == 2
+    assert len(read(tmp_path, outside).points) == 2
 
 
 def test_the_pages_edge_cuts_nothing(tmp_path):

@@ -193,7 +193,7 @@ def read_parts(file: Path) -> tuple[list[Part], bool]:
     size, has_size = _page(root, str(file))
     matrix, viewport = viewbox_transform(root, size, str(file))
     parts = list(_Document(file, root).parts(root, _Context(matrix, viewport)))
-    on_page = [part for part in parts if not part.lies_off(size)]
+    on_page = [part for part in parts if not part.is_outside(size)]
     return on_page or parts, has_size
 
 

@@ -54,8 +54,8 @@ class Part:
         found = outlines(self.element, self.viewport, self.where)
         return [(place(self.matrix, points), closed) for points, closed in found]
 
-    def lies_off(self, page: Viewport) -> bool:
-        """Whether the whole of it lies beside a page of (width, height) [px]; a page of no size has no beside."""
+    def is_outside(self, page: Viewport) -> bool:
+        """Whether all of it is outside a page of (width, height) [px]. Nothing is outside a page without a size."""
         if min(page) <= 0.0 or local_name(self.element) in NO_LINE:
             return False
         ends = np.array([(p.min(axis=0), p.max(axis=0)) for p, _ in self.drawn()])  # (N, 2, 2)

@@ -60,18 +60,23 @@ class Settled:
     precision: Array  # (P,) of all columns, infinite where one is not shared
 
 
+def _places(trial: TrialRows) -> tuple[dict[Key, NDArray[np.int64]], int]:
+    """(columns of each candidate after those of the black box, number of all columns)."""
+    at, end = {}, trial.black_box.shape[1]
+    for key, columns in trial.candidates.items():
+        at[key] = np.arange(end, end + columns.shape[1])
+        end += columns.shape[1]
+    return at, end
+
+
 def settled(old: Sequence[TrialRows]) -> Settled:
     """Noise of the channels and the ridge, by leaving OLD's trials out."""
-    keys = list(old[0].candidates)
-    at, start = {}, old[0].black_box.shape[1]
-    for k in keys:
-        width = old[0].candidates[k].shape[1]
-        at[k] = np.arange(start, start + width)
-        start += width
+    at, count = _places(old[0])
+    keys = list(at)
     shared_keys = [k for k in keys if k[0] != PARAMETER + "all drags"]
     columns = [np.hstack([t.black_box, *(t.candidates[k] for k in keys)]) for t in old]
     noise = FIRST_NOISE
-    groups = _groups(old[0].black_box.shape[1], start, at, shared_keys)
+    groups = _groups(old[0].black_box.shape[1], count, at, shared_keys)
     for _ in range(NOISE_ROUNDS):
         scaled = [scaled_rows(t, x, noise) for t, x in zip(old, columns, strict=True)]
         precision, residuals = _ridge(scaled, groups)
@@ -84,12 +89,8 @@ def regression(
 ) -> Regression:
     """The normal equations with noise and ridge from OLD; by_old: these, where they are known."""
     trials = [*old, *new]
-    keys = list(trials[0].candidates)
-    at, start = {}, trials[0].black_box.shape[1]
-    for k in keys:
-        width = trials[0].candidates[k].shape[1]
-        at[k] = np.arange(start, start + width)
-        start += width
+    at, _ = _places(trials[0])
+    keys = list(at)
     columns = [np.hstack([t.black_box, *(t.candidates[k] for k in keys)]) for t in trials]
     by_old = settled(old) if by_old is None else by_old
     noise, precision = by_old.noise, by_old.precision
