@@ -32,16 +32,33 @@ class Log:
 
     page_bytes: int = 0
     pages: list[tuple[int, bytes]] = field(default_factory=list)  # number from 1, content
+    committed_pages: int = 0  # of the database after the last commit, 0 without one
     lost: str = ""  # what cannot be read, "" where the log is whole
 
-    def applied(self, database: bytes) -> bytes:
-        """The database with all pages of the log, those without a commit too."""
-        data = bytearray(database)
+    def applied(self, database: bytes) -> tuple[bytes, list[range]]:
+        """The database with all pages of the log, those without a commit too, and the bytes that neither of them holds.
+
+        Missing bytes are zero.
+        """
+        size, data = self.page_bytes, bytearray(database)
         for number, page in self.pages:
-            end = number * self.page_bytes
+            end = number * size
             data.extend(bytes(max(0, end - len(data))))
-            data[end - self.page_bytes : end] = page
-        return bytes(data)
+            data[end - size : end] = page
+        written = {number for number, _ in self.pages}
+        holes = [
+            range(max(end - size, len(database)), end)
+            for end in range(size, len(data) + 1, size or 1)
+            if end > len(database) and end // size not in written
+        ]
+        return bytes(data), holes
+
+    def missing_pages(self, database_bytes: int) -> int:
+        """How many pages of the last commit stand neither in the database of that size nor in the log."""
+        if not self.committed_pages:
+            return 0
+        asked = range(database_bytes // self.page_bytes + 1, self.committed_pages + 1)
+        return len(set(asked) - {number for number, _ in self.pages})
 
 
 def read_log(data: bytes) -> Log:
@@ -64,6 +81,7 @@ def read_log(data: bytes) -> Log:
         if found != salts or sums != (first, second) or not number:
             break
         log.pages.append((number, page))
+        log.committed_pages = commit or log.committed_pages
         position, committed = end, end if commit else committed
     rest = len(data) - position
     if rest and not _is_old(data, position, salts[0]):

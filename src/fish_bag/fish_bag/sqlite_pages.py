@@ -10,7 +10,7 @@ Source: sqlite.org/fileformat2.html.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from fish_bag.storage import Buffer
@@ -35,8 +35,14 @@ class Row:
     )
 
 
-def rows(data: Buffer, near: int | None = None) -> Iterator[Row]:
-    """All rows that are whole, or those in the pages up to byte `near`, in order of their place in the file."""
+def rows(data: Buffer, near: int | None = None, holes: Sequence[range] = ()) -> Iterator[Row]:
+    """All rows that are whole, or those in the pages up to byte `near`, in order of their place in the file.
+
+    Args:
+        data: the file.
+        near: the byte up to which pages are read, None for all.
+        holes: bytes that are zeros because the file does not hold them.
+    """
     page_bytes = int.from_bytes(data[16:18], "big")
     page_bytes = 65536 if page_bytes == 1 else page_bytes
     if page_bytes < 512 or page_bytes & (page_bytes - 1):
@@ -47,10 +53,12 @@ def rows(data: Buffer, near: int | None = None) -> Iterator[Row]:
         last = near // page_bytes
         starts = starts[max(0, last - NEAR_PAGES) : last + 1]
     for start in starts:
-        yield from _page(data, start, page_bytes, usable)
+        yield from _page(data, start, page_bytes, usable, holes)
 
 
-def _page(data: Buffer, start: int, page_bytes: int, usable: int) -> Iterator[Row]:
+def _page(
+    data: Buffer, start: int, page_bytes: int, usable: int, holes: Sequence[range]
+) -> Iterator[Row]:
     head = start + (FILE_HEAD_BYTES if start == 0 else 0)
     if head + 8 > len(data) or data[head] != LEAF:
         return
@@ -60,14 +68,16 @@ def _page(data: Buffer, start: int, page_bytes: int, usable: int) -> Iterator[Ro
         if not 8 + 2 * count <= place < usable:
             continue
         try:
-            row = _row(data, start + place, start + usable, page_bytes, usable)
+            row = _row(data, start + place, start + usable, page_bytes, usable, holes)
         except (IndexError, ValueError, struct.error):  # UnicodeDecodeError is a ValueError
             continue
         if row is not None:
             yield row
 
 
-def _row(data: Buffer, at: int, page_end: int, page_bytes: int, usable: int) -> Row | None:
+def _row(
+    data: Buffer, at: int, page_end: int, page_bytes: int, usable: int, holes: Sequence[range]
+) -> Row | None:
     """The row at byte `at`, None where a part of it is missing."""
     size, at = _varint(data, at)
     number, at = _varint(data, at)
@@ -77,7 +87,7 @@ def _row(data: Buffer, at: int, page_end: int, page_bytes: int, usable: int) -> 
         local = least + (size - least) % (usable - 4)
         local = local if local <= longest else least
     end = at + local
-    if size <= 0 or end > page_end or end > len(data):
+    if size <= 0 or end > page_end or end > len(data) or _meets(at, end, holes):
         return None
     payload = bytes(data[at:end])
     following = int.from_bytes(data[end : end + 4], "big") if local < size else 0
@@ -86,13 +96,17 @@ def _row(data: Buffer, at: int, page_end: int, page_bytes: int, usable: int) -> 
         page = (following - 1) * page_bytes
         take = min(size - len(payload), usable - 4)
         last = page + 4 + take
-        if page <= 0 or last > len(data):
+        if page <= 0 or last > len(data) or _meets(page, last, holes):
             return None
         following = int.from_bytes(data[page : page + 4], "big")
         payload += bytes(data[page + 4 : last])
         end = max(end, last)
     values = _values(payload)
     return None if values is None else Row(number, values, end, zeros_follow)
+
+
+def _meets(start: int, end: int, holes: Sequence[range]) -> bool:
+    return any(hole.start < end and start < hole.stop for hole in holes)
 
 
 def _values(payload: bytes) -> tuple[Value, ...] | None:

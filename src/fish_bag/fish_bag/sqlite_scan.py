@@ -14,12 +14,13 @@ import sqlite3
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fish_bag.message_types import ros2_type_name
 from fish_bag.sqlite_log import Log, read_log
-from fish_bag.sqlite_pages import Row, rows
+from fish_bag.sqlite_pages import Row, Value, rows
 from fish_bag.storage import (
     ENOUGH_OTHERS,
     Contents,
@@ -49,22 +50,22 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
         path: the database; its companions (-wal, -shm) lie in the same folder.
         keep: how many bytes of the messages of a topic are kept.
     """
-    with _settled(path) as (database, notes, lost):
-        contents = Contents(notes=notes)
+    with _settled(path) as settled:
+        contents = Contents(notes=settled.notes)
         try:
-            if lost:
-                raise sqlite3.DatabaseError(lost)
-            _read(database, contents, keep)
+            if settled.lost:
+                raise sqlite3.DatabaseError(settled.lost)
+            _read(settled.path, contents, keep)
             head = path.read_bytes()  # the database without its companions
             content_end = end_of_content(head)
             if content_end < len(head):
-                _drop_zeroed(database.read_bytes(), content_end, contents)
+                _drop_zeroed(settled.path.read_bytes(), content_end, contents)
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            contents = Contents(notes=notes)
+            contents = Contents(notes=settled.notes)
             said = " ".join(str(error).split())
             contents.lost.append(f"the database is damaged ({said}); its pages are read one by one")
-            _read_pages(database.read_bytes(), contents)
-        alone = _alone(path, keep) if notes or lost else None
+            _read_pages(settled.path.read_bytes(), contents, settled.holes)
+        alone = _alone(path, keep) if settled.notes or settled.lost else None
     if alone is not None and (sign := _sign_of_another(path, alone, contents)):
         alone.lost.append(
             f"{path.name}{LOG} belongs to another database: {sign}; this one is read without it, and what stands in it"
@@ -113,22 +114,38 @@ def companions(path: Path) -> list[Path]:
     return [file for file in files if file.exists() and file.stat().st_size]
 
 
+@dataclass(frozen=True)
+class Settled:
+    """A database with everything that its companions hold."""
+
+    path: Path
+    notes: list[str] = field(default_factory=list)
+    lost: str = ""  # what cannot be read of the companions
+    holes: list[range] = field(default_factory=list)  # bytes that no file holds
+
+
 @contextmanager
-def _settled(path: Path) -> Iterator[tuple[Path, list[str], str]]:
-    """The database with everything that its companions hold, what is worth a note of that, and what is lost of it."""
+def _settled(path: Path) -> Iterator[Settled]:
+    """The database with everything that its companions hold."""
     found = companions(path)
     if not found:
-        yield path, [], ""
+        yield Settled(path)
         return
     names = ", ".join(file.name for file in found)
     log_file = Path(f"{path}{LOG}")
     log = read_log(log_file.read_bytes()) if log_file in found else Log()
     with TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
-        if log.lost or not path.stat().st_size:  # sqlite3 throws away the log of an empty database
-            copy.write_bytes(log.applied(path.read_bytes()))
+        gone = log.missing_pages(path.stat().st_size)
+        # sqlite3 throws away the log of an empty database, and takes zeros for pages that are missing
+        if log.lost or gone or not path.stat().st_size:
+            data, holes = log.applied(path.read_bytes())
+            copy.write_bytes(data)
             lost = f"{log_file.name}: {log.lost}" if log.lost else ""
-            yield copy, [] if lost else [f"empty; what stands in {names} is read"], lost
+            if gone and not lost:
+                lost = f"it is cut: {gone} of its {log.committed_pages} pages are missing"
+            notes = [] if lost else [f"empty; what stands in {names} is read"]
+            yield Settled(copy, notes, lost, holes)
             return
         for file in (path, *found):
             shutil.copyfile(file, Path(folder) / file.name)
@@ -139,7 +156,7 @@ def _settled(path: Path) -> Iterator[tuple[Path, list[str], str]]:
                 connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
         except sqlite3.Error as error:
             lost = f"{names} cannot be read ({error}); what stands in it is missing"
-        yield copy, notes, lost
+        yield Settled(copy, notes, lost)
 
 
 def _read(path: Path, contents: Contents, keep: Keep) -> None:
@@ -152,9 +169,6 @@ def _read(path: Path, contents: Contents, keep: Keep) -> None:
         found = connection.execute("PRAGMA quick_check(1)").fetchone()
         if found is None or found[0] != "ok":
             raise sqlite3.DatabaseError(found[0] if found else "no answer")
-        (page_bytes,) = connection.execute("PRAGMA page_size").fetchone()
-        if path.stat().st_size % page_bytes:  # sqlite3 takes zeros for what is missing
-            raise sqlite3.DatabaseError("the file ends inside a page")
         definitions = {}
         if _columns(connection, "message_definitions"):
             query = (
@@ -212,13 +226,13 @@ def _topic(
     )
 
 
-def _read_pages(data: bytes, contents: Contents) -> None:
+def _read_pages(data: bytes, contents: Contents, holes: list[range]) -> None:
     """Sort the rows of all pages into topics, definitions and messages by the kinds of their columns."""
     content_end = end_of_content(data)
     topics: dict[int, list[str]] = {}
     definitions: dict[str, tuple[bytes, str]] = {}
-    messages: dict[int, Row] = {}
-    for row in rows(data):
+    messages: dict[tuple[int, tuple[Value, ...]], Row] = {}  # damage may give two the same number
+    for row in rows(data, holes=holes):
         values = row.values[1:]
         texts = [value for value in values if isinstance(value, str)]
         if row.values[:1] != (None,) or (row.end > content_end and len(texts) == len(values)):
@@ -229,11 +243,11 @@ def _read_pages(data: bytes, contents: Contents) -> None:
             elif texts[1] in ENCODINGS:
                 definitions.setdefault(texts[0], (texts[2].encode(), texts[1]))
         elif [type(value) for value in values] == [int, int, bytes]:
-            messages.setdefault(row.number, row)
+            messages.setdefault((row.number, row.values), row)
     for number, texts in topics.items():
         named = dict(zip(TOPIC_COLUMNS, texts[2:], strict=False))
         contents.topics[number] = _topic(texts[0], texts[1], named, definitions)
-    _keep_whole(messages, contents, content_end)
+    _keep_whole(list(messages.values()), contents, content_end)
 
 
 def _drop_zeroed(data: bytes, content_end: int, contents: Contents) -> None:
@@ -254,10 +268,10 @@ def _drop_zeroed(data: bytes, content_end: int, contents: Contents) -> None:
             contents.lost.append("a message that reaches into zeros")
 
 
-def _keep_whole(found: dict[int, Row], contents: Contents, content_end: int) -> None:
+def _keep_whole(found: list[Row], contents: Contents, content_end: int) -> None:
     """Take the messages in order of their rows, but none that reaches into zeros that damage has left."""
     late: list[tuple[int, int, bytes]] = []
-    for _, row in sorted(found.items()):
+    for row in sorted(found, key=lambda row: row.number):
         _, topic, time_ns, raw = row.values
         if not (isinstance(topic, int) and isinstance(time_ns, int) and isinstance(raw, bytes)):
             continue

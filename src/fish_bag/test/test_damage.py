@@ -17,6 +17,7 @@ from fish_bag.damage import KINDS, PROTECTED, check, damaged, make_sample, messa
 from fish_bag.mcap_writer import McapRecording
 from fish_bag.message_types import MessageType
 from fish_bag.sample_formats import SQLITE, WRITERS, write_rosbag2
+from fish_bag.sqlite_pages import LEAF
 from fish_bag.stated_metadata import parse_metadata
 from fish_bag.storage import ends_like_others
 
@@ -181,6 +182,34 @@ def test_messages_in_the_write_ahead_log_are_read(wholes):
     bag = salvage_bag(sample.path)
     assert Counter(messages_of(bag)) == wholes["sqlite3"].messages
     assert "db3-wal" in bag.notes[0]
+
+
+def test_a_cut_database_beside_a_whole_log(tmp_path):
+    """sqlite3 takes zeros for pages that neither file holds, and calls the database whole."""
+    write = WRITERS["sqlite3 log"]
+    sample = make_sample("sqlite3 log", write(tmp_path / "whole", samples.robot_messages(0.4)))
+    places = {end - back for end in range(8192, len(sample.data), 4096) for back in (278, 360, 2000)}
+    for at in sorted(places):
+        folder = tmp_path / str(at)
+        folder.mkdir()
+        assert check(sample, "cut", sample.data[:at], at, folder) == "", f"cut at byte {at}"
+
+
+def test_a_row_with_the_number_of_another_hides_none(wholes, tmp_path):
+    """Damage to the number of a row takes this row at most."""
+    sample, page_bytes = wholes["sqlite3"], 4096
+    found = [
+        page
+        for page in range(page_bytes, len(sample.data), page_bytes)
+        if sample.data[page] == LEAF and int.from_bytes(sample.data[page + 3 : page + 5], "big") > 3
+    ]
+    page = found[-1]
+    upper, lower = struct.unpack_from(">HH", sample.data, page + 8)
+    broken = bytearray(sample.data)
+    # a row begins with its length (two bytes from 128 on, one below) and its number; rows lie in falling order
+    places = [page + cell + (2 if sample.data[page + cell] > 127 else 1) for cell in (upper, lower)]
+    broken[places[0]] = sample.data[places[1]]
+    assert check(sample, "byte", bytes(broken), places[0], tmp_path) == ""
 
 
 @pytest.mark.parametrize("size", [5_000, 70_000], ids=["one overflow page", "many"])
