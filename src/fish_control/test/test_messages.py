@@ -19,6 +19,7 @@ from fish_control.nodes.messages import (
     to_stamp,
     yaw_of,
 )
+from fish_control.watchdog import estimate_fault
 
 # rows of a covariance (x, y, z, rotation about x, y, z): geometry_msgs/PoseWithCovariance
 X, Y, YAW = 0, 1, 5
@@ -88,6 +89,17 @@ def test_signs_of_an_estimate_hold_the_worst_variance_of_pose_and_of_twist(place
     signs = estimate_signs(message, now=10.5)
     assert (signs.age, signs.finite) == (pytest.approx(0.25), True)
     assert (signs.pose_variance, signs.twist_variance) == (0.5, 0.25)
+
+
+@pytest.mark.parametrize("place", [X, Y, YAW])
+def test_a_variance_below_zero_says_that_nobody_measured_it(place):
+    message = odometry()
+    message.pose.covariance[7 * place] = message.twist.covariance[7 * place] = -1.0
+    signs = estimate_signs(message, now=10.5)
+    assert "camera lost" in estimate_fault(signs, timeout=1.0, largest_variance=1.0)
+    message.pose.covariance[7 * place] = 0.01
+    signs = estimate_signs(message, now=10.5)
+    assert "IMU lost" in estimate_fault(signs, timeout=1.0, largest_variance=1.0)
 
 
 @pytest.mark.parametrize("spoil", ["position", "velocity", "orientation"])

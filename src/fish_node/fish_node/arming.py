@@ -189,6 +189,12 @@ def operator_and_estimate(settings: ArmingSettings) -> tuple[Source, ...]:
     return tuple(sources)
 
 
+def largest_of(variances: Iterable[float]) -> float:
+    """The largest variance; NaN if one is no number or below zero, which says that nobody measured it."""
+    found = list(variances)
+    return max(found) if all(value >= 0.0 for value in found) else math.nan
+
+
 def estimate_trouble(
     pose_variance: float, twist_variance: float, finite: bool, largest_variance: float
 ) -> str:

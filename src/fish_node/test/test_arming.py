@@ -18,6 +18,7 @@ from fish_node.arming import (
     ArmingSettings,
     Source,
     estimate_trouble,
+    largest_of,
     operator_and_estimate,
 )
 
@@ -165,6 +166,12 @@ def test_what_fusion_does_not_vouch_for_is_lost(pose, twist, finite, said):
     trouble = estimate_trouble(pose, twist, finite, 1.0)
     assert said in trouble
     assert bool(trouble) == bool(said)
+
+
+@pytest.mark.parametrize("bad", [-1.0, math.nan])
+def test_a_variance_that_nobody_measured_vouches_for_nothing(bad):
+    assert largest_of([0.5, 0.25, 0.0]) == 0.5
+    assert "camera lost" in estimate_trouble(largest_of([0.1, bad, 0.1]), 0.1, True, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from fish_control.controller import Command
 from fish_control.line_of_sight import Motion
 from fish_control.planner import motion_is_finite
 from fish_control.watchdog import EstimateHealth
+from fish_node.arming import largest_of
 
 NOT_MEASURED = -1.0  # first covariance of what an Imu message does not measure
 PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
@@ -95,8 +96,8 @@ def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
     return EstimateHealth(
         age=now - seconds(message.header.stamp),
         finite=motion_is_finite(motion_of(message)),
-        pose_variance=float(message.pose.covariance[PLANAR_VARIANCES].max()),
-        twist_variance=float(message.twist.covariance[PLANAR_VARIANCES].max()),
+        pose_variance=largest_of(message.pose.covariance[PLANAR_VARIANCES]),
+        twist_variance=largest_of(message.twist.covariance[PLANAR_VARIANCES]),
     )
 
 

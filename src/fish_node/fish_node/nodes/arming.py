@@ -12,7 +12,7 @@ it goes on).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -34,6 +34,7 @@ from fish_node.arming import (
     Arming,
     ArmingSettings,
     estimate_trouble,
+    largest_of,
 )
 from fish_node.foreign_text import visible
 
@@ -117,8 +118,8 @@ class ArmingServer:
         q = pose.pose.orientation
         values = (position.x, position.y, q.z, q.w, speed.linear.x, speed.linear.y, speed.angular.z)
         trouble = estimate_trouble(
-            max_or_nan(pose.covariance[i] for i in PLANAR),
-            max_or_nan(twist.covariance[i] for i in PLANAR),
+            largest_of(pose.covariance[i] for i in PLANAR),
+            largest_of(twist.covariance[i] for i in PLANAR),
             all(map(math.isfinite, values)),
             self._settings.largest_variance,
         )
@@ -170,9 +171,3 @@ class ArmingListener:
             self.armed = status.level == DiagnosticStatus.OK
             self.reason = "" if self.armed else visible(status.message)
         self._on_state()
-
-
-def max_or_nan(values: Iterable[float]) -> float:
-    """The largest value; NaN if one is no number."""
-    found = list(values)
-    return math.nan if any(map(math.isnan, found)) else max(found)
