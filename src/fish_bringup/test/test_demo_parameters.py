@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from fish_bringup.node_table import CONTROL, FAKE, RECORDER, ROBOTS, SIMULATED
+from fish_bringup.run_watch import SwimEnd
 from fish_bringup.verbs import demo
 
 
@@ -25,15 +26,28 @@ def test_in_lockstep_the_simulator_waits_and_every_node_follows_its_clock(tmp_pa
     assert given[RECORDER]["name"] == "recording"
 
 
-def test_without_it_nodes_follow_their_own_clocks() -> None:
+def test_simulated_time_waits_for_nodes_that_lag_by_more_than_an_image() -> None:
     given = changed()
+    assert given[SIMULATED[0]]["lockstep"] > 0.0
+    assert 0.0 < given[SIMULATED[0]]["lockstep_slack"] < 0.05
+    assert all(given[spec]["use_sim_time"] is True for spec in ROBOTS["sim"])
+
+
+def test_in_real_time_nodes_follow_their_own_clocks() -> None:
+    given = changed("--real-time")
     assert "lockstep" not in given[SIMULATED[0]]
     assert not any("use_sim_time" in values for values in given.values())
 
 
+def test_a_run_that_waited_says_how_long() -> None:
+    end = SwimEnd("at the end of the path", seconds=48.0, robot_s=30.0, cpu={})
+    assert "30 s of swimming took 48 s" in demo.waited(end, 1.0)
+    assert demo.waited(end, 0.62) == ""
+
+
 def test_a_computer_that_the_nodes_fill_is_named_with_what_to_do() -> None:
     shares = [0.3] * 6  # of a core
-    assert "--lockstep" in demo.too_slow(shares, cores=2)
+    assert "--real-time" in demo.too_slow(shares, cores=2)
     assert demo.too_slow(shares, cores=4) == ""
 
 

@@ -6,7 +6,7 @@ Simulator, camera, tracker, fusion, planner, controller and recorder run as proc
 their own ROS domain. The command arms the simulated robot itself. The run ends at the end of the path (a closed one: after
 a lap), after --duration, or with Ctrl-C; what was recorded is then scored. It ends with an error when the fish is at a wall
 of the pool or beyond for 1 s, when the camera is silent for 30 s, and when a node ends or hangs; the recording is kept.
-Times are the simulator's.
+Times are the simulator's: it runs in real time, and waits for nodes that lag.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ from fish_sim.robot_argument import read_model
 
 VIEW_PORT = ViewConfig().port
 FULL = 0.75  # share of all cores from which on messages wait for a processor
+WAITED = 1.1  # times as long as asked, from which on a run is said to have waited
 NEED = 5.0  # cores that the nodes of a fake robot fill in real time
 LOCKSTEP = 60.0  # s of real time that simulated time waits for a node
 LONGEST = 600.0  # s, a run that does not end by itself
@@ -91,7 +92,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lockstep",
         action="store_true",
-        help="the simulator waits for the nodes: for a computer that is too slow or too busy for real time",
+        help="the simulator waits for every answer of the nodes: the same swim on every computer",
+    )
+    parser.add_argument(
+        "--real-time",
+        action="store_true",
+        help="never wait: messages are late on a computer that is too slow for real time (simulated time waits for nodes that "
+        "lag)",
     )
     parser.add_argument(
         "--real-time-factor",
@@ -118,8 +125,12 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(
             "--lockstep is for the simulator alone: with drivers say --real-time-factor"
         )
+    if args.lockstep and args.real_time:
+        raise UserError(
+            "--lockstep waits for the nodes and --real-time never does: say one of them"
+        )
     if args.real_time_factor is None:
-        args.real_time_factor = pace(args.hardware)
+        args.real_time_factor = 1.0 if args.real_time else pace(args.hardware)
     if not args.real_time_factor > 0.0:
         raise UserError(
             f"real-time-factor is {args.real_time_factor:g}, expected a positive number"
@@ -148,7 +159,7 @@ def run(args: argparse.Namespace) -> int:
     write_run_page(page, f"Path {args.letter} at {args.speed:g} m/s", trial, score, tables)
     say(console, f"recording: {folder / 'recording'}")
     say(console, f"page: {page}")
-    if args.hardware == "sim" and not args.lockstep and (hint := too_slow(end.cpu.values())):
+    if hint := too_slow(end.cpu.values()) if args.real_time else waited(end, args.real_time_factor):
         say(console, hint)
     if missing := what_is_missing(score):
         raise UserError(missing)
@@ -162,7 +173,17 @@ def too_slow(shares: Iterable[float], cores: int | None = None) -> str:
         return ""
     return (
         f"the nodes used {100 * used:.0f} % of a core, this computer has {all_cores}: messages were late, and the errors "
-        "are those of a busy computer; make demo ARGS=--lockstep waits for the nodes"
+        "are those of a busy computer; without --real-time simulated time waits for the nodes"
+    )
+
+
+def waited(end: SwimEnd, factor: float) -> str:
+    """How much longer than asked a run took because simulated time waited for the nodes; empty where it hardly did."""
+    if end.seconds <= WAITED * end.robot_s / factor:
+        return ""
+    return (
+        f"{end.robot_s:.0f} s of swimming took {end.seconds:.0f} s: this computer is too slow or too busy for the nodes, and "
+        "simulated time waited for them"
     )
 
 
@@ -187,11 +208,11 @@ def node_parameters(
     changed[simulator] = {**changed.get(simulator, {}), **start}
     if args.lockstep:
         changed[simulator]["lockstep"] = LOCKSTEP
-    elif fake and args.real_time_factor != 1.0:
+    elif not args.real_time:
         changed[simulator] |= LAGS
     if args.real_time_factor != 1.0:
         changed[simulator]["real_time_factor"] = args.real_time_factor
-    if args.lockstep or args.real_time_factor != 1.0:
+    if not args.real_time or args.real_time_factor != 1.0:
         for spec in robot_of(args.hardware):
             changed[spec] = {**changed.get(spec, {}), "use_sim_time": True}
     if args.robot:
