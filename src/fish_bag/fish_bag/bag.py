@@ -113,7 +113,7 @@ def _scan_file(path: Path, keep: Keep) -> Contents:
     """Contents of one storage file."""
     try:
         size = path.stat().st_size
-        if not size and companions(path):
+        if not size and (companions(path) or companions(path.resolve())):
             return scan_sqlite(path, keep)
         if not size:
             return Contents(lost=["the file is empty (0 bytes)"])
