@@ -108,6 +108,8 @@ def find_files(path: Path) -> RecordingFiles:
         raise RecordingError(f"{path}: does not exist")
     if path.is_file():
         return RecordingFiles(path, [path])
+    if not path.is_dir():
+        raise RecordingError(f"{path}: neither a file nor a folder")
     stated = read_metadata(path)
     if stated is not None:
         return _stated_files(path, stated)

@@ -5,6 +5,7 @@
 import bz2
 import gzip
 import lzma
+import os
 import shutil
 import sqlite3
 import struct
@@ -17,7 +18,7 @@ import yaml
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
-from fish_bag import RecordingError, read_trial
+from fish_bag import RecordingError, read_dataset, read_trial
 from fish_bag import sample_formats as formats
 from fish_bag import sample_recordings as samples
 from fish_bag.bag import salvage_bag
@@ -204,6 +205,18 @@ def test_a_file_that_is_something_else_is_named(tmp_path, name, data, said):
     for read in (read_trial, salvage_bag):
         with pytest.raises(RecordingError, match=said):
             read(tmp_path / name)
+
+
+def test_what_is_neither_file_nor_folder_costs_itself_only(tmp_path):
+    for name in ("a.mcap", "c.mcap"):
+        write(tmp_path / name)
+    os.mkfifo(tmp_path / "b.mcap")
+    with pytest.raises(RecordingError, match="neither a file nor a folder"):
+        read_trial(tmp_path / "b.mcap")
+    data = read_dataset(tmp_path)
+    holds_the_robot(data.trials[0])
+    assert any("b.mcap left out" in problem.text for problem in data.problems)
+    assert len(data) == 2
 
 
 def test_a_second_file_behind_the_first_is_said(tmp_path):
