@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line: every verb loads, mistakes are one line."""
 
+import os
 import subprocess
 import sys
 from argparse import ArgumentParser
@@ -38,6 +39,21 @@ def test_help_is_fast_because_no_verb_is_loaded():
     *table, modules = out.splitlines()
     assert all(any(line.split()[:1] == [verb] for line in table) for verb in BROUGHT_BY)
     assert not {"numpy", "rosbags", "torch", "rclpy"} & set(modules.split())
+
+
+def test_names_and_terminals_that_are_not_utf_8(tmp_path):
+    """A file from another computer, and a pipe that takes ASCII only."""
+    path = samples.robot_recording(tmp_path / "swim\udcff", duration=0.3)
+    code = "import sys; from fish_report.robofish import main; sys.exit(main(sys.argv[1:]))"
+    page = tmp_path / "page.html"
+    ended = subprocess.run(
+        [sys.executable, "-c", code, "inspect", path, "--html", page],
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert b"/fish/imu/data" in ended.stdout
+    assert r"swim\udcff" in page.read_text(encoding="utf-8")
 
 
 def test_unknown_verb(capsys):

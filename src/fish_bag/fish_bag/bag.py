@@ -97,7 +97,10 @@ def salvage_bag(path: Path, wanted: Callable[[str, str], bool] = lambda *_: True
     def keep(topic: StoredTopic) -> int | None:
         return None if wanted(topic.name, topic.type) else STAMP_PREFIX
 
-    found = find_files(path)
+    try:
+        found = find_files(path)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
     contents = []
     for file in found.files:
         part = _scan_file(file, keep)
@@ -113,7 +116,7 @@ def _scan_file(path: Path, keep: Keep) -> Contents:
     """Contents of one storage file."""
     try:
         size = path.stat().st_size
-        if not size and companions(path):
+        if not size and (companions(path) or companions(path.resolve())):
             return scan_sqlite(path, keep)
         if not size:
             return Contents(lost=["the file is empty (0 bytes)"])

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fish_bag.clock import ClockEstimate
-from fish_bag.decode import ABSENT_COLUMNS, ROLES
+from fish_bag.decode import ABSENT_COLUMNS, JOINT_VALUES, ROLES
 from fish_bag.decode import NOT_MEASURED as NOT_MEASURED_ARRAY
 from fish_bag.jumps import find_jumps
 from fish_bag.problem import SEVERITIES, Problem
@@ -104,6 +104,16 @@ def check_stream(stream: Stream, rule: TopicRule, frames: np.ndarray | None) -> 
         text = f"{wrong.sum()} of {len(stream)} messages in frame {other}, expected {rule.frame!r}"
         yield Problem("error", "wrong_frame", stream.topic, text, int(wrong.sum()))
     yield from _gaps(stream)
+
+
+def check_joints(role: str, decoded: Decoded, rule: TopicRule) -> Iterator[Problem]:
+    """Values of joints that no message has, as under other names."""
+    severity = "error" if rule.required else "warning"
+    for array, (joint, field) in JOINT_VALUES.get(role, {}).items():
+        if not np.isfinite(decoded.arrays[array]).any():
+            named = ", ".join(map(repr, decoded.joints[:8])) or "none"
+            text = f"no message has a {field} of joint {joint!r}; joints that it names: {named}"
+            yield Problem(severity, "joint", decoded.topic, text, len(decoded.arrival_ns))
 
 
 def _gaps(stream: Stream) -> Iterator[Problem]:

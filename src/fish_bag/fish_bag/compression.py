@@ -12,6 +12,7 @@ import zstandard
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # no serialised message begins like this: CDR begins with a zero
 LZ4_MAGIC = b"\x04\x22\x4d\x18"
+KNOWN = ("", "none", "zstd", "lz4", "bz2")  # names of compressions; the first two are none
 DAMAGE = (zstandard.ZstdError, RuntimeError, MemoryError, OSError, EOFError, ValueError)
 
 
@@ -34,7 +35,7 @@ def unpack(name: str, packed: bytes) -> tuple[bytes, bool]:
     Raises:
         one of DAMAGE: the bytes make no sense, or the compression is unknown.
     """
-    if name in ("", "none"):
+    if name in KNOWN[:2]:
         return packed, True
     parts = []
     while packed:

@@ -28,6 +28,15 @@ from fish_bag.trial import (
 POSE_ROWS = np.array([0, 1, 5])  # x, y, rotation about z in a 6x6 covariance (REP 103 order)
 NOT_MEASURED = "not_measured"  # an array of a stream of its own: (n, columns)
 ABSENT_COLUMNS = {"gyro": 0, "accel": 1, "x": 0, "y": 0, "psi": 0}  # its column for an array
+# arrays of a role -> joint and field of sensor_msgs/JointState
+JOINT_VALUES = {
+    "commands": {
+        "rotor_phase": ("rotor", "position"),
+        "rotor_speed": ("rotor", "velocity"),
+        "rudder": ("rudder", "position"),
+    },
+    "encoder": {"angle": ("rotor", "position"), "speed": ("rotor", "velocity")},
+}
 Arrays = dict[str, np.ndarray]
 
 
@@ -52,15 +61,11 @@ def vector(block: Block, path: str) -> np.ndarray:
 
 
 def commands(block: Block) -> Arrays:
-    return {
-        "rotor_phase": joint(block, "rotor", "position"),
-        "rotor_speed": joint(block, "rotor", "velocity"),
-        "rudder": joint(block, "rudder", "position"),
-    }
+    return {key: joint(block, *where) for key, where in JOINT_VALUES["commands"].items()}
 
 
 def encoder(block: Block) -> Arrays:
-    return {"angle": joint(block, "rotor", "position"), "speed": joint(block, "rotor", "velocity")}
+    return {key: joint(block, *where) for key, where in JOINT_VALUES["encoder"].items()}
 
 
 def imu(block: Block) -> Arrays:

@@ -36,6 +36,9 @@ DTYPES = {
 }
 # per topic; more means that lengths change with every message and columns make no sense
 MAX_LAYOUTS = 200
+# fields that a walk visits without coming further: types without fields may name each other without end
+MOST_EMPTY = 10_000
+DEEPEST = 100  # types within types
 
 
 class LayoutError(Exception):
@@ -82,16 +85,23 @@ class _Walker:
             )
         self.order = "<" if ros1 or raw[1] else ">"
         self.pos = self.base
+        self.reached, self.empty, self.depth = self.base, 0, 0
         self.layout = Layout(fixed=list(range(self.base)))
 
     def message(self, msgtype: str, prefix: str) -> None:
         if msgtype not in self.types:
             raise LayoutError(f"the recording does not define message type {msgtype}")
+        self.depth += 1
         for name, desc in self.types[msgtype][1]:
             self.item(desc, f"{prefix}{name}")
+        self.depth -= 1
 
     def item(self, desc: Any, path: str) -> None:
         kind, what = desc
+        self.empty = 0 if self.pos > self.reached else self.empty + 1
+        self.reached = self.pos
+        if self.empty > MOST_EMPTY or self.depth > DEEPEST:
+            raise LayoutError(f"the type of field {path[:60]} has no end or no fields")
         if kind == Nodetype.NAME:
             self.message(what, f"{path}.")
         elif kind == Nodetype.BASE and what[0] == "string":

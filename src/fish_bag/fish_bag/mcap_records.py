@@ -25,6 +25,8 @@ from fish_bag.storage import Buffer, StoredTopic
 
 HEAD = struct.Struct("<BQ")  # opcode, length
 FOOTER_BYTES = HEAD.size + 20
+OPCODES = frozenset(Opcode)
+MOST_STRANGE = 1000  # records of unknown kinds, one after another
 OF_DATA = frozenset(
     {
         *(Opcode.HEADER, Opcode.FOOTER, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX),
@@ -92,6 +94,18 @@ def whole_record(kind: type[Any], body: bytes, extended: bool = False) -> Any:
     return record
 
 
+def begins_record(data: Buffer, position: int, end: int) -> bool:
+    """Whether a record of a known kind that fits into the file begins there, also after some of unknown kinds."""
+    for _ in range(MOST_STRANGE):
+        if position + HEAD.size > end:
+            return position == end
+        opcode, length = HEAD.unpack_from(data, position)
+        position += HEAD.size + length
+        if opcode in OPCODES or not opcode or position > end:
+            return opcode in OPCODES and position <= end
+    return False
+
+
 def read_summary(data: Buffer) -> Summary | None:
     """The summary section; None where there is none or where it is damaged."""
     footer_at = len(data) - len(MCAP0_MAGIC) - FOOTER_BYTES
@@ -118,7 +132,7 @@ def read_summary(data: Buffer) -> Summary | None:
             position = following
     except DAMAGE:
         return None  # only where the writer left out the checksum
-    return summary
+    return summary if position == footer_at else None
 
 
 def _take_summary(summary: Summary, opcode: int, body: bytes) -> None:

@@ -20,11 +20,14 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
+from fish_bag.compression import KNOWN
 from fish_bag.mcap_chunk import CHUNK_START, chunk_head, cut_chunk, whole_chunk
 from fish_bag.mcap_records import (
     DAMAGE,
     HEAD,
+    OPCODES,
     another_file,
+    begins_record,
     check_length,
     checksum_holds,
     read_summary,
@@ -51,7 +54,6 @@ RECORDS: dict[int, type[Any]] = {
     Opcode.CHANNEL: Channel,
     Opcode.METADATA: Metadata,
 }
-OPCODES = frozenset(Opcode)
 MESSAGE = int(Opcode.MESSAGE)
 
 
@@ -142,25 +144,18 @@ class _Scan:
             return self.nonsense(position)
         following = int(body + length)
         if opcode not in OPCODES:
-            if opcode < PRIVATE and not self._begins_record(following):
+            if opcode < PRIVATE and not begins_record(self.data, following, self.end):
                 return self.nonsense(position)
             self.strange[opcode] += 1
             return following
         if opcode == Opcode.MESSAGE:
             return self.loose_message(position, following)
         try:
-            self.take(opcode, data[body:following], self._begins_record(following))
+            self.take(opcode, data[body:following], begins_record(self.data, following, self.end))
         except DAMAGE:
             return self.nonsense(position)
         self.data_end = position
         return None if self.ended else following
-
-    def _begins_record(self, position: int) -> bool:
-        """Whether a record of a known kind that fits into the file begins there."""
-        if position + HEAD.size > self.end:
-            return position == self.end
-        opcode, length = HEAD.unpack_from(self.data, position)
-        return opcode in OPCODES and position + HEAD.size + length <= self.end
 
     def take(self, opcode: int, body: bytes, extended: bool) -> None:
         """Take one record that is no message; one of DAMAGE if it makes no sense. `extended`: its length is sure."""
@@ -231,14 +226,22 @@ class _Scan:
             records, following = whole
             self.records(records, len(records), whole=True)
             end = position + HEAD.size + length
-            extended = following < end <= self.end and not self._begins_record(following)
-            return end if extended and self._begins_record(end) else following
+            extended = following < end <= self.end and not begins_record(
+                self.data, following, self.end
+            )
+            return end if extended and begins_record(self.data, end, self.end) else following
         head = chunk_head(self.data, position, self.content_end)
         if head is None or head.end - position - HEAD.size != length:
             if position + HEAD.size + length > self.content_end:
                 self.lost.append(f"the chunk at byte {position}, of which only the head is left")
                 return None
             return self.nonsense(position)
+        if head.compression not in KNOWN:
+            name = repr(head.compression)
+            self.lost.append(
+                f"chunk at byte {position} is compressed as {name}, which is not known; left out"
+            )
+            return head.end
         if head.end <= self.content_end:
             self.lost.append(f"chunk at byte {position} is damaged (wrong checksum); left out")
             return head.end

@@ -37,6 +37,7 @@ from fish_bag.time_axis import (
     Stamps,
     TimeAxis,
     build_axis,
+    clocks_apart,
 )
 from fish_bag.topic_map import TopicMap, TopicRule
 from fish_bag.trial import (
@@ -115,8 +116,12 @@ class _Assembly:
                 f"{self.bag.path}: none of the robot's topics can be read; it holds {held}{advice}"
             )
         arrivals = self.arrivals()
+        mapped = self.separated(mapped)
         stamps = [m.stamps for m in mapped.values() if m.stamps is not None]
         axis = build_axis(stamps, int(arrivals.min()), self.topics.max_latency_s)
+        self.clocks = {
+            m.decoded.topic: m.stamps.clock for m in mapped.values() if m.stamps is not None
+        }
         streams: dict[str, Any] = {role: self.stream(role, m, axis) for role, m in mapped.items()}
         paths = self.paths(axis)
         for clock in axis.clocks.values():
@@ -219,6 +224,23 @@ class _Assembly:
             decoded.topic, clock, decoded.stamp_ns, decoded.arrival_ns, steady=not self.simulated
         )
 
+    def separated(self, mapped: dict[str, _Mapped]) -> dict[str, _Mapped]:
+        """The same with a clock of its own for each topic whose stamps do not fit the others of its clock (said)."""
+        stamps = [m.stamps for m in mapped.values() if m.stamps is not None]
+        out = dict(mapped)
+        for topic, ahead in clocks_apart(stamps).items():
+            role, one = next((r, m) for r, m in mapped.items() if m.decoded.topic == topic)
+            assert one.stamps is not None
+            text = (
+                f"stamps are {ahead:+.3f} s from those of the other topics of clock {one.stamps.clock!r}; they are taken for"
+                " those of another clock and moved by an estimate: correct them where they are published"
+            )
+            self.problems.append(Problem("warning", "clock_apart", topic, text))
+            out[role] = replace(
+                one, stamps=replace(one.stamps, clock=f"{one.stamps.clock} of {topic}")
+            )
+        return out
+
     def stream(self, role: str, mapped: _Mapped, axis: TimeAxis) -> Stream:
         decoded, rule, stamps = mapped.decoded, mapped.rule, mapped.stamps
         t_arrival = axis.arrived(decoded.arrival_ns)
@@ -238,6 +260,7 @@ class _Assembly:
         }
         stream = ROLES[role].stream(**values)
         self.problems += checks.check_stream(stream, rule, decoded.frames)
+        self.problems += checks.check_joints(role, decoded, rule)
         if role in MEASURED:
             self.problems += check_publishers(stream)
         return stream
@@ -265,7 +288,7 @@ class _Assembly:
             full_name(self.namespace, rule.topic): role for role, rule in self.topics.rules.items()
         }
         role = roles.get(raw.topic, "")
-        clock = self.topics.rules[role].clock if role else "robot"
+        clock = self.clocks.get(raw.topic, self.topics.rules[role].clock if role else MASTER)
         stamp_ns = stamps_of_prefixes(raw)
         t_arrival = axis.arrived(raw.arrival_ns)
         t = t_arrival if stamp_ns is None else axis.measured(clock, stamp_ns)

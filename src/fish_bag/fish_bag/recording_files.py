@@ -25,6 +25,14 @@ STRANGERS = {
     b"PK\3\4": ("a zip archive", "unzip it"),
     b"7z\xbc\xaf": ("a 7z archive", "unpack it"),
     b"/annex/objects": ("a git-annex pointer", "'git annex get' brings the recording"),
+    b"\x89MCAP0\n": (
+        "an MCAP file whose line ends were changed",
+        "copy it again, as a binary file",
+    ),
+    b"\x89MCAP0\r\r\n": (
+        "an MCAP file whose line ends were changed",
+        "copy it again, as a binary file",
+    ),
     b"<!DOCTYPE": ("a web page", "download the file itself"),
     b"<html": ("a web page", "download the file itself"),
 }  # first bytes of files that are given the name of a recording
@@ -100,6 +108,8 @@ def find_files(path: Path) -> RecordingFiles:
         raise RecordingError(f"{path}: does not exist")
     if path.is_file():
         return RecordingFiles(path, [path])
+    if not path.is_dir():
+        raise RecordingError(f"{path}: neither a file nor a folder")
     stated = read_metadata(path)
     if stated is not None:
         return _stated_files(path, stated)

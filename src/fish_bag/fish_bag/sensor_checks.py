@@ -23,6 +23,7 @@ from fish_bag.rudder_checks import check_rudder, check_tail
 from fish_bag.trial import JUMP, Camera, Trial
 from fish_bag.yaw_checks import check_yaw
 
+TURNS = {"gyro_axes", "camera_heading"}  # findings after which accelerations cannot be compared
 STILL = 1.0  # rad/s, change of the commanded rotor speed from which the robot moves
 JUMPY = 0.3  # share of poses flagged as jumps from which the camera speaks in another unit
 
@@ -57,7 +58,7 @@ def check_sensors(trial: Trial) -> Iterator[Problem]:
     said = {problem.kind for problem in rotor}
     yield from (problem for problem in yaw if problem.kind not in said)
     wrong = {problem.kind for problem in yaw}
-    if imu is not None and camera is not None and felt is not None and "gyro_axes" not in wrong:
+    if imu is not None and camera is not None and felt is not None and not wrong & TURNS:
         yield from check_unit(camera, felt)
         if "camera_axes" not in wrong:
             yield from check_directions(imu, felt)
@@ -87,7 +88,8 @@ def _stuck(trial: Trial) -> Iterator[Problem]:
         held += [(encoder.topic, "rotor speed", encoder.speed)]
         held += [(encoder.topic, "rotor angle", encoder.angle)]
     if camera is not None and len(camera) >= FEWEST:
-        held.append((camera.topic, "pose", camera.pose))
+        moved = np.ptp(camera.pose[:, :2], axis=0).any()
+        held.append((camera.topic, *(("heading", camera.psi) if moved else ("pose", camera.pose))))
     for topic, name, values in held:
         if not np.ptp(values, axis=0).any():
             value = np.array2string(np.atleast_1d(values[0]), precision=3)

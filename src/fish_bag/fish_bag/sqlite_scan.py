@@ -19,6 +19,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fish_bag.message_types import ros2_type_name
+from fish_bag.problem import RecordingError
 from fish_bag.sqlite_log import Log, read_log
 from fish_bag.sqlite_pages import Row, Value, rows
 from fish_bag.storage import (
@@ -40,6 +41,7 @@ COMPANIONS = (
     "-journal",
 )  # files in which sqlite3 keeps what is not yet, or no more, in the database
 TOPIC_COLUMNS = ("serialization_format", "offered_qos_profiles", "type_description_hash")
+TABLES = "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name"
 ENCODINGS = ("ros2msg", "ros2idl", "unknown", "")
 
 
@@ -47,9 +49,13 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
     """Collect every message that can be read.
 
     Args:
-        path: the database; its companions (-wal, -shm) lie in the same folder.
+        path: the database, or a symbolic link to it; its companions (-wal, -journal) lie in its folder.
         keep: how many bytes of the messages of a topic are kept.
     """
+    if path.is_symlink() and not companions(
+        path
+    ):  # sqlite3 too looks for them where the database lies
+        path = path.resolve()
     with _settled(path) as settled:
         contents = Contents(notes=settled.notes)
         try:
@@ -60,6 +66,8 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
             content_end = end_of_content(head)
             if content_end < len(head):
                 _drop_zeroed(settled.path.read_bytes(), content_end, contents)
+        except RecordingError as error:
+            raise RecordingError(f"{path}: {error}") from error
         except (sqlite3.Error, UnicodeDecodeError) as error:
             contents = Contents(notes=settled.notes)
             said = " ".join(str(error).split())
@@ -81,7 +89,7 @@ def _alone(path: Path, keep: Keep) -> Contents | None:
     contents = Contents()
     try:
         _read(path, contents, keep)
-    except (sqlite3.Error, UnicodeDecodeError):
+    except (sqlite3.Error, UnicodeDecodeError, RecordingError):
         return None
     return contents if contents.count else None
 
@@ -160,7 +168,7 @@ def _settled(path: Path) -> Iterator[Settled]:
 
 
 def _read(path: Path, contents: Contents, keep: Keep) -> None:
-    """Read a database that is whole; sqlite3.Error where it is not."""
+    """Read a database that is whole; sqlite3.Error where it is not, RecordingError where it is something else."""
     address = path.absolute().as_uri() + "?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as connection:
         (page_bytes,) = connection.execute("PRAGMA page_size").fetchone()
@@ -169,6 +177,12 @@ def _read(path: Path, contents: Contents, keep: Keep) -> None:
         found = connection.execute("PRAGMA quick_check(1)").fetchone()
         if found is None or found[0] != "ok":
             raise sqlite3.DatabaseError(found[0] if found else "no answer")
+        tables = [row[0] for row in connection.execute(TABLES)]
+        if tables and not {"topics", "messages"} & set(tables):
+            raise RecordingError(
+                f"a SQLite database with the tables {', '.join(tables[:5])}, not a recording; expected rosbag2's tables"
+                " topics and messages"
+            )
         definitions = {}
         if _columns(connection, "message_definitions"):
             query = (

@@ -28,6 +28,7 @@ class Decoded:
     arrays: dict[str, np.ndarray]  # fields of the role's stream, (N, ...)
     names: tuple[str, ...]
     unreadable: np.ndarray  # positions of messages that cannot be decoded
+    joints: tuple[str, ...] = ()  # names in messages of joints, in order of first appearance
 
 
 def decode_topic(raw: RawTopic, role: Role) -> Decoded:
@@ -42,7 +43,8 @@ def decode_topic(raw: RawTopic, role: Role) -> Decoded:
             if role.names == "name":
                 values = _by_name(values, block.texts["name"], names)
             _put(arrays, name, values, block.index, count)
-    return Decoded(raw.topic, raw.arrival_ns, stamp_ns, frames, arrays, names, unreadable)
+    joints = tuple(dict.fromkeys(n for block in blocks for n in block.texts.get("name", [])))
+    return Decoded(raw.topic, raw.arrival_ns, stamp_ns, frames, arrays, names, unreadable, joints)
 
 
 def topic_blocks(raw: RawTopic, messages: list[bytes]) -> tuple[list[Block], np.ndarray]:

@@ -13,6 +13,7 @@ from fish_bag.clock import ClockEstimate, estimate_clock, robust_line
 MASTER = "robot"  # the clock that commands are stamped with: physics is simulated on its time
 RECORDER = "recorder"
 FUTURE_S = 1e-3  # stamps may lie so far after the arrival before the clock is called another one
+APART_S = 2.0  # latencies of two topics differ by less, also on a computer that is too slow
 OUTLIER_S = 5.0  # a stamp so far off the recording's trend is wrong
 NEIGHBOURS = 11  # messages that make the trend of a clock that may stand still
 
@@ -95,6 +96,31 @@ def build_axis(stamps: list[Stamps], first_arrival_ns: int, max_latency_s: float
         return TimeAxis(first_arrival_ns, RECORDER, clocks)
     origin = master.from_recorder(np.array([first_arrival_ns]), master.middle_ns)[0]
     return TimeAxis(master.middle_ns + round(origin * 1e9), MASTER, clocks)
+
+
+def clocks_apart(stamps: list[Stamps]) -> dict[str, float]:
+    """Topics whose stamps are of another clock than those of the first topic of their clock, and by how much [s].
+
+    Topics of one clock differ by their latencies only; more than APART_S between them is another clock, such as one
+    in another time zone or one that counts from the start of the computer. Clocks that stand still are not judged.
+    """
+    first: dict[str, Stamps] = {}
+    apart = {}
+    for one in stamps:
+        other = first.setdefault(one.clock, one)
+        if other is one or not (one.steady and len(one.stamp_ns) and len(other.stamp_ns)):
+            continue
+        base = int(np.median(other.arrival_ns - other.stamp_ns))
+        late, usual = (
+            ((s.arrival_ns - s.stamp_ns - base) * 1e-9)[np.argsort(s.arrival_ns)]
+            for s in (one, other)
+        )
+        at, known = np.sort(one.arrival_ns), np.sort(other.arrival_ns)
+        start = int(known[0])
+        distance = float(np.median(late - np.interp(at - start, known - start, usual)))
+        if abs(distance) > APART_S:
+            apart[one.topic] = -distance
+    return apart
 
 
 def _estimate(name: str, stamps: list[Stamps], max_latency_s: float) -> ClockEstimate | None:

@@ -28,6 +28,7 @@ from fish_bag.rudder_checks import rudder_follows
 from fish_bag.trial import Camera, Commands, Imu, Trial
 
 TURN_RAD = 0.05  # standard deviation of the heading from which it can be compared
+SAME_TURNS = 0.5  # mean of unit vectors with the angles between turns by camera and by gyro
 STRAY_TURN_RAD = 0.3  # from which a gyro must show it
 RUDDER_FOLLOWS = 0.6  # correlation; a controller acts against disturbances, which lowers it
 ANSWERS = 0.8  # coherence of the yaw rate with the rotor
@@ -51,6 +52,9 @@ def check_yaw(
     )
     answer = _answer(trial)
     headings = None if imu is None or camera is None else _headings(imu, camera)
+    if imu is not None and camera is not None and (found := list(_degrees(imu, camera))):
+        yield from found
+        return
     if imu is not None and camera is not None and headings is not None:
         psi, angles = headings
         found = list(_gyro(imu, psi, angles))
@@ -64,12 +68,30 @@ def check_yaw(
         sure = headings is None or correlation(headings[0], headings[1][2]) > FOLLOWS
         if sure and imu is not None:
             yield from _rotor(commands, answer, alone=headings is None)
-        if follows is not None and follows < -RUDDER_FOLLOWS:
+        if sure and follows is not None and follows < -RUDDER_FOLLOWS:
             text = (
                 f"the fish turns against the rudder (correlation {follows:.2f}); expected a left turn for a "
                 "positive angle: change the sign of the rudder"
             )
             yield Problem("error", "rudder_sign", commands.topic, text)
+
+
+def _degrees(imu: Imu, camera: Camera) -> Iterator[Problem]:
+    """A heading in degrees, of which the quaternion keeps what is left after whole turns: looked for between poses."""
+    inside = (camera.t >= imu.t[0]) & (camera.t <= imu.t[-1])
+    if np.sum(inside) < FEWEST or len(imu) < FEWEST:
+        return
+    turns = np.diff(camera.psi[inside])
+    by_gyro = np.diff(np.interp(camera.t[inside], imu.t, integral(imu.t, imu.gyro[:, 2])))
+    rad, deg = (
+        float(np.abs(np.mean(np.exp(1j * (turns - k * by_gyro))))) for k in (1.0, np.degrees(1.0))
+    )
+    if deg > SAME_TURNS > rad:
+        text = (
+            f"its turns between poses are 57.3 times those of gyro z (agreement {deg:.2f} of 1, without the factor "
+            f"{rad:.2f}): a heading in deg? make the quaternion from rad"
+        )
+        yield Problem("error", "camera_heading", camera.topic, text)
 
 
 def _answer(trial: Trial) -> RotorResponse | None:

@@ -103,6 +103,34 @@ def test_joint_missing_from_some_messages(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("topic", "severity"), [("joint_command", "error"), ("joint_states", "warning")]
+)
+def test_joints_under_other_names_are_said(tmp_path, topic, severity):
+    def renamed(_, t, m):
+        m.name = [name.capitalize() for name in m.name]
+        return t, m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), f"/fish/{topic}", renamed))
+    said = [p for p in result.problems if p.kind == "joint"]
+    assert {p.severity for p in said} == {severity}
+    assert all("'Rotor'" in p.text for p in said)
+
+
+@pytest.mark.parametrize("ahead", [7200.0, -1.6e9, 3.0])
+def test_stamps_of_another_clock_move_no_other_topic(tmp_path, ahead):
+    """A time zone, seconds since the start of a computer, a wrong second: the other topics keep their times."""
+
+    def moved(_, t, m):
+        return t, samples.shift_stamp(m, ahead)
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/imu/data", moved))
+    assert f"stamps are {ahead - 0.002:+.3f} s" in problem(result, "clock_apart", "imu/data").text
+    assert result.axis == "recorder"
+    np.testing.assert_allclose(result.commands.t, np.arange(0, 2, 0.01), atol=1e-6)
+    np.testing.assert_allclose(result.imu.t, np.arange(0, 2, 0.01) + 0.002, atol=1e-3)
+
+
+@pytest.mark.parametrize(
     ("topic", "severity"),
     [
         ("joint_command", "error"),

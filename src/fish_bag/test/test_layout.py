@@ -5,6 +5,7 @@
 import numpy as np
 import pytest
 from rosbags.interfaces import Nodetype
+from rosbags.typesys import get_types_from_msg
 
 from fish_bag import message_build as build
 from fish_bag.layout import (
@@ -127,6 +128,21 @@ def test_absurd_length_is_refused():
     raw[4 + 8 : 4 + 12] = b"\xff\xff\xff\x7f"  # frame_id of 2 GB
     with pytest.raises(LayoutError, match="fields need more"):
         find_layout(bytes(raw), "sensor_msgs/msg/JointState", store.fielddefs, ros1=False)
+
+
+@pytest.mark.parametrize(
+    "definition",
+    [
+        "sensor_msgs/Imu x",
+        f"sensor_msgs/Foo[1000000000] x\n{'=' * 80}\nMSG: sensor_msgs/Foo\n",
+        f"sensor_msgs/Foo a\nsensor_msgs/Foo b\n{'=' * 80}\nMSG: sensor_msgs/Foo\nsensor_msgs/Imu y\nsensor_msgs/Imu z",
+    ],
+    ids=["itself", "many empty ones", "two of each other"],
+)
+def test_types_without_end_or_fields_are_refused(definition):
+    types = get_types_from_msg(definition, "sensor_msgs/msg/Imu")
+    with pytest.raises(LayoutError, match="no end or no fields"):
+        find_layout(bytes([0, 1, 0, 0]) + bytes(40), "sensor_msgs/msg/Imu", types, ros1=False)
 
 
 def test_ros1_layout_has_no_alignment():

@@ -5,18 +5,20 @@
 import bz2
 import gzip
 import lzma
+import os
 import shutil
 import sqlite3
 import struct
 import zlib
 from collections import Counter
+from contextlib import closing
 
 import pytest
 import yaml
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
-from fish_bag import RecordingError, read_trial
+from fish_bag import RecordingError, read_dataset, read_trial
 from fish_bag import sample_formats as formats
 from fish_bag import sample_recordings as samples
 from fish_bag.bag import salvage_bag
@@ -76,10 +78,11 @@ def holds_the_robot(trial):
     return " ".join(problem.text for problem in trial.problems)
 
 
-def test_a_summary_that_begins_inside_the_data_hides_nothing(tmp_path):
+@pytest.mark.parametrize("inside", [0, 1, 100])
+def test_a_summary_that_begins_inside_the_data_hides_nothing(tmp_path, inside):
     path = write(tmp_path / "a.mcap", enable_crcs=False)
     data = bytearray(path.read_bytes())
-    third = [place for place, opcode, _ in records(data) if opcode == Opcode.CHUNK][2]
+    third = [place for place, opcode, _ in records(data) if opcode == Opcode.CHUNK][2] + inside
     struct.pack_into("<Q", data, len(data) - 8 - 20, third)  # summary_start of the footer
     path.write_bytes(data)
     assert "no message is lost" in holds_the_robot(read_trial(path))
@@ -103,6 +106,29 @@ def test_records_of_unknown_kinds_are_left_out_and_said(tmp_path):
 
     path = rewritten(write(tmp_path / "a.mcap"), change)
     assert "0x91" in holds_the_robot(read_trial(path))
+
+
+def test_reserved_records_in_a_row_are_left_out_and_said(tmp_path):
+    """The specification has readers skip opcodes of later versions, however many follow each other."""
+
+    def change(opcode, body):
+        strange = [(0x7F, b"x" * 50), (0x10, b""), (0x90, b"y")]
+        return [*strange, (opcode, body)] if opcode == Opcode.CHUNK else [(opcode, body)]
+
+    path = rewritten(write(tmp_path / "a.mcap", enable_crcs=False), change)
+    data = bytearray(path.read_bytes())
+    first = next(place for place, opcode, _ in records(data) if opcode == Opcode.DATA_END) + 13
+    struct.pack_into("<Q", data, len(data) - 28, first)  # where the summary begins now
+    path.write_bytes(data)
+    assert "0x10" in holds_the_robot(read_trial(path))
+
+
+def test_an_unknown_compression_of_a_chunk_is_named(tmp_path):
+    path = write(tmp_path / "a.mcap", compression=CompressionType.ZSTD)
+    name = struct.pack("<I", 4) + b"zstd"
+    path.write_bytes(path.read_bytes().replace(name, name[:4] + b"brot", 1))
+    with pytest.raises(RecordingError, match="compressed as 'brot', which is not known"):
+        read_trial(path)
 
 
 def test_a_channel_without_its_schema_harms_no_other(tmp_path):
@@ -169,6 +195,8 @@ def test_the_total_of_metadata_is_compared(tmp_path):
         ("a.mcap", lzma.compress(b"mcap"), "an xz file"),
         ("a.zip", b"PK\3\4" + bytes(40), "a zip archive"),
         ("a.bag", b"/annex/objects/SHA256E-s1--aa.bag\n", "a git-annex pointer"),
+        ("a.mcap", b"\x89MCAP0\n" + bytes(40), "whose line ends were changed"),
+        ("a.mcap", b"\x89MCAP0\r\r\n" + bytes(40), "whose line ends were changed"),
         ("a.mcap", b"\n<!doctype html><html>404</html>", "a web page"),
     ],
 )
@@ -177,6 +205,18 @@ def test_a_file_that_is_something_else_is_named(tmp_path, name, data, said):
     for read in (read_trial, salvage_bag):
         with pytest.raises(RecordingError, match=said):
             read(tmp_path / name)
+
+
+def test_what_is_neither_file_nor_folder_costs_itself_only(tmp_path):
+    for name in ("a.mcap", "c.mcap"):
+        write(tmp_path / name)
+    os.mkfifo(tmp_path / "b.mcap")
+    with pytest.raises(RecordingError, match="neither a file nor a folder"):
+        read_trial(tmp_path / "b.mcap")
+    data = read_dataset(tmp_path)
+    holds_the_robot(data.trials[0])
+    assert any("b.mcap left out" in problem.text for problem in data.problems)
+    assert len(data) == 2
 
 
 def test_a_second_file_behind_the_first_is_said(tmp_path):
@@ -370,3 +410,18 @@ def test_rows_whose_time_is_no_number_are_said(tmp_path):
         read_trial(path)
     recover(path, tmp_path / "out")
     holds_the_robot(read_trial(tmp_path / "out"))
+
+
+def test_a_link_to_a_database_brings_its_log(tmp_path):
+    path = formats.write_sqlite_with_log(tmp_path / "a", MESSAGES)
+    (tmp_path / "link.db3").symlink_to(path / "a.db3")
+    assert "a.db3-wal is taken in" in holds_the_robot(read_trial(tmp_path / "link.db3"))
+
+
+def test_a_database_of_another_program_is_named(tmp_path):
+    with closing(sqlite3.connect(tmp_path / "a.db3")) as connection:
+        connection.execute("CREATE TABLE birds (name)")
+        connection.commit()
+    for read in (read_trial, salvage_bag):
+        with pytest.raises(RecordingError, match="with the tables birds, not a recording"):
+            read(tmp_path / "a.db3")

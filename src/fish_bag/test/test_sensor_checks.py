@@ -91,6 +91,7 @@ def test_a_fault_is_an_error(tmp_path, fault, expected):
         ({"encoder": lambda a, s: (a, 0.0)}, "rotor speed is"),
         ({"encoder": lambda a, s: (1.5, s)}, "rotor angle is"),
         ({"pose": lambda p: 0 * p + 0.3}, "pose is"),
+        ({"pose": lambda p: p * [1, 1, 0]}, "heading is"),
     ],
 )
 def test_a_sensor_that_gives_one_value_is_named(tmp_path, fault, words):

@@ -160,6 +160,12 @@ FAULTS = {
         "camera_axes",
         "left-handed",
     ),
+    "heading in deg": (
+        lambda s: camera(s, lambda p: p * [1, 1, np.degrees(1)]),
+        "error",
+        "camera_heading",
+        "57.3 times",
+    ),
     "marker turned by 180 deg": (
         lambda s: camera(s, lambda p: p + [0, 0, np.pi]),
         "error",
@@ -237,6 +243,11 @@ def test_a_faultless_swim_has_no_finding(course, seed):
 def test_a_left_handed_camera_is_one_finding():
     found = findings(camera(stroke_swim(), lambda p: p * [1, -1, -1]))
     assert set(found) == {("error", "camera_axes")}
+
+
+def test_a_heading_in_degrees_blames_nothing_else():
+    found = findings(camera(stroke_swim(), lambda p: p * [1, 1, np.degrees(1)]))
+    assert set(found) == {("error", "camera_heading")}
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drawings as paths."""
 
+import gzip
+
 import numpy as np
 import pytest
 
@@ -133,3 +135,17 @@ def test_a_file_of_points_has_no_ids_and_a_vertical_line_no_width(tmp_path):
         make_path(str(file), id="a")
     with pytest.raises(PathError, match="no width"):
         make_path(str(file), width=1.0)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.svg"])
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (gzip.compress(b"x,y"), "compressed by gzip"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:aa\nsize 9\n", "git lfs pull"),
+    ],
+)
+def test_a_packed_file_is_named(tmp_path, name, content, said):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(PathError, match=said):
+        make_path(str(tmp_path / name))

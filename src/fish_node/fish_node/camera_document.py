@@ -13,7 +13,6 @@ from xml.etree import ElementTree
 
 import yaml
 
-LFS_START = "version https://git-lfs"
 YAML_LINE = "%YAML:1.0"  # OpenCV's first line, which is no YAML 1.1 directive
 # headings of the oST text and the names of their numbers
 OST = {
@@ -24,6 +23,7 @@ OST = {
     "rectification": "rectification_matrix",
     "projection": "projection_matrix",
 }
+FISHEYE = 4  # coefficients; camera_calibration writes 5 or 8 for other lenses
 WRONG = (yaml.YAMLError, ElementTree.ParseError, ValueError, RecursionError)  # what parsing raises
 
 
@@ -31,10 +31,20 @@ class _Loader(yaml.SafeLoader):  # type: ignore[misc]
     """YAML with OpenCV's tagged matrices."""
 
 
-def _matrix(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+def _unique(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+    """A mapping; of two entries of one name, which YAML forbids, neither is chosen."""
+    names = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise ValueError(f"{twice[0]} is given twice; keep one of the two")
     return dict(loader.construct_mapping(node, deep=True))
 
 
+def _matrix(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+    return _unique(loader, node)
+
+
+_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique)
 _Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
 _Loader.add_implicit_resolver(  # 1e-05, as C++ writes it: a number in YAML 1.2, a text in 1.1
     "tag:yaml.org,2002:float",
@@ -50,8 +60,6 @@ def parse(text: str) -> object:
         one of WRONG: the text is nothing of the kind.
     """
     start = text.lstrip("\ufeff \t\r\n")
-    if start.startswith(LFS_START):
-        raise ValueError("a Git LFS pointer; 'git lfs pull' brings the file")
     if start.startswith("<"):
         document: object = _xml(start)
     elif re.match(r"(#[^\n]*\n|\s)*\[image\]", start):
@@ -84,11 +92,19 @@ def _ost(text: str) -> dict[str, Any]:
     for line in map(str.strip, text.splitlines()):
         if line in OST:
             heading = OST[line]
+            if heading in numbers:
+                raise ValueError(
+                    f"two cameras: {line!r} stands in it twice; give each camera a file of its own"
+                )
             numbers[heading] = []
         elif line.startswith(("#", "[")):
             heading = ""
         elif heading and line:
             numbers[heading] += [float(word) for word in line.split()]
+    if len(numbers.get(OST["distortion"], ())) == FISHEYE:
+        raise ValueError(
+            f"{FISHEYE} numbers of distortion, a fisheye's: this format names no model; use the ost.yaml beside it"
+        )
     single = {
         name: values[0] for name, values in numbers.items() if name.startswith("image_") and values
     }

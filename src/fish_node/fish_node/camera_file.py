@@ -17,12 +17,19 @@ from typing import Any
 import yaml
 
 from fish_node.camera_document import WRONG, parse
+from fish_node.packed_file import packed_as
 
 # numbers of coefficients that each model may have; none and four of plumb_bob are five with zeros
 COEFFICIENTS = {"plumb_bob": (5, 4, 0), "rational_polynomial": (8,), "equidistant": (4,)}
 # OpenCV's rational model gives 14: behind the 8 those of a thin prism and a tilted sensor, zero unless they were asked for
 LONGER = (8, 12, 14)
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+# other names of a model: older camera_calibration wrote fisheye, and the equation is that of Kannala and Brandt
+ALIASES = {
+    "fisheye": "equidistant",
+    "kannala_brandt": "equidistant",
+    "kannala_brandt4": "equidistant",
+}
 LONGEST = 100  # characters of a foreign text in a message
 
 
@@ -50,7 +57,10 @@ def read_camera_file(path: Path) -> CameraFile:
         CameraFileError: the file is no camera file, or a field is missing or impossible.
     """
     try:
-        document = parse(path.read_text(encoding="utf-8"))
+        content = path.read_bytes()
+        if said := packed_as(content):
+            raise ValueError(said)
+        document = parse(content.decode())
     except (OSError, *WRONG) as error:
         raise CameraFileError(
             f"{path}: no camera file: {_short(' '.join(str(error).split()))}"
@@ -67,7 +77,7 @@ def read_camera_file(path: Path) -> CameraFile:
             "camera_matrix", f"has focal lengths {K[0]:g}, {K[4]:g}", "those of a calibrated camera"
         )
     size = fields.whole("image_width"), fields.whole("image_height")
-    if (K[3], *K[6:9]) != (0.0, 0.0, 0.0, 1.0):
+    if (K[1], K[3], *K[6:9]) != (0.0, 0.0, 0.0, 0.0, 1.0):
         raise fields.wrong(
             "camera_matrix", f"is {_short(str(K))}", "fx 0 cx, 0 fy cy, 0 0 1 row by row"
         )
@@ -142,8 +152,17 @@ class _Fields:
     def wrong(self, name: str, what: str, expected: str) -> CameraFileError:
         return CameraFileError(f"{self._path}: {name} {what}, expected {expected}")
 
+    def absent(self, name: str) -> CameraFileError:
+        held = ", ".join(map(str, list(self._document)[:12])) or "nothing"
+        return CameraFileError(
+            f"{self._path}: no {name}; it holds {_short(held)}; expected the names that camera_info_manager or"
+            " camera_calibration writes"
+        )
+
     def whole(self, name: str) -> int:
-        value = self._document.get(name)
+        if name not in self._document:
+            raise self.absent(name)
+        value = self._document[name]
         if (
             isinstance(value, bool)
             or not isinstance(value, int | float)
@@ -158,7 +177,9 @@ class _Fields:
     ) -> tuple[float, ...]:
         if name not in self._document and default is not None:
             return default
-        matrix = self._document.get(name)
+        if name not in self._document:
+            raise self.absent(name)
+        matrix = self._document[name]
         data = matrix.get("data") if isinstance(matrix, dict) else matrix
         data = [] if data is None and counts[-1] == 0 and isinstance(matrix, dict) else data
         good = isinstance(data, list) and len(data) in counts and all(map(_is_number, data))
@@ -178,6 +199,7 @@ class _Fields:
             data = self.numbers(name, (4,) if fisheye else (5, 4, *LONGER, 0))
             model = "rational_polynomial" if len(data) in LONGER else "plumb_bob"
             model = "equidistant" if fisheye else model
+        model = ALIASES.get(model, model) if isinstance(model, str) else model
         if not isinstance(model, str) or model not in COEFFICIENTS:
             known = ", ".join(COEFFICIENTS)
             raise self.wrong(

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Camera files of all writers."""
 
+import gzip
+
 import cv2
 import numpy as np
 import pytest
@@ -54,6 +56,12 @@ def test_every_model_is_read(tmp_path, model, data, expected):
     assert camera.projection[0] == 500.0
 
 
+@pytest.mark.parametrize("name", ["fisheye", "kannala_brandt4"])
+def test_other_names_of_a_fisheye_are_taken(tmp_path, name):
+    camera = read_camera_file(written(tmp_path, changed(name, [0.05, 0.04, -0.02, 0.004])))
+    assert (camera.model, camera.distortion[0]) == ("equidistant", 0.05)
+
+
 @pytest.mark.parametrize("head", ["%YAML:1.0\n", "%YAML:1.0\n---\n"])
 def test_the_first_line_of_opencv_is_taken(tmp_path, head):
     assert read_camera_file(written(tmp_path, head + yaml.safe_dump(FILE))).width == 800
@@ -82,6 +90,7 @@ def test_what_file_storage_writes_is_taken(tmp_path, count):
         ({"camera_matrix": {"data": [1, 2]}}, r"camera_matrix.data is \[1, 2\], expected 9 finite"),
         ({"camera_matrix": 3}, "camera_matrix.data is 3, expected 9 finite numbers"),
         ({"camera_matrix": {"data": [0.0] * 9}}, "focal lengths 0, 0"),
+        ({"camera_matrix": {"data": [K[0], 5.0, *K[2:]]}}, "expected fx 0 cx"),
         ({"distortion_model": "fancy"}, "distortion_model is 'fancy', expected one of plumb_bob"),
         ({"distortion_coefficients": {"data": [0.1] * 3}}, "expected 5 or 4 or 0 finite numbers"),
         ({"distortion_coefficients": {"data": [float("nan")] * 5}}, "finite numbers"),
@@ -100,6 +109,26 @@ def test_errors_name_file_and_field_in_one_short_line(tmp_path, change, expected
 def test_files_that_are_no_camera_file(tmp_path, text):
     with pytest.raises(CameraFileError, match="no camera file"):
         read_camera_file(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("missing", ["image_width", "camera_matrix", "distortion_coefficients"])
+def test_a_missing_field_is_named_with_those_that_are_there(tmp_path, missing):
+    document = {name: value for name, value in FILE.items() if name != missing}
+    with pytest.raises(CameraFileError, match=f"no {missing}; it holds .*camera_name"):
+        read_camera_file(written(tmp_path, document))
+
+
+def test_a_field_that_is_given_twice_is_refused(tmp_path):
+    text = yaml.safe_dump(FILE) + "image_width: 640\n"
+    with pytest.raises(CameraFileError, match="image_width is given twice"):
+        read_camera_file(written(tmp_path, text))
+
+
+def test_a_packed_file_is_named(tmp_path):
+    path = tmp_path / "camera.yml.gz"
+    path.write_bytes(gzip.compress(yaml.safe_dump(FILE).encode()))
+    with pytest.raises(CameraFileError, match="compressed by gzip; gunzip it"):
+        read_camera_file(path)
 
 
 def test_a_missing_file_is_named(tmp_path):
@@ -148,6 +177,22 @@ def test_the_text_of_camera_calibration_is_read(tmp_path):
     assert camera.camera_matrix == (538.63, 0.0, 310.5, 0.0, 539.72, 240.25, 0.0, 0.0, 1.0)
     assert camera.distortion == (-0.3, 0.08, 0.002, -0.0001, 0.0)
     assert camera.projection[:4] == (500.0, 0.0, 312.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (OST + OST.replace("narrow_stereo", "narrow_stereo/right"), "two cameras"),
+        (
+            OST.replace(" -0.000100 0.000000", " -0.000100"),
+            "a fisheye's: .* use the ost.yaml beside it",
+        ),
+    ],
+    ids=["stereo", "fisheye"],
+)
+def test_a_text_that_leaves_the_camera_open_is_refused(tmp_path, text, said):
+    with pytest.raises(CameraFileError, match=said):
+        read_camera_file(written(tmp_path, text))
 
 
 @pytest.mark.parametrize("suffix", [".xml", ".json", ".yaml"])

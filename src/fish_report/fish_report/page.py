@@ -67,7 +67,8 @@ def write_page(path: Path, title: str, lead: str, blocks: Sequence[Block]) -> No
     page = template.render(
         title=title, lead=lead, blocks=blocks, plotlyjs=get_plotlyjs(), font=FONT
     )
-    path.write_text(page, encoding="utf-8")
+    # names of files may hold bytes that are no UTF-8
+    path.write_text(page, encoding="utf-8", errors="backslashreplace")
 
 
 def styled(figure: go.Figure, height: int = 320, titled: bool = False) -> go.Figure:

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
+from io import TextIOWrapper
 from pathlib import Path
 from typing import NoReturn
 
@@ -88,6 +89,11 @@ def usage() -> str:
 
 def run_verb(verb: str, argv: list[str] | None = None) -> int:
     """Parse the arguments of one verb and run it; an error that the user can mend becomes one line and status 1."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(
+            stream, TextIOWrapper
+        ):  # a terminal or pipe in another encoding shows ? for what it lacks
+            stream.reconfigure(errors="replace")
     verbs, verb = installed_verbs(), verb.replace("-", "_")
     if verb not in verbs:
         print(f"robofish: {_unknown(verb, verbs)}", file=sys.stderr)

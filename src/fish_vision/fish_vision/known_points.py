@@ -42,25 +42,39 @@ def read_points(path: Path) -> KnownPoints:
     """Points from a CSV file with header x,y,u,v or id,x,y or x,y.
 
     Raises:
-        CalibrationError: no such file, another header, or a value that is no finite number.
+        CalibrationError: no such file, another header, a line with more or fewer fields, or a value that is no finite number.
     """
+    lines: list[int] = []
+    rows: list[list[float]] = []
     try:
-        with path.open(newline="") as file:
-            table = csv.DictReader(file)
-            header = tuple(table.fieldnames or ())
+        with path.open(
+            newline="", encoding="utf-8-sig"
+        ) as file:  # spreadsheets write a byte order mark
+            table = csv.reader(file)
+            header = [name.strip() for name in next(table, [])]
             form = next((f for f in FORMATS if set(f) <= set(header)), None)
-            if form is None:
+            if form is None or any(header.count(name) > 1 for name in form):
                 raise ValueError(f"header {','.join(header)}")
-            rows = [[float(row[key]) for key in form] for row in table]
-    except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+            places = [header.index(name) for name in form]
+            for row in filter(any, table):
+                lines.append(table.line_num)
+                if len(row) != len(header):
+                    raise ValueError(
+                        f"line {lines[-1]} has {len(row)} fields for {len(header)} names"
+                    )
+                rows.append([float(row[k]) for k in places])
+    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
         raise CalibrationError(
-            f"{path}: expected CSV with header x,y,u,v or id,x,y or x,y and numbers ({error})"
+            f"{path}: expected CSV with header x,y,u,v or id,x,y or x,y, commas between fields and numbers with points"
+            f" ({error})"
         ) from error
     values = np.array(rows).reshape(-1, len(form))
     if not np.isfinite(values).all():
-        line = int(np.argmin(np.isfinite(values).all(axis=1))) + 2  # after the header, from 1
-        raise CalibrationError(f"{path}: line {line} has {rows[line - 2]}: expected finite numbers")
+        k = int(np.argmin(np.isfinite(values).all(axis=1)))
+        raise CalibrationError(f"{path}: line {lines[k]} has {rows[k]}: expected finite numbers")
     if form[0] == "id":
+        if (values[:, 0] % 1).any():
+            raise CalibrationError(f"{path}: an id is no whole number; expected those of the tags")
         return KnownPoints(tuple(str(int(v)) for v in values[:, 0]), values[:, 1:], tags=True)
     pixels = values[:, 2:] if len(form) == 4 else None
     return KnownPoints(tuple(_name(place) for place in values[:, :2]), values[:, :2], pixels)

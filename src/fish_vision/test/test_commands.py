@@ -254,6 +254,10 @@ def test_calibrate_colours_lets_a_person_click_the_markers(files: Path) -> None:
         ("x,y\n1,2\n", "no pixels: expected --image or --topic"),
         ("a,b\n1,2\n", "header x,y,u,v or id,x,y or x,y"),
         ("x,y,u,v\n1,2,3,a\n", "header x,y,u,v"),
+        ("x,y,u,v\n\n0,5,1,5,3,0,4,0\n", "line 3 has 8 fields for 4 names"),
+        ("x,y\n0,5,1,5\n", "line 2 has 4 fields for 2 names"),
+        ("id,x,y\n7.5,1,2\n", "an id is no whole number"),
+        ("\ufeffx, y,u,v\n", "at least 4"),
         ("x,y,u,v\n", "at least 4"),
     ],
 )

@@ -63,7 +63,9 @@ def read_points(file: Path) -> NDArray[np.float64]:
     signs: set[str] = set()
     for number, row, comment in _rows(text, delimiter, file):
         if comment:
-            found = _heading(row, file, number, comment)
+            found = _heading(row, file, number, comment) or _heading(
+                _two_names(delimiter.join(row)), file, number, comment
+            )
             if not points and (found or _speaks_of_columns(row)):
                 remarks.setdefault(found, f"line {number}, the comment {_shown(row)},")
             continue
@@ -152,6 +154,12 @@ def _heading(row: list[str], file: Path, number: int, comment: bool) -> _Columns
             f"{file}: line {number} has x in {units[0]!r} and y in {units[1]!r}, expected both in m, cm or mm"
         )
     return _Columns(x, y, METRES[units[0].lower()], named=len(row))
+
+
+def _two_names(comment: str) -> list[str]:
+    """The words of a comment such as `columns: y [mm] x [mm]` if they are two, however they are separated."""
+    words = re.split(r"\s*[,;\t]\s*|\s+(?![\[(])", comment.rsplit(":", 1)[-1].strip())
+    return words if len(words) == 2 else []
 
 
 def _speaks_of_columns(row: list[str]) -> bool:

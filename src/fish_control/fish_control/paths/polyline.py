@@ -14,6 +14,7 @@ from fish_control.paths.requirements import require_positive
 from fish_control.paths.rounded import round_corners
 from fish_control.paths.svg import read_svg
 from fish_control.reference_path import End, PathError, ReferencePath
+from fish_node.packed_file import packed_as
 
 SUFFIXES = (".csv", ".svg")
 
@@ -71,6 +72,10 @@ def polyline(
 def _read(path: Path, chosen: str | None, scaled: bool) -> tuple[NDArray[np.float64], bool, bool]:
     """Points [m], whether an outline is closed, and whether the points have their place in the pool."""
     try:
+        with path.open("rb") as opened:
+            said = packed_as(opened.read(32))
+        if said:
+            raise PathError(f"polyline: {str(path)!r} is {said}")
         if path.suffix.lower() == ".csv":
             if chosen is not None:
                 raise PathError(

@@ -54,6 +54,10 @@ def read_svg(file: Path, chosen: str | None = None) -> Drawing:
             " apart (Inkscape: Path > Break Apart) and choose a part by `id:`"
         )
     points, closed = outlines[0] if outlines else (np.zeros((0, 2)), False)
+    if not np.isfinite(points).all():
+        raise PathError(
+            f"{file}: {part.name} has coordinates that are too large; scale the drawing"
+        )
     scale = METRES_PER_PIXEL if has_size else 1.0
     return Drawing(points * [scale, -scale], closed, has_size)
 

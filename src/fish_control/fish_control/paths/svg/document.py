@@ -85,6 +85,8 @@ class _Document:
         if any(local_name(child) in MOVING for child in element):
             raise PathError(f"{where} is animated; draw one still line")
         inner = self._inner(element, replace(context, style=style, depth=context.depth + 1), where)
+        if not np.linalg.det(inner.matrix):  # scaled to nothing
+            return
         if tag in GROUPS:
             yield from self._children(element, inner, where)
         elif painted(style, where, self.by_id) and _has_content(element, inner.viewport, where):
