@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,24 +15,24 @@ from fish_control.estimate import Estimate, to_estimate
 from fish_control.fusion_config import FusionConfig
 from fish_control.imu_heading import HeadingNoise, ImuHeading
 from fish_control.imu_history import ImuHistory, InertialSample
-from fish_control.measurement_buffer import CameraPose, Moment, Timeline, start_moment
-from fish_control.noise_scale import EVERY, HORIZON, NoiseScale
-from fish_control.pose_checks import AgreeingPoses, RepeatedPose, doubts_motion, is_near
+from fish_control.measurement_buffer import (
+    CameraPose,
+    Moment,
+    RawPose,
+    Timeline,
+    start_moment,
+)
+from fish_control.motion_models import MotionModels
+from fish_control.noise_scale import NoiseScale
+from fish_control.pose_checks import AgreeingPoses, RepeatedPose, doubts_motion
 from fish_control.pose_weight import given_covariance, not_measured, weighted
-from fish_control.strapdown import StrapdownFilter
+from fish_control.strapdown import MotionModel, StrapdownFilter
 
 Array = NDArray[np.float64]
 SILENT_POSES = 3  # in a row without an IMU sample in between: the IMU is dead; stamps cannot say it
 OLD_POSES = 3  # in a row from before the history: the clock was set back, where no IMU says it
 SWIMS = 0.03  # m/s; a fish at rest does not show how well its motion is measured
 REFIT = 0.005  # s, change of the camera's offset after which the history is fused anew
-
-
-class RawPose(NamedTuple):
-    """A pose as it came, kept in case the camera's offset changes."""
-
-    stamp: float  # s
-    camera: CameraPose
 
 
 class Fusion:
@@ -49,6 +48,7 @@ class Fusion:
         self.counts: Counter[str] = Counter()
         self._scale = NoiseScale()
         self._filter = StrapdownFilter(self.config, self._scale)
+        self._models = MotionModels(self.config, self._scale)
         self._clear()
 
     def _clear(self) -> None:
@@ -66,7 +66,8 @@ class Fusion:
         self._accepted_at = -math.inf  # s, clock of the sensors when a pose was last accepted
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
         self._old_poses = 0  # in a row, from before the history
-        self._swum = 0  # poses of a fish that swims
+        self._models.begin()
+        self._filter.model = self._models.current
 
     def _restart(self) -> None:
         self._clear()
@@ -81,6 +82,11 @@ class Fusion:
     def noise_scale(self) -> NoiseScale:
         """Factors on the variances, from the innovations."""
         return self._scale
+
+    @property
+    def motion_model(self) -> MotionModel:
+        """The model of the motion that the poses bear out."""
+        return self._filter.model
 
     def add_imu(
         self,
@@ -171,14 +177,8 @@ class Fusion:
         moment = self._timeline.at(time)
         camera_lost = now - self._accepted_at > self.config.camera_timeout
         std = self.camera_clock.current.std if not imu_lost else self.config.camera_offset_std
-        return to_estimate(
-            moment,
-            self._imu.yaw_rate(moment.time),
-            std,
-            self.config.gyro_noise,
-            camera_lost,
-            imu_lost,
-        )
+        rate, noise = self._imu.yaw_rate(moment.time), self.config.gyro_noise
+        return to_estimate(moment, rate, std, noise, camera_lost, imu_lost)
 
     def _refuse(self, reason: str) -> bool:
         self.counts[reason] += 1
@@ -213,6 +213,7 @@ class Fusion:
             y, S = filter.innovation(camera.pose, camera.R)
             if float(y @ np.linalg.solve(S, y)) <= self.config.gate:
                 self._timeline.insert(time, camera)
+        self._models.begin(self._timeline.last.time)
 
     def _weighted(self, camera: CameraPose, time: float) -> CameraPose:
         """A pose with what makes it uncertain; the filter must hold its prediction for `time` [s]."""
@@ -235,8 +236,6 @@ class Fusion:
         fits = float(y @ np.linalg.solve(S, y)) <= self.config.gate
         if self.camera_clock.current.sure or not self.camera_clock.contradicted:
             self._scale.learn(y, S)
-            if is_near(y) and math.hypot(x[3], x[4]) > SWIMS:
-                self._learn_motion(time, camera)
         if fits:
             self._candidates.clear()
             return self._accept(time, camera)
@@ -244,7 +243,6 @@ class Fusion:
         known = self.camera_clock.current.sure or not imu_lives
         agree = agreeing >= self.config.start_frames
         if agree and doubts_motion(y, self._candidates.duration, known):
-            self._scale.surprise(y, S)
             fade = float(y @ np.linalg.solve(S, y)) / len(y)
             self.counts["motion_doubted"] += 1
             return self._accept(time, camera._replace(fade=fade))
@@ -254,20 +252,19 @@ class Fusion:
     def _accept(self, time: float, camera: CameraPose) -> bool:
         assert self._timeline is not None
         self._timeline.insert(time, camera)
+        self._choose_model(self._timeline)
         self._forget(max(time, self._last_imu_time))
         self._last_pose_time = max(self._last_pose_time, time)
         self._accepted_at = max(time, self._last_imu_time)
         self.counts["pose"] += 1
         return True
 
-    def _learn_motion(self, time: float, camera: CameraPose) -> None:
-        """See how well every few poses are predicted from HORIZON before, where the IMU measured all the way."""
-        assert self._timeline is not None
-        self._swum += 1
-        begin = max(self._timeline.first.time, self._imu.first_time)
-        if self._swum % EVERY == 0 and begin < time - HORIZON and time <= self._last_imu_time:
-            before = self._timeline.predict(time, HORIZON)
-            self._scale.learn_motion(*before.innovation(camera.pose, camera.R))
+    def _choose_model(self, timeline: Timeline) -> None:
+        """Let the poses say which model of the motion they bear out."""
+        moments = timeline.since(self._models.time)
+        swims = math.hypot(*moments[-1].x[3:5]) > SWIMS
+        clear = self.camera_clock.current.sure or not self.camera_clock.contradicted
+        self._filter.model = self._models.follow(moments, self._imu, clear and swims)
 
     def _forget(self, now: float) -> None:
         assert self._timeline is not None
@@ -294,6 +291,7 @@ class Fusion:
 
     def _begin(self, moment: Moment) -> bool:
         self._timeline = Timeline(self._filter, self._imu, moment)
+        self._models.begin()
         self._last_pose_time = moment.time
         self._accepted_at = max(moment.time, self._last_imu_time)
         self._candidates.clear()

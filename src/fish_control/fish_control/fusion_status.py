@@ -40,8 +40,9 @@ def clock_values(fusion: Fusion) -> dict[str, str]:
         "camera_offset_std_s": f"{clock.current.std:.4f}",
         "camera_offset_sure": str(clock.current.sure).lower(),
         "camera_clock_jumps": str(clock.jumps),
-        "camera_noise_factor": f"{math.sqrt(fusion.noise_scale.position.total):.2f}",
-        "motion_noise_factor": f"{math.sqrt(fusion.noise_scale.position.process):.2f}",
+        "camera_noise_factor": f"{math.sqrt(fusion.noise_scale.position):.2f}",
+        "accelerometer_used": str(fusion.motion_model.accel_used).lower(),
+        "accel_noise_m_s2": f"{fusion.motion_model.accel_noise:.3f}",
     }
     if math.isfinite(clock.age):
         values["camera_latency_s"] = f"{clock.age:.3f}"

@@ -34,6 +34,13 @@ class CameraPose(NamedTuple):
     fade: float = 1.0  # by which the predicted covariance is multiplied: more than 1 where the motion is doubted
 
 
+class RawPose(NamedTuple):
+    """A pose as it came, kept in case the camera's offset changes."""
+
+    stamp: float  # s
+    camera: CameraPose
+
+
 @dataclass
 class Moment:
     """The filter at one time, after the pose taken then; the first one may have none."""
@@ -72,13 +79,17 @@ class Timeline:
         """The newest."""
         return self._moments[-1]
 
-    def predict(self, time: float, horizon: float = 0.0) -> StrapdownFilter:
-        """The filter at `time` [s] without what the camera says there and `horizon` [s] before; valid until the next call."""
-        before = self._moments[self._place(time - horizon) - 1]
+    def since(self, time: float) -> list[Moment]:
+        """The newest moment up to `time` [s] and all after it."""
+        return self._moments[self._place(time) - 1 :]
+
+    def predict(self, time: float) -> StrapdownFilter:
+        """The filter at `time` [s] without what the camera says there; valid until the next call."""
+        before = self._moments[self._place(time) - 1]
         self._filter.set(before.x, before.P)
         if time > before.time:
             self._filter.advance(self._imu.between(before.time, time))
-        self._predicted = time if horizon == 0.0 else None
+        self._predicted = time
         return self._filter
 
     def at(self, time: float) -> Moment:

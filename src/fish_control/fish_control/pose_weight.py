@@ -38,7 +38,7 @@ def weighted(
 
     motion: (v_x, v_y, psi') of the fish [m/s, m/s, rad/s], along which a camera's clock that is not known displaces it.
     """
-    spread = np.sqrt([scale.position.total, scale.position.total, scale.heading.total])
+    spread = np.sqrt([scale.position, scale.position, scale.heading])
     R = camera.R * np.outer(spread, spread)
     if not clock.sure:
         R = R + clock.std**2 * np.outer(motion, motion)

@@ -33,7 +33,8 @@ class Preintegration:
         parts: left, dv_x and dv_y of each step.
     """
 
-    def __init__(self, x: Array, steps: Sequence[Step]) -> None:
+    def __init__(self, x: Array, steps: Sequence[Step], accel_used: bool = True) -> None:
+        """x: state at the start (8,); accel_used: False if the accelerometer drives nothing."""
         self.steps = steps
         self.duration = T = sum(step.dt for step in steps)
         psi, bias, bias_forward, bias_left = (float(x[k]) for k in (2, 5, 6, 7))
@@ -48,7 +49,7 @@ class Preintegration:
             left = T - middle
             turned = turned - bias * dt if yaw_known else 0.0  # without an IMU nothing is biased
             x_part = y_part = 0.0
-            if accel_known:
+            if accel_known and accel_used:
                 angle = psi + turn + 0.5 * turned
                 c, s = math.cos(angle) * dt, math.sin(angle) * dt
                 ahead, aside = forward - bias_forward, sideways - bias_left

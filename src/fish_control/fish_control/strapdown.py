@@ -12,7 +12,9 @@ w is the rate of the IMU's own heading, a the specific force in base_link; the p
 gravity has no share in the plane (what tilt adds is taken up by the biases). The rotor's swing of the head is in the
 measurements. All samples between two moments are integrated at once (preintegration).
 
-The noises follow the data: one factor each for positions and headings, which a share of the innovations exceeds.
+The noises follow the data: one factor each for positions and headings, which a share of the innovations exceeds
+(`noise_scale`), and the model of the motion that the poses bear out (`motion_models`). Without its accelerometer v' is white
+noise.
 Sources: Titterton and Weston, Strapdown Inertial Navigation Technology, ch. 3, planar; Forster et al., On-manifold
 preintegration, 2017.
 """
@@ -21,6 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -37,16 +40,33 @@ POSE = slice(0, 3)
 H_CAMERA = np.eye(3, SIZE)
 
 
+class MotionModel(NamedTuple):
+    """How far the IMU is believed."""
+
+    accel_used: bool  # whether the accelerometer drives the velocity
+    accel_density: float  # m^2/s^3, of the noise of v'
+    turn_factor: float  # on the variance of the IMU's turns
+
+    @property
+    def accel_noise(self) -> float:
+        """The noise of v' as a standard deviation per sample at 100 Hz [m/s^2]."""
+        return math.sqrt(self.accel_density / SAMPLE_PERIOD)
+
+
 class StrapdownFilter:
     """filterpy's extended Kalman filter with the motion model above.
 
     Args:
         noise: its constants.
         scale: factors on the variances, which may change; all 1 without.
+
+    Attributes:
+        model: of the motion; the IMU as `noise` says it until another one is set.
     """
 
     def __init__(self, noise: MotionNoise, scale: NoiseScale | None = None) -> None:
-        self._noise, self._scale = noise, scale or NoiseScale(first_process=1.0)
+        self._noise, self._scale = noise, scale or NoiseScale()
+        self.model = MotionModel(True, noise.accel_noise**2 * SAMPLE_PERIOD, 1.0)
         self._filter = ExtendedKalmanFilter(dim_x=SIZE, dim_z=3)
 
     @property
@@ -67,7 +87,7 @@ class StrapdownFilter:
 
     def advance(self, steps: Sequence[Step]) -> None:
         """Predict over the IMU's steps, all at once."""
-        x, moved = self.x, Preintegration(self.x, steps)
+        x, moved = self.x, Preintegration(self.x, steps, self.model.accel_used)
         T = moved.duration
         x[0] += T * x[3] + moved.left_dv[0]
         x[1] += T * x[4] + moved.left_dv[1]
@@ -90,9 +110,10 @@ class StrapdownFilter:
 
     def _process_noise(self, moved: Preintegration) -> Array:
         n, Q = self._noise, np.zeros((SIZE, SIZE))
-        position_scale, heading_scale = self._scale.position.motion, self._scale.heading.motion
-        known = n.accel_noise**2 * SAMPLE_PERIOD * position_scale
-        coasting = n.coasting_accel**2 * COASTING_TIME
+        used, density, heading_scale = self.model
+        heading_scale *= self._scale.heading
+        known = density * self._scale.position
+        coasting = n.coasting_accel**2 * COASTING_TIME if used else known
         unknown_turn = n.coasting_yaw_rate**2 * COASTING_TIME
         speed = mixed = place = 0.0  # of v, v and p, p
         Q_turn = np.zeros((5, 5))
@@ -122,7 +143,7 @@ class StrapdownFilter:
             Q[p, p] += place
         T = moved.duration
         Q[5, 5] = n.gyro_drift**2 * T
-        Q[6, 6] = Q[7, 7] = n.accel_drift**2 * position_scale * T
+        Q[6, 6] = Q[7, 7] = n.accel_drift**2 * T
         return Q
 
 

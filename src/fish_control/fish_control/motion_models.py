@@ -1,0 +1,123 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Which model of the motion the poses bear out: how noisy the IMU is, and whether its accelerometer helps at all.
+
+Candidates of the position, with white noise w of density q in m^2/s^3 each:
+
+    accelerometer used:      p' = v,   v' = R(psi) (a - b) + w
+    accelerometer not used:  p' = v,   v' = w
+
+A head that rolls as it swings leaks gravity into its accelerometer; where that is more than the head's own
+acceleration, the second model predicts better. Candidates of the heading: psi' = w_imu - b_g, with the variance of each
+turn multiplied by a factor. A bank of filters with one candidate each follows the poses; the shares that the poses give
+to the candidates choose the model and its noise. The mean of a noise over its candidates is cautious while the poses
+leave much open, since the largest ones weigh most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_control.filter_bank import FilterBank
+from fish_control.imu_heading import SAMPLE_PERIOD
+from fish_control.imu_history import ImuHistory, Step
+from fish_control.measurement_buffer import Moment
+from fish_control.motion_noise import MotionNoise
+from fish_control.noise_scale import NoiseScale
+from fish_control.preintegration import Preintegration
+from fish_control.strapdown import MotionModel
+
+Array = NDArray[np.float64]
+ACCEL_FACTORS = 2.0 ** np.arange(0.0, 6.1, 0.5)  # on the accelerometer's standard deviation
+DENSITIES = 10.0 ** np.arange(-4.0, -0.9, 0.5)  # m^2/s^3, of the acceleration that nobody measures
+TURN_FACTORS = 4.0 ** np.arange(0.0, 5.1, 0.5)  # on the variance of the heading's turns
+LONGEST_GAP = 0.5  # s between two poses that are compared
+POSITION = np.array([0, 1, 3, 4, 6, 7])  # place, velocity and biases in the strapdown state
+HEADING = np.array([2, 5])  # heading and bias
+
+
+class MotionModels:
+    """Feed it the moments of a timeline; ask for the model."""
+
+    def __init__(self, noise: MotionNoise, scale: NoiseScale) -> None:
+        self._noise, self._scale = noise, scale
+        known = noise.accel_noise**2 * SAMPLE_PERIOD * ACCEL_FACTORS**2
+        self._density = np.concatenate((known, DENSITIES))
+        self._used = np.arange(len(self._density)) < len(known)
+        sizes = np.where(self._used, len(known), len(DENSITIES))
+        self._position = FilterBank(-np.log(sizes))
+        self._heading = FilterBank(-np.log(TURN_FACTORS))
+        self._time = -math.inf  # s, of the moment that was followed last
+        self._fresh = True  # whether the banks begin anew at the next moment
+        self.current = self._choose()
+
+    @property
+    def time(self) -> float:
+        """Up to which the poses are followed [s]."""
+        return self._time
+
+    def begin(self, time: float = -math.inf) -> None:
+        """Go on with the moments after `time` [s] of another timeline; what was learned remains."""
+        self._time, self._fresh = time, True
+
+    def follow(self, moments: Sequence[Moment], imu: ImuHistory, scored: bool) -> MotionModel:
+        """Take in moments in a row, as far as the IMU has measured; scored: they count for the choice, which is returned."""
+        for before, after in pairwise(moments):
+            if after.time > imu.last_time:
+                break
+            if self._fresh or before.time != self._time:
+                self._position.start(before.x[POSITION], before.P[np.ix_(POSITION, POSITION)])
+                self._heading.start(before.x[HEADING], before.P[np.ix_(HEADING, HEADING)])
+            self._compare(before, after, imu.between(before.time, after.time), scored)
+            self._time = after.time
+        self.current = self._choose()
+        return self.current
+
+    def _compare(self, before: Moment, after: Moment, steps: list[Step], scored: bool) -> None:
+        dt = after.time - before.time
+        measured = all(step.accel_known and step.yaw_known for step in steps)
+        self._fresh = not (measured and 0.0 < dt <= LONGEST_GAP) or after.camera is None
+        if self._fresh or after.camera is None:
+            return
+        moved, (z, R, _) = Preintegration(before.x, steps), after.camera
+        F = moved.jacobian()
+        self._move_positions(moved, F, before.x)
+        self._position.correct(z[:2], R[:2, :2], dt, scored)
+        self._turn_headings(moved, F, before.x)
+        near = self._heading.x[0, 0]
+        psi = near + math.remainder(float(z[2]) - near, 2.0 * math.pi)
+        self._heading.correct(np.array([psi]), R[2:, 2:], dt, scored)
+
+    def _move_positions(self, moved: Preintegration, F: Array, x: Array) -> None:
+        T, K = moved.duration, len(self._density)
+        A = np.tile(F[np.ix_(POSITION, POSITION)], (K, 1, 1))
+        A[~self._used, :4, 4:] = 0.0
+        u = np.zeros((K, 6))
+        u[self._used, :4] = (*moved.left_dv, *moved.dv) - A[0, :4, 4:] @ x[6:8]
+        unit = np.zeros((6, 6))
+        unit[:4, :4] = np.kron(((T**3 / 3.0, T**2 / 2.0), (T**2 / 2.0, T)), np.eye(2))
+        Q = self._scale.position * self._density[:, None, None] * unit
+        Q[self._used, 4:, 4:] += self._noise.accel_drift**2 * T * np.eye(2)
+        self._position.predict(A, u, Q)
+
+    def _turn_headings(self, moved: Preintegration, F: Array, x: Array) -> None:
+        T, K = moved.duration, len(TURN_FACTORS)
+        variance = sum(step.yaw_variance for step in moved.steps)
+        variance += self._noise.heading_drift**2 * T
+        Q = np.zeros((K, 2, 2))
+        Q[:, 0, 0] = self._scale.heading * TURN_FACTORS * variance
+        Q[:, 1, 1] = self._noise.gyro_drift**2 * T
+        u = np.tile((moved.turn - F[2, 5] * x[5], 0.0), (K, 1))
+        self._heading.predict(np.tile(F[np.ix_(HEADING, HEADING)], (K, 1, 1)), u, Q)
+
+    def _choose(self) -> MotionModel:
+        shares, turns = self._position.shares, self._heading.shares
+        used = bool(shares[self._used].sum() > 0.5 - 1e-6)
+        among = shares * (self._used == used)
+        density = float(among @ self._density / among.sum())
+        return MotionModel(used, density, float(turns @ TURN_FACTORS))
