@@ -188,7 +188,9 @@ def test_a_cut_database_beside_a_whole_log(tmp_path):
     """sqlite3 takes zeros for pages that neither file holds, and calls the database whole."""
     write = WRITERS["sqlite3 log"]
     sample = make_sample("sqlite3 log", write(tmp_path / "whole", samples.robot_messages(0.4)))
-    places = {end - back for end in range(8192, len(sample.data), 4096) for back in (278, 360, 2000)}
+    places = {
+        end - back for end in range(8192, len(sample.data), 4096) for back in (278, 360, 2000)
+    }
     for at in sorted(places):
         folder = tmp_path / str(at)
         folder.mkdir()
