@@ -59,7 +59,7 @@ def test_the_fish_swims_on_its_path(shown):
 def test_latency_and_cpu_of_every_node_are_shown(shown):
     output, *_ = shown
     assert float(re.search(r"latency_p99_ms +([\d.]+)", output)[1]) > 0.0
-    for name in ("simulator", "camera", "tracker", "fusion", "planner", "controller", "recorder"):
+    for name in ("simulator", "camera", "tracker", r"fusion \+ planner \+ controller", "recorder"):
         assert re.search(rf"/{name} +\d+ %", output)
 
 
@@ -86,7 +86,7 @@ def test_sigterm_ends_the_demo_and_its_nodes(tmp_path):
         text=True,
     ) as process:
         deadline = time.monotonic() + 30.0
-        while not (tmp_path / "run" / "logs" / "fish_control.controller.log").exists():
+        while not (tmp_path / "run" / "logs" / "fish_control.pilot.log").exists():
             assert time.monotonic() < deadline and process.poll() is None, "the demo did not start"
             time.sleep(0.05)
         process.send_signal(signal.SIGTERM)

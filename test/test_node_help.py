@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 import rclpy
 
+from fish_control.nodes import entry
+
 NODES = {
     "fish_sim": ("simulator", "camera"),
     "fish_vision": ("tracker",),
@@ -32,3 +34,13 @@ def test_help_says_what_a_node_is_and_starts_nothing(package, name, flag, monkey
     assert what
     assert Path(parameters.split(": ")[1]).name == f"{name}.yaml"
     assert Path(parameters.split(": ")[1]).exists()
+
+
+def test_help_of_several_nodes_in_one_process_names_them(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["pilot", "--help"])
+    monkeypatch.setattr(rclpy, "init", lambda *_, **__: pytest.fail("started"))
+    assert entry.pilot() == 0
+    usage, what, parameters = capsys.readouterr().out.splitlines()
+    assert usage.startswith("usage: pilot --ros-args -r __ns:=/fish --fusion --params-file FILE")
+    assert "fusion, planner and controller" in what
+    assert parameters.endswith("config/NODE.yaml")

@@ -29,6 +29,7 @@ setup(
             "fusion = fish_control.nodes.entry:fusion",
             "planner = fish_control.nodes.entry:planner",
             "controller = fish_control.nodes.entry:controller",
+            "pilot = fish_control.nodes.entry:pilot",
             "exciter = fish_control.nodes.entry:exciter",
         ],
     },

@@ -13,6 +13,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ament_index_python.packages import (
     PackageNotFoundError,
@@ -35,6 +36,7 @@ class NodeSpec:
         parameter_file: in config/ of the package's share directory.
         frames: whether it has the parameter frame_prefix.
         remaps: rules "from:=to" of topics, services and of the node's name (__node).
+        parts: the nodes of an executable that is several; it has no parameters of its own.
     """
 
     package: str
@@ -42,6 +44,7 @@ class NodeSpec:
     parameter_file: str
     frames: bool = False
     remaps: tuple[str, ...] = ()
+    parts: tuple[NodeSpec, ...] = ()
 
     @property
     def name(self) -> str:
@@ -65,6 +68,7 @@ CONTROL = (
     NodeSpec("fish_control", "planner", "planner.yaml", frames=True),
     NodeSpec("fish_control", "controller", "controller.yaml"),
 )
+PILOT = NodeSpec("fish_control", "pilot", "", parts=CONTROL[1:])  # what is here one process
 EXCITER = NodeSpec("fish_control", "exciter", "exciter.yaml")
 RECORDER = NodeSpec("fish_bag", "recorder", "recorder.yaml")
 REPLAYER = NodeSpec("fish_bag", "replayer", "replayer.yaml")
@@ -165,6 +169,11 @@ def open_loop(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
     return (*(spec for spec in robot if spec not in CONTROL[2:]), EXCITER)
 
 
+def composed(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
+    """A robot's nodes with fusion, planner and controller in one process."""
+    return (*(spec for spec in robot if spec not in PILOT.parts), PILOT)
+
+
 def executable_path(spec: NodeSpec) -> Path:
     """install/<package>/lib/<package>/<executable>, what `ros2 run` starts.
 
@@ -189,24 +198,40 @@ def parameter_path(spec: NodeSpec) -> Path:
 
 
 def command(
-    spec: NodeSpec, parameters: Parameters | None = None, namespace: str = NAMESPACE
+    spec: NodeSpec,
+    parameters: Parameters | Mapping[NodeSpec, Parameters] | None = None,
+    namespace: str = NAMESPACE,
 ) -> list[str]:
-    """Command line of a node: its parameter file, then single parameters that override it.
+    """Command line of a process: parameter files, then single parameters that override them.
 
     A fish in another namespace than the usual one may be the second on its domain: its clock and its frames are its own.
+
+    Args:
+        parameters: of the node; of each part where the process has several.
     """
     line = [str(executable_path(spec)), "--ros-args", "-r", f"__ns:={namespace}"]
     for old, new in remappings(namespace):
         line += ["-r", f"{old}:={new}"]
-    line += [word for rule in spec.remaps for word in ("-r", rule)]
+    given: Mapping[Any, Any] = parameters or {}
+    if not spec.parts:
+        return line + arguments(spec, given, namespace)
+    for part in spec.parts:
+        line += [f"--{part.executable}", *arguments(part, given.get(part, {}), namespace)]
+    return line
+
+
+def arguments(spec: NodeSpec, parameters: Parameters, namespace: str) -> list[str]:
+    """ROS arguments of one node."""
+    line = [word for rule in spec.remaps for word in ("-r", rule)]
     line += ["--params-file", str(parameter_path(spec))]
     own = {"frame_prefix": frame_prefix(namespace)} if spec.frames else {}
-    for name, value in {**own, **(parameters or {})}.items():
-        line += [
-            "-p",
-            f"{name}:={json.dumps(value)}",
-        ]  # JSON is YAML, and keeps "N" a string and 1.0 a float
-    return line
+    return line + ros_parameters({**own, **parameters})
+
+
+def ros_parameters(parameters: Parameters) -> list[str]:
+    """ROS arguments of single parameters. JSON is YAML, and keeps "N" a string and 1.0 a float."""
+    given = [f"{name}:={json.dumps(value)}" for name, value in parameters.items()]
+    return [word for item in given for word in ("-p", item)]
 
 
 def remappings(namespace: str) -> tuple[tuple[str, str], ...]:

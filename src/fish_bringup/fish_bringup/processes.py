@@ -10,7 +10,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -35,7 +35,7 @@ class NodeProcess:
     def __init__(
         self,
         spec: NodeSpec,
-        parameters: Parameters | None,
+        parameters: Parameters | Mapping[NodeSpec, Parameters] | None,
         env: dict[str, str],
         log_folder: Path,
         namespace: str = NAMESPACE,
@@ -103,8 +103,10 @@ class NodeProcesses:
         self._log_folder, self._namespace = log_folder, namespace
         self.running: dict[NodeSpec, NodeProcess] = {}
 
-    def start(self, spec: NodeSpec, parameters: Parameters | None = None) -> NodeProcess:
-        """Start a node, or start it again after its end."""
+    def start(
+        self, spec: NodeSpec, parameters: Parameters | Mapping[NodeSpec, Parameters] | None = None
+    ) -> NodeProcess:
+        """Start a process, or start it again after its end; parameters as for `command`."""
         process = NodeProcess(spec, parameters, self.environment, self._log_folder, self._namespace)
         self.running[spec] = process
         return process

@@ -12,7 +12,7 @@ from typing import Protocol
 from rich.console import Console
 from rich.status import Status
 
-from fish_bringup.node_table import CONTROL, VIEW, NodeSpec
+from fish_bringup.node_table import CONTROL, PILOT, VIEW, NodeSpec
 from fish_bringup.processes import NodeProcesses
 from fish_bringup.run_limits import RunWatch, Seen
 from fish_control.path_tracker import PathTracker
@@ -192,9 +192,10 @@ class Patience:
         if sight is not None and sight.stamp != self._stamp:
             self._stamp, self._since = sight.stamp, time.monotonic()
         elif time.monotonic() - self._since > STILL_TIMEOUT:
+            fusion = self._nodes.running.get(PILOT) or self._nodes.running[FUSION]
             raise UserError(
                 f"no new odometry/filtered for {STILL_TIMEOUT:g} s: {FUSION.name}, or a node that it hears (simulator, camera, "
-                f"tracker), hangs; see {self._nodes.running[FUSION].log} and the logs in its folder; what was recorded is kept"
+                f"tracker), hangs; see {fusion.log} and the logs in its folder; what was recorded is kept"
             )
 
 

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from fish_bringup.node_table import CONTROL, FAKE, RECORDER, ROBOTS, SIMULATED
+from fish_bringup.run_tables import latency_table
 from fish_bringup.run_watch import SwimEnd
 from fish_bringup.verbs import demo
 
@@ -68,7 +69,7 @@ def test_a_computer_with_few_cores_gets_a_slower_fake_robot_and_no_slower_simula
 
 def test_the_latency_is_the_robot_s_own_and_its_texts_can_do_no_harm():
     said = {"latency [/x]\x1b[31m": "m" * 5000, "commands": "7"}
-    table = demo._latency_table({"evil/controller": {"latency": "1"}, "fish/controller": said})
+    table = latency_table({"evil/controller": {"latency": "1"}, "fish/controller": said})
     ((key, value),) = table.rows
     assert key == "latency [/x]\\x1b[31m"
     assert len(value) < 500

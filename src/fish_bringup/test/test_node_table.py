@@ -16,6 +16,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from fish_bringup import node_table
 from fish_bringup.node_table import NodeSpec
+from fish_control.nodes.pilot import split_arguments
 from fish_report.errors import UserError
 
 SOURCE = Path(__file__).parents[2]
@@ -302,6 +303,37 @@ def test_a_node_that_ends_is_started_again_or_ends_the_launch(launched, respawn)
         assert (node.on_exit is not None) == ends_all
     if respawn == "false":
         assert nodes["planner"].on_exit.reason == "fish_control/planner ended"
+
+
+def test_composed_nodes_have_the_parameters_that_they_have_alone(launched, tmp_path):
+    """In the installed file of each, in the robot's own, and in the arguments; the namespace, which launch adds, is for all."""
+    (tmp_path / "fusion.yaml").touch()
+    given = {"path": "N", "speed": "0.1", "use_sim_time": "true", "config": str(tmp_path)}
+    alone, together = launched(**given), launched(compose="true", **given)
+    names = {"fusion", "planner", "controller"}
+    assert set(alone) - set(together) == names
+    pilot = together["pilot"]
+    assert pilot.on_exit.reason == "fish_control/pilot ended"
+    common, own = split_arguments([*pilot.arguments, "--ros-args", "-r", "__ns:=/fish"])
+    assert common == ["--ros-args", "-r", "__ns:=/fish"]
+    for name in names:
+        files = [own[name][k + 1] for k, word in enumerate(own[name]) if word == "--params-file"]
+        assert files == [file for file in alone[name].parameters if isinstance(file, str)]
+    assert own["planner"][-5::2] == ["use_sim_time:=true", 'path:="N"', "speed:=0.1"]
+    assert "pilot" not in launched(compose="true", robot="real", part="fish")
+    assert "pilot" not in launched(compose="true", program="diagnosis.json")
+
+
+def test_a_process_of_several_nodes_hands_each_its_own(installed):
+    (installed / "lib" / "fish_control").mkdir()
+    (installed / "lib" / "fish_control" / "pilot").touch()
+    planner = node_table.CONTROL[2]
+    line = node_table.command(node_table.PILOT, {planner: {"path": "N"}}, "/fish_2")
+    common, own = split_arguments(line[1:])
+    assert common == ["--ros-args", "-r", "__ns:=/fish_2", "-r", "/clock:=/fish_2/clock"]
+    assert own["planner"][-2:] == ["-p", 'path:="N"']
+    assert 'frame_prefix:="fish_2/"' in own["fusion"]
+    assert not any("path:=" in word for word in own["fusion"] + own["controller"])
 
 
 def test_a_second_fish_has_a_clock_and_frames_of_its_own(launched):

@@ -438,7 +438,7 @@ def test_path_and_speed_can_be_set_while_it_swims(bench):
     b.say("odometry/filtered", odometry(b.now(), x=-1.4))
     b.until(lambda: b.heard["control/twist"])
     assert b.node.set_parameters([Parameter("speed", value=0.3)])[0].successful
-    b.say("odometry/filtered", odometry(b.now(), x=-1.3))
+    b.say("odometry/filtered", odometry(b.now() + 0.1, x=-1.3))  # a period later than the first
     b.until(lambda: b.heard["control/twist"][-1].twist.linear.x == 0.3)
     changes = [
         Parameter("path", value="circle"),
@@ -614,12 +614,16 @@ def test_a_planner_that_crashes_leaves_its_progress_and_one_that_ends_does_not(
 ):
     file = tmp_path / "progress.json"
 
-    def spin(node):
-        swim(node, 100.0, -1.0, 0.0)
-        assert file.exists()
-        raise ValueError("a mistake in a callback") if crash else KeyboardInterrupt
+    class Spin:
+        def init(self, arguments):
+            rclpy.init(args=arguments)
 
-    monkeypatch.setattr("fish_node.nodes.start.spin", spin)
+        def __call__(self, nodes):
+            swim(nodes[0], 100.0, -1.0, 0.0)
+            assert file.exists()
+            raise ValueError("a mistake in a callback") if crash else KeyboardInterrupt
+
+    monkeypatch.setattr(planner, "ByEvents", Spin)
     arguments = ["path:=straight", 'path_args:="{length: 2.0}"', f"state_file:={file}"]
     monkeypatch.setattr(
         sys, "argv", ["node", "--ros-args", *(w for a in arguments for w in ("-p", a))]

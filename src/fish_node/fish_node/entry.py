@@ -35,6 +35,11 @@ def _help(package: str, name: str, node: ModuleType) -> str:
         share = Path(get_package_share_directory(package))
     except (PackageNotFoundError, OSError):  # no workspace is sourced: run from the source tree
         share = Path(node.__file__ or "").parents[2]
-    usage = f"usage: {name} [--ros-args -r __ns:=/fish --params-file FILE -p NAME:=VALUE ...]"
     what, file = (node.__doc__ or "").partition("\n")[0], share / "config" / f"{name}.yaml"
+    given = "--params-file FILE -p NAME:=VALUE ..."
+    if parts := getattr(node, "NODES", ()):
+        each, file = " ".join(f"--{part} {given}" for part in parts), share / "config" / "NODE.yaml"
+        usage = f"usage: {name} --ros-args -r __ns:=/fish {each}"
+    else:
+        usage = f"usage: {name} [--ros-args -r __ns:=/fish {given}]"
     return f"{usage}\n{what}\nparameters, their units and values: {file}"

@@ -9,13 +9,15 @@ from typing import Any
 
 import pytest
 import rclpy
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
-from fish_node.nodes.executor import KeptWaitSetExecutor
+from fish_node.nodes.executor import KeptWaitSetExecutor, Polled, take_all
 
 DOMAIN = 172
 TURNS = 2000  # of at most 10 ms: the timer of the bench ends every wait
@@ -169,3 +171,52 @@ def test_parameters_are_answered(bench: Bench) -> None:
     answer = client.call_async(GetParameters.Request(names=["speed"]))
     assert bench.until(answer.done)
     assert answer.result().values[0].double_value == 0.2
+
+
+def test_messages_of_a_polled_subscription_wait_until_they_are_taken(bench: Bench) -> None:
+    called: list[bytes] = []
+    polled = bench.node.create_subscription(
+        Int32, "numbers", called.append, 100, raw=True, callback_group=Polled()
+    )
+    heard: list[int] = []
+    bench.node.create_subscription(Int32, "numbers", lambda m: heard.append(m.data), 100)
+    publisher = bench.node.create_publisher(Int32, "numbers", 100)
+    assert bench.until(lambda: publisher.get_subscription_count() == 2)
+    for k in range(50):
+        publisher.publish(Int32(data=k))
+    assert bench.until(lambda: len(heard) == 50)
+    taken = [int.from_bytes(data[-4:], "little") for data, _ in take_all(polled)]
+    assert taken == list(range(50))
+    assert called == list(take_all(polled)) == []
+
+
+def test_an_offer_that_does_not_fit_is_noticed(bench: Bench) -> None:
+    """The events of a subscription are looked at now and then only."""
+    noticed: list[Any] = []
+    bench.node.create_publisher(
+        Int32, "numbers", QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    )
+    bench.node.create_subscription(
+        Int32,
+        "numbers",
+        lambda _: None,
+        1,
+        event_callbacks=SubscriptionEventCallbacks(incompatible_qos=noticed.append),
+    )
+    assert bench.until(lambda: noticed)
+
+
+def test_messages_alone_do_not_wake_a_node_that_does_not_wait_for_them(bench: Bench) -> None:
+    """The middleware wakes who waits for a subscription's events also for its messages, which is what a look costs."""
+    bench.node.create_subscription(Int32, "numbers", print, 100, callback_group=Polled())
+    publisher = bench.node.create_publisher(Int32, "numbers", 100)
+    assert bench.until(publisher.get_subscription_count)
+    beats: list[None] = []
+    for timer in bench.node.timers:
+        bench.node.destroy_timer(timer)
+    bench.node.create_timer(0.05, lambda: [publisher.publish(Int32()), beats.append(None)])
+    turns = 0
+    while len(beats) < 20:
+        bench.executor.spin_once()
+        turns += 1
+    assert turns < 30

@@ -14,17 +14,20 @@ def run(monkeypatch, error, alive):
     """Run a node whose callback raises `error` and return what it did at its end; alive: no signal has come."""
     ended = []
 
-    def spin(_):
-        raise error
+    class Spin:
+        def init(self, _):
+            pass
+
+        def __call__(self, _):
+            raise error
 
     replaced = {
-        "init": lambda: None,
         "ok": lambda: alive,
         "try_shutdown": lambda: ended.append("shut down"),
     }
     monkeypatch.setattr(start, "rclpy", SimpleNamespace(**replaced))
-    monkeypatch.setattr(start, "spin", spin)
-    start.run(lambda: SimpleNamespace(destroy_node=lambda: ended.append("destroyed")), "controller")
+    node = SimpleNamespace(destroy_node=lambda: ended.append("destroyed"))
+    start.run(lambda: node, "controller", spin=Spin())
     return ended
 
 
@@ -53,9 +56,9 @@ def test_what_cannot_start_says_why(monkeypatch, capsys):
     def refuse():
         raise ValueError("speed is -1.0,\n expected at least 0")
 
-    replaced = {"init": lambda: None, "ok": lambda: True, "try_shutdown": lambda: None}
+    replaced = {"ok": lambda: True, "try_shutdown": lambda: None}
     monkeypatch.setattr(start, "rclpy", SimpleNamespace(**replaced))
-    assert start.run(refuse, "planner") == 1
+    assert start.run(refuse, "planner", spin=SimpleNamespace(init=lambda _: None)) == 1
     assert capsys.readouterr().err == "planner: speed is -1.0, expected at least 0\n"
 
 

@@ -9,6 +9,7 @@ recorder and the live view may end without the rest.
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable, Shutdown
@@ -23,11 +24,13 @@ from fish_bringup.node_table import (
     LAGS,
     NAMESPACE,
     PARTS,
+    PILOT,
     RECORDER,
     ROBOTS,
     SIMULATED,
     VIEW,
     NodeSpec,
+    composed,
     fake_parameters,
     frame_prefix,
     in_part,
@@ -35,6 +38,7 @@ from fish_bringup.node_table import (
     middleware,
     open_loop,
     parameter_path,
+    ros_parameters,
 )
 
 PLANNER = CONTROL[2]
@@ -66,6 +70,10 @@ ARGUMENTS = {
         "",
         "simulated seconds in a second, of robot:=sim and robot:=fake; every node follows /clock; without it what "
         "simulator.yaml says",
+    ),
+    "compose": (
+        "false",
+        "true: fusion, planner and controller in one process, for two thirds of the processor time; they end together",
     ),
     "record": ("true", "false: no recorder"),
     "view": ("false", "true: the live view in a browser, on this computer"),
@@ -128,13 +136,13 @@ def _chosen(chosen: Mapping[str, str]) -> list[NodeSpec]:
         specs = [spec for spec in specs if spec != RECORDER]
     if _yes(chosen["view"]):
         specs.append(VIEW)
-    config = chosen["config"]
+    compose, config = _yes(chosen["compose"]) and set(PILOT.parts) <= set(specs), chosen["config"]
     if config and not any(_own(spec, config) for spec in specs):
         expected = ", ".join(spec.parameter_file for spec in specs)
         raise RuntimeError(
             f"config:={config} holds none of the nodes' parameter files; expected some of {expected}"
         )
-    return specs
+    return list(composed(specs)) if compose else specs
 
 
 def _node(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> Node:
@@ -146,7 +154,8 @@ def _node(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> Node:
         package=spec.package,
         executable=spec.executable,
         namespace=chosen["namespace"],
-        parameters=_parameters(spec, chosen, full),
+        arguments=_arguments(spec, chosen, full),
+        parameters=[] if spec.parts else _parameters(spec, chosen, full),
         remappings=[
             *([("/clock", "clock")] if second else []),
             *(tuple(rule.split(":=")) for rule in spec.remaps),
@@ -159,14 +168,19 @@ def _node(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> Node:
 
 
 def _parameters(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> list[object]:
-    """Files and single values of a node; what comes later overrides what comes before.
+    """Files and single values of a node; what comes later overrides what comes before."""
+    given = _given(spec, chosen)
+    return [*_files(spec, chosen, full), *([given] if given else [])]
+
+
+def _files(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> list[Any]:
+    """Files of a node and what follows from the robot's kind and place; what comes later overrides what comes before.
 
     A robot's own file must not lead the drivers of a fake robot to real devices.
     """
     prefixed = spec.frames and not is_usual(full)
     devices = Path(tempfile.gettempdir()) / f"{full.strip('/').replace('/', '_')}_devices"
     fake = fake_parameters(devices).get(spec) if chosen["robot"] == "fake" else None
-    given = _given(spec, chosen)
     return [
         str(parameter_path(spec)),
         *([{"frame_prefix": frame_prefix(full)}] if prefixed else []),
@@ -174,17 +188,36 @@ def _parameters(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> list[ob
         *([fake] if fake else []),
         *([{"use_sim_time": True}] if chosen["real_time_factor"] else []),
         *([LAGS] if chosen["real_time_factor"] and spec == FAKE[1] else []),
-        *([given] if given else []),
     ]
 
 
+def _arguments(spec: NodeSpec, chosen: Mapping[str, str], full: str) -> list[str]:
+    """Of an executable of several nodes: files and single values of each; what launch adds after them is for all."""
+    words: list[str] = []
+    for part in spec.parts:
+        words.append(f"--{part.executable}")
+        values = {name: _value(chosen[word], kind) for name, (word, kind) in _wanted(part, chosen)}
+        for given in [*_files(part, chosen, full), values]:
+            words += ros_parameters(given) if isinstance(given, dict) else ["--params-file", given]
+    return [*words, "--all"] if words else words
+
+
+def _value(text: str, kind: type) -> object:
+    return _yes(text) if kind is bool else kind(text)
+
+
 def _given(spec: NodeSpec, chosen: Mapping[str, str]) -> dict[str, ParameterValue]:
-    """What the arguments say of a node's parameters; one that nobody gave must not override the robot's own file."""
+    """What the arguments say of a node's parameters."""
     return {
         parameter: ParameterValue(LaunchConfiguration(argument), value_type=kind)
-        for parameter, (argument, kind) in {**OF_EVERY_NODE, **OF_NODE.get(spec, {})}.items()
-        if chosen[argument]
+        for parameter, (argument, kind) in _wanted(spec, chosen)
     }
+
+
+def _wanted(spec: NodeSpec, chosen: Mapping[str, str]) -> list[tuple[str, tuple[str, type]]]:
+    """Parameters that an argument gives; one that nobody gave must not override the robot's own file."""
+    known = {**OF_EVERY_NODE, **OF_NODE.get(spec, {})}
+    return [(name, of) for name, of in known.items() if chosen[of[0]]]
 
 
 def _own(spec: NodeSpec, config: str) -> list[str]:

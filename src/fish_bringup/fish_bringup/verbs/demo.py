@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole robot: start every node, let the fish swim a path, record, score and show it.
 
-Simulator, camera, tracker, fusion, planner, controller and recorder run as processes of their own, on
-their own ROS domain. The command arms the simulated robot itself. The run ends at the end of the path (a closed one: after
-a lap), after --duration, or with Ctrl-C; what was recorded is then scored. It ends with an error when the fish is at a wall
-of the pool or beyond for 1 s, when the camera is silent for 30 s, and when a node ends or hangs; the recording is kept.
+Simulator, camera, tracker and recorder run as processes on their own ROS domain, fusion, planner and controller together as
+one more (--separate: each for itself). The command arms the simulated robot itself. The run ends at the end of the path (a
+closed one: after a lap), after --duration, or with Ctrl-C; what was recorded is then scored. It ends with an error when the
+fish is at a wall of the pool or beyond for 1 s, when the camera is silent for 30 s, and when a node ends or hangs; the
+recording is kept.
 Times are the simulator's: it runs in real time, and waits for nodes that lag.
 """
 
@@ -25,18 +26,20 @@ from fish_bringup.node_table import (
     FAKE,
     HARDWARE,
     LAGS,
-    NAMESPACE,
+    PILOT,
     RECORDER,
     SIMULATED,
     VIEW,
     NodeSpec,
     Parameters,
+    composed,
     fake_parameters,
     robot_of,
 )
 from fish_bringup.nodes.watch import watching
 from fish_bringup.processes import NodeProcesses
 from fish_bringup.run_page import write_run_page
+from fish_bringup.run_tables import cpu_table, latency_table
 from fish_bringup.run_watch import Robot, SwimEnd
 from fish_bringup.score import score_trial, what_is_missing
 from fish_bringup.score_table import error_table
@@ -50,7 +53,6 @@ from fish_report.errors import UserError, user_errors
 from fish_report.interruption import Interruption
 from fish_report.output_folder import new_folder
 from fish_report.page import Table
-from fish_report.printable import plain
 from fish_report.terminal import print_table, say, terminal
 from fish_sim.robot_argument import read_model
 
@@ -106,6 +108,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="simulated seconds in a second; every node follows /clock, the drivers of a fake robot too (1, or what this "
         "computer can keep)",
     )
+    parser.add_argument(
+        "--separate",
+        action="store_true",
+        help="fusion, planner and controller as processes of their own: half as much processor time again for the three",
+    )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 232 (a free one)")
     parser.add_argument("--view", action="store_true", help="watch it live in a browser")
     parser.add_argument(
@@ -120,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
     """Swim, record, score, show."""
     if not args.duration > 0.0:
         raise UserError(f"duration is {args.duration:g} s, expected a positive number")
-    specs = robot_of(args.hardware)
+    specs = robot_of(args.hardware) if args.separate else composed(robot_of(args.hardware))
     if args.lockstep and args.hardware != "sim":
         raise UserError(
             "--lockstep is for the simulator alone: with drivers say --real-time-factor"
@@ -152,7 +159,7 @@ def run(args: argparse.Namespace) -> int:
     say(console, f"ended {end.reason}, {end.robot_s:.1f} s after the first odometry")
     trial = read_trial(folder / "recording")
     score = score_trial(trial)
-    tables = [error_table(score), latency, _cpu_table(end)]
+    tables = [error_table(score), latency, cpu_table(end)]
     for table in tables:
         print_table(console, table)
     page = folder / "report.html"
@@ -253,11 +260,12 @@ def _swim(
     with Interruption() as interruption, NodeProcesses(domain, folder / "logs") as nodes:
         with watching(domain) as (watch, listen):
             robot = Robot(nodes, watch, listen, interruption)
+            last = PILOT if PILOT in specs else CONTROLLER
             for spec in (*specs, *([VIEW] if VIEW in changed else [])):
-                if spec != CONTROLLER:
+                if spec != last:
                     nodes.start(spec, changed.get(spec))
             robot.wait_for(lambda: watch.sees(RECORDER.executable), "recorder")
-            nodes.start(CONTROLLER, changed.get(CONTROLLER))
+            nodes.start(last, changed if last.parts else changed.get(last))
             robot.wait_for(lambda: watch.tracker is not None, "reference/path")
             robot.wait_for(lambda: watch.sight is not None, "odometry/filtered")
             robot.arm()
@@ -265,7 +273,7 @@ def _swim(
             _say_view(nodes, changed, console)
             end = robot.swim(duration, console)
             nodes.stop([RECORDER])
-            return end, _latency_table(watch.diagnostics)
+            return end, latency_table(watch.diagnostics)
 
 
 def _say_view(
@@ -278,30 +286,3 @@ def _say_view(
         say(console, f"live view: http://127.0.0.1:{changed[VIEW]['port']}/")
     else:
         say(console, f"no live view: {nodes.running[VIEW].last_words()}")
-
-
-def _latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:
-    """What the controller says of its own latency and period."""
-    said = diagnostics.get(f"{NAMESPACE.strip('/')}/controller", {})
-    rows = [
-        [plain(key), plain(value)]
-        for key, value in said.items()
-        if "latency" in key or "period" in key
-    ]
-    return Table(
-        "Controller",
-        ["value", "measured"],
-        rows,
-        "Latency: stamp of the measurement to the command.",
-    )
-
-
-def _cpu_table(end: SwimEnd) -> Table:
-    rows = [[spec.name, f"{100 * share:.0f} %"] for spec, share in end.cpu.items()]
-    rows.append(["all nodes", f"{100 * sum(end.cpu.values()):.0f} %"])
-    return Table(
-        "CPU",
-        ["node", "of one core"],
-        rows,
-        f"In real time; mean over {end.robot_s:.0f} s of swimming, which took {end.seconds:.0f} s.",
-    )

@@ -41,6 +41,7 @@ from fish_control.nodes.reporter import Reporter
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.changes import Changes
+from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
 SETTABLE = ("gains_lowest", "gains_highest")
@@ -186,4 +187,4 @@ def to_message(gains: Gains) -> Float64MultiArray:
 
 def main() -> int:
     """Entry point."""
-    return run(ControllerNode, "controller")
+    return run(ControllerNode, "controller", spin=ByEvents())

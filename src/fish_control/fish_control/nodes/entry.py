@@ -9,4 +9,5 @@ from fish_node.entry import start
 fusion = partial(start, "fish_control", "fusion")
 planner = partial(start, "fish_control", "planner")
 controller = partial(start, "fish_control", "controller")
+pilot = partial(start, "fish_control", "pilot")
 exciter = partial(start, "fish_control", "exciter")

@@ -37,6 +37,7 @@ from fish_control.nodes.reporter import Reporter
 from fish_control.pose_weight import not_measured
 from fish_node.frames import BODY, POOL
 from fish_node.nodes.frame_broadcaster import FrameBroadcaster
+from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.static_frames import publish_static_frame
 
@@ -121,7 +122,8 @@ class FusionNode(Node):
             return
         message = to_odometry(estimate, *self._frames)
         self._odometry.publish(message)
-        self._transform.send(to_transform(message))
+        if self._transform.heard:
+            self._transform.send(to_transform(message))
         if self._state(estimate)[1] != self._said:
             self._report(estimate)
 
@@ -170,4 +172,4 @@ def to_transform(odometry: Odometry) -> TransformStamped:
 
 def main() -> int:
     """Entry point."""
-    return run(FusionNode, "fusion")
+    return run(FusionNode, "fusion", spin=ByEvents())

@@ -49,6 +49,7 @@ from fish_control.progress_file import ProgressFile, path_digest
 from fish_control.reference_path import PathError, ReferencePath
 from fish_control.watchdog import pose_loss
 from fish_node.nodes.changes import Changes
+from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -290,4 +291,4 @@ class PlannerNode(Node):
 
 def main() -> int:
     """Entry point."""
-    return run(PlannerNode, "planner", PlannerNode.end)
+    return run(PlannerNode, "planner", PlannerNode.end, spin=ByEvents())

@@ -5,21 +5,28 @@
 rclpy's SingleThreadedExecutor collects all entities of all nodes before every wait. Each callback also triggers the
 executor's own guard condition, so that the next wait returns at once without work. For a node that hears 100 messages a
 second this takes most of its processor time. Here the entities are collected when they change, and callbacks run directly.
-What rclpy does in a callback is left to rclpy.
+What rclpy does in a callback is left to rclpy. Subscriptions of a Polled group are not waited for.
+
+Every publisher and subscription also has events, such as an offer that does not fit. To add them to the wait set takes most
+of the time of a wait, and who waits for a subscription's events wakes up for its messages. So they are looked at once a second.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import rclpy
 from rclpy._rclpy_pybind11 import InvalidHandle, WaitSet
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import EventHandler
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from rclpy.waitable import NumberOfEntities, Waitable
 
+EVENTS_S, EVENTS_NS = 1.0, 1_000_000_000  # between two looks at the events
 Work = Callable[[], Coroutine[Any, Any, None]] | None  # what rclpy's _take_.. functions give
 Take = Callable[[Any], Work]
 
@@ -29,18 +36,21 @@ class Waited:
     """The wait set with room for everything that is waited for.
 
     Attributes:
+        events: of publishers and subscriptions.
+        waitables: everything else of this kind.
         added: functions that add a handle to the wait set, each with its handles.
         taken: kinds of entities in the order in which their callbacks run; of each the entities by the address of their
             handle, and rclpy's function that takes an event of one.
     """
 
     wait_set: WaitSet
+    events: tuple[Waitable, ...]
     waitables: tuple[Waitable, ...]
     added: tuple[tuple[Callable[[Any], object], tuple[Any, ...]], ...]
     taken: tuple[tuple[str, Mapping[int, Any], Take], ...]
 
-    def fill(self) -> None:
-        """Put everything into the wait set anew.
+    def fill(self, events: bool) -> tuple[Waitable, ...]:
+        """Put everything into the wait set anew, the events only if so said; the waitables that are in it.
 
         Raises:
             InvalidHandle: something was destroyed.
@@ -49,8 +59,32 @@ class Waited:
         for add, handles in self.added:
             for handle in handles:
                 add(handle)
-        for waitable in self.waitables:
+        waitables = self.waitables + self.events if events else self.waitables
+        for waitable in waitables:
             waitable.add_to_wait_set(self.wait_set)
+        return waitables
+
+
+class Polled(CallbackGroup):
+    """Subscriptions that no executor takes messages of: their node looks by itself when it wants to (take_all)."""
+
+    def can_execute(self, _: Any) -> bool:
+        """Never."""
+        return False
+
+    def beginning_execution(self, _: Any) -> bool:
+        """Never."""
+        return False
+
+    def ending_execution(self, _: Any) -> None:
+        """Nothing was begun."""
+
+
+def take_all(subscription: Subscription) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Take every message that waits, with what the middleware says of it, oldest first."""
+    with subscription.handle:
+        while taken := subscription.handle.take_message(subscription.msg_type, subscription.raw):
+            yield taken
 
 
 class KeptWaitSetExecutor(SingleThreadedExecutor):
@@ -61,6 +95,7 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
 
     def __init__(self, **options: Any) -> None:
         self._waited: Waited | None = None  # None: to be collected
+        self._events_due = 0.0  # s of the monotonic clock
         super().__init__(**options)
 
     def add_node(self, node: Node) -> bool:
@@ -112,18 +147,19 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
         self._check_context()
         waited = self._waited = self._waited or self._collect()
         wait_set = waited.wait_set
+        events = (now := time.monotonic()) >= self._events_due
+        if events:
+            self._events_due = now + EVENTS_S
         try:
-            waited.fill()
+            waitables = waited.fill(events)
         except InvalidHandle:  # destroyed since: collect again
             self._waited = None
             return
-        wait_set.wait(-1)
+        wait_set.wait(0 if events else EVENTS_NS)
         self._check_context()
         # all that is ready is known before a callback can change the wait set
         found: list[tuple[Any, Take]] = [
-            (waitable, self._take_waitable)
-            for waitable in waited.waitables
-            if waitable.is_ready(wait_set)
+            (waitable, self._take_waitable) for waitable in waitables if waitable.is_ready(wait_set)
         ]
         for kind, entities, take in waited.taken:
             ready = wait_set.get_ready_entities(kind)
@@ -150,6 +186,7 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
             tuple(entity for node in nodes for entity in getattr(node, name))
             for name in ("subscriptions", "guards", "timers", "clients", "services")
         )
+        subscriptions = tuple(s for s in subscriptions if not isinstance(s.callback_group, Polled))
         awake = (*guards, self._guard, self._sigint_gc)  # the executor's own have no callback
         count = NumberOfEntities(
             len(subscriptions), len(awake), len(timers), len(clients), len(services)
@@ -181,7 +218,8 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
         )
         return Waited(
             wait_set,
-            waitables,
+            tuple(w for w in waitables if isinstance(w, EventHandler)),
+            tuple(w for w in waitables if not isinstance(w, EventHandler)),
             tuple((add, tuple(entity.handle for entity in found)) for add, found in added),
             tuple(
                 (kind, {entity.handle.pointer: entity for entity in found}, take)
@@ -189,12 +227,3 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
                 if found
             ),
         )
-
-
-def spin(node: Node) -> None:
-    """Run a node's callbacks until its context ends; rclpy.spin with this executor.
-
-    Raises:
-        ExternalShutdownException: the context was shut down while it waited.
-    """
-    rclpy.spin(node, KeptWaitSetExecutor(context=node.context))

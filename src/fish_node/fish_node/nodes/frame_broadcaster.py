@@ -12,10 +12,15 @@ except ImportError:
 
 
 class FrameBroadcaster:
-    """A node's moving frames on /tf; without tf2_msgs it says nothing."""
+    """A node's moving frames on /tf; without tf2_msgs it says nothing.
+
+    Attributes:
+        heard: whether there is a /tf to say them on.
+    """
 
     def __init__(self, node: Node) -> None:
         self._publisher = node.create_publisher(TFMessage, "/tf", 10) if TFMessage else None
+        self.heard = self._publisher is not None
 
     def send(self, transform: TransformStamped) -> None:
         """Publish one transform."""

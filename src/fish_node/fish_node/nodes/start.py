@@ -3,9 +3,9 @@
 """What every node does to start and to stop: parameters from a dataclass, a clean end."""
 
 import sys
-from collections.abc import Callable, Collection
-from dataclasses import asdict
-from typing import TypeVar
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Generic, TypeVar
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
@@ -13,7 +13,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from fish_node.nodes.descriptors import descriptors
-from fish_node.nodes.executor import spin
+from fish_node.nodes.spin import ByWaitSet, Spin
 from fish_node.parameters import in_type_of, unknown_names
 
 Config = TypeVar("Config")
@@ -54,41 +54,68 @@ def read_parameters(node: Node, kind: type[Config], settable: Collection[str] = 
     return config
 
 
-def run(
-    make_node: Callable[[], Made], name: str, at_end: Callable[[Made], None] | None = None
-) -> int:
-    """Spin a node until SIGINT or SIGTERM: 0; or 1 and one line on stderr if its arguments are refused.
+@dataclass(frozen=True)
+class Part(Generic[Made]):
+    """One node of a process.
 
-    A signal may come while the node is still being made: its context ends there and then, and whatever that makes fail is
-    no failure. Errors of callbacks are the caller's.
-
-    Args:
-        make_node: the node's class.
+    Attributes:
+        make: makes the node.
         name: for the line on stderr.
         at_end: is handed the node on the clean way out, not after an error.
     """
+
+    make: Callable[[], Made]
+    name: str
+    at_end: Callable[[Made], None] | None = None
+
+
+def run(
+    make_node: Callable[[], Made],
+    name: str,
+    at_end: Callable[[Made], None] | None = None,
+    spin: Spin | None = None,
+) -> int:
+    """Spin a node until SIGINT or SIGTERM; run_together with one part."""
+    return run_together([Part(make_node, name, at_end)], spin=spin)
+
+
+def run_together(
+    parts: Sequence[Part[Any]], arguments: list[str] | None = None, spin: Spin | None = None
+) -> int:
+    """Spin nodes in one process until SIGINT or SIGTERM: 0; or 1 and one line on stderr if their arguments are refused.
+
+    A signal may come while a node is still being made: the context ends there and then, and whatever that makes fail is
+    no failure. Errors of callbacks are the caller's.
+
+    Args:
+        parts: the nodes.
+        arguments: command line, instead of the process's own.
+        spin: which executor runs the callbacks; a wait set unless said otherwise.
+    """
+    part, nodes, spin = parts[0], list[Node](), spin or ByWaitSet()
     try:
-        rclpy.init()
+        spin.init(arguments)
     except REFUSALS as error:
-        return _refused(name, error)
-    node = None
+        return _refused(part.name, error)
     try:
         try:
-            node = make_node()
-            spin(node)
+            for part in parts:
+                nodes.append(part.make())
+            spin(nodes)
         except (KeyboardInterrupt, ExternalShutdownException):
             pass
         except Exception:
             if rclpy.ok():
                 raise
-        if node is not None and at_end is not None:
-            at_end(node)
+        for part, node in zip(parts, nodes, strict=False):  # a signal may come before all are made
+            if part.at_end is not None:
+                part.at_end(node)
     except REFUSALS as error:
-        if node is not None:  # not a refused argument but a mistake in a callback
+        if len(nodes) == len(parts):  # not a refused argument but a mistake in a callback
             raise
-        return _refused(name, error)
+        return _refused(part.name, error)
     finally:
-        if node is not None:
+        for node in nodes:
             node.destroy_node()
         shut_down()
     return 0

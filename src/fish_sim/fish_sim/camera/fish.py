@@ -4,6 +4,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import cos, pi, sin
 from typing import Any
 
@@ -128,9 +129,15 @@ def silhouette(pose: FishPose, shape: FishShape) -> Sequence[Array]:
     ]
 
 
-def _disc(centre: Array, diameter: float, points: int = 24) -> Array:
+@cache
+def _circle(points: int) -> Array:
+    """(points, 2) of the unit circle."""
     angles = np.arange(points) * (2 * pi / points)
-    return centre + 0.5 * diameter * np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _disc(centre: Array, diameter: float, points: int = 24) -> Array:
+    return centre + 0.5 * diameter * _circle(points)
 
 
 def _taper(near: Array, far: Array, near_width: float, far_width: float) -> Array:
@@ -149,9 +156,9 @@ def _taper(near: Array, far: Array, near_width: float, far_width: float) -> Arra
 
 def _head(pose: FishPose, shape: FishShape, scale: float, points: int = 40) -> Array:
     """Ellipse around the centre of mass, blunt ahead and pointed towards the tail."""
-    angles = np.arange(points) * (2 * pi / points)
-    along = 0.5 * shape.head_length * np.cos(angles)
-    across = 0.5 * shape.head_width * np.sin(angles) * (1.0 + 0.18 * np.cos(angles))
+    along, across = _circle(points).T
+    across = 0.5 * shape.head_width * across * (1.0 + 0.18 * along)
+    along = 0.5 * shape.head_length * along
     return _placed(pose, scale * np.column_stack([along, across]))
 
 

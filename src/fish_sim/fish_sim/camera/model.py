@@ -3,6 +3,7 @@
 """The overhead camera as geometry: pool coordinates to pixels and back."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -56,11 +57,15 @@ class CameraModel:
         centre: Array = self.R @ np.asarray(self.position, float)
         return -centre
 
+    @cached_property
+    def _optics(self) -> tuple[Array, Array, Array, Array]:
+        """Rotation vector, translation, K and D, for OpenCV."""
+        return cv2.Rodrigues(self.R)[0], self.t, self.K, self.D
+
     def project(self, points: ArrayLike) -> Array:
         """(N, 3) points in the pool frame, m -> (N, 2) pixels."""
         points = np.asarray(points, float).reshape(-1, 3)
-        rotation, _ = cv2.Rodrigues(self.R)
-        return cv2.projectPoints(points, rotation, self.t, self.K, self.D)[0].reshape(-1, 2)
+        return cv2.projectPoints(points, *self._optics)[0].reshape(-1, 2)
 
     def rays(self, pixels: ArrayLike) -> Array:
         """(N, 2) pixels -> (N, 3) directions in the pool frame (not normalised, optical depth 1)."""

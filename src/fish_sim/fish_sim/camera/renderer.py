@@ -103,15 +103,16 @@ class PoolRenderer:
 
     def _draw_fish(self, picture: Image, poses: Sequence[FishPose]) -> None:
         """Shadow, then the mean of all poses, into the patch of the picture that holds them."""
-        shapes = [
-            [(self._pixels(p.outline, 0.0), p.colour) for p in patches(pose, self._shape)]
-            for pose in poses
-        ]
-        shadows = [self._pixels(s, -DEPTH) for s in silhouette(poses[len(poses) // 2], self._shape)]
-        corners = np.vstack([outline for fish in shapes for outline, _ in fish] + shadows)
-        box = _box(corners, self.camera.size)
+        fishes = [patches(pose, self._shape) for pose in poses]
+        outlines = [patch.outline for fish in fishes for patch in fish]
+        cast = silhouette(poses[len(poses) // 2], self._shape)
+        seen = self._pixels([*outlines, *cast], [0.0] * len(outlines) + [-DEPTH] * len(cast))
+        box = _box(np.vstack(seen), self.camera.size)
         if box is None:
             return
+        corners = _subpixels(seen, box)
+        shadows, drawn = corners[len(outlines) :], iter(corners)
+        shapes = [[(next(drawn), patch.colour) for patch in fish] for fish in fishes]
         left, top, right, bottom = box
         view = picture[top:bottom, left:right].astype(np.float32)
         view *= 1.0 - SHADOW * _shade(shadows, box)[..., None]
@@ -124,9 +125,11 @@ class PoolRenderer:
 
     def _draw_thing(self, picture: Image, thing: Sequence[Patch]) -> None:
         """The patches of one thing at rest, without a shadow."""
-        outlines = [(self._pixels(patch.outline, 0.0), patch.colour) for patch in thing]
-        box = _box(np.vstack([outline for outline, _ in outlines]), self.camera.size)
+        seen = self._pixels([patch.outline for patch in thing], [0.0] * len(thing))
+        box = _box(np.vstack(seen), self.camera.size)
         if box is not None:
+            colours = [patch.colour for patch in thing]
+            outlines = list(zip(_subpixels(seen, box), colours, strict=True))
             view = picture[box[1] : box[3], box[0] : box[2]].astype(np.float32)
             self._lay(picture, view, *_fill(outlines, box), box)
 
@@ -144,8 +147,11 @@ class PoolRenderer:
         view = view * (1.0 - cover[..., None]) + colour * light
         picture[top:bottom, left:right] = np.clip(view + 0.5, 0, 255).astype(np.uint8)
 
-    def _pixels(self, outline: Array, height: float) -> Array:
-        return self.camera.project(np.column_stack([outline, np.full(len(outline), height)]))
+    def _pixels(self, outlines: Sequence[Array], heights: Sequence[float]) -> list[Array]:
+        """(N, 2) corners of each outline, m, at its height, m, as pixels; one projection for all of them."""
+        flat = np.vstack(outlines)
+        height = np.repeat(heights, [len(outline) for outline in outlines])
+        return _split(self.camera.project(np.column_stack([flat, height])), outlines)
 
     def _with_noise(self, picture: Image) -> Image:
         rows, columns = (
@@ -175,10 +181,16 @@ def _box(corners: Array, size: tuple[int, int]) -> tuple[int, int, int, int] | N
     return (left, top, right, bottom) if left < right and top < bottom else None
 
 
-def _subpixels(outline: Array, box: tuple[int, int, int, int]) -> Array:
+def _split(rows: Array, like: Sequence[Array]) -> list[Array]:
+    """Rows as parts that are as long as those of `like`."""
+    ends = np.cumsum([len(part) for part in like])
+    return [rows[end - len(part) : end] for part, end in zip(like, ends, strict=True)]
+
+
+def _subpixels(outlines: Sequence[Array], box: tuple[int, int, int, int]) -> list[Array]:
     """Fixed-point corners in the enlarged patch; subpixel centres: (u - left + 1/2) FINE - 1/2."""
-    place: Array = (outline - np.array(box[:2]) + 0.5) * FINE - 0.5
-    return np.round(place * (1 << SHIFT)).astype(np.int32)
+    place: Array = (np.vstack(outlines) - np.array(box[:2]) + 0.5) * FINE - 0.5
+    return _split(np.round(place * (1 << SHIFT)).astype(np.int32), outlines)
 
 
 def _shrink(canvas: Image, box: tuple[int, int, int, int]) -> Image:
@@ -192,18 +204,17 @@ def _canvas(box: tuple[int, int, int, int], *channels: int) -> Image:
 def _fill(
     fish: Sequence[tuple[Array, tuple[int, int, int]]], box: tuple[int, int, int, int]
 ) -> tuple[Array, Array]:
-    """Colour times cover (h, w, 3) and cover (h, w) of the fish in the patch, antialiased."""
+    """Colour times cover (h, w, 3) and cover (h, w) of the fish, of corners in subpixels, in the patch, antialiased."""
     colour, cover = _canvas(box, 3), _canvas(box)
-    for outline, fill in fish:
-        corners = [_subpixels(outline, box)]
-        cv2.fillPoly(colour, corners, fill, shift=SHIFT)
-        cv2.fillPoly(cover, corners, 255, shift=SHIFT)
+    for corners, fill in fish:
+        cv2.fillPoly(colour, [corners], fill, shift=SHIFT)
+        cv2.fillPoly(cover, [corners], 255, shift=SHIFT)
     return _shrink(colour, box).astype(np.float32), _shrink(cover, box).astype(np.float32) / 255.0
 
 
 def _shade(outlines: Sequence[Array], box: tuple[int, int, int, int]) -> Array:
-    """(h, w) cover of the shadow, softened by the depth of the water."""
+    """(h, w) cover of the shadow of outlines, in subpixels, softened by the depth of the water."""
     cover = _canvas(box)
-    for outline in outlines:
-        cv2.fillPoly(cover, [_subpixels(outline, box)], 255, shift=SHIFT)
+    for corners in outlines:
+        cv2.fillPoly(cover, [corners], 255, shift=SHIFT)
     return cv2.GaussianBlur(_shrink(cover, box).astype(np.float32) / 255.0, (9, 9), 2.5)

@@ -13,6 +13,7 @@ from collections import deque
 from dataclasses import dataclass
 from math import atan2, ceil
 
+import cv2
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
@@ -22,6 +23,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
 from fish_sim.camera.config import CameraConfig
@@ -51,6 +53,7 @@ class CameraNode(Node):
         super().__init__(
             "camera", namespace="fish", automatically_declare_parameters_from_overrides=True
         )
+        cv2.setNumThreads(1)  # a second thread waits busily for small pieces of work
         self._config = config = read_parameters(self, CameraConfig)
         self._renderer = PoolRenderer(config.model(), config.shape(), config.look())
         self._random = np.random.default_rng(config.seed + 1)
@@ -192,7 +195,7 @@ def _raw_image(header: Header, picture: np.ndarray) -> Image:
 
 def main() -> int:
     """Entry point."""
-    return run(CameraNode, "camera")
+    return run(CameraNode, "camera", spin=ByEvents())
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
 from fish_node.nodes.changes import Changes
+from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.static_frames import publish_static_frame
 from fish_node.nodes.status_log import StatusLog
@@ -226,7 +227,7 @@ def _earlier(header: Header, delay: float) -> Header:
 def main() -> int:
     """Entry point."""
     keep_freed_memory()
-    return run(TrackerNode, "tracker")
+    return run(TrackerNode, "tracker", spin=ByEvents())
 
 
 if __name__ == "__main__":
