@@ -13,7 +13,8 @@ from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import Parametrization, zeros
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.left_out import Step, step_text
-from fish_sysid.estimation.shooting.prediction_fit import IMU_CLOCK, PLACE, RANGE, PredictionFit
+from fish_sysid.estimation.shooting.prediction_fit import IMU_CLOCK, PLACE, PredictionFit
+from fish_sysid.estimation.shooting.rudder_end import RANGE, WIDEST
 from fish_sysid.prediction.held_out_errors import AHEAD, BASELINES, PEEK
 from fish_sysid.prediction.prediction import HORIZONS, WARM_UP, ErrorSizes
 from fish_sysid.prediction.stroke_average import stroke_mean
@@ -55,6 +56,10 @@ def prediction_statements(found: PredictionFit) -> list[str]:
     if RANGE in found.found.hypothesis.free:
         out.append(
             f"commands of the rudder go beyond rudder_range: the range is fitted ({found.robot.parameters[RANGE]:.2f} rad)"
+        )
+    elif found.robot.parameters[RANGE] == WIDEST:
+        out.append(
+            "the rudder has no end in this fit: trials left out show none below its largest command; measure its range"
         )
     return [*out, *map(step_statement, found.steps)]
 

@@ -15,6 +15,7 @@ from fish_sysid.dataset.experiment import Experiment, Frames, Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
+from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.elimination import eliminate, without
 from fish_sysid.estimation.shooting.fold_steps import fold_steps
 from fish_sysid.estimation.shooting.multistep import LARGEST_STEP
@@ -24,6 +25,7 @@ from fish_sysid.estimation.shooting.prediction_fit import (
     prediction_hypothesis,
 )
 from fish_sysid.estimation.shooting.residuals import SENSORS
+from fish_sysid.estimation.shooting.rudder_end import WIDEST, judged_end, largest_command
 from fish_sysid.estimation.shooting.schedule import Found, multistep, polished
 from fish_sysid.estimation.shooting.selection import choose
 from fish_sysid.estimation.shooting.trust import trusted
@@ -115,15 +117,28 @@ def test_more_links_must_predict_trials_left_out_better(true: int) -> None:
     assert [(step.name, step.added) for step in steps] == [("2 links", true == 2)]
 
 
-def test_the_servo_s_rate_is_held_and_its_range_follows_the_commands() -> None:
+def test_the_servo_s_rate_is_held_and_commands_beyond_the_range_leave_it_open() -> None:
     experiment = swum(Robot(links=1))
     beyond = replace(experiment, commands=experiment.commands * [1.0, 2.0])
     names = ("head_drag_surge", "servo_rate_limit")
-    hypothesis = prediction_hypothesis(Robot(links=1), beyond, names, (), 0.3)
-    assert hypothesis.free == ("head_drag_surge", "rudder_range")
-    assert hypothesis.robot.parameters["rudder_range"] > 0.8
-    within = prediction_hypothesis(Robot(links=1), experiment, names, (), 0.3)
-    assert within.free == ("head_drag_surge",)
+    for trials, end in ((beyond, WIDEST), (experiment, 0.8)):
+        hypothesis = prediction_hypothesis(Robot(links=1), trials, names, (), 0.3)
+        assert hypothesis.free == ("head_drag_surge",)
+        assert hypothesis.robot.parameters["rudder_range"] == end
+
+
+@pytest.mark.parametrize("end", [0.35, 0.8])
+def test_the_rudder_ends_only_where_trials_left_out_show_it(end: float) -> None:
+    """The file states 0.3 rad; the true end is below the largest commands, or beyond them."""
+    experiment = swum(Robot(links=1).with_parameters(rudder_range=end))
+    assert largest_command(experiment) == pytest.approx(0.5, abs=0.1)
+    stated = Robot(links=1).with_parameters(rudder_range=0.3)
+    hypothesis = prediction_hypothesis(stated, experiment, FREE, (), 0.3)
+    start = Found(hypothesis, np.zeros(len(FREE) + len(SENSORS)), np.inf)
+    found, (step,) = judged_end(experiment, start)
+    assert step.added == (end < 0.5)
+    values = ShotParametrization(found.hypothesis).robot(found.z[: -len(SENSORS)]).parameters
+    assert values["rudder_range"] == pytest.approx(0.35 if end < 0.5 else WIDEST, abs=0.03)
 
 
 def test_a_fit_to_predictions_finds_the_robot_and_says_how_surely() -> None:

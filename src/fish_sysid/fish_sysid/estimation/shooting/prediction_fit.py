@@ -22,6 +22,12 @@ from fish_sysid.estimation.shooting.fold_steps import FOLDS, without_folds
 from fish_sysid.estimation.shooting.huber import weight
 from fish_sysid.estimation.shooting.left_out import EVERY, Step, judged, left_out_costs
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
+from fish_sysid.estimation.shooting.rudder_end import (
+    RANGE,
+    judged_end,
+    with_end,
+    without_false_end,
+)
 from fish_sysid.estimation.shooting.schedule import FINE, Found, best_start, multistep, polished
 from fish_sysid.estimation.shooting.selection import GLANCE, choose
 from fish_sysid.estimation.shooting.trust import trusted
@@ -32,8 +38,6 @@ Report = Callable[[str], None]
 LINKS = (1, 2, 3)
 MOST_STARTS, QUICK_ROUNDS = 120, 2  # of a quick fit
 HELD = ("servo_rate_limit",)  # takes the place of any delay of the rudder
-RANGE = "rudder_range"  # free where commands go beyond it
-BEYOND = 0.95  # of the largest command: where the range starts, so that the data can move it
 PLACE = f"{MARKER}.{AHEAD}"  # of the camera's point
 IMU_CLOCK = "imu_latency.delay"  # free in windows alone: predictions hardly feel it
 
@@ -106,13 +110,9 @@ def with_links(robot: Robot, links: int) -> Robot:
 def prediction_hypothesis(
     robot: Robot, experiment: Experiment, free: Sequence[str], effects: Sequence[str], start: float
 ) -> Hypothesis:
-    """The robot with its parameters free but the servo's rate; its range too where commands go beyond it."""
-    moved = [name for name in free if name not in HELD]
-    largest = float(np.abs(experiment.given_commands[:, 1]).max())
-    if largest > robot.parameters[RANGE]:
-        robot = robot.with_parameters(**{RANGE: min(BEYOND * largest, np.pi / 2)})
-        moved.append(RANGE)
-    hypothesis = nominal_hypothesis(robot, tuple(moved))
+    """The robot with its parameters free but the servo's rate; without an end of the rudder where commands go beyond it."""
+    moved = tuple(name for name in free if name not in HELD)
+    hypothesis = nominal_hypothesis(without_false_end(robot, experiment), moved)
     for name in effects:
         hypothesis = hypothesis.with_effect(name, start)
     return hypothesis
@@ -140,13 +140,12 @@ def fit_predictions(
     hypothesis = prediction_hypothesis(with_links(robot, first), experiment, free, begun, start)
     found = best_start(experiment, hypothesis, report)
     report("trust in the sensors at start points")
-    found = trusted(experiment, found, EVERY)
-    steps: tuple[Step, ...] = ()
+    found, steps = judged_end(experiment, trusted(experiment, found, EVERY), report)
     if choose_from:
         found, kept = eliminate(experiment, found, at_once, report)
         rest = [name for name in choose_from if name not in at_once]
         found, added = choose(experiment, found, rest, report)
-        steps = (*kept, *added)
+        steps = (*steps, *kept, *added)
     found, judged = more_links(experiment, found, robot, free, more, report)
     report("predictions over 0.5 to 5 s, last steps")
     found = polished(experiment, trusted(experiment, polished(experiment, found)))
@@ -188,6 +187,8 @@ def more_links(
         hypothesis = prediction_hypothesis(
             with_links(robot, count), experiment, free, names, GLANCE
         )
+        if RANGE in found.hypothesis.free:
+            hypothesis = with_end(hypothesis, found.hypothesis.robot.parameters[RANGE])
         longer = replace(best_start(experiment, hypothesis, report), trust=found.trust)
         report(f"{count} links: leaving trials out")
         longer, costs = left_out_costs(experiment, longer)
