@@ -25,7 +25,7 @@ from fish_control.measurement_buffer import (
 from fish_control.motion_models import MotionModels
 from fish_control.noise_scale import NoiseScale
 from fish_control.pose_checks import AgreeingPoses, RepeatedPose, doubts_motion
-from fish_control.pose_weight import given_covariance, not_measured, weighted
+from fish_control.pose_weight import given_covariance, unusable, weighted
 from fish_control.strapdown import MotionModel, StrapdownFilter
 
 Array = NDArray[np.float64]
@@ -46,6 +46,7 @@ class Fusion:
     def __init__(self, config: FusionConfig | None = None) -> None:
         self.config = config or FusionConfig()
         self.counts: Counter[str] = Counter()
+        self.refused = ""  # why the latest measurement that was not used was not
         self._scale = NoiseScale()
         self._filter = StrapdownFilter(self.config, self._scale)
         self._models = MotionModels(self.config, self._scale)
@@ -135,11 +136,9 @@ class Fusion:
 
     def add_pose(self, stamp: float, pose: ArrayLike, covariance: Array | None = None) -> bool:
         """A camera pose (x, y, psi) [m, m, rad] with its stamp [s]; False if it was not used."""
-        if covariance is not None and not_measured(covariance):
-            return self._refuse("pose_not_measured")
         camera = CameraPose(np.array(pose, float), given_covariance(covariance, self.config))
-        if not all(np.all(np.isfinite(v)) for v in (stamp, camera.pose, camera.R)):
-            return self._refuse("pose_not_finite")
+        if reason := unusable(stamp, camera, covariance):
+            return self._refuse(reason)
         if any(raw.stamp == stamp for raw in self._raw):
             return self._refuse("pose_duplicate")
         imu_lives = self._poses_in_a_row < SILENT_POSES
@@ -182,6 +181,7 @@ class Fusion:
 
     def _refuse(self, reason: str) -> bool:
         self.counts[reason] += 1
+        self.refused = reason
         return False
 
     def _compare_clocks(self, stamp: float, camera: CameraPose) -> None:

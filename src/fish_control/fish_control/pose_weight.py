@@ -12,6 +12,7 @@ from fish_control.fusion_config import FusionConfig
 from fish_control.measurement_buffer import CameraPose
 from fish_control.noise_scale import NoiseScale
 
+ROUNDING = 1e-6  # of the largest element of a covariance; trackers compute in single precision
 Array = NDArray[np.float64]
 
 
@@ -29,6 +30,19 @@ def given_covariance(covariance: Array | None, config: FusionConfig) -> Array:
     R = np.array(covariance, dtype=float)
     silent = np.all(np.isfinite(R)) and np.any(R.diagonal() <= 0.0)
     return given if silent else R
+
+
+def unusable(stamp: float, camera: CameraPose, covariance: Array | None) -> str:
+    """Why a pose with its own covariance (None: not given) is used nowhere, as fusion counts it; "" if it is usable."""
+    if covariance is not None and not_measured(covariance):
+        return "pose_not_measured"
+    R = camera.R
+    if not all(np.all(np.isfinite(v)) for v in (stamp, camera.pose, R)):
+        return "pose_not_finite"
+    tolerance = ROUNDING * float(np.abs(R).max())
+    if np.abs(R - R.T).max() > tolerance or np.linalg.eigvalsh(R)[0] < -tolerance:
+        return "pose_no_covariance"
+    return ""
 
 
 def weighted(

@@ -267,6 +267,30 @@ def test_values_that_are_not_finite_are_counted_and_dropped(bad):
     np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
 
 
+@pytest.mark.parametrize("one_sided", [False, True])
+@pytest.mark.parametrize("places", [(0, 1), (0, 2), (1, 2)])
+def test_what_is_no_covariance_is_not_used(places, one_sided):
+    """Parts that vary together more than each by itself, or numbers that are not symmetric, give negative variances."""
+    fusion = Fusion()
+    feed(fusion, measurements(2.0))
+    before = fusion.estimate()
+    R = np.diag([1e-5, 1e-5, 1e-4])
+    R[places] = 1e-6 if one_sided else 1.0
+    if not one_sided:
+        R[places[::-1]] = 1.0
+    assert not fusion.add_pose(2.0, [1.0, 1.0, 1.0], R)
+    assert fusion.counts["pose_no_covariance"] == 1
+    np.testing.assert_array_equal(fusion.estimate().pose, before.pose)
+
+
+def test_parts_that_vary_wholly_together_are_used():
+    """Single precision gives them an eigenvalue a little below 0."""
+    fusion = Fusion()
+    feed(fusion, measurements(2.0))
+    along = np.array([1e-3, 2e-3, 0.5e-3], np.float32)
+    assert fusion.add_pose(2.0, truth(2.0)[0], np.outer(along, along).astype(float))
+
+
 @pytest.mark.parametrize("place", range(3))
 def test_a_pose_of_which_a_part_is_not_measured_is_not_used(place):
     fusion = Fusion()

@@ -258,6 +258,30 @@ def test_fusion_refuses_poses_of_which_a_part_is_not_measured(bench, place):
     assert b.node._fusion.counts["pose"] == b.node._fusion.counts["started"] == 0
 
 
+@pytest.mark.parametrize(
+    ("spoil", "said", "count"),
+    [
+        (
+            lambda m: m.pose.covariance.__setitem__(slice(1, 2), [1.0]),
+            "not symmetric",
+            "no_covariance",
+        ),
+        (lambda m: setattr(m.pose.pose.orientation, "w", 0.0), "no length", "not_finite"),
+    ],
+)
+def test_fusion_survives_poses_that_are_none_and_says_why(bench, spoil, said, count):
+    b = bench(FusionNode)
+    for k in range(20):
+        message = PoseWithCovarianceStamped()
+        message.header.stamp, message.header.frame_id = to_stamp(b.now() + 0.01 * k), "pool"
+        message.pose.pose.orientation.w = 1.0
+        message.pose.covariance[[0, 7, 35]] = 1e-5
+        spoil(message)
+        b.say("camera/pose", message)
+    b.until(lambda: b.said(b"\x02", said))
+    assert b.node._fusion.counts[f"pose_{count}"] > 10
+
+
 def test_fusion_uses_nothing_that_a_message_calls_not_measured(bench):
     node = bench(FusionNode).node
     message = Imu()

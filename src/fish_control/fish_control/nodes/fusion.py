@@ -34,13 +34,27 @@ from fish_control.nodes.messages import (
     yaw_of,
 )
 from fish_control.nodes.reporter import Reporter
-from fish_control.pose_weight import not_measured
 from fish_node.frames import BODY, POOL
 from fish_node.nodes.frame_broadcaster import FrameBroadcaster
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.static_frames import publish_static_frame
 
+# why fusion does not use a pose, as it counts it -> the reason and what to change
+REFUSALS = {
+    "pose_not_measured": (
+        "its poses say by a variance below 0 that x, y or yaw is not measured",
+        "a tracker that does not know its noise leaves the variances at 0",
+    ),
+    "pose_no_covariance": (
+        "what its poses give as covariance is none: not symmetric, or with a negative variance in some direction",
+        "publish variances on the diagonal",
+    ),
+    "pose_not_finite": (
+        "its poses are not finite, or their quaternion has no length",
+        "a tracker that sees no fish publishes no pose",
+    ),
+}
 SENSORS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -88,13 +102,10 @@ class FusionNode(Node):
         time, p = seconds(message.header.stamp), message.pose.pose
         pose = np.array([p.position.x, p.position.y, yaw_of(p.orientation)])
         covariance = planar_covariance(message.pose.covariance)
-        if not_measured(covariance):
-            self._refuse(
-                "its poses say by a variance below 0 that x, y or yaw is not measured",
-                "a tracker that does not know its noise leaves the variances at 0",
-            )
         if self._fusion.add_pose(time, pose, covariance):
             self._used, self._refusal = self._now(), ""
+        elif self._fusion.refused in REFUSALS:
+            self._refuse(*REFUSALS[self._fusion.refused])
         estimate = self._estimate()
         if estimate is not None and estimate.imu_lost:  # no IMU message will publish it
             self._publish(estimate)
