@@ -56,6 +56,12 @@ def check_encoder(encoder: Encoder) -> Iterator[Problem]:
         text = "the rotor's angle runs against its speed; expected the same sign in the driver"
         yield Problem("error", "encoder_sign", encoder.topic, text)
     elif followed > FOLLOWS:
-        text = "the rotor's measured speed is {} times the change of its angle"
+        # of two records of one motion, the larger numbers are those in deg, rpm or thousandths
         slope = float(np.std(mean) / np.std(rate))
+        text = "the rotor's measured speed is {} times the change of its angle"
+        if slope < 1.0:
+            slope, text = (
+                1.0 / slope,
+                "the change of the rotor's angle is {} times its measured speed",
+            )
         yield from unit_problem("encoder_unit", encoder.topic, text, "rad and rad/s", slope)

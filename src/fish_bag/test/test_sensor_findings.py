@@ -198,6 +198,12 @@ FAULTS = {
     ),
     "rotor in deg/s": (lambda s: rotor(s, 57.3), "error", "rotor_unit", "deg/s"),
     "rotor in rpm": (lambda s: rotor(s, 9.549), "warning", "rotor_unit", "rpm"),
+    "encoder's angle in deg": (
+        lambda s: replace(s, encoder=replace(s.encoder, angle=np.degrees(s.encoder.angle))),
+        "error",
+        "encoder_unit",
+        "change of the rotor's angle is 57",
+    ),
     "rotor turned round": (lambda s: rotor(s, -1.0), "error", "rotor_sign", "hull turns with"),
     "command in rpm": (lambda s: commands(s, rotor=9.549), "error", "rotor_unit", "rpm"),
     "tail in deg": (
