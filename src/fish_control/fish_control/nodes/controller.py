@@ -41,6 +41,7 @@ from fish_control.nodes.reporter import Reporter
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.changes import Changes
+from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
@@ -85,7 +86,9 @@ class ControllerNode(Node):
         self._pause = self.create_publisher(String, "arming/pause", 10)
         self._arming = ArmingListener(self)
         self._reporter = Reporter(self, self._command)
-        self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
+        self.create_subscription(
+            Odometry, "odometry/filtered", from_bytes(Odometry, self._on_odometry), 10, raw=True
+        )
         self.create_subscription(TwistStamped, "control/twist", self._on_twist, 10)
         self.create_subscription(Vector3Stamped, "tracking/error", self._on_error, 10)
         self.create_subscription(PoseStamped, "control/target", self._on_target, 10)

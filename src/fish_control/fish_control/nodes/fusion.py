@@ -36,6 +36,7 @@ from fish_control.nodes.messages import (
 from fish_control.nodes.reporter import Reporter
 from fish_node.frames import BODY, POOL
 from fish_node.nodes.frame_broadcaster import FrameBroadcaster
+from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.static_frames import publish_static_frame
@@ -77,7 +78,7 @@ class FusionNode(Node):
         self._odometry = self.create_publisher(Odometry, "odometry/filtered", 10)
         self._transform = FrameBroadcaster(self)
         self._reporter = Reporter(self, self._odometry)
-        self.create_subscription(Imu, "imu/data", self._on_imu, SENSORS)
+        self.create_subscription(Imu, "imu/data", from_bytes(Imu, self._on_imu), SENSORS, raw=True)
         self.create_subscription(PoseWithCovarianceStamped, "camera/pose", self._on_pose, SENSORS)
         self.create_timer(1.0, lambda: self._report(self._estimate()))
         self._used = 0.0  # s on this node's clock, when a measurement was last used

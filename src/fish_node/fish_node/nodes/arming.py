@@ -37,6 +37,7 @@ from fish_node.arming import (
     largest_of,
 )
 from fish_node.foreign_text import visible
+from fish_node.nodes.quick_messages import from_bytes
 
 STATE_PERIOD_S = 0.05
 PLANAR = (0, 7, 35)  # x, y and rotation about z on the diagonal of a covariance of 6
@@ -62,7 +63,13 @@ class ArmingServer:
         self._state = node.create_publisher(DiagnosticArray, "arming/state", 10)
         node.create_service(SetBool, "arm", self._on_arm)
         if settings.estimate != "ignored":
-            node.create_subscription(Odometry, "odometry/filtered", self._on_odometry, NEWEST)
+            node.create_subscription(
+                Odometry,
+                "odometry/filtered",
+                from_bytes(Odometry, self._on_odometry),
+                NEWEST,
+                raw=True,
+            )
             node.create_subscription(
                 PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST
             )

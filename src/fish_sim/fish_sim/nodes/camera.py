@@ -23,6 +23,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
@@ -72,7 +73,9 @@ class CameraNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
         self.create_subscription(JointState, "sim/joint_states", self._on_joints, QUEUE)
-        self.create_subscription(Odometry, "sim/odometry", self._on_odometry, QUEUE)
+        self.create_subscription(
+            Odometry, "sim/odometry", from_bytes(Odometry, self._on_odometry), QUEUE, raw=True
+        )
         self._release = self.create_timer(1.0, self._send_due)  # armed for each frame
         self._release.cancel()
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))

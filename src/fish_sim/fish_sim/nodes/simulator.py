@@ -38,6 +38,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from fish_node.arming import Arming, Source, operator_and_estimate
 from fish_node.nodes.arming import ArmingServer
+from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
 from fish_node.rivals import Rivals
@@ -123,7 +124,13 @@ class SimulatorNode(Node):
         )
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
-            self.create_subscription(Odometry, "odometry/filtered", self._on_estimate, QUEUE)
+            self.create_subscription(
+                Odometry,
+                "odometry/filtered",
+                from_bytes(Odometry, self._on_estimate),
+                QUEUE,
+                raw=True,
+            )
             self.create_subscription(Header, "lockstep", self._on_other, QUEUE)
         self._armed = ArmingServer(self, self._arming, self._config, lambda: self._simulation.time)
         self.create_service(SetBool, "pause", self._on_pause)

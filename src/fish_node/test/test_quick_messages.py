@@ -1,0 +1,75 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages read from their bytes have the values that rclpy reads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from nav_msgs.msg import Odometry
+from rclpy._rclpy_pybind11 import RMWError
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import Imu
+
+from fish_node.nodes.quick_messages import read_imu, read_odometry
+
+FRAMES = ["", "a", "pool", "fish_2/base_link", "Teich-ö", "x" * 255]
+READ = {Odometry: read_odometry, Imu: read_imu}
+
+
+def filled(message: Any, random: np.random.Generator) -> Any:
+    """A message with a random number in every field of numbers, one of them none."""
+    for name, kind in message.get_fields_and_field_types().items():
+        value = getattr(message, name)
+        if kind == "double":
+            setattr(message, name, float(random.choice([np.nan, -np.inf, random.normal()])))
+        elif kind.startswith("double["):
+            setattr(message, name, random.normal(size=len(value)))
+        elif kind in ("int32", "uint32"):
+            setattr(message, name, int(random.integers(0, 2**31)))
+        elif kind != "string":
+            filled(value, random)
+    return message
+
+
+def same(quick: Any, message: Any) -> None:
+    """Compare field by field."""
+    for name, kind in message.get_fields_and_field_types().items():
+        got, expected = getattr(quick, name), getattr(message, name)
+        if "/" in kind:
+            same(got, expected)
+        else:
+            np.testing.assert_array_equal(got, expected, err_msg=name)
+
+
+@pytest.mark.parametrize("kind", READ)
+@pytest.mark.parametrize("frame", FRAMES)
+def test_every_field_is_as_rclpy_reads_it(kind: type, frame: str) -> None:
+    random = np.random.default_rng(len(frame))
+    for child in FRAMES:
+        message = filled(kind(), random)
+        message.header.frame_id = frame
+        if kind is Odometry:
+            message.child_frame_id = child
+        data = serialize_message(message)
+        same(READ[kind](data), deserialize_message(data, kind))
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_bytes_of_another_encapsulation_are_left_to_rclpy(kind: type) -> None:
+    """Which cannot read them in the wheels, and says so."""
+    data = b"\x7f\x7f" + serialize_message(kind())[2:]
+    with pytest.raises(RMWError):
+        deserialize_message(data, kind)
+    with pytest.raises(RMWError):
+        READ[kind](data)
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_a_header_may_be_given_on(kind: type) -> None:
+    message = filled(kind(), np.random.default_rng(1))
+    header = READ[kind](serialize_message(message)).header
+    assert type(kind(header=header).header) is type(message.header)
+    assert header == message.header
