@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fish_sim.model import DT
 from fish_sim.robot import Robot
+from fish_sysid.dataset.experiment import Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.sensor_noise import (
@@ -52,3 +54,16 @@ def test_a_slow_sensor_is_measured_as_long_as_it_follows_the_motion(every, expec
     t, signal = 0.01 * np.arange(3000), np.full(3000, np.nan)
     signal[::every] = 0.02 * np.random.default_rng(5).standard_normal(3000 // every)
     assert white_noise([(t, signal)], 0.006) == pytest.approx(expected, rel=0.15)
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_a_gyro_is_measured_fast_or_slow(swum, every):
+    """A fast one by differences of its samples; one at 20 Hz by what the IMU's own orientation says of the turn."""
+    random, t = np.random.default_rng(6), DT * np.arange(swum.length)
+    kept = t[::every]
+    gyro = np.full(swum.gyro.shape, np.nan)
+    noise = 0.1 * random.standard_normal((len(kept), gyro.shape[1]))
+    gyro[::every] = 0.6 * np.cos(2.0 * kept)[:, None] + noise
+    turned = Headings(kept, 0.3 * np.sin(2.0 * kept))
+    seen = replace(swum, gyro=gyro, headings=(turned,) * gyro.shape[1])
+    assert usual_noise(seen).gyro == pytest.approx(0.1, rel=0.15)

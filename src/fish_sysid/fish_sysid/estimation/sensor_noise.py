@@ -40,8 +40,30 @@ def usual_noise(experiment: Experiment) -> Noise:
     }
     usual = Noise()
     measured = {name: white_noise(own, getattr(usual, name)) for name, own in signals.items()}
+    measured["gyro"] = max(measured["gyro"], slow_gyro(experiment))
     measured["encoder"] = encoder_noise(commanded_residual(experiment), usual.encoder)
     return replace(usual, **measured)  # type: ignore[arg-type]  # all numbers, no wrench among them
+
+
+def slow_gyro(experiment: Experiment) -> float:
+    """Standard deviation [rad/s] of a gyro too slow for differences, about the rate of the IMU's own orientation; else 0.
+
+    Samples of a real IMU differ from the turn that its orientation makes by far more than white noise. The rate between two
+    orientations is compared with the mean of two samples, which halves the variance.
+    """
+    apart = [np.zeros(0)]
+    for m in range(len(experiment.names)):
+        turned = experiment.heading_of(m)
+        felt = DT * np.flatnonzero(np.isfinite(experiment.gyro[:, m]))
+        if len(turned.t) < 2 or len(felt) < 2 or np.median(np.diff(felt)) < SLOWEST:
+            continue
+        middle = 0.5 * (turned.t[1:] + turned.t[:-1])
+        rate = np.interp(middle, felt, experiment.gyro[np.isfinite(experiment.gyro[:, m]), m])
+        apart.append(rate - np.diff(turned.psi) / np.diff(turned.t))
+    off = np.concatenate(apart)
+    if len(off) < FEWEST:
+        return 0.0
+    return sqrt(2.0) * float(np.median(np.abs(off - np.median(off)))) / NORMAL_MAD
 
 
 def white_noise(signals: Sequence[tuple[Array, Array]], usual: float) -> float:

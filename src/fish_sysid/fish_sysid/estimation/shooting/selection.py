@@ -23,7 +23,7 @@ from fish_sysid.estimation.parametrization import (
 from fish_sysid.estimation.shooting.fold_steps import FOLDS, fold_of, fold_steps
 from fish_sysid.estimation.shooting.huber import huber
 from fish_sysid.estimation.shooting.left_out import EVERY, Step, judged, left_out_costs, step_text
-from fish_sysid.estimation.shooting.multistep import Multistep
+from fish_sysid.estimation.shooting.multistep import SETTLED, Multistep
 from fish_sysid.estimation.shooting.schedule import Found, multistep
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ def choose(
         further, control = left_out_costs(experiment, found)
         fits, tried = {}, []
         for name in promising:
-            fits[name], costs = left_out_costs(experiment, extended(found, name))
+            fits[name], costs = converged(experiment, found, name, further.cost)
             tried.append(judged(name, control, costs))
         good = [step for step in tried if step.sure]
         best = max(good, key=lambda step: step.gain, default=None)
@@ -70,6 +70,26 @@ def choose(
             return further, tuple(steps)
         found = fits[best.name]
     return found, tuple(steps)
+
+
+def converged(
+    experiment: Experiment,
+    found: Found,
+    name: str,
+    control: float,
+    strengths: Sequence[float] = (GLANCE, 0.1 * GLANCE),
+) -> tuple[Found, Array]:
+    """`left_out_costs` of the fit with one more effect.
+
+    control: cost of the fit without it, which this one contains. One that ends at a higher cost has not converged and starts
+    again from the next of the strengths.
+    """
+    fit, costs = left_out_costs(experiment, extended(found, name, strengths[0]))
+    for strength in strengths[1:]:
+        if fit.cost <= (1.0 + SETTLED) * control:
+            break
+        fit, costs = left_out_costs(experiment, extended(found, name, strength))
+    return fit, costs
 
 
 def _alike(best: Step, judged: Sequence[Step]) -> tuple[str, ...]:

@@ -4,7 +4,7 @@
 
 A model that lacks something leaves its start state between what the sensors say now and what they said a second ago. Which of
 them is right more often is no property of the sensors. It is found with the fit: each scale is halved or doubled as long as
-predictions over 0.5 to 5 s get better. Only training trials take part.
+stroke means 0.5 to 5 s ahead get better. Only training trials take part.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def trusted(experiment: Experiment, found: Found, every: float = FINE) -> Found:
     """The fit with the trust under which it predicts these trials best."""
 
     def cost(trust: Scale) -> float:
-        return multistep(experiment, replace(found, trust=trust), every).cost(found.z)
+        return multistep(experiment, replace(found, trust=trust), every).mean_cost(found.z)
 
     best, trust = cost(found.trust), found.trust
     for _ in range(SWEEPS):
@@ -39,4 +39,4 @@ def trusted(experiment: Experiment, found: Found, every: float = FINE) -> Found:
                     break
         if best == before:
             break
-    return replace(found, cost=best, trust=trust)
+    return replace(found, trust=trust)
