@@ -68,7 +68,7 @@ def test_nothing_is_found_where_nothing_changed(compared) -> None:
 def test_what_was_put_in_is_found_with_its_strength(compared, name, values, strength) -> None:
     swapped, judged = compared(name, **values)
     assert swapped.p_value <= 0.01
-    assert max(swapped.ratio, key=lambda n: swapped.ratio[n]) == name
+    assert max(swapped.rarity, key=lambda n: swapped.rarity[n]) == name
     assert judged[name].strengths[0] == pytest.approx(strength, abs=0.25)
 
 
