@@ -12,13 +12,20 @@ import pytest
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.dataset.injection import with_injection
-from fish_sysid.diagnosis.change.rudder_change import rudder_change
+from fish_sysid.diagnosis.change.change import Member, Named
+from fish_sysid.diagnosis.change.rudder_change import (
+    RudderChange,
+    rudder_change,
+    with_second_opinion,
+)
 from fish_sysid.diagnosis.change.servos import SERVOS, delayed, lagged, with_play, with_servo
 from fish_sysid.diagnosis.change.step_response import step_response
+from fish_sysid.diagnosis.change.strength import Refitted
+from fish_sysid.diagnosis.families import family_of
 
 OLD, NEW, STEPS = 8, 5, 1000
 STRATA = [0] * (OLD + NEW)
-LEVEL = 0.01
+LEVEL = 0.02
 
 
 def swum(seed: int, count: int) -> Experiment:
@@ -49,7 +56,8 @@ def test_nothing_changed(days) -> None:
     answer = step_response(*days, STRATA, 150)
     assert answer is not None
     assert answer.p_value > LEVEL
-    assert rudder_change(*days, STRATA, LEVEL) is None
+    change = rudder_change(*days, STRATA)
+    assert change is None or change.p_value > LEVEL
 
 
 @pytest.mark.parametrize(
@@ -58,8 +66,9 @@ def test_nothing_changed(days) -> None:
 )
 def test_an_injection_is_named_with_its_number(days, name, values, tolerance) -> None:
     old, new = days
-    change = rudder_change(old, with_injection(new, name, values), STRATA, LEVEL)
+    change = rudder_change(old, with_injection(new, name, values), STRATA)
     assert change is not None
+    assert change.p_value < LEVEL
     assert change.named.name == name
     assert change.named.family == "rudder timing"
     ((key, value),) = values.items()
@@ -75,9 +84,10 @@ def test_a_lag_is_told_from_a_delay(days) -> None:
     led = rudder.copy()
     led[1:] = (rudder[1:] - kept * rudder[:-1]) / (1.0 - kept)
     change = rudder_change(
-        old, replace(new, commands=np.stack([new.commands[..., 0], led], axis=-1)), STRATA, LEVEL
+        old, replace(new, commands=np.stack([new.commands[..., 0], led], axis=-1)), STRATA
     )
     assert change is not None
+    assert change.p_value < LEVEL
     assert [m.name for m in change.named.members] == ["rudder_lag"]
     assert change.named.members[0].refitted.parameters["time_constant"].value == pytest.approx(
         0.12, abs=0.01
@@ -98,3 +108,24 @@ def test_servos_do_to_a_step_what_their_names_say() -> None:
 def test_without_a_gyro_there_is_no_answer(days) -> None:
     old, new = days
     assert step_response(old, replace(new, gyro=np.full_like(new.gyro, np.nan)), STRATA) is None
+
+
+def test_the_gyro_has_a_second_opinion_on_timing_alone() -> None:
+    """The mean motion says placement, the gyro lag; a flow beside it is none of the gyro's business."""
+    by_motion = _named("rudder_placement", rudder_placement=0.7, rudder_delay=0.3)
+    flow = _named("current", current=1.0)
+    by_gyro = RudderChange(0.03, _named("rudder_lag", rudder_lag=0.9, rudder_delay=0.1))
+    timing, same = with_second_opinion([by_motion, flow], by_gyro)
+    assert {m.name: m.probability for m in timing.members} == pytest.approx(
+        {"rudder_lag": 0.45, "rudder_placement": 0.35, "rudder_delay": 0.2}
+    )
+    assert timing.name == "rudder_lag"
+    assert same is flow
+    unsure = RudderChange(0.3, by_gyro.named)
+    assert with_second_opinion([by_motion], unsure) == [by_motion]
+
+
+def _named(first: str, **members: float) -> Named:
+    none = Refitted({}, "", np.zeros(3))
+    made = tuple(Member(name, p, 1.0, 0.5, none) for name, p in members.items())
+    return Named(made, family_of(first), 1.0, 0.1)

@@ -46,10 +46,15 @@ def _injected(scenario: Scenario, folder: Path) -> None:
         for trial in trials:
             try:
                 write_trial_file(
-                    folder / name / Path(trial.name).stem, with_effects(trial, effects)
+                    folder / name / folder_name(trial.name), with_effects(trial, effects)
                 )
             except (InjectionError, ValueError) as error:
                 raise ScenarioError(str(error)) from error
+
+
+def folder_name(trial: str) -> str:
+    """Name of a trial's folder; no two trials share it, though their names have dots or lie in folders."""
+    return trial.replace("/", "_").removesuffix(".mcap")
 
 
 def split(trials: Sequence[Trial], seed: int) -> tuple[list[Trial], list[Trial]]:

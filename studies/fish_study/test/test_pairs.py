@@ -17,7 +17,7 @@ from fish_report.robofish import main
 from fish_study import scenario_groups
 from fish_study.build import make_recordings
 from fish_study.new_study import Asked
-from fish_study.pair_recordings import make_pair, split
+from fish_study.pair_recordings import folder_name, make_pair, split
 from fish_study.pair_table import pair_tables
 from fish_study.runner import Job, run_scenario
 from fish_study.scenario import Scenario, ScenarioError
@@ -108,6 +108,11 @@ def test_old_and_new_are_of_different_runs_and_new_alone_has_the_effect(
         assert np.polyfit(trial.camera.t, drift, 1)[0] == pytest.approx(-0.02)
     with pytest.raises(ScenarioError, match="expected at least 9"):
         split(trials[:8], 0)
+
+
+def test_runs_whose_names_differ_after_a_dot_stay_apart() -> None:
+    names = ["O_0.15", "O_0.20", "day_1/run", "day_2/run", "swim.mcap"]
+    assert [folder_name(n) for n in names] == ["O_0.15", "O_0.20", "day_1_run", "day_2_run", "swim"]
 
 
 def test_injections_and_changes_come_in_turn_a_fifth_of_them_nothing() -> None:

@@ -41,7 +41,7 @@ def write_change_page(path: Path, name: str, content: Content, change: Change) -
         blocks.append(_named(content))
     if change.robot is not None and change.old is not None and change.new is not None:
         blocks.append(side_by_side(change))
-        blocks.append(_ratios(change))
+        blocks.append(_rarities(change))
         blocks.append(symmetry_table(content["symmetry"]))
     blocks += [Text("Next experiment", content["next_experiment"]["why"])]
     blocks += [Text("Left out", text) for text in content["left_out"]]
@@ -79,11 +79,11 @@ def _named(content: Content) -> Table:
     return Table("What changed", header, rows, note)
 
 
-def _ratios(change: Change) -> Table:
-    best = sorted(change.ratios.items(), key=lambda item: -item[1])[:8]
-    note = "The largest of these is compared with that of exchanged trials: the swap test."
-    header = ("candidate", "gain in NEW over the 90 % quantile of exchanged trials")
-    return Table("What differs most", header, [[n, f"{r:.1f}"] for n, r in best], note)
+def _rarities(change: Change) -> Table:
+    best = sorted(change.rarities.items(), key=lambda item: -item[1])[:8]
+    note = "The smallest of these is compared with that of exchanged trials: the swap test."
+    header = ("candidate", "p among exchanged trials, by itself")
+    return Table("What differs most", header, [[n, f"{np.exp(-r):.2g}"] for n, r in best], note)
 
 
 def side_by_side(change: Change) -> Figure:

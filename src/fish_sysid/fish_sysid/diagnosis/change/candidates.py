@@ -189,7 +189,8 @@ def _gyro_scale(swim: Swim) -> Array:
     H[:, 0] = more * swim.amplitudes[:, 0]
     centres = np.column_stack([0.0 * r, 0.0 * r, more * r, -more * r])
     windows = np.column_stack([np.zeros(len(swim.windows)), -more * swim.windows[:, 3]])
-    return swim.flat(np.hstack([centres, parts(H)]), windows)[:, None]
+    turns = -more * swim.turns[:, 1]
+    return swim.flat(np.hstack([centres, parts(H)]), windows, turns=turns)[:, None]
 
 
 def _imu_misalignment(swim: Swim) -> Array:

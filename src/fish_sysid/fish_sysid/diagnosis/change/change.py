@@ -56,4 +56,4 @@ class Change:
     new: Experiment | None = None
     camera_delay: float = 0.0  # s, of OLD's images
     symmetry: tuple[SymmetryFinding, ...] = ()  # of OLD
-    ratios: Mapping[str, float] = field(default_factory=dict)
+    rarities: Mapping[str, float] = field(default_factory=dict)  # - log p of each name by itself

@@ -11,7 +11,8 @@ and an array (W, 2) in windows of four seconds, for the channels
     age of the images beyond the known one [rad], angle by the gyro [rad]
 
 both projections of camera heading less gyro angle: on its rate of change, and on the gyro angle itself. Last come the rows of
-`symmetry.accelerometer`: the camera's second derivative less the accelerometer's force, turned by the camera's heading.
+`symmetry.accelerometer`: the camera's second derivative less the accelerometer's force, turned by the camera's heading; and
+turns by the IMU's orientation less those by its gyro, projected on the latter, in windows of four seconds.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from fish_sim.model import DT
 from fish_sysid.dataset.camera_time_offset import gyro_windows
 from fish_sysid.dataset.experiment import Experiment, Frames
+from fish_sysid.dataset.orientation_windows import orientation_windows
 from fish_sysid.diagnosis.change.harmonics import HARMONICS, StrokeWeights
 from fish_sysid.diagnosis.symmetry.accelerometer import force_rows
 from fish_sysid.diagnosis.symmetry.regression import Rows
@@ -36,7 +38,9 @@ Complex = NDArray[np.complex128]
 MEANS = 4  # channels of stroke means
 AT_CENTRES = MEANS + 2 * len(HARMONICS)
 IN_WINDOWS = 2
-CHANNELS = AT_CENTRES + IN_WINDOWS + 1
+FORCE = AT_CENTRES + IN_WINDOWS
+ORIENTATION = FORCE + 1
+CHANNELS = ORIENTATION + 1
 NO_FORCE = Rows(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
 AGE = 0.05  # s, by which images are made older to see what that does
 
@@ -53,11 +57,12 @@ class Swim:
     stroke: Array  # (C,) rad/s
     windows: Array  # (W, 4) rest on rate, length of rate, rest on gyro, length of gyro
     force: Rows  # (V,) of the accelerometer: the lever, the force and the force turned by 90 degrees, the difference
+    turns: Array  # (Q, 2) of the IMU's orientation: rest on the gyro's turns, length of these
 
     @property
-    def shape(self) -> tuple[int, int, int]:
-        """(C, W, V)."""
-        return len(self.means.t), len(self.windows), len(self.force.measured)
+    def shape(self) -> tuple[int, int, int, int]:
+        """(C, W, V, Q)."""
+        return len(self.means.t), len(self.windows), len(self.force.measured), len(self.turns)
 
     @property
     def backwards(self) -> bool:
@@ -70,17 +75,22 @@ class Swim:
         turned = self.means.gyro
         centres = np.column_stack([u, v, np.where(np.isfinite(turned), turned, r), r - turned])
         both = np.hstack([centres, parts(self.amplitudes)])
-        return self.flat(both, self.windows[:, [0, 2]], self.force.measured)
+        return self.flat(both, self.windows[:, [0, 2]], self.force.measured, self.turns[:, 0])
 
     def flat(
-        self, centres: Array | None = None, windows: Array | None = None, force: Array | None = None
+        self,
+        centres: Array | None = None,
+        windows: Array | None = None,
+        force: Array | None = None,
+        turns: Array | None = None,
     ) -> Array:
-        """(N,) of a column (C, 12), (W, 2) and (V,); None: zeros."""
-        C, W, V = self.shape
+        """(N,) of a column (C, 12), (W, 2), (V,) and (Q,); None: zeros."""
+        C, W, V, Q = self.shape
         centres = np.zeros((C, AT_CENTRES)) if centres is None else centres
         windows = np.zeros((W, IN_WINDOWS)) if windows is None else windows
         force = np.zeros(V) if force is None else force
-        return np.concatenate([centres.ravel(), windows.ravel(), force])
+        turns = np.zeros(Q) if turns is None else turns
+        return np.concatenate([centres.ravel(), windows.ravel(), force, turns])
 
     def means_only(self, **channel: Array) -> Array:
         """(N,) of a column with some of u, v, r, d (C,) alone."""
@@ -91,9 +101,10 @@ class Swim:
     @property
     def channel(self) -> NDArray[np.int64]:
         """(N,) which channel a row is."""
-        C, W, V = self.shape
+        C, W, V, Q = self.shape
         centres, windows = np.arange(AT_CENTRES), AT_CENTRES + np.arange(IN_WINDOWS)
-        return np.concatenate([np.tile(centres, C), np.tile(windows, W), np.full(V, CHANNELS - 1)])
+        alone = np.repeat([FORCE, ORIENTATION], [V, Q])
+        return np.concatenate([np.tile(centres, C), np.tile(windows, W), alone])
 
 
 def parts(amplitudes: Complex) -> Array:
@@ -118,8 +129,9 @@ def _swim(name: str, alone: Experiment, means: StrokeMeans) -> Swim:
     weights = StrokeWeights.of(rotor, means.t)
     amplitudes = weights.amplitudes(*(filled(x) for x in felt))
     aged, windows = _aged(frames, means), gyro_windows(alone, 0)
+    turns = orientation_windows(alone, 0)
     return Swim(
-        name, means, aged, amplitudes, weights.rotor, weights.stroke, windows, _force(alone)
+        name, means, aged, amplitudes, weights.rotor, weights.stroke, windows, _force(alone), turns
     )
 
 

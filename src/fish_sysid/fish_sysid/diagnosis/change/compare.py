@@ -28,7 +28,11 @@ from fish_sysid.diagnosis.change.comparable import (
 from fish_sysid.diagnosis.change.contest import apart, mean_gain, tie
 from fish_sysid.diagnosis.change.naming import Judged, judge_all
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, STROKES, TrialRows, look, trial_rows
-from fish_sysid.diagnosis.change.rudder_change import RudderChange, rudder_change
+from fish_sysid.diagnosis.change.rudder_change import (
+    RudderChange,
+    rudder_change,
+    with_second_opinion,
+)
 from fish_sysid.diagnosis.change.servos import with_servo
 from fish_sysid.diagnosis.change.shared_fit import Key, Regression, regression
 from fish_sysid.diagnosis.change.strength import Refitted, refit
@@ -45,9 +49,12 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
 LOOKS = {"mean motion": MEAN_MOTION, "strokes": STROKES}
-LEVEL = 0.02 / 3  # of each look, the rudder's answer among them: at most 2 % of nulls
+LEVEL, LEVEL_OF_ANSWER = (
+    0.005,
+    0.01,
+)  # of each of the two looks, of the rudder's answer: at most 2 % of nulls
 MOST_CHANGES = 3
-CONTENDS = 0.5  # of the largest ratio to the null that a contender has
+CONTENDS = 0.5  # of the largest - log p of a name that a contender has
 REFITTED = 3  # contenders of any family
 # a name whose special case explains as much is not needed
 SPECIAL_CASE = {"nonuniform_current": "current", "wake_memory": "tip_slip"}
@@ -108,7 +115,8 @@ def _compare(
     report("the rudder's answer")
     strata = kinds(old_days, new_days)
     used, moved = _of(old, old_days), _of(new, new_days)
-    servo = rudder_change(used, moved, strata, LEVEL)
+    answer = rudder_change(used, moved, strata)
+    servo = answer if answer is not None and answer.p_value <= LEVEL_OF_ANSWER else None
     if servo is not None:
         new, new_days = _as_passed_on(new, new_days, servo)
     report("fitting OLD by predictions")
@@ -134,7 +142,7 @@ def _compare(
     case, swapped = found[seen]
     base = Change(
         "unchanged", p_value=swapped.p_value, look=seen, left_out=(*told, *more), robot=model, old=old, new=new,
-        camera_delay=delay, symmetry=symmetry, ratios=swapped.ratio,
+        camera_delay=delay, symmetry=symmetry, rarities=swapped.rarity,
     )  # fmt: skip
     if servo is not None:
         base = replace(
@@ -144,7 +152,11 @@ def _compare(
     if swapped.p_value > LEVEL:
         return base
     report("naming what changed")
-    return _named(replace(base, verdict="changed"), case, swapped)
+    found_names = _named(replace(base, verdict="changed"), case, swapped)
+    if servo is None:
+        named = with_second_opinion(found_names.named, answer)
+        found_names = replace(found_names, named=tuple(named))
+    return found_names
 
 
 def _of(experiment: Experiment, days: Sequence[Swim]) -> Experiment:
@@ -198,7 +210,7 @@ def _named(change: Change, case: _Case, swapped: Swapped) -> Change:
         swapped = swap_test(case.fit, case.strata, taken=taken, days=case.day_of)
     named, taken, swapped = needed(case, named, taken, swapped)
     left = swapped.p_value <= LEVEL
-    suspects = sorted(swapped.ratio, key=lambda n: -swapped.ratio[n])[:SUSPECTS] if left else []
+    suspects = sorted(swapped.rarity, key=lambda n: -swapped.rarity[n])[:SUSPECTS] if left else []
     return replace(
         change,
         named=tuple(named),
@@ -255,8 +267,8 @@ def _next(
 ) -> tuple[Named, Key] | None:
     """The next change with its family, or nothing where no contender is an effect of the vocabulary."""
     judged = judge_all(case.fit, taken)
-    largest = max(swapped.ratio.values())
-    strong = [j for j in judged.values() if swapped.ratio.get(j.name, 0.0) >= CONTENDS * largest]
+    rarest = max(swapped.rarity.values())
+    strong = [j for j in judged.values() if swapped.rarity.get(j.name, 0.0) >= CONTENDS * rarest]
     contenders = sorted((j for j in strong if j.gain > 0.0), key=lambda j: -j.gain)
     names = [j for j in contenders if not j.name.startswith(PARAMETER)]
     if not names or apart(contenders[0].by_trial, names[0].by_trial):

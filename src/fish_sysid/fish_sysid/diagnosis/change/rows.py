@@ -21,7 +21,9 @@ from fish_sysid.diagnosis.symmetry.stroke_means import ROTOR
 Array = NDArray[np.float64]
 
 # standard deviations of the channels' noise, before OLD tells them: m/s, rad/s, harmonics, rad
-FIRST_NOISE = np.array([0.01, 0.01, 0.05, 0.01, *([0.03] * (2 * len(HARMONICS))), 0.1, 0.1, 0.01])
+FIRST_NOISE = np.array(
+    [0.01, 0.01, 0.05, 0.01, *([0.03] * (2 * len(HARMONICS))), 0.1, 0.1, 0.01, 0.03]
+)
 # channels of the two looks: the mean motion, clocks and scales alone, and with the strokes
 MEAN_MOTION = (*range(MEANS), *range(AT_CENTRES, CHANNELS))
 STROKES = tuple(range(CHANNELS))
@@ -75,7 +77,7 @@ def keyed(candidates: Sequence[Candidate]) -> dict[tuple[str, int], Candidate]:
 
 def _rows(swim: Swim, own: Array, candidates: Mapping[tuple[str, int], Array]) -> TrialRows:
     measured = swim.measured()
-    valid = np.isfinite(measured)
+    valid = np.isfinite(measured) & np.isfinite(swim.flat(own))
     columns = {
         key: np.where(valid[:, None], np.nan_to_num(c), 0.0) for key, c in candidates.items()
     }
@@ -100,6 +102,7 @@ def black_box(swim: Swim, own: Array) -> Array:
         columns.append(swim.flat(None, window))
     for column in (*swim.force.base.T, *swim.force.terms.T):
         columns.append(swim.flat(force=column))
+    columns.append(swim.flat(turns=swim.turns[:, 1]))
     return np.column_stack(columns)
 
 

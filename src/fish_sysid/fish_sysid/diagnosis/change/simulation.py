@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Channels of a simulated robot under the recorded commands: what an effect or a parameter would change.
 
-The fish starts at rest; what a wrong start does is gone after the first second and a half, which no stroke mean covers.
+The fish starts at rest; what a wrong start does is gone after the first second and a half, which no stroke mean covers. A
+simulation that diverges, as one of a rotor that jumps may, starts again from rest there; the channels around it are NaN.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.sparse import csr_matrix
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
+from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.channels import AT_CENTRES, MEANS, Swim, parts
 from fish_sysid.diagnosis.change.harmonics import StrokeWeights
@@ -29,6 +31,8 @@ LARGEST_MEAN, LARGEST_AMPLITUDE = (
     20.0,
 )  # m/s or rad/s, and SI units; what exceeds it has diverged
 LANES = 240  # trials times variants of one pass: memory
+MOST_RESTARTS = 10  # of one trial
+BEFORE, AFTER = 0.3, 1.5  # s around a restart, in which the states say nothing
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class Variant:
 def simulate(
     robot: Robot, experiment: Experiment, days: Sequence[Swim], variants: Sequence[Variant]
 ) -> list[list[Array]]:
-    """Channels (C, 12) of every variant in each of these trials; the camera and the gyro agree in them.
+    """Channels (C, 12) of every variant in each of these trials, NaN near a restart; the camera and the gyro agree in them.
 
     Variants of one effect share a compiled kernel and are simulated side by side.
     """
@@ -72,17 +76,37 @@ def _pass(
     robots = [_robot(robot, variant) for variant in variants]
     stepper, M = filter_stepper(robots[0]), len(trials)
     table = np.array([stepper.parameters(r) for r in robots])
-    rest = np.array([stepper.rest((0.0, 0.0, 0.0), parameters=row) for row in table])
     commands = np.tile(experiment.commands[:, trials], (1, len(variants), 1))
-    x = stepper.rollout(np.repeat(rest, M, axis=0), commands, np.repeat(table, M, axis=0))
+    x, lost = rollout(stepper, np.repeat(table, M, axis=0), commands)
     turn = stepper.layout.links + 3
     return [
         [
-            lens.channels(x[: experiment.steps[m] + 1, i * M + j], turn)
+            lens.channels(x[: experiment.steps[m] + 1, i * M + j], lost[:, i * M + j], turn)
             for j, (m, lens) in enumerate(zip(trials, lenses, strict=True))
         ]
         for i in range(len(variants))
     ]
+
+
+def rollout(stepper: Stepper, table: Array, commands: Array) -> tuple[Array, Array]:
+    """States (T + 1, B, NS) of fish that start at rest, and where they say nothing (T + 1, B) after a restart from rest.
+
+    table (B, P): their parameters; commands (T, B, 2).
+    """
+    rest = np.array([stepper.rest((0.0, 0.0, 0.0), parameters=row) for row in table])
+    x = stepper.rollout(rest, commands, table)
+    lost = np.zeros(x.shape[:2], dtype=bool)
+    before, after = round(BEFORE / DT), round(AFTER / DT)
+    for _ in range(MOST_RESTARTS):
+        gone: NDArray[np.bool_] = np.asarray(~np.isfinite(x[:-1]).all(axis=2))
+        for lane in np.flatnonzero(gone.any(axis=0)):
+            k = int(gone[:, lane].argmax())
+            lost[max(k - before, 0) : k + after, lane] = True
+            again = stepper.rollout(rest[[lane]], commands[k:, [lane]], table[[lane]])
+            x[k:, lane] = again[:, 0]
+        if not gone.any():
+            break
+    return x, lost
 
 
 def _robot(robot: Robot, variant: Variant) -> Robot:
@@ -105,8 +129,8 @@ class _Lens:
         value, slope = (csr_matrix(np.nan_to_num(w)) for w in (weights.value, weights.slope))
         return cls(value, slope, StrokeWeights.of(rotor, swim.means.t))
 
-    def channels(self, x: Array, turn: int) -> Array:
-        """(C, 12) of states (T + 1, NS); `turn`: where the velocities begin."""
+    def channels(self, x: Array, lost: Array, turn: int) -> Array:
+        """(C, 12) of states (T + 1, NS); `turn`: where the velocities begin; NaN at centres whose window has lost ones (T,)."""
         pose, velocity = x[:-1, :3], x[:, turn : turn + 2]
         mean, rate = self.value @ pose, self.slope @ pose
         surge, sway = _turned(rate[:, 0], rate[:, 1], mean[:, 2])
@@ -117,6 +141,7 @@ class _Lens:
         motion = np.column_stack([surge, sway, rate[:, 2]])
         out[:, : MEANS - 1] = np.clip(np.nan_to_num(motion), -LARGEST_MEAN, LARGEST_MEAN)
         out[:, MEANS:] = np.clip(np.nan_to_num(H), -LARGEST_AMPLITUDE, LARGEST_AMPLITUDE)
+        out[abs(self.value) @ lost[: len(x) - 1] > 0.0] = np.nan
         return out
 
 

@@ -20,6 +20,7 @@ from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.servos import SERVOS, lagged
 from fish_sysid.diagnosis.change.swap_test import SWAPS, Index, exchanges
+from fish_sysid.diagnosis.change.tail_probability import tail_probability
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.diagnosis.symmetry.regression import jackknife
 
@@ -61,10 +62,9 @@ def step_response(
     rows = np.arange(len(old.names), len(trials))
     observed = _judged(trials, rows)
     pooled = _Pooled.of(trials)
-    least = pooled.misfit(rows)
     random = np.random.default_rng(0)
-    null = [pooled.misfit(some) for some in exchanges(strata, rows, random, swaps)]
-    p = (1.0 + sum(misfit <= least for misfit in null)) / (1.0 + len(null))
+    null = np.array([pooled.gain(some) for some in exchanges(strata, rows, random, swaps)])
+    p = tail_probability(null, pooled.gain(rows))
     answers = [
         Answered(name, gains, _estimate(name, losses)) for name, (gains, losses) in observed.items()
     ]
@@ -121,17 +121,17 @@ class _Pooled:
         plain = gram[:, 0].sum(axis=0, dtype=np.float64), moment[:, 0].sum(axis=0)
         return cls(plain, gram - gram[:, :1], moment - moment[:, :1])
 
-    def misfit(self, rows: Index) -> float:
-        """Share of the gyro that is left with the best servo in the trials `rows` and none in the others.
+    def gain(self, rows: Index) -> float:
+        """What the best servo in the trials `rows`, and none in the others, explains of the gyro over what is left then.
 
-        A trial that is changed and counts as unchanged, or the other way round, makes it larger.
+        A trial that is changed and counts as unchanged, or the other way round, makes it smaller.
         """
         G = self.plain[0] + self.gram[rows].sum(axis=0, dtype=np.float64)
         h = self.plain[1] + self.moment[rows].sum(axis=0)
         ridge = RIDGE * np.maximum(np.diagonal(G, axis1=1, axis2=2), 1e-9)
         b = np.linalg.solve(G + ridge[:, :, None] * np.eye(G.shape[1]), h[..., None])[..., 0]
         left = len(self.gram) - 2.0 * np.sum(b * h, axis=1) + np.einsum("sp,spq,sq->s", b, G, b)
-        return float(left.min() / len(self.gram))
+        return float((left[0] - left.min()) / left.min())
 
 
 def _past(signals: Sequence[Array], at: NDArray[np.int64]) -> Array:

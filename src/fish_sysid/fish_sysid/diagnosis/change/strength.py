@@ -133,10 +133,12 @@ def _linearised(
         for k, s, u in zip(keys, steps, unit, strict=True)
     ]
     own, there, *moved = simulate(robot, experiment, days, variants)
-    change = [s.flat(b - a) for s, a, b in zip(days, own, there, strict=True)]
+    change = [np.nan_to_num(s.flat(b - a)) for s, a, b in zip(days, own, there, strict=True)]
     slopes = [
-        np.column_stack(
-            [s.flat((m[i] - there[i]) / step) for m, step in zip(moved, steps, strict=True)]
+        np.nan_to_num(
+            np.column_stack(
+                [s.flat((m[i] - there[i]) / step) for m, step in zip(moved, steps, strict=True)]
+            )
         )
         for i, s in enumerate(days)
     ]

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Is NEW different? Trials of OLD and NEW exchanged at random: what a candidate gains then is the null.
 
-The statistic is the largest gain over all names, each relative to what it gains when trials are exchanged. A trial that is
-changed and counts as OLD makes that null wider, so that few trials need a strong change.
+Each name has a statistic of its own, whose rarity is that among exchanged trials. The rarest name counts, and how rare that is
+among the rarest of exchanged trials is the p-value (Westfall and Young 1993, min-p): by its count, or by the tail where that is
+less. An exchanged set that keeps most of NEW's trials looks as changed as NEW does and is no null: of a change it would say how
+little the trials weigh that it leaves out. Sets that share more trials with NEW than random sets do in the mean take no part.
 """
 
 from __future__ import annotations
@@ -16,14 +18,13 @@ from numpy.typing import NDArray
 
 from fish_sysid.diagnosis.change.candidates import PARAMETER
 from fish_sysid.diagnosis.change.shared_fit import CHANGE, Key, Regression
+from fish_sysid.diagnosis.change.tail_probability import Tails, tail_probability
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 SWAPS = 300
-USUAL = 0.9  # quantile of exchanged trials' gains that a gain is compared with
 SMALLEST = 0.5  # nats of one trial
-LEAST_USUAL = 0.1
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,7 @@ class Swapped:
     """What the test says."""
 
     p_value: float
-    ratio: dict[
-        str, float
-    ]  # of a name's F in NEW to the USUAL quantile of that of exchanged trials
+    rarity: dict[str, float]  # of a name's F in NEW among those of exchanged trials, - log p
 
 
 def swap_test(
@@ -51,32 +50,43 @@ def swap_test(
     """
     random = np.random.default_rng(seed)
     gains = _Gains(fit, taken)
-    observed = gains.of(gains.new)
-    null = np.array([gains.of(rows) for rows in exchanges(strata, gains.new, random, swaps)])
-    usual = np.maximum(np.quantile(null, USUAL, axis=0), LEAST_USUAL)
-    asked = np.array([not name.startswith(PARAMETER) for name in gains.names])
-    largest = (observed / usual)[asked].max()
-    under_null = (null / usual)[:, asked].max(axis=1)
-    p = (1.0 + float((under_null >= largest).sum())) / (1.0 + len(null))
-    of_days = np.array([gains.of(rows) for rows in single_days(days, fit.old)])
-    if len(of_days):
-        as_large = int(((of_days / usual)[:, asked].max(axis=1) >= largest).sum())
-        p = max(p, as_large / len(of_days))
-    return Swapped(p, dict(zip(gains.names, (observed / usual).tolist(), strict=True)))
+    null = gains.of(exchanges(strata, gains.new, random, swaps))
+    tails = Tails.of(null)
+    counts = [not n.startswith(PARAMETER) for n in gains.names]
+
+    def rarest(values: Array) -> Array:
+        return np.asarray(1.0 / tails.probability(values)[:, counts].min(axis=1))
+
+    observed = gains.of([gains.new])
+    of_null, of_new = rarest(null), float(rarest(observed)[0])
+    counted = (1.0 + float((of_null >= of_new).sum())) / (1.0 + len(of_null))
+    p = min(counted, tail_probability(of_null, of_new))
+    of_days = single_days(days, fit.old)
+    if of_days:
+        p = max(p, float((rarest(gains.of(of_days)) >= of_new).mean()))
+    rarity = -np.log(tails.probability(observed)[0])
+    return Swapped(p, dict(zip(gains.names, rarity.tolist(), strict=True)))
 
 
 def exchanges(
     strata: Sequence[int], new: Index, random: np.random.Generator, count: int
 ) -> list[Index]:
-    """Up to `count` different sets of trials that stand for NEW, none NEW itself, as many of each stratum as NEW has."""
+    """Up to `count` different sets of trials that stand for NEW, as many of each stratum as NEW has.
+
+    None shares more trials with NEW than random sets do in the mean, or than one.
+    """
     kinds, found = np.asarray(strata), {}
-    for _ in range(3 * count):
+    most = max(
+        1,
+        int(sum((kinds[new] == k).sum() ** 2 / (kinds == k).sum() for k in np.unique(kinds[new]))),
+    )
+    for _ in range(6 * count):
         chosen = []
         for kind in np.unique(kinds[new]):
             wanted = int((kinds[new] == kind).sum())
             chosen.append(random.permutation(np.flatnonzero(kinds == kind))[:wanted])
         rows = np.sort(np.concatenate(chosen))
-        if not np.array_equal(rows, new):
+        if np.isin(rows, new).sum() <= most:
             found[rows.tobytes()] = rows
         if len(found) == count:
             break
@@ -96,7 +106,8 @@ class _Gains:
     def __init__(self, fit: Regression, taken: Sequence[Key]) -> None:
         keys = [k for k in fit.at if k not in taken]
         self.names = tuple(dict.fromkeys(name for name, _ in keys))
-        self.new = np.arange(fit.old, len(fit.names))
+        self._trials = len(fit.names)
+        self.new = np.arange(fit.old, self._trials)
         S, fixed = fit.shared, np.array([i for k in taken for i in fit.at[k]], dtype=int)
         G, h = fit.gram.sum(axis=0)[:S, :S] + np.diag(fit.precision), fit.moment.sum(axis=0)[:S]
         N, g = fit.gram[self.new].sum(axis=0), fit.moment[self.new].sum(axis=0)
@@ -112,12 +123,15 @@ class _Gains:
             own = fit.gram[:, i][:, :, i]
             self._columns.append((key[0], _Column(both, own, fit.moment[:, i], inverse, right)))
 
-    def of(self, rows: Index) -> Array:
-        """F (names,) of `_Column`, the best form of each."""
-        best = dict.fromkeys(self.names, 0.0)
+    def of(self, sets: Sequence[Index]) -> Array:
+        """F (sets, names) of `_Column`, the best form of each."""
+        chosen = np.zeros((len(sets), self._trials))
+        for row, rows in zip(chosen, sets, strict=True):
+            row[rows] = 1.0
+        best = {name: np.zeros(len(sets)) for name in self.names}
         for name, column in self._columns:
-            best[name] = max(best[name], column.ratio(rows))
-        return np.array(list(best.values()))
+            best[name] = np.maximum(best[name], column.ratio(chosen))
+        return np.column_stack(list(best.values()))
 
 
 class _Column:
@@ -136,13 +150,20 @@ class _Column:
         self._each = np.linalg.inv(own + np.eye(K) / CHANGE**2)
         self._prior = np.eye(K) / CHANGE**2
 
-    def ratio(self, rows: Index) -> float:
-        """Gain [nats] when it acts in the trials `rows` over the mean of what is left of each trial, SMALLEST at least."""
-        B = self._both[rows].sum(axis=0)
+    def ratio(self, chosen: Array) -> Array:
+        """(sets,) gain [nats] when it acts in the trials of a set over the mean of what is left of each trial, SMALLEST at least.
+
+        chosen (sets, M): 1 for the trials of a set.
+        """
+        B = np.einsum("nm,mib->nib", chosen, self._both)
         W = B @ self._inverse
-        score = self._score[rows].sum(axis=0)
-        strength = np.linalg.solve(self._own[rows].sum(axis=0) - W @ B.T + self._prior, score)
-        left = self._score + self._both @ (W.T @ strength)
-        left[rows] -= self._own[rows] @ strength
-        each = 0.5 * np.einsum("mi,mij,mj->m", left, self._each, left)
-        return 0.5 * float(score @ strength) / max(float(each.mean()), SMALLEST)
+        score = chosen @ self._score
+        own = np.einsum("nm,mij->nij", chosen, self._own)
+        own = own - W @ B.transpose(0, 2, 1) + self._prior
+        strength = np.linalg.solve(own, score[..., None])[..., 0]
+        shared = np.einsum("nib,ni->nb", W, strength)
+        left = self._score + np.einsum("mib,nb->nmi", self._both, shared)
+        left -= chosen[..., None] * np.einsum("mij,nj->nmi", self._own, strength)
+        each = 0.5 * np.einsum("nmi,mij,nmj->nm", left, self._each, left)
+        gain = 0.5 * np.einsum("ni,ni->n", score, strength)
+        return np.asarray(gain / np.maximum(each.mean(axis=1), SMALLEST))
