@@ -14,6 +14,8 @@ from array import array
 from dataclasses import dataclass, field
 
 from fish_bag.recording_files import LFS_MAGIC
+from fish_bag.sqlite_pages import Gaps
+from fish_bag.storage import end_of_content
 
 HEAD = struct.Struct(
     ">IIIIIIII"
@@ -35,23 +37,28 @@ class Log:
     committed_pages: int = 0  # of the database after the last commit, 0 without one
     lost: str = ""  # what cannot be read, "" where the log is whole
 
-    def applied(self, database: bytes) -> tuple[bytes, list[range]]:
-        """The database with all pages of the log, those without a commit too, and the bytes that neither of them holds.
-
-        Missing bytes are zero.
-        """
+    def applied(self, database: bytes) -> tuple[bytes, Gaps]:
+        """The database with all pages of the log, those without a commit too, and what neither of them holds."""
         size, data = self.page_bytes, bytearray(database)
         for number, page in self.pages:
             end = number * size
             data.extend(bytes(max(0, end - len(data))))
             data[end - size : end] = page
         written = {number for number, _ in self.pages}
-        holes = [
-            range(max(end - size, len(database)), end)
+        own = [
+            range(end - size, end)
             for end in range(size, len(data) + 1, size or 1)
-            if end > len(database) and end // size not in written
+            if end // size not in written
         ]
-        return bytes(data), holes
+        content, length = end_of_content(database), len(database)
+        return bytes(data), Gaps(
+            holes=[range(max(page.start, length), page.stop) for page in own if page.stop > length],
+            zeros=[
+                range(max(page.start, content), min(page.stop, length))
+                for page in own
+                if page.stop > content and page.start < length
+            ],
+        )
 
     def missing_pages(self, database_bytes: int) -> int:
         """How many pages of the last commit stand neither in the database of that size nor in the log."""

@@ -24,24 +24,40 @@ Value = int | str | bytes | None
 
 
 @dataclass(frozen=True)
+class Gaps:
+    """Bytes of a database that damage has taken.
+
+    Attributes:
+        holes: what no file holds; a row that reaches there is no row.
+        zeros: the zeros at the end of what is there; they may be a row's own.
+    """
+
+    holes: Sequence[range] = ()
+    zeros: Sequence[range] = ()
+
+
+@dataclass(frozen=True)
 class Row:
-    """One row: its number, its columns, the byte of the file after it, and whether zeros follow it in its page."""
+    """One row: its number, its columns, whether it reaches into a gap's zeros, and whether zeros follow it in its page."""
 
     number: int
     values: tuple[Value, ...]
-    end: int
+    in_zeros: bool
     zeros_follow: (
         bool  # packed rows do not leave room, so that the row's end may be zeros by damage
     )
 
 
-def rows(data: Buffer, near: int | None = None, holes: Sequence[range] = ()) -> Iterator[Row]:
+NO_GAPS = Gaps()
+
+
+def rows(data: Buffer, near: int | None = None, gaps: Gaps = NO_GAPS) -> Iterator[Row]:
     """All rows that are whole, or those in the pages up to byte `near`, in order of their place in the file.
 
     Args:
         data: the file.
         near: the byte up to which pages are read, None for all.
-        holes: bytes that are zeros because the file does not hold them.
+        gaps: what of the file is not to be trusted.
     """
     page_bytes = int.from_bytes(data[16:18], "big")
     page_bytes = 65536 if page_bytes == 1 else page_bytes
@@ -53,12 +69,10 @@ def rows(data: Buffer, near: int | None = None, holes: Sequence[range] = ()) -> 
         last = near // page_bytes
         starts = starts[max(0, last - NEAR_PAGES) : last + 1]
     for start in starts:
-        yield from _page(data, start, page_bytes, usable, holes)
+        yield from _page(data, start, page_bytes, usable, gaps)
 
 
-def _page(
-    data: Buffer, start: int, page_bytes: int, usable: int, holes: Sequence[range]
-) -> Iterator[Row]:
+def _page(data: Buffer, start: int, page_bytes: int, usable: int, gaps: Gaps) -> Iterator[Row]:
     head = start + (FILE_HEAD_BYTES if start == 0 else 0)
     if head + 8 > len(data) or data[head] != LEAF:
         return
@@ -68,7 +82,7 @@ def _page(
         if not 8 + 2 * count <= place < usable:
             continue
         try:
-            row = _row(data, start + place, start + usable, page_bytes, usable, holes)
+            row = _row(data, start + place, start + usable, page_bytes, usable, gaps)
         except (IndexError, ValueError, struct.error):  # UnicodeDecodeError is a ValueError
             continue
         if row is not None:
@@ -76,7 +90,7 @@ def _page(
 
 
 def _row(
-    data: Buffer, at: int, page_end: int, page_bytes: int, usable: int, holes: Sequence[range]
+    data: Buffer, at: int, page_end: int, page_bytes: int, usable: int, gaps: Gaps
 ) -> Row | None:
     """The row at byte `at`, None where a part of it is missing."""
     size, at = _varint(data, at)
@@ -87,26 +101,26 @@ def _row(
         local = least + (size - least) % (usable - 4)
         local = local if local <= longest else least
     end = at + local
-    if size <= 0 or end > page_end or end > len(data) or _meets(at, end, holes):
+    if size <= 0 or end > page_end or end > len(data) or _meets(at, end, gaps.holes):
         return None
-    payload = bytes(data[at:end])
+    payload, in_zeros = bytes(data[at:end]), _meets(at, end, gaps.zeros)
     following = int.from_bytes(data[end : end + 4], "big") if local < size else 0
     zeros_follow = local == size and end < len(data) and not any(data[end : end + 2])
     while len(payload) < size:
         page = (following - 1) * page_bytes
         take = min(size - len(payload), usable - 4)
         last = page + 4 + take
-        if page <= 0 or last > len(data) or _meets(page, last, holes):
+        if page <= 0 or last > len(data) or _meets(page, last, gaps.holes):
             return None
         following = int.from_bytes(data[page : page + 4], "big")
         payload += bytes(data[page + 4 : last])
-        end = max(end, last)
+        in_zeros = in_zeros or _meets(page, last, gaps.zeros)
     values = _values(payload)
-    return None if values is None else Row(number, values, end, zeros_follow)
+    return None if values is None else Row(number, values, in_zeros, zeros_follow)
 
 
-def _meets(start: int, end: int, holes: Sequence[range]) -> bool:
-    return any(hole.start < end and start < hole.stop for hole in holes)
+def _meets(start: int, end: int, parts: Sequence[range]) -> bool:
+    return any(part.start < end and start < part.stop for part in parts)
 
 
 def _values(payload: bytes) -> tuple[Value, ...] | None:

@@ -14,14 +14,14 @@ import sqlite3
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fish_bag.message_types import ros2_type_name
 from fish_bag.problem import RecordingError
 from fish_bag.sqlite_log import Log, read_log
-from fish_bag.sqlite_pages import Row, Value, rows
+from fish_bag.sqlite_pages import NO_GAPS, Gaps, Row, Value, rows
 from fish_bag.storage import (
     ENOUGH_OTHERS,
     Contents,
@@ -36,10 +36,7 @@ from fish_bag.storage import (
 MAGIC = b"SQLite format 3\0"
 LOG = "-wal"
 ROLLBACK = b"\1\1"  # file format versions of a database without a write-ahead log
-COMPANIONS = (
-    LOG,
-    "-journal",
-)  # files in which sqlite3 keeps what is not yet, or no more, in the database
+COMPANIONS = (LOG, "-journal")  # hold what is not yet, or no more, in the database
 TOPIC_COLUMNS = ("serialization_format", "offered_qos_profiles", "type_description_hash")
 TABLES = "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name"
 ENCODINGS = ("ros2msg", "ros2idl", "unknown", "")
@@ -72,7 +69,7 @@ def scan_sqlite(path: Path, keep: Keep = keep_whole) -> Contents:
             contents = Contents(notes=settled.notes)
             said = " ".join(str(error).split())
             contents.lost.append(f"the database is damaged ({said}); its pages are read one by one")
-            _read_pages(settled.path.read_bytes(), contents, settled.holes)
+            _read_pages(settled.path.read_bytes(), contents, settled.gaps)
         alone = _alone(path, keep) if settled.notes or settled.lost else None
     if alone is not None and (sign := _sign_of_another(path, alone, contents)):
         alone.lost.append(
@@ -129,7 +126,7 @@ class Settled:
     path: Path
     notes: list[str] = field(default_factory=list)
     lost: str = ""  # what cannot be read of the companions
-    holes: list[range] = field(default_factory=list)  # bytes that no file holds
+    gaps: Gaps = NO_GAPS
 
 
 @contextmanager
@@ -147,13 +144,13 @@ def _settled(path: Path) -> Iterator[Settled]:
         gone = log.missing_pages(path.stat().st_size)
         # sqlite3 throws away the log of an empty database, and takes zeros for pages that are missing
         if log.lost or gone or not path.stat().st_size:
-            data, holes = log.applied(path.read_bytes())
+            data, gaps = log.applied(path.read_bytes())
             copy.write_bytes(data)
             lost = f"{log_file.name}: {log.lost}" if log.lost else ""
             if gone and not lost:
                 lost = f"it is cut: {gone} of its {log.committed_pages} pages are missing"
             notes = [] if lost else [f"empty; what stands in {names} is read"]
-            yield Settled(copy, notes, lost, holes)
+            yield Settled(copy, notes, lost, gaps)
             return
         for file in (path, *found):
             shutil.copyfile(file, Path(folder) / file.name)
@@ -240,16 +237,17 @@ def _topic(
     )
 
 
-def _read_pages(data: bytes, contents: Contents, holes: list[range]) -> None:
+def _read_pages(data: bytes, contents: Contents, gaps: Gaps) -> None:
     """Sort the rows of all pages into topics, definitions and messages by the kinds of their columns."""
-    content_end = end_of_content(data)
+    end = range(end_of_content(data), len(data))
+    gaps = replace(gaps, zeros=[*gaps.zeros, end])
     topics: dict[int, list[str]] = {}
     definitions: dict[str, tuple[bytes, str]] = {}
     messages: dict[tuple[int, tuple[Value, ...]], Row] = {}  # damage may give two the same number
-    for row in rows(data, holes=holes):
+    for row in rows(data, gaps=gaps):
         values = row.values[1:]
         texts = [value for value in values if isinstance(value, str)]
-        if row.values[:1] != (None,) or (row.end > content_end and len(texts) == len(values)):
+        if row.values[:1] != (None,) or (row.in_zeros and len(texts) == len(values)):
             continue
         if len(texts) == len(values) >= 3:
             if texts[0].startswith("/"):
@@ -261,20 +259,20 @@ def _read_pages(data: bytes, contents: Contents, holes: list[range]) -> None:
     for number, texts in topics.items():
         named = dict(zip(TOPIC_COLUMNS, texts[2:], strict=False))
         contents.topics[number] = _topic(texts[0], texts[1], named, definitions)
-    _keep_whole(list(messages.values()), contents, content_end)
+    _keep_whole(list(messages.values()), contents)
 
 
 def _drop_zeroed(data: bytes, content_end: int, contents: Contents) -> None:
     """Take out a message whose end the zeros from byte `content_end` on have overwritten: sqlite3 does not see that."""
-    for row in rows(data, content_end):
-        if row.end <= content_end or [type(v) for v in row.values[1:]] != [int, int, bytes]:
+    for row in rows(data, content_end, Gaps(zeros=[range(content_end, len(data))])):
+        if not row.in_zeros or [type(v) for v in row.values[1:]] != [int, int, bytes]:
             continue
-        _, topic, time_ns, raw = row.values
-        if not (isinstance(topic, int) and isinstance(time_ns, int) and isinstance(raw, bytes)):
+        _, topic, _, raw = row.values
+        if not (isinstance(topic, int) and isinstance(raw, bytes)):
             continue
         found = contents.messages.get(topic, Messages())
-        place = len(found) - 1
-        while place >= 0 and (found.times[place], found.raws[place]) != (time_ns, raw):
+        place = len(found) - 1  # not by its time, which sqlite3 takes from an index
+        while place >= 0 and found.raws[place] != raw:
             place -= 1
         others = found.raws[:place] + found.raws[place + 1 :]
         if place >= 0 and len(others) >= ENOUGH_OTHERS and not ends_like_others(raw, others):
@@ -282,14 +280,14 @@ def _drop_zeroed(data: bytes, content_end: int, contents: Contents) -> None:
             contents.lost.append("a message that reaches into zeros")
 
 
-def _keep_whole(found: list[Row], contents: Contents, content_end: int) -> None:
+def _keep_whole(found: list[Row], contents: Contents) -> None:
     """Take the messages in order of their rows, but none that reaches into zeros that damage has left."""
     late: list[tuple[int, int, bytes]] = []
     for row in sorted(found, key=lambda row: row.number):
         _, topic, time_ns, raw = row.values
         if not (isinstance(topic, int) and isinstance(time_ns, int) and isinstance(raw, bytes)):
             continue
-        if row.end > content_end or row.zeros_follow:
+        if row.in_zeros or row.zeros_follow:
             late.append((topic, time_ns, raw))
         else:
             contents.messages.setdefault(topic, Messages()).add(time_ns, raw)

@@ -189,12 +189,14 @@ def test_a_cut_database_beside_a_whole_log(tmp_path):
     write = WRITERS["sqlite3 log"]
     sample = make_sample("sqlite3 log", write(tmp_path / "whole", samples.robot_messages(0.4)))
     places = {
-        end - back for end in range(8192, len(sample.data), 4096) for back in (278, 360, 2000)
+        end - back for end in range(8192, len(sample.data), 4096) for back in (278, 326, 360, 2000)
     }
     for at in sorted(places):
-        folder = tmp_path / str(at)
-        folder.mkdir()
-        assert check(sample, "cut", sample.data[:at], at, folder) == "", f"cut at byte {at}"
+        for zeros in (0, 150):
+            folder = tmp_path / f"{at}_{zeros}"
+            folder.mkdir()
+            kind, broken = "zero tail" if zeros else "cut", sample.data[:at] + bytes(zeros)
+            assert check(sample, kind, broken, at, folder) == "", f"{kind} at byte {at}"
 
 
 def test_a_row_with_the_number_of_another_hides_none(wholes, tmp_path):
