@@ -11,8 +11,10 @@ from made_fits import made_fit
 from fish_sysid.diagnosis.corrected_model import much_is_left, named, unexplained_share, verdict
 from fish_sysid.diagnosis.diagnosis_json import law, mean_interval, whiteness
 from fish_sysid.diagnosis.next_experiment import next_experiment
+from fish_sysid.diagnosis.prediction_evidence import prediction_entries
 from fish_sysid.diagnosis.residual_regression import Law
 from fish_sysid.diagnosis.significance import Level
+from fish_sysid.estimation.shooting.left_out import Step
 
 NO_LAW = Law({"surge": 0.0, "sway": 0.0, "yaw": 0.0}, {}, 1e4)
 
@@ -113,3 +115,16 @@ def test_the_next_experiment_follows_what_is_open():
 def test_a_gyro_that_reads_too_much_shows_in_circles():
     turns = {row["rudder"] for row in next_experiment(["gyro_scale"], [])["program"]}
     assert turns == {0.5, -0.5}
+
+
+def test_what_predictions_ask_for_stands_beside_the_verdict():
+    surrogate = made_fit(0.0, "tip_slip")
+    step = Step("tip_slip", np.log(2.5), 0.16, added=True)
+    d = SimpleNamespace(task=found().task, surrogate=surrogate, predicted=(step,))
+    (entry,) = prediction_entries(d)
+    assert entry["name"] == "tip_slip"
+    assert entry["kind"] == "physics"
+    assert entry["evidence"]["basis"] == "prediction"
+    assert entry["evidence"]["cost_ratio"] == pytest.approx(0.4)
+    assert entry["parameters"]["mobility"]["unit"] == "m/(N s)"
+    assert prediction_entries(SimpleNamespace(surrogate=None, predicted=())) == []

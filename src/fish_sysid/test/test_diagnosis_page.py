@@ -83,6 +83,18 @@ def test_what_no_name_explains_is_told_with_the_names_that_would_help(nearest, t
     assert sentence({**content(), "verdict": "unexplained", "unexplained": left}) == told
 
 
+def test_what_predictions_ask_for_is_said_beside_the_verdict():
+    slip = {
+        "name": "tip_slip",
+        "parameters": {"mobility": {"value": 0.3, "std": 0.04, "unit": "m/(N s)"}},
+        "evidence": {"basis": "prediction", "cost_ratio": 0.4},
+    }
+    left = {"description": "a strong force", "nearest": [], "by_prediction": [slip]}
+    said = sentence({**content(), "verdict": "unexplained", "unexplained": left})
+    assert said.startswith("unexplained: a strong force. Predictions of trials left out get better")
+    assert "tip_slip (mobility 0.3 ± 0.04 m/(N s); cost x 0.40)" in said
+
+
 def nothing_found(tried, **options) -> str:
     ranking = [{"name": name} for name in tried]
     return sentence({**content(**options), "verdict": "no_mismatch", "ranking": ranking})

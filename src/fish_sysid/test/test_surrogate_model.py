@@ -45,7 +45,9 @@ def test_what_helps_is_taken_and_unseen_trials_are_predicted(slipping: Experimen
     """A sensor's error moves no fish, and is not tried."""
     start = nominal(slipping)
     names = ("camera_scale", "tip_slip")
-    found = surrogate_model(start, names, slipping, lambda _: None)
+    found, steps = surrogate_model(start, names, slipping, lambda _: None)
+    assert [step.name for step in steps] == ["tip_slip"]
+    assert steps[0].gain > 2.0 * steps[0].deviation
     assert "tip_slip" in found.hypothesis.names
     assert "camera_scale" not in found.hypothesis.names
     assert found.values["tip_slip.mobility"] == pytest.approx(0.3, rel=0.15)
@@ -59,7 +61,8 @@ def test_what_helps_is_taken_and_unseen_trials_are_predicted(slipping: Experimen
 def test_a_fit_that_predicts_better_stays(slipping: Experiment) -> None:
     hypothesis = nominal_hypothesis(SLIPPING, FREE)
     true = evaluate(hypothesis, np.zeros(len(FREE)), slipping, WATER)
-    found = surrogate_model(true, (), slipping, lambda _: None)
+    found, steps = surrogate_model(true, (), slipping, lambda _: None)
+    assert not steps
     sizes = [prediction_size(slipping, fit.robot, fit.noise) for fit in (found, true)]
     assert sizes[0] <= sizes[1]
     assert found.values["head_drag_surge"] == pytest.approx(0.26, rel=0.1)
@@ -67,4 +70,4 @@ def test_a_fit_that_predicts_better_stays(slipping: Experiment) -> None:
 
 def test_trials_too_short_to_predict_leave_the_fit_as_it_is(slipping: Experiment) -> None:
     start = nominal(short := shorten(slipping, 150))
-    assert surrogate_model(start, ("tip_slip",), short, lambda _: None) is start
+    assert surrogate_model(start, ("tip_slip",), short, lambda _: None) == (start, ())

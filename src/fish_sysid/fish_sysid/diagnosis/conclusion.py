@@ -45,8 +45,8 @@ def conclude(state: State, task: Task) -> Diagnosis:
     helpful = dict.fromkeys((*names, *(name for name in STRUCTURAL if name in task.names)))
     if task.runs("surrogate's own choice"):
         helpful |= dict.fromkeys(task.names)
-    model = surrogate_model(nominal, tuple(helpful), training, task.progress)
-    return replace(found, surrogate=model)
+    model, steps = surrogate_model(nominal, tuple(helpful), training, task.progress)
+    return replace(found, surrogate=model, predicted=steps)
 
 
 def shares(

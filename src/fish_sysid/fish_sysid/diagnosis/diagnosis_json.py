@@ -20,9 +20,11 @@ from fish_sysid.diagnosis.corrected_model import (
     unexplained_share,
     verdict,
 )
+from fish_sysid.diagnosis.effect_parameters import effect_parameters
 from fish_sysid.diagnosis.effect_wrench import intervals, regimes
 from fish_sysid.diagnosis.families import family_of, separating
 from fish_sysid.diagnosis.next_experiment import next_experiment
+from fish_sysid.diagnosis.prediction_evidence import prediction_entries
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
 from fish_sysid.diagnosis.significance import p_value, p_value_unseen, probabilities
 from fish_sysid.diagnosis.symmetry.symmetry_json import symmetry_entry, with_symmetry
@@ -141,19 +143,6 @@ def family_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     }
 
 
-def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:
-    """Values, standard errors and units of an effect's parameters."""
-    values, errors = fit.values, fit.standard_errors
-    return {
-        key: {
-            "value": values[f"{name}.{key}"],
-            "std": errors[f"{name}.{key}"],
-            "unit": parameter.unit,
-        }
-        for key, parameter in fit.hypothesis.effect(name).parameters.items()
-    }
-
-
 def where_entry(d: Diagnosis, name: str) -> dict[str, Any]:
     """Degrees of freedom, covariates, times and places of an effect: of its push, or of the force that is missing without it."""
     without, missing = d.parts.get(name, (d.nominal, d.force))
@@ -179,6 +168,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "share": share,
             "where": {},
             "nearest": [],
+            "by_prediction": [],
             "description": "; ".join(limits) or text,
         }
     scale, ratio = np.array(d.final.noise.wrench), d.final.process_noise_ratio
@@ -191,6 +181,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "place": latent_force.place_shares(d.remaining, scale),
         },
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
+        "by_prediction": prediction_entries(d),
         "description": "; ".join(
             [*limits, *(law(d, dof) for dof in d.state.law.lawful(d.task.level))]
         )

@@ -4,8 +4,9 @@
 
 The likelihood misleads a model that lacks something without a name: its parameters go where the next 50 ms are right. Here the
 robot is fitted to predictions (`estimation.shooting`), from the values that were given, and gets the effects that trials left out
-ask for. It serves simulation and training; no effect in it is a name of the answer. Where the nominal fit predicts the training
-trials better, that is taken.
+ask for. It serves simulation and training. What an effect does to predictions of trials left out is stated beside the verdict
+(`basis` "prediction"); the verdict itself stays `unexplained`, because such a fit can put one thing that it lacks in the place
+of another. Where the nominal fit predicts the training trials better, that is taken.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from fish_sysid.estimation.ekf_types import SensorModel
 from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.shooting.left_out import Step
 from fish_sysid.estimation.shooting.prediction_fit import PLACE, PredictionFit, fit_predictions
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
 from fish_sysid.estimation.shooting.start_states import without_sensor_errors
@@ -38,13 +40,14 @@ def surrogate_model(
     candidates: Sequence[str],
     experiment: Experiment,
     report: Callable[[str], None],
-) -> Fit:
-    """The model that predicts best; nominal: the fit without effects; candidates: effects that may help.
+) -> tuple[Fit, tuple[Step, ...]]:
+    """(the model that predicts best, the effects in it with what each does to predictions of trials left out).
 
-    The nominal fit itself where no trial is long enough to predict.
+    nominal: the fit without effects; candidates: effects that may help. The nominal fit itself where no trial is long enough to
+    predict.
     """
     if not can_be_predicted(experiment):
-        return nominal
+        return nominal, ()
     report("no name fits: fitting predictions over seconds")
     robot = nominal.hypothesis.robot.without_effect("disturbance")
     free = [name for name in nominal.hypothesis.free if "." not in name]
@@ -56,7 +59,9 @@ def surrogate_model(
     own, other = (
         prediction_size(experiment, f.robot, f.noise) for f in (fit, _with_filter(nominal))
     )
-    return fit if own < other else nominal
+    if own >= other:
+        return nominal, ()
+    return fit, tuple(step for step in found.steps if step.added and step.name in moving)
 
 
 def _as_fit(found: PredictionFit, before: SensorModel, experiment: Experiment) -> Fit:

@@ -46,8 +46,24 @@ def _verdict(content: Content) -> str:
     if content["verdict"] == "unexplained":
         nearest = ", ".join(content["unexplained"]["nearest"])
         aside = f" Without explaining the most of it, {nearest} would help." if nearest else ""
-        return f"unexplained: {content['unexplained']['description']}.{aside}"
+        return (
+            f"unexplained: {content['unexplained']['description']}.{aside}{_by_prediction(content)}"
+        )
     return f"no_mismatch: {_nothing_found([entry['name'] for entry in content['ranking']])}"
+
+
+def _by_prediction(content: Content) -> str:
+    """What predictions of trials left out ask for; "" where nothing was judged by them."""
+    entries = content["unexplained"].get("by_prediction", [])
+    texts = [
+        f"{e['name']} ({_parameters(e)}; cost x {e['evidence']['cost_ratio']:.2f})" for e in entries
+    ]
+    if not texts:
+        return ""
+    return (
+        f" Predictions of trials left out get better with {' and '.join(texts)}; something else that the model lacks may stand "
+        "behind that."
+    )
 
 
 def _nothing_found(tried: list[str]) -> str:
