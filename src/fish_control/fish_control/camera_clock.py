@@ -11,6 +11,9 @@ A parabola through the smallest three gives the value between grid points, its c
 swing of the head repeats itself once a stroke, so the estimate counts only where no other offset fits nearly as well. An
 image cannot be taken after it arrives: this bounds the grid, however far the clocks are apart. Source: time delay
 estimation by least squares (Jacovitti and Scarano 1993), on a grid with forgetting.
+
+Where the time from stamp to arrival steps, a clock was set by as much, or the images come later with stamps as good as
+before. The headings tell the two apart within some poses; until then the offset is undecided.
 """
 
 from __future__ import annotations
@@ -18,12 +21,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.imu_history import ImuHistory
+from fish_control.latency_watch import LatencyWatch
 
 Array = NDArray[np.float64]
 
@@ -45,9 +48,9 @@ CLEAR_RATIO = 1.3  # and the ratio of the sums of squares
 LARGEST_STD = 0.005  # s, of an estimate that is applied
 LEAST_PAIRS = 12.0
 CLOCK_DRIFT = 1e-4  # s per s, of two clocks while nobody compares them
-JUMP = 0.25  # s, change of the time from stamp to arrival that says that a clock was set
-JUMP_POSES = 8  # in a row that must agree on it
-STEADY = 0.05  # s, within which they agree
+STEP_STD = 0.02  # s, of the step of a clock as the latency shows it
+CHOICE_PAIRS = 6.0  # after a step before one of two offsets is chosen
+LONGEST_DOUBT = 3.0  # s, after which the offset is looked for as if nothing were known
 
 
 @dataclass(frozen=True)
@@ -111,31 +114,42 @@ class CameraClock:
     def __init__(self, offset: float, std: float) -> None:
         """offset, std: what is known beforehand [s]."""
         self._prior = ClockEstimate(offset, std, False)
-        self._latencies: deque[float] = deque(maxlen=30)  # s, from stamp to arrival, as stamped
+        self._watch = LatencyWatch()
         self._grid: Array | None = None  # (G,) offsets [s]
         self.jumps = 0
         self.current = self._prior
         self.contradicted = False
         self._newest = -math.inf  # s, stamp of the newest pair
-        self._strange: list[float] = []
         self._waiting: deque[tuple[float, float, float]] = deque()  # arrival, stamp, heading
-        self._sure: tuple[float, ClockEstimate] | None = (
-            None  # stamp and value of the newest sure one
-        )
+        # stamp and value of the newest sure one
+        self._sure: tuple[float, ClockEstimate] | None = None
+        self._rivals: tuple[
+            ClockEstimate, ...
+        ] = ()  # after a step: as before, moved with the clock
+        self._stepped_at = 0.0  # s, stamp
 
     @property
     def age(self) -> float:
         """Median age of an image at its arrival [s], NaN before the first."""
-        if not self._latencies:
-            return math.nan
-        return median(self._latencies) - self.current.offset
+        usual = self._watch.usual
+        return math.nan if usual is None else usual - self.current.offset
+
+    @property
+    def undecided(self) -> bool:
+        """Whether a clock may have been set: poses that show a moving fish wait until it is clear."""
+        return bool(self._rivals)
 
     def add(self, stamp: float, heading: float, imu: ImuHistory, now: float) -> None:
         """A pose with this stamp and heading arrives when the IMU's clock is at `now` [s].
 
         It is compared once the IMU has told all that the grid asks for.
         """
-        self._watch(now - stamp)
+        usual = self._watch.usual
+        stepped = self._watch.add(now - stamp)
+        if stepped is not None and usual is not None:
+            self._step(stamp, stepped, usual)
+        elif self._grid is None and self._watch.usual is not None:
+            self._place_grid(self._watch.usual)
         self._waiting.append((now, stamp, heading))
         while self._grid is not None and self._waiting and self._waiting[0][0] <= now - AHEAD:
             self._compare(*self._waiting.popleft()[1:], imu)
@@ -157,34 +171,38 @@ class CameraClock:
         self._newest = stamp
         self._decide(stamp)
 
-    def _watch(self, latency: float) -> None:
-        """Where the grid lies, and whether a clock was set."""
-        if self._grid is None:
-            self._latencies.append(latency)
-            if len(self._latencies) >= 3:
-                self._place_grid(median(self._latencies))
-            return
-        usual = median(self._latencies)
-        if abs(latency - usual) <= JUMP:
-            self._strange.clear()
-            self._latencies.append(latency)
-            return
-        self._strange.append(latency)
-        newest = self._strange[-JUMP_POSES:]
-        if len(newest) == JUMP_POSES and max(newest) - min(newest) < STEADY:
-            self._jumped(median(newest), usual)
-
-    def _jumped(self, latency: float, usual: float) -> None:
-        self.jumps += 1
-        self._strange.clear()
-        self._latencies.clear()
-        self._latencies.append(latency)
-        age = latency - self.current.offset
-        moved = 0.0 if 0.0 <= age <= OLDEST else latency - usual
-        self.current = ClockEstimate(self.current.offset + moved, abs(latency - usual), False)
-        self._sure = None
-        self._prior = self.current
+    def _step(self, stamp: float, latency: float, usual: float) -> None:
+        """The latency has changed from `usual` [s]."""
+        held = self._rivals[0] if self._rivals else self.current
+        moved = ClockEstimate(held.offset + latency - usual, STEP_STD, False)
+        images_late = -AHEAD <= latency - held.offset <= OLDEST
+        self._prior = held if images_late else moved
         self._place_grid(latency)
+        self._rivals, self._stepped_at = (held, moved), stamp
+        if not images_late:
+            self._settle(moved)
+
+    def _settle(self, chosen: ClockEstimate) -> None:
+        """End the doubt."""
+        if chosen is not self._rivals[0]:
+            self.jumps += 1
+            self._sure = None
+        self._prior = self.current = chosen
+        self._rivals = ()
+
+    def _choose(self, stamp: float) -> None:
+        """Let the headings since the step say which offset is right; at rest they do not."""
+        assert self._grid is not None
+        near = [np.abs(self._grid - e.offset) <= 1.5 * STEP for e in self._rivals]
+        squares = [float(np.min(self._long.squares, where=n, initial=math.inf)) for n in near]
+        pairs, best = self._long.pairs, min(squares)
+        unlikely = 2.0 * CORRELATION * CLEAR * max(best / max(pairs, 1.0), 1e-8)
+        if pairs >= CHOICE_PAIRS and abs(squares[1] - squares[0]) > unlikely:
+            self._settle(self._rivals[squares.index(best)])
+        elif stamp - self._stepped_at > LONGEST_DOUBT:
+            held, moved = self._rivals
+            doubt = abs(moved.offset - held.offset)
+            self._settle(ClockEstimate(held.offset, doubt, False))
 
     def _place_grid(self, latency: float) -> None:
         first = math.floor((latency - OLDEST) / STEP) * STEP
@@ -203,6 +221,9 @@ class CameraClock:
 
     def _decide(self, stamp: float) -> None:
         assert self._grid is not None
+        if self._rivals:
+            self._choose(stamp)
+            return
         found = self._long.estimate(self._grid)
         if self._sure is not None:
             held = self.current

@@ -26,6 +26,7 @@ from fish_control.motion_models import MotionModels
 from fish_control.noise_scale import NoiseScale
 from fish_control.pose_checks import AgreeingPoses, RepeatedPose, doubts_motion
 from fish_control.pose_weight import given_covariance, unusable, weighted
+from fish_control.stale_stamps import StaleStamps
 from fish_control.strapdown import MotionModel, StrapdownFilter
 
 Array = NDArray[np.float64]
@@ -67,6 +68,7 @@ class Fusion:
         self._accepted_at = -math.inf  # s, clock of the sensors when a pose was last accepted
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
         self._old_poses = 0  # in a row, from before the history
+        self._stale = StaleStamps()
         self._models.begin()
         self._filter.model = self._models.current
 
@@ -112,14 +114,12 @@ class Fusion:
             or abs(yaw_rate or 0.0) > largest[1]
         ):
             return self._refuse("imu_implausible")
-        if (
-            time < self._last_imu_time - self.config.history
-        ):  # the clock was set back: a restarted simulation
-            self._restart()
+        stale = self._stale.set_back(time, self._last_imu_time)
+        if stale or time < self._last_imu_time - self.config.history:
+            self._restart()  # the clock was set back, as in a restarted simulation
         if time <= self._last_imu_time:
-            return self._refuse(
-                "imu_duplicate" if time == self._last_imu_time else "imu_out_of_order"
-            )
+            same = time == self._last_imu_time
+            return self._refuse("imu_duplicate" if same else "imu_out_of_order")
         previous, self._last_imu_time, self._poses_in_a_row = self._last_imu_time, time, 0
         self.counts["imu"] += 1
         step = self._heading.add(time, yaw_rate, yaw, yaw_std or self.config.imu_heading_noise)
@@ -154,6 +154,8 @@ class Fusion:
             self._restart()
         if self._timeline is None:
             return self._start(RawPose(stamp, camera))
+        if self.camera_clock.undecided and math.hypot(*self._timeline.last.x[3:5]) > SWIMS:
+            return self._refuse("pose_clock_undecided")
         newest = max(self._last_imu_time, self._timeline.last.time)
         if time <= max(self._timeline.first.time, newest - self.config.history):
             return self._refuse("pose_too_late")

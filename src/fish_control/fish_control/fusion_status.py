@@ -22,6 +22,8 @@ def clock_warning(fusion: Fusion) -> str | None:
     """What is wrong with the camera's stamps, None if nothing is known to be."""
     clock, given = fusion.camera_clock, fusion.config.camera_offset
     current = clock.current
+    if clock.undecided:
+        return "a clock was set, or images come later: poses wait until the IMU shows which"
     if current.sure and abs(current.offset - given) > max(NOTABLE_OFFSET, 3.0 * current.std):
         return (
             f"images are taken {-current.offset:.3f} s before their stamps: found and applied; "

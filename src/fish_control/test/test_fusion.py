@@ -446,6 +446,76 @@ def test_an_offset_that_nobody_told_is_found(latency, late):
     assert abs(error[2]) < 0.02
 
 
+def errors_of_swum(fusion, events, clock_set=0.0, since=6.0):
+    """Distances (N,) [m] and NEES (N,) of the estimates at the IMU's samples; clock_set: of the IMU at `since` [s]."""
+    rows = []
+    for arrival, kind, stamp, values in events:
+        feed(fusion, [(arrival, kind, stamp, values)])
+        estimate = fusion.estimate()
+        if kind != "imu" or estimate is None or arrival < 2.0:
+            continue
+        error = estimate.pose - true_pose(estimate.time - clock_set * (arrival > since))
+        error[2] = (error[2] + np.pi) % (2 * np.pi) - np.pi
+        nees = error @ np.linalg.solve(estimate.pose_covariance, error)
+        rows.append((np.hypot(*error[:2]), nees))
+    return np.transpose(rows)
+
+
+@pytest.mark.parametrize("jump", [-0.3, -0.22, 0.15, 0.22, -1.0])
+def test_a_camera_s_clock_that_is_set_a_little_is_followed(jump):
+    """The images seem to come later or earlier by as much, as they do where only their transport takes longer."""
+    fusion, events = Fusion(), swum(10.0)
+    moved = [(a, k, s + jump * (k == "camera" and a > 6.0), v) for a, k, s, v in events]
+    distances, _ = errors_of_swum(fusion, moved)
+    assert fusion.camera_clock.jumps == 1
+    assert fusion.applied_offset == pytest.approx(-jump, abs=0.01)
+    assert distances.max() < 0.3  # until it is noticed
+    assert distances[-150:].max() < 0.02
+    assert not fusion.estimate().camera_lost
+
+
+def test_an_imu_s_clock_that_is_set_ahead_a_little_is_followed():
+    fusion, events = Fusion(), swum(10.0)
+    moved = [(a, k, s + 0.22 * (k == "imu" and a > 6.0), v) for a, k, s, v in events]
+    distances, _ = errors_of_swum(fusion, moved, 0.22)
+    assert fusion.camera_clock.jumps == 1
+    assert fusion.applied_offset == pytest.approx(0.22, abs=0.01)
+    assert distances[-100:].max() < 0.01
+
+
+@pytest.mark.parametrize("later", [0.15, 0.6])
+def test_images_that_come_later_with_right_stamps_are_no_set_clock(later):
+    fusion, events = Fusion(), swum(10.0)
+    late = [(a + later * (k == "camera" and a > 6.0), k, s, v) for a, k, s, v in events]
+    distances, nees = errors_of_swum(fusion, sorted(late, key=lambda e: e[0]))
+    assert fusion.camera_clock.jumps == 0
+    assert fusion.applied_offset == pytest.approx(0.0, abs=0.005)
+    assert fusion.camera_clock.age == pytest.approx(0.08 + later, abs=0.02)
+    assert distances.max() < 0.04
+    assert np.mean(nees < 16.27) > 0.95
+
+
+@pytest.mark.parametrize("back", [0.05, 0.3, 1.0, 1.99])
+def test_both_clocks_set_back_by_less_than_the_history_start_anew(back):
+    fusion, events = Fusion(), swum(8.0)
+    moved = [(a, k, s - back * (a > 6.0), v) for a, k, s, v in events]
+    distances, _ = errors_of_swum(fusion, moved, -back)
+    assert fusion.counts["restarted"] == 1
+    assert fusion.counts["imu_out_of_order"] + fusion.counts["imu_duplicate"] <= 4
+    assert distances[-100:].max() < 0.02
+    assert fusion.applied_offset == pytest.approx(0.0, abs=0.005)
+
+
+def test_a_few_imu_samples_out_of_order_set_no_clock_back():
+    fusion = Fusion()
+    for k, event in enumerate(measurements(3.0)):
+        feed(fusion, [event])
+        if k % 10 == 0 and event[1] == "imu" and event[2] > 0.2:
+            feed(fusion, [("late", "imu", event[2] - d, event[3]) for d in (0.03, 0.02, 0.01)])
+    assert fusion.counts["imu_out_of_order"] > 50
+    assert fusion.counts["restarted"] == 0
+
+
 def test_a_latency_that_changes_is_followed():
     events = swum(30.0)
     fusion = Fusion()
