@@ -1,12 +1,17 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""calibrate lens | mount | colours: make the files that tell the tracker about its camera and its light."""
+"""calibrate lens | mount | colours | tags: make the files that tell the tracker about its camera and its light."""
 
 import argparse
 import sys
 
 from fish_vision.calibration import CalibrationError
-from fish_vision.commands import calibrate_colours, calibrate_lens, calibrate_mount
+from fish_vision.commands import (
+    calibrate_colours,
+    calibrate_lens,
+    calibrate_mount,
+    calibrate_tags,
+)
 
 
 def arguments() -> argparse.ArgumentParser:
@@ -19,7 +24,7 @@ def arguments() -> argparse.ArgumentParser:
 def add_verbs(parser: argparse.ArgumentParser) -> None:
     """Sub-commands of calibrate; each sets `calibrate`, the function to call."""
     verbs = parser.add_subparsers(required=True)
-    for command in (calibrate_lens, calibrate_mount, calibrate_colours):
+    for command in (calibrate_lens, calibrate_mount, calibrate_colours, calibrate_tags):
         command.add_parser(verbs)
 
 

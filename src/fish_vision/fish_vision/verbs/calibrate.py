@@ -1,9 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Set up the overhead camera: its lens, its mount, the markers' colours.
+"""Set up the overhead camera: its lens, its mount, the markers' colours, tags to print.
 
 calibrate lens: camera matrix and distortion from chessboard pictures. calibrate mount: position and tilt from known
-points of the pool. calibrate colours: colour ranges from pictures of the fish in today's light.
+points of the pool. calibrate colours: colour ranges from pictures of the fish in today's light. calibrate tags: a sheet of
+coded tags to print.
 """
 
 import argparse
