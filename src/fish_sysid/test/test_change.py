@@ -16,7 +16,7 @@ from fish_sysid.dataset.injection import INJECTIONS, with_injection
 from fish_sysid.dataset.joined import joined
 from fish_sysid.diagnosis.change import comparable
 from fish_sysid.diagnosis.change.change import Change
-from fish_sysid.diagnosis.change.change_json import answer, with_change
+from fish_sysid.diagnosis.change.change_json import answer, chance, with_change
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import compare, days_of
 from fish_sysid.diagnosis.change.harmonics import StrokeWeights
@@ -192,3 +192,8 @@ def test_a_change_is_added_to_what_the_robot_has() -> None:
     assert changed.effects["current"]["x"] == pytest.approx(0.04)
     assert changed.effects["current"]["y"] == pytest.approx(-0.02)
     assert answer(Change("unchanged", p_value=0.4))["verdict"] == "no_mismatch"
+
+
+def test_a_few_hundred_exchanges_are_not_said_to_show_one_in_millions() -> None:
+    assert chance(8.7e-8) == "p < 0.001"
+    assert chance(0.0033) == "p = 0.0033"

@@ -19,6 +19,7 @@ from fish_sysid.estimation.parametrization import effect_class
 Entry = dict[str, Any]
 NOT_A_NUMBER = float("nan")
 SURE = 0.9  # probability from which one member of a family is named alone
+LEAST_SAID = 0.001  # p-value
 
 
 def answer(change: Change) -> Entry:
@@ -66,6 +67,11 @@ def verdict(change: Change) -> str:
     return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
 
 
+def chance(p_value: float) -> str:
+    """A p-value in words; a few hundred exchanges with the tail of their null say no more than that it is below 0.001."""
+    return f"p = {p_value:.2g}" if p_value >= LEAST_SAID else f"p < {LEAST_SAID}"
+
+
 def sentence(change: Change) -> str:
     """What changed, in words."""
     if change.verdict == "not_comparable":
@@ -74,17 +80,17 @@ def sentence(change: Change) -> str:
     if change.verdict == "unchanged":
         return (
             "Nothing changed that these recordings show: exchanged trials differ as much "
-            f"(p = {change.p_value:.2g}).{lacks}"
+            f"({chance(change.p_value)}).{lacks}"
         )
     if not change.named:
-        return f"The fish changed (p = {change.p_value:.2g}), and no name explains it: {remainder(change)}.{lacks}"
+        return f"The fish changed ({chance(change.p_value)}), and no name explains it: {remainder(change)}.{lacks}"
     parts = [_words(named) for named in change.named]
     left = (
         f" Something else changed too: {remainder(change)}."
         if change.suspects
-        else f" What is left looks like exchanged trials (p = {change.remainder_p_value:.2g})."
+        else f" What is left looks like exchanged trials ({chance(change.remainder_p_value)})."
     )
-    return f"Since OLD the fish has {' and '.join(parts)} (p = {change.p_value:.2g}).{left}{lacks}"
+    return f"Since OLD the fish has {' and '.join(parts)} ({chance(change.p_value)}).{left}{lacks}"
 
 
 def remainder(change: Change) -> str:
