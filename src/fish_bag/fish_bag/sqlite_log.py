@@ -39,6 +39,8 @@ class Log:
 
     def applied(self, database: bytes) -> tuple[bytes, Gaps]:
         """The database with all pages of the log, those without a commit too, and what neither of them holds."""
+        if not self.page_bytes:  # its head cannot be read
+            return database, Gaps()
         size, data = self.page_bytes, bytearray(database)
         for number, page in self.pages:
             end = number * size
@@ -47,7 +49,7 @@ class Log:
         written = {number for number, _ in self.pages}
         own = [
             range(end - size, end)
-            for end in range(size, len(data) + 1, size or 1)
+            for end in range(size, len(data) + 1, size)
             if end // size not in written
         ]
         content, length = end_of_content(database), len(database)
