@@ -117,20 +117,13 @@ class SimulatorNode(Node):
             Rivals(publisher.topic_name, self.count_publishers, self.get_logger().warning)
             for publisher in (self._odometry, self._clock_publisher)
         ]
-        self._camera = (
-            self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
-            if camera_pose
-            else None
-        )
+        self._camera = None
+        if camera_pose:
+            self._camera = self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
-            self.create_subscription(
-                Odometry,
-                "odometry/filtered",
-                from_bytes(Odometry, self._on_estimate),
-                QUEUE,
-                raw=True,
-            )
+            heard = from_bytes(Odometry, self._on_estimate)
+            self.create_subscription(Odometry, "odometry/filtered", heard, QUEUE, raw=True)
             self.create_subscription(Header, "lockstep", self._on_other, QUEUE)
         self._armed = ArmingServer(self, self._arming, self._config, lambda: self._simulation.time)
         self.create_service(SetBool, "pause", self._on_pause)
