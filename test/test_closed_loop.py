@@ -94,7 +94,7 @@ def test_a_replay_through_fusion_gives_the_same_odometry(swum, tmp_path):
         },
     }
     with running(tmp_path, settings, swims=False) as run:
-        assert run.nodes.running[REPLAYER].wait(60.0) == 0
+        assert run.nodes.running[REPLAYER].wait(300.0) == 0
         run.nodes.stop([RECORDER])
     t, recorded = odometry(swum, "/fish/odometry/filtered")
     t_again, replayed = odometry(tmp_path / "recording", "/fish/odometry/filtered")
