@@ -65,6 +65,8 @@ def degenerate(name: str, values: Values, effects: EffectTable = EFFECTS) -> str
             continue
         p, value = effect.parameters[key], values[key]
         near = AT_AN_END * scale_of(p)
+        if not p.lowest - near <= value <= p.highest + near:
+            return f"{name}: {key} is out of its range ({value:.3g} {p.unit})"
         if p.value not in (p.lowest, p.highest) and min(value - p.lowest, p.highest - value) < near:
             return f"{name}: {key} is at an end of its range ({value:.3g} {p.unit})"
         if p.value == p.lowest and p.highest - value < near:

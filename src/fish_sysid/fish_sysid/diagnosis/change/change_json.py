@@ -111,7 +111,7 @@ def _words(named: Named) -> str:
         f"{key} {p.value:.3g} ± {p.std:.2g} {p.unit}".rstrip(" 1")
         for key, p in named.members[0].refitted.parameters.items()
     )
-    text = f"{named.name} ({values})" if values else named.name
+    text = f"{named.name} ({values or 'how much, the model of OLD cannot say'})"
     others = [m.name for m in named.members[1:]]
     if not others or named.members[0].probability >= SURE:
         return text
@@ -177,7 +177,8 @@ def changed_robot(change: Change) -> Robot:
     if change.camera_delay > 0.0:
         robot = robot.with_effect("camera_latency", delay=change.camera_delay)
     for named in change.named:
-        robot = with_change(robot, named.members[0])
+        if named.members[0].refitted.parameters:
+            robot = with_change(robot, named.members[0])
     return robot
 
 

@@ -27,6 +27,7 @@ from fish_sysid.estimation.parametrization import effect_class, scale_of
 Array = NDArray[np.float64]
 
 ROUNDS = 3  # of linearisation
+WEAKEST = 0.25  # of the typical strength that is named
 STEP = 0.1  # of a typical strength, for differences
 PLACED = {
     "payload": ("mass", "forward", "left")
@@ -39,7 +40,7 @@ class Refitted:
     """Values of a name's parameters."""
 
     parameters: dict[str, Estimate]
-    degenerate: str  # why these values are no such effect; "": they are one
+    refused: str  # why these values are no such effect, or too little of it; "": they are one
     by_trial: Array  # (M,) nats on each of NEW's trials, left out
 
 
@@ -203,4 +204,20 @@ def _refitted(
 ) -> Refitted:
     effect = effect_class(name)
     found = {k: Estimate(v, errors[k], effect.parameters[k].unit) for k, v in values.items()}
-    return Refitted(found, degenerate(name, values), by_trial)
+    return Refitted(found, degenerate(name, values) or _too_weak(name, values), by_trial)
+
+
+def _too_weak(name: str, values: dict[str, float]) -> str:
+    """Why a name is not said of so little of it; "" where one strength is WEAKEST of its typical one, or not known."""
+    if name in LIMITS:
+        return ""
+    effect = effect_class(name)
+    known = {k: values[k] for k in effect.strength if k in values}
+    sizes = [
+        abs((v - effect.parameters[k].value) / (typical(name, k) - effect.parameters[k].value))
+        for k, v in known.items()
+    ]
+    if not sizes or max(sizes) >= WEAKEST:
+        return ""
+    said = ", ".join(f"{k} {v:.2g} {effect.parameters[k].unit}" for k, v in known.items())
+    return f"{name}: {said} is too little of it to be told from what the model of OLD lacks"

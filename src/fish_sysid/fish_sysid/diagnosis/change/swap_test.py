@@ -23,6 +23,7 @@ from fish_sysid.diagnosis.change.tail_probability import Tails, tail_probability
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+REMAINDER = 0.005  # p-value up to which there is something left to name
 SWAPS = 300
 SMALLEST = 0.5  # nats of one trial
 
@@ -33,6 +34,8 @@ class Swapped:
 
     p_value: float
     rarity: dict[str, float]  # of a name's F in NEW among those of exchanged trials, - log p
+    of_exchanged: Array  # (sets,) what the p-value is of exchanged trials
+    of_days: float  # share of OLD's single days that look as changed as NEW; 0 where OLD is one day
 
 
 def swap_test(
@@ -61,11 +64,23 @@ def swap_test(
     of_null, of_new = rarest(null), float(rarest(observed)[0])
     counted = (1.0 + float((of_null >= of_new).sum())) / (1.0 + len(of_null))
     p = min(counted, tail_probability(of_null, of_new))
-    of_days = single_days(days, fit.old)
-    if of_days:
-        p = max(p, float((rarest(gains.of(of_days)) >= of_new).mean()))
+    some_days = single_days(days, fit.old)
+    share = float((rarest(gains.of(some_days)) >= of_new).mean()) if some_days else 0.0
     rarity = -np.log(tails.probability(observed)[0])
-    return Swapped(p, dict(zip(gains.names, rarity.tolist(), strict=True)))
+    return Swapped(
+        max(p, share),
+        dict(zip(gains.names, rarity.tolist(), strict=True)),
+        Tails.of(of_null[:, None]).probability(of_null[:, None])[:, 0],
+        share,
+    )
+
+
+def at_once(tests: Sequence[Swapped]) -> float:
+    """The p-value of several tests of the same exchanged trials together: how rare the smallest of their p-values is (min-p)."""
+    smallest = 1.0 / np.min([test.of_exchanged for test in tests], axis=0)
+    seen = min(tests, key=lambda test: test.p_value)
+    counted = (1.0 + float((smallest >= 1.0 / seen.p_value).sum())) / (1.0 + len(smallest))
+    return max(min(counted, tail_probability(smallest, 1.0 / seen.p_value)), seen.of_days)
 
 
 def exchanges(

@@ -1,0 +1,151 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The next name: contenders by gain and by rarity, refitted, and what exchanged trials say of the remainder of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fish_sysid.diagnosis.change.candidates import PARAMETER
+from fish_sysid.diagnosis.change.case import Case
+from fish_sysid.diagnosis.change.change import Member, Named
+from fish_sysid.diagnosis.change.contest import apart, mean_gain, tie
+from fish_sysid.diagnosis.change.naming import Judged
+from fish_sysid.diagnosis.change.shared_fit import Key
+from fish_sysid.diagnosis.change.strength import Refitted, refit
+from fish_sysid.diagnosis.change.swap_test import REMAINDER, Swapped, swap_test
+from fish_sysid.diagnosis.families import family_of
+
+CONTENDS = 0.5  # of the largest - log p of a name that a contender has
+REFITTED = 3  # contenders of any family by their gain, and as many by their rarity
+MOST = 2 / 3  # of the weight of all contenders, that a family has which is named without numbers
+KIN = 6  # further members of the best one's family
+FEW_SWAPS = 150  # of a contender's remainder
+# a name whose special case explains as much is not needed
+SPECIAL_CASE = {"nonuniform_current": "current", "wake_memory": "tip_slip"}
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A name that may be the next one."""
+
+    judged: Judged
+    refitted: Refitted
+    remainder: float  # p-value once it is taken out
+    rarity: float  # - log p of its own gain among exchanged trials
+
+    @property
+    def survives(self) -> bool:
+        """Whether what it leaves looks like exchanged trials."""
+        return self.remainder > REMAINDER
+
+
+def next_change(
+    case: Case,
+    swapped: Swapped,
+    judged: Mapping[str, Judged],
+    taken: Sequence[Key],
+    refused: list[str],
+) -> tuple[Named, Key] | None:
+    """The next change with its family, or nothing where no contender is an effect of the vocabulary.
+
+    A name that leaves nothing is an explanation; one that leaves something is part of one. So the first go before the second
+    unless they predict trials left out clearly worse.
+    """
+    found: list[Contender] = []
+    for one in _asked(swapped, judged):
+        values = refit(case.fit, case.rows, case.robot, case.new, case.days, one)
+        if values.refused:
+            refused.append(values.refused)
+        elif values.by_trial.mean() > 0.0:
+            left = swap_test(case.fit, case.strata, FEW_SWAPS, taken=(*taken, one.key))
+            rarity = swapped.rarity.get(one.name, 0.0)
+            found.append(Contender(one, values, left.p_value, rarity))
+    if not found:
+        return family_alone(swapped, judged)
+    alike, weights = weighed(found)
+    members = tuple(
+        Member(
+            one.judged.name,
+            weight,
+            one.refitted.by_trial.mean(),
+            one.remainder,
+            one.refitted,
+        )
+        for one, weight in zip(alike, weights, strict=True)
+    )
+    best = alike[0]
+    gain = mean_gain(best.refitted.by_trial)
+    return Named(members, family_of(best.judged.name), *gain), best.judged.key
+
+
+def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named, Key] | None:
+    """A family without numbers, where its members explain most and the model of OLD gives none of them a strength that can be.
+
+    On a plant of another structure an effect may work the other way round than in the model.
+    """
+    names = _contenders(swapped, judged)
+    if not names:
+        return None
+    alike = [one for one in names if not apart(names[0].by_trial, one.by_trial)]
+    weight = {
+        one.name: tie(names[0].by_trial, one.by_trial) * math.exp(swapped.rarity[one.name])
+        for one in alike
+    }
+    family = family_of(names[0].name)
+    kin = [one for one in alike if family_of(one.name) == family != ""]
+    share = sum(weight[one.name] for one in kin) / sum(weight.values())
+    if len(kin) < 2 or share < MOST:
+        return None
+    kin.sort(key=lambda one: -weight[one.name])
+    total = sum(weight[one.name] for one in kin)
+    members = tuple(
+        Member(
+            one.name, weight[one.name] / total, one.gain, math.nan, Refitted({}, "", one.by_trial)
+        )
+        for one in kin
+    )
+    return Named(members, family, *mean_gain(kin[0].by_trial)), kin[0].key
+
+
+def weighed(found: Sequence[Contender]) -> tuple[list[Contender], list[float]]:
+    """Those that the data cannot tell from the best, the likeliest first, and their probabilities."""
+    top = max(found, key=lambda one: one.refitted.by_trial.mean()).refitted.by_trial
+    alike = [one for one in found if not apart(top, one.refitted.by_trial)]
+    alike = [one for one in alike if one.survives] or alike
+    kept = {one.judged.name for one in alike}
+    alike = [one for one in alike if SPECIAL_CASE.get(one.judged.name) not in kept]
+    best = max(alike, key=lambda one: one.refitted.by_trial.mean()).refitted.by_trial
+    weight = {
+        one.judged.name: tie(best, one.refitted.by_trial) * math.exp(one.rarity) for one in alike
+    }
+    alike.sort(key=lambda one: -weight[one.judged.name])
+    return alike, [weight[one.judged.name] / sum(weight.values()) for one in alike]
+
+
+def _contenders(swapped: Swapped, judged: Mapping[str, Judged]) -> list[Judged]:
+    """Names whose gain is as rare as any, the best first; none where a parameter of the fish itself explains clearly more."""
+    rarest = max(swapped.rarity.values())
+    strong = [
+        one
+        for one in judged.values()
+        if swapped.rarity.get(one.name, 0.0) >= CONTENDS * rarest and one.gain > 0.0
+    ]
+    contenders = sorted(strong, key=lambda one: -one.gain)
+    names = [one for one in contenders if not one.name.startswith(PARAMETER)]
+    if not names or apart(contenders[0].by_trial, names[0].by_trial):
+        return []
+    return names
+
+
+def _asked(swapped: Swapped, judged: Mapping[str, Judged]) -> list[Judged]:
+    """The candidates that are refitted: the best, its kin, the next, and the rarest."""
+    names = _contenders(swapped, judged)
+    if not names:
+        return []
+    kin = [one for one in names[1:] if family_of(one.name) == family_of(names[0].name) != ""]
+    rare = sorted(names, key=lambda one: -swapped.rarity[one.name])[:REFITTED]
+    asked = [names[0], *kin[:KIN], *names[1:REFITTED], *rare]
+    return list({one.name: one for one in asked}.values())

@@ -1,0 +1,162 @@
+"""Which name, how many, and at which level: the rules by which a change is explained."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kinematic_swims import World, kinematic_swims
+
+from fish_sim.robot import Robot
+from fish_sysid.dataset.injection import with_injection
+from fish_sysid.diagnosis.change.case import Case
+from fish_sysid.diagnosis.change.change import Change
+from fish_sysid.diagnosis.change.channels import swims
+from fish_sysid.diagnosis.change.compare import LOOKS
+from fish_sysid.diagnosis.change.contenders import Contender, family_alone, weighed
+from fish_sysid.diagnosis.change.explanation import explained, swapped_in, telling
+from fish_sysid.diagnosis.change.naming import Judged
+from fish_sysid.diagnosis.change.rows import look, trial_rows
+from fish_sysid.diagnosis.change.shared_fit import regression
+from fish_sysid.diagnosis.change.strength import Refitted, refit
+from fish_sysid.diagnosis.change.swap_test import Swapped, at_once
+from fish_sysid.diagnosis.degenerate import degenerate
+
+NAMES = ("current", "camera_latency", "camera_heading_offset", "gyro_scale", "imu_misalignment")
+OLD, NEW, TRIALS = 10, 5, 8
+SPREADS = np.array([np.tile([1.0, -1.0], TRIALS // 2), np.repeat([1.0, -1.0], TRIALS // 2)])
+
+
+def judged(name: str, gain: float, spread: float = 1.0) -> Judged:
+    """Gains over trials that go their own way for names of odd and even length."""
+    by_trial = gain + spread * SPREADS[len(name) % 2]
+    return Judged((name, 0), gain, 0.4, by_trial, np.ones(1), np.eye(1), gain)
+
+
+def contender(name: str, gain: float, remainder: float, rarity: float = 5.0) -> Contender:
+    one = judged(name, gain, 10.0)
+    return Contender(one, Refitted({}, "", one.by_trial), remainder, rarity)
+
+
+def swapped(p_value: float, of_exchanged: np.ndarray, **rarity: float) -> Swapped:
+    return Swapped(p_value, rarity, of_exchanged, 0.0)
+
+
+def names(contenders: list[Contender]) -> list[str]:
+    return [one.judged.name for one in contenders]
+
+
+def test_two_looks_at_the_same_exchanges_cost_one_and_at_independent_ones_two() -> None:
+    random = np.random.default_rng(3)
+    first, second = random.uniform(size=(2, 400))
+    alone = at_once([swapped(0.02, first)])
+    same = at_once([swapped(0.02, first), swapped(0.02, first)])
+    two = at_once([swapped(0.02, first), swapped(0.6, second)])
+    assert alone == pytest.approx(0.02, abs=0.008)
+    assert same == alone
+    assert two == pytest.approx(0.04, abs=0.015)
+
+
+def test_a_day_of_old_that_looks_as_changed_counts_in_both_looks_together() -> None:
+    null = np.random.default_rng(4).uniform(size=300)
+    assert at_once([replace(swapped(0.001, null), of_days=0.5)]) == 0.5
+
+
+def test_a_name_that_leaves_nothing_goes_before_one_that_gains_more() -> None:
+    found = [contender("camera_scale", 13.0, 0.002), contender("rudder_offset", 8.0, 0.07)]
+    assert names(weighed(found)[0]) == ["rudder_offset"]
+
+
+def test_a_name_that_leaves_nothing_and_predicts_clearly_worse_does_not() -> None:
+    found = [contender("payload", 40.0, 0.002), contender("tether", 8.0, 0.07)]
+    assert names(weighed(found)[0]) == ["payload"]
+
+
+def test_of_names_that_predict_as_well_the_rarer_one_is_first() -> None:
+    found = [
+        contender("hull_asymmetry", 10.0, 0.001, 6.7),
+        contender("rudder_offset", 9.0, 0.001, 8.0),
+    ]
+    alike, weights = weighed(found)
+    assert names(alike) == ["rudder_offset", "hull_asymmetry"]
+    assert sum(weights) == pytest.approx(1.0)
+
+
+def test_a_family_is_named_without_numbers_where_its_members_explain_most() -> None:
+    rarity = {"tip_slip": 6.7, "wake_memory": 6.7, "payload": 4.0}
+    seen = swapped(0.001, np.zeros(1), **rarity)
+    found = {n: judged(n, g) for n, g in (("tip_slip", 18.9), ("wake_memory", 18.8))}
+    named, _ = family_alone(seen, found) or pytest.fail("no family")
+    assert named.family == "tail losses"
+    assert [m.name for m in named.members] == ["tip_slip", "wake_memory"]
+    assert all(m.refitted.parameters == {} for m in named.members)
+    assert math.isclose(sum(m.probability for m in named.members), 1.0)
+    assert family_alone(seen, {"payload": judged("payload", 18.9)}) is None
+    of_the_fish = {**found, "parameter head_inertia": judged("parameter head_inertia", 60.0)}
+    of_its_own = replace(seen, rarity={**rarity, "parameter head_inertia": 9.0})
+    assert family_alone(of_its_own, of_the_fish) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "text"),
+    [
+        ("imu_latency", {"delay": -0.004}, "out of its range"),
+        ("camera_scale", {"factor": 2.5}, "out of its range"),
+        ("imu_latency", {"delay": 0.004}, ""),
+    ],
+)
+def test_a_value_out_of_its_range_is_no_such_effect(name, values, text) -> None:
+    said = degenerate(name, values)
+    assert text in said
+    assert bool(said) == bool(text)
+
+
+@pytest.fixture(scope="module")
+def days():
+    return kinematic_swims(World(), 1, OLD), kinematic_swims(World(), 2, NEW)
+
+
+def looks_at(old, new) -> list[Case]:
+    rows = [trial_rows(Robot(), e, swims(e), NAMES) for e in (old, new)]
+    cases = []
+    for channels in LOOKS.values():
+        kept, moved = (look(r, channels) for r in rows)
+        fit, strata = regression(kept, moved), [0] * (OLD + NEW)
+        day_of = [0] * OLD + [1] * NEW
+        cases.append(
+            Case(channels, fit, kept, moved, strata, day_of, Robot(), new, tuple(swims(new)))
+        )
+    return cases
+
+
+def test_two_changes_are_named_one_after_the_other_and_leave_nothing(days) -> None:
+    old, new = days
+    flow = with_injection(new, "current", {"x": 0.03, "y": -0.02})
+    looks = looks_at(old, with_injection(flow, "gyro_scale", {"factor": 1.06}))
+    found = explained(Change("changed"), looks, swapped_in(looks, ()))
+    assert {named.name for named in found.named} == {"current", "gyro_scale"}
+    assert found.remainder_p_value > 0.005
+    assert found.suspects == ()
+
+
+def test_the_strokes_name_what_the_mean_motion_does_not_show(days) -> None:
+    old, new = days
+    turned = looks_at(old, with_injection(new, "imu_misalignment", {"angle": 0.15}))
+    flow = looks_at(old, with_injection(new, "current", {"x": 0.03, "y": -0.02}))
+    case, _, found = telling(turned, swapped_in(turned, ()), ())
+    assert max(found.values(), key=lambda one: one.gain).name == "imu_misalignment"
+    assert telling(flow, swapped_in(flow, ()), ())[0] is flow[0]
+    assert case in turned
+
+
+def test_so_little_of_an_effect_is_not_said(days) -> None:
+    old, new = days
+    for offset, said in ((0.01, True), (0.06, False)):
+        changed = with_injection(new, "camera_heading_offset", {"offset": offset})
+        case = looks_at(old, changed)[0]
+        seen = telling([case], swapped_in([case], ()), ())[2]["camera_heading_offset"]
+        values = refit(case.fit, case.rows, case.robot, case.new, case.days, seen)
+        assert values.parameters["offset"].value == pytest.approx(offset, abs=0.004)
+        assert ("too little of it" in values.refused) == said
