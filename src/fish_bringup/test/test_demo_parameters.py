@@ -34,9 +34,16 @@ def test_simulated_time_waits_for_nodes_that_lag_by_more_than_an_image() -> None
     assert all(given[spec]["use_sim_time"] is True for spec in ROBOTS["sim"])
 
 
+def test_simulated_time_waits_for_the_tracker_too() -> None:
+    """With room for the camera's delay and one lost picture, and less than what fusion takes for a step of a clock."""
+    for words in ((), ("--lockstep",)):
+        assert 0.12 < changed(*words)[SIMULATED[0]]["lockstep_camera"] < 0.17
+    assert "lockstep_camera" not in changed("--hardware", "fake")[FAKE[1]]  # which says it itself
+
+
 def test_in_real_time_nodes_follow_their_own_clocks() -> None:
     given = changed("--real-time")
-    assert "lockstep" not in given[SIMULATED[0]]
+    assert not {"lockstep", "lockstep_camera"} & given[SIMULATED[0]].keys()
     assert not any("use_sim_time" in values for values in given.values())
 
 

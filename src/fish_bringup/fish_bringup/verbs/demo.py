@@ -26,6 +26,7 @@ from fish_bringup.node_table import (
     FAKE,
     HARDWARE,
     LAGS,
+    PICTURES,
     PILOT,
     RECORDER,
     SIMULATED,
@@ -217,6 +218,8 @@ def node_parameters(
         changed[simulator]["lockstep"] = LOCKSTEP
     elif not args.real_time:
         changed[simulator] |= LAGS
+    if not (fake or args.real_time):
+        changed[simulator] |= PICTURES
     if args.real_time_factor != 1.0:
         changed[simulator]["real_time_factor"] = args.real_time_factor
     if not args.real_time or args.real_time_factor != 1.0:

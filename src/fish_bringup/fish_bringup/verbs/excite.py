@@ -25,6 +25,7 @@ from fish_bag import read_trial
 from fish_bringup.excite_check import incomplete
 from fish_bringup.node_table import (
     EXCITER,
+    PICTURES,
     RECORDER,
     ROBOTS,
     SIMULATED,
@@ -183,7 +184,7 @@ def parameters(
     if args.robot:
         start["robot_file"] = str(args.robot.resolve())
     changed: dict[NodeSpec, dict[str, object]] = {
-        SIMULATOR: {**start, "lockstep": PATIENCE},
+        SIMULATOR: {**start, "lockstep": PATIENCE, **PICTURES},
         EXCITER: {
             "program_file": str(args.program.resolve()),
             "begin": swim.begin,

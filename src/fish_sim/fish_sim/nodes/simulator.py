@@ -17,8 +17,8 @@ wall_contacts.
 Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
 nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause, and after a step
 of the wall clock.
-With lockstep it stands still while joint_command, odometry/filtered or anybody who speaks on lockstep (std_msgs/Header:
-frame_id is who, stamp how far) is behind it (Lockstep), so that a run does not depend on how busy the computer is.
+With lockstep it stands still while joint_command, or anybody else who says how far he is (lockstep_topics), is behind it
+(Lockstep), so that a run does not depend on how busy the computer is.
 """
 
 import math
@@ -38,13 +38,13 @@ from std_srvs.srv import SetBool, Trigger
 
 from fish_node.arming import Arming, Source, operator_and_estimate
 from fish_node.nodes.arming import ArmingServer
-from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
 from fish_node.rivals import Rivals
 from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.lockstep import Lockstep
+from fish_sim.nodes.lockstep_topics import hear_lockstep
 from fish_sim.nodes.pacer import MAX_LAG, Pacer
 from fish_sim.nodes.simulator_health import health
 from fish_sim.robot import Robot
@@ -122,9 +122,7 @@ class SimulatorNode(Node):
             self._camera = self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
-            heard = from_bytes(Odometry, self._on_estimate)
-            self.create_subscription(Odometry, "odometry/filtered", heard, QUEUE, raw=True)
-            self.create_subscription(Header, "lockstep", self._on_other, QUEUE)
+            hear_lockstep(self, self._lockstep, self._simulated, self._config.lockstep_camera)
         self._armed = ArmingServer(self, self._arming, self._config, lambda: self._simulation.time)
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Trigger, "reset", self._on_reset)
@@ -140,12 +138,6 @@ class SimulatorNode(Node):
             self._refused += 1
             self._refusal = str(error)
         self._lockstep.answered("joint_command", self._simulated(msg.header.stamp))
-
-    def _on_estimate(self, msg: Odometry) -> None:
-        self._lockstep.answered("odometry/filtered", self._simulated(msg.header.stamp))
-
-    def _on_other(self, msg: Header) -> None:
-        self._lockstep.answered(msg.frame_id, self._simulated(msg.stamp))
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if self._paused and not request.data:
