@@ -171,6 +171,14 @@ def open_loop(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
     return (*(spec for spec in robot if spec not in CONTROL[2:]), EXCITER)
 
 
+def followers(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
+    """A robot's nodes that follow /clock where time is simulated.
+
+    Not the simulator, which says it, nor the recorder, whose time is the wall clock's: each would wake up for every tick.
+    """
+    return tuple(spec for spec in robot if spec.executable not in ("simulator", "recorder"))
+
+
 def composed(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
     """A robot's nodes with fusion, planner and controller in one process."""
     return (*(spec for spec in robot if spec not in PILOT.parts), PILOT)

@@ -30,6 +30,7 @@ from fish_bringup.node_table import (
     ROBOTS,
     SIMULATED,
     NodeSpec,
+    followers,
     open_loop,
 )
 from fish_bringup.nodes.watch import watching
@@ -192,9 +193,9 @@ def parameters(
         },
         RECORDER: {"output": str((folder / "recordings").resolve()), "name": name},
     }
-    return {
-        spec: {"use_sim_time": True, **changed.get(spec, {})} for spec in open_loop(ROBOTS["sim"])
-    }
+    for spec in followers(open_loop(ROBOTS["sim"])):
+        changed[spec] = {"use_sim_time": True, **changed.get(spec, {})}
+    return changed
 
 
 def _swim(

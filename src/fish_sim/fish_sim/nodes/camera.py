@@ -23,6 +23,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.heap import keep_freed_memory
 from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
@@ -208,6 +209,7 @@ def _raw_image(header: Header, picture: np.ndarray) -> Image:
 
 def main() -> int:
     """Entry point."""
+    keep_freed_memory()
     return run(CameraNode, "camera", spin=ByEvents())
 
 

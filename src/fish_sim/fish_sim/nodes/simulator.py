@@ -88,7 +88,8 @@ class SimulatorNode(Node):
         self._refused = self._divergences = self._contacts = 0
         self._refusal = ""
         self._lockstep = Lockstep(config.lockstep, config.lockstep_slack)
-        self._felt: Imu | None = None  # newest sample
+        self._out = messages.PeriodMessages(self._frames, robot.links, config)
+        self._felt: bytes | None = None  # newest sample
         self._felt_said = self._clock_said = 0.0  # s of real time
         self._create_interfaces(config.camera == "pose")
         self._start_ns = time.time_ns()
@@ -123,7 +124,13 @@ class SimulatorNode(Node):
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
             hear_lockstep(self, self._lockstep, self._simulated, self._config.lockstep_camera)
-        self._armed = ArmingServer(self, self._arming, self._config, lambda: self._simulation.time)
+        self._armed = ArmingServer(
+            self,
+            self._arming,
+            self._config,
+            lambda: self._simulation.time,
+            lambda: self._stamp(self._simulation.time),
+        )
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Trigger, "reset", self._on_reset)
 
@@ -187,7 +194,7 @@ class SimulatorNode(Node):
         now = time.monotonic()
         if min(self._lockstep.waited(now), now - self._clock_said) > CLOCK_AGAIN:
             self._clock_said = now
-            self._clock_publisher.publish(ClockMessage(clock=self._stamp(self._simulation.time)))
+            self._clock_publisher.publish(self._out.clock(self._stamp(self._simulation.time)))
         if (
             self._felt is not None
             and min(self._lockstep.waited(now), now - self._felt_said) > SAY_AGAIN
@@ -228,20 +235,19 @@ class SimulatorNode(Node):
 
     def _publish(self, readings: Readings) -> None:
         stamp = self._stamp(readings.time)
-        self._clock_publisher.publish(ClockMessage(clock=stamp))
-        pool, body = (Header(stamp=stamp, frame_id=frame) for frame in self._frames[:2])
-        self._tail.publish(messages.tail(body, readings.truth))
-        self._odometry.publish(messages.odometry(pool, body.frame_id, readings.truth))
-        self._joints.publish(messages.rotor(body, readings.rotor))
-        sensor = Header(stamp=stamp, frame_id=self._frames[2])
-        self._felt = messages.imu(sensor, readings.imu, self._config)
+        self._clock_publisher.publish(self._out.clock(stamp))
+        self._tail.publish(self._out.tail(stamp, readings.truth))
+        self._odometry.publish(self._out.odometry(stamp, readings.truth))
+        self._joints.publish(self._out.rotor(stamp, readings.rotor))
+        self._felt = self._out.imu(stamp, readings.imu)
         self._felt_said = time.monotonic()
         self._imu.publish(self._felt)
         if readings.battery is not None:
-            self._battery.publish(messages.battery(body, readings.battery))
+            header = Header(stamp=stamp, frame_id=self._frames[1])
+            self._battery.publish(messages.battery(header, readings.battery))
         if self._camera is not None:
             for sample in readings.camera:
-                header = Header(stamp=self._stamp(sample.stamp), frame_id=pool.frame_id)
+                header = Header(stamp=self._stamp(sample.stamp), frame_id=self._frames[0])
                 self._camera.publish(messages.camera_pose(header, sample, self._config))
 
     def _report(self) -> None:
