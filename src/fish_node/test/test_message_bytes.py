@@ -14,7 +14,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from fish_node.nodes.message_bytes import MessageBytes, mark
+from fish_node.nodes.message_bytes import MessageBytes, exact_bytes, mark
 
 FRAMES = ["", "a", "pool", "fish_2/base_link", "Teich-ö"]
 
@@ -49,6 +49,22 @@ def test_without_numbers_only_the_stamp_changes() -> None:
     data = MessageBytes(DiagnosticArray(status=[status]), 0)(Time(sec=7, nanosec=8))
     read = deserialize_message(data, DiagnosticArray)
     assert read == DiagnosticArray(header=Header(stamp=Time(sec=7, nanosec=8)), status=[status])
+
+
+@pytest.mark.parametrize(
+    ("message", "size"),
+    [
+        (JointState(name=["rotor"], position=[1.0], velocity=[2.0]), 72),
+        (JointState(name=["tail_1", "tail_2"], position=[1.0, 2.0]), 76),
+        (JointState(), 36),
+        (Odometry(), 708),
+    ],
+)
+def test_nothing_is_left_behind_the_message(message: JointState | Odometry, size: int) -> None:
+    """As CDR counts: 4 bytes of encapsulation, 8 of stamp, 4 before each string and sequence, numbers at multiples of 8."""
+    data = exact_bytes(message)
+    assert len(data) == size
+    assert deserialize_message(data, type(message)) == message
 
 
 @pytest.mark.parametrize("position", [[mark(0)], [mark(0), mark(1), mark(1)]])

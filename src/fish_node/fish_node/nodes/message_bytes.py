@@ -13,11 +13,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from rclpy.serialization import serialize_message
+from rclpy._rclpy_pybind11 import RMWError
+from rclpy.serialization import deserialize_message, serialize_message
 
 from fish_node.nodes.quick_messages import BODY, STAMP
 
 MARK = 1.2345e300
+LEFT_BEHIND = 16  # bytes, at most
 
 
 def mark(place: int) -> float:
@@ -38,7 +40,7 @@ class MessageBytes:
     """
 
     def __init__(self, message: Any, count: int) -> None:
-        data = serialize_message(message)
+        data = exact_bytes(message)
         places = [_only_place(data, place) for place in range(count)]
         self._data, self._runs = bytearray(data), list[tuple[struct.Struct, int, int, int]]()
         begin = 0
@@ -54,6 +56,21 @@ class MessageBytes:
         for run, place, begin, end in self._runs:
             run.pack_into(self._data, place, *numbers[begin:end])
         return bytes(self._data)
+
+
+def exact_bytes(message: Any) -> bytes:
+    """A message's bytes without what rclpy leaves behind them: some where it ends with empty sequences of numbers.
+
+    Readers of recordings refuse those.
+    """
+    data = serialize_message(message)
+    for end in range(max(len(data) - LEFT_BEHIND, 0), len(data)):
+        try:
+            if deserialize_message(data[:end], type(message)) == message:
+                return data[:end]
+        except RMWError:  # too short
+            continue
+    return data
 
 
 def _only_place(data: bytes, place: int) -> int:
