@@ -111,9 +111,11 @@ FAKE = (
 # s, of a robot that hurts nobody: as the node simulator
 BORNE = {"odometry_timeout_s": 0.5, "camera_timeout_s": 1.0, "pause_s": 1.0, "stale_s": 1.0}
 
-# The simulator behind a fake robot whose clock it says: time waits for drivers, tracker and controller that lag by more than
-# slack [s of simulated time], for so long [s of real time].
+# A simulator whose clock all nodes follow: time waits for nodes that lag by more than slack [s of simulated time], for so long
+# [s of real time]. The camera's poses are late by its own delay, one lost picture, and the tracker; a fake robot says itself how
+# far the tracker is.
 LAGS = {"lockstep": 5.0, "lockstep_slack": 0.035}
+PICTURES = {"lockstep_camera": 0.15}
 
 HARDWARE = ("sim", "fake")  # what a run of this computer alone can swim with
 VIEW = NodeSpec("fish_bringup", "live_view", "view.yaml")
@@ -167,6 +169,14 @@ def fake_parameters(devices: Path) -> dict[NodeSpec, dict[str, object]]:
 def open_loop(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
     """A robot's nodes with the exciter in the place of planner and controller."""
     return (*(spec for spec in robot if spec not in CONTROL[2:]), EXCITER)
+
+
+def followers(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:
+    """A robot's nodes that follow /clock where time is simulated.
+
+    Not the simulator, which says it, nor the recorder, whose time is the wall clock's: each would wake up for every tick.
+    """
+    return tuple(spec for spec in robot if spec.executable not in ("simulator", "recorder"))
 
 
 def composed(robot: Sequence[NodeSpec]) -> tuple[NodeSpec, ...]:

@@ -18,11 +18,17 @@ def changed(*words: str) -> dict:
     return demo.node_parameters(args, {"start_x": 0.0}, Path("folder"), Path("devices"))
 
 
+def follow_clock(given: dict, robot: tuple) -> bool:
+    """All but the simulator, which says the time, and the recorder, whose time is the wall clock's."""
+    without = {spec.executable for spec in robot if "use_sim_time" not in given.get(spec, {})}
+    return without == {"simulator", "recorder"}
+
+
 def test_in_lockstep_the_simulator_waits_and_every_node_follows_its_clock(tmp_path) -> None:
     weights = tmp_path / "gains.safetensors"
     given = changed("--lockstep", "--weights", str(weights))
     assert given[SIMULATED[0]]["lockstep"] == demo.LOCKSTEP
-    assert all(given[spec]["use_sim_time"] is True for spec in ROBOTS["sim"])
+    assert follow_clock(given, ROBOTS["sim"])
     assert given[CONTROL[3]]["weights_file"] == str(weights)
     assert given[RECORDER]["name"] == "recording"
 
@@ -31,12 +37,19 @@ def test_simulated_time_waits_for_nodes_that_lag_by_more_than_an_image() -> None
     given = changed()
     assert given[SIMULATED[0]]["lockstep"] > 0.0
     assert 0.0 < given[SIMULATED[0]]["lockstep_slack"] < 0.05
-    assert all(given[spec]["use_sim_time"] is True for spec in ROBOTS["sim"])
+    assert follow_clock(given, ROBOTS["sim"])
+
+
+def test_simulated_time_waits_for_the_tracker_too() -> None:
+    """With room for the camera's delay and one lost picture, and less than what fusion takes for a step of a clock."""
+    for words in ((), ("--lockstep",)):
+        assert 0.12 < changed(*words)[SIMULATED[0]]["lockstep_camera"] < 0.17
+    assert "lockstep_camera" not in changed("--hardware", "fake")[FAKE[1]]  # which says it itself
 
 
 def test_in_real_time_nodes_follow_their_own_clocks() -> None:
     given = changed("--real-time")
-    assert "lockstep" not in given[SIMULATED[0]]
+    assert not {"lockstep", "lockstep_camera"} & given[SIMULATED[0]].keys()
     assert not any("use_sim_time" in values for values in given.values())
 
 
@@ -56,7 +69,7 @@ def test_on_a_slow_clock_every_node_of_a_fake_robot_follows_the_simulator() -> N
     given = changed("--hardware", "fake", "--real-time-factor", "0.2")
     assert given[FAKE[1]]["real_time_factor"] == 0.2
     assert given[FAKE[1]]["lockstep"] > 0.0
-    assert all(given[spec]["use_sim_time"] is True for spec in ROBOTS["fake"])
+    assert follow_clock(given, ROBOTS["fake"])
 
 
 def test_a_computer_with_few_cores_gets_a_slower_fake_robot_and_no_slower_simulation() -> None:

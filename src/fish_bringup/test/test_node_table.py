@@ -378,6 +378,11 @@ def test_the_launch_file_refuses_an_unknown_robot(launched):
         launched(robot="whale")
 
 
+def test_the_launch_file_refuses_another_time_for_a_real_robot(launched):
+    with pytest.raises(RuntimeError, match="real_time_factor:=2 is for robot:=sim and robot:=fake"):
+        launched(robot="real", real_time_factor="2")
+
+
 @pytest.mark.parametrize(
     ("given", "overridden"),
     [

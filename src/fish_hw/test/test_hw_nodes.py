@@ -17,6 +17,7 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import BatteryState, CameraInfo, CompressedImage, Image, Imu, JointState
 from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Bool, String
@@ -315,9 +316,9 @@ def test_imu_message_keeps_every_axis(graph):
         angular_velocity_stdev=0.2,
         linear_acceleration_stdev=0.3,
     )
-    message = g.node._message(
-        ImuSample(1.0, (0.1, 0.2, 0.3, 0.9), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 3)
-    )
+    sample = ImuSample(1.0, (0.1, 0.2, 0.3, 0.9), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 3)
+    message = deserialize_message(g.node._message(sample), Imu)
+    assert message.header.frame_id == "imu_link"
     q, w, a = message.orientation, message.angular_velocity, message.linear_acceleration
     assert (q.x, q.y, q.z, q.w) == (0.1, 0.2, 0.3, 0.9)
     assert (w.x, w.y, w.z, a.x, a.y, a.z) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

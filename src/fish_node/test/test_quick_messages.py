@@ -4,16 +4,19 @@
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from rclpy._rclpy_pybind11 import RMWError
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu
 
-from fish_node.nodes.quick_messages import read_imu, read_odometry
+from fish_node.nodes.quick_messages import read_imu, read_odometry, read_stamp
 
 FRAMES = ["", "a", "pool", "fish_2/base_link", "Teich-ö", "x" * 255]
 READ = {Odometry: read_odometry, Imu: read_imu}
@@ -69,6 +72,14 @@ def test_bytes_of_another_encapsulation_are_left_to_rclpy(kind: type) -> None:
         deserialize_message(data, kind)
     with pytest.raises(RMWError):
         READ[kind](data)
+
+
+def test_the_stamp_of_any_stamped_message_is_read() -> None:
+    message = PoseWithCovarianceStamped()
+    message.header.stamp = Time(sec=-3, nanosec=999_999_999)
+    assert read_stamp(serialize_message(message)) == message.header.stamp
+    big_endian = b"\x00\x00\x00\x00" + struct.pack(">iI", 7, 8)
+    assert read_stamp(big_endian) == Time(sec=7, nanosec=8)
 
 
 @pytest.mark.parametrize("kind", READ)

@@ -14,7 +14,9 @@ import pytest
 DOMAIN = "173"
 PROGRAM = """
 import sys
+import time
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int32
 from fish_node.nodes.spin import ByEvents, ByWaitSet
 from fish_node.nodes.start import Part, run_together
@@ -50,6 +52,30 @@ class Idle(Node):
         super().__init__("idle")
         print("made", flush=True)
 
+class Sensor(Node):
+    def __init__(self):
+        super().__init__("sensor")
+        self.heard = {"sensor": [], "command": []}
+        self.publisher = self.speak("sensor", ReliabilityPolicy.BEST_EFFORT)
+        self.speak("command", ReliabilityPolicy.RELIABLE)
+        time.sleep(0.3)  # all has arrived
+        self.create_timer(0.05, lambda: self.publisher.publish(Int32(data=99)))
+
+    def speak(self, topic, reliability):
+        qos = QoSProfile(depth=50, reliability=reliability)
+        publisher = self.create_publisher(Int32, topic, qos)
+        self.create_subscription(Int32, topic, lambda message: self.hear(topic, message.data), qos)
+        while not publisher.get_subscription_count():
+            time.sleep(0.01)
+        for number in range(20):
+            publisher.publish(Int32(data=number))
+        return publisher
+
+    def hear(self, topic, number):
+        self.heard[topic].append(number)
+        if number == 99:
+            print(self.heard["sensor"][0], len(self.heard["command"]), flush=True)
+
 class Refused(Node):
     def __init__(self):
         super().__init__("refused")
@@ -58,7 +84,8 @@ class Refused(Node):
 def end(node):
     print("end of", node.get_name(), flush=True)
 
-parts = {"idle": [Part(Idle, "idle", end)], "refused": [Part(Idle, "idle"), Part(Refused, "refused", end)]}
+parts = {"idle": [Part(Idle, "idle", end)], "sensor": [Part(Sensor, "sensor")],
+    "refused": [Part(Idle, "idle"), Part(Refused, "refused", end)]}
 sys.exit(run_together(parts.get(kind, [Part(Talker, "talker", end), Part(Listener, "listener", end)]), spin=spin))
 """
 EXECUTORS = pytest.mark.parametrize("executor", ["events", "wait_set"])
@@ -92,6 +119,16 @@ def test_messages_of_one_node_reach_the_other_until_a_signal_comes(
         assert output in ("end of idle\n", "" if executor == "wait_set" else "end of idle\n")
     assert "Traceback" not in errors
     assert "Error" not in errors
+
+
+@EXECUTORS
+def test_what_a_sensor_said_while_the_nodes_were_made_is_no_news(executor: str) -> None:
+    with process(executor, "sensor") as nodes:
+        assert nodes.stdout is not None
+        assert nodes.stdout.readline() == "99 20\n"
+        nodes.send_signal(signal.SIGTERM)
+        nodes.communicate(timeout=30)
+    assert nodes.returncode == 0
 
 
 @EXECUTORS

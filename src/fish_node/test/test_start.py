@@ -170,14 +170,18 @@ def test_a_mistake_in_a_callback_is_no_refused_parameter() -> None:
     assert not rclpy.ok()
 
 
+@pytest.mark.parametrize(("given", "named"), [(["-p", "foo"], "'-p foo'"), (["--foo"], "--foo")])
 def test_an_argument_that_ros_refuses_gives_one_line_and_1(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    given: list[str],
+    named: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["node", "--ros-args", "-p", "foo"])
+    monkeypatch.setattr(sys, "argv", ["node", "--ros-args", *given])
     assert run(Stopped, "node") == 1
     error = capsys.readouterr().err
     assert error.startswith("node: ")
-    assert "'-p foo'" in error
+    assert named in error
     assert error.count("\n") == 1
 
 

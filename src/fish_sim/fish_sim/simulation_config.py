@@ -70,6 +70,7 @@ class SimulatorConfig(SimulationConfig, ArmingSettings):
         0.0  # s of real time to wait for estimates and commands that lag; 0 = do not wait
     )
     lockstep_slack: float = 0.0  # s of simulated time that they may lag without being waited for
+    lockstep_camera: float = 0.0  # s of simulated time, likewise, of camera/pose after its stamp; 0 = it is not waited for
     pool_frame: str = POOL  # frame of the pool, which several fish share
     body_frame: str = BODY  # frame of the head's centre of mass
     imu_frame: str = IMU  # frame of imu/data
@@ -82,8 +83,9 @@ class SimulatorConfig(SimulationConfig, ArmingSettings):
             raise ValueError(f"real_time_factor = {self.real_time_factor}: expected 0 to 100")
         if not 0.0 <= self.lockstep <= 60.0:
             raise ValueError(f"lockstep = {self.lockstep}: expected 0 to 60 s")
-        if not 0.0 <= self.lockstep_slack <= 1.0:
-            raise ValueError(f"lockstep_slack = {self.lockstep_slack}: expected 0 to 1 s")
+        for name in ("lockstep_slack", "lockstep_camera"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} = {getattr(self, name)}: expected 0 to 1 s")
         for name in ("pool_frame", "body_frame", "imu_frame"):
             require_frame(name, getattr(self, name))
         require_frame_prefix(self.frame_prefix)

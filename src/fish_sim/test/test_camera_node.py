@@ -43,7 +43,7 @@ class Bench:
             "diagnostics": [],
             "arrival": [],
         }
-        self.odometry = self.peer.create_publisher(Odometry, "sim/odometry", 10)
+        self.odometry = self.peer.create_publisher(Odometry, "sim/odometry", 1000)
         for name, kind, topic in (
             ("info", CameraInfo, "camera/camera_info"),
             ("jpeg", CompressedImage, "camera/image_raw/compressed"),
@@ -101,6 +101,29 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
 
 def seconds(msg: CameraInfo | CompressedImage | Image) -> float:
     return msg.header.stamp.sec + msg.header.stamp.nanosec * 1e-9
+
+
+@pytest.mark.parametrize("bench", [{"latency_s": 0.5}], indirect=True)
+def test_a_camera_that_was_busy_misses_nothing_of_the_fish(bench: Bench) -> None:
+    """Half a second of the simulation waits for it; a sample that is lost is a heading that is guessed."""
+    assert bench.spin_until(lambda: bench.odometry.get_subscription_count() > 0)
+    begin = bench.now() - 0.5
+    for k in range(50):
+        bench.send(FishPose(0.01 * k, 0.0, 0.0), begin + 0.01 * k)
+    assert bench.spin_until(lambda: len(bench.got["info"]) >= 14)
+    gaps = np.diff([seconds(info) for info in bench.got["info"]])
+    np.testing.assert_allclose(gaps, 1 / 30, atol=1e-6)
+
+
+@pytest.mark.parametrize("bench", [{"latency_s": 0.0}], indirect=True)
+def test_a_picture_that_would_come_too_late_is_not_drawn(bench: Bench) -> None:
+    assert bench.spin_until(lambda: bench.odometry.get_subscription_count() > 0)
+    for late in (0.9, 0.85, 0.8):  # s
+        bench.send(FishPose(0.0, 0.0, 0.0), bench.now() - late)
+    stamp = bench.now()
+    bench.send(FishPose(0.0, 0.0, 0.0), stamp)
+    assert bench.spin_until(lambda: len(bench.got["info"]) >= 1)
+    assert seconds(bench.got["info"][0]) == pytest.approx(stamp, abs=1 / 30)
 
 
 @pytest.mark.parametrize("bench", [{"latency_s": 0.08, "publish_raw": True}], indirect=True)

@@ -217,6 +217,22 @@ def test_in_lockstep_time_stands_until_the_command_is_answered(bench):
     assert seconds(bench.collect("sim/odometry", 1)[0].header.stamp) > seconds(answered)
 
 
+@pytest.mark.parametrize("bench", [{"lockstep": 60.0, "lockstep_camera": 0.15}], indirect=True)
+def test_in_lockstep_time_stands_while_the_tracker_lags(bench):
+    """A busy computer draws and tracks late; poses that come later and later look like a clock that was set."""
+    poses = bench.peer.create_publisher(PoseWithCovarianceStamped, "camera/pose", 10)
+    bench.until(lambda: poses.get_subscription_count() >= 3)  # the arming, lockstep, this bench
+    for _ in range(3):
+        seen = bench.collect("sim/odometry", 1)[0].header
+        poses.publish(PoseWithCovarianceStamped(header=seen))
+        said = len(bench.got["/diagnostics"])
+        while len(bench.got["/diagnostics"]) < said + 2:  # two seconds, thousands of periods
+            bench.command(0.0, 0.0, bench.got["sim/odometry"][-1].header.stamp)
+            bench.executor.spin_once(timeout_sec=1.0)
+        lag = seconds(bench.got["sim/odometry"][-1].header.stamp) - seconds(seen.stamp)
+        assert 0.13 < lag < 0.15 + AHEAD + 0.015
+
+
 @pytest.mark.parametrize("bench", [{"lockstep": 60.0}], indirect=True)
 def test_in_lockstep_the_newest_imu_sample_is_said_again_while_time_stands(bench):
     """Fusion takes the IMU best-effort: a sample that it missed, it would wait for for ever."""

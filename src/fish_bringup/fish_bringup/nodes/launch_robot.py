@@ -130,6 +130,10 @@ def _chosen(chosen: Mapping[str, str]) -> list[NodeSpec]:
         raise RuntimeError(
             f"part:={part} of robot:={robot} is unknown; known: all, and of robot:=real {', '.join(PARTS[1:])}"
         )
+    if robot == "real" and chosen["real_time_factor"]:
+        raise RuntimeError(
+            f"real_time_factor:={chosen['real_time_factor']} is for robot:=sim and robot:=fake; a real robot's time is real"
+        )
     whole = open_loop(ROBOTS[robot]) if chosen["program"] else ROBOTS[robot]
     specs = [spec for spec in whole if in_part(spec, part)]
     if not _yes(chosen["record"]):

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import argparse
 
-from fish_bringup.node_table import NAMESPACE
 from fish_bringup.nodes.operator import set_armed
+from fish_bringup.robot_arguments import add_robot, check_robot
 from fish_report.errors import UserError
 from fish_report.printable import plain
 
@@ -22,13 +22,12 @@ TIMEOUT = 5.0  # s
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("--off", action="store_true", help="disarm instead")
+    add_robot_and_timeout(parser)
+
+
+def add_robot_and_timeout(parser: argparse.ArgumentParser) -> None:
+    """Which robot is meant, and how long it may take to answer."""
     add_robot(parser)
-
-
-def add_robot(parser: argparse.ArgumentParser) -> None:
-    """Which robot is meant."""
-    parser.add_argument("--namespace", default=NAMESPACE, help=f"of the robot ({NAMESPACE})")
-    parser.add_argument("--domain", type=int, help="ROS domain (ROS_DOMAIN_ID)")
     parser.add_argument(
         "--timeout", type=float, default=TIMEOUT, help=f"s to wait for the robot ({TIMEOUT:g})"
     )
@@ -41,8 +40,7 @@ def run(args: argparse.Namespace) -> int:
 
 def ask(armed: bool, args: argparse.Namespace) -> int:
     """Arm or disarm the robot of the arguments; UserError if it refuses."""
-    if args.domain is not None and not 0 <= args.domain <= 232:
-        raise UserError(f"domain is {args.domain}, expected 0 to 232")
+    check_robot(args)
     done, said = set_armed(armed, args.namespace, args.domain, args.timeout)
     if not done:
         raise UserError(f"not armed: {said}")

@@ -26,6 +26,7 @@ from fish_bringup.node_table import (
     FAKE,
     HARDWARE,
     LAGS,
+    PICTURES,
     PILOT,
     RECORDER,
     SIMULATED,
@@ -34,6 +35,7 @@ from fish_bringup.node_table import (
     Parameters,
     composed,
     fake_parameters,
+    followers,
     robot_of,
 )
 from fish_bringup.nodes.watch import watching
@@ -217,10 +219,12 @@ def node_parameters(
         changed[simulator]["lockstep"] = LOCKSTEP
     elif not args.real_time:
         changed[simulator] |= LAGS
+    if not (fake or args.real_time):
+        changed[simulator] |= PICTURES
     if args.real_time_factor != 1.0:
         changed[simulator]["real_time_factor"] = args.real_time_factor
     if not args.real_time or args.real_time_factor != 1.0:
-        for spec in robot_of(args.hardware):
+        for spec in followers(robot_of(args.hardware)):
             changed[spec] = {**changed.get(spec, {}), "use_sim_time": True}
     if args.robot:
         changed[simulator]["robot_file"] = str(args.robot.resolve())

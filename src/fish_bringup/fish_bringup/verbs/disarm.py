@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import argparse
 
-from fish_bringup.verbs.arm import add_robot, ask
+from fish_bringup.verbs.arm import add_robot_and_timeout, ask
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    add_robot(parser)
+    add_robot_and_timeout(parser)
 
 
 def run(args: argparse.Namespace) -> int:

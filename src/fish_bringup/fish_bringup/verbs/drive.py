@@ -16,8 +16,8 @@ import time
 from dataclasses import astuple, fields
 
 from fish_bringup.keyboard import Keyboard, keyboard
-from fish_bringup.node_table import NAMESPACE
 from fish_bringup.nodes.hand_drive import HandDrive, Pad, driving
+from fish_bringup.robot_arguments import add_robot, check_robot
 from fish_control.manual_drive import ManualDrive
 from fish_report.errors import UserError, user_errors
 from fish_report.interruption import Interruption
@@ -42,14 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             default=field.default,
             help=f"{kind} of the gamepad ({field.default})",
         )
-    parser.add_argument("--namespace", default=NAMESPACE, help=f"of the robot ({NAMESPACE})")
-    parser.add_argument("--domain", type=int, help="ROS domain (ROS_DOMAIN_ID)")
+    add_robot(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Drive until q or Ctrl-C."""
-    if args.domain is not None and not 0 <= args.domain <= 232:
-        raise UserError(f"domain is {args.domain}, expected 0 to 232")
+    check_robot(args)
     pad = Pad(**{field.name: getattr(args, field.name) for field in fields(Pad)})
     if min(astuple(pad)) < 0:
         raise UserError("buttons and axes are counted from 0")

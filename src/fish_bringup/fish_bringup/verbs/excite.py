@@ -25,10 +25,12 @@ from fish_bag import read_trial
 from fish_bringup.excite_check import incomplete
 from fish_bringup.node_table import (
     EXCITER,
+    PICTURES,
     RECORDER,
     ROBOTS,
     SIMULATED,
     NodeSpec,
+    followers,
     open_loop,
 )
 from fish_bringup.nodes.watch import watching
@@ -183,7 +185,7 @@ def parameters(
     if args.robot:
         start["robot_file"] = str(args.robot.resolve())
     changed: dict[NodeSpec, dict[str, object]] = {
-        SIMULATOR: {**start, "lockstep": PATIENCE},
+        SIMULATOR: {**start, "lockstep": PATIENCE, **PICTURES},
         EXCITER: {
             "program_file": str(args.program.resolve()),
             "begin": swim.begin,
@@ -191,9 +193,9 @@ def parameters(
         },
         RECORDER: {"output": str((folder / "recordings").resolve()), "name": name},
     }
-    return {
-        spec: {"use_sim_time": True, **changed.get(spec, {})} for spec in open_loop(ROBOTS["sim"])
-    }
+    for spec in followers(open_loop(ROBOTS["sim"])):
+        changed[spec] = {"use_sim_time": True, **changed.get(spec, {})}
+    return changed
 
 
 def _swim(

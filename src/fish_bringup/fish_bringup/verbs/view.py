@@ -11,9 +11,10 @@ from __future__ import annotations
 import argparse
 import os
 
-from fish_bringup.node_table import NAMESPACE, VIEW, command, middleware
+from fish_bringup.node_table import VIEW, command, middleware
+from fish_bringup.robot_arguments import add_robot, check_robot
 from fish_bringup.view_state import ViewConfig
-from fish_report.errors import UserError, user_errors
+from fish_report.errors import user_errors
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,16 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"to serve it on; 0.0.0.0 for other computers ({usual.address})",
     )
     parser.add_argument("--control", action="store_true", help="let the page arm and disarm")
-    parser.add_argument("--namespace", default=NAMESPACE, help=f"of the robot ({NAMESPACE})")
-    parser.add_argument("--domain", type=int, help="ROS domain (ROS_DOMAIN_ID)")
+    add_robot(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Become the node live_view."""
     with user_errors():
         config = ViewConfig(args.address, args.port, args.foxglove_port, args.control)
-    if args.domain is not None and not 0 <= args.domain <= 232:
-        raise UserError(f"domain is {args.domain}, expected 0 to 232")
+    check_robot(args)
     names = ("address", "port", "foxglove_port", "control")
     line = command(VIEW, {name: getattr(config, name) for name in names}, args.namespace)
     env = {**os.environ, **middleware(), "PYTHONUNBUFFERED": "1"}

@@ -32,12 +32,12 @@ from fish_control.nodes.messages import (
     OK,
     WARN,
     estimate_signs,
-    joint_command,
     motion_of,
     seconds,
     yaw_of,
 )
 from fish_control.nodes.reporter import Reporter
+from fish_control.nodes.written import CommandBytes
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.changes import Changes
@@ -82,6 +82,7 @@ class ControllerNode(Node):
 
     def _create_interfaces(self) -> None:
         self._command = self.create_publisher(JointState, "joint_command", 10)
+        self._written = CommandBytes()
         self._gains = self.create_publisher(Float64MultiArray, "control/gains", 10)
         self._pause = self.create_publisher(String, "arming/pause", 10)
         self._arming = ArmingListener(self)
@@ -135,7 +136,7 @@ class ControllerNode(Node):
             self._gains.publish(to_message(self._controller.decide(self._wanted)))
         self._ticks += 1
         command = self._controller.command(dt)
-        self._command.publish(joint_command(clock.to_msg(), command))
+        self._command.publish(self._written(clock.to_msg(), command))
         if may_swim:
             self._latency.add(now - self._odometry_time)
         if self._watchdog.state != self._said:

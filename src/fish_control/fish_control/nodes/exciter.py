@@ -26,10 +26,10 @@ from fish_control.nodes.messages import (
     OK,
     WARN,
     estimate_signs,
-    joint_command,
     motion_of,
 )
 from fish_control.nodes.reporter import Reporter
+from fish_control.nodes.written import CommandBytes
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.start import read_parameters, run
 
@@ -64,6 +64,7 @@ class ExciterNode(Node):
         self._now = math.nan
         self._said: State | None = None
         self._command = self.create_publisher(JointState, "joint_command", RESENT)
+        self._written = CommandBytes()
         self._disarm = self.create_publisher(String, "arming/disarm", 10)
         self._arming = ArmingListener(self)
         self._reporter = Reporter(self, self._command)
@@ -80,7 +81,7 @@ class ExciterNode(Node):
         dt = 0.0 if math.isnan(self._now) else min(max(now - self._now, 0.0), LONGEST_PERIOD)
         self._now = now
         command = self._exciter.command(now, dt, self._sight(now), self._arming.reason)
-        self._command.publish(joint_command(clock.to_msg(), command))
+        self._command.publish(self._written(clock.to_msg(), command))
         if self._exciter.state != self._said:
             if self._exciter.state == "lost":
                 self._disarm.publish(String(data=f"exciter: {self._exciter.reason}"))

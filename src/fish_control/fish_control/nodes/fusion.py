@@ -28,13 +28,12 @@ from fish_control.nodes.messages import (
     inertial_values,
     planar_covariance,
     seconds,
-    to_covariance,
     to_quaternion,
     to_stamp,
     yaw_of,
 )
 from fish_control.nodes.reporter import Reporter
-from fish_node.frames import BODY, POOL
+from fish_control.nodes.written import OdometryBytes
 from fish_node.nodes.frame_broadcaster import FrameBroadcaster
 from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.spin import ByEvents
@@ -76,6 +75,7 @@ class FusionNode(Node):
             self, self._frames[1], config.frame_prefix + config.imu_frame
         )
         self._odometry = self.create_publisher(Odometry, "odometry/filtered", 10)
+        self._written = OdometryBytes(*self._frames)
         self._transform = FrameBroadcaster(self)
         self._reporter = Reporter(self, self._odometry)
         self.create_subscription(Imu, "imu/data", from_bytes(Imu, self._on_imu), SENSORS, raw=True)
@@ -132,10 +132,9 @@ class FusionNode(Node):
     def _publish(self, estimate: Estimate | None) -> None:
         if estimate is None:
             return
-        message = to_odometry(estimate, *self._frames)
-        self._odometry.publish(message)
+        self._odometry.publish(self._written(estimate))
         if self._transform.heard:
-            self._transform.send(to_transform(message))
+            self._transform.send(to_transform(estimate, *self._frames))
         if self._state(estimate)[1] != self._said:
             self._report(estimate)
 
@@ -159,26 +158,13 @@ class FusionNode(Node):
         self._reporter.report(level, self._said, values)
 
 
-def to_odometry(estimate: Estimate, pool_frame: str = POOL, body_frame: str = BODY) -> Odometry:
-    """An estimate as a message."""
-    message = Odometry(child_frame_id=body_frame)
-    message.header.frame_id = pool_frame
-    message.header.stamp = to_stamp(estimate.time)
-    pose, twist = message.pose.pose, message.twist.twist
-    pose.position.x, pose.position.y = map(float, estimate.pose[:2])
-    pose.orientation = to_quaternion(float(estimate.pose[2]))
-    twist.linear.x, twist.linear.y, twist.angular.z = map(float, estimate.twist)
-    message.pose.covariance = to_covariance(estimate.pose_covariance)
-    message.twist.covariance = to_covariance(estimate.twist_covariance)
-    return message
-
-
-def to_transform(odometry: Odometry) -> TransformStamped:
+def to_transform(estimate: Estimate, pool_frame: str, body_frame: str) -> TransformStamped:
     """pool -> base_link."""
-    message = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
-    position = odometry.pose.pose.position
-    message.transform.translation.x, message.transform.translation.y = position.x, position.y
-    message.transform.rotation = odometry.pose.pose.orientation
+    message = TransformStamped(child_frame_id=body_frame)
+    message.header.frame_id, message.header.stamp = pool_frame, to_stamp(estimate.time)
+    translation = message.transform.translation
+    translation.x, translation.y = map(float, estimate.pose[:2])
+    message.transform.rotation = to_quaternion(float(estimate.pose[2]))
     return message
 
 

@@ -10,9 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import Imu
 
-from fish_control.controller import Command
 from fish_control.line_of_sight import Motion
 from fish_control.planner import motion_is_finite
 from fish_control.watchdog import EstimateHealth
@@ -69,15 +68,6 @@ def to_quaternion(yaw: float) -> Quaternion:
     return Quaternion(z=math.sin(0.5 * yaw), w=math.cos(0.5 * yaw))
 
 
-def joint_command(stamp: Time, command: Command) -> JointState:
-    """Rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder: position = alpha (rad)."""
-    message = JointState(name=["rotor", "rudder"])
-    message.header.stamp = stamp
-    message.position = [command.phase, command.alpha]
-    message.velocity = [command.rotor_speed, 0.0]
-    return message
-
-
 def motion_of(message: Odometry) -> Motion:
     """Pose in the pool and velocity in base_link."""
     p, v = message.pose.pose, message.twist.twist
@@ -99,13 +89,6 @@ def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
         pose_variance=largest_of(message.pose.covariance[PLANAR_VARIANCES]),
         twist_variance=largest_of(message.twist.covariance[PLANAR_VARIANCES]),
     )
-
-
-def to_covariance(planar: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, 3) of x, y and yaw to (36,); the rest is known to be zero."""
-    full = np.zeros(36)
-    full[PLANAR_BLOCK] = planar.ravel()
-    return full
 
 
 def diagnostics(

@@ -22,7 +22,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Float64, Header
+from std_msgs.msg import Float64
 
 from fish_control.line_of_sight import Motion
 from fish_control.node_configs import PlannerConfig
@@ -33,7 +33,6 @@ from fish_control.nodes.messages import (
     estimate_signs,
     motion_of,
     seconds,
-    to_quaternion,
 )
 from fish_control.nodes.path_messages import (
     check_frames,
@@ -43,6 +42,7 @@ from fish_control.nodes.path_messages import (
 )
 from fish_control.nodes.path_service import PathService, State
 from fish_control.nodes.reporter import Reporter
+from fish_control.nodes.written import PlanBytes
 from fish_control.planner import Plan, Planner
 from fish_control.pool import check_inside_pool
 from fish_control.progress_file import ProgressFile, path_digest
@@ -74,6 +74,8 @@ class PlannerNode(Node):
         self._target = self.create_publisher(PoseStamped, "control/target", 10)
         self._twist = self.create_publisher(TwistStamped, "control/twist", 10)
         self._error = self.create_publisher(Vector3Stamped, "tracking/error", 10)
+        body_frame = config.frame_prefix + config.body_frame
+        self._written = PlanBytes(config.pool_frame, body_frame)
         self._speed = self.create_publisher(Float64, "reference/speed", LATCHED)
         self._reporter = Reporter(self, self._target)
         self._progress = ProgressFile(
@@ -230,18 +232,10 @@ class PlannerNode(Node):
 
     def _publish(self, plan: Plan, odometry: Odometry) -> None:
         self._plan = plan
-        target = PoseStamped(header=odometry.header)
-        target.pose.position.x, target.pose.position.y = map(float, plan.at.target)
-        target.pose.orientation = to_quaternion(plan.errors.course)
-        body = self._config.frame_prefix + self._config.body_frame
-        twist = TwistStamped(header=Header(stamp=odometry.header.stamp, frame_id=body))
-        twist.twist.linear.x, twist.twist.angular.z = plan.speed, plan.yaw_rate
-        error = Vector3Stamped(header=odometry.header)
-        e = plan.errors
-        error.vector.x, error.vector.y, error.vector.z = e.cross_track, e.heading, e.speed
-        self._twist.publish(twist)
-        self._error.publish(error)
-        self._target.publish(target)
+        stamp = odometry.header.stamp
+        self._twist.publish(self._written.twist(stamp, plan))
+        self._error.publish(self._written.error(stamp, plan))
+        self._target.publish(self._written.target(stamp, plan))
         if self._state() != self._service.state:
             self._report()
         if plan.speed != self._said_speed:

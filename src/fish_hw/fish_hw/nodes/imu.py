@@ -21,6 +21,7 @@ from fish_hw.transport.i2c_bus import KernelI2c
 from fish_hw.transport.interfaces import DataReady, I2cBus
 from fish_hw.transport.serial_port import SerialPort
 from fish_hw.transport.unix_socket import PREFIX, SocketI2c
+from fish_node.nodes.message_bytes import MessageBytes, mark
 
 
 class ImuNode(DeviceNode):
@@ -38,7 +39,7 @@ class ImuNode(DeviceNode):
             lambda: SerialPort(settings.port, BAUD),
             self.clock.now,
         )
-        self._template = self._message_template()
+        self._bytes = self._message_bytes()
         emulated = settings.interface == "i2c" and settings.bus == "emulator"
         waits = (
             settings.interface == "rvc" or settings.int_line >= 0
@@ -63,23 +64,22 @@ class ImuNode(DeviceNode):
         for sample in cycle.samples:
             self.publish(self._data, self._message(sample))
 
-    def _message_template(self) -> Imu:
-        """What is the same in every message: frame and covariances (REP 145)."""
+    def _message_bytes(self) -> MessageBytes:
+        """Frame and covariances (REP 145) are the same in every message."""
         message = Imu()
         message.header.frame_id = self.settings.frame_prefix + self.settings.frame_id
         message.orientation_covariance = diagonal(self.settings.orientation_stdev)
         message.angular_velocity_covariance = diagonal(self.settings.angular_velocity_stdev)
         message.linear_acceleration_covariance = diagonal(self.settings.linear_acceleration_stdev)
-        return message
-
-    def _message(self, sample: ImuSample) -> Imu:
-        message = self._template
-        message.header.stamp = self.stamp(sample.time_s)
         q, w, a = message.orientation, message.angular_velocity, message.linear_acceleration
-        q.x, q.y, q.z, q.w = sample.orientation
-        w.x, w.y, w.z = sample.angular_velocity
-        a.x, a.y, a.z = sample.acceleration
-        return message
+        q.x, q.y, q.z, q.w = map(mark, range(4))
+        w.x, w.y, w.z = map(mark, range(4, 7))
+        a.x, a.y, a.z = map(mark, range(7, 10))
+        return MessageBytes(message, 10)
+
+    def _message(self, sample: ImuSample) -> bytes:
+        numbers = (*sample.orientation, *sample.angular_velocity, *sample.acceleration)
+        return self._bytes(self.stamp(sample.time_s), numbers)
 
 
 def diagonal(stddev: float) -> list[float]:

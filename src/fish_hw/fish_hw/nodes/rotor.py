@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 
 from fish_hw.devices.leak_sensor import LeakSensor
 from fish_hw.devices.rotor_driver import RUDDER, RotorDriver
-from fish_hw.devices.vertiq import RotorSample, RotorTelemetry
+from fish_hw.devices.vertiq import RotorTelemetry
 from fish_hw.emulators.vertiq import VertiqEmulator
 from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.nodes.joint_message import joint_value
@@ -31,6 +31,7 @@ from fish_hw.transport.gpio_line import InterruptLine
 from fish_hw.transport.interfaces import ByteStream
 from fish_hw.transport.serial_port import SerialPort
 from fish_node.nodes.arming import ArmingServer
+from fish_node.nodes.message_bytes import MessageBytes, mark
 
 BATTERY_PERIOD_S = 1.0
 
@@ -41,6 +42,9 @@ class RotorNode(DeviceNode):
     def __init__(self) -> None:
         super().__init__("rotor", RotorSettings)
         self._joint_states = self.create_publisher(JointState, "joint_states", 10)
+        moves = JointState(name=["rotor"], position=[mark(0)], velocity=[mark(1)])
+        moves.header.frame_id = self.settings.frame_prefix + self.settings.frame_id
+        self._joint_bytes = MessageBytes(moves, 2)
         self._battery_state = self.create_publisher(BatteryState, "battery_state", 10)
         self._emulator = (
             VertiqEmulator(self.settings.module_id, clock=self.clock.now)
@@ -103,13 +107,9 @@ class RotorNode(DeviceNode):
         if cycle.telemetry is not None and cycle.telemetry.volts is not None:
             self._telemetry = cycle.telemetry
         if cycle.sample is not None:
-            self.publish(self._joint_states, self._joint_message(cycle.sample))
-
-    def _joint_message(self, sample: RotorSample) -> JointState:
-        message = JointState(name=["rotor"], position=[sample.angle], velocity=[sample.velocity])
-        message.header.stamp = self.stamp(sample.time_s)
-        message.header.frame_id = self.settings.frame_prefix + self.settings.frame_id
-        return message
+            stamp = self.stamp(cycle.sample.time_s)
+            numbers = cycle.sample.angle, cycle.sample.velocity
+            self.publish(self._joint_states, self._joint_bytes(stamp, numbers))
 
     def _on_battery(self) -> None:
         telemetry, self._telemetry = self._telemetry, None  # a value is not said twice

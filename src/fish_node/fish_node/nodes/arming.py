@@ -37,6 +37,7 @@ from fish_node.arming import (
     largest_of,
 )
 from fish_node.foreign_text import visible
+from fish_node.nodes.message_bytes import MessageBytes
 from fish_node.nodes.quick_messages import from_bytes
 
 STATE_PERIOD_S = 0.05
@@ -52,14 +53,22 @@ class ArmingServer:
         node: the owner.
         arming: the state.
         clock: s, the clock of the arming state.
+        stamp: of messages; the node's clock unless said otherwise.
     """
 
     def __init__(
-        self, node: Node, arming: Arming, settings: ArmingSettings, clock: Callable[[], float]
+        self,
+        node: Node,
+        arming: Arming,
+        settings: ArmingSettings,
+        clock: Callable[[], float],
+        stamp: Callable[[], Time] | None = None,
     ) -> None:
         self._node, self._arming, self._settings, self._clock = node, arming, settings, clock
+        self._now = stamp or (lambda: node.get_clock().now().to_msg())
         self._stamps: dict[str, Time] = {}
         self._said: str | None = None
+        self._written: tuple[tuple[object, ...], MessageBytes] = (), MessageBytes(Header(), 0)
         self._state = node.create_publisher(DiagnosticArray, "arming/state", 10)
         node.create_service(SetBool, "arm", self._on_arm)
         if settings.estimate != "ignored":
@@ -98,11 +107,13 @@ class ArmingServer:
             else:
                 log.warning(f"disarmed: {reason}")
         level = DiagnosticStatus.OK if armed else DiagnosticStatus.WARN
-        status = DiagnosticStatus(name="arming", level=level, message=reason or ARMED)
-        status.values = [KeyValue(key="count", value=str(self._arming.count))]
-        stamp = self._node.get_clock().now().to_msg()
+        said = (level, reason, self._arming.count)
+        if said != self._written[0]:
+            status = DiagnosticStatus(name="arming", level=level, message=reason or ARMED)
+            status.values = [KeyValue(key="count", value=str(self._arming.count))]
+            self._written = said, MessageBytes(DiagnosticArray(status=[status]), 0)
         try:
-            self._state.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
+            self._state.publish(self._written[1](self._now()))
         except RCLError:  # a device's thread lives a little longer than the context
             if self._node.context.ok():
                 raise

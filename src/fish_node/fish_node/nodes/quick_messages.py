@@ -24,6 +24,10 @@ from std_msgs.msg import Header
 LITTLE_ENDIAN = b"\x00\x01"  # how an encapsulation begins
 BODY = 4  # bytes of encapsulation
 STAMP = struct.Struct("<iI")
+STAMPS = (
+    struct.Struct(">iI"),
+    STAMP,
+)  # by the encapsulation's second byte: big endian, little endian
 LENGTH = struct.Struct("<I")
 POSE = struct.Struct("<7d")
 TWIST = struct.Struct("<6d")
@@ -143,6 +147,12 @@ def read_imu(data: bytes) -> QuickImu | Imu:
         Vector3(*VECTOR.unpack_from(data, at + 25 * 8)),
         _numbers(data, at + 28 * 8, 9),
     )
+
+
+def read_stamp(data: bytes) -> Time:
+    """The stamp of any message that begins with a std_msgs/Header."""
+    seconds, nanoseconds = STAMPS[data[1] & 1].unpack_from(data, BODY)
+    return Time(sec=seconds, nanosec=nanoseconds)
 
 
 def _header(data: bytes) -> tuple[Header, int]:

@@ -22,10 +22,11 @@ from typing import Protocol
 import rclpy
 from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from fish_node.nodes.executor import KeptWaitSetExecutor
+from fish_node.nodes.executor import KeptWaitSetExecutor, Polled, take_all
 
 try:  # not in the first releases of Jazzy
     from rclpy.experimental import EventsExecutor
@@ -116,5 +117,20 @@ class ByEvents:
 
 def _add(executor: Executor, nodes: Sequence[Node]) -> None:
     for node in nodes:
+        forget_backlog(node)
         executor.add_node(node)
     gc.freeze()  # what nodes were made of stays: the collector need not look at it again and again
+
+
+def forget_backlog(node: Node) -> None:
+    """Drop what sensors said while the nodes of this process were being made.
+
+    Executors take one topic's backlog after the other: a camera's poses of the last second would come behind the newest IMU
+    samples, as if they were so late, and fusion judges clocks by that. Sensors are who is heard best effort. Reliable topics and
+    those that their node polls keep their messages.
+    """
+    for subscription in node.subscriptions:
+        sensor = subscription.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+        if sensor and not isinstance(subscription.callback_group, Polled):
+            for _ in take_all(subscription):
+                pass

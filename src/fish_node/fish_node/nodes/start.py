@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Generic, TypeVar
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
@@ -18,7 +18,8 @@ from fish_node.parameters import in_type_of, unknown_names
 
 Config = TypeVar("Config")
 Made = TypeVar("Made", bound=Node)
-REFUSALS = (ValueError, OSError, RCLError)  # of arguments, of parameters, of files that they name
+# of arguments, of parameters, of files that they name
+REFUSALS = (ValueError, OSError, RCLError, UnknownROSArgsError)
 
 
 def read_parameters(node: Node, kind: type[Config], settable: Collection[str] = ()) -> Config:
@@ -130,5 +131,7 @@ def shut_down() -> None:
 
 
 def _refused(name: str, error: Exception) -> int:
-    print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
+    unknown = isinstance(error, UnknownROSArgsError)
+    said = f"unknown ROS arguments {error}; --help says what there is" if unknown else str(error)
+    print(f"{name}: {' '.join(said.split())}", file=sys.stderr)
     return 1

@@ -48,7 +48,7 @@ class PoolRenderer:
         self._light_share = vignette(camera)
         self._caustics, self._glare = moving_light(camera, look.glare, look.seed)
         self._random = np.random.default_rng(look.seed)
-        self._noise, self._noise_mean = _noise_tile(camera.size, look.noise_std, self._random)
+        self._noise = _noise_tile(camera.size, look.noise_std, self._random)
         # kept between frames: fresh megabytes cost more in page faults than the sums made in them
         self._picture, self._light = np.empty_like(self._pool), np.empty_like(self._pool)
         self._grey = np.empty(self._pool.shape[:2], np.uint8)
@@ -155,21 +155,26 @@ class PoolRenderer:
 
     def _with_noise(self, picture: Image) -> Image:
         rows, columns = (
-            self._noise.shape[0] - picture.shape[0],
-            self._noise.shape[1] - picture.shape[1],
+            self._noise[0].shape[0] - picture.shape[0],
+            self._noise[0].shape[1] - picture.shape[1],
         )
         i, j = self._random.integers(0, rows + 1), self._random.integers(0, columns + 1)
-        tile = self._noise[i : i + picture.shape[0], j : j + picture.shape[1]]
-        return cv2.addWeighted(picture, 1.0, tile, 1.0, -self._noise_mean)
+        place = np.s_[i : i + picture.shape[0], j : j + picture.shape[1]]
+        brighter, darker = self._noise
+        noisy = cv2.add(picture, brighter[place])
+        return cv2.subtract(noisy, darker[place], dst=noisy)
 
 
 def _noise_tile(
     size: tuple[int, int], std: float, random: np.random.Generator
-) -> tuple[Image, float]:
-    """Noise with its mean raised so that it fits unsigned bytes, larger than the image for random offsets."""
-    mean = float(np.ceil(4.0 * std))
-    shape = (size[1] + 61, size[0] + 127, 3)
-    return np.clip(np.round(random.normal(mean, std, shape)), 0, 255).astype(np.uint8), mean
+) -> tuple[Image, Image]:
+    """What makes pixels brighter and what makes them darker, larger than the image for random offsets.
+
+    Each pixel has one of the two: added and subtracted with saturation, they are the noise clipped once.
+    """
+    noise = np.round(random.normal(0.0, std, (size[1] + 61, size[0] + 127, 3)))
+    brighter, darker = np.clip(noise, 0, 255), np.clip(-noise, 0, 255)
+    return brighter.astype(np.uint8), darker.astype(np.uint8)
 
 
 def _box(corners: Array, size: tuple[int, int]) -> tuple[int, int, int, int] | None:

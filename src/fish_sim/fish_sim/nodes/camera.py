@@ -23,6 +23,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.heap import keep_freed_memory
 from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
@@ -33,6 +34,8 @@ from fish_sim.camera.renderer import PoolRenderer
 from fish_sim.camera.timing import FrameClock, History
 
 QUEUE = 10
+KEPT = 100  # messages of the simulation: a picture drawn between two samples that are far apart shows a wrong heading
+LATE = 0.1  # s; a picture that would come later than this after its time is not drawn
 BLUR_STEP = 0.002  # s of exposure per drawn pose
 CLOCK_MISMATCH = 1.0  # s between odometry stamp and own clock that is worth a warning
 
@@ -72,9 +75,9 @@ class CameraNode(Node):
         self._info = self.create_publisher(CameraInfo, "camera/camera_info", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
-        self.create_subscription(JointState, "sim/joint_states", self._on_joints, QUEUE)
+        self.create_subscription(JointState, "sim/joint_states", self._on_joints, KEPT)
         self.create_subscription(
-            Odometry, "sim/odometry", from_bytes(Odometry, self._on_odometry), QUEUE, raw=True
+            Odometry, "sim/odometry", from_bytes(Odometry, self._on_odometry), KEPT, raw=True
         )
         self._release = self.create_timer(1.0, self._send_due)  # armed for each frame
         self._release.cancel()
@@ -100,13 +103,21 @@ class CameraNode(Node):
         if middle < 0.0:  # of an exposure that began before time did: no stamp says that
             return
         exposure = self._clock_of_frames.due(middle)
-        if exposure is None:
+        if exposure is None or self._too_late(exposure):
             return
         if self._random.random() < self._config.drop_rate:
             self._dropped += 1
             return
         self._waiting.append(self._take(exposure))
         self._send_due()
+
+    def _too_late(self, exposure: float) -> bool:
+        """Whether this computer is so busy that a picture would only make the next ones late."""
+        late = self.get_clock().now().nanoseconds * 1e-9 - exposure - self._config.latency_s
+        if not LATE < late < CLOCK_MISMATCH:
+            return False
+        self._clock_of_frames.skipped += 1
+        return True
 
     def _take(self, exposure: float) -> Frame:
         """Draw and encode the frame whose exposure is centred at a time."""
@@ -198,6 +209,7 @@ def _raw_image(header: Header, picture: np.ndarray) -> Image:
 
 def main() -> int:
     """Entry point."""
+    keep_freed_memory()
     return run(CameraNode, "camera", spin=ByEvents())
 
 

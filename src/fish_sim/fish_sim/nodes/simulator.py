@@ -17,8 +17,8 @@ wall_contacts.
 Time on /clock and in stamps starts at the wall clock's and runs real_time_factor times as fast, so that other
 nodes may use either clock at factor 1. Without use_sim_time it returns to the wall clock's after a pause, and after a step
 of the wall clock.
-With lockstep it stands still while joint_command, odometry/filtered or anybody who speaks on lockstep (std_msgs/Header:
-frame_id is who, stamp how far) is behind it (Lockstep), so that a run does not depend on how busy the computer is.
+With lockstep it stands still while joint_command, or anybody else who says how far he is (lockstep_topics), is behind it
+(Lockstep), so that a run does not depend on how busy the computer is.
 """
 
 import math
@@ -38,13 +38,13 @@ from std_srvs.srv import SetBool, Trigger
 
 from fish_node.arming import Arming, Source, operator_and_estimate
 from fish_node.nodes.arming import ArmingServer
-from fish_node.nodes.quick_messages import from_bytes
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
 from fish_node.rivals import Rivals
 from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.lockstep import Lockstep
+from fish_sim.nodes.lockstep_topics import hear_lockstep
 from fish_sim.nodes.pacer import MAX_LAG, Pacer
 from fish_sim.nodes.simulator_health import health
 from fish_sim.robot import Robot
@@ -88,7 +88,8 @@ class SimulatorNode(Node):
         self._refused = self._divergences = self._contacts = 0
         self._refusal = ""
         self._lockstep = Lockstep(config.lockstep, config.lockstep_slack)
-        self._felt: Imu | None = None  # newest sample
+        self._out = messages.PeriodMessages(self._frames, robot.links, config)
+        self._felt: bytes | None = None  # newest sample
         self._felt_said = self._clock_said = 0.0  # s of real time
         self._create_interfaces(config.camera == "pose")
         self._start_ns = time.time_ns()
@@ -122,10 +123,14 @@ class SimulatorNode(Node):
             self._camera = self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
         self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
-            heard = from_bytes(Odometry, self._on_estimate)
-            self.create_subscription(Odometry, "odometry/filtered", heard, QUEUE, raw=True)
-            self.create_subscription(Header, "lockstep", self._on_other, QUEUE)
-        self._armed = ArmingServer(self, self._arming, self._config, lambda: self._simulation.time)
+            hear_lockstep(self, self._lockstep, self._simulated, self._config.lockstep_camera)
+        self._armed = ArmingServer(
+            self,
+            self._arming,
+            self._config,
+            lambda: self._simulation.time,
+            lambda: self._stamp(self._simulation.time),
+        )
         self.create_service(SetBool, "pause", self._on_pause)
         self.create_service(Trigger, "reset", self._on_reset)
 
@@ -140,12 +145,6 @@ class SimulatorNode(Node):
             self._refused += 1
             self._refusal = str(error)
         self._lockstep.answered("joint_command", self._simulated(msg.header.stamp))
-
-    def _on_estimate(self, msg: Odometry) -> None:
-        self._lockstep.answered("odometry/filtered", self._simulated(msg.header.stamp))
-
-    def _on_other(self, msg: Header) -> None:
-        self._lockstep.answered(msg.frame_id, self._simulated(msg.stamp))
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if self._paused and not request.data:
@@ -195,7 +194,7 @@ class SimulatorNode(Node):
         now = time.monotonic()
         if min(self._lockstep.waited(now), now - self._clock_said) > CLOCK_AGAIN:
             self._clock_said = now
-            self._clock_publisher.publish(ClockMessage(clock=self._stamp(self._simulation.time)))
+            self._clock_publisher.publish(self._out.clock(self._stamp(self._simulation.time)))
         if (
             self._felt is not None
             and min(self._lockstep.waited(now), now - self._felt_said) > SAY_AGAIN
@@ -236,20 +235,19 @@ class SimulatorNode(Node):
 
     def _publish(self, readings: Readings) -> None:
         stamp = self._stamp(readings.time)
-        self._clock_publisher.publish(ClockMessage(clock=stamp))
-        pool, body = (Header(stamp=stamp, frame_id=frame) for frame in self._frames[:2])
-        self._tail.publish(messages.tail(body, readings.truth))
-        self._odometry.publish(messages.odometry(pool, body.frame_id, readings.truth))
-        self._joints.publish(messages.rotor(body, readings.rotor))
-        sensor = Header(stamp=stamp, frame_id=self._frames[2])
-        self._felt = messages.imu(sensor, readings.imu, self._config)
+        self._clock_publisher.publish(self._out.clock(stamp))
+        self._tail.publish(self._out.tail(stamp, readings.truth))
+        self._odometry.publish(self._out.odometry(stamp, readings.truth))
+        self._joints.publish(self._out.rotor(stamp, readings.rotor))
+        self._felt = self._out.imu(stamp, readings.imu)
         self._felt_said = time.monotonic()
         self._imu.publish(self._felt)
         if readings.battery is not None:
-            self._battery.publish(messages.battery(body, readings.battery))
+            header = Header(stamp=stamp, frame_id=self._frames[1])
+            self._battery.publish(messages.battery(header, readings.battery))
         if self._camera is not None:
             for sample in readings.camera:
-                header = Header(stamp=self._stamp(sample.stamp), frame_id=pool.frame_id)
+                header = Header(stamp=self._stamp(sample.stamp), frame_id=self._frames[0])
                 self._camera.publish(messages.camera_pose(header, sample, self._config))
 
     def _report(self) -> None:

@@ -5,12 +5,15 @@
 import math
 from collections.abc import Mapping
 
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion
 from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.message_bytes import MessageBytes, mark
 from fish_sim.sensors.imu import ImuSample
 from fish_sim.sensors.overhead_camera import CameraPose
 from fish_sim.sensors.settings import SensorSettings
@@ -36,33 +39,67 @@ def quaternion(heading: float) -> Quaternion:
     return Quaternion(z=math.sin(heading / 2), w=math.cos(heading / 2))
 
 
-def odometry(header: Header, body_frame: str, truth: Truth) -> Odometry:
-    """The truth: pose in the header's frame, the pool; velocity in base_link, zero covariance."""
+class PeriodMessages:
+    """The bytes of what goes out in every period.
+
+    Args:
+        frames: of the pool, of the head, of the IMU.
+        links: of the tail.
+    """
+
+    def __init__(self, frames: tuple[str, str, str], links: int, settings: SensorSettings) -> None:
+        pool, body, imu_link = (Header(frame_id=frame) for frame in frames)
+        self._clock = MessageBytes(Clock(), 0)
+        self._odometry = MessageBytes(_odometry(pool, frames[1]), 7)
+        names = [f"tail_{i}" for i in range(1, links + 1)]
+        tail = JointState(header=body, name=names, position=[mark(i) for i in range(links)])
+        self._tail = MessageBytes(tail, links)
+        rotor = JointState(header=body, name=["rotor"], position=[mark(0)], velocity=[mark(1)])
+        self._rotor = MessageBytes(rotor, 2)
+        self._imu = MessageBytes(_imu(imu_link, settings), 8)
+
+    def clock(self, stamp: Time) -> bytes:
+        """rosgraph_msgs/Clock."""
+        return self._clock(stamp)
+
+    def odometry(self, stamp: Time, truth: Truth) -> bytes:
+        """nav_msgs/Odometry, the truth: pose in the pool; velocity in base_link, zero covariance."""
+        x, y, heading = truth.pose
+        return self._odometry(
+            stamp, (x, y, math.sin(heading / 2), math.cos(heading / 2), *truth.velocity)
+        )
+
+    def tail(self, stamp: Time, truth: Truth) -> bytes:
+        """sensor_msgs/JointState: tail_1 .. relative angles."""
+        return self._tail(stamp, truth.tail)
+
+    def rotor(self, stamp: Time, measured: tuple[float, float]) -> bytes:
+        """sensor_msgs/JointState: angle and speed of the rotor's encoder."""
+        return self._rotor(stamp, measured)
+
+    def imu(self, stamp: Time, sample: ImuSample) -> bytes:
+        """sensor_msgs/Imu: orientation without absolute heading, rates, specific force."""
+        half = sample.yaw / 2
+        rates, forces = sample.angular_velocity.tolist(), sample.specific_force.tolist()
+        return self._imu(stamp, (math.sin(half), math.cos(half), *rates, *forces))
+
+
+def _odometry(header: Header, body_frame: str) -> Odometry:
+    """With marks for x, y, orientation z, w, surge, sway and yaw rate."""
     msg = Odometry(header=header, child_frame_id=body_frame)
     position, twist = msg.pose.pose.position, msg.twist.twist
-    position.x, position.y = truth.pose[:2]
-    msg.pose.pose.orientation = quaternion(truth.pose[2])
-    twist.linear.x, twist.linear.y, twist.angular.z = truth.velocity
+    position.x, position.y = mark(0), mark(1)
+    msg.pose.pose.orientation = Quaternion(z=mark(2), w=mark(3))
+    twist.linear.x, twist.linear.y, twist.angular.z = mark(4), mark(5), mark(6)
     return msg
 
 
-def tail(header: Header, truth: Truth) -> JointState:
-    """tail_1 .. relative angles."""
-    names = [f"tail_{i}" for i in range(1, len(truth.tail) + 1)]
-    return JointState(header=header, name=names, position=truth.tail)
-
-
-def rotor(header: Header, measured: tuple[float, float]) -> JointState:
-    """Angle and speed of the rotor's encoder."""
-    return JointState(header=header, name=["rotor"], position=measured[:1], velocity=measured[1:])
-
-
-def imu(header: Header, sample: ImuSample, settings: SensorSettings) -> Imu:
-    """Orientation without absolute heading, rates, specific force."""
-    msg = Imu(header=header, orientation=quaternion(sample.yaw))
+def _imu(header: Header, settings: SensorSettings) -> Imu:
+    """With marks for orientation z, w, rates and specific force."""
+    msg = Imu(header=header, orientation=Quaternion(z=mark(0), w=mark(1)))
     rate, force = msg.angular_velocity, msg.linear_acceleration
-    rate.x, rate.y, rate.z = sample.angular_velocity.tolist()
-    force.x, force.y, force.z = sample.specific_force.tolist()
+    rate.x, rate.y, rate.z = mark(2), mark(3), mark(4)
+    force.x, force.y, force.z = mark(5), mark(6), mark(7)
     for field, std in (
         ("orientation", settings.orientation_noise),
         ("angular_velocity", settings.gyro_noise),

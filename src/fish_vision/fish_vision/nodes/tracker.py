@@ -27,6 +27,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
 from fish_node.nodes.changes import Changes
+from fish_node.nodes.heap import keep_freed_memory
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.static_frames import publish_static_frame
@@ -36,7 +37,6 @@ from fish_vision.calibration import Calibration, CalibrationError, Lens
 from fish_vision.config import TrackerConfig
 from fish_vision.follower import Follower, make_follower
 from fish_vision.lowpass import PoseLowPass
-from fish_vision.nodes.heap import keep_freed_memory
 from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
 from fish_vision.statistics import Statistics
 from fish_vision.tracker import Detection

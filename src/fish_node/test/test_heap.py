@@ -7,7 +7,7 @@ import resource
 import numpy as np
 import pytest
 
-from fish_vision.nodes.heap import keep_freed_memory
+from fish_node.nodes.heap import keep_freed_memory
 
 
 def test_large_blocks_are_used_again() -> None:
