@@ -25,7 +25,7 @@ from fish_sysid.estimation.shooting.huber import huber, weight
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS, Scale
 from fish_sysid.estimation.shooting.rollout import STEP
 from fish_sysid.estimation.shooting.start_states import PAST, START_TRUST, shot_states
-from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, MEANS, targets_of
+from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, targets_of
 from fish_sysid.prediction.stroke_average import HALF_WINDOW
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ class Multistep:
         return out
 
     def errors(self, z: Array, states: Array, slopes: bool = False) -> tuple[Array, Array]:
-        """Scaled errors (R, 6) and, if asked, slopes (R, 6, K + 4); those without a start state are 0."""
+        """Scaled errors (R, 4) and, if asked, slopes (R, 4, K + 4); those without a start state are 0."""
         K = len(z) - len(SENSORS)
         p, dp, _ = self.coordinates.filter_inputs(z[:K])
         late, _, offset, ahead = z[K:] * SENSOR_SCALE
@@ -163,10 +163,6 @@ class Multistep:
     def cost(self, z: Array) -> float:
         """With states of its own."""
         return self.total(z, self.errors(z, self.states(z))[0])
-
-    def mean_cost(self, z: Array) -> float:
-        """Of stroke means alone, with states of its own."""
-        return self.total(z, self.errors(z, self.states(z))[0][:, :MEANS])
 
     def costs_by_trial(self, z: Array) -> Array:
         """(M,) mean cost per prediction of each trial, without the prior; NaN for a trial without a target."""
