@@ -196,6 +196,25 @@ def test_predictions_have_the_slopes_of_finite_differences_and_improve() -> None
     assert robot.parameters["head_drag_surge"] == pytest.approx(0.28, rel=0.1)
 
 
+def test_slopes_are_used_for_more_than_one_step() -> None:
+    """From slopes at one point the cost falls further than by the best damped step that they give."""
+    experiment, _ = recorded(kinds=("steps", "sines"), duration=9.0)
+    coordinates = ShotParametrization(nominal_hypothesis(NOMINAL, FREE))
+    cost = Multistep(experiment, coordinates, np.array([[m, 200] for m in range(2)]))
+    z = np.zeros(len(FREE) + len(SENSORS))
+    states = cost.states(z)
+    e, J = cost.errors(z, states, slopes=True)
+    gradient, normal = cost.normal(z, e, J)
+    by_one_step = []
+    for damping in (1e-2, 1e-1, 1.0, 10.0):
+        step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
+        step[cost.imu_clock] = 0.0
+        tried = cost.clip(z + np.clip(step, -0.5, 0.5))
+        by_one_step.append(cost.total(tried, cost.errors(tried, states)[0]))
+    found = cost.minimise(z, states, 1)
+    assert cost.total(found, cost.errors(found, states)[0]) < min(by_one_step)
+
+
 def test_the_prior_is_as_wide_as_what_is_known() -> None:
     robot = replace(
         NOMINAL, knowledge={"head_drag_surge": "measured", "head_drag_yaw": "estimated"}

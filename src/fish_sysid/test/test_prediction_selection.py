@@ -180,5 +180,5 @@ def test_start_states_trust_the_sensor_that_is_right() -> None:
         trusted(e, right, 4.0) for e in (experiment, replace(experiment, frames=shaken))
     )
     assert noisy.trust.fading > clean.trust.fading or noisy.trust.position > clean.trust.position
-    start, end = (multistep(experiment, f, 4.0).mean_cost(f.z) for f in (right, clean))
+    start, end = (multistep(experiment, f, 4.0).cost(f.z) for f in (right, clean))
     assert end <= start

@@ -23,6 +23,19 @@ def test_what_cannot_be_read_is_left_out_and_said(tmp_path):
     assert "recover" in left_out[0]
 
 
+def test_samples_that_come_twice_are_said_and_used_once(tmp_path):
+    twice = [m for m in samples.robot_messages() for _ in range(1 + ("camera/pose" in m[1]))]
+    samples.robot_recording(tmp_path / "once" / "a")
+    samples.write_mcap(tmp_path / "twice" / "a", twice)
+    once, nothing = read_experiment(tmp_path / "once")
+    both, said = read_experiment(tmp_path / "twice")
+    assert nothing == []
+    assert len(said) == 1
+    assert "a /fish/camera/pose" in said[0]
+    assert "repeat an earlier one" in said[0]
+    assert np.array_equal(both.frames[0].pose, once.frames[0].pose)
+
+
 def test_recordings_of_a_laboratory_with_its_own_names(tmp_path, capsys):
     samples.robot_recording(tmp_path / "ours" / "a")
     own = {"/fish/camera/pose": "/tracking/head", "/fish/joint_command": "/fish/motors"}

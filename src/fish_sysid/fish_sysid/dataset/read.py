@@ -52,6 +52,17 @@ def mixed(trials: Sequence[Trial]) -> str | None:
     return next(texts, None)
 
 
+def repeated(trial: Trial) -> list[str]:
+    """What a trial holds more than once, of what an experiment is made of."""
+    used = ("commands", "encoder", "imu", "camera")
+    topics = [trial.streams[role].topic for role in used if role in trial.streams]
+    return [
+        f"{trial.name} {problem.topic}: {problem.text}; each is used once"
+        for problem in trial.problems
+        if problem.kind == "duplicate" and problem.topic in topics
+    ]
+
+
 def _usable(paths: Sequence[Path], topics: TopicMap | None) -> tuple[list[Trial], list[str]]:
     """Trials that can be put on the grid, and what was left out and why."""
     read, trials, left_out = [], [], []
@@ -70,6 +81,7 @@ def _usable(paths: Sequence[Path], topics: TopicMap | None) -> tuple[list[Trial]
             left_out.append(str(error))
         else:
             trials.append(trial)
+            left_out += repeated(trial)
     if not trials:
         raise UserError("no trial can be used: " + "; ".join(left_out))
     return trials, left_out

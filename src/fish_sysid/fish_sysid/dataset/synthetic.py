@@ -70,19 +70,35 @@ def record(
     pushed = robot.with_effect("disturbance")
     stepper = Stepper.of(pushed)
     state, wrench = _swim(stepper, stepper.parameters(pushed), commands, noise, random)
-    gyro, accel = true_imu(stepper, stepper.parameters(pushed), state, wrench, commands)
+    felt = true_imu(stepper, stepper.parameters(pushed), state, wrench, commands)
+    rotor = state[:, :, len(stepper.layout.motion) + 1]
+    made, bias = sensed(commands, state[..., :3], *felt, rotor, noise, random, camera_rate)
+    return made, Truth(state, bias)
+
+
+def sensed(
+    commands: Array,
+    pose: Array,
+    gyro: Array,
+    accel: Array,
+    rotor: Array,
+    noise: Noise,
+    random: np.random.Generator,
+    camera_rate: float = CAMERA_RATE,
+) -> tuple[Experiment, Array]:
+    """(what sensors say, their biases (M, 3)) of any plant's true motion on the grid.
+
+    commands (T, M, 2); pose (T, M, 3); gyro (T, M) [rad/s]; accel (T, M, 2) forward and left [m/s^2]; rotor (T, M) [rad/s].
+    """
     T, M = commands.shape[:2]
     bias = random.standard_normal((M, 3)) * BIAS
     gyro = gyro + bias[:, 0] + noise.gyro * random.standard_normal((T, M))
     accel = accel + bias[:, 1:] + noise.accel * random.standard_normal((T, M, 2))
-    encoder = state[:, :, len(stepper.layout.motion) + 1] + noise.encoder * random.standard_normal(
-        (T, M)
-    )
-    frames = tuple(_camera(state[:, m, :3], noise, random, camera_rate) for m in range(M))
+    encoder = rotor + noise.encoder * random.standard_normal((T, M))
+    frames = tuple(_camera(pose[:, m], noise, random, camera_rate) for m in range(M))
     names = tuple(f"synthetic_{m:02d}" for m in range(M))
-    return Experiment(names, np.full(M, T), commands, gyro, accel, encoder, frames, True), Truth(
-        state, bias
-    )
+    steps = np.full(M, T)
+    return Experiment(names, steps, commands, gyro, accel, encoder, frames, True), bias
 
 
 def _swim(

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fish_report.parallel import on_all_cores
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.shooting.fold_steps import FOLDS
 from fish_sysid.estimation.shooting.left_out import Step, judged, left_out_costs, step_text
@@ -48,9 +49,10 @@ def eliminate(
     while unsure:
         report(f"leaving trials out, without {', '.join(unsure)} in turn")
         further, control = left_out_costs(experiment, found)
+        fewer = [without(found, name) for name in unsure]
+        tried = on_all_cores(lambda fit: left_out_costs(experiment, fit), fewer)
         fits = {}
-        for name in unsure:
-            fits[name], costs = left_out_costs(experiment, without(found, name))
+        for name, (fits[name], costs) in zip(unsure, tried, strict=True):
             steps[name] = replace(judged(name, costs, control), added=True)
             report(f"{name}: {step_text(steps[name])}")
         unsure = [name for name in unsure if not steps[name].sure]

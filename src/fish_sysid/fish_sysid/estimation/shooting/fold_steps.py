@@ -37,7 +37,7 @@ def fold_steps(
 ) -> Array:
     """(F, P) Gauss-Newton steps of the cost without the rows of each fold.
 
-    e: (R, 6) errors; J: (R, 6, P) slopes; gradient (P,) and normal (P, P) of the whole cost; fold: (R,) that of each row;
+    e: (R, 4) errors; J: (R, 4, P) slopes; gradient (P,) and normal (P, P) of the whole cost; fold: (R,) that of each row;
     damping: of the diagonal (Marquardt 1963).
     """
     weighted, out = weight(e), []

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 EVERY = 4.0  # s between start points
 SURE = 2.0  # standard errors; the best of many effects gains one by chance
-ROUNDS, ITERATIONS = 2, 4  # of a fit and its control alike
+ROUNDS, ITERATIONS = 2, 2  # of a fit and its control alike
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from fish_sysid.estimation.shooting.huber import huber, weight
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS, Scale
 from fish_sysid.estimation.shooting.rollout import STEP
 from fish_sysid.estimation.shooting.start_states import PAST, START_TRUST, shot_states
-from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, MEANS, targets_of
+from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, targets_of
 from fish_sysid.prediction.stroke_average import HALF_WINDOW
 
 Array = NDArray[np.float64]
@@ -34,8 +34,10 @@ Index = NDArray[np.int64]
 LOST = 30.0  # a scaled error of a prediction that diverged
 STEEPEST = 300.0  # slope of an error beyond which the motion is unstable
 LARGEST_STEP = 0.5  # of theta and sensors
+LANES = 512  # of a rollout; the states of more do not stay in the processor's cache
 SHARES = (1.0, 0.3, 0.1)  # of the way to what a round found
 SETTLED = 0.002  # of the cost
+UPDATES = 2  # steps with slopes that the last step showed
 
 
 class Multistep:
@@ -93,7 +95,7 @@ class Multistep:
         return out
 
     def errors(self, z: Array, states: Array, slopes: bool = False) -> tuple[Array, Array]:
-        """Scaled errors (R, 6) and, if asked, slopes (R, 6, K + 4); those without a start state are 0."""
+        """Scaled errors (R, 4) and, if asked, slopes (R, 4, K + 4); those without a start state are 0."""
         K = len(z) - len(SENSORS)
         p, dp, _ = self.coordinates.filter_inputs(z[:K])
         late, _, offset, ahead = z[K:] * SENSOR_SCALE
@@ -146,7 +148,8 @@ class Multistep:
             pose = moved[..., :3].reshape(T + 1, len(own), C, 3)
             return forward(pose, camera[:, 0])
 
-        shares = np.array_split(np.arange(len(start)), max(1, min(2 * cores(), len(start))))
+        count = max(2 * cores(), len(start) * C // LANES)
+        shares = np.array_split(np.arange(len(start)), max(1, min(count, len(start))))
         return np.concatenate(on_all_cores(share, shares), axis=1)
 
     def _cleaned(self, e: Array) -> Array:
@@ -160,10 +163,6 @@ class Multistep:
     def cost(self, z: Array) -> float:
         """With states of its own."""
         return self.total(z, self.errors(z, self.states(z))[0])
-
-    def mean_cost(self, z: Array) -> float:
-        """Of stroke means alone, with states of its own."""
-        return self.total(z, self.errors(z, self.states(z))[0][:, :MEANS])
 
     def costs_by_trial(self, z: Array) -> Array:
         """(M,) mean cost per prediction of each trial, without the prior; NaN for a trial without a target."""
@@ -182,26 +181,45 @@ class Multistep:
         return out
 
     def minimise(self, z: Array, states: Array, iterations: int) -> Array:
-        """Damped Gauss-Newton with the start states as they are."""
-        damping, best = 1e-2, self.total(z, self.errors(z, states)[0])
+        """Damped Gauss-Newton with the start states as they are: so many times with slopes, and UPDATES steps after each.
+
+        A step after the first takes the slopes that the last step showed (Broyden 1965), at the cost of one rollout.
+        """
+        damping = 1e-2
         for _ in range(iterations):
             e, J = self.errors(z, states, slopes=True)
-            gradient, normal = self.normal(z, e, J)
-            for _ in range(5):
-                damped = normal + damping * np.diag(np.diag(normal))
-                step = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
-                step[self.imu_clock] = 0.0
-                tried = self.clip(z + step)
-                cost = self.total(tried, self.errors(tried, states)[0])
-                if cost < best:
+            best = before = self.total(z, e)
+            for _ in range(1 + UPDATES):
+                tried, found, enough = self._step(z, states, e, J, damping)
+                cost = self.total(tried, found)
+                if not cost < best:
                     break
-                damping *= 5.0
-            if not cost < best:
-                break
-            gain, best, z, damping = best - cost, cost, tried, max(damping / 5.0, 1e-6)
-            if gain < SETTLED * best:
+                moved = tried - z
+                J += np.multiply.outer(found - e - J @ moved, moved / (moved @ moved))
+                gain, best, z, e = best - cost, cost, tried, found
+                damping = max(enough / 5.0, 1e-6)
+                if gain < SETTLED * best:
+                    break
+            if before - best < SETTLED * best:
                 break
         return z
+
+    def _step(
+        self, z: Array, states: Array, e: Array, J: Array, damping: float
+    ) -> tuple[Array, Array, float]:
+        """(z, its errors, damping) of the first step that lowers the cost, of a few with more and more damping."""
+        best = self.total(z, e)
+        gradient, normal = self.normal(z, e, J)
+        for _ in range(5):
+            damped = normal + damping * np.diag(np.diag(normal))
+            step = np.clip(-np.linalg.solve(damped, gradient), -LARGEST_STEP, LARGEST_STEP)
+            step[self.imu_clock] = 0.0
+            tried = self.clip(z + step)
+            found = self.errors(tried, states)[0]
+            if self.total(tried, found) < best:
+                break
+            damping *= 5.0
+        return tried, found, damping
 
     def normal(
         self, z: Array, e: Array, J: Array, prior: Array | None = None
@@ -213,7 +231,7 @@ class Multistep:
         gradient = rows.T @ (weighted * flat) + z / prior**2
         return gradient, (rows.T * weighted) @ rows + np.diag(1.0 / prior**2)
 
-    def improve(self, z: Array, rounds: int = 3, iterations: int = 5) -> tuple[float, Array]:
+    def improve(self, z: Array, rounds: int = 3, iterations: int = 3) -> tuple[float, Array]:
         """(cost, z): rounds of parameters found with states of z, judged with states of their own."""
         states = self.states(z)
         best = self.total(z, self.errors(z, states)[0])

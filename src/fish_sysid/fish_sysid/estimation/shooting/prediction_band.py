@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sysid.estimation.shooting.multistep import Multistep
-from fish_sysid.estimation.shooting.stroke_targets import MEANS
 
 Array = NDArray[np.float64]
 
@@ -25,7 +24,7 @@ def missed(training: Multistep, z: Array) -> dict[float, Array]:
     """Horizon -> (4,) spread of scaled errors on training trials, by the quantile that a 95 % band needs."""
     e, horizon = training.errors(z, training.states(z))[0], training.targets.horizon
     return {
-        float(h): np.quantile(np.abs(e[horizon == h, :MEANS]), 0.95, axis=0) / NORMAL
+        float(h): np.quantile(np.abs(e[horizon == h]), 0.95, axis=0) / NORMAL
         for h in np.unique(horizon)
     }
 
@@ -36,7 +35,7 @@ def inside(
     """(R, 4) whether each error of unseen trials at a horizon [s] lies in its 95 % band: x, y, heading, speed."""
     e, J = unseen.errors(z, unseen.states(z), slopes=True)
     rows = unseen.targets.horizon == horizon
-    e, J = e[rows, :MEANS], J[rows, :MEANS]
+    e, J = e[rows], J[rows]
     open_left = np.einsum("rip,pq,riq->ri", J, covariance, J)
     band = NORMAL * np.sqrt(open_left + missed(training, z)[horizon] ** 2)
     return np.asarray(np.abs(e) <= band)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_report.parallel import on_all_cores
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.parametrization import Hypothesis, Parametrization
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
@@ -91,16 +92,17 @@ def best_start(
     experiment: Experiment, hypothesis: Hypothesis, report: Report = lambda _: None
 ) -> Found:
     """The best of the optima that the ladder of stiffnesses leads to, by coarse predictions."""
-    origin, best = Parametrization(hypothesis), None
-    for stiffness, heavy in LADDER:
-        report(f"shooting, {hypothesis.robot.links} links, tail {stiffness:g} times as stiff")
-        _, z = shoot(experiment, hypothesis, ladder_start(origin, stiffness, heavy))
+    origin = Parametrization(hypothesis)
+    stiffer = ", ".join(f"{stiffness:g}" for stiffness, _ in LADDER)
+    report(f"shooting, {hypothesis.robot.links} links, tail {stiffer} times as stiff")
+
+    def climbed(rung: tuple[float, float]) -> Found:
+        _, z = shoot(experiment, hypothesis, ladder_start(origin, *rung))
         start = Found(hypothesis, z, np.inf)
-        cost, z = multistep(experiment, start, 4.0 * FINE).improve(z, 2, 3)
-        if best is None or cost < best.cost:
-            best = Found(hypothesis, z, cost)
-    assert best is not None
-    return best
+        cost, z = multistep(experiment, start, 4.0 * FINE).improve(z, 2, 2)
+        return Found(hypothesis, z, cost)
+
+    return min(on_all_cores(climbed, LADDER), key=lambda found: found.cost)
 
 
 def polished(

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_report.parallel import on_all_cores
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.parametrization import (
     EFFECT_PRIOR,
@@ -54,10 +55,14 @@ def choose(
         promising = glances(experiment, found, left)[:JUDGED]
         report(f"effect {number + 1}: leaving trials out for {', '.join(promising)}")
         further, control = left_out_costs(experiment, found)
-        fits, tried = {}, []
-        for name in promising:
-            fits[name], costs = converged(experiment, found, name, further.cost)
-            tried.append(judged(name, control, costs))
+        ends = on_all_cores(
+            lambda name: converged(experiment, found, name, further.cost),  # noqa: B023
+            promising,
+        )
+        fits = {name: fit for name, (fit, _) in zip(promising, ends, strict=True)}
+        tried = [
+            judged(name, control, costs) for name, (_, costs) in zip(promising, ends, strict=True)
+        ]
         good = [step for step in tried if step.sure]
         best = max(good, key=lambda step: step.gain, default=None)
         steps += [
@@ -119,8 +124,8 @@ def glances(experiment: Experiment, found: Found, names: Sequence[str]) -> list[
     """
     base = multistep(experiment, found, EVERY)
     e, J = base.errors(found.z, base.states(found.z), slopes=True)
-    promise = {name: _promise(experiment, found, name, base, e, J) for name in names}
-    return sorted(promise, key=lambda name: promise[name])
+    promise = on_all_cores(lambda name: _promise(experiment, found, name, base, e, J), names)
+    return [name for _, name in sorted(zip(promise, names, strict=True))]
 
 
 def _promise(

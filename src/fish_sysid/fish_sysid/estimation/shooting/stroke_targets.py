@@ -1,11 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What predictions are compared with: stroke means and swings, linear in the predicted poses, so that one product serves all.
+"""What predictions are compared with: stroke means, linear in the predicted poses, so that one product serves all.
 
-A target is the stroke mean of the camera's poses `h` seconds after a start point, with the swing of the heading around it
-(`stroke_swing`). Its errors, scaled by what counts as one,
+A target is the stroke mean of the camera's poses `h` seconds after a start point. Its errors, scaled by what counts as one,
 
-    e = (x / s_p(h), y / s_p(h), psi / s_psi(h), u / s_u, c / s_c, s / s_c),   s_p = a + b h
+    e = (x / s_p(h), y / s_p(h), psi / s_psi(h), u / s_u),   s_p = a + b h
 """
 
 from __future__ import annotations
@@ -17,20 +16,17 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.estimation.shooting.stroke_swing import stroke_frequency, swing_weights
 from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-# start point, trial, grid points of the frames, weights of mean, rate, cosine and sine, what was measured, what counts as one
-Row = tuple[int, int, Array, Array, Array, Array, Array, Array, Array]
+# start point, trial, grid points of the frames, weights of mean and rate, what was measured, what counts as one
+Row = tuple[int, int, Array, Array, Array, Array, Array]
 
 HORIZONS = (0.5, 1.0, 2.0, 3.5, 5.0)  # s
 POSITION = (0.008, 0.02)  # m, and m per s of horizon: what counts as one
 HEADING = (0.06, 0.04)  # rad, and rad per s
 SPEED = 0.02  # m/s
-SWING = 0.1  # rad: a swing that is wrong by all of its size, 0.03 to 0.16 rad, counts as much as a heading that is a little off
-MEANS = 4  # of a target's numbers; the others are its swing
 
 
 @dataclass(frozen=True)
@@ -42,9 +38,8 @@ class Targets:
     position: Array  # (R, F) grid points after the start, of the frames
     value: Array  # (R, F) weights of the mean
     slope: Array  # (R, F) 1/s, weights of the rate
-    swing: Array  # (R, 2, F) weights of the heading's swing, cosine and sine
-    measured: Array  # (R, 6) x, y [m], psi [rad], u [m/s], swing [rad]
-    scale: Array  # (R, 6)
+    measured: Array  # (R, 4) x, y [m], psi [rad], u [m/s]
+    scale: Array  # (R, 4)
 
     @property
     def horizon(self) -> Array:
@@ -55,7 +50,7 @@ class Targets:
         return len(self.start)
 
     def errors(self, pose: Array, late: float, offset: float) -> Array:
-        """(R, ..., 6) scaled errors of poses (T, S, ..., 3) of the point that the camera follows.
+        """(R, ..., 4) scaled errors of poses (T, S, ..., 3) of the point that the camera follows.
 
         Images are `late` [s], headings seen `offset` [rad] too large.
         """
@@ -67,9 +62,8 @@ class Targets:
         q = below + share * (above - below)
         mean, rate = (np.einsum("rf,rf...->r...", w, q) for w in (self.value, self.slope))
         u = rate[..., 0] * np.cos(mean[..., 2]) + rate[..., 1] * np.sin(mean[..., 2])
-        swing = np.einsum("rif,rf...->r...i", self.swing, q[..., 2])
         shape = (len(self), *([1] * (pose.ndim - 3)), self.measured.shape[1])
-        e = np.concatenate([mean, u[..., None], swing], axis=-1) - self.measured.reshape(shape)
+        e = np.concatenate([mean, u[..., None]], axis=-1) - self.measured.reshape(shape)
         e[..., 2] = (e[..., 2] + offset + np.pi) % (2.0 * np.pi) - np.pi
         return e / self.scale.reshape(shape)
 
@@ -93,23 +87,14 @@ def targets_of(
                 if not np.isfinite(value).all() or frames.t[near[0]] < starts[row, 1] * DT:
                     continue
                 pose = frames.pose[near]
-                swing = swing_weights(
-                    frames.t[near] - centres[i], _frequency(experiment, m, centres[i])
-                )
                 seen, rate = value @ pose, slope @ pose
                 u = rate[0] * np.cos(seen[2]) + rate[1] * np.sin(seen[2])
                 p, psi = (a + b * h for a, b in (POSITION, HEADING))
                 at = frames.t[near] / DT - starts[row, 1]
-                size = np.array([p, p, psi, SPEED, SWING, SWING])
-                measured = np.concatenate([seen, [u], swing @ pose[:, 2]])
-                rows.append((row, m, at, value, slope, *swing, measured, size))
+                size = np.array([p, p, psi, SPEED])
+                measured = np.append(seen, u)
+                rows.append((row, m, at, value, slope, measured, size))
     return _padded(rows)
-
-
-def _frequency(experiment: Experiment, m: int, centre: float) -> float:
-    """The stroke's frequency [rad/s] in trial m around `centre` [s]."""
-    half, k = round(HALF_WINDOW / DT), round(centre / DT)
-    return stroke_frequency(experiment.commands[max(k - half, 0) : k + half, m, 0])
 
 
 def _padded(rows: list[Row]) -> Targets:
@@ -125,6 +110,5 @@ def _padded(rows: list[Row]) -> Targets:
     def column(i: int) -> Index:
         return np.array([row[i] for row in rows], dtype=np.int64)
 
-    measured, scale = (np.array([row[i] for row in rows]).reshape(-1, MEANS + 2) for i in (7, 8))
-    swing = np.stack([wide(5), wide(6)], axis=1)
-    return Targets(column(0), column(1), wide(2), wide(3), wide(4), swing, measured, scale)
+    measured, scale = (np.array([row[i] for row in rows]).reshape(-1, 4) for i in (5, 6))
+    return Targets(column(0), column(1), wide(2), wide(3), wide(4), measured, scale)

@@ -26,7 +26,7 @@ def trusted(experiment: Experiment, found: Found, every: float = FINE) -> Found:
     """The fit with the trust under which it predicts these trials best."""
 
     def cost(trust: Scale) -> float:
-        return multistep(experiment, replace(found, trust=trust), every).mean_cost(found.z)
+        return multistep(experiment, replace(found, trust=trust), every).cost(found.z)
 
     best, trust = cost(found.trust), found.trust
     for _ in range(SWEEPS):
