@@ -11,7 +11,7 @@ from fish_node.parameter_file import read_settings
 from fish_vision.calibration import Calibration, Lens, Mount
 from fish_vision.pose import MarkerLayout
 from fish_vision.segmentation import HUES, ColourRange
-from fish_vision.tags import tags_in
+from fish_vision.tags import FINDS_TAGS, tags_in
 
 NODE = "/fish/tracker"
 KINDS = ("colours", "tags")
@@ -112,7 +112,8 @@ class TrackerConfig:
                 )
         if self.marker_kind not in KINDS:
             raise ValueError(f"marker_kind = {self.marker_kind!r}: expected {' or '.join(KINDS)}")
-        self._check_tags()
+        if FINDS_TAGS or self.marker_kind == "tags":
+            self._check_tags()
         if self.layout().spacing < self.marker_diameter:
             raise ValueError(
                 f"front_marker = {list(self.front_marker)}, rear_marker = {list(self.rear_marker)}: "

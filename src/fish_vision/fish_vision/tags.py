@@ -14,7 +14,9 @@ from fish_vision.segmentation import Image
 
 Array = NDArray[Any]  # float64
 
-aruco: Any = cv2.aruco  # its annotations know one of the two interfaces
+# None in pip's OpenCV before 4.7 without contrib; its annotations know one of the two interfaces
+aruco: Any = getattr(cv2, "aruco", None)
+FINDS_TAGS = aruco is not None
 PREFIX = "DICT_"
 OLD = not hasattr(aruco, "ArucoDetector")  # OpenCV before 4.7: functions instead of a class
 SIDE_LEAST = 0.6  # share of the expected side below which a square is no tag
@@ -126,6 +128,11 @@ class TagDetector:
 
 
 def _dictionary(name: str) -> Any:
+    if not FINDS_TAGS:
+        raise ValueError(
+            f"OpenCV {cv2.__version__} is here without its module aruco, which finds tags; install Ubuntu's python3-opencv, or "
+            "opencv-contrib-python-headless in the place of opencv-python-headless"
+        )
     number = getattr(aruco, PREFIX + name, None)
     if number is None:
         raise ValueError(
