@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from fish_control.camera_clock import CameraClock
 from fish_control.estimate import Estimate, to_estimate
 from fish_control.fusion_config import FusionConfig
+from fish_control.imu_checks import unusable_sample
 from fish_control.imu_heading import HeadingNoise, ImuHeading
-from fish_control.imu_history import ImuHistory, InertialSample
+from fish_control.imu_history import ImuHistory, inertial_sample
 from fish_control.measurement_buffer import (
     CameraPose,
     Moment,
@@ -33,6 +34,7 @@ Array = NDArray[np.float64]
 SILENT_POSES = 3  # in a row without an IMU sample in between: the IMU is dead; stamps cannot say it
 OLD_POSES = 3  # in a row from before the history: the clock was set back, where no IMU says it
 SWIMS = 0.03  # m/s; a fish at rest does not show how well its motion is measured
+LONGEST_WAIT = 0.3  # s, beyond imu_timeout, that a pose may be ahead of a living IMU: its clock, or the IMU has a gap
 REFIT = 0.005  # s, change of the camera's offset after which the history is fused anew
 
 
@@ -42,15 +44,16 @@ class Fusion:
     Attributes:
         counts: what became of the measurements, for diagnostics.
         camera_clock: what is known of the camera's clock.
+        noise_scale: factors on the variances, from the innovations.
     """
 
     def __init__(self, config: FusionConfig | None = None) -> None:
         self.config = config or FusionConfig()
         self.counts: Counter[str] = Counter()
         self.refused = ""  # why the latest measurement that was not used was not
-        self._scale = NoiseScale()
-        self._filter = StrapdownFilter(self.config, self._scale)
-        self._models = MotionModels(self.config, self._scale)
+        self.noise_scale = NoiseScale()
+        self._filter = StrapdownFilter(self.config, self.noise_scale)
+        self._models = MotionModels(self.config, self.noise_scale)
         self._clear()
 
     def _clear(self) -> None:
@@ -60,15 +63,14 @@ class Fusion:
         self._heading = ImuHeading(noise)
         self.camera_clock = CameraClock(c.camera_offset, c.camera_offset_std)
         self._applied, self._jumps = c.camera_offset, 0
-        self._raw: deque[RawPose] = deque()
+        self._raw, self._waiting = deque[RawPose](), deque[RawPose]()  # fused, ahead of the IMU
         self._timeline: Timeline | None = None
         self._candidates = AgreeingPoses()
         self._repeated = RepeatedPose()
-        self._last_pose_time = self._last_imu_time = -math.inf
-        self._accepted_at = -math.inf  # s, clock of the sensors when a pose was last accepted
+        # s, the last of the sensors' clock when a pose was accepted
+        self._last_pose_time = self._last_imu_time = self._accepted_at = -math.inf
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
-        self._old_poses = 0  # in a row, from before the history
-        self._stale = StaleStamps()
+        self._stale, self._old_poses = StaleStamps(), 0  # poses in a row from before the history
         self._models.begin()
         self._filter.model = self._models.current
 
@@ -80,11 +82,6 @@ class Fusion:
     def applied_offset(self) -> float:
         """What is added to the camera's stamps [s]."""
         return self._applied
-
-    @property
-    def noise_scale(self) -> NoiseScale:
-        """Factors on the variances, from the innovations."""
-        return self._scale
 
     @property
     def motion_model(self) -> MotionModel:
@@ -105,33 +102,24 @@ class Fusion:
         None: not measured. False if it was not used. What no fish does is a damaged sample, such as one of a flipped bit:
         it would move a trusted pose, and the camera, which contradicts it, would be refused until reacquire_time.
         """
-        values = (time, yaw_rate, forward, left, yaw, yaw_std)
-        if not all(math.isfinite(v) for v in values if v is not None):
-            return self._refuse("imu_not_finite")
-        largest = self.config.largest_accel, self.config.largest_yaw_rate
-        if (
-            math.hypot(forward or 0.0, left or 0.0) > largest[0]
-            or abs(yaw_rate or 0.0) > largest[1]
-        ):
-            return self._refuse("imu_implausible")
+        if reason := unusable_sample((time, yaw_rate, forward, left, yaw, yaw_std), self.config):
+            return self._refuse(reason)
         stale = self._stale.set_back(time, self._last_imu_time)
         if stale or time < self._last_imu_time - self.config.history:
             self._restart()  # the clock was set back, as in a restarted simulation
         if time <= self._last_imu_time:
-            same = time == self._last_imu_time
-            return self._refuse("imu_duplicate" if same else "imu_out_of_order")
+            return self._refuse(
+                "imu_out_of_order" if time < self._last_imu_time else "imu_duplicate"
+            )
         previous, self._last_imu_time, self._poses_in_a_row = self._last_imu_time, time, 0
         self.counts["imu"] += 1
         step = self._heading.add(time, yaw_rate, yaw, yaw_std or self.config.imu_heading_noise)
-        known = forward is not None and left is not None
-        sample = InertialSample(
-            step.yaw, step.yaw_rate, forward or 0.0, left or 0.0, step.variance, step.known, known
-        )
-        self._imu.add(time, sample)
+        self._imu.add(time, inertial_sample(step, forward, left))
         if self._timeline is not None:
             self._timeline.imu_came(previous)
             self._forget(time)
         self._imu.forget(time - self.config.history - 2.0 * self.config.imu_timeout)
+        self._fuse_waiting(time + self.config.imu_timeout, imu_lives=True)
         return True
 
     def add_pose(self, stamp: float, pose: ArrayLike, covariance: Array | None = None) -> bool:
@@ -139,27 +127,26 @@ class Fusion:
         camera = CameraPose(np.array(pose, float), given_covariance(covariance, self.config))
         if reason := unusable(stamp, camera, covariance):
             return self._refuse(reason)
-        if any(raw.stamp == stamp for raw in self._raw):
+        if any(raw.stamp == stamp for raw in (*self._raw, *self._waiting)):
             return self._refuse("pose_duplicate")
         imu_lives = self._poses_in_a_row < SILENT_POSES
         self._poses_in_a_row += 1
         if imu_lives:
             self._compare_clocks(stamp, camera)
         time = stamp + self._applied
-        if imu_lives and time > self._last_imu_time + self.config.imu_timeout:
-            return self._refuse("pose_from_future")
+        ahead = time - self._last_imu_time - self.config.imu_timeout
+        if imu_lives and ahead > 0.0:
+            if ahead > LONGEST_WAIT:
+                return self._refuse("pose_from_future")
+            self._waiting.append(RawPose(stamp, camera))  # the IMU's samples are still to come
+            return False
+        if not imu_lives:
+            self._fuse_waiting(math.inf, imu_lives)
         old = not imu_lives and time < self._last_pose_time - self.config.history
         self._old_poses = self._old_poses + 1 if old else 0
         if self._old_poses >= OLD_POSES:
             self._restart()
-        if self._timeline is None:
-            return self._start(RawPose(stamp, camera))
-        if self.camera_clock.undecided and math.hypot(*self._timeline.last.x[3:5]) > SWIMS:
-            return self._refuse("pose_clock_undecided")
-        newest = max(self._last_imu_time, self._timeline.last.time)
-        if time <= max(self._timeline.first.time, newest - self.config.history):
-            return self._refuse("pose_too_late")
-        return self._fuse(RawPose(stamp, camera), time, imu_lives)
+        return self._take(RawPose(stamp, camera), imu_lives)
 
     def estimate(self, silence: float = 0.0) -> Estimate | None:
         """State at the newest IMU sample, without an IMU at the newest pose; None before the first.
@@ -194,7 +181,7 @@ class Fusion:
         offset = self.camera_clock.current.offset
         if self.camera_clock.jumps != self._jumps:  # what came before has another offset
             self._jumps, self._applied = self.camera_clock.jumps, offset
-            self._raw.clear()
+            self._raw, self._waiting = deque(), deque()
         if abs(offset - self._applied) > REFIT:
             self.counts["offset_changed"] += 1
             self._applied = offset
@@ -202,12 +189,11 @@ class Fusion:
         self._applied = offset
 
     def _refit(self) -> None:
-        """Fuse the poses of the history anew, at the times that the new offset gives them."""
-        if self._timeline is None or not self._raw:
+        """Fuse the history anew, at the times that the new offset gives; forget biases that wrong times taught."""
+        raws = sorted(self._raw, key=lambda raw: raw.stamp)
+        if self._timeline is None or not raws:
             return
-        known, raws = self._timeline.last, sorted(self._raw, key=lambda raw: raw.stamp)
-        first = raws[0]
-        self._begin(start_moment(first.stamp + self._applied, first.camera.pose, known))
+        self._begin(start_moment(raws[0].stamp + self._applied, raws[0].camera.pose))
         for raw in raws[1:]:
             time = raw.stamp + self._applied
             filter = self._timeline.predict(time)
@@ -217,39 +203,53 @@ class Fusion:
                 self._timeline.insert(time, camera)
         self._models.begin(self._timeline.last.time)
 
+    def _take(self, raw: RawPose, imu_lives: bool) -> bool:
+        """Start with a pose, or fuse it; False if it was not used."""
+        if self._timeline is None:
+            return self._start(raw)
+        if self.camera_clock.undecided and math.hypot(*self._timeline.last.x[3:5]) > SWIMS:
+            return self._refuse("pose_clock_undecided")
+        time, newest = raw.stamp + self._applied, max(self._last_imu_time, self._timeline.last.time)
+        if time <= max(self._timeline.first.time, newest - self.config.history):
+            return self._refuse("pose_too_late")
+        return self._fuse(raw, time, imu_lives)
+
+    def _fuse_waiting(self, until: float, imu_lives: bool) -> None:
+        """Take the poses that wait for the IMU and were taken up to `until` [s] of its clock."""
+        while self._waiting and self._waiting[0].stamp + self._applied <= until:
+            self._take(self._waiting.popleft(), imu_lives)
+
     def _weighted(self, camera: CameraPose, time: float) -> CameraPose:
         """A pose with what makes it uncertain; the filter must hold its prediction for `time` [s]."""
         rate = self._imu.yaw_rate(time) or 0.0
         motion = np.array([*self._filter.x[3:5], rate])
-        return weighted(camera, self._scale, self.camera_clock.current, motion)
+        return weighted(camera, self.noise_scale, self.camera_clock.current, motion)
 
     def _fuse(self, raw: RawPose, time: float, imu_lives: bool) -> bool:
         assert self._timeline is not None
         pose = raw.camera.pose
         filter = self._timeline.predict(time)
-        x, P = filter.x, filter.P
-        speed_std = math.sqrt(max(P[3, 3], P[4, 4]))
+        speed_std = math.sqrt(max(filter.P[3, 3], filter.P[4, 4]))
         yaw = float(self._imu.heading(np.array([time]))[0]) if len(self._imu) else 0.0
-        if self._repeated.check(pose, yaw, math.hypot(x[3], x[4]), speed_std):
+        if self._repeated.check(pose, yaw, math.hypot(*filter.x[3:5]), speed_std):
             return self._refuse("pose_repeated")
         self._raw.append(raw)
         camera = self._weighted(raw.camera, time)
         y, S = filter.innovation(pose, camera.R)
         fits = float(y @ np.linalg.solve(S, y)) <= self.config.gate
         if self.camera_clock.current.sure or not self.camera_clock.contradicted:
-            self._scale.learn(y, S)
+            self.noise_scale.learn(y, S)
         if fits:
             self._candidates.clear()
             return self._accept(time, camera)
-        agreeing = self._candidates.add(time, pose)
         known = self.camera_clock.current.sure or not imu_lives
-        agree = agreeing >= self.config.start_frames
+        agree = self._candidates.add(time, pose) >= self.config.start_frames
         if agree and doubts_motion(y, self._candidates.duration, known):
             fade = float(y @ np.linalg.solve(S, y)) / len(y)
             self.counts["motion_doubted"] += 1
             return self._accept(time, camera._replace(fade=fade))
         self.counts["pose_outlier"] += 1
-        return self._reacquire(time, pose, agreeing)
+        return agree and self._reacquire(time, pose)
 
     def _accept(self, time: float, camera: CameraPose) -> bool:
         assert self._timeline is not None
@@ -283,10 +283,10 @@ class Fusion:
         self.counts["started"] += 1
         return self._begin(start_moment(time, raw.camera.pose))
 
-    def _reacquire(self, time: float, pose: Array, agreeing: int) -> bool:
+    def _reacquire(self, time: float, pose: Array) -> bool:
         """Believe poses that contradict the estimate once they have agreed for long enough."""
-        waited = self._candidates.duration >= self.config.reacquire_time
-        if self._timeline is None or agreeing < self.config.start_frames or not waited:
+        assert self._timeline is not None
+        if self._candidates.duration < self.config.reacquire_time:
             return False
         self.counts["reacquired"] += 1
         return self._begin(start_moment(time, pose, self._timeline.last))

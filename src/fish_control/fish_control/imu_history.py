@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_control.imu_heading import HeadingStep
+
 Array = NDArray[np.float64]
 CAPACITY = 4096  # rows; the older half is dropped when they are full
 
@@ -29,6 +31,13 @@ class InertialSample(NamedTuple):
     )
     yaw_known: bool = True  # whether the heading was measured since the sample before
     accel_known: bool = True
+
+
+def inertial_sample(step: HeadingStep, forward: float | None, left: float | None) -> InertialSample:
+    """A sample from what it adds to the heading and its specific force [m/s^2]; None: not measured."""
+    known = forward is not None and left is not None
+    force = forward or 0.0, left or 0.0
+    return InertialSample(step.yaw, step.yaw_rate, *force, step.variance, step.known, known)
 
 
 class Step(NamedTuple):

@@ -700,3 +700,17 @@ def test_camera_offset_moves_the_stamps():
 def test_config_names_field_and_value(field, value):
     with pytest.raises(ValueError, match=f"{field} is {value!r}, expected a finite number > "):
         FusionConfig(**{field: value})
+
+
+def gap(events, first, last):
+    """Events without the IMU's samples between two times [s]."""
+    return [e for e in events if not (e[1] == "imu" and first < e[2] < last)]
+
+
+@pytest.mark.parametrize("silence", [0.15, 0.3, 0.6])
+def test_poses_that_come_while_the_imu_pauses_are_used(silence):
+    fusion = Fusion()
+    feed(fusion, gap(measurements(4.0, latency=0.0), 2.0, 2.0 + silence))
+    assert fusion.counts["pose_from_future"] == 0
+    assert fusion.counts["pose"] >= 115  # of 120, three of which start it
+    assert np.all(np.abs(pose_error(fusion.estimate())) < [0.01, 0.01, 0.03])
