@@ -67,8 +67,13 @@ def find_pool(
     ideal = ideal_picture(picture, lens)
     found = rectangles(straight_lines(ideal), ideal, length, width)
     fitter = OutlineFitter(picture, lens, length, width)
-    fits = [fitter.fit(rectangle.R, rectangle.t) for rectangle in found]
-    best = _chosen([fit for fit in fits if fit is not None], lens, sides)
+    fits: list[OutlineFit] = []
+    for rectangle in found:
+        start = project(fitter.corners, cv2.Rodrigues(rectangle.R)[0], rectangle.t, lens)
+        if all(_apart(start, fit.corners) > SAME * max(lens.size) for fit in fits):
+            fit = fitter.fit(rectangle.R, rectangle.t)
+            fits += [fit] if fit is not None else []
+    best = _chosen(fits, lens, sides)
     turned = _turned(fitter.corners, best, lens, sides, x_points)
     pixels = project(turned, best.rotation, best.t, lens)
     places = np.column_stack([fitter.corners[:, :2], np.full(4, height)])
@@ -99,7 +104,7 @@ def _chosen(fits: Sequence[OutlineFit], lens: Lens, sides: tuple[float, float]) 
     largest = max(f.size for f in good)
     best = min((f for f in good if f.size >= NEAR * largest), key=lambda f: f.rms)
     for other in good:
-        apart = float(np.abs(other.corners - _nearest(other.corners, best.corners)).max())
+        apart = _apart(other.corners, best.corners)
         beside = (
             cv2.pointPolygonTest(
                 best.corners.astype(np.float32), other.corners.mean(axis=0).tolist(), False
@@ -117,11 +122,9 @@ def _chosen(fits: Sequence[OutlineFit], lens: Lens, sides: tuple[float, float]) 
     return best
 
 
-def _nearest(corners: Array, others: Array) -> Array:
-    """(4, 2) of the other corners the nearest to each."""
-    distance = np.linalg.norm(corners[:, None] - others, axis=2)
-    nearest: Array = others[np.argmin(distance, axis=1)]
-    return nearest
+def _apart(corners: Array, others: Array) -> float:
+    """Greatest distance of a corner (4, 2) from the nearest of the others, pixels."""
+    return float(np.linalg.norm(corners[:, None] - others, axis=2).min(axis=1).max())
 
 
 def _turned(

@@ -22,7 +22,7 @@ SUPPORT_SIDE, SUPPORT = (
 NEAR = 2.5  # pixels from an edge that still supports a side
 SAMPLES = 48  # points of a side
 SAME = 3.0  # pixels between the corners of two rectangles that are one
-MOST = 80  # rectangles, the largest first
+MOST = 250  # rectangles, the largest first
 TRIED = 20000  # largest combinations whose edges are looked at
 
 

@@ -140,10 +140,9 @@ def _find(
         cv2.circle(shown, (u, v), 2, EDGE, 1, cv2.LINE_AA)
     write_picture(marked, shown)
     _write(out, found.mount)
-    worst = min(found.seen)
     print(
         f"{out}: outline of {args.pool} m found, {len(found.points)} edge points, error {found.rms:.2f} pixels rms, "
-        f"{found.millimetres:.1f} mm on the water plane, each side seen along {100 * worst:.0f} % or more, camera "
+        f"{found.millimetres:.1f} mm on the water plane, at least {100 * min(found.seen):.0f} % of each side seen, camera "
         f"{found.mount.position[2]:.3f} m high; {marked} shows it: the outline must lie on the walls at the water"
     )
 
