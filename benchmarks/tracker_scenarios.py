@@ -214,6 +214,11 @@ def speed(count: int) -> None:
             plain.pose(picture)
             if isinstance(found, Detection) and not found.whole_image:
                 times.append((between - start, thread_time() - between))
+        if not times:
+            print(
+                f"{config.width} x {config.height}: no frame in the region of interest; expected --speed 2 or more"
+            )
+            continue
         own, other = np.median(times, axis=0)
         print(
             f"{config.width} x {config.height}: tracker {1 / own:.0f} frames/s, plain OpenCV pipeline "

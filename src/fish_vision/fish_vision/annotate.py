@@ -35,10 +35,10 @@ def annotated(
     return _text(picture, numbers, WHITE)
 
 
-def drawn_pool(image: Image, calibration: Calibration) -> Image:
-    """Copy of an image with the pool's outline."""
+def drawn_pool(image: Image, calibration: Calibration, sides: tuple[float, float] = POOL) -> Image:
+    """Copy of an image with the pool's outline; sides: along x and y, m."""
     picture = image.copy()
-    _line(picture, calibration, _outline(), WHITE, closed=True)
+    _line(picture, calibration, _outline(sides), WHITE, closed=True)
     return picture
 
 
@@ -52,9 +52,9 @@ def tail_points(found: Detection, config: TrackerConfig) -> np.ndarray:
     return np.array(points)
 
 
-def _outline(points: int = 20) -> np.ndarray:
+def _outline(walls: tuple[float, float], points: int = 20) -> np.ndarray:
     """(N, 2) points along the pool's walls, m: many, because the lens bends them."""
-    x, y = POOL[0] / 2, POOL[1] / 2
+    x, y = walls[0] / 2, walls[1] / 2
     corners = np.array([[x, y], [-x, y], [-x, -y], [x, -y], [x, y]])
     sides = itertools.pairwise(corners)
     return np.vstack([np.linspace(a, b, points, endpoint=False) for a, b in sides])

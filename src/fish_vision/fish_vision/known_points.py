@@ -31,9 +31,9 @@ class KnownPoints:
         return KnownPoints(names, self.places[chosen], seen, self.tags)
 
 
-def pool_corners() -> KnownPoints:
-    """The corners of the walls' inner faces at the water."""
-    x, y = POOL[0] / 2, POOL[1] / 2
+def pool_corners(sides: tuple[float, float] = POOL) -> KnownPoints:
+    """The corners of the walls' inner faces at the water; sides: along x and y, m."""
+    x, y = sides[0] / 2, sides[1] / 2
     places = np.array([[x, y], [-x, y], [-x, -y], [x, -y]])
     return KnownPoints(tuple(_name(place) for place in places), places)
 

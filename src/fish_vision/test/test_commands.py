@@ -185,6 +185,50 @@ def test_calibrate_mount_finds_tags_at_known_places(files: Path, monkeypatch, ca
     assert "tags none of 7, 3, 4, 9, 20 were found: expected 4" in capsys.readouterr().err
 
 
+@pytest.fixture
+def pond(files: Path) -> Path:
+    """The working directory with pond.png: a pool of 4 x 2 m with a pale rim, and its fish."""
+    picture = np.full((720, 1280, 3), (112, 116, 118), np.uint8)
+    for length, width, colour in ((4.1, 2.1, (205, 205, 200)), (4.0, 2.0, (190, 165, 90))):
+        half = np.array([length, width]) / 2
+        corners = calibration().pool_to_pixel([half, half * [-1, 1], -half, half * [1, -1]])
+        cv2.fillPoly(picture, [np.round(corners * 16).astype(np.int32)], colour, cv2.LINE_AA, 4)
+    cv2.imwrite(str(files / "pond.png"), picture)
+    return files
+
+
+def test_calibrate_mount_finds_the_pools_outline(pond: Path, monkeypatch, capsys) -> None:
+    given = ("mount", "--find", "--lens", "lens.yaml", "--image", "pond.png")
+    assert call(calibrate, monkeypatch, *given, "--pool", "4x2") == 0
+    config = config_from_file(pond / "mount.yaml")
+    assert config.camera_position == pytest.approx(CONFIG.camera_position, abs=0.01)
+    printed = capsys.readouterr().out
+    assert re.search(r"error 0\.\d+ pixels rms, \d\.\d mm on the water plane", printed)
+    drawn = cv2.imread(str(pond / "mount.png"))
+    assert np.any(drawn != cv2.imread(str(pond / "pond.png")))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--image", "pond.png", "--pool", "5x2"), "no rectangle of 5 x 2 m"),
+        (("--image", "pond.png", "--pool", "4"), "--pool 4: expected sides in metres"),
+        (("--image", "pond.png", "--pool", "4xnan"), "--pool 4xnan: expected sides in metres"),
+        ((), "--find needs a picture and no list of points"),
+        (("points.csv", "--image", "pond.png"), "--find needs a picture and no list of points"),
+        (("--image", "none.png"), "none.png: no such picture"),
+    ],
+)
+def test_calibrate_mount_finds_nothing_rather_than_something_wrong(
+    pond: Path, monkeypatch, capsys, given: tuple[str, ...], message: str
+) -> None:
+    assert call(calibrate, monkeypatch, "mount", "--find", "--lens", "lens.yaml", *given) == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (pond / "mount.yaml").exists()
+
+
 class Person:
     """Runs a command that serves a page, and clicks there."""
 

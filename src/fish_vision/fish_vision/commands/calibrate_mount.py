@@ -12,7 +12,15 @@ import yaml
 
 from fish_vision.annotate import drawn_pool
 from fish_vision.calibrate import POINTS_MIN, mount_from_points
-from fish_vision.calibration import Array, Calibration, CalibrationError, Lens, Mount, read_lens
+from fish_vision.calibration import (
+    POOL,
+    Array,
+    Calibration,
+    CalibrationError,
+    Lens,
+    Mount,
+    read_lens,
+)
 from fish_vision.commands.pictures import (
     add_picture_arguments,
     new_file,
@@ -21,12 +29,13 @@ from fish_vision.commands.pictures import (
 )
 from fish_vision.known_points import KnownPoints, pool_corners, read_points
 from fish_vision.picking import PickingPage, Points
+from fish_vision.pool_outline import X_POINTS, find_pool
 from fish_vision.segmentation import Image
 from fish_vision.tags import TagDetector
 
 RMS_LIMIT = 5.0  # pixels; worse points are swapped or mistyped
 TAG_LEAST = 12.0  # pixels, shortest side of a tag that is looked for
-MARK = (60, 60, 255)  # blue, green, red
+MARK, EDGE = (60, 60, 255), (60, 230, 60)  # blue, green, red
 
 
 def add_parser(verbs: Any) -> None:
@@ -39,10 +48,26 @@ def add_parser(verbs: Any) -> None:
         nargs="?",
         type=Path,
         help="CSV in the pool frame, m, with header x,y,u,v (pixels are known), x,y (to click on a page) or id,x,y "
-        "(middles of coded tags); without it the pool's corners are clicked",
+        "(middles of coded tags); without it the pool's corners are clicked, or found with --find",
     )
     mount.add_argument("--lens", required=True, type=Path, help="file written by `calibrate lens`")
     add_picture_arguments(mount)
+    mount.add_argument(
+        "--find",
+        action="store_true",
+        help="find the pool's outline in the picture instead of having its corners clicked",
+    )
+    mount.add_argument(
+        "--pool",
+        default=f"{POOL[0]:g}x{POOL[1]:g}",
+        help=f"the pool's sides along x and y at the water, m ({POOL[0]:g}x{POOL[1]:g})",
+    )
+    mount.add_argument(
+        "--x-points",
+        choices=X_POINTS,
+        default="right",
+        help="with --find: where the pool's x axis points in the picture (right)",
+    )
     mount.add_argument("--dictionary", default="4X4_50", help="of the tags")
     mount.add_argument("--port", type=int, default=0, help="of the page; 0 takes a free one")
     mount.add_argument("--height", type=float, default=0.0, help="of the points above the water, m")
@@ -59,7 +84,11 @@ def calibrate_mount(args: argparse.Namespace) -> None:
     """Write a params file with camera_position and camera_tilt, and a picture of the points."""
     out, marked = new_file(args.out), new_file(args.picture)
     lens = read_lens(args.lens)
-    known = read_points(args.points) if args.points else pool_corners()
+    sides = _sides(args.pool)
+    if args.find:
+        _find(args, lens, sides, out, marked)
+        return
+    known = read_points(args.points) if args.points else pool_corners(sides)
     picture = one_picture(args, lens)
     if known.pixels is None and picture is None:
         raise CalibrationError("these points have no pixels: expected --image or --topic")
@@ -72,13 +101,56 @@ def calibrate_mount(args: argparse.Namespace) -> None:
             f"{args.points or 'clicked points'}: the points fit to {rms:.1f} pixels rms only: expected below {RMS_LIMIT}; "
             "a point is mistaken or the lens file is of another camera"
         )
-    write_picture(marked, _drawn(picture, lens, mount, known, args.height))
-    values = {"camera_position": list(mount.position), "camera_tilt": list(mount.tilt)}
-    out.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
+    write_picture(marked, _drawn(picture, lens, mount, known, args.height, sides))
+    _write(out, mount)
     print(
         f"{out}: {len(known.places)} points, error {rms:.2f} pixels rms, {millimetres:.1f} mm on the water plane, camera "
         f"{mount.position[2]:.3f} m high; {marked} shows it"
     )
+
+
+def _sides(text: str) -> tuple[float, float]:
+    """Sides of the pool as LENGTHxWIDTH, m."""
+    try:
+        length, width = (float(side) for side in text.lower().split("x"))
+        able = all(0.1 <= side <= 100.0 for side in (length, width))
+    except ValueError:
+        able = False
+    if not able:
+        raise CalibrationError(
+            f"--pool {text}: expected sides in metres, 0.1 to 100, like 4.27x2.13"
+        )
+    return length, width
+
+
+def _find(
+    args: argparse.Namespace, lens: Lens, sides: tuple[float, float], out: Path, marked: Path
+) -> None:
+    """Mount from the pool's outline in the picture."""
+    picture = one_picture(args, lens)
+    if args.points or picture is None:
+        raise CalibrationError(
+            "--find needs a picture and no list of points: expected --image or --topic"
+        )
+    found = find_pool(picture, lens, sides, args.height, args.x_points)
+    known = pool_corners(sides)
+    corners = KnownPoints(known.names, known.places, found.corners)
+    shown = _drawn(picture, lens, found.mount, corners, args.height, sides)
+    for u, v in np.round(found.points).astype(int).tolist():
+        cv2.circle(shown, (u, v), 2, EDGE, 1, cv2.LINE_AA)
+    write_picture(marked, shown)
+    _write(out, found.mount)
+    print(
+        f"{out}: outline of {args.pool} m found, {len(found.points)} edge points, error {found.rms:.2f} pixels rms, "
+        f"{found.millimetres:.1f} mm on the water plane, at least {100 * min(found.seen):.0f} % of each side seen, camera "
+        f"{found.mount.position[2]:.3f} m high; {marked} shows it: the outline must lie on the walls at the water"
+    )
+
+
+def _write(out: Path, mount: Mount) -> None:
+    """The params file."""
+    values = {"camera_position": list(mount.position), "camera_tilt": list(mount.tilt)}
+    out.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
 
 
 def _located(
@@ -96,7 +168,7 @@ def _located(
         chosen = known.at(points)
         try:
             mount, rms, millimetres = _fit(lens, chosen, args.height)
-            shown = _drawn(picture, lens, mount, chosen, args.height)
+            shown = _drawn(picture, lens, mount, chosen, args.height, _sides(args.pool))
         except CalibrationError as error:
             return str(error), None
         return f"error {rms:.2f} pixels rms, {millimetres:.1f} mm on the water plane", shown
@@ -138,11 +210,18 @@ def _fit(lens: Lens, known: KnownPoints, height: float) -> tuple[Mount, float, f
     return mount, rms, 1e3 * float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
 
 
-def _drawn(picture: Image, lens: Lens, mount: Mount, known: KnownPoints, height: float) -> Image:
+def _drawn(
+    picture: Image,
+    lens: Lens,
+    mount: Mount,
+    known: KnownPoints,
+    height: float,
+    sides: tuple[float, float],
+) -> Image:
     """Copy of a picture with the pool's outline, the points where they were seen and where the mount shows them."""
     assert known.pixels is not None
     calibration = Calibration(lens, mount, height)
-    result = drawn_pool(picture, calibration)
+    result = drawn_pool(picture, calibration, sides)
     for name, seen, shown in zip(
         known.names, known.pixels, calibration.pool_to_pixel(known.places), strict=True
     ):
