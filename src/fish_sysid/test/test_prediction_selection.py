@@ -21,7 +21,7 @@ from fish_sysid.estimation.shooting.fold_steps import fold_steps
 from fish_sysid.estimation.shooting.multistep import LARGEST_STEP
 from fish_sysid.estimation.shooting.prediction_fit import (
     fit_predictions,
-    more_links,
+    other_links,
     prediction_hypothesis,
 )
 from fish_sysid.estimation.shooting.residuals import SENSORS
@@ -121,9 +121,9 @@ def test_a_step_without_a_fold_is_the_fit_without_it_where_errors_are_linear() -
 
 
 @pytest.mark.parametrize("true", [1, 2])
-def test_more_links_must_predict_trials_left_out_better(true: int) -> None:
+def test_another_number_of_links_must_predict_trials_left_out_better(true: int) -> None:
     experiment = swum(Robot(links=true))
-    found, steps = more_links(experiment, fitted(experiment), Robot(links=1), FREE, (2,))
+    found, steps = other_links(experiment, fitted(experiment), Robot(links=1), FREE, (2,))
     assert found.hypothesis.robot.links == true
     assert [(step.name, step.added) for step in steps] == [("2 links", true == 2)]
 

@@ -35,7 +35,7 @@ from fish_sysid.estimation.shooting.trust import trusted
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-LINKS = (1, 2, 3)
+LINKS = (2, 1, 3)  # numbers of links in the order that they are tried in
 MOST_STARTS, QUICK_ROUNDS = 120, 2  # of a quick fit
 HELD = ("servo_rate_limit",)  # takes the place of any delay of the rudder
 PLACE = f"{MARKER}.{AHEAD}"  # of the camera's point
@@ -50,7 +50,7 @@ class PredictionFit:
     steps: tuple[Step, ...]  # every effect that was judged
     covariance: Array  # (P, P) of z, clustered by trial
     spread: Array  # (P,) standard deviation of z over fits without a fold each, times the jackknife's factor
-    links_judged: tuple[Step, ...]  # every number of links beyond the fewest that was judged
+    links_judged: tuple[Step, ...]  # every other number of links that was judged
 
     @property
     def robot(self) -> Robot:
@@ -131,10 +131,11 @@ def fit_predictions(
 ) -> PredictionFit:
     """The robot that predicts these trials best, with `effects` and those of `choose_from` that left-out trials ask for.
 
+    links: numbers of links; the first is fitted, the others must predict left-out trials better.
     together: those of `choose_from` that are fitted from the start and must then earn their place; the others must earn it one
     after the other. start: strength in typical ones, at which the fit of `effects` and `together` starts.
     """
-    first, *more = sorted(links)
+    first, *others = links
     at_once = [name for name in together if name in choose_from and name not in effects]
     begun = (*effects, *at_once)
     hypothesis = prediction_hypothesis(with_links(robot, first), experiment, free, begun, start)
@@ -146,7 +147,7 @@ def fit_predictions(
         rest = [name for name in choose_from if name not in at_once]
         found, added = choose(experiment, found, rest, report)
         steps = (*steps, *kept, *added)
-    found, judged = more_links(experiment, found, robot, free, more, report)
+    found, judged = other_links(experiment, found, robot, free, others, report)
     report("predictions over 0.5 to 5 s, last steps")
     found = polished(experiment, trusted(experiment, polished(experiment, found)))
     report("standard errors")
@@ -167,19 +168,24 @@ def quick_robot(experiment: Experiment, robot: Robot, free: Sequence[str]) -> Ro
     return ShotParametrization(found.hypothesis).robot(found.z[: -len(SENSORS)])
 
 
-def more_links(
+def other_links(
     experiment: Experiment,
     found: Found,
     robot: Robot,
     free: Sequence[str],
-    more: Sequence[int],
+    others: Sequence[int],
     report: Report = lambda _: None,
 ) -> tuple[Found, tuple[Step, ...]]:
-    """(the fit, or one of more links that trials left out ask for, what was judged)."""
+    """(the fit, or one of other numbers of links that trials left out ask for, what was judged).
+
+    Only neighbours are tried: where one link is better than two, three are not asked.
+    """
     steps: list[Step] = []
     if len(experiment.names) < FOLDS:
         return found, ()
-    for count in more:
+    for count in others:
+        if abs(count - found.hypothesis.robot.links) > 1:
+            continue
         found, control = left_out_costs(experiment, found)
         names = tuple(
             name for name in found.hypothesis.names if name in found.hypothesis.robot.table
@@ -189,15 +195,14 @@ def more_links(
         )
         if RANGE in found.hypothesis.free:
             hypothesis = with_end(hypothesis, found.hypothesis.robot.parameters[RANGE])
-        longer = replace(best_start(experiment, hypothesis, report), trust=found.trust)
+        other = replace(best_start(experiment, hypothesis, report), trust=found.trust)
         report(f"{count} links: leaving trials out")
-        longer, costs = left_out_costs(experiment, longer)
+        other, costs = left_out_costs(experiment, other)
         step = judged(f"{count} links", control, costs)
         better = step.sure
         steps.append(replace(step, added=better))
-        if not better:
-            break
-        found = longer
+        if better:
+            found = other
     return found, tuple(steps)
 
 
