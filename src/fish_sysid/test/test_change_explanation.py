@@ -1,7 +1,10 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Which name, how many, and at which level: the rules by which a change is explained."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -18,6 +21,11 @@ from fish_sysid.diagnosis.change.compare import LOOKS
 from fish_sysid.diagnosis.change.contenders import Contender, family_alone, weighed
 from fish_sysid.diagnosis.change.explanation import explained, swapped_in, telling
 from fish_sysid.diagnosis.change.naming import Judged
+from fish_sysid.diagnosis.change.permutation_test import (
+    permutation_p_value,
+    rank,
+    sets_in_place,
+)
 from fish_sysid.diagnosis.change.rows import look, trial_rows
 from fish_sysid.diagnosis.change.shared_fit import regression
 from fish_sysid.diagnosis.change.strength import Refitted, refit
@@ -160,3 +168,28 @@ def test_so_little_of_an_effect_is_not_said(days) -> None:
         values = refit(case.fit, case.rows, case.robot, case.new, case.days, seen)
         assert values.parameters["offset"].value == pytest.approx(offset, abs=0.004)
         assert ("too little of it" in values.refused) == said
+
+
+def test_where_nothing_changed_every_rank_is_as_likely_as_any() -> None:
+    """All 70 sets of four of eight trials in NEW's place: each rank comes up once, whatever the trials are like."""
+    odd = np.random.default_rng(8).standard_t(2, size=8)
+    gains = []
+    for new in itertools.combinations(range(8), 4):
+        sets = sets_in_place([0] * 8, np.array(new), np.random.default_rng(0), 200)
+        assert len(sets) == 70
+        means = np.array([abs(odd[list(s)].mean()) for s in sets])
+        gains.append(rank(means)[0])
+    assert np.sort(gains) == pytest.approx(np.arange(1, 71) / 70, abs=1 / 70 + 1e-9)
+    assert np.mean(np.array(gains) <= 0.1) <= 0.1
+
+
+def test_a_flow_is_the_rarest_of_all_sets_and_nothing_is_not(days) -> None:
+    old, new = days
+    flow = looks_at(old, with_injection(new, "current", {"x": 0.03, "y": -0.02}))
+    same = looks_at(old, new)
+    strata = [0] * (OLD + NEW)
+    changed, unchanged = (
+        permutation_p_value([c.fit for c in x], strata, 200) for x in (flow, same)
+    )
+    assert changed == pytest.approx(1 / 201)
+    assert unchanged > 0.02

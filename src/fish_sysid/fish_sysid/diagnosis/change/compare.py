@@ -25,6 +25,7 @@ from fish_sysid.diagnosis.change.comparable import (
     screened,
 )
 from fish_sysid.diagnosis.change.explanation import NAMES, explained
+from fish_sysid.diagnosis.change.permutation_test import permutation_p_value
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, STROKES, look, trial_rows
 from fish_sysid.diagnosis.change.rudder_change import (
     RudderChange,
@@ -33,7 +34,7 @@ from fish_sysid.diagnosis.change.rudder_change import (
 )
 from fish_sysid.diagnosis.change.servos import with_servo
 from fish_sysid.diagnosis.change.shared_fit import regression
-from fish_sysid.diagnosis.change.swap_test import Swapped, at_once, swap_test
+from fish_sysid.diagnosis.change.swap_test import Swapped, swap_test
 from fish_sysid.diagnosis.symmetry.applied import in_still_water
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
@@ -104,8 +105,9 @@ def _compare(
         case = Case(channels, fit, kept_old, kept_new, strata, day_of, model, new, new_days)
         found[name] = case, swap_test(fit, strata, days=day_of)
     looks, tests = [case for case, _ in found.values()], [swapped for _, swapped in found.values()]
-    p_value = at_once(tests)
     seen = min(found, key=lambda name: found[name][1].p_value)
+    by_trials = permutation_p_value([case.fit for case in looks], strata)
+    p_value = max(by_trials, found[seen][1].of_days)
     base = Change(
         "unchanged", p_value=p_value, look=seen, left_out=(*told, *more), robot=model, old=old, new=new,
         camera_delay=delay, symmetry=symmetry, rarities=found[seen][1].rarity,

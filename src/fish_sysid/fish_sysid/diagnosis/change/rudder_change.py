@@ -21,7 +21,7 @@ SECOND_LEVEL = 0.1  # p-value up to which the gyro's answer helps to name what a
 
 @dataclass(frozen=True)
 class RudderChange:
-    """What the test says, with its p-value by exchanged trials."""
+    """What the test says, with its p-value by sets of trials in NEW's place."""
 
     p_value: float
     named: Named

@@ -5,7 +5,7 @@
 Stroke means take a second together, in which a lag and a delay look the same. OLD's gyro is regressed on the past of the rudder
 and of the rotor's commands: a finite impulse response on a grid of 20 ms. NEW's commands go through a servo before they go into
 OLD's response. Which servo predicts NEW's gyro best, its number found on NEW's other trials, is judged trial by trial. No model
-of the fish takes part. The p-value is that of exchanged trials, as in `swap_test`.
+of the fish takes part. The p-value is NEW's rank among sets of trials in its place, as in `permutation_test`.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.change.permutation_test import SETS, rank, sets_in_place
 from fish_sysid.diagnosis.change.servos import SERVOS, lagged
-from fish_sysid.diagnosis.change.swap_test import SWAPS, Index, exchanges
-from fish_sysid.diagnosis.change.tail_probability import tail_probability
+from fish_sysid.diagnosis.change.swap_test import Index
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.diagnosis.symmetry.regression import jackknife
 
@@ -52,7 +52,7 @@ class StepResponse:
 
 
 def step_response(
-    old: Experiment, new: Experiment, strata: Sequence[int], swaps: int = SWAPS
+    old: Experiment, new: Experiment, strata: Sequence[int], count: int = SETS
 ) -> StepResponse | None:
     """The answer; None where a trial's gyro or rudder says too little. strata (M,): OLD's trials first, then NEW's."""
     parts = [_Trial.of(e, m) for e in (old, new) for m in range(len(e.names))]
@@ -62,9 +62,8 @@ def step_response(
     rows = np.arange(len(old.names), len(trials))
     observed = _judged(trials, rows)
     pooled = _Pooled.of(trials)
-    random = np.random.default_rng(0)
-    null = np.array([pooled.gain(some) for some in exchanges(strata, rows, random, swaps)])
-    p = tail_probability(null, pooled.gain(rows))
+    sets = sets_in_place(strata, rows, np.random.default_rng(0), count)
+    p = float(rank(np.array([pooled.gain(some) for some in sets]))[0])
     answers = [
         Answered(name, gains, _estimate(name, losses)) for name, (gains, losses) in observed.items()
     ]

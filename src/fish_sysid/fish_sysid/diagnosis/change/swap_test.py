@@ -1,11 +1,12 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Is NEW different? Trials of OLD and NEW exchanged at random: what a candidate gains then is the null.
+"""What in NEW is rare? Trials of OLD and NEW exchanged at random: what a candidate gains then is the null.
 
 Each name has a statistic of its own, whose rarity is that among exchanged trials. The rarest name counts, and how rare that is
 among the rarest of exchanged trials is the p-value (Westfall and Young 1993, min-p): by its count, or by the tail where that is
 less. An exchanged set that keeps most of NEW's trials looks as changed as NEW does and is no null: of a change it would say how
-little the trials weigh that it leaves out. Sets that share more trials with NEW than random sets do in the mean take no part.
+little the trials weigh that it leaves out. Sets that share more trials with NEW than random sets do in the mean take no part, and
+`permutation_test` says at which level such p-values stand.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def swap_test(
     must be larger than that from any of these days to the others.
     """
     random = np.random.default_rng(seed)
-    gains = _Gains(fit, taken)
+    gains = Gains(fit, taken)
     null = gains.of(exchanges(strata, gains.new, random, swaps))
     tails = Tails.of(null)
     counts = [not n.startswith(PARAMETER) for n in gains.names]
@@ -90,11 +91,7 @@ def exchanges(
 
     None shares more trials with NEW than random sets do in the mean, or than one.
     """
-    kinds, found = np.asarray(strata), {}
-    most = max(
-        1,
-        int(sum((kinds[new] == k).sum() ** 2 / (kinds == k).sum() for k in np.unique(kinds[new]))),
-    )
+    kinds, found, most = np.asarray(strata), {}, most_shared(strata, new)
     for _ in range(6 * count):
         chosen = []
         for kind in np.unique(kinds[new]):
@@ -108,6 +105,13 @@ def exchanges(
     return list(found.values())
 
 
+def most_shared(strata: Sequence[int], new: Index) -> int:
+    """How many trials random sets share with NEW in the mean, one at least."""
+    kinds = np.asarray(strata)
+    some = np.unique(kinds[new])
+    return max(1, int(sum((kinds[new] == k).sum() ** 2 / (kinds == k).sum() for k in some)))
+
+
 def single_days(days: Sequence[int], old: int) -> list[Index]:
     """The trials of each day of OLD, whose trials come first; none where OLD is one day."""
     of_old = np.asarray(days, dtype=np.int64)[:old]
@@ -115,7 +119,7 @@ def single_days(days: Sequence[int], old: int) -> list[Index]:
     return found if len(found) > 1 else []
 
 
-class _Gains:
+class Gains:
     """What each name gains when it acts in some trials alone, beside what is shared and the names taken."""
 
     def __init__(self, fit: Regression, taken: Sequence[Key]) -> None:
