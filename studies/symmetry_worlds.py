@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """How often the symmetry tests name a flow or a clock where there is one, and where there is none.
 
     python studies/symmetry_worlds.py [--worlds 100] [--mujoco 20] [--seed 1]

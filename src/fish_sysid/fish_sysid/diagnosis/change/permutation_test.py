@@ -1,3 +1,5 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
 """Is NEW different, at the level that is asked? NEW's rank among sets of trials that stand in its place.
 
 `swap_test` says how rare what NEW shows is among sets that share few trials with NEW. That is powerful, and small too often where
