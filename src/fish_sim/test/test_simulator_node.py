@@ -20,6 +20,7 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from fish_node import rivals
@@ -222,9 +223,13 @@ def test_in_lockstep_time_stands_while_the_tracker_lags(bench):
     """A busy computer draws and tracks late; poses that come later and later look like a clock that was set."""
     poses = bench.peer.create_publisher(PoseWithCovarianceStamped, "camera/pose", 10)
     bench.until(lambda: poses.get_subscription_count() >= 3)  # the arming, lockstep, this bench
-    for _ in range(3):
+    words = bench.peer.create_publisher(Header, "lockstep", 10)
+    for kind in ("pose", "pose", "no pose"):
         seen = bench.collect("sim/odometry", 1)[0].header
-        poses.publish(PoseWithCovarianceStamped(header=seen))
+        if kind == "pose":
+            poses.publish(PoseWithCovarianceStamped(header=seen))
+        else:
+            words.publish(Header(stamp=seen.stamp, frame_id="tracker"))
 
         def lag(seen=seen) -> float:
             bench.command(0.0, 0.0, bench.got["sim/odometry"][-1].header.stamp)

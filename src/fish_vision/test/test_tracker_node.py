@@ -23,6 +23,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
+from std_msgs.msg import Header
 
 from fish_vision.config import config_from_file
 from fish_vision.nodes.tracker import TrackerNode
@@ -46,12 +47,14 @@ class Bench:
         self.info = self.peer.create_publisher(CameraInfo, "camera/camera_info", 10)
         self.jpeg = self.peer.create_publisher(CompressedImage, "camera/image_raw/compressed", 10)
         self.raw = self.peer.create_publisher(Image, "camera/image_raw", 10)
-        self.got: dict[str, list] = {"pose": [], "tail": [], "debug": [], "diagnostics": []}
+        self.got: dict[str, list] = {"pose": [], "tail": [], "debug": []}
+        self.got |= {"diagnostics": [], "lockstep": []}
         for name, kind, topic in (
             ("pose", PoseWithCovarianceStamped, "camera/pose"),
             ("tail", JointState, "camera/tail"),
             ("debug", CompressedImage, "camera/debug/compressed"),
             ("diagnostics", DiagnosticArray, "/diagnostics"),
+            ("lockstep", Header, "lockstep"),
         ):
             self.peer.create_subscription(kind, topic, self.got[name].append, 10)
         self.executor = SingleThreadedExecutor()
@@ -166,6 +169,17 @@ def test_pose_and_tail_come_with_the_stamp_of_the_image(bench: Bench) -> None:
     assert tail.name == ["tail_1", "tail_2", "tail_3"]
     assert list(tail.position) == pytest.approx([0.3, -0.2, 0.1], abs=0.1)
     assert bench.says("fish seen in all 1 images")
+
+
+def test_an_image_without_the_fish_is_said_to_who_waits_for_its_pose(bench: Bench) -> None:
+    bench.send_info()
+    bench.send_jpeg(to_jpeg(draw([])))
+    assert bench.spin_until(lambda: bench.got["lockstep"])
+    said = bench.got["lockstep"][-1]
+    assert (said.frame_id, said.stamp.nanosec) == ("tracker", bench.frame * 33_000_000)
+    bench.send_jpeg(to_jpeg(PICTURE))
+    assert bench.spin_until(lambda: bench.got["pose"])
+    assert len(bench.got["lockstep"]) == 1
 
 
 @pytest.mark.parametrize("bench", [{"use_raw": True}], indirect=True)

@@ -4,7 +4,7 @@
 
 In: odometry/filtered, and anybody who speaks on lockstep (std_msgs/Header: frame_id is who, stamp how far). With
 lockstep_camera also camera/pose: on a busy computer camera and tracker lag by more than anything else, and poses that come
-later and later look to fusion as if a clock had been set.
+later and later look to fusion as if a clock had been set. The tracker says on lockstep which image gives no pose.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from fish_sim.nodes.lockstep import Lockstep
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 QUEUE = 10
+POSES, TRACKER = "camera/pose", "tracker"
 
 
 def hear_lockstep(
@@ -37,17 +38,19 @@ def hear_lockstep(
     """
 
     def on_other(message: Header) -> None:
-        lockstep.answered(message.frame_id, simulated(message.stamp))
+        time = simulated(message.stamp)
+        if camera > 0.0 and message.frame_id == TRACKER:
+            lockstep.answered(POSES, time + camera)
+        else:
+            lockstep.answered(message.frame_id, time)
 
     def on_odometry(data: bytes) -> None:
         lockstep.answered("odometry/filtered", simulated(read_stamp(data)))
 
     def on_pose(data: bytes) -> None:
-        lockstep.answered("camera/pose", simulated(read_stamp(data)) + camera)
+        lockstep.answered(POSES, simulated(read_stamp(data)) + camera)
 
     node.create_subscription(Header, "lockstep", on_other, QUEUE)
     node.create_subscription(Odometry, "odometry/filtered", on_odometry, QUEUE, raw=True)
     if camera > 0.0:
-        node.create_subscription(
-            PoseWithCovarianceStamped, "camera/pose", on_pose, NEWEST, raw=True
-        )
+        node.create_subscription(PoseWithCovarianceStamped, POSES, on_pose, NEWEST, raw=True)

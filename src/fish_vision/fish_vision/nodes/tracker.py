@@ -5,7 +5,8 @@
 In: camera/image_raw/compressed (sensor_msgs/CompressedImage) or, with use_raw, camera/image_raw
 (sensor_msgs/Image, from a reliable publisher); camera/camera_info (sensor_msgs/CameraInfo). Out: camera/pose
 (geometry_msgs/PoseWithCovarianceStamped, frame pool), camera/tail (sensor_msgs/JointState, tail_1 .. relative
-angles, rad), both stamped as the image; with debug_image camera/debug/compressed; /diagnostics. Bad images
+angles, rad), both stamped as the image; with debug_image camera/debug/compressed; lockstep (std_msgs/Header, where somebody
+listens: an image that gives no pose, so that a simulator does not wait for it); /diagnostics. Bad images
 and calibrations are counted and said in the diagnostics.
 """
 
@@ -43,6 +44,7 @@ from fish_vision.tracker import Detection
 
 SETTABLE = ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour")
 NO_INFO = "no camera/camera_info yet"
+NO_POSE = "tracker"  # who says on lockstep that an image gives no pose
 QUEUE = 10
 # a late image is worse than a lost one; a raw image is many packets, of which best effort sooner or later loses one
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -81,6 +83,7 @@ class TrackerNode(Node):
         self._debug = None
         if self._config.debug_image:
             self._debug = self.create_publisher(CompressedImage, "camera/debug/compressed", QUEUE)
+        self._lockstep = self.create_publisher(Header, "lockstep", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
         self.create_subscription(
@@ -131,6 +134,8 @@ class TrackerNode(Node):
         if isinstance(found, Detection):
             filtered = self._lowpass.filtered(found)
             self._publish(filtered, _earlier(msg.header, stamp - filtered.stamp))
+        elif self._lockstep.get_subscription_count():
+            self._lockstep.publish(Header(stamp=msg.header.stamp, frame_id=NO_POSE))
         age = self.get_clock().now().nanoseconds * 1e-9 - stamp
         self._statistics.add(found, perf_counter() - start, age)
         if self._debug is not None:
