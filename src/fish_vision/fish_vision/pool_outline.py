@@ -21,7 +21,7 @@ RMS_LIMIT = 0.0015  # share of the picture's longer side
 SAME = 0.004  # share of it between the corners of two fits that are one
 NEAR = 0.96  # ratio of two outlines' sizes from which on one may be the other edge of the same rim
 AGAIN, MORE = 2.0, 0.2  # rms within this factor or these pixels of the best is as good
-RIVAL = 0.5  # ratio of sizes from which on an outline beside another is its rival
+RIVAL = 0.5  # ratio of sizes from which on an outline next to another is its rival
 SQUARE = 0.03  # ratio of the sides to one below which they do not say which of them is x
 X_POINTS = {
     "right": 0.0,
@@ -105,7 +105,7 @@ def _chosen(fits: Sequence[OutlineFit], lens: Lens, sides: tuple[float, float]) 
     best = min((f for f in good if f.size >= NEAR * largest), key=lambda f: f.rms)
     for other in good:
         apart = _apart(other.corners, best.corners)
-        beside = (
+        next_to_it = (
             cv2.pointPolygonTest(
                 best.corners.astype(np.float32), other.corners.mean(axis=0).tolist(), False
             )
@@ -114,7 +114,7 @@ def _chosen(fits: Sequence[OutlineFit], lens: Lens, sides: tuple[float, float]) 
         rival = other.size >= NEAR * best.size and other.rms < max(
             AGAIN * best.rms, best.rms + MORE
         )
-        if apart > SAME * longer and (rival or (beside and other.size >= RIVAL * best.size)):
+        if apart > SAME * longer and (rival or (next_to_it and other.size >= RIVAL * best.size)):
             raise CalibrationError(
                 f"more than one rectangle of {name} is seen, {apart:.0f} pixels apart ({best.rms:.1f} and {other.rms:.1f} "
                 "pixels rms): expected one outline; leave --find out and click the corners"

@@ -71,7 +71,7 @@ def explained(change: Change, looks: Sequence[Case], seen: Sequence[Swapped]) ->
 
 
 def swapped_in(looks: Sequence[Case], taken: Sequence[Key]) -> list[Swapped]:
-    """What exchanged trials say in each look beside the names taken."""
+    """What exchanged trials say in each look of what the names taken leave."""
     return [swap_test(c.fit, c.strata, taken=taken, days=c.day_of) for c in looks]
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fish_sysid.diagnosis.change.candidates import PARAMETER
 from fish_sysid.diagnosis.change.shared_fit import Regression
-from fish_sysid.diagnosis.change.swap_test import Gains, Index, most_shared
+from fish_sysid.diagnosis.change.swap_test import TRIES, Gains, Index, drawn, most_shared
 from fish_sysid.diagnosis.change.tail_probability import Tails
 
 Array = NDArray[np.float64]
@@ -41,14 +41,8 @@ def sets_in_place(
     strata: Sequence[int], new: Index, random: np.random.Generator, count: int
 ) -> list[Index]:
     """NEW's own trials, then up to `count` other sets at random, as many of each stratum as NEW has."""
-    kinds = np.asarray(strata)
     found = {new.tobytes(): new}
-    for _ in range(6 * count):
-        chosen = []
-        for kind in np.unique(kinds[new]):
-            wanted = int((kinds[new] == kind).sum())
-            chosen.append(random.permutation(np.flatnonzero(kinds == kind))[:wanted])
-        rows = np.sort(np.concatenate(chosen))
+    for rows in drawn(strata, new, random, TRIES * count):
         found[rows.tobytes()] = rows
         if len(found) > count:
             break

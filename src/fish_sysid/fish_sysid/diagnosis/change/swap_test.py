@@ -11,7 +11,7 @@ little the trials weigh that it leaves out. Sets that share more trials with NEW
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,7 @@ Index = NDArray[np.int64]
 
 REMAINDER = 0.005  # p-value up to which there is something left to name
 SWAPS = 300
+TRIES = 6  # draws for each set that is wanted
 SMALLEST = 0.5  # nats of one trial
 
 
@@ -91,18 +92,26 @@ def exchanges(
 
     None shares more trials with NEW than random sets do in the mean, or than one.
     """
-    kinds, found, most = np.asarray(strata), {}, most_shared(strata, new)
-    for _ in range(6 * count):
-        chosen = []
-        for kind in np.unique(kinds[new]):
-            wanted = int((kinds[new] == kind).sum())
-            chosen.append(random.permutation(np.flatnonzero(kinds == kind))[:wanted])
-        rows = np.sort(np.concatenate(chosen))
+    found, most = {}, most_shared(strata, new)
+    for rows in drawn(strata, new, random, TRIES * count):
         if np.isin(rows, new).sum() <= most:
             found[rows.tobytes()] = rows
         if len(found) == count:
             break
     return list(found.values())
+
+
+def drawn(
+    strata: Sequence[int], new: Index, random: np.random.Generator, count: int
+) -> Iterator[Index]:
+    """`count` random sets of trials in their order, as many of each stratum as NEW has; a set may come twice."""
+    kinds = np.asarray(strata)
+    for _ in range(count):
+        chosen = []
+        for kind in np.unique(kinds[new]):
+            wanted = int((kinds[new] == kind).sum())
+            chosen.append(random.permutation(np.flatnonzero(kinds == kind))[:wanted])
+        yield np.sort(np.concatenate(chosen))
 
 
 def most_shared(strata: Sequence[int], new: Index) -> int:
