@@ -119,7 +119,7 @@ def test_a_gyro_that_reads_too_much_shows_in_circles():
 
 def test_what_predictions_ask_for_stands_beside_the_verdict():
     surrogate = made_fit(0.0, "tip_slip")
-    step = Step("tip_slip", np.log(2.5), 0.16, added=True)
+    step = Step("tip_slip", np.log(2.5), 0.16, 2.3, added=True)
     d = SimpleNamespace(task=found().task, surrogate=surrogate, predicted=(step,))
     (entry,) = prediction_entries(d)
     assert entry["name"] == "tip_slip"

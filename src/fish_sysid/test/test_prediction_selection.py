@@ -18,6 +18,7 @@ from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.elimination import eliminate, without
 from fish_sysid.estimation.shooting.fold_steps import fold_steps
+from fish_sysid.estimation.shooting.left_out import LEVEL, judged
 from fish_sysid.estimation.shooting.multistep import LARGEST_STEP
 from fish_sysid.estimation.shooting.prediction_fit import (
     fit_predictions,
@@ -182,3 +183,13 @@ def test_start_states_trust_the_sensor_that_is_right() -> None:
     assert noisy.trust.fading > clean.trust.fading or noisy.trust.position > clean.trust.position
     start, end = (multistep(experiment, f, 4.0).cost(f.z) for f in (right, clean))
     assert end <= start
+
+
+def test_the_best_of_many_candidates_by_chance_is_seldom_added() -> None:
+    random, trials, candidates, repeats = np.random.default_rng(5), 12, 15, 2000
+    logarithm = 0.1 * random.standard_normal((repeats, candidates, trials))
+    added = [
+        any(judged("x", np.exp(row), np.ones(trials), candidates).sure for row in found)
+        for found in logarithm
+    ]
+    assert np.mean(added) == pytest.approx(LEVEL, abs=0.01)

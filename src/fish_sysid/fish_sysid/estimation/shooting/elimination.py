@@ -42,7 +42,7 @@ def eliminate(
 ) -> tuple[Found, tuple[Step, ...]]:
     """(the fit with those of `names` that trials left out ask for, what each of them does).
 
-    The effect that gains least goes while one gains less than SURE standard errors.
+    The effect that gains least goes while one gains less than chance may let it gain (`standard_errors_asked`).
     """
     steps: dict[str, Step] = {}
     unsure = list(names) if len(experiment.names) >= FOLDS else []

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm, t
 
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.shooting.fold_steps import fold_of, without_folds
@@ -21,7 +22,7 @@ from fish_sysid.estimation.shooting.schedule import Found, multistep
 Array = NDArray[np.float64]
 
 EVERY = 4.0  # s between start points
-SURE = 2.0  # standard errors; the best of many effects gains one by chance
+LEVEL = float(norm.sf(2.0))  # probability that chance lets any of the effects looked at gain enough
 ROUNDS, ITERATIONS = 2, 2  # of a fit and its control alike
 
 
@@ -32,20 +33,29 @@ class Step:
     name: str
     gain: float  # mean over trials of the logarithm of the cost without it over that with it
     deviation: float  # its standard error over trials
-    added: bool
+    asked: float  # standard errors that it must gain
+    added: bool = False
     alike: tuple[str, ...] = ()  # of its family, that gain as much within a standard error
 
     @property
     def sure(self) -> bool:
         """Whether it gains more than chance."""
-        return self.gain > SURE * self.deviation
+        return self.gain > self.asked * self.deviation
+
+
+def standard_errors_asked(trials: int, looked_at: int = 1) -> float:
+    """Standard errors of a mean over so many trials that the best of so many effects passes with probability LEVEL by chance.
+
+    Student's t, as the standard error is estimated from the trials, with Bonferroni's correction.
+    """
+    return float(t.isf(LEVEL / looked_at, max(trials - 1, 1)))
 
 
 def step_text(step: Step) -> str:
     """What it does, in words."""
     return (
         f"predictions of trials left out cost {np.exp(-step.gain) - 1.0:+.0%} against as many iterations without it "
-        f"(a standard error: {step.deviation:.0%})"
+        f"(a standard error: {step.deviation:.0%}; asked: {step.asked:.1f} of them)"
     )
 
 
@@ -61,12 +71,13 @@ def left_out_costs(experiment: Experiment, found: Found) -> tuple[Found, Array]:
     return replace(found, z=z, cost=size), costs
 
 
-def judged(name: str, control: Array, costs: Array) -> Step:
+def judged(name: str, control: Array, costs: Array, looked_at: int = 1) -> Step:
     """Costs (M,) of trials left out with an effect against those of the control without it.
 
-    Logarithms, so that no trial outweighs all others.
+    Logarithms, so that no trial outweighs all others. looked_at: effects of which this one is the most promising.
     """
     ratio = np.log(control / costs)
     ratio = ratio[np.isfinite(ratio)]
     deviation = float(np.std(ratio, ddof=1) / np.sqrt(len(ratio))) if len(ratio) > 1 else np.inf
-    return Step(name, float(ratio.mean()) if len(ratio) else 0.0, deviation, False)
+    gain = float(ratio.mean()) if len(ratio) else 0.0
+    return Step(name, gain, deviation, standard_errors_asked(len(ratio), looked_at))

@@ -4,7 +4,7 @@
 
 Every round each candidate is looked at where the fit stands: what would trials left out cost after one Gauss-Newton step along
 its own slope and those of the fit? The most promising are fitted from where the fit stands and judged (`left_out`). The one that
-gains most joins the model if it gains more than SURE standard errors over the trials.
+gains most joins the model if it gains more over the trials than the best of all candidates gains by chance.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ def choose(
         )
         fits = {name: fit for name, (fit, _) in zip(promising, ends, strict=True)}
         tried = [
-            judged(name, control, costs) for name, (_, costs) in zip(promising, ends, strict=True)
+            judged(name, control, costs, len(left))
+            for name, (_, costs) in zip(promising, ends, strict=True)
         ]
         good = [step for step in tried if step.sure]
         best = max(good, key=lambda step: step.gain, default=None)
