@@ -53,8 +53,8 @@ def main() -> None:
         fit = fit_predictions(training, Robot(), NOMINAL_FREE, links=(1,))
         found = fit.found
         good = inside(
-            multistep(training, found.hypothesis, found.z),
-            multistep(unseen, found.hypothesis, found.z),
+            multistep(training, found),
+            multistep(unseen, found),
             found.z,
             fit.covariance,
             HORIZON,
