@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import os
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -94,6 +95,8 @@ def run_verb(verb: str, argv: list[str] | None = None) -> int:
             stream, TextIOWrapper
         ):  # a terminal or pipe in another encoding shows ? for what it lacks
             stream.reconfigure(errors="replace")
+    # before numpy is imported; threads in the algebra of small matrices take up to ten times the processor time
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     verbs, verb = installed_verbs(), verb.replace("-", "_")
     if verb not in verbs:
         print(f"robofish: {_unknown(verb, verbs)}", file=sys.stderr)
