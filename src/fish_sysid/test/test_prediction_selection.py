@@ -18,7 +18,7 @@ from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.elimination import eliminate, without
 from fish_sysid.estimation.shooting.fold_steps import fold_steps
-from fish_sysid.estimation.shooting.left_out import LEVEL, judged
+from fish_sysid.estimation.shooting.left_out import LEVEL, judged, left_out_costs
 from fish_sysid.estimation.shooting.multistep import LARGEST_STEP
 from fish_sysid.estimation.shooting.prediction_fit import (
     fit_predictions,
@@ -26,7 +26,12 @@ from fish_sysid.estimation.shooting.prediction_fit import (
     prediction_hypothesis,
 )
 from fish_sysid.estimation.shooting.residuals import SENSORS
-from fish_sysid.estimation.shooting.rudder_end import WIDEST, judged_end, largest_command
+from fish_sysid.estimation.shooting.rudder_end import (
+    WIDEST,
+    converged_end,
+    judged_end,
+    largest_command,
+)
 from fish_sysid.estimation.shooting.schedule import Found, multistep, polished
 from fish_sysid.estimation.shooting.selection import GLANCE, choose, converged
 from fish_sysid.estimation.shooting.trust import trusted
@@ -151,6 +156,17 @@ def test_the_rudder_ends_only_where_trials_left_out_show_it(end: float) -> None:
     assert step.added == (end < 0.5)
     values = ShotParametrization(found.hypothesis).robot(found.z[: -len(SENSORS)]).parameters
     assert values["rudder_range"] == pytest.approx(0.35 if end < 0.5 else WIDEST, abs=0.03)
+
+
+def test_an_end_that_starts_too_low_starts_again() -> None:
+    """A fit with an end contains the one without: it must not cost much more."""
+    experiment = swum(Robot(links=1).with_parameters(rudder_range=0.9))
+    stated = Robot(links=1).with_parameters(rudder_range=0.3)
+    hypothesis = prediction_hypothesis(stated, experiment, FREE, (), 0.3)
+    start = Found(hypothesis, np.zeros(len(FREE) + len(SENSORS)), np.inf)
+    found, _ = left_out_costs(experiment, start)
+    ended, _ = converged_end(experiment, found)
+    assert ended.cost < 1.1 * found.cost
 
 
 def test_a_fit_to_predictions_finds_the_robot_and_says_how_surely() -> None:
