@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far off a prediction may be: what its parameters leave open, and what the model misses in trials left out.
 
-    band^2 = t^2 (J C J' + s^2 (1 + 1 / M))
+    band^2 = t^2 (J C J' + s^2)
 
 J: slope of the predicted stroke mean; C: covariance clustered by trial; s: robust spread of the training trials' errors at the
 same horizon, each fold of trials predicted by the parameters without it; t: 97.5 % quantile of Student's t with M - 1 degrees of
@@ -45,6 +45,5 @@ def inside(
     e, J = e[rows], J[rows]
     open_left = np.einsum("rip,pq,riq->ri", J, covariance, J)
     trials = len(training.experiment.names)
-    more = (1.0 + 1.0 / trials) * missed(training, z)[horizon] ** 2
-    band = t.ppf(0.975, trials - 1) * np.sqrt(open_left + more)
+    band = t.ppf(0.975, trials - 1) * np.sqrt(open_left + missed(training, z)[horizon] ** 2)
     return np.asarray(np.abs(e) <= band)
