@@ -434,6 +434,23 @@ def test_calibrate_colours_proposes_ranges_in_which_the_fish_is_seen(
     assert cv2.imread(str(files / "colours.png")).shape == (720, 1280, 3)
 
 
+@pytest.mark.parametrize("quality", [60, 75, 95])
+def test_calibrate_colours_takes_the_pictures_that_a_camera_compresses(
+    files: Path, monkeypatch, capsys, quality: int
+) -> None:
+    """JPEG smears the colours of the tail's markers, 2 pixels apart, into each other."""
+    picture = draw(discs_of_fish(0.5, 0.2, 1.0, (0.2, 0.0, -0.2)))
+    cv2.imwrite(str(files / "sent.jpg"), picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    given = ("--lens", files / "lens.yaml", "--params", files / "params.yaml")
+    written = ("--out", files / "colours.yaml", "--picture", files / "colours.png")
+    assert call(calibrate, monkeypatch, "colours", files / "sent.jpg", *given, *written) == 0
+    assert "the tracker sees the fish in 1 of 1 pictures" in capsys.readouterr().out
+    config = config_from_file(files / "colours.yaml")
+    for marker, hue in (("front", 25), ("rear", 151), ("tail_odd", 3), ("tail_even", 61)):
+        low, high = getattr(config, f"{marker}_colour")[:2]
+        assert (hue - low) % 180 <= (high - low) % 180
+
+
 def test_calibrate_colours_says_that_no_picture_shows_the_fish(
     files: Path, monkeypatch, capsys
 ) -> None:
