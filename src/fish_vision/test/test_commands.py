@@ -25,6 +25,8 @@ from fish_vision.config import config_from_file
 from fish_vision.tags import tag_picture
 from fish_vision.tracker import Detection, Tracker
 
+DATA = Path(__file__).parent / "data"
+
 
 def call(command, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     monkeypatch.setattr(sys, "argv", [command.__name__, *map(str, arguments)])
@@ -407,6 +409,23 @@ def test_calibrate_lens_refuses_pictures_without_a_board(files: Path, monkeypatc
         == 1
     )
     assert "expected like 8x6" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("stretch", [1.0, 1.04])
+def test_calibrate_lens_says_that_the_error_is_large(
+    files: Path, monkeypatch, capsys, stretch: float
+) -> None:
+    """With a stretch two of the pictures are those of another lens."""
+    photographs = [cv2.imread(str(DATA / f"chessboard_{i}.jpg")) for i in (1, 2, 3, 5, 8)]
+    (files / "boards").mkdir()
+    for i, photograph in enumerate(photographs):
+        wider = np.array([[stretch if i > 2 else 1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        shown = cv2.warpAffine(photograph, wider, photograph.shape[1::-1])
+        cv2.imwrite(str(files / "boards" / f"{i}.png"), shown)
+    given = ("lens", files / "boards", "--corners", "9x6", "--square", "0.025")
+    written = ("--out", files / "new.yaml", "--picture", files / "new.png")
+    assert call(calibrate, monkeypatch, *given, *written) == 0
+    assert ("the error is large" in capsys.readouterr().out) == (stretch > 1.0)
 
 
 def test_calibrate_colours_proposes_ranges_in_which_the_fish_is_seen(
