@@ -5,9 +5,9 @@
 python benchmarks/fusion_recordings.py FOLDER [--imu-x M] [--imu-y M]
 
 A row is a recording: camera poses accepted, refused and repeated, reacquisitions, the camera's offset found (added to its
-stamps) with its standard deviation, the median age of an image at its arrival, the factors on the noises given, whether the
-accelerometer is used and the noise of the acceleration per sample, and the robust RMS distance [mm] and angle [degrees]
-between a pose that arrives and what was published for its moment before.
+stamps) with its standard deviation, the same to the gyro's clock, the median age of an image at its arrival, the factors on
+the noises given, whether the accelerometer is used and the noise of the acceleration per sample, and the robust RMS distance
+[mm] and angle [degrees] between a pose that arrives and what was published for its moment before.
 Exit status 2: the folder is absent or holds no recordings.
 """
 
@@ -24,6 +24,12 @@ import numpy as np
 from fish_bag import Trial, find_trials, read_trial
 from fish_control.fusion import Fusion
 from fish_control.fusion_config import FusionConfig
+from fish_control.heading_lead import against_gyro
+
+HEADER = (
+    "recording     poses accepted  refused repeated reacquired   offset +- std  to gyro +- std"
+    "    age   noise x  accel m/s^2      mm degrees"
+)
 
 
 def events(trial: Trial) -> list[tuple[float, str, int]]:
@@ -83,10 +89,12 @@ def row(name: str, fusion: Fusion, errors: np.ndarray) -> str:
     """A line of text."""
     clock, counts = fusion.camera_clock, fusion.counts
     poses, share = counts["came"], 100 * counts["fused"] / counts["came"]
+    to_gyro = against_gyro(clock.current, fusion.imu_heading.lead)
     square = np.median(np.square(errors), axis=0) / 0.455 if len(errors) else np.full(3, np.nan)
     return (
         f"{name:12s} {poses:6d} {share:8.1f} {counts['pose_outlier']:8d} {counts['pose_repeated']:8d} "
-        f"{counts['reacquired']:10d} {clock.current.offset:8.3f} +- {clock.current.std:.3f} {clock.age:6.3f} "
+        f"{counts['reacquired']:10d} {clock.current.offset:8.3f} +- {clock.current.std:.3f} "
+        f"{to_gyro.offset:8.3f} +- {to_gyro.std:.3f} {clock.age:6.3f} "
         f"{motion(fusion)} "
         f"{1e3 * math.sqrt(square[0] + square[1]):8.1f} {math.degrees(math.sqrt(square[2])):6.2f}"
     )
@@ -116,9 +124,7 @@ def main() -> int:
             file=sys.stderr,
         )
         return 2
-    print(
-        "recording     poses accepted  refused repeated reacquired   offset +- std     age   noise x  accel m/s^2      mm degrees"
-    )
+    print(HEADER)
     total: Counter[str] = Counter()
     for path in trials:
         text, counts = fuse(read_trial(path), config)

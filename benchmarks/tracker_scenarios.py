@@ -233,7 +233,8 @@ def main() -> None:
     )
     parser.add_argument("--frames", type=int, default=1000, help="of each scenario")
     parser.add_argument("--speed", type=int, default=600, help="frames of the speed measurement")
-    parser.add_argument("--only", nargs="*", default=[*ALONE, *TAGGED, *RIVALS], help="scenarios")
+    names = [*ALONE, *TAGGED, *RIVALS]
+    parser.add_argument("--only", nargs="+", choices=names, default=names, help="scenarios")
     args = parser.parse_args()
     cv2.setNumThreads(1)
     if args.speed:

@@ -7,10 +7,9 @@ over LAG is compared with that of the IMU's heading; the offset with the smalles
 
     S(o) = sum over k of exp(-age_k / memory) (psi_k - psi_j - Y(t_k + o) + Y(t_j + o))^2,   t_k - t_j about LAG
 
-A parabola through the smallest three gives the value between grid points, its curvature the standard deviation. The
-swing of the head repeats itself once a stroke, so the estimate counts only where no other offset fits nearly as well. An
-image cannot be taken after it arrives: this bounds the grid, however far the clocks are apart. Source: time delay
-estimation by least squares (Jacovitti and Scarano 1993), on a grid with forgetting.
+with the sums of `offset_sums`. The swing of the head repeats itself once a stroke, so the estimate counts only where no
+other offset fits nearly as well. An image cannot be taken after it arrives: this bounds the grid, however far the clocks
+are apart.
 
 Where the time from stamp to arrival steps, a clock was set by as much, or the images come later with stamps as good as
 before. The headings tell the two apart within some poses; until then the offset is undecided.
@@ -20,88 +19,34 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.imu_history import ImuHistory
 from fish_control.latency_watch import LatencyWatch
+from fish_control.offset_sums import (
+    CLEAR,
+    CLIP,
+    CORRELATION,
+    LAG,
+    STEP,
+    ClockEstimate,
+    OffsetSums,
+)
 
 Array = NDArray[np.float64]
 
-LAG = 0.15  # s between the two poses of a pair, a third of a stroke
 LONGEST_PAIR = 0.4  # s
-STEP = 0.01  # s, of the grid
 OLDEST = 1.7  # s, largest age of an image at its arrival
 AHEAD = 0.1  # s, by which an image may seem to be taken after its arrival
-CLIP = 0.3  # rad, larger differences count no more
 MEMORY = 20.0  # s, of the estimate
 SHORT_MEMORY = 4.0  # s, of the one that notices changes
-CORRELATION = 2.0  # variance of the estimate to that of independent pairs: each pose is in two
-MODEL_STD = 3e-4  # s, of what the noise does not explain
-NEIGHBOURHOOD = 0.08  # s, within which offsets belong to one minimum
 REFINED = 0.005  # s, smaller changes are left to the long memory
-REACH = 0.2  # s, less than half a stroke, in which an offset is looked for that has changed
-CLEAR = 10.0  # log-likelihood by which every other minimum must be worse
-CLEAR_RATIO = 1.3  # and the ratio of the sums of squares
-LARGEST_STD = 0.005  # s, of an estimate that is applied
-LEAST_PAIRS = 12.0
 CLOCK_DRIFT = 1e-4  # s per s, of two clocks while nobody compares them
 STEP_STD = 0.02  # s, of the step of a clock as the latency shows it
 CHOICE_PAIRS = 6.0  # after a step before one of two offsets is chosen
 LONGEST_DOUBT = 3.0  # s, after which the offset is looked for as if nothing were known
-
-
-@dataclass(frozen=True)
-class ClockEstimate:
-    """Offset of the camera's clock."""
-
-    offset: float  # s, added to a stamp to get the IMU's time
-    std: float  # s
-    sure: bool  # whether it may be applied
-
-
-class OffsetSums:
-    """Sums of squares over the grid with one memory."""
-
-    def __init__(self, memory: float, size: int) -> None:
-        self.memory = memory
-        self.squares = np.zeros(size)
-        self.pairs = 0.0
-
-    def add(self, squares: Array, dt: float) -> None:
-        """One more pair's squares (G,) [rad^2], dt [s] after the last."""
-        keep = math.exp(-max(dt, 0.0) / self.memory)
-        self.squares = keep * self.squares + squares
-        self.pairs = keep * self.pairs + 1.0
-
-    def log_likelihood(self) -> Array:
-        """Of each offset, less that of the best: at most 0."""
-        best = float(self.squares.min())
-        variance = max(best / max(self.pairs, 1.0), 1e-8)
-        return (best - self.squares) / (2.0 * CORRELATION * variance)
-
-    def estimate(self, grid: Array, around: float | None = None) -> ClockEstimate:
-        """The best offset of the grid, or of what lies within REACH of `around` [s]."""
-        within = np.ones(len(grid), dtype=bool)
-        if around is not None:
-            within = np.abs(grid - around) <= REACH
-        best = int(np.where(within, self.squares, np.inf).argmin())
-        edge = best < 2 or best > len(grid) - 3
-        if edge or self.pairs < LEAST_PAIRS:
-            return ClockEstimate(float(grid[best]), math.inf, False)
-        a, b, c = self.squares[best - 1 : best + 2]
-        curvature = a - 2.0 * b + c
-        if curvature <= 0.0:
-            return ClockEstimate(float(grid[best]), math.inf, False)
-        offset = float(grid[best] + 0.5 * STEP * (a - c) / curvature)
-        variance = max(b / self.pairs, 1e-8) * CORRELATION / (0.5 * curvature / STEP**2)
-        std = math.hypot(math.sqrt(variance), MODEL_STD)
-        other = within & (np.abs(grid - grid[best]) > NEIGHBOURHOOD)
-        clear = self.log_likelihood()[other].max() < -CLEAR
-        distinct = self.squares[other].min() > CLEAR_RATIO * b
-        return ClockEstimate(offset, std, bool(clear and distinct and std < LARGEST_STD))
 
 
 class CameraClock:

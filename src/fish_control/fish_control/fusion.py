@@ -16,13 +16,7 @@ from fish_control.fusion_config import FusionConfig
 from fish_control.imu_checks import unusable_sample
 from fish_control.imu_heading import HeadingNoise, ImuHeading
 from fish_control.imu_history import ImuHistory, inertial_sample
-from fish_control.measurement_buffer import (
-    CameraPose,
-    Moment,
-    RawPose,
-    Timeline,
-    start_moment,
-)
+from fish_control.measurement_buffer import CameraPose, Moment, RawPose, Timeline, start_moment
 from fish_control.motion_models import MotionModels
 from fish_control.noise_scale import NoiseScale
 from fish_control.pose_checks import AgreeingPoses, RepeatedPose, doubts_motion
@@ -44,6 +38,7 @@ class Fusion:
     Attributes:
         counts: what became of the measurements, for diagnostics.
         camera_clock: what is known of the camera's clock.
+        imu_heading: the IMU's heading alone, and by how much it leads the gyro.
         noise_scale: factors on the variances, from the innovations.
     """
 
@@ -60,7 +55,7 @@ class Fusion:
         c = self.config
         self._imu = ImuHistory(c.imu_timeout, (c.imu_x, c.imu_y))
         noise = HeadingNoise(c.gyro_noise, c.gyro_drift, c.coasting_yaw_rate, c.imu_timeout)
-        self._heading = ImuHeading(noise)
+        self.imu_heading = ImuHeading(noise)
         self.camera_clock = CameraClock(c.camera_offset, c.camera_offset_std)
         self._applied, self._jumps = c.camera_offset, 0
         self._raw, self._waiting = deque[RawPose](), deque[RawPose]()  # fused, ahead of the IMU
@@ -113,7 +108,7 @@ class Fusion:
             )
         previous, self._last_imu_time, self._poses_in_a_row = self._last_imu_time, time, 0
         self.counts["imu"] += 1
-        step = self._heading.add(time, yaw_rate, yaw, yaw_std or self.config.imu_heading_noise)
+        step = self.imu_heading.add(time, yaw_rate, yaw, yaw_std or self.config.imu_heading_noise)
         self._imu.add(time, inertial_sample(step, forward, left))
         if self._timeline is not None:
             self._timeline.imu_came(previous)

@@ -8,6 +8,7 @@ import math
 
 from fish_control.estimate import Estimate
 from fish_control.fusion import Fusion
+from fish_control.heading_lead import against_gyro
 
 NOTABLE_OFFSET = 0.02  # s, difference to camera_offset that is worth a warning
 
@@ -35,7 +36,10 @@ def clock_warning(fusion: Fusion) -> str | None:
 
 
 def clock_values(fusion: Fusion) -> dict[str, str]:
-    """The camera's clock for /diagnostics."""
+    """The camera's clock for /diagnostics.
+
+    camera_offset_s is to the clock of the heading that fusion uses, camera_offset_to_gyro_s to that of the gyro.
+    """
     clock = fusion.camera_clock
     values = {
         "camera_offset_s": f"{fusion.applied_offset:.4f}",
@@ -46,6 +50,14 @@ def clock_values(fusion: Fusion) -> dict[str, str]:
         "accelerometer_used": str(fusion.motion_model.accel_used).lower(),
         "accel_noise_m_s2": f"{fusion.motion_model.accel_noise:.3f}",
     }
+    lead = fusion.imu_heading.lead
+    if lead.sure:
+        values["imu_heading_lead_s"] = f"{lead.offset:.4f}"
+        values["imu_heading_lead_std_s"] = f"{lead.std:.4f}"
+    if lead.sure and clock.current.sure:
+        gyro = against_gyro(clock.current, lead)
+        values["camera_offset_to_gyro_s"] = f"{gyro.offset:.4f}"
+        values["camera_offset_to_gyro_std_s"] = f"{gyro.std:.4f}"
     if math.isfinite(clock.age):
         values["camera_latency_s"] = f"{clock.age:.3f}"
     return values

@@ -7,12 +7,16 @@
 z is the yaw of the orientation, whose zero is unknown (game rotation vector); so is the zero of the result. The gyro's
 noise follows the innovations: a gyro that contradicts its own orientation counts less, and the heading then follows the
 orientation. Source: linear Kalman filter, process noise adapted by the ratio of the innovations to their variance.
+The two may have different delays; `heading_lead` finds by how much the heading that results leads the gyro.
 """
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
+
+from fish_control.heading_lead import MEMORY, HeadingLead
+from fish_control.offset_sums import ClockEstimate
 
 SAMPLE_PERIOD = 0.01  # s, for which noises per sample are given
 COASTING_TIME = 0.1  # s, for which an unknown rate keeps its sign
@@ -42,10 +46,16 @@ class HeadingStep(NamedTuple):
 
 
 class ImuHeading:
-    """Continuous heading from samples in order."""
+    """Continuous heading from samples in order.
 
-    def __init__(self, noise: HeadingNoise) -> None:
+    Args:
+        noise: standard deviations of the sensor.
+        memory: s, of the lead on the gyro.
+    """
+
+    def __init__(self, noise: HeadingNoise, memory: float = MEMORY) -> None:
         self._noise = noise
+        self._lead = HeadingLead(noise.reach, memory)
         self._time: float | None = None
         self._rate: float | None = None  # rad/s, newest of the gyro
         self._yaw = self._bias = 0.0
@@ -57,6 +67,11 @@ class ImuHeading:
     def gyro_noise_ratio(self) -> float:
         """Standard deviation of the gyro, as its orientation shows it, to the given one."""
         return math.sqrt(self._ratio)
+
+    @property
+    def lead(self) -> ClockEstimate:
+        """By how much the heading leads the gyro [s]."""
+        return self._lead.current
 
     def add(
         self, time: float, rate: float | None, yaw: float | None = None, yaw_std: float = 0.003
@@ -74,6 +89,7 @@ class ImuHeading:
         if yaw is not None:
             correction = self._correct(yaw, yaw_std, measured)
             variance = min(variance, 2.0 * self._P[0])
+        self._lead.add(time, rate, self._yaw)
         newest = 0.0 if rate is None else rate - self._bias
         turned = newest + (correction / dt if dt > 0.0 else 0.0)
         return HeadingStep(self._yaw, turned, variance, measured or (yaw is not None and near))

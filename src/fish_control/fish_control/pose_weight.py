@@ -7,10 +7,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.camera_clock import ClockEstimate
 from fish_control.fusion_config import FusionConfig
 from fish_control.measurement_buffer import CameraPose
 from fish_control.noise_scale import NoiseScale
+from fish_control.offset_sums import ClockEstimate
 
 ROUNDING = 1e-6  # of the largest element of a covariance; trackers compute in single precision
 Array = NDArray[np.float64]

@@ -4,27 +4,21 @@
 
 The sums of squares are those of `camera_clock`, of blocks of BLOCK each. All blocks together give the estimate; leaving out
 one at a time gives its standard deviation, which knows what the single poses do not: errors that last. Sources:
-`camera_clock`; jackknife over blocks (Kunsch 1989).
+`camera_clock`; jackknife over blocks (Kunsch 1989). The estimates of several recordings are pooled.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.camera_clock import (
-    AHEAD,
-    CLIP,
-    LAG,
-    LONGEST_PAIR,
-    OLDEST,
-    STEP,
-    ClockEstimate,
-    OffsetSums,
-)
+from fish_control.camera_clock import AHEAD, LONGEST_PAIR, OLDEST
+from fish_control.offset_sums import CLIP, LAG, STEP, ClockEstimate, OffsetSums
 
 Array = NDArray[np.float64]
 BLOCK = 5.0  # s
@@ -78,6 +72,26 @@ def recorded_offset(
     estimate = ClockEstimate(found.offset, std, found.sure)
     blocks = tuple(e for e in near if math.isfinite(e.std))
     return RecordedOffset(estimate, latency - found.offset, len(later), blocks)
+
+
+class PooledOffset(NamedTuple):
+    """What several recordings say together."""
+
+    offset: float  # s
+    std: float  # s, of the offset
+    between: float  # s, standard deviation of the recordings' own offsets beyond what their errors explain
+
+
+def pooled(estimates: Sequence[ClockEstimate]) -> PooledOffset:
+    """Mean of one estimate or more, each with its own true value. Source: random effects, DerSimonian and Laird 1986."""
+    offset, variance = np.array([(e.offset, e.std**2) for e in estimates]).T
+    weight = 1.0 / variance
+    excess = float(weight @ (offset - weight @ offset / weight.sum()) ** 2) - (len(offset) - 1)
+    scale = float(weight.sum() - weight @ weight / weight.sum())
+    between = max(0.0, excess / scale) if len(offset) > 1 else 0.0
+    weight = 1.0 / (variance + between)
+    mean = float(weight @ offset / weight.sum())
+    return PooledOffset(mean, math.sqrt(1.0 / weight.sum()), math.sqrt(between))
 
 
 def _pairs(camera: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -8,6 +8,7 @@ import pytest
 from fish_control.estimate import LOST_VARIANCE
 from fish_control.fusion import Fusion
 from fish_control.fusion_config import FusionConfig
+from fish_control.fusion_status import clock_values
 
 DT = 0.01
 W = 4.0 * np.pi
@@ -598,6 +599,27 @@ def test_an_orientation_stands_in_for_a_wrong_gyro():
         errors[oriented] = np.sqrt(np.mean(np.square(rows)))
     assert errors[True] < 0.02
     assert errors[True] < 0.3 * errors[False]
+
+
+def test_an_orientation_that_leads_its_gyro_is_named_and_the_camera_s_offset_said_to_the_gyro():
+    rng, fusion, lead, late = np.random.default_rng(3), Fusion(), 0.015, 0.49
+    for _, kind, stamp, values in swum(20.0, latency=0.5):
+        if kind == "imu":
+            yaw = true_pose(stamp + lead)[2] + 2.0 + rng.normal(0.0, 0.003)
+            fusion.add_imu(stamp, 0.7 * values[0], *values[1:], yaw)
+        else:
+            fusion.add_pose(stamp + late, values)
+    values = clock_values(fusion)
+    assert float(values["imu_heading_lead_s"]) == pytest.approx(lead, abs=0.003)
+    assert float(values["camera_offset_s"]) == pytest.approx(-late - lead, abs=0.003)
+    assert float(values["camera_offset_to_gyro_s"]) == pytest.approx(-late, abs=0.004)
+    assert 0.0 < float(values["camera_offset_to_gyro_std_s"]) < 0.004
+
+
+def test_without_a_sure_offset_none_is_said_to_the_gyro():
+    fusion = Fusion()
+    feed(fusion, swum(4.0, rest=4.0))
+    assert "camera_offset_to_gyro_s" not in clock_values(fusion)
 
 
 @pytest.mark.parametrize("ahead", [0.02, 0.05])

@@ -5,7 +5,8 @@
 import numpy as np
 import pytest
 
-from fish_control.recorded_offset import recorded_offset
+from fish_control.offset_sums import ClockEstimate
+from fish_control.recorded_offset import pooled, recorded_offset
 
 
 def heading(t):
@@ -48,3 +49,19 @@ def test_sensors_that_do_not_overlap_are_refused():
         recorded_offset(camera, seen, latencies, imu + 500.0, yaw)
     with pytest.raises(ValueError, match="0 camera poses"):
         recorded_offset(camera[:0], seen[:0], latencies[:0], imu, yaw)
+
+
+@pytest.mark.parametrize("between", [0.0, 0.01])
+def test_pooled_offsets_say_how_much_the_recordings_differ(between):
+    rng, stds, errors, found = np.random.default_rng(5), np.linspace(0.002, 0.006, 12), [], []
+    for _ in range(200):
+        own = -0.5 + rng.normal(0.0, between, 12) + rng.normal(0.0, stds)
+        mean = pooled([ClockEstimate(o, s, True) for o, s in zip(own, stds, strict=True)])
+        errors.append((mean.offset + 0.5) / mean.std)
+        found.append(mean.between)
+    assert 0.85 < np.std(errors) < 1.2
+    assert np.mean(found) == pytest.approx(between, abs=0.0015)
+
+
+def test_one_recording_stands_for_itself():
+    assert pooled([ClockEstimate(-0.3, 0.004, True)]) == pytest.approx((-0.3, 0.004, 0.0))

@@ -200,6 +200,9 @@ def undistort(pixels: Array, lens: Lens) -> Array:
     """
     if len(pixels) == 0:
         return np.zeros((0, 2))
+    pixels = np.ascontiguousarray(
+        pixels
+    )  # OpenCV reads columns of a wider array wrongly for a fisheye
     ideal = cv2.fisheye.undistortPoints if lens.fisheye else cv2.undistortPoints
     flat: Array = ideal(pixels.reshape(-1, 1, 2), lens.K, lens.D).reshape(-1, 2)
     h = 1e-6

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import log
 
 import cv2
 import numpy as np
@@ -12,12 +13,17 @@ from fish_vision.calibration import Calibration, CalibrationError
 from fish_vision.colours import MARKERS
 from fish_vision.config import TrackerConfig
 from fish_vision.heads import Head, HeadFinder
-from fish_vision.pose import link_ends
+from fish_vision.pose import Spot, link_ends
 from fish_vision.segmentation import HUES, ColourRange, Image, hsv_of
-from fish_vision.spots import SpotFinder
+from fish_vision.spots import CANDIDATES, SpotFinder
 
 WATER_WIDTH = 12  # half degrees around the commonest hue that count as water
+BAND, BAND_STEP = (
+    36,
+    12,
+)  # half degrees, width of the bands in which discs are looked for, and between them
 SATURATION_LEAST, VALUE_LEAST = 80, 70  # of a marker
+ALIKE = 0.1  # of a marker's diameter, between places that bands agree on
 MIDDLE = 0.35  # share of a marker's diameter around its middle whose pixels are measured
 HUE_MARGIN = 8  # half degrees beyond the hues seen
 LEVEL_SHARE = 0.6  # share of the least saturation and value seen
@@ -81,19 +87,8 @@ def tinted(picture: Image, found: Mapping[str, Sequence[int]]) -> Image:
 
 def _sighting(picture: Image, config: TrackerConfig, calibration: Calibration) -> Sighting | None:
     """The one head with the whole tail behind it, of discs of any hue but the water's."""
-    hsv = hsv_of(picture, (0, 0, picture.shape[1], picture.shape[0]))
-    water = int(np.argmax(np.bincount(hsv[::4, ::4, 0].ravel(), minlength=HUES)))
-    low, high = (water + WATER_WIDTH) % HUES, (water - WATER_WIDTH) % HUES
-    any_hue = (low, high, SATURATION_LEAST, VALUE_LEAST)
-    wide = replace(
-        config,
-        front_colour=any_hue,
-        rear_colour=any_hue,
-        tail_odd_colour=any_hue,
-        tail_even_colour=any_hue,
-    )
-    discs, links = SpotFinder(wide, calibration).find(hsv, ("front", "tail_odd"), (0, 0))
-    finder = HeadFinder(wide)
+    discs, links = _any_spots(picture, config, calibration)
+    finder = HeadFinder(config)
     heads = [
         head
         for head in finder.heads(discs, discs, [links, links])[0]
@@ -103,6 +98,42 @@ def _sighting(picture: Image, config: TrackerConfig, calibration: Calibration) -
         return None
     best = min(heads, key=lambda head: abs(head.misfit))
     return _marks(best, finder, config, calibration)
+
+
+def _any_spots(
+    picture: Image, config: TrackerConfig, calibration: Calibration
+) -> tuple[list[Spot], list[Spot]]:
+    """Spots of the size of the head's and of the tail's markers, of any hue but the water's.
+
+    They are looked for in one band of hues after another: JPEG smears colours over some pixels, and neighbouring markers
+    of different hues would grow together in one range of all hues.
+    """
+    hsv = hsv_of(picture, (0, 0, picture.shape[1], picture.shape[0]))
+    water = int(np.argmax(np.bincount(hsv[::4, ::4, 0].ravel(), minlength=HUES)))
+    found: tuple[list[Spot], list[Spot]] = [], []
+    for low in range(water + WATER_WIDTH, water + HUES - WATER_WIDTH - BAND + 1, BAND_STEP):
+        band = (low % HUES, (low + BAND) % HUES, SATURATION_LEAST, VALUE_LEAST)
+        narrow = replace(config, front_colour=band, tail_odd_colour=band, hue_shift_max=0)
+        spots = SpotFinder(narrow, calibration).find(hsv, ("front", "tail_odd"), (0, 0))
+        for kind, more in zip(found, spots, strict=True):
+            kind += more
+    return _apart(found[0], config.marker_diameter), _apart(found[1], config.tail_marker_diameter)
+
+
+def _apart(spots: Sequence[Spot], diameter: float) -> list[Spot]:
+    """Of spots of several bands at one place the one that most bands agree on, then that of the best size; diameter: m.
+
+    A band that holds only a part of a marker's hues shows a part of it, elsewhere than the others.
+    """
+    places = np.array([spot.position for spot in spots]).reshape(-1, 2)
+    apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    alike = np.sum(apart < ALIKE * diameter, axis=1).tolist()
+    order = sorted(range(len(spots)), key=lambda i: (-alike[i], abs(log(spots[i].share))))
+    kept: list[int] = []
+    for i in order:
+        if all(apart[i, k] > diameter / 2 for k in kept):
+            kept.append(i)
+    return [spots[i] for i in kept[:CANDIDATES]]
 
 
 def _marks(

@@ -87,6 +87,14 @@ def test_a_fisheye_maps_the_pool_there_and_back_and_its_mount_is_found() -> None
     np.testing.assert_allclose(mount.position, (0.05, -0.08, 1.9), atol=1e-4)
 
 
+def test_pixels_may_be_columns_of_a_table_with_places() -> None:
+    """They lie apart in memory then."""
+    calibration = Calibration(fisheye_lens(), MOUNT)
+    places = np.array([[2.0, 1.0], [-2.0, 1.0], [-2.0, -1.0], [2.0, -1.0], [0.0, 0.5]])
+    table = np.column_stack([places, calibration.pool_to_pixel(places)])
+    np.testing.assert_allclose(calibration.pixel_to_pool(table[:, 2:]), places, atol=1e-6)
+
+
 def rational_lens() -> Lens:
     return Lens.from_camera_info(
         1280, 720, "rational_polynomial", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], RATIONAL

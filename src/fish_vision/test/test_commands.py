@@ -25,6 +25,8 @@ from fish_vision.config import config_from_file
 from fish_vision.tags import tag_picture
 from fish_vision.tracker import Detection, Tracker
 
+DATA = Path(__file__).parent / "data"
+
 
 def call(command, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     monkeypatch.setattr(sys, "argv", [command.__name__, *map(str, arguments)])
@@ -409,6 +411,23 @@ def test_calibrate_lens_refuses_pictures_without_a_board(files: Path, monkeypatc
     assert "expected like 8x6" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("stretch", [1.0, 1.04])
+def test_calibrate_lens_says_that_the_error_is_large(
+    files: Path, monkeypatch, capsys, stretch: float
+) -> None:
+    """With a stretch two of the pictures are those of another lens."""
+    photographs = [cv2.imread(str(DATA / f"chessboard_{i}.jpg")) for i in (1, 2, 3, 5, 8)]
+    (files / "boards").mkdir()
+    for i, photograph in enumerate(photographs):
+        wider = np.array([[stretch if i > 2 else 1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        shown = cv2.warpAffine(photograph, wider, photograph.shape[1::-1])
+        cv2.imwrite(str(files / "boards" / f"{i}.png"), shown)
+    given = ("lens", files / "boards", "--corners", "9x6", "--square", "0.025")
+    written = ("--out", files / "new.yaml", "--picture", files / "new.png")
+    assert call(calibrate, monkeypatch, *given, *written) == 0
+    assert ("the error is large" in capsys.readouterr().out) == (stretch > 1.0)
+
+
 def test_calibrate_colours_proposes_ranges_in_which_the_fish_is_seen(
     files: Path, monkeypatch, capsys
 ) -> None:
@@ -432,6 +451,23 @@ def test_calibrate_colours_proposes_ranges_in_which_the_fish_is_seen(
     assert isinstance(found, Detection)
     assert found.head.x == pytest.approx(0.5, abs=1e-3)
     assert cv2.imread(str(files / "colours.png")).shape == (720, 1280, 3)
+
+
+@pytest.mark.parametrize("quality", [60, 75, 95])
+def test_calibrate_colours_takes_the_pictures_that_a_camera_compresses(
+    files: Path, monkeypatch, capsys, quality: int
+) -> None:
+    """JPEG smears the colours of the tail's markers, 2 pixels apart, into each other."""
+    picture = draw(discs_of_fish(0.5, 0.2, 1.0, (0.2, 0.0, -0.2)))
+    cv2.imwrite(str(files / "sent.jpg"), picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    given = ("--lens", files / "lens.yaml", "--params", files / "params.yaml")
+    written = ("--out", files / "colours.yaml", "--picture", files / "colours.png")
+    assert call(calibrate, monkeypatch, "colours", files / "sent.jpg", *given, *written) == 0
+    assert "the tracker sees the fish in 1 of 1 pictures" in capsys.readouterr().out
+    config = config_from_file(files / "colours.yaml")
+    for marker, hue in (("front", 25), ("rear", 151), ("tail_odd", 3), ("tail_even", 61)):
+        low, high = getattr(config, f"{marker}_colour")[:2]
+        assert (hue - low) % 180 <= (high - low) % 180
 
 
 def test_calibrate_colours_says_that_no_picture_shows_the_fish(

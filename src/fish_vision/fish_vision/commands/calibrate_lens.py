@@ -17,6 +17,7 @@ from fish_vision.commands.pictures import from_topic, new_file, read_pictures, w
 from fish_vision.segmentation import Image
 
 MOVED = 0.06  # share of the picture's width by which a board must have moved to be another view
+LARGE_RMS = 0.5  # pixels; a usual camera gives less than 0.3
 ENLARGED = 20  # how much longer the drawn errors are than they are
 SEEN, ERROR = (90, 220, 90), (60, 60, 255)  # blue, green, red
 
@@ -62,6 +63,11 @@ def calibrate_lens(args: argparse.Namespace) -> None:
         f"{out}: board found in {len(fit.used)} of {len(pictures)} pictures, error {fit.rms:.3f} pixels rms, "
         f"{each_metre:.2f} mm on the water for each metre of the camera's height; {marked} shows it"
     )
+    if fit.rms > LARGE_RMS:
+        print(
+            f"the error is large: expected below {LARGE_RMS} pixels; take sharp pictures of one camera at one focus, and a board "
+            "that is flat"
+        )
 
 
 def _corners(args: argparse.Namespace) -> tuple[int, int]:
