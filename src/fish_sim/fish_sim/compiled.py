@@ -49,6 +49,8 @@ OPTIMISATION = (("-O3", *FEW_SPILLS), ("-O3", "-fno-tree-vectorize", *FEW_SPILLS
 SCALAR_OPTIMISATION = OPTIMISATION[1:]
 # Half of the compiler's time for a text with derivatives of several lanes, whose kernel is a twentieth slower.
 DERIVATIVE_OPTIMISATION = (("-O2", *FEW_SPILLS), *OPTIMISATION)
+# Half of the compiler's time or less; the kernels take up to twice as long.
+QUICK_OPTIMISATION = (("-Og", *FEW_SPILLS), ("-O1",))
 
 log = logging.getLogger(__name__)
 
@@ -124,7 +126,8 @@ def library(source: str, check: Check, width: int, derivatives: bool = False) ->
     derivatives: the text has tangents or adjoints, so that compiling it takes long.
 
     A text that is not in the cache is compiled and its library given to `check`. One whose errors exceed TOLERANCE is
-    compiled with safer flags; where none helps, or no compiler works, a warning says so.
+    compiled with safer flags; where none helps, or no compiler works, a warning says so. With FISH_SIM_QUICK_COMPILE=1
+    in the environment QUICK_OPTIMISATION is used: for short runs of many structures, such as tests.
     """
     cc = compiler()
     if cc is None:
@@ -156,6 +159,8 @@ def library(source: str, check: Check, width: int, derivatives: bool = False) ->
 
 
 def _levels(width: int, derivatives: bool) -> tuple[tuple[str, ...], ...]:
+    if os.environ.get("FISH_SIM_QUICK_COMPILE"):
+        return QUICK_OPTIMISATION
     if width == 1:
         return SCALAR_OPTIMISATION
     return DERIVATIVE_OPTIMISATION if derivatives else OPTIMISATION
