@@ -49,8 +49,6 @@ OPTIMISATION = (("-O3", *FEW_SPILLS), ("-O3", "-fno-tree-vectorize", *FEW_SPILLS
 SCALAR_OPTIMISATION = OPTIMISATION[1:]
 # Half of the compiler's time for a text with derivatives of several lanes, whose kernel is a twentieth slower.
 DERIVATIVE_OPTIMISATION = (("-O2", *FEW_SPILLS), *OPTIMISATION)
-# Half of the compiler's time or less; the kernels take up to twice as long.
-QUICK_OPTIMISATION = (("-Og", *FEW_SPILLS), ("-O1",))
 
 log = logging.getLogger(__name__)
 
@@ -120,19 +118,21 @@ def has_libmvec() -> bool:
     return platform.machine() in ("x86_64", "AMD64")
 
 
-def library(source: str, check: Check, width: int, derivatives: bool = False) -> ctypes.CDLL | None:
+def library(
+    source: str, check: Check, width: int, derivatives: bool = False, quick: str = "-Og"
+) -> ctypes.CDLL | None:
     """The loaded library for a C text of `width` lanes; None where the caller should use the interpreted form.
 
-    derivatives: the text has tangents or adjoints, so that compiling it takes long.
+    derivatives: the text has tangents or adjoints, so that compiling it takes long. quick: the level of optimisation
+    with FISH_SIM_QUICK_COMPILE=1 in the environment, for short runs of many structures, such as tests.
 
     A text that is not in the cache is compiled and its library given to `check`. One whose errors exceed TOLERANCE is
-    compiled with safer flags; where none helps, or no compiler works, a warning says so. With FISH_SIM_QUICK_COMPILE=1
-    in the environment QUICK_OPTIMISATION is used: for short runs of many structures, such as tests.
+    compiled with safer flags; where none helps, or no compiler works, a warning says so.
     """
     cc = compiler()
     if cc is None:
         return None
-    levels = _levels(width, derivatives)
+    levels = _levels(width, derivatives, quick)
     key = _digest(
         "\n".join(
             [source, cc, _processor(), *FLAGS, str(levels), str(TOLERANCE), str(CHECKED)]
@@ -158,9 +158,9 @@ def library(source: str, check: Check, width: int, derivatives: bool = False) ->
     return None
 
 
-def _levels(width: int, derivatives: bool) -> tuple[tuple[str, ...], ...]:
+def _levels(width: int, derivatives: bool, quick: str) -> tuple[tuple[str, ...], ...]:
     if os.environ.get("FISH_SIM_QUICK_COMPILE"):
-        return QUICK_OPTIMISATION
+        return (quick, *FEW_SPILLS), ("-O1",)
     if width == 1:
         return SCALAR_OPTIMISATION
     return DERIVATIVE_OPTIMISATION if derivatives else OPTIMISATION
