@@ -27,11 +27,12 @@ KEPT_KERNELS = (
 
 
 @pytest.fixture
-def shipped_flags(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def shipped_flags() -> Iterator[None]:
     """For tests of the kernels themselves: they are compiled as for users, and none is kept from another test."""
-    monkeypatch.delenv(QUICK, raising=False)
-    _forget_kernels()
-    yield
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv(QUICK, raising=False)
+        _forget_kernels()
+        yield
     _forget_kernels()
 
 
