@@ -114,22 +114,26 @@ train evaluate paper:
 	@$(ROBOFISH) $@ --out '$(or $(OUT),out/$@)' $(ARGS)
 
 # --- tests ----------------------------------------------------------------------------------------------------------------
-# Parts that run two at a time: whoever is free takes the next, the longest first, and both cores stay busy to the end.
-# Tests that start nodes are one part, one after the other: two would draw the same ROS domain now and then.
-WITHOUT_NODES := fish_sysid fish_study fish_sim fish_train
-PARTS := with_nodes $(WITHOUT_NODES)
+# Parts that run three at a time on two cores, since tests with nodes wait now and then; the longest first. Tests that draw a
+# free ROS domain are one part, one after the other: two would draw the same now and then. All others have domains of their own.
+DRAW_A_DOMAIN := fish_bag
+ALONE := fish_sysid fish_study fish_control fish_vision fish_hw fish_sim fish_train fish_node
+PARTS := across $(ALONE) rest
 test: setup install/.studies
-	@status=0; $(MAKE) --jobs=2 --keep-going $(PARTS:%=.test/%) || status=1; \
+	@status=0; $(MAKE) --jobs=3 --keep-going $(PARTS:%=.test/%) || status=1; \
 		$(ACTIVATE); colcon test-result --all --verbose || status=1; \
 		if python3.12 -c '' 2>/dev/null; then $(MAKE) test-noble || status=1; fi; exit $$status
 
 COLCON_TEST = colcon --log-base log/$(@F) test $(WITH_STUDIES) --executor sequential --return-code-on-test-failure
 .PHONY: $(PARTS:%=.test/%)
-.test/with_nodes:
-	@unset MAKEFLAGS MFLAGS; $(WORKSPACE); status=0; $(COLCON_TEST) --packages-skip $(WITHOUT_NODES) || status=1; \
-		python -m pytest test || status=1; exit $$status
-$(WITHOUT_NODES:%=.test/%): .test/%:
+.test/across:
+	@unset MAKEFLAGS MFLAGS; $(WORKSPACE); status=0; python -m pytest test || status=1; \
+		$(COLCON_TEST) --packages-select $(DRAW_A_DOMAIN) || status=1; exit $$status
+$(ALONE:%=.test/%): .test/%:
 	@$(WORKSPACE); $(COLCON_TEST) --packages-select $*
+# whatever package is not named above
+.test/rest:
+	@$(WORKSPACE); $(COLCON_TEST) --packages-skip $(DRAW_A_DOMAIN) $(ALONE)
 
 # Ubuntu 24.04's versions of Python and of every library that rosdep installs there; all packages but training.
 NOBLE := .noble

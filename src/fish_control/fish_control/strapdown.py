@@ -26,7 +26,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
 from fish_control.imu_heading import COASTING_TIME, SAMPLE_PERIOD
@@ -65,6 +64,8 @@ class StrapdownFilter:
     """
 
     def __init__(self, noise: MotionNoise, scale: NoiseScale | None = None) -> None:
+        from filterpy.kalman import ExtendedKalmanFilter  # slow to import; fusion alone filters
+
         self._noise, self._scale = noise, scale or NoiseScale()
         self.model = MotionModel(True, noise.accel_noise**2 * SAMPLE_PERIOD, 1.0)
         self._filter = ExtendedKalmanFilter(dim_x=SIZE, dim_z=3)

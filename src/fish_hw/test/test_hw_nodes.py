@@ -41,7 +41,7 @@ from fish_hw.transport.sysfs_pwm import SysfsPwm
 from fish_node.camera_file import CameraFileError, read_camera_file
 
 pytestmark = pytest.mark.ros
-DOMAIN = 145 + os.getpid() % 50  # tests of other packages, at 141 to 144, run beside this one
+DOMAIN = 176 + os.getpid() % 50  # tests of other packages, below, run beside this one
 TIMEOUT_S = 20.0
 
 

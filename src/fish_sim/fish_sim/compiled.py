@@ -118,10 +118,13 @@ def has_libmvec() -> bool:
     return platform.machine() in ("x86_64", "AMD64")
 
 
-def library(source: str, check: Check, width: int, derivatives: bool = False) -> ctypes.CDLL | None:
+def library(
+    source: str, check: Check, width: int, derivatives: bool = False, quick: str = "-Og"
+) -> ctypes.CDLL | None:
     """The loaded library for a C text of `width` lanes; None where the caller should use the interpreted form.
 
-    derivatives: the text has tangents or adjoints, so that compiling it takes long.
+    derivatives: the text has tangents or adjoints, so that compiling it takes long. quick: the level of optimisation
+    with FISH_SIM_QUICK_COMPILE=1 in the environment, for short runs of many structures, such as tests.
 
     A text that is not in the cache is compiled and its library given to `check`. One whose errors exceed TOLERANCE is
     compiled with safer flags; where none helps, or no compiler works, a warning says so.
@@ -129,7 +132,7 @@ def library(source: str, check: Check, width: int, derivatives: bool = False) ->
     cc = compiler()
     if cc is None:
         return None
-    levels = _levels(width, derivatives)
+    levels = _levels(width, derivatives, quick)
     key = _digest(
         "\n".join(
             [source, cc, _processor(), *FLAGS, str(levels), str(TOLERANCE), str(CHECKED)]
@@ -155,7 +158,9 @@ def library(source: str, check: Check, width: int, derivatives: bool = False) ->
     return None
 
 
-def _levels(width: int, derivatives: bool) -> tuple[tuple[str, ...], ...]:
+def _levels(width: int, derivatives: bool, quick: str) -> tuple[tuple[str, ...], ...]:
+    if os.environ.get("FISH_SIM_QUICK_COMPILE"):
+        return (quick, *FEW_SPILLS), ("-O1",)
     if width == 1:
         return SCALAR_OPTIMISATION
     return DERIVATIVE_OPTIMISATION if derivatives else OPTIMISATION

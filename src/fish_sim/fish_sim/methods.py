@@ -6,15 +6,14 @@ The tail's fastest mode is an almost undamped oscillation of about 150 rad/s (n 
 fine solution to 1e-6 over 20 s and keeps the energy to 2e-7 per second with 18 rates in 10 ms; DOP853 needs two steps
 (24 rates) too: one of 10 ms loses up to 8e-6 per second, RK4 at 10 ms damps that mode by 8 % a step.
 Sources: Calvo, Franco, Montijano and Randez 1996, J. Comput. Appl. Math. 76, 195-212 (order of dispersion 10, of
-dissipation 9); DOP853: Hairer, Norsett and Wanner 1993, coefficients from SciPy's public class.
+dissipation 9); DOP853: Hairer, Norsett and Wanner 1993.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.integrate import DOP853
+from fish_sim import dop853
 
 
 @dataclass(frozen=True)
@@ -25,12 +24,6 @@ class Method:
     A: tuple[tuple[float, ...], ...]
     B: tuple[float, ...]
     C: tuple[float, ...]
-
-
-def _method(name: str, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> Method:
-    stages = len(B)
-    rows = tuple(tuple(float(a) for a in row[:stages]) for row in A[:stages])
-    return Method(name, rows, tuple(float(b) for b in B), tuple(float(c) for c in C[:stages]))
 
 
 CFMR7 = (
@@ -103,5 +96,10 @@ METHODS = {
         (0.0, 0.5, 0.5, 1.0),
     ),
     "cfmr7": Method("cfmr7", *CFMR7),
-    "dop853": _method("dop853", DOP853.A, DOP853.B, DOP853.C),
+    "dop853": Method(
+        "dop853",
+        tuple((*row, *(0.0,) * (len(dop853.B) - len(row))) for row in dop853.A),
+        dop853.B,
+        dop853.C,
+    ),
 }

@@ -16,6 +16,8 @@ from fish_sim.step import Scheme, Stepper
 
 SCHEME = Scheme("euler")
 
+pytestmark = pytest.mark.usefixtures("shipped_flags")
+
 
 @pytest.fixture
 def fresh(monkeypatch, tmp_path):

@@ -27,6 +27,8 @@ COMPILERS = [
     for name in ("gcc", "clang")
 ]
 
+pytestmark = pytest.mark.usefixtures("shipped_flags")
+
 
 @pytest.fixture
 def compiler(request, monkeypatch):

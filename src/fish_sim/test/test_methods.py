@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, solve_ivp
 
 from fish_sim.methods import METHODS
 from fish_sim.stability import growth
@@ -34,6 +34,13 @@ def test_error_falls_with_the_order_of_the_method(name):
     errors = [np.abs(integrate(METHODS[name], steps) - exact).max() for steps in (4, 8)]
     assert np.log2(errors[0] / errors[1]) > ORDERS[name] - 0.5
     np.testing.assert_allclose(np.sum(METHODS[name].A, axis=1), METHODS[name].C, atol=1e-12)
+
+
+def test_the_literals_of_dop853_are_those_of_scipy():
+    method = METHODS["dop853"]
+    np.testing.assert_array_equal(method.A, DOP853.A[:12, :12])
+    np.testing.assert_array_equal(method.B, DOP853.B)
+    np.testing.assert_array_equal(method.C, DOP853.C[:12])
 
 
 def test_cfmr7_keeps_an_oscillation_that_rk4_damps():

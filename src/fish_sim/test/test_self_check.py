@@ -24,7 +24,10 @@ from fish_sim.step import Stepper
 SCHEME = Scheme("rk4")
 GCC = shutil.which("gcc") or shutil.which("cc")
 
-pytestmark = pytest.mark.skipif(GCC is None, reason="no gcc on this computer")
+pytestmark = [
+    pytest.mark.skipif(GCC is None, reason="no gcc on this computer"),
+    pytest.mark.usefixtures("shipped_flags"),
+]
 
 
 @pytest.fixture
@@ -100,6 +103,20 @@ def test_a_kernel_that_is_wrong_with_the_fast_flags_is_built_with_safer_ones(
     assert result["passed"]
     assert result["flags"] == ["-O1"]
     assert isinstance(step.kernel((1, ()), SCHEME, step.lanes(), True, "values"), CompiledKernel)
+    assert not caplog.text
+
+
+@pytest.mark.parametrize(("edit", "flags"), [("", "-Og"), (EDITS[0], "-O1")])
+def test_a_kernel_that_is_compiled_quickly_is_checked_too(
+    cache, bad_compiler, monkeypatch, caplog, edit, flags
+):
+    monkeypatch.setenv("FISH_SIM_QUICK_COMPILE", "1")
+    bad_compiler(edit, "-Og")
+    assert one_step() < 1e-11
+    (result,) = results(cache)
+    assert result["passed"]
+    assert result["flags"][0] == flags
+    assert max(result["errors"].values()) < 1e-11
     assert not caplog.text
 
 

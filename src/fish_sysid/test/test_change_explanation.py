@@ -126,44 +126,52 @@ def days():
     return kinematic_swims(World(), 1, OLD), kinematic_swims(World(), 2, NEW)
 
 
-def looks_at(old, new) -> list[Case]:
-    rows = [trial_rows(Robot(), e, swims(e), NAMES) for e in (old, new)]
-    cases = []
-    for channels in LOOKS.values():
-        kept, moved = (look(r, channels) for r in rows)
-        fit, strata = regression(kept, moved), [0] * (OLD + NEW)
-        day_of = [0] * OLD + [1] * NEW
-        cases.append(
-            Case(channels, fit, kept, moved, strata, day_of, Robot(), new, tuple(swims(new)))
-        )
+@pytest.fixture(scope="module")
+def looks_at(days):
+    """looks_at(new): both looks at a NEW of the same OLD."""
+    old, _ = days
+    rows_of_old = trial_rows(Robot(), old, swims(old), NAMES)
+
+    def cases(new) -> list[Case]:
+        rows = [rows_of_old, trial_rows(Robot(), new, swims(new), NAMES)]
+        found = []
+        for channels in LOOKS.values():
+            kept, moved = (look(r, channels) for r in rows)
+            fit, strata = regression(kept, moved), [0] * (OLD + NEW)
+            day_of = [0] * OLD + [1] * NEW
+            found.append(
+                Case(channels, fit, kept, moved, strata, day_of, Robot(), new, tuple(swims(new)))
+            )
+        return found
+
     return cases
 
 
-def test_two_changes_are_named_one_after_the_other_and_leave_nothing(days) -> None:
-    old, new = days
+def test_two_changes_are_named_one_after_the_other_and_leave_nothing(days, looks_at) -> None:
+    _, new = days
     flow = with_injection(new, "current", {"x": 0.03, "y": -0.02})
-    looks = looks_at(old, with_injection(flow, "gyro_scale", {"factor": 1.06}))
+    looks = looks_at(with_injection(flow, "gyro_scale", {"factor": 1.06}))
     found = explained(Change("changed"), looks, swapped_in(looks, ()))
     assert {named.name for named in found.named} == {"current", "gyro_scale"}
     assert found.remainder_p_value > 0.005
     assert found.suspects == ()
 
 
-def test_the_strokes_name_what_the_mean_motion_does_not_show(days) -> None:
-    old, new = days
-    turned = looks_at(old, with_injection(new, "imu_misalignment", {"angle": 0.15}))
-    flow = looks_at(old, with_injection(new, "current", {"x": 0.03, "y": -0.02}))
+def test_the_strokes_name_what_the_mean_motion_does_not_show(days, looks_at) -> None:
+    _, new = days
+    turned = looks_at(with_injection(new, "imu_misalignment", {"angle": 0.15}))
+    flow = looks_at(with_injection(new, "current", {"x": 0.03, "y": -0.02}))
     case, _, found = telling(turned, swapped_in(turned, ()), ())
     assert max(found.values(), key=lambda one: one.gain).name == "imu_misalignment"
     assert telling(flow, swapped_in(flow, ()), ())[0] is flow[0]
     assert case in turned
 
 
-def test_so_little_of_an_effect_is_not_said(days) -> None:
-    old, new = days
+def test_so_little_of_an_effect_is_not_said(days, looks_at) -> None:
+    _, new = days
     for offset, said in ((0.01, True), (0.06, False)):
         changed = with_injection(new, "camera_heading_offset", {"offset": offset})
-        case = looks_at(old, changed)[0]
+        case = looks_at(changed)[0]
         seen = telling([case], swapped_in([case], ()), ())[2]["camera_heading_offset"]
         values = refit(case.fit, case.rows, case.robot, case.new, case.days, seen)
         assert values.parameters["offset"].value == pytest.approx(offset, abs=0.004)
@@ -183,10 +191,10 @@ def test_where_nothing_changed_every_rank_is_as_likely_as_any() -> None:
     assert np.mean(np.array(gains) <= 0.1) <= 0.1
 
 
-def test_a_flow_is_the_rarest_of_all_sets_and_nothing_is_not(days) -> None:
-    old, new = days
-    flow = looks_at(old, with_injection(new, "current", {"x": 0.03, "y": -0.02}))
-    same = looks_at(old, new)
+def test_a_flow_is_the_rarest_of_all_sets_and_nothing_is_not(days, looks_at) -> None:
+    _, new = days
+    flow = looks_at(with_injection(new, "current", {"x": 0.03, "y": -0.02}))
+    same = looks_at(new)
     strata = [0] * (OLD + NEW)
     changed, unchanged = (
         permutation_p_value([c.fit for c in x], strata, 200) for x in (flow, same)

@@ -52,6 +52,7 @@ def with_sensors(robot: Robot):
     return hypothesis
 
 
+@pytest.mark.usefixtures("shipped_flags")
 @pytest.mark.parametrize("width", [2, 4, 8])
 @pytest.mark.parametrize("stiffness", [None, 1.5], ids=["nominal", "a tail that needs more steps"])
 def test_compiled_and_numpy_passes_agree(stiffness, width, monkeypatch):

@@ -36,12 +36,12 @@ def test_a_tail_of_one_link_is_fitted_as_well_as_from_the_truth() -> None:
     assert global_fit(hypothesis, data, Noise()).log_posterior > true.log_posterior - 3.0
 
 
-def test_many_starts_reach_the_truth_of_a_tail_of_five_links_where_one_does_not() -> None:
-    hypothesis, data, true = recorded(5, 0)
+def test_many_starts_reach_the_truth_of_a_tail_of_three_links_where_one_does_not() -> None:
+    hypothesis, data, true = recorded(3, 0)
     origin = hypothesis.parametrization.origin()
     single = refit(hypothesis, origin, data, Noise(), ANNEAL)
     found = multistart_fit(hypothesis, data, Noise())
-    assert found.log_posterior > single.log_posterior
+    assert found.log_posterior > single.log_posterior + 100.0
     assert found.log_posterior > true.log_posterior - 3.0
 
 

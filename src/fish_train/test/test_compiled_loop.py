@@ -12,6 +12,7 @@ from fish_train.training.network import FORMS, weight_count
 from fish_train.training.torch_loop import TorchLoop
 
 compiled = pytest.mark.skipif(not CompiledLoop.available(), reason="no C compiler")
+pytestmark = pytest.mark.usefixtures("shipped_flags")
 
 
 def both(form: str = "network"):

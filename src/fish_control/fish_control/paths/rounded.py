@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import gaussian_filter1d
 
 Array = NDArray[np.float64]
 
@@ -79,6 +78,8 @@ def ease(points: ArrayLike, width: float, closed: bool = False) -> Array:
     Returns:
         (N, 2) points every 2 mm.
     """
+    from scipy.ndimage import gaussian_filter1d  # slow to import, and most nodes ease no path
+
     vertices = np.asarray(points, dtype=float)
     if closed:
         vertices = np.vstack([vertices, vertices[:1]])

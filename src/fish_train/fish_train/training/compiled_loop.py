@@ -90,7 +90,8 @@ def loop_check(stepper: Stepper, law: Law, width: int) -> Check:
 def loop_library(stepper: Stepper, law: Law, width: int) -> ctypes.CDLL | None:
     """The compiled and checked kernel of a loop, or None where it is `TorchLoop`."""
     source, check = loop_source(stepper, law, width), loop_check(stepper, law, width)
-    return library(source, check, width, derivatives=True)
+    # training takes many steps of one structure: twice as long with -O1
+    return library(source, check, width, derivatives=True, quick="-O2")
 
 
 class CompiledLoop:
