@@ -3,10 +3,11 @@
 """control/target, control/twist, tracking/error, odometry/filtered -> joint_command, control/gains.
 
 joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder:
-position = alpha (rad). control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy of the
-weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog pauses them on stale or bad
-odometry, lost sensors and a stale target: they go to rest until all is well, and arming/pause says why. How long that may last,
-the owner of the arming state decides. Decisions are in Controller and Watchdog.
+position = alpha (rad). A command follows each new odometry at once, and while none comes a timer; in simulated time, which
+waits for commands, they follow the timer alone. control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy
+of the weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog pauses them on stale
+or bad odometry, lost sensors and a stale target: they go to rest until all is well, and arming/pause says why. How long that
+may last, the owner of the arming state decides. Decisions are in Controller and Watchdog.
 """
 
 import math
@@ -46,6 +47,8 @@ from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
 SETTABLE = ("gains_lowest", "gains_highest")
+MISSED = 1.5  # periods of the command, after which it waits for odometry no more
+EARLY = 0.75  # periods of the command between the stamps of two that follow odometry; stamps jitter
 
 
 class ControllerNode(Node):
@@ -70,7 +73,8 @@ class ControllerNode(Node):
         self._odometry_time = self._target_time = math.nan
         self._wanted = Reference(0.0, 0.0, 0.0, 0.0)
         self._now = math.nan
-        self._ticks = 0
+        self._commanded = -math.inf  # s, stamp of the odometry that the last command followed
+        self._due = 1.0 / config.rate_hz  # s since the last decision
         self._latency = Latency()
         self._said = ""
         self._paused = False
@@ -93,7 +97,9 @@ class ControllerNode(Node):
         self.create_subscription(TwistStamped, "control/twist", self._on_twist, 10)
         self.create_subscription(Vector3Stamped, "tracking/error", self._on_error, 10)
         self.create_subscription(PoseStamped, "control/target", self._on_target, 10)
-        self.create_timer(1.0 / self._config.command_rate_hz, self._tick)
+        self._waits = not self.get_parameter("use_sim_time").value  # for odometry
+        self._period = 1.0 / self._config.command_rate_hz
+        self._timer = self.create_timer(self._period * (MISSED if self._waits else 1.0), self._tick)
         self.create_timer(1.0, self._report)
 
     def _on_odometry(self, message: Odometry) -> None:
@@ -103,6 +109,10 @@ class ControllerNode(Node):
             signs, self._config.largest_variance
         ):  # the water is learned from it
             self._controller.observe(self._odometry_time, motion_of(message))
+        if self._waits and abs(self._odometry_time - self._commanded) > EARLY * self._period:
+            self._commanded = self._odometry_time
+            self._timer.reset()
+            self._tick()
 
     def _on_twist(self, message: TwistStamped) -> None:
         speed, yaw_rate = message.twist.linear.x, message.twist.angular.z
@@ -120,21 +130,23 @@ class ControllerNode(Node):
             self._target_time = seconds(message.header.stamp)
 
     def _tick(self) -> None:
-        """One period of the command; every so many, one of control."""
+        """One command; where a period of control has passed, one decision."""
         clock = self.get_clock().now()
         now = clock.nanoseconds * 1e-9
-        dt = 1.0 / self._config.command_rate_hz if math.isnan(self._now) else now - self._now
+        dt = self._period if math.isnan(self._now) else now - self._now
         dt = min(max(dt, 0.0), LONGEST_PERIOD)
         self._now = now
+        control_period = 1.0 / self._config.rate_hz
+        self._due = min(self._due + dt, 1.5 * control_period)
         may_swim = self._watchdog.check(now, self._signs(now))
         self._say_pause()
         if not may_swim:
             self._controller.rest()
         elif self._wanted.speed <= 0.0:
             self._controller.glide(self._wanted.yaw_rate, dt)
-        elif self._ticks % round(self._config.command_rate_hz / self._config.rate_hz) == 0:
+        elif self._due > control_period - 0.5 * self._period:
+            self._due -= control_period
             self._gains.publish(to_message(self._controller.decide(self._wanted)))
-        self._ticks += 1
         command = self._controller.command(dt)
         self._command.publish(self._written(clock.to_msg(), command))
         if may_swim:
