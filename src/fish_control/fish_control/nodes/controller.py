@@ -23,7 +23,6 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 
-from fish_control.control_law import Gains
 from fish_control.controller import LONGEST_PERIOD, Controller, Reference
 from fish_control.gains_file import read_gains_file, require_fit
 from fish_control.latency import Latency
@@ -42,7 +41,7 @@ from fish_control.nodes.written import CommandBytes
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.changes import Changes
-from fish_node.nodes.quick_messages import from_bytes
+from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
@@ -87,16 +86,15 @@ class ControllerNode(Node):
     def _create_interfaces(self) -> None:
         self._command = self.create_publisher(JointState, "joint_command", 10)
         self._written = CommandBytes()
+        self._gains_message = gains_message()
         self._gains = self.create_publisher(Float64MultiArray, "control/gains", 10)
         self._pause = self.create_publisher(String, "arming/pause", 10)
         self._arming = ArmingListener(self)
         self._reporter = Reporter(self, self._command)
-        self.create_subscription(
-            Odometry, "odometry/filtered", from_bytes(Odometry, self._on_odometry), 10, raw=True
-        )
-        self.create_subscription(TwistStamped, "control/twist", self._on_twist, 10)
-        self.create_subscription(Vector3Stamped, "tracking/error", self._on_error, 10)
-        self.create_subscription(PoseStamped, "control/target", self._on_target, 10)
+        hear(self, Odometry, "odometry/filtered", self._on_odometry, 10)
+        hear(self, TwistStamped, "control/twist", self._on_twist, 10)
+        hear(self, Vector3Stamped, "tracking/error", self._on_error, 10)
+        hear(self, PoseStamped, "control/target", self._on_target, 10)
         self._waits = not self.get_parameter("use_sim_time").value  # for odometry
         self._period = 1.0 / self._config.command_rate_hz
         self._timer = self.create_timer(self._period * (MISSED if self._waits else 1.0), self._tick)
@@ -146,7 +144,8 @@ class ControllerNode(Node):
             self._controller.glide(self._wanted.yaw_rate, dt)
         elif self._due > control_period - 0.5 * self._period:
             self._due -= control_period
-            self._gains.publish(to_message(self._controller.decide(self._wanted)))
+            self._gains_message.data = list(self._controller.decide(self._wanted))
+            self._gains.publish(self._gains_message)
         command = self._controller.command(dt)
         self._command.publish(self._written(clock.to_msg(), command))
         if may_swim:
@@ -191,9 +190,9 @@ def installed_weights() -> str:
         return str(FilePath(__file__).parents[2] / "config" / "gains.safetensors")
 
 
-def to_message(gains: Gains) -> Float64MultiArray:
-    """Gains with a labelled layout: 2 controllers of 3 gains."""
-    message = Float64MultiArray(data=list(gains))
+def gains_message() -> Float64MultiArray:
+    """Room for gains with a labelled layout: 2 controllers of 3 gains."""
+    message = Float64MultiArray()
     message.layout.dim = [
         MultiArrayDimension(label="steering,speed", size=2, stride=6),
         MultiArrayDimension(label="Kp,Ki,Kd", size=3, stride=3),
