@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fish_control import scalar_math
 from fish_control.control_law import (
     ActuatorState,
     ControlState,
@@ -83,7 +84,7 @@ class Controller:
 
     def _observe(self, state: GuidanceState, motion: Motion, dt: float) -> GuidanceState:
         self._listened += dt
-        return observe(state, motion, self._setpoint, dt, self._limits, self._guidance, np)
+        return observe(state, motion, self._setpoint, dt, self._limits, self._guidance, scalar_math)
 
     def decide(self, wanted: Reference) -> Gains:
         """One control period at a wanted speed above zero: errors, gains from the policy, new set-points.
@@ -94,10 +95,10 @@ class Controller:
             raise ValueError("decide() before any odometry was observed")
         motion = self._motion
         state, curvature = self._observer.state, wanted.yaw_rate / wanted.speed
-        water = through_water(state, wanted.course, curvature, wanted.speed, np)
+        water = through_water(state, wanted.course, curvature, wanted.speed, scalar_math)
         e_psi = continued(
             self._control.heading_error,
-            float(heading_error(state, motion, water, self._guidance, np)),
+            float(heading_error(state, motion, water, self._guidance, scalar_math)),
         )
         e_u = wanted.speed - motion.surge
         inputs = policy_inputs(
@@ -107,20 +108,32 @@ class Controller:
             e_psi,
             e_u,
             wanted.cross_track_error,
-            np,
+            scalar_math,
             self._policy.contract.inputs,
         )
-        gains = Gains(*map(float, np.clip(self._policy.gains(np.array(inputs)), *self._bounds)))
-        self._swims = self._swims or bool(has_listened(self._listened, motion, self._guidance, np))
+        gains = Gains(*self._bounded(self._policy.gains(inputs)))
+        self._swims = self._swims or bool(
+            has_listened(self._listened, motion, self._guidance, scalar_math)
+        )
         if not self._swims:
             self.rest()
             return gains
         errors = Errors(e_psi, e_u, water.curvature, water.speed, state.water.thrust)
         self._control, self._setpoint = control_step(
-            self._control, errors, gains, self._policy.contract.control_period, self._limits, np
+            self._control,
+            errors,
+            gains,
+            self._policy.contract.control_period,
+            self._limits,
+            scalar_math,
         )
         self._glides = True
         return gains
+
+    def _bounded(self, gains: Gains) -> list[float]:
+        lowest, highest = self._bounds
+        bounded: list[float] = np.minimum(np.maximum(gains, lowest), highest).tolist()
+        return bounded
 
     def glide(self, yaw_rate: float, dt: float) -> None:
         """No drive for dt [s]; rudder hard over to the side of `yaw_rate` until the fish stands, then let go slowly.
@@ -146,7 +159,7 @@ class Controller:
     def command(self, dt: float) -> Command:
         """Advance the actuators by dt [s]."""
         self._actuators, rotor_speed = actuator_step(
-            self._actuators, self._setpoint, dt, self._limits, np
+            self._actuators, self._setpoint, dt, self._limits, scalar_math
         )
         return Command(
             math.fmod(self._actuators.phase, 2.0 * math.pi),

@@ -144,24 +144,24 @@ def bounded(state: WaterState, limit: float, xp: Any) -> WaterState:
 
 def _correct(state: WaterState, h: tuple[Any, ...], missing: Any, variance: Any) -> WaterState:
     """Take in a measurement h . x [m/s] that exceeds its prediction by `missing`; variance [m^2/s^2]."""
-    P = _matrix(state)
-    Ph = [sum(P[i][k] * h[k] for k in range(SIZE)) for i in range(SIZE)]
-    S = sum(h[i] * Ph[i] for i in range(SIZE)) + variance
+    h_w, h_x, h_y, h_e = h
+    Ph = [w * h_w + x * h_x + y * h_y + e * h_e for w, x, y, e in _matrix(state)]
+    S = Ph[0] * h_w + Ph[1] * h_x + Ph[2] * h_y + Ph[3] * h_e + variance
     K = [value / S for value in Ph]
-    P = [[P[i][j] - K[i] * Ph[j] for j in range(SIZE)] for i in range(SIZE)]
+    P = [
+        [value - k * other for value, other in zip(row, Ph, strict=True)]
+        for row, k in zip(_matrix(state), K, strict=True)
+    ]
     x = [value + k * missing for value, k in zip(state[:SIZE], K, strict=True)]
     return _state(x, [state.rudder, state.throttle, state.early], P)
 
 
 def _matrix(state: WaterState) -> list[list[Any]]:
     """The full covariance."""
-    upper = iter(state[SIZE + LAGGED :])
-    P = [[0.0] * SIZE for _ in range(SIZE)]
-    for i in range(SIZE):
-        for j in range(i, SIZE):
-            P[i][j] = P[j][i] = next(upper)
-    return P
+    ww, wx, wy, we, xx, xy, xe, yy, ye, ee = state[SIZE + LAGGED :]
+    return [[ww, wx, wy, we], [wx, xx, xy, xe], [wy, xy, yy, ye], [we, xe, ye, ee]]
 
 
 def _state(x: list[Any], lagged: list[Any], P: list[list[Any]]) -> WaterState:
-    return WaterState(*x, *lagged, *(P[i][j] for i in range(SIZE) for j in range(i, SIZE)))
+    w, x_row, y_row, e_row = P
+    return WaterState._make((*x, *lagged, *w, *x_row[1:], *y_row[2:], e_row[3]))

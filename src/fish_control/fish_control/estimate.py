@@ -43,28 +43,23 @@ def to_estimate(
     yaw_rate: of the IMU [rad/s], None if it measures none; offset_std: of the camera's clock [s], which moves the pose
     along the motion; gyro_noise: rad/s.
     """
-    x, y, psi, vx, vy, bias = moment.x[:6].tolist()
-    P = moment.P[:6, :6].tolist()
+    psi, vx, vy, bias = moment.x[2:6].tolist()
     c, s = math.cos(psi), math.sin(psi)
     u, v = c * vx + s * vy, c * vy - s * vx  # pool to body
     r = 0.0 if yaw_rate is None else yaw_rate - bias
     twist_P = np.eye(3) * LOST_VARIANCE
     if not imu_lost:
-        J = ((v, c, s), (-u, -s, c))  # d (u, v) / d (psi, v_x, v_y)
-        JP = [[sum(j * P[2 + m][2 + n] for m, j in enumerate(row)) for n in range(3)] for row in J]
-        for i, k in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            twist_P[i, k] = sum(a * b for a, b in zip(JP[i], J[k], strict=True))
+        J = np.array(((v, c, s), (-u, -s, c)))  # d (u, v) / d (psi, v_x, v_y)
+        twist_P[:2, :2] = J @ moment.P[2:5, 2:5] @ J.T
         if yaw_rate is not None:
-            twist_P[2, 2] = P[5][5] + gyro_noise**2
-    motion, offset_variance = (vx, vy, r), offset_std**2
-    pose_P = [
-        [P[i][k] + offset_variance * motion[i] * motion[k] for k in range(3)] for i in range(3)
-    ]
+            twist_P[2, 2] = moment.P[5, 5] + gyro_noise**2
+    motion = np.array((vx, vy, r))
+    pose_P = moment.P[:3, :3] + offset_std**2 * (motion[:, None] * motion)
     return Estimate(
         time=moment.time,
-        pose=np.array([x, y, psi]),
+        pose=moment.x[:3].copy(),
         twist=np.array([u, v, r]),
-        pose_covariance=np.array(pose_P),
+        pose_covariance=pose_P,
         twist_covariance=twist_P,
         gyro_bias=bias,
         camera_lost=camera_lost,

@@ -20,7 +20,7 @@ WILD = 25.0  # squared Mahalanobis distances count no more: one wrong pose decid
 
 
 class FilterBank:
-    """K filters with n states each; a measurement is of the first m of them, z = x[:m] + noise of covariance R.
+    """K filters with n states each; a measurement is of the first m of them, 1 or 2, z = x[:m] + noise of covariance R.
 
     Args:
         log_prior: (K,) logarithms of the candidates' shares before the first measurement, up to a constant.
@@ -37,21 +37,23 @@ class FilterBank:
 
     def predict(self, F: Array, u: Array, Q: Array) -> None:
         """Move by x = F x + u with the noise Q: (K, n, n), (K, n), (K, n, n)."""
-        self.x = np.einsum("kij,kj->ki", F, self.x) + u
+        self.x = _times(F, self.x) + u
         self.P = F @ self.P @ F.swapaxes(1, 2) + Q
 
     def correct(self, z: Array, R: Array, dt: float, scored: bool) -> None:
         """Take in a measurement (m,) with covariance R (m, m), dt [s] after the last; scored: it counts for the shares."""
         m = len(z)
-        S = self.P[:, :m, :m] + R
-        inverse, y = np.linalg.inv(S), z - self.x[:, :m]
+        inverse, determinant = _inverse(self.P[:, :m, :m] + R)
+        y = z - self.x[:, :m]
         if scored:
-            square = np.einsum("ki,kij,kj->k", y, inverse, y)
-            score = -0.5 * (np.minimum(square, WILD) + np.log(np.linalg.det(S)))
+            square = (y * _times(inverse, y)).sum(axis=1)
+            score = -0.5 * (np.minimum(square, WILD) + np.log(determinant))
             self._scores = math.exp(-dt / MEMORY) * self._scores + score - score.max()
         gain = self.P[:, :, :m] @ inverse
-        keep = np.eye(self.P.shape[1]) - gain @ np.eye(m, self.P.shape[1])
-        self.x = self.x + np.einsum("kij,kj->ki", gain, y)
+        keep = np.zeros(self.P.shape)
+        keep[:, :, :m] = -gain
+        keep += np.eye(self.P.shape[1])
+        self.x = self.x + _times(gain, y)
         self.P = keep @ self.P @ keep.swapaxes(1, 2) + gain @ R @ gain.swapaxes(1, 2)
 
     @property
@@ -61,3 +63,18 @@ class FilterBank:
         weights = np.exp(log - log.max())
         shares: Array = weights / weights.sum()
         return shares
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    """Products (K, n) of matrices (K, n, m) and vectors (K, m)."""
+    product: Array = (matrices @ vectors[:, :, None])[:, :, 0]
+    return product
+
+
+def _inverse(matrices: Array) -> tuple[Array, Array]:
+    """Inverses (K, m, m) and determinants (K,) of symmetric matrices (K, m, m), m 1 or 2, by their cofactors."""
+    if matrices.shape[1] == 1:
+        return 1.0 / matrices, matrices[:, 0, 0]
+    a, b, c = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    determinant = a * c - b * b
+    return np.array(((c, -b), (-b, a))).transpose(2, 0, 1) / determinant[:, None, None], determinant

@@ -113,20 +113,17 @@ class ImuHistory:
 
     def forget(self, before: float) -> None:
         """Drop samples older than `before` [s], but not the newest of them."""
-        self._begin += max(0, int(np.searchsorted(self.times, before)) - 1)
+        self._begin += max(0, int(self.times.searchsorted(before)) - 1)
 
     def yaw_rate(self, time: float) -> float | None:
         """Yaw rate [rad/s] of the sample nearest to `time` [s]; None if none is in reach or it was not measured."""
         if not len(self):
             return None
-        rows = self._rows[self._begin : self._end]
-        i = int(np.searchsorted(rows[:, TIME], time))
-        near = min(
-            (k for k in (i - 1, i) if 0 <= k < len(rows)), key=lambda k: abs(rows[k, TIME] - time)
-        )
-        row = rows[near]
-        known = abs(row[TIME] - time) <= self.reach and bool(row[YAW_KNOWN])
-        return float(row[RATE]) if known else None
+        i = self._begin + int(self.times.searchsorted(time))
+        around = self._rows[max(i - 1, self._begin) : min(i + 1, self._end)].tolist()
+        row = min(around, key=lambda row: abs(row[TIME] - time))
+        known = abs(row[TIME] - time) <= self.reach and row[YAW_KNOWN]
+        return row[RATE] if known else None
 
     def heading(self, times: Array) -> Array:
         """Continuous heading [rad] at `times` [s], linear between the samples and constant beyond them."""
@@ -141,8 +138,8 @@ class ImuHistory:
         t = self.times
         if not len(t):
             return [Step(end - start, 0.0, 0.0, 0.0, 0.0, False, False)]
-        first = int(np.searchsorted(t, start, side="right"))
-        last = int(np.searchsorted(t, end, side="left"))
+        first = int(t.searchsorted(start, side="right"))
+        last = int(t.searchsorted(end, side="left"))
         skipped = max(first - 1, 0)
         # plain numbers: most intervals have one to four steps, for which arrays cost many times as much
         rows = self._rows[self._begin + skipped : min(self._begin + last + 1, self._end)].tolist()

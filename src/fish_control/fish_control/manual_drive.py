@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from fish_control import scalar_math
 from fish_control.control_law import ActuatorState, ControlLimits, Setpoint, actuator_step
 from fish_control.controller import Command
 
@@ -67,6 +66,8 @@ class ManualDrive:
         if not self.held(now):
             self.release()
         wanted = Setpoint(self.rudder * self._limits.rudder_range, self.throttle)
-        self._actuators, speed = actuator_step(self._actuators, wanted, dt, self._limits, np)
+        self._actuators, speed = actuator_step(
+            self._actuators, wanted, dt, self._limits, scalar_math
+        )
         phase = math.fmod(self._actuators.phase, 2.0 * math.pi)
         return Command(phase, float(speed), float(self._actuators.alpha))

@@ -39,6 +39,7 @@ TURN_FACTORS = 4.0 ** np.arange(0.0, 5.1, 0.5)  # on the variance of the heading
 LONGEST_GAP = 0.5  # s between two poses that are compared
 POSITION = np.array([0, 1, 3, 4, 6, 7])  # place, velocity and biases in the strapdown state
 HEADING = np.array([2, 5])  # heading and bias
+POSITION_BLOCK, HEADING_BLOCK = np.ix_(POSITION, POSITION), np.ix_(HEADING, HEADING)
 
 
 class MotionModels:
@@ -48,6 +49,7 @@ class MotionModels:
         self._noise, self._scale = noise, scale
         known = noise.accel_noise**2 * SAMPLE_PERIOD * ACCEL_FACTORS**2
         self._density = np.concatenate((known, DENSITIES))
+        self._measuring = len(known)  # candidates that use the accelerometer; the others follow
         self._used = np.arange(len(self._density)) < len(known)
         sizes = np.where(self._used, len(known), len(DENSITIES))
         self._position = FilterBank(-np.log(sizes))
@@ -71,8 +73,8 @@ class MotionModels:
             if after.time > imu.last_time:
                 break
             if self._fresh or before.time != self._time:
-                self._position.start(before.x[POSITION], before.P[np.ix_(POSITION, POSITION)])
-                self._heading.start(before.x[HEADING], before.P[np.ix_(HEADING, HEADING)])
+                self._position.start(before.x[POSITION], before.P[POSITION_BLOCK])
+                self._heading.start(before.x[HEADING], before.P[HEADING_BLOCK])
             self._compare(before, after, imu.between(before.time, after.time), scored)
             self._time = after.time
         self.current = self._choose()
@@ -94,15 +96,17 @@ class MotionModels:
         self._heading.correct(np.array([psi]), R[2:, 2:], dt, scored)
 
     def _move_positions(self, moved: Preintegration, F: Array, x: Array) -> None:
-        T, K = moved.duration, len(self._density)
-        A = np.tile(F[np.ix_(POSITION, POSITION)], (K, 1, 1))
-        A[~self._used, :4, 4:] = 0.0
-        u = np.zeros((K, 6))
-        u[self._used, :4] = (*moved.left_dv, *moved.dv) - A[0, :4, 4:] @ x[6:8]
-        unit = np.zeros((6, 6))
-        unit[:4, :4] = np.kron(((T**3 / 3.0, T**2 / 2.0), (T**2 / 2.0, T)), np.eye(2))
-        Q = self._scale.position * self._density[:, None, None] * unit
-        Q[self._used, 4:, 4:] += self._noise.accel_drift**2 * T * np.eye(2)
+        T, K, used = moved.duration, len(self._density), slice(0, self._measuring)
+        A, u, Q = np.empty((K, 6, 6)), np.zeros((K, 6)), np.zeros((K, 6, 6))
+        A[:] = F[POSITION_BLOCK]
+        A[self._measuring :, :4, 4:] = 0.0
+        u[used, :4] = (*moved.left_dv, *moved.dv) - A[0, :4, 4:] @ x[6:8]
+        density = self._scale.position * self._density
+        for p, v in ((0, 2), (1, 3)):
+            Q[:, p, p] = T**3 / 3.0 * density
+            Q[:, p, v] = Q[:, v, p] = T**2 / 2.0 * density
+            Q[:, v, v] = T * density
+        Q[used, 4, 4] = Q[used, 5, 5] = self._noise.accel_drift**2 * T
         self._position.predict(A, u, Q)
 
     def _turn_headings(self, moved: Preintegration, F: Array, x: Array) -> None:
@@ -112,8 +116,8 @@ class MotionModels:
         Q = np.zeros((K, 2, 2))
         Q[:, 0, 0] = self._scale.heading * TURN_FACTORS * variance
         Q[:, 1, 1] = self._noise.gyro_drift**2 * T
-        u = np.tile((moved.turn - F[2, 5] * x[5], 0.0), (K, 1))
-        self._heading.predict(np.tile(F[np.ix_(HEADING, HEADING)], (K, 1, 1)), u, Q)
+        u = np.array((moved.turn - F[2, 5] * x[5], 0.0))
+        self._heading.predict(F[HEADING_BLOCK][None], u, Q)
 
     def _choose(self) -> MotionModel:
         shares, turns = self._position.shares, self._heading.shares

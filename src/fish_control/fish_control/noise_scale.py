@@ -40,6 +40,13 @@ class NoiseScale:
 
 
 def _follow(factor: float, y: Array, S: Array) -> float:
-    exceeds = float(y @ np.linalg.solve(S, y)) > CHI2[len(y)]
-    step = GAIN * (float(exceeds) - (1.0 - QUANTILE))
+    step = GAIN * (float(_square(y.tolist(), S.tolist()) > CHI2[len(y)]) - (1.0 - QUANTILE))
     return min(max(factor * math.exp(step), SMALLEST), LARGEST)
+
+
+def _square(y: list[float], S: list[list[float]]) -> float:
+    """y S^-1 y of one or two numbers, by the cofactors of S."""
+    if len(y) == 1:
+        return y[0] * y[0] / S[0][0]
+    (first, second), ((a, b), (_, c)) = y, S
+    return (c * first * first - 2.0 * b * first * second + a * second * second) / (a * c - b * b)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fish_control import scalar_math
 from fish_control.line_of_sight import (
     GuidanceConfig,
     Motion,
@@ -98,7 +99,9 @@ class Planner:
         errors = TrackingErrors(
             *map(
                 float,
-                tracking_errors(self._observer.state, motion, ahead, speed, self._guidance, np),
+                tracking_errors(
+                    self._observer.state, motion, ahead, speed, self._guidance, scalar_math
+                ),
             )
         )
         if self.finished:

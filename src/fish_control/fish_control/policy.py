@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,15 @@ class Policy:
         """The same gains always."""
         return cls(contract or PolicySpec(layers=()), {"gains": np.array(gains)})
 
+    @cached_property
+    def _layers(self) -> list[tuple[Array, Array]]:
+        """Weights (in, out) and biases."""
+        count = len(self.contract.layers) - 1
+        return [
+            (self.tensors[f"layers.{k}.weight"].T.copy(), self.tensors[f"layers.{k}.bias"])
+            for k in range(count)
+        ]
+
     def gains(self, inputs: ArrayLike) -> Gains:
         """Gains for normalised inputs (..., 6); each of the six with the leading shape.
 
@@ -77,8 +87,8 @@ class Policy:
         if not self.contract.layers:
             values = np.broadcast_to(self.tensors["gains"], (*x.shape[:-1], len(self._low)))
             return Gains(*np.moveaxis(values, -1, 0))
-        last = len(self.contract.layers) - 2
-        for k in range(last + 1):
-            x = x @ self.tensors[f"layers.{k}.weight"].T + self.tensors[f"layers.{k}.bias"]
-            x = np.tanh(x) if k == last else np.maximum(x, 0.0)
-        return Gains(*np.moveaxis(self._low + self._span * 0.5 * (x + 1.0), -1, 0))
+        *hidden, (weight, bias) = self._layers
+        for W, b in hidden:
+            x = np.maximum(x @ W + b, 0.0)
+        values = self._low + self._span * 0.5 * (np.tanh(x @ weight + bias) + 1.0)
+        return Gains(*(values if values.ndim == 1 else np.moveaxis(values, -1, 0)))

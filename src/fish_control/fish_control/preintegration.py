@@ -71,14 +71,19 @@ class Preintegration:
 
     def jacobian(self) -> Array:
         """d x(end) / d x(start), (8, 8)."""
-        F = np.eye(SIZE)
-        F[0, 3] = F[1, 4] = self.duration
-        F[2, 5] = -self._known
         (x, y), (left_x, left_y) = self.dv, self.left_dv
-        F[3, 2], F[4, 2], F[0, 2], F[1, 2] = -y, x, -left_y, left_x
-        (x, y), (left_x, left_y) = self._since_dv, self._both_dv
-        F[3, 5], F[4, 5], F[0, 5], F[1, 5] = y, -x, left_y, -left_x
+        (after_x, after_y), (both_x, both_y) = self._since_dv, self._both_dv
         (c, s), (left_c, left_s) = self._along, self._left_along
-        F[3:5, 6:8] = (-c, s), (-s, -c)
-        F[0:2, 6:8] = (-left_c, left_s), (-left_s, -left_c)
-        return F
+        T = self.duration
+        return np.array(
+            (
+                (1.0, 0.0, -left_y, T, 0.0, both_y, -left_c, left_s),
+                (0.0, 1.0, left_x, 0.0, T, -both_x, -left_s, -left_c),
+                (0.0, 0.0, 1.0, 0.0, 0.0, -self._known, 0.0, 0.0),
+                (0.0, 0.0, -y, 1.0, 0.0, after_y, -c, s),
+                (0.0, 0.0, x, 0.0, 1.0, -after_x, -s, -c),
+                (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+                (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0),
+                (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+            )
+        )

@@ -37,6 +37,10 @@ from fish_control.preintegration import SIZE, Preintegration
 Array = NDArray[np.float64]
 POSE = slice(0, 3)
 H_CAMERA = np.eye(3, SIZE)
+# of the process noise: variances of p and v, their covariances, variances of the biases
+NOISE_PLACES = np.ravel_multi_index(
+    ((0, 1, 3, 4, 0, 3, 1, 4, 5, 6, 7), (0, 1, 3, 4, 3, 0, 4, 1, 5, 6, 7)), (SIZE, SIZE)
+)
 
 
 class MotionModel(NamedTuple):
@@ -117,7 +121,7 @@ class StrapdownFilter:
         coasting = n.coasting_accel**2 * COASTING_TIME if used else known
         unknown_turn = n.coasting_yaw_rate**2 * COASTING_TIME
         speed = mixed = place = 0.0  # of v, v and p, p
-        Q_turn = np.zeros((5, 5))
+        turns, moves = [], []  # variances, and what each turn moves: p, psi, v
         # a turn in one step turns the accelerations of all later ones, and half of its own
         after_x, after_y = -moved.dv[1], moved.dv[0]
         left_x, left_y = -moved.left_dv[1], moved.left_dv[0]
@@ -132,19 +136,20 @@ class StrapdownFilter:
             turn = unknown_turn * dt
             if step.yaw_known:
                 turn = (step.yaw_variance + n.heading_drift**2 * dt) * heading_scale
-            g = np.array((left_x, left_y, 1.0, after_x, after_y))
-            Q_turn += turn * np.multiply.outer(g, g)
+            turns.append(turn)
+            moves.append((left_x, left_y, 1.0, after_x, after_y))
             after_x, after_y = after_x - half_x, after_y - half_y
             left_x, left_y = left_x - left * half_x, left_y - left * half_y
-        Q[:5, :5] = Q_turn
-        for p, v in ((0, 3), (1, 4)):
-            Q[v, v] += speed
-            Q[p, v] += mixed
-            Q[v, p] += mixed
-            Q[p, p] += place
+        if moves:
+            G = np.array(moves)
+            Q[:5, :5] = (G.T * turns) @ G
         T = moved.duration
-        Q[5, 5] = n.gyro_drift**2 * T
-        Q[6, 6] = Q[7, 7] = n.accel_drift**2 * T
+        drift = n.accel_drift**2 * T
+        Q.ravel()[NOISE_PLACES] += (
+            *(place, place, speed, speed),
+            *(mixed, mixed, mixed, mixed),
+            *(n.gyro_drift**2 * T, drift, drift),
+        )
         return Q
 
 

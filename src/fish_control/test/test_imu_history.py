@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fish_control.imu_history import CAPACITY, ImuHistory, InertialSample
@@ -46,6 +46,7 @@ def test_before_the_first_its_values_hold():
     assert after == pytest.approx((0.005, 0.01, 1e-6, 1.5, 1.5, True, True))
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow])  # a busy computer is no failure
 @given(st.floats(0.99, 1.06), st.floats(1e-4, 0.05), st.floats(0.0, 1.0))
 def test_two_parts_make_the_whole(start, length, share):
     imu = history()

@@ -13,14 +13,22 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TwistStamped, Vector3Stamped
+from geometry_msgs.msg import (
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Twist,
+    TwistStamped,
+    Vector3,
+    Vector3Stamped,
+)
 from nav_msgs.msg import Odometry, Path
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Float64, Float64MultiArray, String
+from std_msgs.msg import Float64, Float64MultiArray, Header, String
 from std_srvs.srv import Trigger
 
 from fish_control.estimate import LOST_VARIANCE
@@ -723,10 +731,44 @@ def test_controller_streams_named_commands_and_labelled_gains(bench):
     gains = b.heard["control/gains"][-1]
     assert [d.label for d in gains.layout.dim] == ["steering,speed", "Kp,Ki,Kd"]
     assert len(gains.data) == 6
-    rate = len(b.heard["joint_command"]) / (
-        seconds(message.header.stamp) - seconds(b.heard["joint_command"][0].header.stamp)
-    )
-    assert rate == pytest.approx(100.0, rel=0.25)
+    heard = len(b.heard["joint_command"])
+    b.until(lambda: len(b.heard["joint_command"]) > heard + 20)  # also without odometry
+
+
+def hear_plan(node, time):
+    node._on_target(PoseStamped(header=Header(stamp=to_stamp(time))))
+    node._on_twist(TwistStamped(twist=Twist(linear=Vector3(x=0.2))))
+
+
+@pytest.mark.parametrize(("simulated", "count"), [(False, 5), (True, 0)])
+def test_a_command_follows_each_new_odometry_and_in_simulated_time_the_clock(
+    bench, simulated, count
+):
+    b = controller_bench(bench, use_sim_time=simulated)
+    b.executor.remove_node(b.node)  # no timer runs
+    start = b.now()
+    for k in range(5):
+        b.node._on_odometry(odometry(start + 0.01 * k))
+        b.node._on_odometry(b.node._odometry)  # the same once more
+    b.until(lambda: len(b.heard["joint_command"]) >= count)
+    b.spin(0.1)
+    assert len(b.heard["joint_command"]) == count
+
+
+@pytest.mark.parametrize("period", [0.005, 0.01, 0.015, 0.02])
+def test_decisions_come_fifty_times_a_second_however_often_commands_come(bench, period):
+    b = controller_bench(bench, use_sim_time=True)
+    b.executor.remove_node(b.node)
+    count = round(2.0 / period)
+    for k in range(1, count + 1):
+        now = 10.0 + k * period
+        b.node.get_clock().set_ros_time_override(Time.from_msg(to_stamp(now)))
+        hear_plan(b.node, now)
+        b.node._on_odometry(odometry(now))
+        b.node._tick()
+        b.until(lambda k=k: len(b.heard["joint_command"]) == k)
+    b.spin(0.1)
+    assert len(b.heard["control/gains"]) == pytest.approx(100, abs=10)
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,11 @@
 """control/target, control/twist, tracking/error, odometry/filtered -> joint_command, control/gains.
 
 joint_command (100 Hz): rotor: position = phase of the oscillation (rad), velocity = phi_dot (rad/s); rudder:
-position = alpha (rad). control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy of the
-weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog pauses them on stale or bad
-odometry, lost sensors and a stale target: they go to rest until all is well, and arming/pause says why. How long that may last,
-the owner of the arming state decides. Decisions are in Controller and Watchdog.
+position = alpha (rad). A command follows each new odometry at once, and while none comes a timer; in simulated time, which
+waits for commands, they follow the timer alone. control/gains (50 Hz): [Kp, Ki, Kd] of steering and of speed, as the policy
+of the weights file gives them. While arming/state says disarmed the commands are at rest. The watchdog pauses them on stale
+or bad odometry, lost sensors and a stale target: they go to rest until all is well, and arming/pause says why. How long that
+may last, the owner of the arming state decides. Decisions are in Controller and Watchdog.
 """
 
 import math
@@ -22,7 +23,6 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 
-from fish_control.control_law import Gains
 from fish_control.controller import LONGEST_PERIOD, Controller, Reference
 from fish_control.gains_file import read_gains_file, require_fit
 from fish_control.latency import Latency
@@ -41,11 +41,13 @@ from fish_control.nodes.written import CommandBytes
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.changes import Changes
-from fish_node.nodes.quick_messages import from_bytes
+from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
 SETTABLE = ("gains_lowest", "gains_highest")
+MISSED = 1.5  # periods of the command, after which it waits for odometry no more
+EARLY = 0.75  # periods of the command between the stamps of two that follow odometry; stamps jitter
 
 
 class ControllerNode(Node):
@@ -70,7 +72,8 @@ class ControllerNode(Node):
         self._odometry_time = self._target_time = math.nan
         self._wanted = Reference(0.0, 0.0, 0.0, 0.0)
         self._now = math.nan
-        self._ticks = 0
+        self._commanded = -math.inf  # s, stamp of the odometry that the last command followed
+        self._due = 1.0 / config.rate_hz  # s since the last decision
         self._latency = Latency()
         self._said = ""
         self._paused = False
@@ -83,17 +86,18 @@ class ControllerNode(Node):
     def _create_interfaces(self) -> None:
         self._command = self.create_publisher(JointState, "joint_command", 10)
         self._written = CommandBytes()
+        self._gains_message = gains_message()
         self._gains = self.create_publisher(Float64MultiArray, "control/gains", 10)
         self._pause = self.create_publisher(String, "arming/pause", 10)
         self._arming = ArmingListener(self)
         self._reporter = Reporter(self, self._command)
-        self.create_subscription(
-            Odometry, "odometry/filtered", from_bytes(Odometry, self._on_odometry), 10, raw=True
-        )
-        self.create_subscription(TwistStamped, "control/twist", self._on_twist, 10)
-        self.create_subscription(Vector3Stamped, "tracking/error", self._on_error, 10)
-        self.create_subscription(PoseStamped, "control/target", self._on_target, 10)
-        self.create_timer(1.0 / self._config.command_rate_hz, self._tick)
+        hear(self, Odometry, "odometry/filtered", self._on_odometry, 10)
+        hear(self, TwistStamped, "control/twist", self._on_twist, 10)
+        hear(self, Vector3Stamped, "tracking/error", self._on_error, 10)
+        hear(self, PoseStamped, "control/target", self._on_target, 10)
+        self._waits = not self.get_parameter("use_sim_time").value  # for odometry
+        self._period = 1.0 / self._config.command_rate_hz
+        self._timer = self.create_timer(self._period * (MISSED if self._waits else 1.0), self._tick)
         self.create_timer(1.0, self._report)
 
     def _on_odometry(self, message: Odometry) -> None:
@@ -103,6 +107,10 @@ class ControllerNode(Node):
             signs, self._config.largest_variance
         ):  # the water is learned from it
             self._controller.observe(self._odometry_time, motion_of(message))
+        if self._waits and abs(self._odometry_time - self._commanded) > EARLY * self._period:
+            self._commanded = self._odometry_time
+            self._timer.reset()
+            self._tick()
 
     def _on_twist(self, message: TwistStamped) -> None:
         speed, yaw_rate = message.twist.linear.x, message.twist.angular.z
@@ -120,21 +128,24 @@ class ControllerNode(Node):
             self._target_time = seconds(message.header.stamp)
 
     def _tick(self) -> None:
-        """One period of the command; every so many, one of control."""
+        """One command; where a period of control has passed, one decision."""
         clock = self.get_clock().now()
         now = clock.nanoseconds * 1e-9
-        dt = 1.0 / self._config.command_rate_hz if math.isnan(self._now) else now - self._now
+        dt = self._period if math.isnan(self._now) else now - self._now
         dt = min(max(dt, 0.0), LONGEST_PERIOD)
         self._now = now
+        control_period = 1.0 / self._config.rate_hz
+        self._due = min(self._due + dt, 1.5 * control_period)
         may_swim = self._watchdog.check(now, self._signs(now))
         self._say_pause()
         if not may_swim:
             self._controller.rest()
         elif self._wanted.speed <= 0.0:
             self._controller.glide(self._wanted.yaw_rate, dt)
-        elif self._ticks % round(self._config.command_rate_hz / self._config.rate_hz) == 0:
-            self._gains.publish(to_message(self._controller.decide(self._wanted)))
-        self._ticks += 1
+        elif self._due > control_period - 0.5 * self._period:
+            self._due -= control_period
+            self._gains_message.data = list(self._controller.decide(self._wanted))
+            self._gains.publish(self._gains_message)
         command = self._controller.command(dt)
         self._command.publish(self._written(clock.to_msg(), command))
         if may_swim:
@@ -179,9 +190,9 @@ def installed_weights() -> str:
         return str(FilePath(__file__).parents[2] / "config" / "gains.safetensors")
 
 
-def to_message(gains: Gains) -> Float64MultiArray:
-    """Gains with a labelled layout: 2 controllers of 3 gains."""
-    message = Float64MultiArray(data=list(gains))
+def gains_message() -> Float64MultiArray:
+    """Room for gains with a labelled layout: 2 controllers of 3 gains."""
+    message = Float64MultiArray()
     message.layout.dim = [
         MultiArrayDimension(label="steering,speed", size=2, stride=6),
         MultiArrayDimension(label="Kp,Ki,Kd", size=3, stride=3),

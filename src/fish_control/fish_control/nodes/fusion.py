@@ -35,7 +35,7 @@ from fish_control.nodes.messages import (
 from fish_control.nodes.reporter import Reporter
 from fish_control.nodes.written import OdometryBytes
 from fish_node.nodes.frame_broadcaster import FrameBroadcaster
-from fish_node.nodes.quick_messages import from_bytes
+from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.static_frames import publish_static_frame
@@ -78,8 +78,8 @@ class FusionNode(Node):
         self._written = OdometryBytes(*self._frames)
         self._transform = FrameBroadcaster(self)
         self._reporter = Reporter(self, self._odometry)
-        self.create_subscription(Imu, "imu/data", from_bytes(Imu, self._on_imu), SENSORS, raw=True)
-        self.create_subscription(PoseWithCovarianceStamped, "camera/pose", self._on_pose, SENSORS)
+        hear(self, Imu, "imu/data", self._on_imu, SENSORS)
+        hear(self, PoseWithCovarianceStamped, "camera/pose", self._on_pose, SENSORS)
         self.create_timer(1.0, lambda: self._report(self._estimate()))
         self._used = 0.0  # s on this node's clock, when a measurement was last used
         self._said = ""

@@ -86,8 +86,8 @@ def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
     return EstimateHealth(
         age=now - seconds(message.header.stamp),
         finite=motion_is_finite(motion_of(message)),
-        pose_variance=largest_of(message.pose.covariance[PLANAR_VARIANCES]),
-        twist_variance=largest_of(message.twist.covariance[PLANAR_VARIANCES]),
+        pose_variance=largest_of(message.pose.covariance[PLANAR_VARIANCES].tolist()),
+        twist_variance=largest_of(message.twist.covariance[PLANAR_VARIANCES].tolist()),
     )
 
 

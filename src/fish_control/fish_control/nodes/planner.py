@@ -49,7 +49,7 @@ from fish_control.progress_file import ProgressFile, path_digest
 from fish_control.reference_path import PathError, ReferencePath
 from fish_control.watchdog import pose_loss
 from fish_node.nodes.changes import Changes
-from fish_node.nodes.quick_messages import from_bytes
+from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
@@ -98,9 +98,7 @@ class PlannerNode(Node):
             self._follow_own(configured_path(config))
         self._service = PathService(self, self._start, self._cancel)
         Changes(self, config, self._change)
-        self.create_subscription(
-            Odometry, "odometry/filtered", from_bytes(Odometry, self._on_odometry), 10, raw=True
-        )
+        hear(self, Odometry, "odometry/filtered", self._on_odometry, 10)
         self.create_timer(1.0, self._report)
 
     def end(self) -> None:

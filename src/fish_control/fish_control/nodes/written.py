@@ -20,6 +20,8 @@ from fish_control.nodes.messages import PLANAR_BLOCK, to_stamp
 from fish_control.planner import Plan
 from fish_node.nodes.message_bytes import MessageBytes, mark
 
+POSE_PLACES, TWIST_PLACES = 4 + PLANAR_BLOCK, 43 + PLANAR_BLOCK  # of covariances among the numbers
+
 
 class OdometryBytes:
     """odometry/filtered of an estimate; frames: of the pool and of the body."""
@@ -40,9 +42,9 @@ class OdometryBytes:
         numbers, yaw = self._numbers, float(estimate.pose[2])
         numbers[:2] = estimate.pose[:2]
         numbers[2], numbers[3] = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
-        numbers[4 + PLANAR_BLOCK] = estimate.pose_covariance.ravel()
+        numbers[POSE_PLACES] = estimate.pose_covariance.ravel()
         numbers[40:43] = estimate.twist
-        numbers[43 + PLANAR_BLOCK] = estimate.twist_covariance.ravel()
+        numbers[TWIST_PLACES] = estimate.twist_covariance.ravel()
         return self._bytes(to_stamp(estimate.time), numbers.tolist())
 
 

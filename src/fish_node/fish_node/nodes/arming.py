@@ -38,7 +38,7 @@ from fish_node.arming import (
 )
 from fish_node.foreign_text import visible
 from fish_node.nodes.message_bytes import MessageBytes
-from fish_node.nodes.quick_messages import from_bytes
+from fish_node.nodes.quick_messages import hear
 
 STATE_PERIOD_S = 0.05
 PLANAR = (0, 7, 35)  # x, y and rotation about z on the diagonal of a covariance of 6
@@ -72,16 +72,8 @@ class ArmingServer:
         self._state = node.create_publisher(DiagnosticArray, "arming/state", 10)
         node.create_service(SetBool, "arm", self._on_arm)
         if settings.estimate != "ignored":
-            node.create_subscription(
-                Odometry,
-                "odometry/filtered",
-                from_bytes(Odometry, self._on_odometry),
-                NEWEST,
-                raw=True,
-            )
-            node.create_subscription(
-                PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST
-            )
+            hear(node, Odometry, "odometry/filtered", self._on_odometry, NEWEST)
+            hear(node, PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST)
         if settings.deadman_timeout_s > 0.0:
             node.create_subscription(Bool, "operator/deadman", self._on_deadman, 1)
         node.create_subscription(Bool, "operator/estop", self._on_estop, 10)

@@ -24,7 +24,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
 from fish_node.nodes.heap import keep_freed_memory
-from fish_node.nodes.quick_messages import from_bytes
+from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
@@ -76,9 +76,7 @@ class CameraNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
         self.create_subscription(JointState, "sim/joint_states", self._on_joints, KEPT)
-        self.create_subscription(
-            Odometry, "sim/odometry", from_bytes(Odometry, self._on_odometry), KEPT, raw=True
-        )
+        hear(self, Odometry, "sim/odometry", self._on_odometry, KEPT)
         self._release = self.create_timer(1.0, self._send_due)  # armed for each frame
         self._release.cancel()
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
