@@ -27,6 +27,7 @@ ARMING = "fish_node.nodes.arming"
 CREATORS = {
     "create_publisher": "publishes",
     "create_subscription": "takes",
+    "hear": "takes",
     "create_service": "serves",
 }
 MEANING = {
@@ -139,8 +140,7 @@ def interfaces(package: str, executable: str) -> list[tuple[str, str, str]]:
         tree = ast.parse(source.read_text(encoding="utf-8"))
         types = imported_types(tree)
         for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                found += interface(node, node.func.attr, types)
+            found += interface(node, types)
             if isinstance(node, ast.ImportFrom) and node.module:
                 near = node.module.rpartition(".")[0]
                 if node.module == ARMING:
@@ -160,8 +160,7 @@ def arming_interfaces(classes: set[str]) -> list[tuple[str, str, str]]:
         for owner in tree.body
         if isinstance(owner, ast.ClassDef) and owner.name in classes
         for node in ast.walk(owner)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
-        for found in interface(node, node.func.attr, types)
+        for found in interface(node, types)
     ]
 
 
@@ -177,11 +176,17 @@ def imported_types(tree: ast.AST) -> dict[str, str]:
     }
 
 
-def interface(call: ast.Call, creator: str, types: dict[str, str]) -> list[tuple[str, str, str]]:
+def interface(node: ast.AST, types: dict[str, str]) -> list[tuple[str, str, str]]:
     """What a call creates, where type and name stand in it."""
-    if creator not in CREATORS or len(call.args) < 2:
+    match node:
+        case ast.Call(
+            func=ast.Attribute(attr=creator), args=[ast.Name(kind), ast.Constant(name), *_]
+        ):
+            pass
+        case ast.Call(func=ast.Name(creator), args=[_, ast.Name(kind), ast.Constant(name), *_]):
+            pass
+        case _:
+            return []
+    if creator not in CREATORS or kind not in types:
         return []
-    kind, name = call.args[:2]
-    if not (isinstance(kind, ast.Name) and isinstance(name, ast.Constant) and kind.id in types):
-        return []
-    return [(CREATORS[creator], types[kind.id], str(name.value))]
+    return [(CREATORS[creator], types[kind], str(name))]
