@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from swims import GIVEN, fish
 
 from fish_sim.robot import Robot
 from fish_sim.robot_file import load_robot
@@ -76,9 +77,9 @@ def test_where_the_likelihood_does_no_effect_is_looked_for_and_that_is_said(
 
 def test_a_model_that_lacks_something_is_fitted_to_what_it_is_for() -> None:
     """The fish's tail slips: the likelihood's parameters would be right for the next moment, and wrong for seconds."""
-    slipping = TRUTH.with_effect("tip_slip", mobility=1.0 / 6.0)
+    slipping = fish(tip_slip={"mobility": 1.0})
     trials = experiment_of(("sines", "random", "steps", "straight"), 9.0, robot=slipping)
-    found = identify(trials, Robot(), free=FREE, links=(3,))
+    found = identify(trials, GIVEN, free=FREE, links=(1,))
     assert FITTED_FOR_OUTLOOK in found.statements
     at_5_s = [found.errors[robot].rms[-1, 0] for robot in ("start", "identified")]
     assert at_5_s[1] < 0.5 * at_5_s[0]

@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -38,26 +39,37 @@ class Rectangle:
     area: float  # of the ideal plane
 
 
+class Combination(NamedTuple):
+    """Two pairs of lines that fit."""
+
+    area: float  # of the ideal plane
+    corners: Array  # (4, 2) there
+    places: Array  # (4, 3) of the corners in the camera's frame, in a scale of their own
+    along: float  # the side between the first two, in that scale
+    first: float  # m, of that side
+    swapped: bool  # whether that side is the shorter one
+
+
 def rectangles(lines: Array, ideal: IdealPicture, length: float, width: float) -> list[Rectangle]:
     """Rectangles whose sides lie on lines (N, 3) and show edges, the largest first.
 
     Two lines meet in the ideal plane at the direction (x, y, 1) that parallel sides share in space. Two pairs of sides
     make a rectangle if the two directions are at right angles and the corners' distances have the ratio of the sides.
     """
-    able: list[tuple[float, Rectangle, Array]] = []
+    able: list[Combination] = []
     for first, second in ((length, width), (width, length)):
         if able and first == second:
             break
         able += list(_fitting(lines, ideal, first, second, swapped=first != length))
-    able.sort(key=lambda item: -item[0])
+    able.sort(key=lambda combination: -combination.area)
     kept: list[tuple[Rectangle, Array]] = []
     distance = cv2.distanceTransform(255 - ideal.edges, cv2.DIST_L2, 3)
-    for _, rectangle, corners in able[:TRIED]:
-        pixels = ideal.pixels(corners)
+    for combination in able[:TRIED]:
+        pixels = ideal.pixels(combination.corners)
         if not _supported(pixels, distance):
             continue
         if all(np.abs(pixels - other).max() > SAME for _, other in kept):
-            kept.append((rectangle, pixels))
+            kept.append((_posed(combination), pixels))
         if len(kept) == MOST:
             break
     return [rectangle for rectangle, _ in kept]
@@ -65,8 +77,8 @@ def rectangles(lines: Array, ideal: IdealPicture, length: float, width: float) -
 
 def _fitting(
     lines: Array, ideal: IdealPicture, first: float, second: float, swapped: bool
-) -> Iterator[tuple[float, Rectangle, Array]]:
-    """Area, rectangle and corners (4, 2) of each fitting combination; the sides on the first pair measure `first`."""
+) -> Iterator[Combination]:
+    """Each fitting combination; the sides on the first pair measure `first`."""
     pairs = _opposite(lines)
     if not len(pairs):
         return
@@ -95,7 +107,7 @@ def _fitting(
     with np.errstate(invalid="ignore"):
         fits &= (area > SMALLEST * span.prod()) & (area < 2.0 * span.prod())
     for k in np.flatnonzero(fits):
-        yield float(area[k]), _posed(places[k], along[k], first, swapped), corners[k]
+        yield Combination(float(area[k]), corners[k], places[k], float(along[k]), first, swapped)
 
 
 def _opposite(lines: Array) -> Array:
@@ -112,13 +124,13 @@ def _area(corners: Array) -> Array:
     return area
 
 
-def _posed(places: Array, along: float, first: float, swapped: bool) -> Rectangle:
-    """The rectangle whose corners lie at places (4, 3) of the camera's frame, in a scale that `first` fixes."""
-    solid = places * (first / along)
+def _posed(combination: Combination) -> Rectangle:
+    """The rectangle in space, in the scale that its first side fixes."""
+    solid = combination.places * (combination.first / combination.along)
     if solid[:, 2].mean() < 0:
         solid = -solid
     sides = solid[1] - solid[0], solid[3] - solid[0]
-    x, other = (sides[1], sides[0]) if swapped else sides
+    x, other = (sides[1], sides[0]) if combination.swapped else sides
     x = x / np.linalg.norm(x)
     z = np.cross(x, other / np.linalg.norm(other))
     z = -np.sign(z[2]) * z / np.linalg.norm(z)  # towards the camera
