@@ -63,7 +63,7 @@ def test_the_effect_wrench_of_a_drag_is_its_equation() -> None:
     """-k |u| u on the head, from the accelerations with and without it."""
     scenario = Scenario(
         "single",
-        3,
+        1,
         {"quadratic_drag": {"surge": 0.5, "sway": 0.0, "yaw": 0.0}},
         count=2,
         duration=4.0,
@@ -85,7 +85,7 @@ def test_the_effect_wrench_of_a_flow_is_that_of_all_of_it() -> None:
         ("current", {"x": 0.05}),
         ("nonuniform_current", {"mean_x": 0.05, "shear_x": 1e-4}),
     ):
-        scenario = Scenario("single", 3, {name: values}, count=2, duration=2.0)
+        scenario = Scenario("single", 1, {name: values}, count=2, duration=2.0)
         experiment = as_experiment(make_readings(scenario), True)
         hypothesis, theta = with_truth(scenario, scenario.names)
         push[name] = effect_wrench(
