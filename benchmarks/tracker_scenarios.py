@@ -6,7 +6,8 @@
 
 A pose is wrong if it is more than 20 mm or 10 degrees from the own fish, also while that is hidden. Every scenario runs
 in episodes of 10 s with a new tracker. Prints for each the share of frames with a right pose, the wrong poses, and the
-errors of the right ones. Then it prints how many frames the tracker takes in a second of processor time, and how many a
+errors of the right ones, the mean of their NEES (3 where the covariance is right) and the share of it above what 1 % of the
+poses should exceed. Then it prints how many frames the tracker takes in a second of processor time, and how many a
 plain OpenCV pipeline takes of the same pictures. The fish of the scenarios tags_* carries a coded tag of 50 mm.
 """
 
@@ -34,6 +35,7 @@ HD = CameraConfig(width=1920, height=1080, focal=(1500.0, 1500.0), centre=(951.0
 TRACKER = TrackerConfig()
 TAGS = replace(TRACKER, marker_kind="tags", tail_links=0)
 RATE, EPISODE = 30.0, 300  # frames/s, frames of one tracker
+NEES_MOST = 11.34  # chi^2 of 3 at 99 %
 FAR, TURNED = 0.020, radians(10.0)  # a pose further off is wrong
 PAPER, INK = (235, 235, 235), (20, 20, 20)  # of a printed tag
 
@@ -129,11 +131,12 @@ def camera(config: CameraConfig, shape: FishShape = SHAPE) -> tuple[Calibration,
 
 @dataclass
 class Score:
-    """Right and wrong poses of a scenario and the errors of the right ones (N, 2): m, rad."""
+    """Right and wrong poses of a scenario, the errors of the right ones (N, 2): m, rad, and their NEES (N,)."""
 
     frames: int
     wrong: int
     errors: np.ndarray
+    nees: np.ndarray
     lost: Counter[str]
 
     def line(self, name: str) -> str:
@@ -145,14 +148,15 @@ class Score:
         most = np.percentile(np.abs(self.errors), 99, axis=0)
         return (
             f"{head} {1e3 * rms[0]:7.2f} {1e3 * most[0]:7.2f} {degrees(rms[1]):8.3f} "
-            f"{degrees(most[1]):8.3f}   {dict(self.lost)}"
+            f"{degrees(most[1]):8.3f} {self.nees.mean():7.2f} {100 * np.mean(self.nees > NEES_MOST):5.1f} %   "
+            f"{dict(self.lost)}"
         )
 
 
 def score(studio: Studio, scenario: Scenario, count: int) -> Score:
     """Run one scenario."""
     config = TAGS if studio.shape.plates else TRACKER
-    errors, wrong, lost = [], 0, Counter[str]()
+    errors, nees, wrong, lost = [], [], 0, Counter[str]()
     tracker = make_follower(config, studio.calibration)
     for frame, scene, picture in studio.frames(scenario, count):
         if frame == 0:
@@ -170,7 +174,9 @@ def score(studio: Studio, scenario: Scenario, count: int) -> Score:
             wrong += 1
         else:
             errors.append(off)
-    return Score(count, wrong, np.array(errors), lost)
+            error = np.array([found.head.x - x, found.head.y - y, off[1]])
+            nees.append(float(error @ np.linalg.solve(found.head.covariance, error)))
+    return Score(count, wrong, np.array(errors), np.array(nees), lost)
 
 
 class PlainPipeline:
@@ -239,7 +245,9 @@ def main() -> None:
     cv2.setNumThreads(1)
     if args.speed:
         speed(args.speed)
-    print(f"{'scenario':11s} frames    right  wrong  mm rms     p99  deg rms      p99   lost")
+    print(
+        f"{'scenario':11s} frames    right  wrong  mm rms     p99  deg rms      p99    NEES above   lost"
+    )
     studios: dict[tuple[float, bool], Studio] = {}
     total = Counter[str]()
     for name in args.only:

@@ -3,7 +3,7 @@
 """Markers to pose: which spots are the head's, where it is and points, how the tail bends, how surely."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, cos, pi, sin
 from typing import Any
 
@@ -35,6 +35,7 @@ class Spot:
     position: Array
     covariance: Array
     share: float = 1.0  # of a whole marker's area
+    moved_std: float = 0.0  # m, by which what hides a part moves the middle, beyond the covariance
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,10 @@ def wrap(angle: float) -> float:
 def head_pose(front: Spot, rear: Spot, layout: MarkerLayout) -> HeadPose:
     """Pose of the head from its two markers, which a rigid body holds at a known distance (see rigid_pose)."""
     mounted = np.array([layout.front, layout.rear], float)
-    return rigid_pose(mounted, [front, rear])
+    moved = [
+        replace(s, covariance=s.covariance + s.moved_std**2 * np.eye(2)) for s in (front, rear)
+    ]
+    return rigid_pose(mounted, moved)
 
 
 def rigid_pose(mounted: Array, seen: Sequence[Spot]) -> HeadPose:

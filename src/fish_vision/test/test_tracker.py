@@ -7,16 +7,18 @@ from dataclasses import replace
 from math import cos, pi, sin
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pool_picture import CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw, lens_fields
+from pool_picture import BODY, CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw, lens_fields
 
 from fish_vision.annotate import annotated, tail_points
 from fish_vision.calibration import POOL, Calibration, Lens
 from fish_vision.choice import Reason
+from fish_vision.pose import wrap
 from fish_vision.tracker import Detection, Lost, Tracker
 
 
@@ -372,3 +374,22 @@ def test_two_fish_of_ours_are_told_apart_by_their_colours() -> None:
         picture = draw(both)
         assert seen(first.track(picture, k / 30)).head.x == pytest.approx(x, abs=5e-4)
         assert seen(second.track(picture, k / 30)).head.x == pytest.approx(-x, abs=5e-4)
+
+
+def test_errors_of_partly_hidden_markers_are_as_large_as_the_covariance_says() -> None:
+    """A bar hides a part of the front marker, and JPEG smears the colours over its edge."""
+    nees = []
+    for k in range(40):
+        heading, x = 0.3 * k, 0.5 + 0.0007 * k
+        picture = draw(discs_of_fish(x, 0.2, heading), seed=k)
+        u = float(calibration().pool_to_pixel([[x + 0.045 * np.cos(heading), 0.2]])[0, 0])
+        left = round(u + 4.0 * np.sin(1.7 * k))
+        picture[:, left : left + 5] = BODY
+        _, sent = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 90])
+        found = Tracker(CONFIG, calibration()).track(cv2.imdecode(sent, cv2.IMREAD_COLOR), 0.0)
+        if isinstance(found, Detection):
+            head = found.head
+            error = np.array([head.x - x, head.y - 0.2, wrap(head.heading - heading)])
+            nees.append(error @ np.linalg.solve(head.covariance, error))
+    assert len(nees) > 15
+    assert np.median(nees) < 5.0  # 2.4 where the covariance is right
