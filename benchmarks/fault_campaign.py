@@ -21,7 +21,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -55,9 +55,6 @@ LOOK_S = 0.05  # s of real time
 STANDS_S = 60.0  # s of real time without a word of the fake robot
 PATIENCE_S = 2.0  # s of real time that simulated time waits for who was silenced by a fault
 KEPT = 1000  # messages that wait for a busy computer
-PICTURES_HZ = (
-    10.0  # three times as many would take most of the processor time and show no other fault
-)
 
 
 @dataclass
@@ -78,12 +75,7 @@ class Counts:
 
 
 class Campaign:
-    """The robot and what is watched of it.
-
-    Attributes:
-        counts: what happened so far.
-        now: s, the robot's time.
-    """
+    """The robot and what is watched of it."""
 
     def __init__(
         self,
@@ -98,7 +90,7 @@ class Campaign:
         peer: Node = watch
         self._command = peer.create_publisher(JointState, "joint_command", 1)
         self._fault = peer.create_publisher(String, "fake/fault", 10)
-        self.now = 0.0
+        self._now = 0.0  # s, the robot's time
         self._states: list[tuple[float, bool]] = []  # s, stamp; whether armed
         self._motion: list[tuple[float, float]] = []  # s, stamp; rad/s
         peer.create_subscription(JointState, "fake/joint_command", self._on_motion, KEPT)
@@ -135,15 +127,15 @@ class Campaign:
 
     def listen(self, seconds: float) -> None:
         """Listen for so many seconds of the robot's time."""
-        begin, since = self.now, time.monotonic()
-        while self.now < begin + seconds and time.monotonic() < since + STANDS_S:
-            before = self.now
+        begin, since = self._now, time.monotonic()
+        while self._now < begin + seconds and time.monotonic() < since + STANDS_S:
+            before = self._now
             self._listen(LOOK_S)
-            since = time.monotonic() if self.now > before else since
+            since = time.monotonic() if self._now > before else since
 
     def _arm(self) -> bool:
-        end = self.now + ARMED_WITHIN_S
-        while self._watch.disarmed != "" and self.now < end:
+        end = self._now + ARMED_WITHIN_S
+        while self._watch.disarmed != "" and self._now < end:
             self._watch.ask_to_arm()
             self.listen(0.1)
         return bool(self._watch.disarmed == "")
@@ -152,7 +144,7 @@ class Campaign:
         """A command for every word of the fake robot."""
         message = JointState(name=["rotor", "rudder"])
         message.header.stamp = header.stamp
-        speed = AMPLITUDE * float(np.sin(FREQUENCY * self.now))
+        speed = AMPLITUDE * float(np.sin(FREQUENCY * self._now))
         message.velocity, message.position = [speed, 0.0], [0.0, 0.2]
         self._command.publish(message)
 
@@ -161,8 +153,8 @@ class Campaign:
         self._states.append((seconds(message.header), armed))
 
     def _on_motion(self, message: JointState) -> None:
-        self.now = seconds(message.header)
-        self._motion.append((self.now, abs(message.velocity[0])))
+        self._now = seconds(message.header)
+        self._motion.append((self._now, abs(message.velocity[0])))
         self._swim(message.header)
 
     def judge(self) -> None:
@@ -200,25 +192,7 @@ def on_a_slow_clock(
     """The nodes' parameters with simulated time that runs `factor` times as fast as real time and waits for who lags."""
     slowed = {spec: {**parameters.get(spec, {}), "use_sim_time": True} for spec in NODES}
     slowed[FAKE[1]] |= {"real_time_factor": factor, **LAGS, "lockstep": PATIENCE_S}
-    for camera in (FAKE[2], CAMERA):
-        slowed[camera]["rate_hz"] = PICTURES_HZ
     return slowed
-
-
-def cost(used: dict[NodeSpec, float], robot_s: float, real_s: float, faults: int) -> Iterator[str]:
-    """What a fault cost: seconds of the robot and real ones, and processor time of each node that still runs.
-
-    Args:
-        used: processor time [s] of each node.
-        robot_s: the robot's time.
-    """
-    total = sum(used.values())
-    yield (
-        f"each fault: {robot_s / faults:.1f} s of the robot in {real_s / faults:.1f} s; nodes used {total / robot_s:.2f} s of "
-        "processor time for a second of the robot"
-    )
-    for spec, seconds_used in sorted(used.items(), key=lambda item: -item[1]):
-        yield f"  {spec.name:24} {seconds_used / robot_s:.3f}"
 
 
 def main() -> int:
@@ -247,23 +221,14 @@ def main() -> int:
         campaign = Campaign(nodes, watch, listen, parameters)
         for spec in NODES:
             campaign.start(spec)
-        begin, began = 0.0, time.monotonic()
         with contextlib.suppress(KeyboardInterrupt):
             campaign.listen(1e-3)  # until the fake robot speaks
             campaign.listen(3.0)
-            begin, began = campaign.now, time.monotonic()
             for k in range(args.faults):
                 name = random.choice(names)
                 campaign.fault(name, random.uniform(1.0, 3.0))
                 print(f"{k + 1:4} {name:28} {watch.disarmed or 'armed'}", flush=True)
         campaign.judge()
-        for line in cost(
-            nodes.cpu_times(),
-            max(campaign.now - begin, 1e-3),
-            time.monotonic() - began,
-            max(campaign.counts.done.total(), 1),
-        ):
-            print(line)
     counts = campaign.counts
     print(f"{counts.done.total()} faults: {dict(counts.done)}")
     print(f"nodes that ended by themselves: {len(counts.crashes)} {counts.crashes}")

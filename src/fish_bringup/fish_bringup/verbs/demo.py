@@ -62,7 +62,7 @@ VIEW_PORT = ViewConfig().port
 FULL = 0.75  # share of all cores from which on messages wait for a processor
 WAITED = 1.1  # times as long as asked, from which on a run is said to have waited
 NEED = 5.0  # cores that the nodes of a fake robot fill in real time
-LOCKSTEP = 20.0  # s of real time that simulated time waits for a node; a run ends when nothing comes for 30 s
+LOCKSTEP = 60.0  # s of real time that simulated time waits for a node
 LONGEST = 600.0  # s, a run that does not end by itself
 PLANNER, CONTROLLER = CONTROL[2], CONTROL[3]
 

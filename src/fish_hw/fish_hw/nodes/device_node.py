@@ -7,7 +7,7 @@ end.
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import rclpy
@@ -16,23 +16,18 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.subscription import Subscription
 
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.status import WARN, Status
 from fish_hw.nodes.worker import Worker
 from fish_hw.transport.errors import TransportError
-from fish_node.nodes.executor import KeptWaitSetExecutor, Polled, hear_all
+from fish_node.nodes.executor import KeptWaitSetExecutor
 from fish_node.nodes.robot_clock import RobotClock
 from fish_node.nodes.start import read_parameters, shut_down
 from fish_node.nodes.status_log import StatusLog
 
 NAMESPACE = "fish"
-# Several commands may come in one period: each is heard, as one that is no number disarms. One that is lost is not sent again:
-# the next is due, and to confirm each takes a tenth of a driver's processor time.
-COMMANDS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 END_TIMEOUT_S = 2.0
 CLOCK_WAIT_S = 0.01
 EXPECTED = (TransportError, DeviceError, ValueError)
@@ -65,10 +60,6 @@ class DeviceNode(Node):
     Args:
         name: of the node, relative to the namespace.
         settings_class: dataclass whose fields are the parameters.
-
-    Attributes:
-        polled: group of subscriptions that the device's thread hears, before each step. Messages that come a hundred times a
-            second belong there: to wake up for each would cost more than all the rest.
     """
 
     def __init__(self, name: str, settings_class: type[Any]) -> None:
@@ -78,7 +69,6 @@ class DeviceNode(Node):
         self.settings = read_parameters(self, settings_class)
         self.clock = RobotClock(self)
         self.failure = ""
-        self.polled = Polled()
         self._device: Device | None = None
         self._repeat: tuple[Callable[[], None], float] | None = None  # step, period [s]
         self._emulated = False
@@ -107,9 +97,8 @@ class DeviceNode(Node):
         device, (step, period_s) = self._device, self._repeat
         if self.clock.runs:
             self._connect(device)
-        polled = [s for s in self.subscriptions if s.callback_group is self.polled]
         self._worker = Worker(
-            lambda: self._step(device, step, polled),
+            lambda: self._step(device, step),
             period_s,
             self._on_failure,
             self.clock.now,
@@ -158,13 +147,10 @@ class DeviceNode(Node):
         else:
             self.get_logger().info("emulated device ready" if self._emulated else "device ready")
 
-    def _step(
-        self, device: Device, step: Callable[[], None], polled: Sequence[Subscription]
-    ) -> None:
+    def _step(self, device: Device, step: Callable[[], None]) -> None:
         if not self.clock.runs:
             time.sleep(CLOCK_WAIT_S)
             return
-        hear_all(polled)
         step()
         if device.connected:
             self._give_up_s = float("inf")  # from now on it is waited for without end

@@ -4,10 +4,8 @@
 
 from sensor_msgs.msg import JointState
 
-from fish_node.nodes.quick_messages import QuickJoints
 
-
-def joint_value(message: JointState | QuickJoints, name: str, field: str) -> float | None:
+def joint_value(message: JointState, name: str, field: str) -> float | None:
     """message.<field> of the joint `name`; None if the joint is absent or has no such value."""
     values = getattr(message, field)
     if name not in message.name:

@@ -24,7 +24,7 @@ from fish_hw.devices.leak_sensor import LeakSensor
 from fish_hw.devices.rotor_driver import RUDDER, RotorDriver
 from fish_hw.devices.vertiq import RotorTelemetry
 from fish_hw.emulators.vertiq import VertiqEmulator
-from fish_hw.nodes.device_node import COMMANDS, DeviceNode, run
+from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.nodes.joint_message import joint_value
 from fish_hw.settings.rotor import RotorSettings
 from fish_hw.transport.gpio_line import InterruptLine
@@ -32,7 +32,6 @@ from fish_hw.transport.interfaces import ByteStream
 from fish_hw.transport.serial_port import SerialPort
 from fish_node.nodes.arming import ArmingServer
 from fish_node.nodes.message_bytes import MessageBytes, mark
-from fish_node.nodes.quick_messages import hear
 
 BATTERY_PERIOD_S = 1.0
 
@@ -56,10 +55,8 @@ class RotorNode(DeviceNode):
             self.settings, self._open_port, self.clock.now, self._leak_sensor(), self._open_at
         )
         self._telemetry: RotorTelemetry | None = None
-        self._arming = ArmingServer(
-            self, self._driver.arming, self.settings, self.clock.now, group=self.polled
-        )
-        hear(self, JointState, "joint_command", self._on_command, COMMANDS, self.polled)
+        self._arming = ArmingServer(self, self._driver.arming, self.settings, self.clock.now)
+        self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
         self.create_subscription(String, "rudder/trouble", self._on_rudder, QoSProfile(depth=1))
         self.create_service(Trigger, "~/clear_faults", self._on_clear_faults)
         self.create_timer(BATTERY_PERIOD_S, self._on_battery)

@@ -11,17 +11,17 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from fish_hw.devices.rudder_driver import PwmOutput, RudderDriver
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.emulators.pwm_chip import PwmChipEmulator
-from fish_hw.nodes.device_node import COMMANDS, DeviceNode, run
+from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.nodes.joint_message import joint_value
 from fish_hw.settings.rudder import RudderSettings
 from fish_node.nodes.arming import ArmingListener
-from fish_node.nodes.quick_messages import hear
 
 TROUBLE_PERIOD_S = 0.05
 
@@ -33,7 +33,7 @@ class RudderNode(DeviceNode):
         super().__init__("rudder", RudderSettings)
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._driver = RudderDriver(self.settings, self._open_output, self.clock.now)
-        hear(self, JointState, "joint_command", self._on_command, COMMANDS, self.polled)
+        self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
         self._arming = ArmingListener(self, self._on_state)
         self._trouble = self.create_publisher(String, "rudder/trouble", 10)
         self.create_timer(TROUBLE_PERIOD_S, self._say_trouble)

@@ -19,7 +19,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from rclpy._rclpy_pybind11 import RCLError
-from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -55,7 +54,6 @@ class ArmingServer:
         arming: the state.
         clock: s, the clock of the arming state.
         stamp: of messages; the node's clock unless said otherwise.
-        group: of the subscriptions to odometry and camera, which speak most often.
     """
 
     def __init__(
@@ -65,7 +63,6 @@ class ArmingServer:
         settings: ArmingSettings,
         clock: Callable[[], float],
         stamp: Callable[[], Time] | None = None,
-        group: CallbackGroup | None = None,
     ) -> None:
         self._node, self._arming, self._settings, self._clock = node, arming, settings, clock
         self._now = stamp or (lambda: node.get_clock().now().to_msg())
@@ -75,8 +72,8 @@ class ArmingServer:
         self._state = node.create_publisher(DiagnosticArray, "arming/state", 10)
         node.create_service(SetBool, "arm", self._on_arm)
         if settings.estimate != "ignored":
-            hear(node, Odometry, "odometry/filtered", self._on_odometry, NEWEST, group)
-            hear(node, PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST, group)
+            hear(node, Odometry, "odometry/filtered", self._on_odometry, NEWEST)
+            hear(node, PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST)
         if settings.deadman_timeout_s > 0.0:
             node.create_subscription(Bool, "operator/deadman", self._on_deadman, 1)
         node.create_subscription(Bool, "operator/estop", self._on_estop, 10)

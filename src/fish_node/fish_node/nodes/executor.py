@@ -14,7 +14,7 @@ of the time of a wait, and who waits for a subscription's events wakes up for it
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -85,13 +85,6 @@ def take_all(subscription: Subscription) -> Iterator[tuple[Any, dict[str, Any]]]
     with subscription.handle:
         while taken := subscription.handle.take_message(subscription.msg_type, subscription.raw):
             yield taken
-
-
-def hear_all(subscriptions: Sequence[Subscription]) -> None:
-    """Let subscriptions of a Polled group hear every message that waits."""
-    for subscription in subscriptions:
-        for message, _ in take_all(subscription):
-            subscription.callback(message)
 
 
 class KeptWaitSetExecutor(SingleThreadedExecutor):

@@ -24,10 +24,10 @@ from geometry_msgs.msg import (
 )
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
-from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Header
 
 LITTLE_ENDIAN = b"\x00\x01"  # how an encapsulation begins
 BODY = 4  # bytes of encapsulation
@@ -41,20 +41,6 @@ POSE = struct.Struct("<7d")
 TWIST = struct.Struct("<6d")
 VECTOR, QUATERNION = struct.Struct("<3d"), struct.Struct("<4d")
 Covariance = NDArray[np.float64]
-
-
-class Stamp(NamedTuple):
-    """As builtin_interfaces/Time."""
-
-    sec: int
-    nanosec: int
-
-
-class QuickHeader(NamedTuple):
-    """As std_msgs/Header."""
-
-    stamp: Stamp
-    frame_id: str
 
 
 class Vector3(NamedTuple):
@@ -105,7 +91,7 @@ class TwistWithCovariance(NamedTuple):
 class QuickOdometry(NamedTuple):
     """As nav_msgs/Odometry."""
 
-    header: QuickHeader
+    header: Header
     child_frame_id: str
     pose: PoseWithCovariance
     twist: TwistWithCovariance
@@ -114,7 +100,7 @@ class QuickOdometry(NamedTuple):
 class QuickImu(NamedTuple):
     """As sensor_msgs/Imu."""
 
-    header: QuickHeader
+    header: Header
     orientation: Quaternion
     orientation_covariance: Covariance
     angular_velocity: Vector3
@@ -126,32 +112,22 @@ class QuickImu(NamedTuple):
 class QuickVector3(NamedTuple):
     """As geometry_msgs/Vector3Stamped."""
 
-    header: QuickHeader
+    header: Header
     vector: Vector3
 
 
 class QuickTwist(NamedTuple):
     """As geometry_msgs/TwistStamped."""
 
-    header: QuickHeader
+    header: Header
     twist: Twist
 
 
 class QuickPose(NamedTuple):
     """As geometry_msgs/PoseStamped, or PoseWithCovarianceStamped."""
 
-    header: QuickHeader
+    header: Header
     pose: Any
-
-
-class QuickJoints(NamedTuple):
-    """As sensor_msgs/JointState."""
-
-    header: QuickHeader
-    name: list[str]
-    position: tuple[float, ...]
-    velocity: tuple[float, ...]
-    effort: tuple[float, ...]
 
 
 def from_bytes(kind: type, callback: Callable[[Any], object]) -> Callable[[Any], None]:
@@ -165,18 +141,9 @@ def from_bytes(kind: type, callback: Callable[[Any], object]) -> Callable[[Any],
     return take
 
 
-def hear(
-    node: Node,
-    kind: type,
-    topic: str,
-    callback: Callable[[Any], object],
-    qos: Any,
-    group: CallbackGroup | None = None,
-) -> None:
+def hear(node: Node, kind: type, topic: str, callback: Callable[[Any], object], qos: Any) -> None:
     """Let `callback` hear a topic with a message of READERS, in the quick form."""
-    node.create_subscription(
-        kind, topic, from_bytes(kind, callback), qos, raw=True, callback_group=group
-    )
+    node.create_subscription(kind, topic, from_bytes(kind, callback), qos, raw=True)
 
 
 def read_odometry(data: bytes) -> QuickOdometry:
@@ -242,22 +209,8 @@ def read_pose_with_covariance(data: bytes) -> QuickPose:
     return QuickPose(header, PoseWithCovariance(pose, _numbers(data, at + POSE.size, 36)))
 
 
-def read_joints(data: bytes) -> QuickJoints:
-    """A sensor_msgs/JointState from its bytes."""
-    header, at = _header(data)
-    at = -(-at // 4) * 4 + 4
-    names = []
-    for _ in range(LENGTH.unpack_from(data, at - 4)[0]):
-        name, at = _string(data, at)
-        names.append(name)
-    position, at = _sequence(data, at)
-    velocity, at = _sequence(data, at)
-    return QuickJoints(header, names, position, velocity, _sequence(data, at)[0])
-
-
 READERS: dict[type, Callable[[bytes], Any]] = {
     Imu: read_imu,
-    JointState: read_joints,
     Odometry: read_odometry,
     PoseStamped: read_pose,
     PoseWithCovarianceStamped: read_pose_with_covariance,
@@ -272,9 +225,10 @@ def read_stamp(data: bytes) -> Time:
     return Time(sec=seconds, nanosec=nanoseconds)
 
 
-def _header(data: bytes) -> tuple[QuickHeader, int]:
+def _header(data: bytes) -> tuple[Header, int]:
+    seconds, nanoseconds = STAMP.unpack_from(data, BODY)
     frame, at = _string(data, BODY + STAMP.size)
-    return QuickHeader(Stamp(*STAMP.unpack_from(data, BODY)), frame), at
+    return Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame), at
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:
@@ -282,16 +236,6 @@ def _string(data: bytes, at: int) -> tuple[str, int]:
     begin = -(-at // 4) * 4 + 4
     end = begin + LENGTH.unpack_from(data, begin - 4)[0]
     return data[begin : end - 1].decode(errors="replace"), end
-
-
-def _sequence(data: bytes, at: int) -> tuple[tuple[float, ...], int]:
-    """The sequence of numbers at a place that is rounded up to 4 bytes, and the place after it."""
-    at = -(-at // 4) * 4 + 4
-    count = LENGTH.unpack_from(data, at - 4)[0]
-    if not count:
-        return (), at
-    at = _aligned(at)
-    return struct.unpack_from(f"<{count}d", data, at), at + 8 * count
 
 
 def _aligned(at: int) -> int:

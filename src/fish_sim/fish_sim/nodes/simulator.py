@@ -38,7 +38,6 @@ from std_srvs.srv import SetBool, Trigger
 
 from fish_node.arming import Arming, Source, operator_and_estimate
 from fish_node.nodes.arming import ArmingServer
-from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
 from fish_node.rivals import Rivals
@@ -122,7 +121,7 @@ class SimulatorNode(Node):
         self._camera = None
         if camera_pose:
             self._camera = self.create_publisher(PoseWithCovarianceStamped, "camera/pose", QUEUE)
-        hear(self, JointState, "joint_command", self._on_command, QUEUE)
+        self.create_subscription(JointState, "joint_command", self._on_command, QUEUE)
         if self._config.lockstep:
             hear_lockstep(self, self._lockstep, self._simulated, self._config.lockstep_camera)
         self._armed = ArmingServer(
@@ -230,7 +229,7 @@ class SimulatorNode(Node):
 
     def _simulated(self, stamp: Time) -> float:
         """Simulated time [s] of a stamp; a message without one is of now."""
-        if not (stamp.sec or stamp.nanosec):
+        if stamp == Time():
             return self._simulation.time
         return 1e-9 * float(stamp.sec * 1_000_000_000 + stamp.nanosec - self._start_ns)
 
