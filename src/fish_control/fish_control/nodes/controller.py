@@ -107,10 +107,16 @@ class ControllerNode(Node):
             signs, self._config.largest_variance
         ):  # the water is learned from it
             self._controller.observe(self._odometry_time, motion_of(message))
-        if self._waits and abs(self._odometry_time - self._commanded) > EARLY * self._period:
+        if self._waits and self._calls_for_a_command():
             self._commanded = self._odometry_time
             self._timer.reset()
             self._tick()
+
+    def _calls_for_a_command(self) -> bool:
+        """Whether the estimate is new and not one of several that waited: the timer then commands with the last of them."""
+        age = self.get_clock().now().nanoseconds * 1e-9 - self._odometry_time
+        new = abs(self._odometry_time - self._commanded) > EARLY * self._period
+        return new and age < MISSED * self._period
 
     def _on_twist(self, message: TwistStamped) -> None:
         speed, yaw_rate = message.twist.linear.x, message.twist.angular.z
