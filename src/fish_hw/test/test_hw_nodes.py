@@ -41,7 +41,7 @@ from fish_hw.transport.sysfs_pwm import SysfsPwm
 from fish_node.camera_file import CameraFileError, read_camera_file
 
 pytestmark = pytest.mark.ros
-DOMAIN = 176 + os.getpid() % 50  # tests of other packages, below, run beside this one
+DOMAIN = 176 + os.getpid() % 50  # tests of other packages, below, run at the same time
 TIMEOUT_S = 20.0
 
 

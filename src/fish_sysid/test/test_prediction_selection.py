@@ -18,7 +18,7 @@ from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.elimination import eliminate, without
 from fish_sysid.estimation.shooting.fold_steps import fold_steps
-from fish_sysid.estimation.shooting.left_out import LEVEL, judged, left_out_costs
+from fish_sysid.estimation.shooting.left_out import LEVEL, converged, judged, left_out_costs
 from fish_sysid.estimation.shooting.multistep import LARGEST_STEP
 from fish_sysid.estimation.shooting.prediction_fit import (
     fit_predictions,
@@ -28,12 +28,12 @@ from fish_sysid.estimation.shooting.prediction_fit import (
 from fish_sysid.estimation.shooting.residuals import SENSORS
 from fish_sysid.estimation.shooting.rudder_end import (
     WIDEST,
-    converged_end,
+    ends,
     judged_end,
     largest_command,
 )
 from fish_sysid.estimation.shooting.schedule import Found, multistep, polished
-from fish_sysid.estimation.shooting.selection import GLANCE, choose, converged
+from fish_sysid.estimation.shooting.selection import GLANCE, choose, extended
 from fish_sysid.estimation.shooting.trust import trusted
 
 FREE = ("head_drag_surge", "head_drag_yaw")
@@ -69,9 +69,10 @@ def test_a_nested_model_that_costs_more_than_its_submodel_starts_again() -> None
     """From twenty typical drags the fit does not come back; the fit without drag costs less."""
     experiment = swum(Robot(links=1))
     found = fitted(experiment)
-    lost, _ = converged(experiment, found, "quadratic_drag", found.cost, (20.0,))
+    far, near = (extended(found, "quadratic_drag", strength) for strength in (20.0, GLANCE))
+    lost, _ = converged(experiment, [far], found.cost)
     assert lost.cost > 1.5 * found.cost
-    fit, costs = converged(experiment, found, "quadratic_drag", found.cost, (20.0, GLANCE))
+    fit, costs = converged(experiment, [far, near], found.cost)
     assert fit.cost < 1.01 * found.cost
     assert np.isfinite(costs).all()
 
@@ -165,7 +166,7 @@ def test_an_end_that_starts_too_low_starts_again() -> None:
     hypothesis = prediction_hypothesis(stated, experiment, FREE, (), 0.3)
     start = Found(hypothesis, np.zeros(len(FREE) + len(SENSORS)), np.inf)
     found, _ = left_out_costs(experiment, start)
-    ended, _ = converged_end(experiment, found)
+    ended, _ = converged(experiment, ends(found, largest_command(experiment)), found.cost)
     assert ended.cost < 1.1 * found.cost
 
 

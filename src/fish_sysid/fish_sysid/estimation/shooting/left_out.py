@@ -9,6 +9,7 @@ evidence.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from scipy.stats import norm, t
 
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.shooting.fold_steps import fold_of, without_folds
+from fish_sysid.estimation.shooting.multistep import SETTLED
 from fish_sysid.estimation.shooting.schedule import Found, multistep
 
 Array = NDArray[np.float64]
@@ -69,6 +71,20 @@ def left_out_costs(experiment: Experiment, found: Found) -> tuple[Found, Array]:
         unseen = multistep(experiment.select(left_out), replace(found, z=without), EVERY)
         costs[left_out] = unseen.costs_by_trial(without)
     return replace(found, z=z, cost=size), costs
+
+
+def converged(
+    experiment: Experiment, starts: Iterable[Found], contained: float
+) -> tuple[Found, Array]:
+    """`left_out_costs` from the first of these starts that ends as low as a fit which it contains, or from the last.
+
+    contained: cost of that fit. One that ends higher has not converged, and starts again.
+    """
+    for start in starts:
+        fit, costs = left_out_costs(experiment, start)
+        if fit.cost <= (1.0 + SETTLED) * contained:
+            break
+    return fit, costs
 
 
 def judged(name: str, control: Array, costs: Array, looked_at: int = 1) -> Step:

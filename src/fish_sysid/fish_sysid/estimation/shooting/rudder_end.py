@@ -8,22 +8,24 @@ where the real one went on. The rudder therefore has no end, unless trials left 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.parametrization import Hypothesis
 from fish_sysid.estimation.shooting.fold_steps import FOLDS
-from fish_sysid.estimation.shooting.left_out import Step, judged, left_out_costs, step_text
-from fish_sysid.estimation.shooting.multistep import SETTLED
+from fish_sysid.estimation.shooting.left_out import (
+    Step,
+    converged,
+    judged,
+    left_out_costs,
+    step_text,
+)
 from fish_sysid.estimation.shooting.residuals import SENSORS
 from fish_sysid.estimation.shooting.schedule import Found
-
-Array = NDArray[np.float64]
 
 RANGE = "rudder_range"
 WIDEST = np.pi / 2  # rad, the largest range of a robot's file: no end
@@ -62,23 +64,16 @@ def judged_end(
         return found, ()
     report("does the rudder end below its commands?")
     found, control = left_out_costs(experiment, found)
-    ended, costs = converged_end(experiment, found)
+    starts = ends(found, largest_command(experiment))
+    ended, costs = converged(experiment, starts, found.cost)
     step = judged(RANGE, control, costs)
     step = replace(step, added=step.sure)
     report(f"{RANGE}: {step_text(step)}")
     return (ended if step.added else found), (step,)
 
 
-def converged_end(experiment: Experiment, found: Found) -> tuple[Found, Array]:
-    """`left_out_costs` of the fit with an end of the rudder.
-
-    The fit without an end is contained in it. One that ends at a higher cost has not converged and starts again nearer to the
-    largest command.
-    """
+def ends(found: Found, largest: float) -> Iterator[Found]:
+    """The fit with an end of the rudder, ever nearer to the largest command [rad]."""
     z = np.insert(found.z, len(found.z) - len(SENSORS), 0.0)
-    for below in BELOW:
-        end = with_end(found.hypothesis, below * largest_command(experiment))
-        ended, costs = left_out_costs(experiment, replace(found, hypothesis=end, z=z))
-        if ended.cost <= (1.0 + SETTLED) * found.cost:
-            break
-    return ended, costs
+    hypotheses = (with_end(found.hypothesis, below * largest) for below in BELOW)
+    return (replace(found, hypothesis=hypothesis, z=z) for hypothesis in hypotheses)

@@ -9,7 +9,7 @@ gains most joins the model if it gains more over the trials than the best of all
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,8 +23,15 @@ from fish_sysid.estimation.parametrization import (
 )
 from fish_sysid.estimation.shooting.fold_steps import FOLDS, fold_of, fold_steps
 from fish_sysid.estimation.shooting.huber import huber
-from fish_sysid.estimation.shooting.left_out import EVERY, Step, judged, left_out_costs, step_text
-from fish_sysid.estimation.shooting.multistep import SETTLED, Multistep
+from fish_sysid.estimation.shooting.left_out import (
+    EVERY,
+    Step,
+    converged,
+    judged,
+    left_out_costs,
+    step_text,
+)
+from fish_sysid.estimation.shooting.multistep import Multistep
 from fish_sysid.estimation.shooting.schedule import Found, multistep
 
 Array = NDArray[np.float64]
@@ -56,7 +63,7 @@ def choose(
         report(f"effect {number + 1}: leaving trials out for {', '.join(promising)}")
         further, control = left_out_costs(experiment, found)
         ends = on_all_cores(
-            lambda name: converged(experiment, found, name, further.cost),  # noqa: B023
+            lambda name: converged(experiment, starts(found, name), further.cost),  # noqa: B023
             promising,
         )
         fits = {name: fit for name, (fit, _) in zip(promising, ends, strict=True)}
@@ -78,26 +85,6 @@ def choose(
     return found, tuple(steps)
 
 
-def converged(
-    experiment: Experiment,
-    found: Found,
-    name: str,
-    control: float,
-    strengths: Sequence[float] = (GLANCE, 0.1 * GLANCE),
-) -> tuple[Found, Array]:
-    """`left_out_costs` of the fit with one more effect.
-
-    control: cost of the fit without it, which this one contains. One that ends at a higher cost has not converged and starts
-    again from the next of the strengths.
-    """
-    fit, costs = left_out_costs(experiment, extended(found, name, strengths[0]))
-    for strength in strengths[1:]:
-        if fit.cost <= (1.0 + SETTLED) * control:
-            break
-        fit, costs = left_out_costs(experiment, extended(found, name, strength))
-    return fit, costs
-
-
 def _alike(best: Step, judged: Sequence[Step]) -> tuple[str, ...]:
     """Members of the best one's family that gain as much within its standard error."""
     if best.name not in RUDDER_TIMING:
@@ -107,6 +94,11 @@ def _alike(best: Step, judged: Sequence[Step]) -> tuple[str, ...]:
         for s in judged
         if s is not best and s.name in RUDDER_TIMING and s.gain > best.gain - best.deviation
     )
+
+
+def starts(found: Found, name: str) -> Iterator[Found]:
+    """The fit with one more effect, ever weaker."""
+    return (extended(found, name, strength) for strength in (GLANCE, 0.1 * GLANCE))
 
 
 def extended(found: Found, name: str, strength: float = GLANCE) -> Found:
