@@ -85,6 +85,19 @@ def test_the_silent_is_given_up_after_the_patience_until_heard_again():
     assert not lockstep.may_advance(6.0, 11.4)
 
 
+def test_who_was_given_up_and_speaks_late_is_not_waited_for_at_every_word():
+    lockstep = Lockstep(1.0)
+    lockstep.answered("fusion", 0.0)
+    assert not lockstep.may_advance(1.0, 10.0)
+    assert lockstep.may_advance(1.0, 11.1)
+    for k in range(1, 5):
+        assert lockstep.may_advance(1.0 + k, 11.1 + k)
+        lockstep.answered("fusion", 1.0 + k - 0.1)
+        assert lockstep.may_advance(1.5 + k, 11.5 + k)
+    lockstep.answered("fusion", 5.5)
+    assert not lockstep.may_advance(5.6, 20.0)
+
+
 def test_every_wait_has_the_whole_patience():
     lockstep = Lockstep(1.0)
     lockstep.answered("controller", 0.0)

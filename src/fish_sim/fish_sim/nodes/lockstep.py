@@ -17,7 +17,8 @@ class Lockstep:
     A computer that is busy with other things then makes a run longer, not worse: everybody is waited for in every period.
     Who answers to every second one only shows it by silence (LOOSEN, or half the patience where that is less) and is
     then waited for in every second. Who stays silent for longer than `patience` [s of real time] is not waited for until
-    heard again; with patience 0 nobody is.
+    he answers in time again: who speaks seldom, such as fusion without an IMU, would hold the time at every word. With
+    patience 0 nobody is waited for.
 
     Args:
         patience: s of real time.
@@ -27,9 +28,12 @@ class Lockstep:
     def __init__(self, patience: float, slack: float = 0.0) -> None:
         self._patience = patience
         self._least = max(slack, STRICT)
+        self._most = max(AHEAD, self._least)
         self._loosen = min(LOOSEN, 0.5 * patience)
         self._answers: dict[str, float] = {}
         self._ahead: dict[str, float] = {}  # s that each may be behind
+        self._given_up: set[str] = set()
+        self._simulated = 0.0  # s, when last asked
         self._since: float | None = None
         self._awaited: list[str] = []
 
@@ -40,6 +44,9 @@ class Lockstep:
 
     def answered(self, who: str, stamp: float) -> None:
         """A message for this simulated time [s] came in."""
+        if who in self._given_up and stamp < self._simulated - self._most:
+            return
+        self._given_up.discard(who)
         if who in self._answers:
             between = max(stamp - self._answers[who], DT)
             self._ahead[who] = max(min(self._ahead[who], between - STRICT), self._least)
@@ -53,6 +60,7 @@ class Lockstep:
 
     def may_advance(self, simulated: float, now: float) -> bool:
         """Whether the simulation at `simulated` [s] may go on at the real time `now` [s]."""
+        self._simulated = simulated
         late = self._awaited = self._late(simulated)
         if late and self._patience > 0.0:
             if self._since is None:
@@ -60,12 +68,13 @@ class Lockstep:
             if self.waited(now) <= self._loosen:
                 return False
             for who in late:
-                self._ahead[who] = min(self._ahead[who] + DT, max(AHEAD, self._least))
+                self._ahead[who] = min(self._ahead[who] + DT, self._most)
             late = self._late(simulated)
             if late and self.waited(now) <= self._patience:
                 return False
             for who in late:
                 del self._answers[who], self._ahead[who]
+            self._given_up.update(late)
         self._since = None
         return True
 
