@@ -42,6 +42,7 @@ class Reason(Enum):
     AMBIGUOUS = "more than one fish has these markers"
     MIRRORED = "only the mirror image in a wall is seen"
     NO_TAG = "no tag of the head"
+    REPEATED = "the same image as before: the camera is frozen, or sends every image twice"
     TAG_SIZE = "tag of the head not of its size"
 
 

@@ -22,6 +22,22 @@ class PictureError(ValueError):
     """Bytes that are no usable picture; the message says what came and what was expected."""
 
 
+class Repeats:
+    """Notices a picture that is the same as the one before, byte by byte.
+
+    Every camera has noise, so that a repeated picture comes from a frozen driver or a message that was sent twice.
+    """
+
+    def __init__(self) -> None:
+        self._last = memoryview(b"")
+
+    def seen(self, data: bytes) -> bool:
+        """Whether the bytes of a picture are those of the one before."""
+        new = memoryview(data)
+        same, self._last = new == self._last, new
+        return same
+
+
 def from_compressed(data: bytes, size: tuple[int, int] | None) -> Image:
     """Picture from JPEG or PNG bytes; without a size any is taken.
 

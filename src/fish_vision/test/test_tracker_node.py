@@ -37,6 +37,11 @@ PICTURE = draw(discs_of_fish(*POSE, (0.3, -0.2, 0.1)))
 MOUNT = {"camera_position": list(CONFIG.camera_position), "camera_tilt": list(CONFIG.camera_tilt)}
 
 
+def another(count: int) -> bytes:
+    """The picture once more, in other bytes, as a camera's noise makes them."""
+    return to_jpeg(PICTURE, 95 + count % 2)
+
+
 class Bench:
     """A tracker node and a node that plays camera and listener, spun by hand."""
 
@@ -228,13 +233,31 @@ def test_a_fish_with_tags_has_the_same_topics(bench: Bench) -> None:
 def test_a_low_pass_stamps_its_poses_earlier_than_their_images(bench: Bench) -> None:
     bench.send_info()
     for count in (1, 2):
-        bench.send_jpeg(to_jpeg(PICTURE, 95))
+        bench.send_jpeg(another(count))
         assert bench.spin_until(lambda n=count: len(bench.got["pose"]) == n)
     stamps = [p.header.stamp.nanosec for p in bench.got["pose"]]
     assert stamps[0] == (bench.frame - 1) * 33_000_000
     weight = 1 - exp(-2 * pi * 2.0 * 0.033)
     assert stamps[1] == pytest.approx(stamps[0] + weight * 33_000_000, abs=2000)
     check_pose(bench.got["pose"][1])
+
+
+def test_a_frozen_image_gives_no_pose_and_the_fish_is_found_where_it_is_afterwards(
+    bench: Bench,
+) -> None:
+    """Followed in the frozen image, the own fish would be another one where the camera shows it again."""
+    bench.send_info()
+    bench.send_jpeg(another(0))
+    assert bench.spin_until(lambda: len(bench.got["pose"]) == 1)
+    for count in range(1, 32):  # 1 s
+        bench.send_jpeg(another(0))
+        assert bench.spin_until(lambda n=count: bench.tracker._statistics.images == n + 1)
+    assert bench.says("the same image as before: the camera is frozen")
+    assert len(bench.got["pose"]) == 1
+    moved = (POSE[0] - 0.4, *POSE[1:])
+    bench.send_jpeg(to_jpeg(draw(discs_of_fish(*moved, (0.3, -0.2, 0.1))), 95))
+    assert bench.spin_until(lambda: len(bench.got["pose"]) == 2)
+    assert bench.got["pose"][1].pose.pose.position.x == pytest.approx(moved[0], abs=5e-3)
 
 
 def test_bad_images_are_said_and_the_next_good_one_is_tracked(bench: Bench) -> None:
@@ -292,14 +315,13 @@ def test_a_wrong_focal_length_is_named_with_the_one_that_fits(scale: float) -> N
     bench = Bench(MOUNT | {"focal_scale": scale})
     try:
         bench.send_info(k=[855.0, 0.0, 640.0, 0.0, 855.0, 360.0, 0.0, 0.0, 1.0])
-        jpeg = to_jpeg(PICTURE, 95)
         if scale != 1.0:
-            bench.send_jpeg(jpeg)
+            bench.send_jpeg(another(0))
             assert bench.spin_until(lambda: bool(bench.got["pose"]))
             check_pose(bench.got["pose"][0])
             return
         for count in range(1, 61):
-            bench.send_jpeg(jpeg)
+            bench.send_jpeg(another(count))
             assert bench.spin_until(lambda n=count: bench.tracker._statistics.images == n)
         assert bench.says("no poses: what is on the head seems +5.")
         message = bench.got["diagnostics"][-1].status[0].message

@@ -7,7 +7,8 @@ In: camera/image_raw/compressed (sensor_msgs/CompressedImage) or, with use_raw, 
 (geometry_msgs/PoseWithCovarianceStamped, frame pool), camera/tail (sensor_msgs/JointState, tail_1 .. relative
 angles, rad), both stamped as the image; with debug_image camera/debug/compressed; lockstep (std_msgs/Header, where somebody
 listens: an image that gives no pose, so that a simulator does not wait for it); /diagnostics. Bad images
-and calibrations are counted and said in the diagnostics.
+and calibrations are counted and said in the diagnostics. An image that is the same as the one before gives no pose: a fish
+that is followed in a frozen image would be another one when the camera goes on.
 """
 
 from collections.abc import Callable
@@ -35,12 +36,13 @@ from fish_node.nodes.static_frames import publish_static_frame
 from fish_node.nodes.status_log import StatusLog
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, CalibrationError, Lens
+from fish_vision.choice import Reason
 from fish_vision.config import TrackerConfig
 from fish_vision.follower import Follower, make_follower
 from fish_vision.lowpass import PoseLowPass
-from fish_vision.picture import PictureError, from_compressed, from_raw, to_jpeg
+from fish_vision.picture import PictureError, Repeats, from_compressed, from_raw, to_jpeg
 from fish_vision.statistics import Statistics
-from fish_vision.tracker import Detection
+from fish_vision.tracker import Detection, Lost
 
 SETTABLE = ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour")
 NO_INFO = "no camera/camera_info yet"
@@ -70,6 +72,7 @@ class TrackerNode(Node):
         self._tracker: Follower | None = None
         self._lowpass = PoseLowPass(self._config.lowpass_hz, self._config.reacquire_s)
         self._statistics = Statistics()
+        self._repeats = Repeats()
         self._images_before = self._tracked_before = 0
         self._mounted = publish_static_frame(
             self,
@@ -130,7 +133,10 @@ class TrackerNode(Node):
             self._statistics.refuse("bad image", str(error))
             return
         stamp = msg.header.stamp.sec + msg.header.stamp.nanosec * 1e-9
-        found = self._tracker.track(picture, stamp)
+        if self._repeats.seen(msg.data):
+            found: Detection | Lost = Lost(stamp, Reason.REPEATED, None)
+        else:
+            found = self._tracker.track(picture, stamp)
         if isinstance(found, Detection):
             filtered = self._lowpass.filtered(found)
             self._publish(filtered, _earlier(msg.header, stamp - filtered.stamp))
