@@ -12,8 +12,12 @@ from fish_vision.config import TrackerConfig
 from fish_vision.segmentation import HUES, ColourRange
 
 MARKERS = ("front", "rear", "tail_odd", "tail_even")
-SHARE = 0.05  # of the way to what is seen, per picture that teaches
-DARKER = 0.5  # share of a marker's value at which its range begins, where that is lower than the parameter
+SHARE, FIRST_SHARE = (
+    0.05,
+    0.3,
+)  # of the way to what is seen, per picture that teaches, and of the first ones
+SMALL_SHIFT = 2  # half degrees, which a range bears
+DARKER = 0.5  # share of a marker's value at which its range begins: a hull that the light tints is much darker
 VALUE_LEAST = 40.0  # no range begins below
 CASTS = (  # gains of red and blue of a light that the ranges were not made for, the nearest first
     (1.15, 0.85),
@@ -27,7 +31,7 @@ CASTS = (  # gains of red and blue of a light that the ranges were not made for,
 
 
 class Colours:
-    """Ranges of the parameters, each moved in hue by at most `hue_shift_max`, and begun at lower values in the dark.
+    """Ranges of the parameters, each moved in hue by at most `hue_shift_max`, and begun at half the value of its marker.
 
     cast: gains of red and blue of the light, from which the hues start.
     """
@@ -38,11 +42,17 @@ class Colours:
         self._ranges: dict[str, ColourRange] = {}  # as they are now
         self.shifts = dict.fromkeys(MARKERS, 0.0)  # half degrees
         self._value_min = {m: float(r.value_min) for m, r in self._given.items()}
+        self._taught = dict.fromkeys(MARKERS, 0)  # pictures
         if cast != (1.0, 1.0):
             for marker, given in self._given.items():
                 hue = middle(given)
                 seen = _hue_under(hue, (given.saturation_min + 255) / 2, (cast[1], 1.0, cast[0]))
                 self._move(marker, (seen - hue + HUES / 2) % HUES - HUES / 2)
+
+    @property
+    def settled(self) -> bool:
+        """Whether every marker has been seen in so many pictures that a few more change little."""
+        return min(self._taught.values()) * SHARE >= 1.0
 
     def range(self, marker: str) -> ColourRange:
         """The range in which a marker is looked for now."""
@@ -51,7 +61,7 @@ class Colours:
         return self._ranges[marker]
 
     def _range(self, marker: str) -> ColourRange:
-        given, shift = self._given[marker], round(self.shifts[marker])
+        given, shift = self._given[marker], self._shift(marker)
         return replace(
             given,
             hue_low=(given.hue_low + shift) % HUES,
@@ -59,15 +69,21 @@ class Colours:
             value_min=round(self._value_min[marker]),
         )
 
+    def _shift(self, marker: str) -> int:
+        """By how much the range is moved: a small shift stays within it, and would move the blobs' edges."""
+        shift = round(self.shifts[marker])
+        return shift if abs(shift) > SMALL_SHIFT else 0
+
     def learn(self, marker: str, hue: float, value: float) -> None:
-        """Move a range a little to the hue (half degrees) and value that its marker shows."""
+        """Move a range towards the hue (half degrees) and value that its marker shows, at first as a mean of what was seen."""
         shift = (hue - middle(self._given[marker]) + HUES / 2) % HUES - HUES / 2
         if abs(shift) > self._most + 10.0:  # glare or something else lies over the marker
             return
-        self._move(marker, self.shifts[marker] + SHARE * (shift - self.shifts[marker]))
-        least = min(float(self._given[marker].value_min), max(DARKER * value, VALUE_LEAST))
-        self._ranges.pop(marker, None)
-        self._value_min[marker] += SHARE * (least - self._value_min[marker])
+        self._taught[marker] += 1
+        share = min(max(1.0 / self._taught[marker], SHARE), FIRST_SHARE)
+        self._move(marker, self.shifts[marker] + share * (shift - self.shifts[marker]))
+        least = max(DARKER * value, VALUE_LEAST)
+        self._value_min[marker] += share * (least - self._value_min[marker])
 
     def _move(self, marker: str, shift: float) -> None:
         self._ranges.pop(marker, None)

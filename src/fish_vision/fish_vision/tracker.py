@@ -22,7 +22,9 @@ Array = NDArray[Any]  # float64
 
 COARSE = 2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
 PLACES = 4  # places of the whole image that are measured
-LEARN_EVERY = 5  # detections of which one teaches the colours of today's light
+LEARN_EVERY = (
+    5  # detections of which one teaches the colours of today's light, once they have settled
+)
 CAST_AFTER = 10  # images without the fish after which other lights are tried
 SAME = 0.05  # m, pairs so near to each other are measured together
 HEAD, TAIL = ("front", "rear"), ("tail_odd", "tail_even")
@@ -186,7 +188,8 @@ class Tracker:
         links = self._config.tail_links
         tail = own.tail if links and len(own.tail) == links else None
         self._seen += 1
-        if tail is not None and not whole_image and self._seen % LEARN_EVERY == 0:
+        due = not self._spots.colours.settled or self._seen % LEARN_EVERY == 0
+        if tail is not None and not whole_image and due:
             self._learn(own, box)
         return Detection(stamp, own.pose, tail, own.spacing, box, whole_image)
 
