@@ -19,6 +19,7 @@ from fish_sysid.diagnosis.conclusion import shares
 from fish_sysid.diagnosis.corrected_model import corrected
 from fish_sysid.diagnosis.diagnosis_json import answer
 from fish_sysid.diagnosis.latent_force import dof_shares
+from fish_sysid.diagnosis.out_of_reach import out_of_reach
 from fish_sysid.diagnosis.task import STAGES, make_task
 from fish_sysid.diagnosis.vocabulary import NoCandidateError, candidates
 from fish_sysid.estimation.ekf_types import Noise
@@ -157,6 +158,29 @@ def test_without_the_check_and_the_model_order_the_answer_is_still_whole():
     result = pipeline.diagnose(data, GIVEN, names=names, without=off)
     assert [a.name for a in result.accepted] == ["current"]
     assert answer(result)["fit"]["errors_are_of"] == "training"
+
+
+def test_where_the_model_cannot_follow_the_fish_no_name_is_searched_for(tmp_path):
+    """Images shake by 5 cm, which no start state, parameter or effect of a fish explains."""
+    data = swim(fish(), duration=7.0)
+    shaken = []
+    for frames in data.frames:
+        pose = frames.pose.copy()
+        pose[:, :2] += 0.05 * np.sin(6.0 * frames.t)[:, None]
+        shaken.append(replace(frames, pose=pose))
+    result = pipeline.diagnose(replace(data, frames=tuple(shaken)), GIVEN, names=FEW)
+    content = answer(result)
+    assert content["verdict"] == "unexplained"
+    assert content["ranking"] == []
+    said = sentence(content)
+    assert "from no start state does the model follow two seconds of swimming" in said
+    write_diagnosis_page(tmp_path / "report.html", "shaken", content, result)
+    assert "no name is searched for" in (tmp_path / "report.html").read_text()
+
+
+def test_a_model_that_lacks_a_strong_current_can_follow_the_fish():
+    task = make_task(swim(fish(current={"x": 0.06, "y": -0.05}), duration=7.0), GIVEN)
+    assert out_of_reach(task) is None
 
 
 def test_of_two_effects_each_has_its_own_place():

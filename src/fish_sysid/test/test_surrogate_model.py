@@ -18,7 +18,7 @@ from fish_sysid.prediction.better_states import prediction_size
 
 FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
 WATER = Noise(wrench=(0.002, 0.004, 1e-4))
-NOMINAL = Robot(links=1)
+NOMINAL = Robot(links=2)
 SLIPPING = NOMINAL.with_parameters(head_drag_surge=0.26).with_effect("tip_slip", mobility=0.3)
 KINDS = ("sines", "random", "steps", "turn")
 

@@ -25,8 +25,11 @@ from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 
-def conclude(state: State, task: Task) -> Diagnosis:
-    """The diagnosis, with a surrogate model where no name fits."""
+def conclude(state: State, settled: Fit | None, task: Task) -> Diagnosis:
+    """The diagnosis, with a surrogate model where no name fits.
+
+    settled: the nominal model refitted with what the symmetry tests find, if they find anything.
+    """
     training, nominal, final = task.trials.training, state.nominal, state.final
     names = [accepted.name for accepted in state.accepted]
     task.progress("locating the missing force")
@@ -39,13 +42,13 @@ def conclude(state: State, task: Task) -> Diagnosis:
     unseen = task.experiment.select(task.split.held_out or task.split.training)
     noise = initial_noise(unseen, task.robot, nominal.noise)
     held = held_out_density(unseen, task.robot, noise, nominal, final)
-    found = Diagnosis(task, state, force, parts, wrenches, remaining, noise, held)
+    found = Diagnosis(task, state, force, parts, wrenches, remaining, noise, held, settled=settled)
     if named(found) or not much_is_left(found) or not task.runs("surrogate model"):
         return found
     helpful = dict.fromkeys((*names, *(name for name in STRUCTURAL if name in task.names)))
     if task.runs("surrogate's own choice"):
         helpful |= dict.fromkeys(task.names)
-    model, steps = surrogate_model(nominal, tuple(helpful), training, task.progress)
+    model, steps = surrogate_model(settled or nominal, tuple(helpful), training, task.progress)
     return replace(found, surrogate=model, predicted=steps)
 
 

@@ -25,17 +25,21 @@ from fish_sysid.diagnosis.effect_wrench import intervals, regimes
 from fish_sysid.diagnosis.families import family_of, separating
 from fish_sysid.diagnosis.next_experiment import next_experiment
 from fish_sysid.diagnosis.prediction_evidence import prediction_entries
-from fish_sysid.diagnosis.result import Accepted, Diagnosis
+from fish_sysid.diagnosis.result import Accepted, Diagnosis, Round
 from fish_sysid.diagnosis.significance import p_value, p_value_unseen, probabilities
 from fish_sysid.diagnosis.symmetry.symmetry_json import symmetry_entry, with_symmetry
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.ekf_types import ROWS, Noise
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.thresholds import PLAUSIBLE
-from fish_sysid.prediction.prediction import predict, prediction_errors
+from fish_sysid.prediction.prediction import EVERY, WARM_UP, predict, prediction_errors
 
 HORIZONS = (1.0, 2.0, 5.0)
 LAGS = 20  # samples of a row over which residuals must be white
+MISSES = (
+    "from no start state does the model follow two seconds of swimming, whatever effects it has: it misses by {:.1f} times the "
+    "camera's noise, and no name is searched for by likelihood"
+)
 STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in surge, sway and yaw"
 
 
@@ -57,19 +61,22 @@ def answer(d: Diagnosis) -> dict[str, Any]:
         "out_of_reach": d.task.not_judged,
         "ranking": [
             {"name": r.name, "gain": r.gain, "free_parameters": d.task.parameter_count(r.name)}
-            for r in d.state.rounds[0].ranking
+            for first in d.state.rounds[:1]
+            for r in first.ranking
         ],
         "refitted": [
-            refitted_entry(d, name, fit) for name, fit in d.state.rounds[0].refitted.items()
+            refitted_entry(d, first, name, fit)
+            for first in d.state.rounds[:1]
+            for name, fit in first.refitted.items()
         ],
     }
 
 
-def refitted_entry(d: Diagnosis, name: str, fit: Fit) -> dict[str, Any]:
+def refitted_entry(d: Diagnosis, first: Round, name: str, fit: Fit) -> dict[str, Any]:
     """A candidate of the first round that was refitted on the search trials, whether it was chosen or not."""
     return {
         "name": name,
-        "gain": d.state.rounds[0].gain(name),
+        "gain": first.gain(name),
         "parameters": effect_parameters(fit, name),
         "held_out_rms": held_out_errors(d, fit.robot, fit.noise),
     }
@@ -172,6 +179,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "description": "; ".join(limits) or text,
         }
     scale, ratio = np.array(d.final.noise.wrench), d.final.process_noise_ratio
+    laws = [*limits, *(law(d, dof) for dof in d.state.law.lawful(d.task.level))]
     return {
         "share": share,
         "where": {
@@ -183,10 +191,14 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
         "nearest": [a.name for a in d.accepted if a not in named(d)],  # help, but leave most of it
         "by_prediction": prediction_entries(d),
         "description": "; ".join(
-            [*limits, *(law(d, dof) for dof in d.state.law.lawful(d.task.level))]
-        )
-        or f"{STRONG.format(*ratio)}; {no_law(d)}",
+            [*unreached(d), *(laws or [f"{STRONG.format(*ratio)}; {no_law(d)}"])]
+        ),
     }
+
+
+def unreached(d: Diagnosis) -> list[str]:
+    """That no name was searched for, where the model cannot follow the fish."""
+    return [MISSES.format(d.misses)] if d.misses is not None else []
 
 
 def no_law(d: Diagnosis) -> str:
@@ -251,11 +263,10 @@ def written(d: Diagnosis) -> str:
 
 def held_out_errors(d: Diagnosis, robot: Robot, noise: Noise) -> dict[str, dict[str, float]]:
     """Prediction errors of a robot on `Diagnosis.unseen`: horizon -> position, heading, speed."""
-    sizes = prediction_errors(predict(d.unseen, robot, noise, max(HORIZONS)), HORIZONS)
+    made = predict(d.unseen, robot, noise, max(HORIZONS), EVERY, WARM_UP)
+    sizes, names = prediction_errors(made, HORIZONS), ("position_m", "heading_rad", "speed_m_s")
     return {
-        f"{h:g} s": dict(
-            zip(("position_m", "heading_rad", "speed_m_s"), map(float, row), strict=True)
-        )
+        f"{h:g} s": dict(zip(names, map(float, row), strict=True))
         for h, row in zip(sizes.horizons, sizes.rms, strict=True)
     }
 

@@ -1,6 +1,9 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The method on one page: symmetries, fit, select effects, choose the number of links, eliminate, say what is left."""
+"""The method on one page: symmetries, fit, select effects, choose the number of links, eliminate, say what is left.
+
+Where the model cannot follow the fish at all there is no search: what is left is located, and predictions over seconds choose.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ from fish_sysid.diagnosis.forward_selection import Selection, select_effects
 from fish_sysid.diagnosis.known_effects import start_hypothesis
 from fish_sysid.diagnosis.law_or_name import name_for_law
 from fish_sysid.diagnosis.model_order import better_order
+from fish_sysid.diagnosis.out_of_reach import out_of_reach
 from fish_sysid.diagnosis.residual_regression import residual_law
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, State
 from fish_sysid.diagnosis.significance import Level
@@ -49,8 +53,18 @@ def diagnose(
     task = make_task(experiment, robot, level, progress, names, effects, without)
     task.progress("testing symmetries")
     symmetry = symmetry_findings(task.experiment, task.robot)
+    task.progress("can the model follow the fish?")
+    misses = out_of_reach(task)
     task.progress("fitting the nominal model")
-    selection = select_effects(fit_nominal(task), task)
+    nominal = fit_nominal(task)
+    state = searched(nominal, task) if misses is None else unsearched(nominal, task)
+    settled = with_symmetry_found(state, symmetry, task)
+    return replace(conclude(state, settled, task), symmetry=symmetry, misses=misses)
+
+
+def searched(nominal: Fit, task: Task) -> State:
+    """The effects that the likelihood asks for."""
+    selection = select_effects(nominal, task)
     state = on_training(selection, task)
     if task.runs("model order"):
         finer = better_order(selection, state.law, task)
@@ -60,8 +74,13 @@ def diagnose(
     if task.runs("backward elimination"):
         final, accepted = eliminate(state.final, state.accepted, task)
         state = with_final(state, final, accepted, task)
-    settled = with_symmetry_found(state, symmetry, task)
-    return replace(conclude(state, task), symmetry=symmetry, settled=settled)
+    return state
+
+
+def unsearched(nominal: Fit, task: Task) -> State:
+    """The nominal model alone, and the law that it leaves."""
+    fit = refit_on(nominal, task.trials.training, anneal=False)
+    return State((), (), fit, fit, residual_law(fit, task.trials.training))
 
 
 def with_symmetry_found(

@@ -91,6 +91,7 @@ class Diagnosis:
     predicted: tuple[Step, ...] = ()  # effects of the surrogate, by trials left out
     symmetry: tuple[SymmetryFinding, ...] = ()  # every test's answer, without a model of the fish
     settled: Fit | None = None  # the nominal model refitted with what the symmetry tests find
+    misses: float | None = None  # times the camera's noise, where the model cannot follow the fish
 
     @property
     def nominal(self) -> Fit:

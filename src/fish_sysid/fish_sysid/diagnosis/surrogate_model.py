@@ -23,6 +23,7 @@ from fish_sysid.estimation.ekf_types import SensorModel
 from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.shooting.elimination import INTRINSIC
 from fish_sysid.estimation.shooting.left_out import Step
 from fish_sysid.estimation.shooting.prediction_fit import PLACE, PredictionFit, fit_predictions
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
@@ -43,8 +44,8 @@ def surrogate_model(
 ) -> tuple[Fit, tuple[Step, ...]]:
     """(the model that predicts best, the effects in it with what each does to predictions of trials left out).
 
-    nominal: the fit without effects; candidates: effects that may help. The nominal fit itself where no trial is long enough to
-    predict.
+    nominal: the fit without effects but those that symmetry tests find: late images are moved back before anything is fitted;
+    candidates: effects that may help. The nominal fit itself where no trial is long enough to predict.
     """
     if not can_be_predicted(experiment):
         return nominal, ()
@@ -54,7 +55,7 @@ def surrogate_model(
     sensors = nominal.hypothesis.parametrization.filter_inputs(nominal.theta)[2]
     moving = [name for name in candidates if name in robot.table]  # a sensor moves no fish
     seen = without_sensor_errors(experiment, sensors)
-    found = fit_predictions(seen, robot, free, (), moving, report, (robot.links,))
+    found = fit_predictions(seen, robot, free, (), moving, report, together=INTRINSIC)
     fit = _as_fit(found, sensors, experiment)
     own, other = (
         prediction_size(experiment, f.robot, f.noise) for f in (fit, _with_filter(nominal))

@@ -24,20 +24,28 @@ from fish_sysid.estimation.shooting.windows import cut, regular_starts
 LENGTH, EVERY = 2.0, 8.0  # s, of windows and between them
 LADDER = ((1.0, 1.0), (5.0, 2.0))  # of the tail's stiffness, and of masses and drags in sway
 ITERATIONS = 8
+FAINT = 0.05  # typical strengths, at which effects start
 TOO_FAR = 2.0  # times the camera's noise
 
 
 def misfit(
-    experiment: Experiment, robot: Robot, noise: Noise, free: Sequence[str], length: float = LENGTH
+    experiment: Experiment,
+    robot: Robot,
+    noise: Noise,
+    free: Sequence[str],
+    length: float = LENGTH,
+    effects: Sequence[str] = (),
 ) -> float:
     """The larger of the camera's residuals in position and heading over their noise (medians), of the better start.
 
-    0 where no window can be cut: nothing speaks against the model.
+    effects: that the model may have as well, all at once. 0 where no window can be cut: nothing speaks against the model.
     """
     windows = cut(experiment, regular_starts(experiment, length, EVERY, FIRST), length)
     if not len(windows):
         return 0.0
     hypothesis, sizes = nominal_hypothesis(robot, tuple(free)), []
+    for name in effects:
+        hypothesis = hypothesis.with_effect(name, FAINT)
     for stiffness, heavy in LADDER:
         theta = ladder_start(ShotParametrization(hypothesis), stiffness, heavy)
         shooting = Shooting(experiment, ShotParametrization(hypothesis, theta), windows)

@@ -1,0 +1,32 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the likelihood can be asked for names: not where the model cannot follow the fish whatever effects it has.
+
+The likelihood of the next 50 ms then prefers whatever helps over 50 ms, and a search of many minutes ends in names that are
+none. Symmetry tests need no model, and predictions of trials left out judge a wrong model by what it is used for.
+"""
+
+from __future__ import annotations
+
+from fish_sysid.diagnosis.known_effects import known_effects
+from fish_sysid.diagnosis.task import Task
+from fish_sysid.estimation.parametrization import NOMINAL_FREE
+from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.shooting.elimination import INTRINSIC
+from fish_sysid.estimation.shooting.misfit import misfit
+from fish_sysid.estimation.thresholds import CANNOT_FOLLOW
+
+FLOW = "current"  # the one effect of the pool that displaces a fish by more than the camera's noise in two seconds
+
+
+def out_of_reach(task: Task) -> float | None:
+    """By how many times the camera's noise the model misses two seconds of swimming; None where it can follow the fish.
+
+    Start states, clocks, parameters and the effects of body, actuators and water are free, all at once.
+    """
+    if not task.runs("question of reach"):
+        return None
+    training, own = task.trials.training, known_effects(task.robot)
+    effects = [name for name in (*INTRINSIC, FLOW) if name in task.robot.table and name not in own]
+    left = misfit(training, task.robot, usual_noise(training), NOMINAL_FREE, effects=effects)
+    return left if left > CANNOT_FOLLOW else None
