@@ -15,11 +15,11 @@ from fish_sim.effects import EFFECTS
 from fish_sim.effects.quadratic_drag import QuadraticDrag
 from fish_sim.robot_file import load_robot, save_robot
 from fish_sysid.diagnosis import pipeline
+from fish_sysid.diagnosis.can_follow import missed_by
 from fish_sysid.diagnosis.conclusion import shares
 from fish_sysid.diagnosis.corrected_model import corrected
 from fish_sysid.diagnosis.diagnosis_json import answer
 from fish_sysid.diagnosis.latent_force import dof_shares
-from fish_sysid.diagnosis.out_of_reach import out_of_reach
 from fish_sysid.diagnosis.task import STAGES, make_task
 from fish_sysid.diagnosis.vocabulary import NoCandidateError, candidates
 from fish_sysid.estimation.ekf_types import Noise
@@ -180,7 +180,7 @@ def test_where_the_model_cannot_follow_the_fish_no_name_is_searched_for(tmp_path
 
 def test_a_model_that_lacks_a_strong_current_can_follow_the_fish():
     task = make_task(swim(fish(current={"x": 0.06, "y": -0.05}), duration=7.0), GIVEN)
-    assert out_of_reach(task) is None
+    assert missed_by(task) is None
 
 
 def test_of_two_effects_each_has_its_own_place():

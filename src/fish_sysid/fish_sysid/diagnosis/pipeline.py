@@ -15,12 +15,12 @@ from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.backward_elimination import eliminate
+from fish_sysid.diagnosis.can_follow import missed_by
 from fish_sysid.diagnosis.conclusion import conclude
 from fish_sysid.diagnosis.forward_selection import Selection, select_effects
 from fish_sysid.diagnosis.known_effects import start_hypothesis
 from fish_sysid.diagnosis.law_or_name import name_for_law
 from fish_sysid.diagnosis.model_order import better_order
-from fish_sysid.diagnosis.out_of_reach import out_of_reach
 from fish_sysid.diagnosis.residual_regression import residual_law
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, State
 from fish_sysid.diagnosis.significance import Level
@@ -54,7 +54,7 @@ def diagnose(
     task.progress("testing symmetries")
     symmetry = symmetry_findings(task.experiment, task.robot)
     task.progress("can the model follow the fish?")
-    misses = out_of_reach(task)
+    misses = missed_by(task)
     task.progress("fitting the nominal model")
     nominal = fit_nominal(task)
     state = searched(nominal, task) if misses is None else unsearched(nominal, task)

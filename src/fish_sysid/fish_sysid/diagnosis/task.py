@@ -21,7 +21,7 @@ Progress = Callable[[str], None]
 
 # name and meaning of every stage that an ablation study may switch off
 STAGES = (
-    ("question of reach", "no search by likelihood where the model cannot follow the fish"),
+    ("can the model follow", "no search by likelihood where the model cannot follow the fish"),
     ("annealed screening", "candidates annealed from the nominal values where the base is far off"),
     ("nominal start", "candidates screened from the nominal values as well as from the base"),
     ("look-alike refits", "look-alikes of the best candidate refitted from its optimum"),

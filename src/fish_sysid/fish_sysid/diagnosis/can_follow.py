@@ -19,12 +19,12 @@ from fish_sysid.estimation.thresholds import CANNOT_FOLLOW
 FLOW = "current"  # the one effect of the pool that displaces a fish by more than the camera's noise in two seconds
 
 
-def out_of_reach(task: Task) -> float | None:
+def missed_by(task: Task) -> float | None:
     """By how many times the camera's noise the model misses two seconds of swimming; None where it can follow the fish.
 
     Start states, clocks, parameters and the effects of body, actuators and water are free, all at once.
     """
-    if not task.runs("question of reach"):
+    if not task.runs("can the model follow"):
         return None
     training, own = task.trials.training, known_effects(task.robot)
     effects = [name for name in (*INTRINSIC, FLOW) if name in task.robot.table and name not in own]
