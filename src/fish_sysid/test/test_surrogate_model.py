@@ -10,7 +10,7 @@ import pytest
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, shorten
 from fish_sysid.dataset.synthetic import program, record
-from fish_sysid.diagnosis.surrogate_model import surrogate_model
+from fish_sysid.diagnosis.surrogate_model import moving_effects, surrogate_model
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.parametrization import nominal_hypothesis
@@ -56,6 +56,13 @@ def test_what_helps_is_taken_and_unseen_trials_are_predicted(slipping: Experimen
     before = prediction_size(unseen, start.robot, start.noise)
     # nine errors: position, heading and speed at three horizons, each at most half as large
     assert prediction_size(unseen, found.robot, found.noise) < before - 9.0 * np.log(2.0)
+
+
+def test_what_the_robot_has_from_the_symmetries_is_no_candidate() -> None:
+    drifting = NOMINAL.with_effect("current", x=0.03, y=0.0)
+    names = ("current", "tip_slip", "camera_latency")
+    assert moving_effects(names, drifting) == ["tip_slip"]
+    assert moving_effects(names, NOMINAL) == ["current", "tip_slip"]
 
 
 def test_a_fit_that_predicts_better_stays(slipping: Experiment) -> None:

@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.marker_place import AHEAD, MARKER, ahead_of, at_centre_of_mass
 from fish_sysid.estimation.ekf_types import SensorModel
@@ -53,7 +54,7 @@ def surrogate_model(
     robot = nominal.hypothesis.robot.without_effect("disturbance")
     free = [name for name in nominal.hypothesis.free if "." not in name]
     sensors = nominal.hypothesis.parametrization.filter_inputs(nominal.theta)[2]
-    moving = [name for name in candidates if name in robot.table]  # a sensor moves no fish
+    moving = moving_effects(candidates, robot)
     seen = without_sensor_errors(experiment, sensors)
     found = fit_predictions(seen, robot, free, (), moving, report, together=INTRINSIC)
     fit = _as_fit(found, sensors, experiment)
@@ -63,6 +64,11 @@ def surrogate_model(
     if own >= other:
         return nominal, ()
     return fit, tuple(step for step in found.steps if step.added and step.name in moving)
+
+
+def moving_effects(candidates: Sequence[str], robot: Robot) -> list[str]:
+    """The candidates that move a fish, as no sensor does, and that the robot has not yet."""
+    return [name for name in candidates if name in robot.table and name not in robot.effects]
 
 
 def _as_fit(found: PredictionFit, before: SensorModel, experiment: Experiment) -> Fit:
