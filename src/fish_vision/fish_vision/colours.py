@@ -12,10 +12,8 @@ from fish_vision.config import TrackerConfig
 from fish_vision.segmentation import HUES, ColourRange
 
 MARKERS = ("front", "rear", "tail_odd", "tail_even")
-SHARE, FIRST_SHARE = (
-    0.05,
-    0.3,
-)  # of the way to what is seen, per picture that teaches, and of the first ones
+SHARE = 0.05  # of the way to what is seen, per picture that teaches
+FIRST_SHARE = 0.3  # at most, of the first pictures
 SMALL_SHIFT = 2  # half degrees, which a range bears
 DARKER = 0.5  # share of a marker's value at which its range begins: a hull that the light tints is much darker
 VALUE_LEAST = 40.0  # no range begins below

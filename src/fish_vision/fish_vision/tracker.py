@@ -22,9 +22,7 @@ Array = NDArray[Any]  # float64
 
 COARSE = 2  # the whole image is searched at every second pixel; what is found there is measured at full resolution
 PLACES = 4  # places of the whole image that are measured
-LEARN_EVERY = (
-    5  # detections of which one teaches the colours of today's light, once they have settled
-)
+LEARN_EVERY = 5  # detections, of which one teaches the light once colours have settled
 CAST_AFTER = 10  # images without the fish after which other lights are tried
 SAME = 0.05  # m, pairs so near to each other are measured together
 HEAD, TAIL = ("front", "rear"), ("tail_odd", "tail_even")
