@@ -4,6 +4,7 @@
 
 import argparse
 import csv
+import shutil
 import sys
 from pathlib import Path
 
@@ -74,6 +75,18 @@ def test_a_video_file_brings_its_own_rate(files: Path) -> None:
     found = rows(files)
     np.testing.assert_allclose([float(r["t"]) for r in found], np.arange(6) / 25)
     np.testing.assert_allclose([float(r["x"]) for r in found], [p[0] for p in POSES], atol=1e-3)
+
+
+def test_a_frozen_stretch_gives_no_poses_of_a_time_that_it_does_not_show(
+    files: Path, capsys
+) -> None:
+    pictures = sorted((files / "frames").iterdir())
+    for k in range(3):  # the third pose stays for three more frames
+        shutil.copy(pictures[3], files / "frames" / f"003_{k}.png")
+    assert run(files, "frames", "--rate", "20") == 0
+    times = [round(20 * float(r["t"])) for r in rows(files)]
+    assert times == [1, 2, 3, 7, 8, 9]
+    assert f"lost in 3: {track.REPEATED}" in capsys.readouterr().out
 
 
 def test_a_video_without_the_fish_ends_with_status_1(files: Path, capsys) -> None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fish_vision.tracker import Detection
 
 HEADER = ["t", "x", "y", "heading", "std_x", "std_y", "std_heading", "spacing"]
+REPEATED = "the same picture as the one before"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,17 +46,22 @@ def _track(args: argparse.Namespace) -> int:
     from fish_vision.config import TrackerConfig, config_from_file
     from fish_vision.follower import make_follower
     from fish_vision.lowpass import PoseLowPass
+    from fish_vision.picture import Repeats
     from fish_vision.tracker import Detection
     from fish_vision.video import frames
 
     config = config_from_file(args.params) if args.params else TrackerConfig()
     calibration = config.calibration(read_lens(args.lens))
     tracker, lost, spacings = make_follower(config, calibration), Counter[str](), []
+    repeats = Repeats()
     lowpass = PoseLowPass(config.lowpass_hz, config.reacquire_s)
     with args.out.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow([*HEADER, *(f"tail_{i + 1}" for i in range(config.tail_links))])
         for stamp, picture in frames(args.video, args.rate, calibration.lens.size):
+            if repeats.seen(picture.tobytes()):
+                lost[REPEATED] += 1
+                continue
             found = tracker.track(picture, stamp)
             if isinstance(found, Detection):
                 rows.writerow(_row(lowpass.filtered(found)))
