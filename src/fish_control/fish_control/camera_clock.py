@@ -12,7 +12,8 @@ other offset fits nearly as well. An image cannot be taken after it arrives: thi
 are apart.
 
 Where the time from stamp to arrival steps, a clock was set by as much, or the images come later with stamps as good as
-before. The headings tell the two apart within some poses; until then the offset is undecided.
+before. Stamps that go back by as much say that it was the clock, as images that come later are still in order. Else the
+headings tell the two apart within some poses; until then the offset is undecided.
 """
 
 from __future__ import annotations
@@ -24,12 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.imu_history import ImuHistory
-from fish_control.latency_watch import LatencyWatch
+from fish_control.latency_watch import LEAST_STEP, LatencyWatch
 from fish_control.offset_sums import (
     CLEAR,
     CLIP,
     CORRELATION,
     LAG,
+    LEAST_PAIRS,
     STEP,
     ClockEstimate,
     OffsetSums,
@@ -72,6 +74,7 @@ class CameraClock:
             ClockEstimate, ...
         ] = ()  # after a step: as before, moved with the clock
         self._stepped_at = 0.0  # s, stamp
+        self._last_stamp, self._back = -math.inf, 0.0  # s; by how much stamps went back
 
     @property
     def age(self) -> float:
@@ -82,7 +85,7 @@ class CameraClock:
     @property
     def undecided(self) -> bool:
         """Whether a clock may have been set: poses that show a moving fish wait until it is clear."""
-        return bool(self._rivals)
+        return bool(self._rivals) or self._back > LEAST_STEP
 
     def add(self, stamp: float, heading: float, imu: ImuHistory, now: float) -> None:
         """A pose with this stamp and heading arrives when the IMU's clock is at `now` [s].
@@ -91,8 +94,11 @@ class CameraClock:
         """
         usual = self._watch.usual
         stepped = self._watch.add(now - stamp)
+        back = max(self._back, self._last_stamp - stamp)
+        self._back = back if self._watch.strange else 0.0
+        self._last_stamp = stamp
         if stepped is not None and usual is not None:
-            self._step(stamp, stepped, usual)
+            self._step(stamp, stepped, usual, back)
         elif self._grid is None and self._watch.usual is not None:
             self._place_grid(self._watch.usual)
         self._waiting.append((now, stamp, heading))
@@ -116,11 +122,12 @@ class CameraClock:
         self._newest = stamp
         self._decide(stamp)
 
-    def _step(self, stamp: float, latency: float, usual: float) -> None:
-        """The latency has changed from `usual` [s]."""
+    def _step(self, stamp: float, latency: float, usual: float, back: float) -> None:
+        """The latency has changed from `usual` [s], and stamps went back by `back` [s] meanwhile."""
         held = self._rivals[0] if self._rivals else self.current
         moved = ClockEstimate(held.offset + latency - usual, STEP_STD, False)
-        images_late = -AHEAD <= latency - held.offset <= OLDEST
+        in_order = back < 0.5 * abs(latency - usual)
+        images_late = in_order and -AHEAD <= latency - held.offset <= OLDEST
         self._prior = held if images_late else moved
         self._place_grid(latency)
         self._rivals, self._stepped_at = (held, moved), stamp
@@ -187,8 +194,14 @@ class CameraClock:
             self._weigh_prior()
 
     def _weigh_prior(self) -> None:
-        """Where the data contradict what was known beforehand, take the nearest offset that they allow."""
+        """Where the data contradict what was known beforehand, take the nearest offset that they allow.
+
+        Of a few pairs the best offset fits too well to contradict any other.
+        """
         assert self._grid is not None
+        if self._long.pairs < LEAST_PAIRS:
+            self.current = self._prior
+            return
         likelihood = self._long.log_likelihood()
         near = np.abs(self._grid - self._prior.offset) <= max(2.0 * self._prior.std, STEP)
         self.contradicted = bool(not near.any() or likelihood[near].max() < -CLEAR)

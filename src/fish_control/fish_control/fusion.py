@@ -202,11 +202,11 @@ class Fusion:
         """Start with a pose, or fuse it; False if it was not used."""
         if self._timeline is None:
             return self._start(raw)
-        if self.camera_clock.undecided and math.hypot(*self._timeline.last.x[3:5]) > SWIMS:
-            return self._refuse("pose_clock_undecided")
         time, newest = raw.stamp + self._applied, max(self._last_imu_time, self._timeline.last.time)
         if time <= max(self._timeline.first.time, newest - self.config.history):
             return self._refuse("pose_too_late")
+        if self.camera_clock.undecided and math.hypot(*self._timeline.last.x[3:5]) > SWIMS:
+            return self._refuse("pose_clock_undecided")
         return self._fuse(raw, time, imu_lives)
 
     def _fuse_waiting(self, until: float, imu_lives: bool) -> None:

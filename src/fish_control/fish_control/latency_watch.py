@@ -26,6 +26,11 @@ class LatencyWatch:
         """Median of the last latencies [s]; None before there are enough."""
         return median(self._usual) if len(self._usual) >= FIRST or self._strange else None
 
+    @property
+    def strange(self) -> bool:
+        """Whether the last latency was not the usual one."""
+        return bool(self._strange)
+
     def add(self, latency: float) -> float | None:
         """One more; the new usual latency [s] where it has changed, otherwise None."""
         usual = self.usual

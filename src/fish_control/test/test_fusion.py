@@ -462,15 +462,18 @@ def errors_of_swum(fusion, events, clock_set=0.0, since=6.0):
     return np.transpose(rows)
 
 
-@pytest.mark.parametrize("jump", [-0.3, -0.22, 0.15, 0.22, -1.0])
+@pytest.mark.parametrize("jump", [-1.0037, -0.3, -0.2237, 0.15, 0.22])
 def test_a_camera_s_clock_that_is_set_a_little_is_followed(jump):
-    """The images seem to come later or earlier by as much, as they do where only their transport takes longer."""
+    """The images seem to come later or earlier by as much, as they do where only their transport takes longer.
+
+    Stamps that go back tell the two apart at once.
+    """
     fusion, events = Fusion(), swum(10.0)
     moved = [(a, k, s + jump * (k == "camera" and a > 6.0), v) for a, k, s, v in events]
     distances, _ = errors_of_swum(fusion, moved)
     assert fusion.camera_clock.jumps == 1
     assert fusion.applied_offset == pytest.approx(-jump, abs=0.01)
-    assert distances.max() < 0.3  # until it is noticed
+    assert distances.max() < (0.02 if jump < 0.0 else 0.3)  # until it is noticed
     assert distances[-150:].max() < 0.02
     assert not fusion.estimate().camera_lost
 
