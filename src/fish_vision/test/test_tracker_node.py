@@ -25,6 +25,7 @@ from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from fish_node import rivals
 from fish_vision.config import config_from_file
 from fish_vision.nodes.tracker import TrackerNode
 from fish_vision.picture import to_jpeg
@@ -185,6 +186,15 @@ def test_an_image_without_the_fish_is_said_to_who_waits_for_its_pose(bench: Benc
     bench.send_jpeg(to_jpeg(PICTURE))
     assert bench.spin_until(lambda: bench.got["pose"])
     assert len(bench.got["lockstep"]) == 1
+
+
+def test_a_second_tracker_of_the_same_topic_is_warned_of(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rivals, "PATIENCE_S", 0.0)
+    bench.peer.create_publisher(PoseWithCovarianceStamped, "camera/pose", 10)
+    assert bench.says("another publisher of /fish/camera/pose: stop one of the two")
+    assert bench.got["diagnostics"][-1].status[0].level == DiagnosticStatus.WARN
 
 
 @pytest.mark.parametrize("bench", [{"use_raw": True}], indirect=True)

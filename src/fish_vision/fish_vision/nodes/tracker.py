@@ -34,6 +34,7 @@ from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.static_frames import publish_static_frame
 from fish_node.nodes.status_log import StatusLog
+from fish_node.rivals import Rivals
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, CalibrationError, Lens
 from fish_vision.choice import Reason
@@ -89,6 +90,9 @@ class TrackerNode(Node):
         self._lockstep = self.create_publisher(Header, "lockstep", QUEUE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self._log = StatusLog(self.get_logger())
+        self._rivals = Rivals(
+            self._pose.topic_name, self.count_publishers, self.get_logger().warning
+        )
         self.create_subscription(
             CameraInfo, "camera/camera_info", self._on_info, qos_profile_sensor_data
         )
@@ -174,6 +178,8 @@ class TrackerNode(Node):
         """Diagnostics, once a second."""
         level, message = self._state()
         self._log.say(level, message)
+        if warning := self._rivals.warning():
+            level, message = max(level, DiagnosticStatus.WARN), f"{message}; {warning}"
         status = DiagnosticStatus(
             name=self.get_fully_qualified_name().lstrip("/"), level=level, message=message
         )
