@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from made_fits import made_fit
 
+from fish_sim.effects import EFFECTS
 from fish_sysid.diagnosis.corrected_model import much_is_left, named, unexplained_share, verdict
 from fish_sysid.diagnosis.diagnosis_json import law, mean_interval, whiteness
 from fish_sysid.diagnosis.next_experiment import next_experiment
-from fish_sysid.diagnosis.prediction_evidence import prediction_entries
+from fish_sysid.diagnosis.prediction_evidence import prediction_effects, prediction_entries
+from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.residual_regression import Law
 from fish_sysid.diagnosis.significance import Level
 from fish_sysid.estimation.shooting.left_out import Step
@@ -25,7 +27,9 @@ def found(names=(), nominal=1.0, final=1.0, left=NO_LAW):
     before, after = made_fit(0.0, ratio=nominal), made_fit(0.0, ratio=final)
     task = SimpleNamespace(level=Level(), robot=before.robot)
     state = SimpleNamespace(law=left)
-    return SimpleNamespace(task=task, state=state, nominal=before, final=after, accepted=accepted)
+    return SimpleNamespace(
+        task=task, state=state, nominal=before, final=after, accepted=accepted, still_misses=None
+    )
 
 
 @pytest.mark.parametrize(
@@ -117,14 +121,66 @@ def test_a_gyro_that_reads_too_much_shows_in_circles():
     assert turns == {0.5, -0.5}
 
 
-def test_what_predictions_ask_for_stands_beside_the_verdict():
-    surrogate = made_fit(0.0, "tip_slip")
-    step = Step("tip_slip", np.log(2.5), 0.16, 2.3, added=True)
-    d = SimpleNamespace(task=found().task, surrogate=surrogate, predicted=(step,))
+SLIP = Named(Step("tip_slip", np.log(2.5), 0.16, 2.3, 1e-3, added=True), {})
+GAIN = Named(
+    Step("rudder_gain", np.log(1.25), 0.05, 2.3, 0.01, added=True),
+    {"rudder_placement": {"tip_share": 0.4}},
+)
+
+
+def far(*asked, misses: float | None = 3.8, still_misses: float | None = None):
+    """A diagnosis of a fish that the model cannot follow, with these effects by prediction, at strengths that are some."""
+    effects = [named.step.name for named in asked]
+    surrogate = made_fit(0.0, *effects, theta=np.full(len(made_fit(0.0, *effects).theta), 0.5))
+    d = found(nominal=100.0, final=100.0)
+    d.surrogate, d.predicted, d.misses, d.still_misses = surrogate, asked, misses, still_misses
+    return d
+
+
+def test_where_the_likelihood_was_asked_what_predictions_ask_for_is_no_effect():
+    d = far(SLIP, misses=None)
     (entry,) = prediction_entries(d)
     assert entry["name"] == "tip_slip"
     assert entry["kind"] == "physics"
     assert entry["evidence"]["basis"] == "prediction"
     assert entry["evidence"]["cost_ratio"] == pytest.approx(0.4)
     assert entry["parameters"]["mobility"]["unit"] == "m/(N s)"
-    assert prediction_entries(SimpleNamespace(surrogate=None, predicted=())) == []
+    assert prediction_effects(d) == []
+    nothing = SimpleNamespace(surrogate=None, predicted=(), misses=None)
+    assert prediction_entries(nothing) == prediction_effects(nothing) == []
+
+
+def test_where_it_cannot_be_asked_predictions_name_effects_and_what_ties_with_them():
+    d = far(SLIP, GAIN)
+    slip, gain = prediction_effects(d)
+    assert prediction_entries(d) == []  # each stands in one place
+    assert slip["equation"] == EFFECTS["tip_slip"].equation
+    assert slip["evidence"]["probability"] == pytest.approx(0.999)
+    assert slip["family"] == {"name": "", "members": []}
+    assert slip["share"] + gain["share"] == pytest.approx(1.0)
+    assert gain["kind"] == "actuator"
+    assert gain["evidence"]["probability"] == pytest.approx(0.99 / 2)
+    assert [rival["name"] for rival in gain["rivals"]] == ["rudder_placement"]
+    assert gain["family"]["name"] == "rudder timing"
+    assert gain["family"]["members"][1]["parameters"]["tip_share"]["value"] == 0.4
+
+
+@pytest.mark.parametrize(
+    ("asked", "still_misses", "expected"),
+    [
+        ((SLIP, GAIN), 1.3, "missing_physics"),
+        ((GAIN,), 1.3, "sensor_or_actuator"),
+        ((SLIP,), 3.5, "unexplained"),  # the names stand, and much is left without one
+        ((), None, "unexplained"),
+    ],
+)
+def test_names_by_prediction_are_the_verdict_where_the_model_follows_with_them(
+    asked, still_misses, expected
+):
+    assert verdict(far(*asked, still_misses=still_misses)) == expected
+
+
+def test_a_name_by_prediction_in_a_limit_does_not_stand():
+    d = far(SLIP)
+    d.surrogate = made_fit(0.0, "tip_slip")  # no slip at all
+    assert prediction_effects(d) == []

@@ -91,8 +91,34 @@ def test_what_predictions_ask_for_is_said_beside_the_verdict():
     }
     left = {"description": "a strong force", "nearest": [], "by_prediction": [slip]}
     said = sentence({**content(), "verdict": "unexplained", "unexplained": left})
-    assert said.startswith("unexplained: a strong force. Predictions of trials left out get better")
+    assert said.startswith(
+        "unexplained: a strong force. Predictions of trials left out ask for tip_slip"
+    )
     assert "tip_slip (mobility 0.3 ± 0.04 m/(N s); cost x 0.40)" in said
+
+
+def test_what_predictions_name_is_said_with_what_ties_and_that_more_is_left():
+    gain = {
+        "name": "rudder_gain",
+        "equation": "delta = k * command",
+        "parameters": {"gain": {"value": 0.7, "std": 0.02, "unit": ""}},
+        "evidence": {
+            "basis": "prediction",
+            "cost_ratio": 0.8,
+            "p_value": 0.004,
+            "probability": 0.5,
+        },
+        "rivals": [{"name": "rudder_placement", "probability": 0.5}],
+        "where": {"dof": {}},
+    }
+    left = {"description": "a strong force", "nearest": [], "by_prediction": []}
+    said = sentence({**content(gain), "verdict": "unexplained", "unexplained": left})
+    assert said.startswith("unexplained: a strong force. Predictions of trials left out ask for ")
+    assert "rudder_gain (gain 0.7 ± 0.02 ; cost x 0.80; or rudder_placement)" in said
+    assert "what is left after them has no name." in said
+    note = _found(gain).note
+    assert "trials left out cost 0.80 times as much" in note
+    assert "Could be mistaken for: rudder_placement" in note
 
 
 def nothing_found(tried, **options) -> str:

@@ -44,10 +44,12 @@ def nominal(experiment: Experiment) -> Fit:
 def test_what_helps_is_taken_and_unseen_trials_are_predicted(slipping: Experiment) -> None:
     """A sensor's error moves no fish, and is not tried."""
     start = nominal(slipping)
-    names = ("camera_scale", "tip_slip")
-    found, steps = surrogate_model(start, names, slipping, lambda _: None)
-    assert [step.name for step in steps] == ["tip_slip"]
-    assert steps[0].gain > 2.0 * steps[0].deviation
+    names = ("camera_scale", "tip_slip", "tail_joint_damping")
+    found, (asked,) = surrogate_model(start, names, slipping, lambda _: None)
+    assert asked.step.name == "tip_slip"
+    assert asked.step.gain > 2.0 * asked.step.deviation
+    assert asked.step.p_value < 0.05
+    assert not asked.rivals  # damped joints do not do as well in its place
     assert "tip_slip" in found.hypothesis.names
     assert "camera_scale" not in found.hypothesis.names
     assert found.values["tip_slip.mobility"] == pytest.approx(0.3, rel=0.15)
@@ -68,8 +70,8 @@ def test_what_the_robot_has_from_the_symmetries_is_no_candidate() -> None:
 def test_a_fit_that_predicts_better_stays(slipping: Experiment) -> None:
     hypothesis = nominal_hypothesis(SLIPPING, FREE)
     true = evaluate(hypothesis, np.zeros(len(FREE)), slipping, WATER)
-    found, steps = surrogate_model(true, (), slipping, lambda _: None)
-    assert not steps
+    found, asked = surrogate_model(true, (), slipping, lambda _: None)
+    assert not asked
     sizes = [prediction_size(slipping, fit.robot, fit.noise) for fit in (found, true)]
     assert sizes[0] <= sizes[1]
     assert found.values["head_drag_surge"] == pytest.approx(0.26, rel=0.1)

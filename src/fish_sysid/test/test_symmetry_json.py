@@ -33,7 +33,12 @@ BLIND = SymmetryFinding(
 def by_search(name: str) -> dict:
     return {
         "name": name,
-        "evidence": {"log_likelihood_gain": 90.0, "p_value": 0.0, "probability": 0.97},
+        "evidence": {
+            "basis": "likelihood",
+            "log_likelihood_gain": 90.0,
+            "p_value": 0.0,
+            "probability": 0.97,
+        },
         "parameters": {"x": {"value": 0.028, "std": 0.001, "unit": "m/s"}},
         "rivals": [],
     }

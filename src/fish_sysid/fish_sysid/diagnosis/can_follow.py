@@ -8,6 +8,9 @@ none. Symmetry tests need no model, and predictions of trials left out judge a w
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from fish_sim.robot import Robot
 from fish_sysid.diagnosis.known_effects import known_effects
 from fish_sysid.diagnosis.task import Task
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
@@ -26,7 +29,15 @@ def missed_by(task: Task) -> float | None:
     """
     if not task.runs("can the model follow"):
         return None
-    training, own = task.trials.training, known_effects(task.robot)
+    own = known_effects(task.robot)
     effects = [name for name in (*INTRINSIC, FLOW) if name in task.robot.table and name not in own]
-    left = misfit(training, task.robot, usual_noise(training), NOMINAL_FREE, effects=effects)
+    left = missed_with(effects, task.robot, task)
     return left if left > CANNOT_FOLLOW else None
+
+
+def missed_with(effects: Iterable[str], robot: Robot, task: Task) -> float:
+    """The same of a robot that has these effects free, and no other but its own."""
+    training, names = task.trials.training, tuple(effects)
+    for name in names:
+        robot = robot.without_effect(name)
+    return misfit(training, robot, usual_noise(training), NOMINAL_FREE, effects=names)

@@ -13,6 +13,7 @@ from fish_report.parallel import on_all_cores
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.backward_elimination import without
+from fish_sysid.diagnosis.can_follow import missed_with
 from fish_sysid.diagnosis.corrected_model import much_is_left, named
 from fish_sysid.diagnosis.effect_wrench import effect_wrench, pushes
 from fish_sysid.diagnosis.latent_force import MissingForce, missing_force
@@ -48,8 +49,18 @@ def conclude(state: State, settled: Fit | None, task: Task) -> Diagnosis:
     helpful = dict.fromkeys((*names, *(name for name in STRUCTURAL if name in task.names)))
     if task.runs("surrogate's own choice"):
         helpful |= dict.fromkeys(task.names)
-    model, steps = surrogate_model(settled or nominal, tuple(helpful), training, task.progress)
-    return replace(found, surrogate=model, predicted=steps)
+    model, asked = surrogate_model(settled or nominal, tuple(helpful), training, task.progress)
+    return replace(found, surrogate=model, predicted=asked)
+
+
+def by_predictions(d: Diagnosis) -> Diagnosis:
+    """Where the likelihood names nothing: whether the model follows the fish with what predictions ask for."""
+    if d.misses is None or d.surrogate is None or not d.predicted:
+        return d
+    d.task.progress("can the model follow the fish with these effects?")
+    robot = d.surrogate.robot.without_effect("disturbance")
+    left = missed_with([asked.step.name for asked in d.predicted], robot, d.task)
+    return replace(d, still_misses=left)
 
 
 def shares(

@@ -7,12 +7,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.degenerate import degenerate
+from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.thresholds import MOST_UNEXPLAINED, RATIO_REJECT
+from fish_sysid.estimation.thresholds import CANNOT_FOLLOW, MOST_UNEXPLAINED, RATIO_REJECT
 from fish_sysid.prediction.prediction import EVERY, WARM_UP, predict, prediction_errors
 
 Array = NDArray[np.float64]
@@ -22,11 +24,16 @@ WORSE = 1.05  # times the refitted nominal model's error; two models as good dif
 
 
 def verdict(d: Diagnosis) -> str:
-    """no_mismatch, missing_physics, sensor_or_actuator or unexplained."""
-    found = named(d)
-    if not found:
+    """no_mismatch, missing_physics, sensor_or_actuator or unexplained.
+
+    Where the likelihood cannot be asked, names by prediction decide if the model follows the fish with them.
+    """
+    names = [a.name for a in named(d)]
+    if d.still_misses is not None and d.still_misses <= CANNOT_FOLLOW:
+        names = [asked.step.name for asked in asked_by_predictions(d)]
+    if not names:
         return "unexplained" if much_is_left(d) or refused(d) else "no_mismatch"
-    kinds = {kind_of(a.name, d.task.robot.table) for a in found}
+    kinds = {kind_of(name, d.task.robot.table) for name in names}
     return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
 
 
@@ -42,6 +49,13 @@ def named(d: Diagnosis) -> tuple[Accepted, ...]:
     return tuple(a for a in d.accepted if not limit_of(d, a.name))
 
 
+def asked_by_predictions(d: Diagnosis) -> tuple[Named, ...]:
+    """Names that stand by predictions of trials left out: only where the likelihood cannot be asked, and in no limit."""
+    if d.misses is None or d.surrogate is None:
+        return ()
+    return tuple(a for a in d.predicted if not limit_in(d.surrogate, a.step.name, d.task.robot))
+
+
 def refused(d: Diagnosis) -> list[str]:
     """What the accepted effects are that lie in a limit where they are another effect or none."""
     return [text for a in d.accepted if (text := limit_of(d, a.name))]
@@ -49,9 +63,14 @@ def refused(d: Diagnosis) -> list[str]:
 
 def limit_of(d: Diagnosis, name: str) -> str:
     """Why the values of an effect in the final model are not this effect; "" where they are."""
+    return limit_in(d.final, name, d.task.robot)
+
+
+def limit_in(fit: Fit, name: str, robot: Robot) -> str:
+    """The same of an effect in a fit."""
     first = f"{name}."
-    values = {k.removeprefix(first): v for k, v in d.final.values.items() if k.startswith(first)}
-    return degenerate(name, values, d.task.robot.table)
+    values = {k.removeprefix(first): v for k, v in fit.values.items() if k.startswith(first)}
+    return degenerate(name, values, robot.table)
 
 
 def unexplained_share(d: Diagnosis) -> float:

@@ -24,7 +24,7 @@ from fish_sysid.diagnosis.effect_parameters import effect_parameters
 from fish_sysid.diagnosis.effect_wrench import intervals, regimes
 from fish_sysid.diagnosis.families import family_of, separating
 from fish_sysid.diagnosis.next_experiment import next_experiment
-from fish_sysid.diagnosis.prediction_evidence import prediction_entries
+from fish_sysid.diagnosis.prediction_evidence import prediction_effects, prediction_entries
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, Round
 from fish_sysid.diagnosis.significance import p_value, p_value_unseen, probabilities
 from fish_sysid.diagnosis.symmetry.symmetry_json import symmetry_entry, with_symmetry
@@ -46,13 +46,12 @@ STRONG = "a force {:.0f}, {:.0f} and {:.0f} times as dense as usual water in sur
 def answer(d: Diagnosis) -> dict[str, Any]:
     """The dictionary written to diagnosis.json."""
     unexplained = unexplained_entry(d)
-    stated = [[a.name, *rivals_of(d, a)] for a in named(d)]
+    effects = [*(effect_entry(d, a) for a in named(d)), *prediction_effects(d)]
+    stated = [[e["name"], *(rival["name"] for rival in e["rivals"])] for e in effects]
     grows_with = next((c["name"] for c in unexplained["where"].get("covariates", [])), None)
     return {
         "verdict": verdict(d),
-        "effects": with_symmetry(
-            [effect_entry(d, a) for a in named(d)], d.symmetry, d.task.robot.table
-        ),
+        "effects": with_symmetry(effects, d.symmetry, d.task.robot.table),
         "symmetry": symmetry_entry(d.symmetry),
         "unexplained": unexplained,
         "fit": fit_entry(d),
@@ -100,6 +99,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         "equation": effect.equation,
         "parameters": effect_parameters(d.final, name),
         "evidence": {
+            "basis": "likelihood",
             "log_likelihood_gain": gains[name],
             "p_value": sure,
             "probability": probability[name],

@@ -16,7 +16,7 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.backward_elimination import eliminate
 from fish_sysid.diagnosis.can_follow import missed_by
-from fish_sysid.diagnosis.conclusion import conclude
+from fish_sysid.diagnosis.conclusion import by_predictions, conclude
 from fish_sysid.diagnosis.forward_selection import Selection, select_effects
 from fish_sysid.diagnosis.known_effects import start_hypothesis
 from fish_sysid.diagnosis.law_or_name import name_for_law
@@ -59,7 +59,8 @@ def diagnose(
     nominal = fit_nominal(task)
     state = searched(nominal, task) if misses is None else unsearched(nominal, task)
     settled = with_symmetry_found(state, symmetry, task)
-    return replace(conclude(state, settled, task), symmetry=symmetry, misses=misses)
+    found = replace(conclude(state, settled, task), symmetry=symmetry, misses=misses)
+    return by_predictions(found)
 
 
 def searched(nominal: Fit, task: Task) -> State:

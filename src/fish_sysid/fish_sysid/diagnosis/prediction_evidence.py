@@ -1,6 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Effects that predictions of trials left out ask for, where the likelihood gives no name."""
+"""Effects that predictions of trials left out ask for, where the likelihood gives no name.
+
+Where the likelihood cannot be asked they are effects of the answer. Where it was asked and gave no name, they are stated under
+`unexplained`: what helps predictions may stand in the place of something else that the model lacks.
+"""
 
 from __future__ import annotations
 
@@ -8,30 +12,85 @@ from typing import Any
 
 import numpy as np
 
+from fish_sysid.diagnosis.corrected_model import asked_by_predictions
 from fish_sysid.diagnosis.effect_parameters import effect_parameters
+from fish_sysid.diagnosis.families import family_of
+from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.result import Diagnosis
 from fish_sysid.diagnosis.vocabulary import kind_of
+from fish_sysid.estimation.parametrization import effect_class
+
+Entry = dict[str, Any]
+NOT_A_NUMBER = float("nan")
 
 
-def prediction_entries(d: Diagnosis) -> list[dict[str, Any]]:
-    """The effects of the surrogate model with their evidence, `basis` "prediction"; none without such a model.
+def prediction_entries(d: Diagnosis) -> list[Entry]:
+    """The effects of the surrogate model with their evidence, `basis` "prediction"; none where they are in `effects`.
 
     cost_ratio: cost of predicting trials left out with the effect over that of the control without it.
     """
-    surrogate = d.surrogate
-    if surrogate is None:
+    if d.surrogate is None or d.misses is not None:
         return []
-    return [
-        {
-            "name": step.name,
-            "kind": kind_of(step.name, d.task.robot.table),
-            "parameters": effect_parameters(surrogate, step.name),
-            "evidence": {
-                "basis": "prediction",
-                "cost_ratio": float(np.exp(-step.gain)),
-                "log_gain": step.gain,
-                "log_gain_std": step.deviation,
-            },
-        }
-        for step in d.predicted
+    return [_entry(d, asked) for asked in d.predicted]
+
+
+def prediction_effects(d: Diagnosis) -> list[Entry]:
+    """The effects by prediction as entries of `effects`.
+
+    probability: 1 - p_value, shared equally with the members of the family that do as well.
+    """
+    found = asked_by_predictions(d)
+    total = sum(asked.step.gain for asked in found)
+    return [_effect(d, asked, asked.step.gain / total) for asked in found]
+
+
+def _entry(d: Diagnosis, asked: Named) -> Entry:
+    assert d.surrogate is not None
+    step = asked.step
+    return {
+        "name": step.name,
+        "kind": kind_of(step.name, d.task.robot.table),
+        "parameters": effect_parameters(d.surrogate, step.name),
+        "evidence": {
+            "basis": "prediction",
+            "cost_ratio": float(np.exp(-step.gain)),
+            "log_gain": step.gain,
+            "log_gain_std": step.deviation,
+            "p_value": step.p_value,
+        },
+    }
+
+
+def _effect(d: Diagnosis, asked: Named, share: float) -> Entry:
+    """Fields of one entry of `effects`; what only a search by likelihood knows is absent."""
+    entry, table = _entry(d, asked), d.task.robot.table
+    name, own = asked.step.name, entry["parameters"]
+    probability = (1.0 - asked.step.p_value) / (1 + len(asked.rivals))
+    entry["evidence"] |= {"log_likelihood_gain": NOT_A_NUMBER, "probability": probability}
+    members = [
+        (name, own),
+        *((rival, _values(rival, table, v)) for rival, v in asked.rivals.items()),
     ]
+    family = [
+        {"name": member, "probability": probability, "parameters": parameters}
+        for member, parameters in members
+    ]
+    return {
+        **entry,
+        "equation": effect_class(name, table).equation,
+        "share": share,
+        "rivals": [{"name": rival, "probability": probability} for rival in asked.rivals],
+        "family": {"name": family_of(name), "members": family}
+        if asked.rivals
+        else {"name": "", "members": []},
+        "where": {"dof": {}, "covariates": [], "time": [], "place": []},
+    }
+
+
+def _values(name: str, table: Any, values: dict[str, float]) -> Entry:
+    """Parameters of a rival, whose standard errors nobody worked out."""
+    units = {key: p.unit for key, p in effect_class(name, table).parameters.items()}
+    return {
+        key: {"value": value, "std": NOT_A_NUMBER, "unit": units[key]}
+        for key, value in values.items()
+    }

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.significance import evidence
 from fish_sysid.estimation.ekf_types import Array, Noise
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.shooting.left_out import Step
 
 if TYPE_CHECKING:
     from fish_sysid.diagnosis.latent_force import MissingForce
@@ -88,10 +88,11 @@ class Diagnosis:
     given_noise: Noise  # for the robot as given, whose filter would diverge at the refitted noise
     held_out: dict[str, np.ndarray]  # log density per sample and trial: given, nominal, final
     surrogate: Fit | None = None  # where no name fits: the model that predicts best
-    predicted: tuple[Step, ...] = ()  # effects of the surrogate, by trials left out
+    predicted: tuple[Named, ...] = ()  # effects of the surrogate, by trials left out
     symmetry: tuple[SymmetryFinding, ...] = ()  # every test's answer, without a model of the fish
     settled: Fit | None = None  # the nominal model refitted with what the symmetry tests find
     misses: float | None = None  # times the camera's noise, where the model cannot follow the fish
+    still_misses: float | None = None  # the same with the names that predictions ask for
 
     @property
     def nominal(self) -> Fit:

@@ -4,9 +4,8 @@
 
 The likelihood misleads a model that lacks something without a name: its parameters go where the next 50 ms are right. Here the
 robot is fitted to predictions (`estimation.shooting`), from the values that were given, and gets the effects that trials left out
-ask for. It serves simulation and training. What an effect does to predictions of trials left out is stated beside the verdict
-(`basis` "prediction"); the verdict itself stays `unexplained`, because such a fit can put one thing that it lacks in the place
-of another. Where the nominal fit predicts the training trials better, that is taken.
+ask for. It serves simulation and training. What its effects do to predictions of trials left out is evidence of its own (`basis`
+"prediction", `prediction_evidence`). Where the nominal fit predicts the training trials better, that is taken.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.marker_place import AHEAD, MARKER, ahead_of, at_centre_of_mass
+from fish_sysid.diagnosis.prediction_rivals import Named, with_rivals
 from fish_sysid.estimation.ekf_types import SensorModel
 from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.elimination import INTRINSIC
-from fish_sysid.estimation.shooting.left_out import Step
 from fish_sysid.estimation.shooting.prediction_fit import PLACE, PredictionFit, fit_predictions
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
 from fish_sysid.estimation.shooting.start_states import without_sensor_errors
@@ -42,8 +41,8 @@ def surrogate_model(
     candidates: Sequence[str],
     experiment: Experiment,
     report: Callable[[str], None],
-) -> tuple[Fit, tuple[Step, ...]]:
-    """(the model that predicts best, the effects in it with what each does to predictions of trials left out).
+) -> tuple[Fit, tuple[Named, ...]]:
+    """(the model that predicts best, the effects in it with what each does to predictions of trials left out, and its rivals).
 
     nominal: the fit without effects but those that symmetry tests find: late images are moved back before anything is fitted;
     candidates: effects that may help. The nominal fit itself where no trial is long enough to predict.
@@ -63,7 +62,8 @@ def surrogate_model(
     )
     if own >= other:
         return nominal, ()
-    return fit, tuple(step for step in found.steps if step.added and step.name in moving)
+    report("members of a family in each other's place")
+    return fit, with_rivals(seen, found.found, [s for s in found.steps if s.name in moving])
 
 
 def moving_effects(candidates: Sequence[str], robot: Robot) -> list[str]:

@@ -32,7 +32,7 @@ from fish_sysid.reports.diagnosis_figures import (
     when_it_acts,
 )
 from fish_sysid.reports.symmetry_table import symmetry_table
-from fish_sysid.reports.verdict_sentence import by_symmetry, sentence
+from fish_sysid.reports.verdict_sentence import by_prediction, by_symmetry, sentence
 
 Content = dict[str, Any]
 
@@ -97,6 +97,12 @@ def _found(effect: Content) -> Table:
         f"{effect['equation']}. {_explains(effect['where']['dof'])} "
         f"Could be mistaken for: {rivals or 'nothing else that was tried'}."
     )
+    if by_prediction(effect):
+        evidence = effect["evidence"]
+        note = (
+            f"{effect['equation']}. By predictions: with it trials left out cost {evidence['cost_ratio']:.2f} times as much as "
+            f"without (p {evidence['p_value']:.2g}). Could be mistaken for: {rivals or 'none of its family that was judged'}."
+        )
     if by_symmetry(effect):
         note = f"{effect['equation']}. By a symmetry test, without a model of the fish."
     return Table(

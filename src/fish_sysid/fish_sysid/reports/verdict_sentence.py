@@ -39,9 +39,14 @@ def by_symmetry(effect: Content) -> bool:
     return bool(effect["evidence"].get("basis") == "symmetry")
 
 
+def by_prediction(effect: Content) -> bool:
+    """Whether predictions of trials left out ask for an effect."""
+    return bool(effect["evidence"].get("basis") == "prediction")
+
+
 def _verdict(content: Content) -> str:
     found = [e for e in content["effects"] if not by_symmetry(e)]
-    if found:
+    if content["verdict"] != "unexplained" and found:
         return f"{content['verdict']}: the model lacks {' and '.join(_effect(e) for e in found)}."
     if content["verdict"] == "unexplained":
         nearest = ", ".join(content["unexplained"]["nearest"])
@@ -54,16 +59,20 @@ def _verdict(content: Content) -> str:
 
 def _by_prediction(content: Content) -> str:
     """What predictions of trials left out ask for; "" where nothing was judged by them."""
-    entries = content["unexplained"].get("by_prediction", [])
-    texts = [
-        f"{e['name']} ({_parameters(e)}; cost x {e['evidence']['cost_ratio']:.2f})" for e in entries
-    ]
-    if not texts:
+    named = [e for e in content["effects"] if by_prediction(e)]
+    entries = named or content["unexplained"].get("by_prediction", [])
+    if not entries:
         return ""
-    return (
-        f" Predictions of trials left out get better with {' and '.join(texts)}; something else that the model lacks may stand "
-        "behind that."
-    )
+    said = f" Predictions of trials left out ask for {' and '.join(_asked(e) for e in entries)}"
+    if named:
+        return f"{said}; what is left after them has no name."
+    return f"{said}; something else that the model lacks may stand behind that."
+
+
+def _asked(effect: Content) -> str:
+    rivals = "".join(f"; or {r['name']}" for r in effect.get("rivals", ()))
+    cost = f"cost x {effect['evidence']['cost_ratio']:.2f}"
+    return f"{effect['name']} ({_parameters(effect)}; {cost}{rivals})"
 
 
 def _nothing_found(tried: list[str]) -> str:

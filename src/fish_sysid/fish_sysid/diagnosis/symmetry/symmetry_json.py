@@ -53,11 +53,9 @@ def with_symmetry(
 ) -> list[Entry]:
     """The effects of the search with the symmetry's numbers beside, and those that only the symmetry finds.
 
-    Entries of the search keep their numbers and `basis` "likelihood".
+    Other entries keep their numbers.
     """
-    entries = [
-        {**entry, "evidence": {**entry["evidence"], "basis": "likelihood"}} for entry in effects
-    ]
+    entries = [{**entry, "evidence": {**entry["evidence"]}} for entry in effects]
     for finding in stated(findings):
         names = (finding.name, CONTAINED_IN.get(finding.name))
         same = [entry for entry in entries if entry["name"] in names]

@@ -36,6 +36,7 @@ class Step:
     gain: float  # mean over trials of the logarithm of the cost without it over that with it
     deviation: float  # its standard error over trials
     asked: float  # standard errors that it must gain
+    p_value: float = float("nan")  # of the best of so many gains by chance
     added: bool = False
     alike: tuple[str, ...] = ()  # of its family, that gain as much within a standard error
 
@@ -96,4 +97,8 @@ def judged(name: str, control: Array, costs: Array, looked_at: int = 1) -> Step:
     ratio = ratio[np.isfinite(ratio)]
     deviation = float(np.std(ratio, ddof=1) / np.sqrt(len(ratio))) if len(ratio) > 1 else np.inf
     gain = float(ratio.mean()) if len(ratio) else 0.0
-    return Step(name, gain, deviation, standard_errors_asked(len(ratio), looked_at))
+    chance = (
+        t.sf(gain / deviation, max(len(ratio) - 1, 1)) if deviation > 0.0 else float(gain <= 0.0)
+    )
+    p_value = min(1.0, looked_at * float(chance))
+    return Step(name, gain, deviation, standard_errors_asked(len(ratio), looked_at), p_value)

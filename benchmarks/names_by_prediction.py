@@ -1,0 +1,66 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether what predictions name is what was put in, on recordings of a fish that no model can follow.
+
+    python benchmarks/names_by_prediction.py RECORDINGS [--only NAME ...] [--out DIR]
+
+The recordings are diagnosed as they are, then with one exact change at a time: a rudder that goes less or farther, whose zero is
+off or that is late, and water that moves. What is named with a change and not without it, or with other values, is the answer
+to the change. A line per diagnosis: verdict, names with their values, what ties with them. DIR keeps every diagnosis, so that a
+run that was stopped goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+from fish_report.json_file import write_json
+from fish_sim.robot import Robot
+from fish_sysid.dataset.injection import with_injection
+from fish_sysid.dataset.read import read_experiment
+from fish_sysid.diagnosis.diagnosis_json import answer
+from fish_sysid.diagnosis.pipeline import diagnose
+
+CHANGES: dict[str, tuple[str, dict[str, float]]] = {
+    "gain 0.75": ("rudder_gain", {"factor": 0.75}),
+    "gain 1.4": ("rudder_gain", {"factor": 1.4}),
+    "zero +0.15": ("rudder_offset", {"offset": 0.15}),
+    "zero -0.15": ("rudder_offset", {"offset": -0.15}),
+    "late by 0.25 s": ("rudder_delay", {"delay": 0.25}),
+    "water": ("current", {"x": 0.03, "y": -0.02}),
+}
+
+
+def main() -> None:
+    """Diagnose, print a line each."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("recordings", type=Path)
+    parser.add_argument("--only", nargs="+", choices=["none", *CHANGES], help="these (all)")
+    parser.add_argument("--out", type=Path, default=Path("out/names_by_prediction"))
+    args = parser.parse_args()
+    experiment, _ = read_experiment(args.recordings)
+    args.out.mkdir(parents=True, exist_ok=True)
+    for label in args.only or ["none", *CHANGES]:
+        kept, begin = args.out / f"{label.replace(' ', '_')}.json", time.process_time()
+        if not kept.exists():
+            changed = experiment
+            if label in CHANGES:
+                changed = with_injection(experiment, *CHANGES[label])
+            write_json(kept, answer(diagnose(changed, Robot())))
+        content = json.loads(kept.read_text())
+        named = "; ".join(_named(effect) for effect in content["effects"]) or "no name"
+        seconds = time.process_time() - begin
+        print(f"{label:15} {content['verdict']}: {named} ({seconds:.0f} s of one core)", flush=True)
+
+
+def _named(effect: dict) -> str:  # type: ignore[type-arg]
+    values = ", ".join(f"{p['value']:.3g}" for p in effect["parameters"].values())
+    ties = "".join(f" or {rival['name']}" for rival in effect["rivals"])
+    return f"{effect['name']} {values}{ties} [{effect['evidence']['basis']}]"
+
+
+if __name__ == "__main__":
+    main()
