@@ -159,6 +159,15 @@ def test_the_rudder_ends_only_where_trials_left_out_show_it(end: float) -> None:
     assert values["rudder_range"] == pytest.approx(0.35 if end < 0.5 else WIDEST, abs=0.03)
 
 
+def test_an_end_that_is_tried_is_one_that_a_robot_may_have() -> None:
+    """Commands in degrees, or of a servo that turns further, go beyond a quarter of a turn."""
+    hypothesis = prediction_hypothesis(Robot(links=1), swum(Robot(links=1)), FREE, (), 0.3)
+    start = Found(hypothesis, np.zeros(len(FREE) + len(SENSORS)), np.inf)
+    tried = [found.hypothesis.robot.parameters["rudder_range"] for found in ends(start, 2.0)]
+    assert tried == sorted(tried)
+    assert tried[-1] < WIDEST
+
+
 def test_an_end_that_starts_too_low_starts_again() -> None:
     """A fit with an end contains the one without: it must not cost much more."""
     experiment = swum(Robot(links=1).with_parameters(rudder_range=0.9))

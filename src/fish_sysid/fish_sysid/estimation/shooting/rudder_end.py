@@ -73,7 +73,7 @@ def judged_end(
 
 
 def ends(found: Found, largest: float) -> Iterator[Found]:
-    """The fit with an end of the rudder, ever nearer to the largest command [rad]."""
+    """The fit with an end of the rudder, ever nearer to the largest command [rad], or to WIDEST where commands go beyond."""
     z = np.insert(found.z, len(found.z) - len(SENSORS), 0.0)
-    hypotheses = (with_end(found.hypothesis, below * largest) for below in BELOW)
+    hypotheses = (with_end(found.hypothesis, below * min(largest, WIDEST)) for below in BELOW)
     return (replace(found, hypothesis=hypothesis, z=z) for hypothesis in hypotheses)
