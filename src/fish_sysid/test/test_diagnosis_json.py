@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the answer says of verdict, evidence, rivals and errors."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -180,7 +181,11 @@ def test_names_by_prediction_are_the_verdict_where_the_model_follows_with_them(
     assert verdict(far(*asked, still_misses=still_misses)) == expected
 
 
-def test_a_name_by_prediction_in_a_limit_does_not_stand():
+def test_a_name_or_rival_by_prediction_in_a_limit_does_not_stand():
     d = far(SLIP)
     d.surrogate = made_fit(0.0, "tip_slip")  # no slip at all
     assert prediction_effects(d) == []
+    none = replace(GAIN, rivals={"rudder_placement": {"tip_share": 0.0}})
+    (gain,) = prediction_effects(far(none))
+    assert gain["rivals"] == []
+    assert gain["family"] == {"name": "", "members": []}

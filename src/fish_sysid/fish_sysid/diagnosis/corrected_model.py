@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,10 +52,15 @@ def named(d: Diagnosis) -> tuple[Accepted, ...]:
 
 
 def asked_by_predictions(d: Diagnosis) -> tuple[Named, ...]:
-    """Names that stand by predictions of trials left out: only where the likelihood cannot be asked, and in no limit."""
+    """Names and rivals that stand by predictions: only where the likelihood cannot be asked, and in no limit."""
     if d.misses is None or d.surrogate is None:
         return ()
-    return tuple(a for a in d.predicted if not limit_in(d.surrogate, a.step.name, d.task.robot))
+    table, standing = d.task.robot.table, []
+    for asked in d.predicted:
+        if not limit_in(d.surrogate, asked.step.name, d.task.robot):
+            rivals = {k: v for k, v in asked.rivals.items() if not degenerate(k, v, table)}
+            standing.append(replace(asked, rivals=rivals))
+    return tuple(standing)
 
 
 def refused(d: Diagnosis) -> list[str]:
