@@ -264,6 +264,64 @@ def test_other_nodes_and_the_emergency_stop_disarm(
     assert g.node._driver.arming.reason == reason
 
 
+def test_a_deadman_that_is_let_go_for_a_moment_disarms(graph, vertiq_emulator):
+    g = graph(
+        RotorNode,
+        port=vertiq_emulator.port,
+        estimate="ignored",
+        rudder_timeout_s=0.0,
+        deadman_timeout_s=5.0,
+        stale_s=1.0,
+        reply_timeout_s=0.2,
+        module_timeout_s=1.0,
+    )
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+    deadman = g.peer.create_publisher(Bool, "operator/deadman", 10)
+    asks = g.arming(publisher)
+
+    def each() -> None:
+        deadman.publish(Bool(data=True))
+        asks()
+
+    assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, each)
+    end = time.monotonic() + 0.2  # until the last of the requests to arm is answered
+    assert g.spin(lambda: time.monotonic() > end, lambda: publisher.publish(command(rotor=50.0)))
+    for held in (False, True):
+        deadman.publish(Bool(data=held))
+    assert g.spin(
+        lambda: vertiq_emulator.mode == reg.COAST, lambda: publisher.publish(command(rotor=50.0))
+    )
+    assert g.node._driver.arming.reason == "the operator let the deadman go"
+
+
+def test_another_owner_of_the_arming_state_forbids_to_arm_while_it_is_there(graph, vertiq_emulator):
+    g = graph(
+        RotorNode,
+        port=vertiq_emulator.port,
+        estimate="ignored",
+        rudder_timeout_s=0.0,
+        stale_s=1.0,
+        reply_timeout_s=0.2,
+        module_timeout_s=1.0,
+    )
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+    simulator = g.peer.create_publisher(DiagnosticArray, "arming/state", 10)
+    status = DiagnosticStatus(level=DiagnosticStatus.OK, hardware_id="/fish/simulator 0123abcd")
+    asks = g.arming(publisher)
+    assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, asks)
+
+    def each() -> None:
+        simulator.publish(DiagnosticArray(status=[status]))
+        asks()
+
+    assert g.spin(lambda: vertiq_emulator.mode == reg.COAST, each)
+    assert g.node._driver.arming.reason.startswith("/fish/simulator says arming/state, too")
+    end = time.monotonic() + 1.0
+    assert g.spin(lambda: time.monotonic() > end, each)
+    assert vertiq_emulator.mode == reg.COAST
+    assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, asks)  # it is gone
+
+
 def test_arming_is_refused_without_an_estimate_and_says_what_lacks(graph, vertiq_emulator):
     g = graph(RotorNode, port=vertiq_emulator.port, reply_timeout_s=0.2)
     answer = g.call(SetBool, "arm", SetBool.Request(data=True))

@@ -162,22 +162,23 @@ class Arming:
         return ""
 
 
-ODOMETRY, CAMERA, DEADMAN, ESTOP, PAUSE = (
+ODOMETRY, CAMERA, DEADMAN, ESTOP, PAUSE, OWNER = (
     "odometry/filtered",
     "camera/pose",
     "operator/deadman",
     "operator/estop",
     "arming/pause",
+    "arming/state",
 )
-PAUSE_FORGOTTEN_S = 1.0  # s; a node that pauses repeats it more often
+PAUSE_FORGOTTEN_S = 1.0  # s; a node that pauses repeats it more often, another owner as well
 
 
 def operator_and_estimate(settings: ArmingSettings) -> tuple[Source, ...]:
-    """The sources that every owner of the arming state has: pauses, the estimate, and the deadman if one is used."""
+    """The sources that every owner of the arming state has: pauses, other owners, the estimate, and the deadman if one is used."""
     pause = Source(
         PAUSE, required=False, patience_s=settings.pause_s, forgotten_s=PAUSE_FORGOTTEN_S
     )
-    sources = [pause]
+    sources = [pause, Source(OWNER, required=False, forgotten_s=PAUSE_FORGOTTEN_S)]
     if settings.estimate != "ignored":
         required = settings.estimate == "required"
         sources += [

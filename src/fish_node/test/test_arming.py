@@ -12,6 +12,7 @@ from fish_node.arming import (
     DEADMAN,
     ESTOP,
     ODOMETRY,
+    OWNER,
     PAUSE,
     PAUSE_FORGOTTEN_S,
     Arming,
@@ -149,7 +150,7 @@ def test_what_is_only_watched_is_not_needed_but_disarms_when_it_ceases():
 
 def test_an_ignored_estimate_has_no_say():
     sources = operator_and_estimate(ArmingSettings(estimate="ignored"))
-    assert [source.name for source in sources] == [PAUSE]
+    assert [source.name for source in sources] == [PAUSE, OWNER]
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,14 @@ Owner (node rotor on the robot, node simulator in simulation). Service arm (std_
 Out: arming/state (diagnostic_msgs/DiagnosticArray: level OK is armed, the message is the reason), 20 Hz and on change.
 In: odometry/filtered, camera/pose, operator/estop and operator/deadman (std_msgs/Bool), arming/disarm (std_msgs/String:
 another node's reason to disarm), arming/pause (std_msgs/String: why a node pauses its commands, repeated while it does; empty:
-it goes on).
+it goes on), arming/state of another owner: one call would arm both, a simulation's the robot.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from uuid import uuid4
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -30,6 +31,7 @@ from fish_node.arming import (
     DEADMAN,
     ESTOP,
     ODOMETRY,
+    OWNER,
     PAUSE,
     Arming,
     ArmingSettings,
@@ -66,6 +68,7 @@ class ArmingServer:
     ) -> None:
         self._node, self._arming, self._settings, self._clock = node, arming, settings, clock
         self._now = stamp or (lambda: node.get_clock().now().to_msg())
+        self._id = f"{node.get_fully_qualified_name()} {uuid4().hex[:8]}"
         self._stamps: dict[str, Time] = {}
         self._said: str | None = None
         self._written: tuple[tuple[object, ...], MessageBytes] = (), MessageBytes(Header(), 0)
@@ -75,7 +78,8 @@ class ArmingServer:
             hear(node, Odometry, "odometry/filtered", self._on_odometry, NEWEST)
             hear(node, PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST)
         if settings.deadman_timeout_s > 0.0:
-            node.create_subscription(Bool, "operator/deadman", self._on_deadman, 1)
+            node.create_subscription(Bool, "operator/deadman", self._on_deadman, 10)
+        node.create_subscription(DiagnosticArray, "arming/state", self._on_state, 10)
         node.create_subscription(Bool, "operator/estop", self._on_estop, 10)
         node.create_subscription(String, "arming/pause", self._on_pause, 10)
         node.create_subscription(String, "arming/disarm", self._on_disarm, 10)
@@ -101,7 +105,9 @@ class ArmingServer:
         level = DiagnosticStatus.OK if armed else DiagnosticStatus.WARN
         said = (level, reason, self._arming.count)
         if said != self._written[0]:
-            status = DiagnosticStatus(name="arming", level=level, message=reason or ARMED)
+            status = DiagnosticStatus(
+                name="arming", level=level, message=reason or ARMED, hardware_id=self._id
+            )
             status.values = [KeyValue(key="count", value=str(self._arming.count))]
             self._written = said, MessageBytes(DiagnosticArray(status=[status]), 0)
         try:
@@ -141,13 +147,26 @@ class ArmingServer:
 
     def _on_deadman(self, message: Bool) -> None:
         trouble = "" if message.data else "the operator let the deadman go"
-        self._arming.heard(DEADMAN, self._clock(), trouble)
+        self._hear_operator(DEADMAN, trouble)
 
     def _on_estop(self, message: Bool) -> None:
         trouble = "emergency stop is pressed" if message.data else ""
-        self._arming.heard(ESTOP, self._clock(), trouble)
+        self._hear_operator(ESTOP, trouble)
+
+    def _hear_operator(self, source: str, trouble: str) -> None:
+        """Judged at once: the next message may take a short word back."""
+        self._arming.heard(source, self._clock(), trouble)
         self._arming.check(self._clock())
         self.say_change()
+
+    def _on_state(self, message: DiagnosticArray) -> None:
+        others = [status.hardware_id for status in message.status if status.hardware_id != self._id]
+        if others:
+            who = others[0].partition(" ")[0] or "a node without a name"
+            trouble = (
+                f"{who} says arming/state, too: stop one of the two, or give it another domain"
+            )
+            self._arming.heard(OWNER, self._clock(), trouble)
 
     def _on_disarm(self, message: String) -> None:
         self._arming.disarm(message.data or "a node asked for it without a reason")
