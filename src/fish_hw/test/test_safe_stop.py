@@ -114,6 +114,19 @@ def test_a_mistake_in_the_rotors_file_does_not_leave_the_rudder(tmp_path, capsys
     assert error.count("\n") == 1
 
 
+def test_a_wrong_value_that_a_stop_does_not_need_keeps_nothing_from_being_stopped(
+    tmp_path, vertiq_emulator
+):
+    vertiq_emulator.mode, vertiq_emulator.commanded = VELOCITY_MODE, 50.0
+    chip = rudder_at_the_side(tmp_path / "side")
+    rotor = parameter_file(tmp_path / "rotor.yaml", port=vertiq_emulator.port, battery_cells=40)
+    wrong = {"armed_timeout_s": 9.0, "stale_s": "fast"}
+    rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip), **wrong)
+    assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 0
+    assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
+    assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
+
+
 def test_what_nobody_expects_does_not_leave_the_rudder(tmp_path, capsys, monkeypatch):
     chip = rudder_at_the_side(tmp_path)
     monkeypatch.setattr(safe_stop, "SerialPort", lambda *_: 1 / 0)

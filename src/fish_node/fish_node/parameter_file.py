@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,7 +22,11 @@ Entry = tuple[str, yaml.Node]
 
 
 def read_settings(
-    path: Path, node: str, kind: type[Settings], say: Callable[[str], None]
+    path: Path,
+    node: str,
+    kind: type[Settings],
+    say: Callable[[str], None],
+    only: Collection[str] = (),
 ) -> Settings:
     """A dataclass of settings from what a file has for a node; what it does not have keeps its default.
 
@@ -31,6 +35,7 @@ def read_settings(
         node: full name, such as /fish/rudder; see read_node_parameters.
         kind: the dataclass.
         say: called with a message for unknown parameters, which are left out; it may raise.
+        only: names of the fields that are needed, all if empty; what the file has for others is not looked at.
 
     Raises:
         ValueError: as read_node_parameters, or a value of the wrong type or out of range; names the file.
@@ -38,7 +43,8 @@ def read_settings(
     parameters, defaults = read_node_parameters(path, node), asdict(kind())  # type: ignore[call-overload]
     if unknown := unknown_names(parameters, defaults):
         say(f"{path}: {unknown}")
-    known = {name: value for name, value in parameters.items() if name in defaults}
+    needed = set(defaults) & set(only or defaults)
+    known = {name: value for name, value in parameters.items() if name in needed}
     try:
         return kind(
             **{name: in_type_of(name, value, defaults[name]) for name, value in known.items()}

@@ -21,13 +21,21 @@ from fish_hw.transport.errors import TransportError
 from fish_hw.transport.serial_port import SerialPort
 from fish_node.parameter_file import read_settings
 
+# what a stop needs; a mistake in another parameter must not keep the robot from being stopped
+ROTOR = ("port", "baud", "module_id")
+RUDDER = (
+    *("backend", "chip", "bus", "address", "channel", "pca_clock_hz", "pwm_hz"),
+    *("sign", "centre_us", "us_per_rad", "trim", "min_us", "max_us"),
+    *("max_angle", "max_rate", "off_at_exit"),
+)
+
 
 def stop_rotor(path: Path) -> None:
     """Tell the module of a parameter file to coast; TransportError if the port is not there.
 
     An emulator has nothing to stop.
     """
-    settings = read_settings(path, "/fish/rotor", RotorSettings, partial(_warn, "rotor"))
+    settings = read_settings(path, "/fish/rotor", RotorSettings, partial(_warn, "rotor"), ROTOR)
     if settings.port == "emulator":
         return
     port = SerialPort(settings.port, settings.baud)
@@ -42,7 +50,7 @@ def stop_rudder(path: Path) -> None:
 
     An emulator has nothing to stop.
     """
-    settings = read_settings(path, "/fish/rudder", RudderSettings, partial(_warn, "rudder"))
+    settings = read_settings(path, "/fish/rudder", RudderSettings, partial(_warn, "rudder"), RUDDER)
     if settings.backend == "emulator":
         return
     driver = RudderDriver(settings, lambda: open_output(settings))
