@@ -291,6 +291,7 @@ def test_water_in_the_hull_disarms_and_forbids_to_arm(vertiq_emulator):
     assert bench.run(15.0, steady, until=lambda: vertiq_emulator.mode == reg.COAST)
     assert driver.arming.reason == "leak: water in the hull"
     assert "leak" in driver.arming.arm(time.monotonic())
+    assert driver.status().message.startswith("leak: water in the hull")  # whatever disarmed it
     driver.close()
 
 

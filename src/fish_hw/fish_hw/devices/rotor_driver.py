@@ -78,7 +78,7 @@ class RotorDriver:
         self._settings = settings
         self._open_stream = open_stream
         self._clock = clock
-        self._leak = leak
+        self._leak, self._leaks = leak, ""
         self._open_at = open_at
         self._lock = threading.Lock()  # of the guard: commands arrive on another thread
         self._stream: ByteStream | None = None
@@ -153,7 +153,8 @@ class RotorDriver:
         """One cycle: decide, command, measure."""
         now = self._clock()
         if self._leak is not None:
-            self.arming.heard(LEAK, now, self._leak.trouble(now))
+            self._leaks = self._leak.trouble(now)
+            self.arming.heard(LEAK, now, self._leaks)
         cycle = RotorCycle()
         try:
             if self._vertiq is None:
@@ -181,11 +182,11 @@ class RotorDriver:
             "clamped commands": self.guard.clamped,
             "reconnect attempts": self._link.attempts,
         }
-        vertiq = self._vertiq
+        vertiq, leaks = self._vertiq, (self._leaks,) if self._leaks else ()
         if vertiq is None:
-            return Status(ERROR, self._link.trouble, values)
+            return Status(ERROR, "; ".join((*leaks, self._link.trouble)), values)
         values |= self._line_values(vertiq)
-        if troubles := self._watch.troubles:
+        if troubles := (*leaks, *self._watch.troubles):
             return Status(ERROR, "; ".join(troubles), values)
         if self._watch.health.warnings:
             return Status(WARN, "; ".join(self._watch.health.warnings), values)
