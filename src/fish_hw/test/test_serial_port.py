@@ -65,7 +65,9 @@ def test_absent_port_lists_the_others():
 
 
 def test_something_that_is_no_serial_port():
-    with pytest.raises(PortUnavailable, match="cannot open serial port /dev/null"):
+    with pytest.raises(
+        PortUnavailable, match="cannot open serial port /dev/null: it is no serial port"
+    ):
         SerialPort("/dev/null", 115200)
 
 

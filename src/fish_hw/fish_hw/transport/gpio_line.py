@@ -27,6 +27,8 @@ NS = 1e-9
 REASONS = {
     errno.ENOENT: "there is no such chip",
     errno.EACCES: "no permission (add the user to group gpio or dialout)",
+    errno.EISDIR: "it is a folder",
+    errno.ENOTTY: "it is no GPIO chip",
     errno.EBUSY: "another program holds the line",
     errno.EINVAL: "the chip has no such line",
 }

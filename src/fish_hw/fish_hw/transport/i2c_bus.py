@@ -12,6 +12,8 @@ from fish_hw.transport.errors import PortUnavailable, TransportError, unavailabl
 REASONS = {
     errno.ENOENT: "there is no such bus (enable it: dtparam=i2c_arm=on)",
     errno.EACCES: "no permission (add the user to group i2c)",
+    errno.EISDIR: "it is a folder",
+    errno.ENOTTY: "it is no I2C bus",
     errno.EBUSY: "another program holds it",
 }
 

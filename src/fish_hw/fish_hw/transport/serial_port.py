@@ -19,6 +19,8 @@ REASONS = {
     errno.EACCES: "no permission (add the user to group dialout)",
     errno.EAGAIN: "another program holds it",
     errno.EBUSY: "another program holds it",
+    errno.EISDIR: "it is a folder",
+    errno.ENOTTY: "it is no serial port",
 }
 
 
@@ -50,7 +52,10 @@ class SerialPort:
                 port, baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True
             )
         except (*self._failures, ValueError) as error:
-            reason = REASONS.get(getattr(error, "errno", None) or 0, str(error))
+            code = getattr(error, "errno", None)
+            if isinstance(error.__context__, termios.error):  # pyserial drops its number
+                code = error.__context__.args[0]
+            reason = REASONS.get(code or 0, str(error))
             raise unavailable(f"serial port {port}", reason, other_ports(serial, port)) from error
         self._ask_for_low_latency()
 
