@@ -14,6 +14,7 @@ from waiting import wait_until
 
 from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.imu_driver import ImuDriver
+from fish_hw.devices.rotor_watch import RotorWatch
 from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.devices.usb_camera import UsbCamera
@@ -23,6 +24,7 @@ from fish_hw.emulators.fed_bno085 import Felt
 from fish_hw.protocol.iquart import encode
 from fish_hw.settings.camera import CameraSettings
 from fish_hw.settings.imu import ImuSettings
+from fish_hw.settings.rotor import RotorSettings
 from fish_hw.settings.rudder import RudderSettings
 from fish_hw.transport.errors import PortUnavailable, TransportError
 from fish_hw.transport.serial_port import SerialPort
@@ -148,6 +150,20 @@ def test_an_unplugged_rotor_coasts_by_its_own_watchdog_and_is_plugged_again(robo
     assert wait_until(lambda: abs(robot.rotor_speed()) < 0.1, TIMEOUT_S)
     robot.mend()
     SerialPort(str(port), 115200).close()
+
+
+def test_a_fake_robot_alone_can_be_armed(robot):
+    said = robot.parameters()["rotor"]
+    settings = RotorSettings(port=str(said["port"]), battery_cells=int(said["battery_cells"]))
+    watch = RotorWatch(settings)
+    stream = SerialPort(settings.port, 115200)
+    vertiq = Vertiq(stream, reply_timeout_s=0.2)
+    end = time.monotonic() + 0.6
+    while time.monotonic() < end:
+        watch.ask(vertiq, time.monotonic())
+    stream.close()
+    assert math.isfinite(watch.judge.filtered_volts)
+    assert watch.health.stops == watch.health.warnings == ()
 
 
 def test_every_fault_can_be_made_and_mended(robot):

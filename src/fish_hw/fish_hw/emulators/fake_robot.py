@@ -23,6 +23,7 @@ from fish_hw.settings.rudder import RudderSettings
 from fish_hw.transport.unix_socket import PREFIX
 
 IMU_ADDRESS = 0x4A
+CELLS, CELL_V = 3, 3.7  # of the battery, until the simulator says its voltage
 LAG_S = 0.01  # s, of the rotor's velocity loop
 BUS_ERRORS = (errno.EIO, errno.ETIMEDOUT, errno.EREMOTEIO)
 
@@ -82,7 +83,7 @@ class FakeRobot:
     def parameters(self) -> dict[str, dict[str, object]]:
         """What each driver's parameter file must say to find its device."""
         return {
-            "rotor": {"port": str(self.folder / "rotor"), "battery_cells": 3},
+            "rotor": {"port": str(self.folder / "rotor"), "battery_cells": CELLS},
             "rudder": {"chip": str(self.folder / "pwmchip0")},
             "imu": {"bus": f"{PREFIX}{self.folder / 'i2c'}"},
             "camera": {"device": f"{PREFIX}{self.folder / 'camera'}"},
@@ -125,6 +126,7 @@ class FakeRobot:
 
     def _plug_rotor(self) -> VertiqEmulator:
         rotor = VertiqEmulator(lag_s=LAG_S, clock=self._clock)
+        rotor.volts = CELLS * CELL_V
         link = self.folder / "rotor"
         link.unlink(missing_ok=True)
         link.symlink_to(rotor.port)

@@ -42,9 +42,14 @@ class FakeRobotNode(Node):
         )
         settings = read_parameters(self, FakeRobotSettings)
         self._time = RobotClock(self)
-        self._robot = FakeRobot(
-            Path(settings.folder), RudderSettings(), settings.seed, self._time.now
-        )
+        folder = Path(settings.folder)
+        try:
+            self._robot = FakeRobot(folder, RudderSettings(), settings.seed, self._time.now)
+        except OSError as error:
+            reason = error.strerror or error
+            raise ValueError(
+                f"folder {folder}: {reason}; give another one: -p folder:=FOLDER"
+            ) from error
         self._steps: dict[str, float] = {}  # s, how far who is
         self._fault = "none"
         self._command = self.create_publisher(JointState, "fake/joint_command", 10)
