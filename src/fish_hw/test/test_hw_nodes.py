@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.clock import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import BatteryState, CameraInfo, CompressedImage, Image, Imu, JointState
@@ -262,6 +263,24 @@ def test_other_nodes_and_the_emergency_stop_disarm(
 
     assert g.spin(lambda: vertiq_emulator.mode == reg.COAST, each)
     assert g.node._driver.arming.reason == reason
+
+
+@pytest.mark.parametrize(
+    ("node_class", "emulated"),
+    [(RotorNode, {"port": "emulator"}), (RudderNode, {"backend": "emulator"})],
+)
+def test_no_timer_rests_while_the_computers_clock_is_set_back(graph, node_class, emulated):
+    g = graph(node_class, **emulated)
+    assert {timer.clock.clock_type for timer in g.node.timers} == {ClockType.STEADY_TIME}
+
+
+def test_a_driver_that_waits_for_simulated_time_says_so(graph):
+    g = graph(RotorNode, port="emulator", use_sim_time=True, startup_timeout_s=2.5)
+    diagnostics = g.listen(DiagnosticArray, "/diagnostics")
+    assert g.spin(lambda: bool(diagnostics))
+    assert "no time on /clock" in diagnostics[0].status[0].message
+    assert g.spin(lambda: bool(g.node.failure))
+    assert "no time on /clock" in g.node.failure
 
 
 def test_a_deadman_that_is_let_go_for_a_moment_disarms(graph, vertiq_emulator):

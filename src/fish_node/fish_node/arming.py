@@ -174,7 +174,7 @@ PAUSE_FORGOTTEN_S = 1.0  # s; a node that pauses repeats it more often, another 
 
 
 def operator_and_estimate(settings: ArmingSettings) -> tuple[Source, ...]:
-    """The sources that every owner of the arming state has: pauses, other owners, the estimate, and the deadman if one is used."""
+    """The sources that every owner of the arming state has: pauses, other owners, the estimate, a deadman if one is used."""
     pause = Source(
         PAUSE, required=False, patience_s=settings.pause_s, forgotten_s=PAUSE_FORGOTTEN_S
     )

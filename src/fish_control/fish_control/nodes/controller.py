@@ -42,6 +42,7 @@ from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.changes import Changes
 from fish_node.nodes.quick_messages import hear
+from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
@@ -97,8 +98,10 @@ class ControllerNode(Node):
         hear(self, PoseStamped, "control/target", self._on_target, 10)
         self._waits = not self.get_parameter("use_sim_time").value  # for odometry
         self._period = 1.0 / self._config.command_rate_hz
-        self._timer = self.create_timer(self._period * (MISSED if self._waits else 1.0), self._tick)
-        self.create_timer(1.0, self._report)
+        self._timer = self.create_timer(
+            self._period * (MISSED if self._waits else 1.0), self._tick, clock=timer_clock(self)
+        )
+        self.create_timer(1.0, self._report, clock=timer_clock(self))
 
     def _on_odometry(self, message: Odometry) -> None:
         self._odometry, self._odometry_time = message, seconds(message.header.stamp)

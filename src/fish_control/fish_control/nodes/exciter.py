@@ -31,6 +31,7 @@ from fish_control.nodes.messages import (
 from fish_control.nodes.reporter import Reporter
 from fish_control.nodes.written import CommandBytes
 from fish_node.nodes.arming import ArmingListener
+from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.start import read_parameters, run
 
 RESENT = 1000  # commands kept for a recorder that lags on a busy computer: 10 s
@@ -69,8 +70,8 @@ class ExciterNode(Node):
         self._arming = ArmingListener(self)
         self._reporter = Reporter(self, self._command)
         self.create_subscription(Odometry, "odometry/filtered", self._on_odometry, 10)
-        self.create_timer(1.0 / config.command_rate_hz, self._tick)
-        self.create_timer(1.0, self._report)
+        self.create_timer(1.0 / config.command_rate_hz, self._tick, clock=timer_clock(self))
+        self.create_timer(1.0, self._report, clock=timer_clock(self))
 
     def _on_odometry(self, message: Odometry) -> None:
         self._odometry = message

@@ -36,6 +36,7 @@ from fish_control.nodes.reporter import Reporter
 from fish_control.nodes.written import OdometryBytes
 from fish_node.nodes.frame_broadcaster import FrameBroadcaster
 from fish_node.nodes.quick_messages import hear
+from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.static_frames import publish_static_frame
@@ -80,7 +81,7 @@ class FusionNode(Node):
         self._reporter = Reporter(self, self._odometry)
         hear(self, Imu, "imu/data", self._on_imu, SENSORS)
         hear(self, PoseWithCovarianceStamped, "camera/pose", self._on_pose, SENSORS)
-        self.create_timer(1.0, lambda: self._report(self._estimate()))
+        self.create_timer(1.0, lambda: self._report(self._estimate()), clock=timer_clock(self))
         self._used = 0.0  # s on this node's clock, when a measurement was last used
         self._said = ""
         self._refusal = ""  # why the poses since the last used one are not fused

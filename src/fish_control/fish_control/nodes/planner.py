@@ -50,6 +50,7 @@ from fish_control.reference_path import PathError, ReferencePath
 from fish_control.watchdog import pose_loss
 from fish_node.nodes.changes import Changes
 from fish_node.nodes.quick_messages import hear
+from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
 
@@ -99,7 +100,7 @@ class PlannerNode(Node):
         self._service = PathService(self, self._start, self._cancel)
         Changes(self, config, self._change)
         hear(self, Odometry, "odometry/filtered", self._on_odometry, 10)
-        self.create_timer(1.0, self._report)
+        self.create_timer(1.0, self._report, clock=timer_clock(self))
 
     def end(self) -> None:
         """A planner that ends as it should leaves no progress behind."""

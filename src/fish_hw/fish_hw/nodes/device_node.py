@@ -14,6 +14,7 @@ import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
@@ -30,6 +31,9 @@ from fish_node.nodes.status_log import StatusLog
 NAMESPACE = "fish"
 END_TIMEOUT_S = 2.0
 CLOCK_WAIT_S = 0.01
+NO_CLOCK = (
+    "use_sim_time is true, but there is no time on /clock: start the simulator, or set it to false"
+)
 EXPECTED = (TransportError, DeviceError, ValueError)
 
 
@@ -77,7 +81,8 @@ class DeviceNode(Node):
         self._give_up_s = time.monotonic() + wait_s
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._log = StatusLog(self.get_logger())
-        self.create_timer(1.0, self._on_diagnostics)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0, self._on_diagnostics, clock=steady)
 
     def use(
         self, device: Device, step: Callable[[], None], period_s: float, emulated: bool
@@ -154,9 +159,16 @@ class DeviceNode(Node):
         step()
         if device.connected:
             self._give_up_s = float("inf")  # from now on it is waited for without end
-        elif time.monotonic() > self._give_up_s:
-            self.failure = device.status().message
+        else:
+            self._give_up_late(device)
+
+    def _give_up_late(self, device: Device) -> None:
+        if time.monotonic() > self._give_up_s:
+            self.failure = self._status(device).message
             self.context.try_shutdown()
+
+    def _status(self, device: Device) -> Status:
+        return device.status() if self.clock.runs else Status(WARN, NO_CLOCK)
 
     def _on_failure(self) -> None:
         """A step raised what nobody expected: that must not leave the device as it is."""
@@ -168,7 +180,7 @@ class DeviceNode(Node):
     def _on_diagnostics(self) -> None:
         if self._device is None:
             return
-        status = self._device.status()
+        status = self._status(self._device)
         if self._emulated:  # nobody should go to the pool with it
             status = Status(
                 max(status.level, WARN), f"{status.message} (emulated device)", status.values
@@ -188,6 +200,8 @@ class DeviceNode(Node):
             )
         ]
         self._diagnostics.publish(message)
+        if not self.clock.runs:  # the device's thread waits for it
+            self._give_up_late(self._device)
 
 
 def run(make_node: Callable[[], DeviceNode], name: str) -> None:

@@ -32,6 +32,7 @@ from fish_hw.transport.interfaces import ByteStream
 from fish_hw.transport.serial_port import SerialPort
 from fish_node.nodes.arming import ArmingServer
 from fish_node.nodes.message_bytes import MessageBytes, mark
+from fish_node.nodes.robot_clock import timer_clock
 
 BATTERY_PERIOD_S = 1.0
 
@@ -59,7 +60,7 @@ class RotorNode(DeviceNode):
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
         self.create_subscription(String, "rudder/trouble", self._on_rudder, QoSProfile(depth=1))
         self.create_service(Trigger, "~/clear_faults", self._on_clear_faults)
-        self.create_timer(BATTERY_PERIOD_S, self._on_battery)
+        self.create_timer(BATTERY_PERIOD_S, self._on_battery, clock=timer_clock(self))
         self.use(self._driver, self._cycle, 1.0 / self.settings.rate_hz, self._emulator is not None)
 
     def _open_port(self) -> ByteStream:

@@ -22,6 +22,7 @@ from fish_hw.nodes.device_node import DeviceNode, run
 from fish_hw.nodes.joint_message import joint_value
 from fish_hw.settings.rudder import RudderSettings
 from fish_node.nodes.arming import ArmingListener
+from fish_node.nodes.robot_clock import timer_clock
 
 TROUBLE_PERIOD_S = 0.05
 
@@ -36,7 +37,7 @@ class RudderNode(DeviceNode):
         self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
         self._arming = ArmingListener(self, self._on_state)
         self._trouble = self.create_publisher(String, "rudder/trouble", 10)
-        self.create_timer(TROUBLE_PERIOD_S, self._say_trouble)
+        self.create_timer(TROUBLE_PERIOD_S, self._say_trouble, clock=timer_clock(self))
         emulated = self.settings.backend == "emulator"
         self.use(self._driver, self._cycle, 1.0 / self.settings.rate_hz, emulated)
 

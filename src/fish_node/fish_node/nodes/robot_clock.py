@@ -5,6 +5,8 @@
 import time
 
 from builtin_interfaces.msg import Time
+from rclpy.clock import Clock as RosClock
+from rclpy.clock import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time as RosTime
@@ -14,6 +16,12 @@ from fish_node.simulated_time import SimulatedTime
 
 TRIES = 3
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def timer_clock(node: Node) -> RosClock:
+    """Of timers: simulated time, or a clock that is never set. One of the ROS clock rests for as long as that is set back."""
+    simulated = node.get_parameter("use_sim_time").value
+    return node.get_clock() if simulated else RosClock(clock_type=ClockType.STEADY_TIME)
 
 
 class RobotClock:
