@@ -104,10 +104,15 @@ class Arming:
         return self._armed
 
     def heard(self, name: str, now: float, trouble: str = "") -> None:
-        """Note that a source spoke at `now` [s], and what its trouble is; an unknown name has no timeout."""
+        """Note that a source spoke at `now` [s], and what its trouble is; an unknown name has no timeout.
+
+        A silence or a trouble that this word ends disarms, though no check came in between, as in a process that stood still.
+        """
         with self._lock:
-            self._sources.setdefault(name, Source(name, required=False))
-            before = self._heard.get(name, _Heard())
+            source = self._sources.setdefault(name, Source(name, required=False))
+            before = self._heard.setdefault(name, _Heard())
+            if self._armed and (ended := self._trouble(source, now, patient=True)):
+                self.disarm(ended)
             self._heard[name] = _Heard(
                 now, visible(trouble), before.since_s if before.trouble else now
             )

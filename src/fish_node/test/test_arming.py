@@ -56,6 +56,23 @@ def test_a_robot_is_disarmed_until_a_person_arms_it():
     assert (arming.reason, arming.count) == ("", 1)
 
 
+def test_a_silence_that_ends_before_anybody_checks_disarms():
+    arming = armed()
+    hear_all_but(arming, "", 0.1)
+    assert arming.check(0.1)
+    hear_all_but(arming, "", 1.0)  # the process stood still
+    assert not arming.check(1.0)
+    assert arming.reason == "no joint_command for 0.15 s"
+
+
+def test_a_trouble_that_ends_before_anybody_checks_disarms():
+    arming = armed()
+    for trouble in ("rudder: output lost", ""):
+        arming.heard("word of the rudder", 0.01, trouble)
+    assert not arming.check(0.01)
+    assert arming.reason == "rudder: output lost"
+
+
 def test_arming_is_refused_with_every_reason():
     arming = Arming((COMMAND, Source("rotor module")))
     arming.heard("rotor module", 0.0, "module faults: coil temperature")
