@@ -85,6 +85,19 @@ def steady(_t: float) -> float:
     return 60.0
 
 
+def test_a_driver_that_stood_still_until_the_module_coasted_is_disarmed(bench):
+    """Commands go on meanwhile: the thread of the device alone waits, as for a blocked write."""
+    running = lambda: bench.emulator.mode == VELOCITY_MODE  # noqa: E731
+    assert bench.run(20.0, steady, until=running)
+    end = time.monotonic() + SETTINGS.module_timeout_s + 0.1
+    while time.monotonic() < end:
+        bench.driver.command(60.0)
+        time.sleep(DT)
+    bench.run(0.2, steady, arm=False)
+    assert bench.driver.arming.reason == "no rotor module for 0.5 s"
+    assert bench.emulator.mode == reg.COAST
+
+
 def test_oscillation_is_followed_and_measured(bench):
     def speeds():
         return [s.velocity for s in bench.samples]

@@ -33,7 +33,7 @@ def sources(settings: RotorSettings) -> tuple[Source, ...]:
     """What must be well while the robot is armed; troubles without a timeout are added as they are heard."""
     rudder = (Source(RUDDER, settings.rudder_timeout_s),) if settings.rudder_timeout_s else ()
     return (
-        Source(MODULE),
+        Source(MODULE, settings.module_timeout_s),
         Source(COMMAND, settings.stale_s),
         *rudder,
         *operator_and_estimate(settings),
