@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 
 from fish_control.imu_history import ImuHistory
 from fish_control.preintegration import SIZE
-from fish_control.strapdown import StrapdownFilter
+from fish_control.strapdown import START_STD, StrapdownFilter
 
 Array = NDArray[np.float64]
 LONGEST_SILENCE = 0.05  # s, of the camera before the history; less is not worth a prediction
-# of the state when it starts: m, m, rad, m/s, m/s, rad/s, m/s^2, m/s^2
-START_STD = (0.02, 0.02, 0.1, 0.2, 0.2, 0.05, 0.3, 0.3)
 
 
 class CameraPose(NamedTuple):

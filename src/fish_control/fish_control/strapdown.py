@@ -35,7 +35,9 @@ from fish_control.noise_scale import NoiseScale
 from fish_control.preintegration import SIZE, Preintegration
 
 Array = NDArray[np.float64]
-POSE = slice(0, 3)
+# of the state when it starts: m, m, rad, m/s, m/s, rad/s, m/s^2, m/s^2
+START_STD = (0.02, 0.02, 0.1, 0.2, 0.2, 0.05, 0.3, 0.3)
+POSE, BIASES = slice(0, 3), slice(5, SIZE)
 H_CAMERA = np.eye(3, SIZE)
 # of the process noise: variances of p and v, their covariances, variances of the biases
 NOISE_PLACES = np.ravel_multi_index(
@@ -108,8 +110,14 @@ class StrapdownFilter:
         return pose_residual(pose, self.x[POSE]), self.P[POSE, POSE] + R
 
     def correct(self, pose: Array, R: Array, fade: float = 1.0) -> None:
-        """Update with a camera pose (x, y, psi) [m, m, rad]; fade: multiplies the predicted covariance before."""
-        self._filter.P = fade * self.P
+        """Update with a camera pose (x, y, psi) [m, m, rad]; fade: multiplies the predicted covariance before.
+
+        Biases are never less known than at the start: poses that do not tell them would let them grow without end.
+        """
+        growth = np.full(SIZE, math.sqrt(fade))
+        known = np.array(START_STD)[BIASES] / np.sqrt(np.diagonal(self.P)[BIASES])
+        growth[BIASES] = np.clip(growth[BIASES], None, np.maximum(known, 1.0))
+        self._filter.P = growth[:, None] * self.P * growth
         self._filter.update(pose, lambda _: H_CAMERA, lambda x: x[POSE], R, residual=pose_residual)
         self.x[2] = math.remainder(self.x[2], 2.0 * math.pi)
 

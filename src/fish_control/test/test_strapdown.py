@@ -8,7 +8,7 @@ import pytest
 from fish_control.imu_history import Step
 from fish_control.motion_noise import MotionNoise
 from fish_control.preintegration import SIZE
-from fish_control.strapdown import StrapdownFilter, pose_residual
+from fish_control.strapdown import START_STD, StrapdownFilter, pose_residual
 
 
 def started(x):
@@ -112,3 +112,14 @@ def test_residual_of_headings():
     np.testing.assert_allclose(
         pose_residual(np.array([1, 2, 3.0]), np.array([0, 0, -3.0])), [1, 2, 6 - 2 * np.pi]
     )
+
+
+def test_doubts_again_and_again_leave_a_covariance_that_can_be_used():
+    """Without the accelerometer no pose tells its biases: each doubt multiplies what is not known of them."""
+    filter = started(np.zeros(SIZE))
+    filter.model = filter.model._replace(accel_used=False)
+    for _ in range(40):
+        filter.advance(interval(0.03, lambda s: 0.0, lambda s: (0.1, -0.2), steps=3))
+        filter.correct(np.zeros(3), np.diag([1e-6, 1e-6, 1e-4]), fade=30.0)
+    assert np.all(np.sqrt(np.diagonal(filter.P)[5:]) <= np.array(START_STD[5:]) * 1.01)
+    assert np.linalg.eigvalsh(filter.P).min() > 0.0
