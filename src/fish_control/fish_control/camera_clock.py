@@ -9,7 +9,7 @@ over LAG is compared with that of the IMU's heading; the offset with the smalles
 
 with the sums of `offset_sums`. The swing of the head repeats itself once a stroke, so the estimate counts only where no
 other offset fits nearly as well. An image cannot be taken after it arrives: this bounds the grid, however far the clocks
-are apart.
+are apart. The IMU's newest sample tells the time of arrival; where it comes later than the image, the bound moves by as much.
 
 Where the time from stamp to arrival steps, a clock was set by as much, or the images come later with stamps as good as
 before. Stamps that go back by as much say that it was the clock, as images that come later are still in order. Else the
@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 LONGEST_PAIR = 0.4  # s
 OLDEST = 1.7  # s, largest age of an image at its arrival
 AHEAD = 0.1  # s, by which an image may seem to be taken after its arrival
+LATE_IMU = 0.4  # s, the same where the offset known beforehand says so: the IMU comes later than the camera
 MEMORY = 20.0  # s, of the estimate
 SHORT_MEMORY = 4.0  # s, of the one that notices changes
 REFINED = 0.005  # s, smaller changes are left to the long memory
@@ -63,6 +64,7 @@ class CameraClock:
         self._prior = ClockEstimate(offset, std, False)
         self._watch = LatencyWatch()
         self._grid: Array | None = None  # (G,) offsets [s]
+        self._ahead = AHEAD  # s, by which the grid goes beyond the arrival
         self.jumps = 0
         self.current = self._prior
         self.contradicted = False
@@ -100,9 +102,9 @@ class CameraClock:
         if stepped is not None and usual is not None:
             self._step(stamp, stepped, usual, back)
         elif self._grid is None and self._watch.usual is not None:
-            self._place_grid(self._watch.usual)
+            self._place_grid(self._watch.usual, self._prior.offset)
         self._waiting.append((now, stamp, heading))
-        while self._grid is not None and self._waiting and self._waiting[0][0] <= now - AHEAD:
+        while self._grid is not None and self._waiting and self._waiting[0][0] <= now - self._ahead:
             self._compare(*self._waiting.popleft()[1:], imu)
 
     def _compare(self, stamp: float, heading: float, imu: ImuHistory) -> None:
@@ -127,9 +129,9 @@ class CameraClock:
         held = self._rivals[0] if self._rivals else self.current
         moved = ClockEstimate(held.offset + latency - usual, STEP_STD, False)
         in_order = back < 0.5 * abs(latency - usual)
-        images_late = in_order and -AHEAD <= latency - held.offset <= OLDEST
+        images_late = in_order and -LATE_IMU <= latency - held.offset <= OLDEST
         self._prior = held if images_late else moved
-        self._place_grid(latency)
+        self._place_grid(latency, max(held.offset, moved.offset))
         self._rivals, self._stepped_at = (held, moved), stamp
         if not images_late:
             self._settle(moved)
@@ -156,9 +158,11 @@ class CameraClock:
             doubt = abs(moved.offset - held.offset)
             self._settle(ClockEstimate(held.offset, doubt, False))
 
-    def _place_grid(self, latency: float) -> None:
+    def _place_grid(self, latency: float, largest: float) -> None:
+        """largest: of the offsets that may be right [s]."""
+        self._ahead = AHEAD + min(max(largest - latency, 0.0), LATE_IMU)
         first = math.floor((latency - OLDEST) / STEP) * STEP
-        steps = np.arange(round((OLDEST + AHEAD) / STEP) + 1, dtype=np.float64)
+        steps = np.arange(round((OLDEST + self._ahead) / STEP) + 1, dtype=np.float64)
         grid: Array = first + STEP * steps
         self._grid = grid
         self._long, self._short = OffsetSums(MEMORY, len(grid)), OffsetSums(SHORT_MEMORY, len(grid))
@@ -166,7 +170,7 @@ class CameraClock:
         self._waiting.clear()
         self._newest = -math.inf
         age = latency - self._prior.offset
-        if not -AHEAD <= age <= OLDEST:  # the clocks are farther apart than anybody said
+        if not -LATE_IMU <= age <= OLDEST:  # the clocks are farther apart than anybody said
             self._prior = ClockEstimate(latency - 0.1, 0.5, False)
             self.current = self._prior
             self.contradicted = True

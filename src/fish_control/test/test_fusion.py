@@ -487,6 +487,19 @@ def test_an_imu_s_clock_that_is_set_ahead_a_little_is_followed():
     assert distances[-100:].max() < 0.01
 
 
+@pytest.mark.parametrize("begin", [0.0, 6.0])
+@pytest.mark.parametrize("late", [0.16, 0.35])
+def test_an_imu_that_comes_later_than_the_camera_is_fused_at_the_right_time(begin, late):
+    fusion, events = Fusion(), swum(12.0, latency=0.05)
+    moved = [(a + late * (k == "imu" and a > begin), k, s, v) for a, k, s, v in events]
+    distances, nees = errors_of_swum(fusion, sorted(moved, key=lambda e: e[0]))
+    assert fusion.camera_clock.current.sure
+    assert fusion.camera_clock.jumps == 0
+    assert fusion.applied_offset == pytest.approx(0.0, abs=0.005)
+    assert distances[-400:].max() < 0.01
+    assert np.mean(nees < 16.27) > 0.95
+
+
 @pytest.mark.parametrize("later", [0.15, 0.6])
 def test_images_that_come_later_with_right_stamps_are_no_set_clock(later):
     fusion, events = Fusion(), swum(10.0)
