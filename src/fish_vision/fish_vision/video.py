@@ -11,6 +11,7 @@ import cv2
 from fish_vision.picture import PictureError
 from fish_vision.segmentation import Image
 
+VARIES = 2.0  # frames, by which a video's own times may differ from a constant rate
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 
@@ -23,11 +24,11 @@ def frames(path: Path, rate: float | None, size: tuple[int, int]) -> Iterator[tu
         size: width, height that the lens was calibrated for.
 
     Raises:
-        PictureError: nothing to read, no rate, or frames of another size.
+        PictureError: nothing to read, no rate or one that varies, or frames of another size.
     """
     if rate is not None and not 0.0 < rate < inf:
         raise PictureError(f"--rate {rate}: expected a positive number of frames/s")
-    source, own = _folder(path) if path.is_dir() else _video(path)
+    source, own = _folder(path) if path.is_dir() else _video(path, rate is None)
     rate = rate or own
     if not rate or not 0.0 < rate < inf:
         raise PictureError(f"{path} says no frame rate: expected --rate")
@@ -58,7 +59,7 @@ def _folder(path: Path) -> tuple[Iterator[Image], float | None]:
     return read(), None
 
 
-def _video(path: Path) -> tuple[Iterator[Image], float | None]:
+def _video(path: Path, own_rate: bool) -> tuple[Iterator[Image], float | None]:
     if not path.is_file():
         raise PictureError(f"{path}: no such video or folder")
     capture = cv2.VideoCapture(str(path))
@@ -67,12 +68,21 @@ def _video(path: Path) -> tuple[Iterator[Image], float | None]:
     rate = float(capture.get(cv2.CAP_PROP_FPS))
 
     def read() -> Iterator[Image]:
+        count = 0
         try:
             while True:
                 able, picture = capture.read()
                 if not able:
                     return
+                at = 1e-3 * float(capture.get(cv2.CAP_PROP_POS_MSEC))  # s; 0 where it is not known
+                frames_off = at * rate - count
+                if own_rate and at > 0.0 and abs(frames_off) > VARIES:
+                    raise PictureError(
+                        f"{path}: frame {count} comes {frames_off:+.0f} frames off a constant {rate:g} frames/s; "
+                        "convert it to a constant rate, or say --rate if its times do not count"
+                    )
                 yield picture
+                count += 1
         finally:
             capture.release()
 

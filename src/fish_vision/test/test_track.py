@@ -19,7 +19,9 @@ from pool_picture import CONFIG, SIZE, calibration, discs_of_fish, draw
 
 from fish_report.errors import UserError
 from fish_vision.calibration import lens_document
+from fish_vision.picture import PictureError
 from fish_vision.verbs import track
+from fish_vision.video import frames
 
 POSES = [(0.02 * k, 0.1, 0.3 + 0.05 * k) for k in range(6)]
 
@@ -115,6 +117,50 @@ def test_what_is_no_video_of_this_camera_is_said(
     cv2.imwrite(str(files / "small" / "1.png"), np.zeros((20, 30, 3), np.uint8))
     with pytest.raises(UserError, match=said):
         run(files, source, *more)
+
+
+def test_poses_of_before_stay_where_the_new_ones_are_refused(files: Path) -> None:
+    assert run(files, "frames", "--rate", "20") == 0
+    before = rows(files)
+    cv2.imwrite(str(files / "frames" / "999.png"), np.zeros((20, 30, 3), np.uint8))
+    with pytest.raises(UserError, match="the lens file says"):
+        run(files, "frames", "--rate", "20")
+    assert rows(files) == before
+
+
+@pytest.mark.parametrize(("rate", "refused"), [(None, True), (25.0, False)])
+def test_a_video_whose_rate_varies_has_no_times_by_counting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rate: float | None, refused: bool
+) -> None:
+    class Varying:
+        """Six frames, the last three after a pause of 0.2 s."""
+
+        def __init__(self, _: str) -> None:
+            self.count = 0
+
+        def isOpened(self) -> bool:
+            return True
+
+        def get(self, what: int) -> float:
+            if what == cv2.CAP_PROP_FPS:
+                return 25.0
+            return 40.0 * (self.count - 1) + 200.0 * (self.count > 3)
+
+        def read(self) -> tuple[bool, np.ndarray]:
+            self.count += 1
+            return self.count <= 6, np.zeros((*SIZE[::-1], 3), np.uint8)
+
+        def release(self) -> None:
+            pass
+
+    (tmp_path / "fish.mp4").touch()
+    monkeypatch.setattr(cv2, "VideoCapture", Varying)
+    got = frames(tmp_path / "fish.mp4", rate, SIZE)
+    if refused:
+        with pytest.raises(PictureError, match=r"frame 3 comes \+5 frames off a constant 25"):
+            list(got)
+    else:
+        assert [time for time, _ in got] == pytest.approx(np.arange(6) / 25.0)
 
 
 def test_a_low_pass_delays_the_poses_and_says_so(files: Path) -> None:

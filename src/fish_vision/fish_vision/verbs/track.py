@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fish_report.errors import UserError
+from fish_report.writable import partial_file, writable_file
 
 if TYPE_CHECKING:
     from fish_vision.tracker import Detection
@@ -55,7 +56,9 @@ def _track(args: argparse.Namespace) -> int:
     tracker, lost, spacings = make_follower(config, calibration), Counter[str](), []
     repeats = Repeats()
     lowpass = PoseLowPass(config.lowpass_hz, config.reacquire_s)
-    with args.out.open("w", newline="", encoding="utf-8") as file:
+    writable_file(args.picture)
+    part = partial_file(writable_file(args.out))  # what stands there is kept until all is tracked
+    with part.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow([*HEADER, *(f"tail_{i + 1}" for i in range(config.tail_links))])
         for stamp, picture in frames(args.video, args.rate, calibration.lens.size):
@@ -70,6 +73,7 @@ def _track(args: argparse.Namespace) -> int:
                 lost[found.reason.value] += 1
             if not spacings or len(spacings) == 1:
                 shown = annotated(picture, found, config, calibration)
+    part.replace(args.out)
     count = len(spacings) + lost.total()
     write_picture(args.picture, shown)
     print(f"{args.out}: fish seen in {len(spacings)} of {count} frames")
