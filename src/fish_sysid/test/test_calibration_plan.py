@@ -95,3 +95,9 @@ def test_the_shortest_set_takes_the_swim_that_says_most_for_its_time():
     assert reachable(information, prior) == pytest.approx(np.full(2, 1.0 / np.sqrt(600.01)))
     # a share of swims 1 and 2 suffices
     assert shortest_possible(information, seconds, prior, wanted) == pytest.approx(2.0, rel=0.01)
+
+
+@pytest.mark.parametrize("error", [0.0, -0.1, np.nan, np.inf])
+def test_an_error_that_is_no_share_is_refused(error: float) -> None:
+    with pytest.raises(UserError, match="expected a share above 0"):
+        plan_calibration(Robot(), error=error)

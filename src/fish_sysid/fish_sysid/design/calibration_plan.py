@@ -72,7 +72,7 @@ def plan_calibration(
 ) -> Plan:
     """The shortest plan for a robot like this one. error: wanted of all parameters, `errors` of single ones.
 
-    Raises UserError where no set of swims reaches what is wanted.
+    Raises UserError where an error is no share, or no set of swims reaches what is wanted.
     """
     sensors, noise = sensors or SensorSet(), noise or Noise()
     report("swims that the pool has room for")
@@ -82,6 +82,10 @@ def plan_calibration(
     wanted = np.array([(errors or {}).get(name, error) for name in names])
     if unknown := sorted(set(errors or {}) - set(names)):
         raise UserError(f"error of {unknown[0]}: expected one of {', '.join(names)}")
+    if (odd := ~((wanted > 0.0) & (wanted < np.inf))).any():
+        raise UserError(
+            f"error of {names[int(odd.argmax())]}: got {wanted[odd][0]:g}; expected a share above 0, as 0.05 for 5 %"
+        )
     tables = []
     for number, like in enumerate(robots_like(robot, free, robots)):
         report(f"information of {len(swims)} swims, robot {number + 1} of {robots}")
