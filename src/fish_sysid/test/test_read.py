@@ -104,3 +104,25 @@ def test_an_imu_without_an_orientation_still_measures(tmp_path):
     assert np.isfinite(half.gyro).sum() == np.isfinite(known.gyro).sum() > 100
     np.testing.assert_allclose(half.gyro, known.gyro, atol=1e-12)
     assert half.start_at_rest == known.start_at_rest
+
+
+def test_a_unit_that_no_fit_can_mend_is_said_of_its_trial(tmp_path):
+    def in_degrees(i, t, m):
+        m.position = np.array([m.position[0], 20.0 * (-1) ** (i // 50)])
+        return t, m
+
+    messages = samples.robot_messages()
+    samples.robot_recording(tmp_path / "a")
+    samples.write_mcap(tmp_path / "b", samples.changed(messages, "/fish/joint_command", in_degrees))
+    experiment, said = read_experiment(tmp_path)
+    assert experiment.names == ("a", "b")
+    assert len(said) == 1
+    assert "b /fish/joint_command" in said[0]
+    assert "goes to 20 rad" in said[0]
+    assert "publish rad" in said[0]
+
+
+def test_an_effect_that_nobody_knows_is_refused_before_anything_is_read(tmp_path, capsys):
+    for given in ("tip_slipp", "choose,tip_slip"):
+        assert command.main(["identify", str(tmp_path), "--effects", given]) == 1
+        assert f"unknown candidate '{given.split(',')[0]}'" in capsys.readouterr().err

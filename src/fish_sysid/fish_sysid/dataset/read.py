@@ -9,10 +9,13 @@ from pathlib import Path
 
 from fish_bag import read_dataset
 from fish_bag.dataset import check_set, told_apart
+from fish_bag.problem import Problem
 from fish_bag.topic_map import TopicMap
 from fish_bag.trial import Trial
 from fish_report.errors import UserError, user_errors
 from fish_sysid.dataset.experiment import Experiment, ExperimentError, build_experiment
+
+DROPPED = ("unreadable", "wrong_frame")  # errors of samples that are not used
 
 
 def read_experiment(*paths: Path, topics: TopicMap | None = None) -> tuple[Experiment, list[str]]:
@@ -54,13 +57,27 @@ def mixed(trials: Sequence[Trial]) -> str | None:
 
 def repeated(trial: Trial) -> list[str]:
     """What a trial holds more than once, of what an experiment is made of."""
-    used = ("commands", "encoder", "imu", "camera")
-    topics = [trial.streams[role].topic for role in used if role in trial.streams]
     return [
         f"{trial.name} {problem.topic}: {problem.text}; each is used once"
-        for problem in trial.problems
-        if problem.kind == "duplicate" and problem.topic in topics
+        for problem in _of_use(trial)
+        if problem.kind == "duplicate"
     ]
+
+
+def unusable(trial: Trial) -> list[str]:
+    """Errors of what an experiment is made of, as of a unit, that no fit can mend."""
+    return [
+        f"{trial.name} {problem.topic}: {problem.text}; used as it is, which no fit can mend"
+        for problem in _of_use(trial)
+        if problem.severity == "error" and problem.kind not in DROPPED
+    ]
+
+
+def _of_use(trial: Trial) -> list[Problem]:
+    """Problems of the topics that an experiment is made of."""
+    used = ("commands", "encoder", "imu", "camera")
+    topics = [trial.streams[role].topic for role in used if role in trial.streams]
+    return [problem for problem in trial.problems if problem.topic in topics]
 
 
 def _usable(paths: Sequence[Path], topics: TopicMap | None) -> tuple[list[Trial], list[str]]:
@@ -81,7 +98,7 @@ def _usable(paths: Sequence[Path], topics: TopicMap | None) -> tuple[list[Trial]
             left_out.append(str(error))
         else:
             trials.append(trial)
-            left_out += repeated(trial)
+            left_out += [*repeated(trial), *unusable(trial)]
     if not trials:
         raise UserError("no trial can be used: " + "; ".join(left_out))
     return trials, left_out

@@ -55,13 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Identify, print, write."""
     from fish_report.terminal import print_table
-    from fish_sysid.diagnosis.vocabulary import choosable
+    from fish_sysid.diagnosis.vocabulary import choosable, known
     from fish_sysid.identification import identify
     from fish_sysid.identification_json import write_identification
     from fish_sysid.reports.identify_page import write_identify_page
     from fish_sysid.reports.identify_tables import error_table, parameter_table
 
     console, chosen = terminal(), args.effects == "choose"
+    with user_errors():
+        effects = () if chosen else known([name for name in args.effects.split(",") if name])
     robot = read_model(args.robot)
     experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
     writable_folder(args.out)
@@ -79,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
             robot,
             hold_out=args.hold_out,
             report=progress,
-            effects=() if chosen else tuple(name for name in args.effects.split(",") if name),
+            effects=effects,
             choose_from=choosable() if chosen else (),
         )
     write_identification(args.out, result, left_out)
