@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.camera_time_offset import Alignment, align, moved_back
-from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.experiment import FEWEST_POSES, Experiment
 from fish_sysid.dataset.imu_time_offset import imu_moved_back
 from fish_sysid.dataset.marker_place import ahead_of, at_centre_of_mass, with_marker
 from fish_sysid.estimation.ekf_types import Noise
@@ -50,6 +50,7 @@ from fish_sysid.prediction.prediction import estimate
 
 Array = NDArray[np.float64]
 
+ADDED = 0.2  # s, delay of the camera that predictions may find beyond the gyro's
 EFFECT_START = 0.3  # typical strengths, at which the fit of an effect starts
 SO_FITTED = (
     "it lacks something, so that it was fitted to predictions over 0.5 to 5 s instead of the likelihood; standard errors are "
@@ -110,6 +111,8 @@ def identify(
     lag = Alignment(0.0, np.nan, np.nan)
     if "camera_latency" not in (*robot.sensors, *effects):
         lag = align(experiment.select(train))
+    experiment, unseen = with_poses_left(experiment, lag.delay)
+    train, held = split(len(experiment.names), hold_out)
     moved = moved_back(experiment, lag.delay)
     training = moved.select(train)
     noise = noise or usual_noise(
@@ -129,7 +132,21 @@ def identify(
         )
         fitted = replace(fitted, statements=(why, *fitted.statements))
     found = concluded(experiment, train, held, lag, robot, fitted, report, began)
-    return replace(found, ahead=ahead)
+    return replace(found, ahead=ahead, statements=(*unseen, *found.statements))
+
+
+def with_poses_left(experiment: Experiment, delay: float) -> tuple[Experiment, list[str]]:
+    """The trials with poses left when images are moved back by this delay [s] and what predictions add; the others in words."""
+    if not delay:
+        return experiment, []
+    left = [int((frames.t >= delay + ADDED).sum()) for frames in experiment.frames]
+    kept = [m for m, count in enumerate(left) if count >= FEWEST_POSES]
+    return experiment.select(kept), [
+        f"{name}: not used: images are {delay:.2f} s older than their stamps, so that only {count} camera poses were taken well "
+        f"after the first command; at least {FEWEST_POSES} are needed; record longer trials"
+        for name, count in zip(experiment.names, left, strict=True)
+        if count < FEWEST_POSES
+    ]
 
 
 def by_likelihood(

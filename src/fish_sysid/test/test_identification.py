@@ -29,6 +29,7 @@ from fish_sysid.identification import (
     Identification,
     identify,
     split,
+    with_poses_left,
 )
 from fish_sysid.identification_json import write_identification
 from fish_sysid.identification_statements import (
@@ -308,3 +309,15 @@ def test_score_of_a_fit_is_its_error_over_its_standard_error(found: Identificati
     ratio = np.array([found.fit.values[n] / TRUTH.parameters[n] for n in FREE])
     deviation = np.sqrt(np.diag(found.fit.covariance))
     np.testing.assert_allclose(score.score, np.log(ratio) / deviation, rtol=1e-6)
+
+
+def test_trials_whose_late_images_leave_no_pose_are_named_and_not_used() -> None:
+    whole = experiment_of(("steps", "steps"), 2.0)
+    t = np.array([0.1, 0.2, 0.3])
+    short = Frames(t, np.zeros((3, 3)))
+    experiment = replace(whole, names=("long", "short"), frames=(whole.frames[0], short))
+    kept, said = with_poses_left(experiment, 0.49)
+    assert kept.names == ("long",)
+    assert len(said) == 1
+    assert said[0].startswith("short: not used: images are 0.49 s older")
+    assert with_poses_left(experiment, 0.0) == (experiment, [])

@@ -219,3 +219,14 @@ def test_the_best_of_many_candidates_by_chance_is_seldom_added() -> None:
         for found in logarithm
     ]
     assert np.mean(added) == pytest.approx(LEVEL, abs=0.01)
+
+
+def test_a_fold_of_trials_too_short_for_a_prediction_says_nothing() -> None:
+    experiment = swum(Robot(links=1)).select([0, 1, 2])
+    steps = experiment.steps.copy()
+    steps[2] = round(1.5 / DT)
+    seen = experiment.frames[2].t < steps[2] * DT
+    short = Frames(experiment.frames[2].t[seen], experiment.frames[2].pose[seen])
+    mixed = replace(experiment, steps=steps, frames=(*experiment.frames[:2], short))
+    _, costs = left_out_costs(mixed, fitted(mixed))
+    assert np.isfinite(costs).tolist() == [True, True, False]

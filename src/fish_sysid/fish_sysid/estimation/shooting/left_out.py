@@ -63,12 +63,17 @@ def step_text(step: Step) -> str:
 
 
 def left_out_costs(experiment: Experiment, found: Found) -> tuple[Found, Array]:
-    """(the fit a few iterations on, (M,) cost per prediction of each trial by its parameters without the trial's fold)."""
+    """(the fit a few iterations on, (M,) cost per prediction of each trial by its parameters without the trial's fold).
+
+    NaN for a trial that is too short for a prediction.
+    """
     cost = multistep(experiment, found, EVERY)
     size, z = cost.improve(found.z, ROUNDS, ITERATIONS)
     fold, costs = fold_of(len(experiment.names)), np.full(len(experiment.names), np.nan)
     for f, without in enumerate(without_folds(cost, z, cost.states(z))):
-        left_out = np.flatnonzero(fold == f).tolist()
+        left_out = [m for m in np.flatnonzero(fold == f).tolist() if m in cost.targets.trial]
+        if not left_out:
+            continue
         unseen = multistep(experiment.select(left_out), replace(found, z=without), EVERY)
         costs[left_out] = unseen.costs_by_trial(without)
     return replace(found, z=z, cost=size), costs
