@@ -35,6 +35,7 @@ from fish_sysid.estimation.shooting.schedule import can_be_predicted
 from fish_sysid.estimation.thresholds import INNOVATION_RMS_REJECT, RATIO_REJECT
 from fish_sysid.identification_result import Identification, trust_of
 from fish_sysid.identification_statements import (
+    AGE_UNKNOWN,
     data_statements,
     fit_statements,
     lag_statements,
@@ -108,9 +109,10 @@ def identify(
     began, ahead = time.monotonic(), ahead_of(robot)
     experiment, robot = at_centre_of_mass(experiment, ahead), with_marker(robot, -ahead)
     train, held = split(len(experiment.names), hold_out)
-    lag = Alignment(0.0, np.nan, np.nan)
+    lag, unknown = Alignment(0.0, np.nan, np.nan), False
     if "camera_latency" not in (*robot.sensors, *effects):
         lag = align(experiment.select(train))
+        unknown = bool(np.isnan(lag.rms))
     experiment, unseen = with_poses_left(experiment, lag.delay)
     train, held = split(len(experiment.names), hold_out)
     moved = moved_back(experiment, lag.delay)
@@ -132,6 +134,7 @@ def identify(
         )
         fitted = replace(fitted, statements=(why, *fitted.statements))
     found = concluded(experiment, train, held, lag, robot, fitted, report, began)
+    unseen += [AGE_UNKNOWN] if unknown else []
     return replace(found, ahead=ahead, statements=(*unseen, *found.statements))
 
 

@@ -28,6 +28,10 @@ STILL = 0.02
 LONG_GAP = 1.0  # s without a sample of IMU or camera
 NO_TURN = 0.3  # rad, between the leftmost and the rightmost stroke-mean heading of a trial
 NO_IMU = "its biases stay unknown, and fast motion is seen by the camera only"
+AGE_UNKNOWN = (
+    "the age of the images is not known: no trial has 5 s of gyro without a pause and of images with it; where images are late, "
+    "no fit can be trusted before it is: record the IMU"
+)
 NO_ENCODER = "the rotor is taken to follow its commands"
 
 
@@ -45,7 +49,7 @@ def prediction_statements(found: PredictionFit) -> list[str]:
         *map(step_statement, found.links_judged),
     ]
     out += [
-        f"{name}: {clocks[name]:+.3f} +- {deviation[name]:.3f} beyond what camera and gyro say, by predictions"
+        f"{name}: {clocks[name]:+.3f} +- {deviation[name]:.3f} beyond what was taken out before, by predictions"
         for name in clocks
         if name not in (IMU_CLOCK, PLACE)
     ]

@@ -33,6 +33,7 @@ from fish_sysid.identification import (
 )
 from fish_sysid.identification_json import write_identification
 from fish_sysid.identification_statements import (
+    AGE_UNKNOWN,
     data_statements,
     entangled,
     lost_statements,
@@ -84,6 +85,16 @@ def test_a_model_that_lacks_something_is_fitted_to_what_it_is_for() -> None:
     assert FITTED_FOR_OUTLOOK in found.statements
     at_5_s = [found.errors[robot].rms[-1, 0] for robot in ("start", "identified")]
     assert at_5_s[1] < 0.5 * at_5_s[0]
+
+
+def test_that_the_images_age_is_not_known_without_a_gyro_is_said(found: Identification) -> None:
+    assert AGE_UNKNOWN not in found.statements
+    trials = experiment_of(("sines", "random", "steps"), 6.0)
+    blind = identify(replace(trials, gyro=np.full_like(trials.gyro, np.nan)), Robot(), free=FREE)
+    assert AGE_UNKNOWN in blind.statements
+    known = Robot().with_effect("camera_latency", delay=0.1)
+    told = identify(replace(trials, gyro=np.full_like(trials.gyro, np.nan)), known, free=FREE)
+    assert AGE_UNKNOWN not in told.statements
 
 
 def test_held_out_trial_took_no_part(found: Identification) -> None:
