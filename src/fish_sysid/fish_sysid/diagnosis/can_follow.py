@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fish_sim.robot import Robot
+from fish_sysid.dataset.camera_time_offset import align, moved_back
 from fish_sysid.diagnosis.known_effects import known_effects
 from fish_sysid.diagnosis.task import Task
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.shooting.elimination import INTRINSIC
-from fish_sysid.estimation.shooting.misfit import misfit
-from fish_sysid.estimation.thresholds import CANNOT_FOLLOW
+from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
 
 FLOW = "current"  # the one effect of the pool that displaces a fish by more than the camera's noise in two seconds
 
@@ -25,19 +25,22 @@ FLOW = "current"  # the one effect of the pool that displaces a fish by more tha
 def missed_by(task: Task) -> float | None:
     """By how many times the camera's noise the model misses two seconds of swimming; None where it can follow the fish.
 
-    Start states, clocks, parameters and the effects of body, actuators and water are free, all at once.
+    Start states, clocks, parameters and the effects of body, actuators and water are free, all at once. Images are first moved
+    back by the age that camera and gyro show.
     """
     if not task.runs("can the model follow"):
         return None
     own = known_effects(task.robot)
     effects = [name for name in (*INTRINSIC, FLOW) if name in task.robot.table and name not in own]
     left = missed_with(effects, task.robot, task)
-    return left if left > CANNOT_FOLLOW else None
+    return left if left > TOO_FAR else None
 
 
 def missed_with(effects: Iterable[str], robot: Robot, task: Task) -> float:
     """The same of a robot that has these effects free, and no other but its own."""
     training, names = task.trials.training, tuple(effects)
+    if "camera_latency" not in robot.sensors:
+        training = moved_back(training, align(training).delay)
     for name in names:
         robot = robot.without_effect(name)
     return misfit(training, robot, usual_noise(training), NOMINAL_FREE, effects=names)

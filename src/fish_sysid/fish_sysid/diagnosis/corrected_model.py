@@ -16,7 +16,8 @@ from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.thresholds import CANNOT_FOLLOW, MOST_UNEXPLAINED, RATIO_REJECT
+from fish_sysid.estimation.shooting.misfit import TOO_FAR
+from fish_sysid.estimation.thresholds import MOST_UNEXPLAINED, RATIO_REJECT
 from fish_sysid.prediction.prediction import EVERY, WARM_UP, predict, prediction_errors
 
 Array = NDArray[np.float64]
@@ -31,7 +32,7 @@ def verdict(d: Diagnosis) -> str:
     Where the likelihood cannot be asked, names by prediction decide if the model follows the fish with them.
     """
     names = [a.name for a in named(d)]
-    if d.still_misses is not None and d.still_misses <= CANNOT_FOLLOW:
+    if d.still_misses is not None and d.still_misses <= TOO_FAR:
         names = [asked.step.name for asked in asked_by_predictions(d)]
     if not names:
         return "unexplained" if much_is_left(d) or refused(d) else "no_mismatch"

@@ -33,9 +33,6 @@ RATIO_GROWTH = 2.0  # on more trials than fitted to: from there on the optimum i
 INNOVATION_RMS_SUSPECT = 1.2  # too large for the estimated noise: a poor optimum
 INNOVATION_RMS_REJECT = 4.0  # no wrench explains it: the sensors are noisier, or the model is wrong
 
-# --- can the model follow the fish? -----------------------------------------------------------------
-CANNOT_FOLLOW = 2.5  # times the camera's noise, left by windows of 2 s: the likelihood would name what happens to help
-
 # --- annealing: (factor of the IMU's noise, most iterations) ---------------------------------------
 CAMERA_STAGES = ((100.0, 25), (30.0, 25), (10.0, 15))  # the camera decides
 IMU_STAGES = ((3.0, 15), (1.0, 15))  # up to the IMU's full weight
