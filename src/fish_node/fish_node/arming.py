@@ -109,13 +109,15 @@ class Arming:
         A silence or a trouble that this word ends disarms, though no check came in between, as in a process that stood still.
         """
         with self._lock:
-            source = self._sources.setdefault(name, Source(name, required=False))
-            before = self._heard.setdefault(name, _Heard())
-            if self._armed and (ended := self._trouble(source, now, patient=True)):
+            if name not in self._sources:
+                self._sources[name] = Source(name, required=False)
+                self._heard[name] = _Heard()
+            heard = self._heard[name]
+            if self._armed and (ended := self._trouble(self._sources[name], now, patient=True)):
                 self.disarm(ended)
-            self._heard[name] = _Heard(
-                now, visible(trouble), before.since_s if before.trouble else now
-            )
+            if not heard.trouble:
+                heard.since_s = now
+            heard.time_s, heard.trouble = now, visible(trouble) if trouble else ""
 
     def troubles(self, now: float, patient: bool = False) -> list[str]:
         """Everything that forbids to move at `now` [s], in words; patient: without what may last a little longer."""

@@ -23,6 +23,7 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool
 
@@ -79,7 +80,7 @@ class ArmingServer:
             hear(node, PoseWithCovarianceStamped, "camera/pose", self._on_camera, NEWEST)
         if settings.deadman_timeout_s > 0.0:
             node.create_subscription(Bool, "operator/deadman", self._on_deadman, 10)
-        node.create_subscription(DiagnosticArray, "arming/state", self._on_state, 10)
+        node.create_subscription(DiagnosticArray, "arming/state", self._on_state, 10, raw=True)
         node.create_subscription(Bool, "operator/estop", self._on_estop, 10)
         node.create_subscription(String, "arming/pause", self._on_pause, 10)
         node.create_subscription(String, "arming/disarm", self._on_disarm, 10)
@@ -159,7 +160,10 @@ class ArmingServer:
         self._arming.check(self._clock())
         self.say_change()
 
-    def _on_state(self, message: DiagnosticArray) -> None:
+    def _on_state(self, data: bytes) -> None:
+        if self._id.encode() in data:  # its own, twenty times a second
+            return
+        message = deserialize_message(data, DiagnosticArray)
         others = [status.hardware_id for status in message.status if status.hardware_id != self._id]
         if others:
             who = others[0].partition(" ")[0] or "a node without a name"
