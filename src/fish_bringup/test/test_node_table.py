@@ -438,6 +438,8 @@ def test_the_drivers_alone_take_a_robots_own_values_in_the_same_way(launch_names
     drivers = [spec for spec in node_table.ROBOTS["real"] if spec.package == "fish_hw"]
     installed = {spec.executable: [str(node_table.parameter_path(spec))] for spec in drivers}
     for config, own in (("", []), (str(tmp_path), [str(tmp_path / "rotor.yaml")])):
-        files = {node.executable: node.parameters for node in opaque.function({"config": config})}
+        nodes = opaque.function({"config": config})
+        files = {node.executable: node.parameters for node in nodes}
+        assert [node.on_exit.reason for node in nodes] == [f"{name} ended" for name in files]
         assert files == {**installed, "rotor": installed["rotor"] + own}
     assert {argument.args[0] for argument in arguments} == {"config", "namespace", *installed}

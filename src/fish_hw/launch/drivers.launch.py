@@ -6,13 +6,15 @@ ros2 launch fish_hw drivers.launch.py config:=FOLDER
 
 FOLDER holds this robot's own values: what stands in FOLDER/rotor.yaml, rudder.yaml, ... overrides the installed file of that
 name, as in fish.launch.py. The camera usually hangs on another computer than the rest: camera:=false leaves it out.
+A driver that ends, ends the launch with it: the unit fish-drivers.service then stops and centres both motors, and starts all
+drivers again, disarmed.
 """
 
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -38,6 +40,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
             parameters=[str(INSTALLED / f"{name}.yaml"), *own.get(name, [])],
             condition=IfCondition(LaunchConfiguration(name)),
             output="screen",
+            on_exit=Shutdown(reason=f"{name} ended"),
         )
         for name in DRIVERS
     ]

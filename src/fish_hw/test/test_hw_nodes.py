@@ -39,6 +39,7 @@ from fish_hw.nodes.rotor import RotorNode
 from fish_hw.nodes.rudder import RudderNode
 from fish_hw.nodes.worker import Worker
 from fish_hw.transport.sysfs_pwm import SysfsPwm
+from fish_node import rivals
 from fish_node.camera_file import CameraFileError, read_camera_file
 
 pytestmark = pytest.mark.ros
@@ -281,6 +282,20 @@ def test_a_driver_that_waits_for_simulated_time_says_so(graph):
     assert "no time on /clock" in diagnostics[0].status[0].message
     assert g.spin(lambda: bool(g.node.failure))
     assert "no time on /clock" in g.node.failure
+
+
+def test_a_second_commander_is_warned_of(graph, monkeypatch, capfd):
+    monkeypatch.setattr(rivals, "PATIENCE_S", 0.0)
+    g = graph(RotorNode, port="emulator")
+    both = [g.peer.create_publisher(JointState, "joint_command", 10) for _ in range(2)]
+    said = []
+
+    def warned() -> bool:
+        said.append(capfd.readouterr().err)
+        return "another publisher of /fish/joint_command: stop one of the two" in "".join(said)
+
+    assert g.spin(warned)
+    assert len(both) == 2
 
 
 def test_a_deadman_that_is_let_go_for_a_moment_disarms(graph, vertiq_emulator):

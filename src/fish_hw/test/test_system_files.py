@@ -37,6 +37,7 @@ def test_the_unit_stops_rotor_and_rudder_whatever_ended_the_drivers():
     assert "--rotor " in stop
     assert "--rudder " in stop
     assert re.search(r"^ExecStart=.*ros2 launch fish_hw drivers.launch.py", UNIT, re.MULTILINE)
+    assert re.search(r"^Restart=always$", UNIT, re.MULTILINE)
 
 
 @pytest.mark.skipif(

@@ -33,8 +33,9 @@ from fish_hw.transport.serial_port import SerialPort
 from fish_node.nodes.arming import ArmingServer
 from fish_node.nodes.message_bytes import MessageBytes, mark
 from fish_node.nodes.robot_clock import timer_clock
+from fish_node.rivals import Rivals
 
-BATTERY_PERIOD_S = 1.0
+SECOND_S = 1.0  # between two words of the battery, and two looks for other commanders
 
 
 class RotorNode(DeviceNode):
@@ -57,10 +58,15 @@ class RotorNode(DeviceNode):
         )
         self._telemetry: RotorTelemetry | None = None
         self._arming = ArmingServer(self, self._driver.arming, self.settings, self.clock.now)
-        self.create_subscription(JointState, "joint_command", self._on_command, QoSProfile(depth=1))
+        commands = self.create_subscription(
+            JointState, "joint_command", self._on_command, QoSProfile(depth=1)
+        )
+        self._commanders = Rivals(
+            commands.topic_name, self.count_publishers, self.get_logger().warning
+        )
         self.create_subscription(String, "rudder/trouble", self._on_rudder, QoSProfile(depth=1))
         self.create_service(Trigger, "~/clear_faults", self._on_clear_faults)
-        self.create_timer(BATTERY_PERIOD_S, self._on_battery, clock=timer_clock(self))
+        self.create_timer(SECOND_S, self._on_second, clock=timer_clock(self))
         self.use(self._driver, self._cycle, 1.0 / self.settings.rate_hz, self._emulator is not None)
 
     def _open_port(self) -> ByteStream:
@@ -112,7 +118,11 @@ class RotorNode(DeviceNode):
             numbers = cycle.sample.angle, cycle.sample.velocity
             self.publish(self._joint_states, self._joint_bytes(stamp, numbers))
 
-    def _on_battery(self) -> None:
+    def _on_second(self) -> None:
+        self._commanders.warning()
+        self._say_battery()
+
+    def _say_battery(self) -> None:
         telemetry, self._telemetry = self._telemetry, None  # a value is not said twice
         if telemetry is None or telemetry.volts is None or telemetry.amps is None:
             return
