@@ -790,9 +790,12 @@ def test_controller_stops_on_every_fault_and_swims_again_when_it_has_passed(benc
     assert b.said(b"\x02", said)
     np.testing.assert_allclose(commands(b, 5)[:, 1:], 0.0, atol=1e-6)
     assert b.heard["arming/pause"][-1].data.startswith(f"controller: {said}")
-    drive(b, 0.8)
-    assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
+    for _ in range(20):  # a busy computer may pause the test for longer than the watchdog waits
+        drive(b, 0.8)
+        if b.said(b"\x00", "swimming"):
+            break
     assert b.said(b"\x00", "swimming")
+    assert np.abs(commands(b, 40)[:, 1]).max() > 10.0
     assert b.heard["arming/pause"][-1].data == ""
 
 

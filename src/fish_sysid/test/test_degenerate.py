@@ -55,8 +55,9 @@ def diagnosed(**place: float):
     state = SimpleNamespace(law=Law({"surge": 0.0, "sway": 0.0, "yaw": 0.0}, {}, 1e4))
     task = SimpleNamespace(level=Level(), robot=fit.robot)
     accepted = (SimpleNamespace(name="tether"),)
+    nominal = made_fit(0.0, ratio=100.0)
     return SimpleNamespace(
-        task=task, state=state, nominal=made_fit(0.0, ratio=100.0), final=fit, accepted=accepted
+        task=task, state=state, nominal=nominal, final=fit, accepted=accepted, still_misses=None
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from training_setup import COST, make_bank, make_batch, make_stepper, make_weights
 
+from fish_train.training import compiled_loop
 from fish_train.training.closed_loop_equations import Law
 from fish_train.training.compiled_loop import CompiledLoop, fastest_loop
 from fish_train.training.network import FORMS, weight_count
@@ -121,10 +122,14 @@ def test_without_a_compiler_the_numbers_are_the_same(monkeypatch: pytest.MonkeyP
 
 
 @compiled
-def test_a_loop_that_the_compiler_gets_wrong_is_that_of_torch(wrong_compiler, caplog) -> None:
-    """Wrong is the gradient alone: what travels back through the actuators."""
+@pytest.mark.parametrize("width", [2, 4, 8])
+def test_a_loop_that_the_compiler_gets_wrong_is_that_of_torch(
+    wrong_compiler, caplog, monkeypatch, width
+) -> None:
+    """Wrong is the gradient alone: what travels back through the actuators. At the width of every processor."""
     law = Law(inputs="none")
     wrong_compiler("s/copy(g_actuator, NA, g->actuator)/zero(g->actuator, NA)/")
+    monkeypatch.setattr(compiled_loop, "lanes", lambda: width)
     loop = fastest_loop(make_stepper(), law, make_bank(law), FORMS["constant"].layers)
     assert isinstance(loop, TorchLoop)
     assert "the slower interpreted form is used" in caplog.text

@@ -29,7 +29,8 @@ from fish_train.training.torch_loop import TorchLoop
 
 Array = NDArray[np.float64]
 
-PERIODS, HOLD = 4, 2
+# of fewer no actuator falls behind its set-point again, and nothing travels back through its memory
+PERIODS, HOLD = 6, 2
 HIDDEN = 9  # units, one more than a panel of weights
 SEED = 3
 FLEET = ("plant", "memory", "place", "history")
