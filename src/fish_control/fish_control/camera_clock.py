@@ -77,6 +77,10 @@ class CameraClock:
         ] = ()  # after a step: as before, moved with the clock
         self._stepped_at = 0.0  # s, stamp
         self._last_stamp, self._back = -math.inf, 0.0  # s; by how much stamps went back
+        self._back_at, self._disordered = (
+            0.0,
+            False,
+        )  # s, when they did; whether it may be a set clock
 
     @property
     def age(self) -> float:
@@ -87,7 +91,7 @@ class CameraClock:
     @property
     def undecided(self) -> bool:
         """Whether a clock may have been set: poses that show a moving fish wait until it is clear."""
-        return bool(self._rivals) or self._back > LEAST_STEP
+        return bool(self._rivals) or self._disordered
 
     def add(self, stamp: float, heading: float, imu: ImuHistory, now: float) -> None:
         """A pose with this stamp and heading arrives when the IMU's clock is at `now` [s].
@@ -97,7 +101,12 @@ class CameraClock:
         usual = self._watch.usual
         stepped = self._watch.add(now - stamp)
         back = max(self._back, self._last_stamp - stamp)
+        if self._back <= LEAST_STEP:
+            self._back_at = now
         self._back = back if self._watch.strange else 0.0
+        # a network that mixes up images for longer sets no clock
+        recent = now - self._back_at <= LONGEST_DOUBT
+        self._disordered = self._back > LEAST_STEP and recent
         self._last_stamp = stamp
         if stepped is not None and usual is not None:
             self._step(stamp, stepped, usual, back)

@@ -512,6 +512,21 @@ def test_images_that_come_later_with_right_stamps_are_no_set_clock(later):
     assert np.mean(nees < 16.27) > 0.95
 
 
+def test_a_network_that_mixes_up_images_for_long_does_not_hold_all_of_them_back():
+    """Every image comes late, each by another time and many out of order: no clock was set."""
+    fusion, random = Fusion(), np.random.default_rng(0)
+    late = [
+        (a + random.uniform(0.15, 0.7) * (k == "camera" and a > 4.0), k, s, v)
+        for a, k, s, v in swum(14.0)
+    ]
+    feed(fusion, sorted(late, key=lambda e: e[0]))
+    assert fusion.camera_clock.jumps == 0
+    assert fusion.counts["pose_clock_undecided"] < 110  # 3 s of them
+    assert not fusion.estimate().camera_lost
+    error = fusion.estimate().pose - true_pose(fusion.estimate().time)
+    assert np.hypot(*error[:2]) < 0.05
+
+
 @pytest.mark.parametrize("back", [0.05, 0.3, 1.0, 1.99])
 def test_both_clocks_set_back_by_less_than_the_history_start_anew(back):
     fusion, events = Fusion(), swum(8.0)

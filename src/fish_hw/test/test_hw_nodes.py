@@ -298,17 +298,18 @@ def test_a_second_commander_is_warned_of(graph, monkeypatch, capfd):
     assert len(both) == 2
 
 
+# without estimate and rudder; a loaded computer keeps the emulated module waiting
+PATIENT = {
+    "estimate": "ignored",
+    "rudder_timeout_s": 0.0,
+    "stale_s": 1.0,
+    "reply_timeout_s": 0.2,
+    "module_timeout_s": 1.0,
+}
+
+
 def test_a_deadman_that_is_let_go_for_a_moment_disarms(graph, vertiq_emulator):
-    g = graph(
-        RotorNode,
-        port=vertiq_emulator.port,
-        estimate="ignored",
-        rudder_timeout_s=0.0,
-        deadman_timeout_s=5.0,
-        stale_s=1.0,
-        reply_timeout_s=0.2,
-        module_timeout_s=1.0,
-    )
+    g = graph(RotorNode, port=vertiq_emulator.port, deadman_timeout_s=5.0, **PATIENT)
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     deadman = g.peer.create_publisher(Bool, "operator/deadman", 10)
     asks = g.arming(publisher)
@@ -329,15 +330,7 @@ def test_a_deadman_that_is_let_go_for_a_moment_disarms(graph, vertiq_emulator):
 
 
 def test_another_owner_of_the_arming_state_forbids_to_arm_while_it_is_there(graph, vertiq_emulator):
-    g = graph(
-        RotorNode,
-        port=vertiq_emulator.port,
-        estimate="ignored",
-        rudder_timeout_s=0.0,
-        stale_s=1.0,
-        reply_timeout_s=0.2,
-        module_timeout_s=1.0,
-    )
+    g = graph(RotorNode, port=vertiq_emulator.port, **PATIENT)
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     simulator = g.peer.create_publisher(DiagnosticArray, "arming/state", 10)
     status = DiagnosticStatus(level=DiagnosticStatus.OK, hardware_id="/fish/simulator 0123abcd")

@@ -10,10 +10,13 @@ import pytest
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, shorten
 from fish_sysid.dataset.synthetic import program, record
+from fish_sysid.diagnosis.prediction_rivals import with_rivals
 from fish_sysid.diagnosis.surrogate_model import moving_effects, surrogate_model
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.parametrization import nominal_hypothesis
+from fish_sysid.estimation.shooting.left_out import Step
+from fish_sysid.estimation.shooting.schedule import Found
 from fish_sysid.prediction.better_states import prediction_size
 
 FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
@@ -65,6 +68,17 @@ def test_what_the_robot_has_from_the_symmetries_is_no_candidate() -> None:
     names = ("current", "tip_slip", "camera_latency")
     assert moving_effects(names, drifting) == ["tip_slip"]
     assert moving_effects(names, NOMINAL) == ["current", "tip_slip"]
+
+
+def test_an_effect_that_was_added_in_a_later_round_is_nobodys_rival(slipping: Experiment) -> None:
+    steps = (
+        Step("quadratic_drag", 0.3, 0.1, 2.0, added=True),
+        Step("wave_drag", 0.1, 0.1, 2.0),
+        Step("wave_drag", 0.3, 0.1, 2.0, added=True),
+    )
+    found = Found(nominal(slipping).hypothesis, np.zeros(len(FREE)), np.inf)
+    named = with_rivals(slipping, found, steps)
+    assert [(n.step.name, n.rivals) for n in named] == [("quadratic_drag", {}), ("wave_drag", {})]
 
 
 def test_a_fit_that_predicts_better_stays(slipping: Experiment) -> None:

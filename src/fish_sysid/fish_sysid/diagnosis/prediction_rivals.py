@@ -40,7 +40,8 @@ class Named:
 def with_rivals(experiment: Experiment, found: Found, steps: Sequence[Step]) -> tuple[Named, ...]:
     """The effects that were added, each with its rivals among all that were judged."""
     added = [step for step in steps if step.added]
-    others = dict.fromkeys(step.name for step in steps if not step.added)
+    taken = {step.name for step in added}  # one may be judged in several rounds before it is added
+    others = dict.fromkeys(step.name for step in steps if step.name not in taken)
     pairs = [
         (step, other)
         for step in added
