@@ -21,6 +21,7 @@ from fish_sysid.diagnosis.change.compare import LOOKS
 from fish_sysid.diagnosis.change.contenders import Contender, family_alone, weighed
 from fish_sysid.diagnosis.change.explanation import explained, swapped_in, telling
 from fish_sysid.diagnosis.change.naming import Judged
+from fish_sysid.diagnosis.change.other_commands import OldAnswer
 from fish_sysid.diagnosis.change.permutation_test import (
     permutation_p_value,
     rank,
@@ -40,7 +41,7 @@ SPREADS = np.array([np.tile([1.0, -1.0], TRIALS // 2), np.repeat([1.0, -1.0], TR
 def judged(name: str, gain: float, spread: float = 1.0) -> Judged:
     """Gains over trials that go their own way for names of odd and even length."""
     by_trial = gain + spread * SPREADS[len(name) % 2]
-    return Judged((name, 0), gain, 0.4, by_trial, np.ones(1), np.eye(1), gain)
+    return Judged((name, 0), gain, 0.4, by_trial, np.ones(1), np.eye(1), gain, 1.0)
 
 
 def contender(name: str, gain: float, remainder: float, rarity: float = 5.0) -> Contender:
@@ -131,6 +132,7 @@ def looks_at(days):
     """looks_at(new): both looks at a NEW of the same OLD."""
     old, _ = days
     rows_of_old = trial_rows(Robot(), old, swims(old), NAMES)
+    answer = OldAnswer.of(rows_of_old)
 
     def cases(new) -> list[Case]:
         rows = [rows_of_old, trial_rows(Robot(), new, swims(new), NAMES)]
@@ -140,7 +142,18 @@ def looks_at(days):
             fit, strata = regression(kept, moved), [0] * (OLD + NEW)
             day_of = [0] * OLD + [1] * NEW
             found.append(
-                Case(channels, fit, kept, moved, strata, day_of, Robot(), new, tuple(swims(new)))
+                Case(
+                    channels,
+                    fit,
+                    kept,
+                    moved,
+                    strata,
+                    day_of,
+                    Robot(),
+                    new,
+                    tuple(swims(new)),
+                    answer,
+                )
             )
         return found
 

@@ -18,7 +18,7 @@ from fish_sysid.diagnosis.change.rudder_change import (
     rudder_change,
     with_second_opinion,
 )
-from fish_sysid.diagnosis.change.servos import SERVOS, delayed, lagged, with_play, with_servo
+from fish_sysid.diagnosis.change.servos import ANSWERED, delayed, lagged, with_play, with_servo
 from fish_sysid.diagnosis.change.step_response import step_response
 from fish_sysid.diagnosis.change.strength import Refitted
 from fish_sysid.diagnosis.families import family_of
@@ -102,7 +102,7 @@ def test_servos_do_to_a_step_what_their_names_say() -> None:
     assert with_play(step, 0.05)[150] == pytest.approx(0.25)
     with pytest.raises(KeyError):
         with_servo(swum(1, 1), "payload", 0.1)
-    assert set(SERVOS) == {"rudder_lag", "rudder_delay", "rudder_backlash", "rudder_gain"}
+    assert set(ANSWERED) == {"rudder_lag", "rudder_delay", "rudder_backlash", "rudder_gain"}
 
 
 def test_without_a_gyro_there_is_no_answer(days) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fish_report.json_file import write_json
 from fish_report.page import Table
 from fish_study.asked_table import ASKED
 from fish_study.new_study import Asked, begin_or_go_on
@@ -64,10 +65,29 @@ def ablation_studies(out: Path, asked: Asked, stages: Sequence[str]) -> dict[str
 def run_ablation(
     studies: Mapping[str, Study], jobs: int, done: Callable[[str], None], cluster: str = ""
 ) -> None:
-    """Run every scenario of every study that has no result yet."""
+    """Run every scenario of every study that has no result yet.
+
+    A search that does not come to a stage gives the same answer without it: that answer is taken and not computed again.
+    """
     for name, study in studies.items():
         tool = DIAGNOSE if name == COMPLETE else (*DIAGNOSE, "--without", name)
+        if name != COMPLETE:
+            for scenario in take_same_answers(studies[COMPLETE], study, name):
+                done(scenario)
         run_study(study, jobs, done, tool, cluster=cluster)
+
+
+def take_same_answers(complete: Study, study: Study, stage: str) -> list[str]:
+    """Copy the answers of the complete search where it did not come to this stage; names of these scenarios."""
+    taken, results = [], complete.results
+    for name in study.pending:
+        result = results[name]
+        diagnosis = result["diagnosis"]
+        if diagnosis is not None and stage not in diagnosis.get("stages", [stage]):
+            study.folder_of(name).mkdir(parents=True, exist_ok=True)
+            write_json(study.folder_of(name) / "result.json", result)
+            taken.append(name)
+    return taken
 
 
 def ablation_table(scores: Mapping[str, Sequence[Score]]) -> Table:

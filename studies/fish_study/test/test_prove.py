@@ -12,11 +12,17 @@ from prove_samples import diagnosis
 from fish_report.command_words import words_after
 from fish_report.json_file import write_json
 from fish_report.robofish import main
-from fish_study.ablation import COMPLETE, ablation_studies, ablation_table, search_stages
+from fish_study.ablation import (
+    COMPLETE,
+    ablation_studies,
+    ablation_table,
+    search_stages,
+    take_same_answers,
+)
 from fish_study.archive import pack_studies
 from fish_study.new_study import Asked, begin_or_go_on
 from fish_study.score import study_scores
-from fish_study.study import Study, StudyError
+from fish_study.study import Study, StudyError, read_json
 
 NULLS = Asked(3, ["null"], 4, 20.0, 5, frozenset({"scenarios", "groups", "trials", "seed"}))
 
@@ -117,6 +123,22 @@ def test_an_ablation_diagnoses_the_same_scenarios_without_each_stage(tmp_path: P
         ["nothing", "–", "–", f"0/{nulls}", "–", f"0/{others}", "1"],
         ["first", "–", "–", f"{nulls}/{nulls}", "–", f"{others}/{others}", "9"],
     ]
+
+
+def test_what_a_search_does_not_come_to_needs_no_second_run(tmp_path: Path) -> None:
+    studies = ablation_studies(tmp_path, Asked(3, ["null"], 4, 20.0, None), ["first"])
+    complete, without = studies[COMPLETE], studies["first"]
+    answer_all(complete)
+    names = list(complete.results)
+    for name, stages in zip(names, (["second"], ["first", "second"], None), strict=True):
+        file = complete.folder_of(name) / "result.json"
+        result = read_json(file)
+        if stages is not None:
+            result["diagnosis"]["stages"] = stages
+        write_json(file, result)
+    assert take_same_answers(complete, without, "first") == names[:1]
+    assert without.results[names[0]] == complete.results[names[0]]
+    assert without.pending == names[1:]
 
 
 def test_a_stage_that_the_diagnosis_does_not_have_is_refused(

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
@@ -56,11 +56,13 @@ class Task:
     progress: Progress
     without: frozenset[str]  # stages that are switched off
     ahead: float = 0.0  # m, of the camera's point; taken out of experiment and robot
+    asked: set[str] = field(default_factory=set, compare=False)  # stages that the search came to
 
     def runs(self, stage: str) -> bool:
         """Whether a stage of STAGES is on."""
         if stage not in STAGE_NAMES:
             raise ValueError(f"stage {stage!r}: expected one of {', '.join(sorted(STAGE_NAMES))}")
+        self.asked.add(stage)
         return stage not in self.without
 
     def needed(self, base: Fit) -> dict[str, float]:

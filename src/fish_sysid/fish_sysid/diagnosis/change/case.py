@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.channels import Swim
+from fish_sysid.diagnosis.change.other_commands import OldAnswer
 from fish_sysid.diagnosis.change.rows import TrialRows
 from fish_sysid.diagnosis.change.shared_fit import Regression
 
@@ -26,3 +27,4 @@ class Case:
     robot: Robot
     new: Experiment
     days: tuple[Swim, ...]  # of NEW
+    answer: OldAnswer

@@ -25,6 +25,7 @@ from fish_sysid.diagnosis.change.comparable import (
     screened,
 )
 from fish_sysid.diagnosis.change.explanation import NAMES, explained
+from fish_sysid.diagnosis.change.other_commands import OldAnswer
 from fish_sysid.diagnosis.change.permutation_test import permutation_p_value
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, STROKES, look, trial_rows
 from fish_sysid.diagnosis.change.rudder_change import (
@@ -92,6 +93,11 @@ def _compare(
     report("what each candidate would change")
     old_rows = trial_rows(model, old, old_days, NAMES)
     new_rows = trial_rows(model, new, new_days, NAMES)
+    answered = OldAnswer.of(old_rows)
+    old_rows, new_rows = (
+        answered.added(old_rows, old_days, old),
+        answered.added(new_rows, new_days, new),
+    )
     report("exchanging trials")
     found: dict[str, tuple[Case, Swapped]] = {}
     day_of = days_of(olds, [s.name for s in old_days], len(new_days))
@@ -102,7 +108,9 @@ def _compare(
         told += [
             f"OLD {s}: out of the other trials' family" for s in strange if s not in " ".join(told)
         ]
-        case = Case(channels, fit, kept_old, kept_new, strata, day_of, model, new, new_days)
+        case = Case(
+            channels, fit, kept_old, kept_new, strata, day_of, model, new, new_days, answered
+        )
         found[name] = case, swap_test(fit, strata, days=day_of)
     looks, tests = [case for case, _ in found.values()], [swapped for _, swapped in found.values()]
     seen = min(found, key=lambda name: found[name][1].p_value)

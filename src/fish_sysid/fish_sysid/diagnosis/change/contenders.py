@@ -12,7 +12,7 @@ from fish_sysid.diagnosis.change.candidates import PARAMETER
 from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Member, Named
 from fish_sysid.diagnosis.change.contest import apart, mean_gain, tie
-from fish_sysid.diagnosis.change.naming import Judged
+from fish_sysid.diagnosis.change.naming import SPECIAL_CASE, Judged
 from fish_sysid.diagnosis.change.shared_fit import Key
 from fish_sysid.diagnosis.change.strength import Refitted, refit
 from fish_sysid.diagnosis.change.swap_test import REMAINDER, Swapped, swap_test
@@ -23,8 +23,6 @@ REFITTED = 3  # contenders of any family by their gain, and as many by their rar
 MOST = 2 / 3  # of the weight of all contenders, that a family has which is named without numbers
 KIN = 6  # further members of the best one's family
 FEW_SWAPS = 150  # of a contender's remainder
-# a name whose special case explains as much is not needed
-SPECIAL_CASE = {"nonuniform_current": "current", "wake_memory": "tip_slip"}
 
 
 @dataclass(frozen=True)

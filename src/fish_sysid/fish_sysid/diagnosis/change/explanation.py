@@ -9,14 +9,22 @@ from dataclasses import dataclass, replace
 
 from fish_sysid.dataset.camera_time_offset import fine_delay, moved_back
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.change.candidates import COLUMNS, PARAMETER, POOL_AND_SENSORS, SIMULATED
+from fish_sysid.diagnosis.change.candidates import (
+    COLUMNS,
+    PARAMETER,
+    POOL_AND_SENSORS,
+    SIMULATED,
+    typical,
+)
 from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change, Named
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.contenders import next_change
-from fish_sysid.diagnosis.change.naming import Judged, judge_all
+from fish_sysid.diagnosis.change.naming import Judged, judge_all, strength_of
 from fish_sysid.diagnosis.change.rows import look, trial_rows
-from fish_sysid.diagnosis.change.shared_fit import Key, regression
+from fish_sysid.diagnosis.change.servos import SERVOS, with_servo
+from fish_sysid.diagnosis.change.shared_fit import Key, by_old_trials, regression
+from fish_sysid.diagnosis.change.strength import refitted
 from fish_sysid.diagnosis.change.swap_test import REMAINDER, Swapped, at_once, swap_test
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 
@@ -24,6 +32,7 @@ MOST_CHANGES = 3
 # of the gain of a simulated name that a later one must have: on a plant of another structure a simulated effect has the right
 # shape to about a half, and a quarter of its squares is left to others
 SHARE = 0.3
+SERVO_ROUNDS = 2  # of linearisation of a servo's number
 MUCH_MORE = 3.0  # times the gain in the mean motion, with which the strokes name
 LEAST = 1.0  # nats per trial, that count as such a gain
 SUSPECTS = 4  # of a remainder without a name
@@ -47,7 +56,13 @@ def explained(change: Change, looks: Sequence[Case], seen: Sequence[Swapped]) ->
             break
         if one.name == "camera_latency":
             age, one = exact_age(case.new, one)
-            looks = [younger(look, age) for look in looks]
+            looks = [with_new(case, moved_back(case.new, age)) for case in looks]
+            steps.append(_Step(one, None))
+        elif by_old_trials(key):
+            looks, one = with_its_commands(looks, one, key, _taken(steps))
+            if one.members[0].refitted.refused:
+                refused.append(one.members[0].refitted.refused)
+                break
             steps.append(_Step(one, None))
         else:
             steps.append(_Step(one, key))
@@ -145,10 +160,27 @@ def exact_age(new: Experiment, one: Named) -> tuple[float, Named]:
     return value, replace(one, members=(replace(first, refitted=values), *one.members[1:]))
 
 
-def younger(case: Case, age: float) -> Case:
-    """The case with NEW's images at the moment they were taken."""
-    new = moved_back(case.new, age)
+def with_its_commands(
+    looks: Sequence[Case], one: Named, key: Key, taken: Sequence[Key]
+) -> tuple[list[Case], Named]:
+    """NEW with its commands as the servo of today passes them on, and the change with the number that leaves none of it."""
+    first, (name, _) = one.members[0], key
+    servo = SERVOS[name]
+    found = first.refitted.parameters[servo.parameter]
+    unit, value = typical(name, servo.parameter) - servo.neutral, found.value
+    for _ in range(SERVO_ROUNDS):
+        moved = [with_new(case, with_servo(case.new, name, value)) for case in looks]
+        value += unit * float(strength_of(moved[0].fit, key, taken)[0])
+    values = refitted(
+        name, {servo.parameter: value}, {servo.parameter: found.std}, first.refitted.by_trial
+    )
+    return moved, replace(one, members=(replace(first, refitted=values), *one.members[1:]))
+
+
+def with_new(case: Case, new: Experiment) -> Case:
+    """The case with other recordings of NEW."""
     kept = {swim.name for swim in case.days}
     days = tuple(swim for swim in swims(new) if swim.name in kept)
-    rows = look(trial_rows(case.robot, new, days, NAMES), case.channels)
+    rows = case.answer.added(trial_rows(case.robot, new, days, NAMES), days, new)
+    rows = look(rows, case.channels)
     return replace(case, fit=regression(case.old, rows), rows=rows, new=new, days=days)

@@ -11,8 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sysid.diagnosis.change.shared_fit import CHANGE, Key, Regression
+from fish_sysid.diagnosis.change.swap_test import Gains
 
 Array = NDArray[np.float64]
+
+# a name whose special case explains as much is not needed
+SPECIAL_CASE = {"nonuniform_current": "current", "wake_memory": "tip_slip"}
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,7 @@ class Judged:
     strengths: Array  # (K,) in typical ones
     covariance: Array  # (K, K), by the jackknife over trials
     whole: float  # nats on the trials that it was fitted to
+    dispersion: float  # by which all these nats are divided
 
     @property
     def name(self) -> str:
@@ -43,21 +48,30 @@ def judge_all(fit: Regression, taken: Sequence[Key] = ()) -> dict[str, Judged]:
     base = _Fitter(fit, [i for k in taken for i in fit.at[k]])
     without = [base.loss(m, *base.left_out(m)) for m in new]
     found: dict[str, Judged] = {}
-    for key in fit.at:
-        if key in taken:
-            continue
-        judged = _judge(fit, key, taken, np.array(without), new)
+    dispersion = Gains(fit, taken).dispersion()
+    for key, own in dispersion.items():
+        # what its special case adds up to, it does too
+        least = dispersion.get((SPECIAL_CASE.get(key[0], ""), 0), 1.0)
+        judged = _judge(fit, key, taken, np.array(without), new, base.best, max(own, least))
         if key[0] not in found or judged.whole > found[key[0]].whole:
             found[key[0]] = judged
-    start = base.best
-    return {
-        n: Judged(j.key, j.gain, j.std, j.by_trial, j.strengths, j.covariance, j.whole - start)
-        for n, j in found.items()
-    }
+    return found
+
+
+def strength_of(fit: Regression, key: Key, taken: Sequence[Key] = ()) -> Array:
+    """Strengths (K,) of one candidate in NEW beside those `taken`, in typical ones."""
+    own = [i for k in (*taken, key) for i in fit.at[k]]
+    return _Fitter(fit, own).coefficients[-len(fit.at[key]) :]
 
 
 def _judge(
-    fit: Regression, key: Key, taken: Sequence[Key], without: Array, new: Sequence[int]
+    fit: Regression,
+    key: Key,
+    taken: Sequence[Key],
+    without: Array,
+    new: Sequence[int],
+    start: float,
+    dispersion: float,
 ) -> Judged:
     own = [i for k in (*taken, key) for i in fit.at[k]]
     fitter, K = _Fitter(fit, own), len(fit.at[key])
@@ -65,13 +79,15 @@ def _judge(
     gains = without - np.array(
         [fitter.loss(m, *found) for m, found in zip(new, left_out, strict=True)]
     )
+    gains /= dispersion
     values = np.array([b[-K:] for b, _ in left_out])
     spread = values - values.mean(axis=0)
     covariance = (len(new) - 1) / len(new) * spread.T @ spread
     std = float(gains.std(ddof=1) / np.sqrt(len(gains))) if len(gains) > 1 else np.inf
     return Judged(
-        key, float(gains.mean()), std, gains, fitter.coefficients[-K:], covariance, fitter.best
-    )
+        key, float(gains.mean()), std, gains, fitter.coefficients[-K:], covariance,
+        (fitter.best - start) / dispersion, dispersion,
+    )  # fmt: skip
 
 
 class _Fitter:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,10 @@ class Servo:
     parameter: str
     unit: str
     act: Callable[[Array, float], Array]
-    tried: Array  # (V,)
+    neutral: float  # changes nothing
+    tried: Array = field(
+        default_factory=lambda: np.zeros(0)
+    )  # (V,) that the gyro's answer is asked for
 
 
 def lagged(rudder: Array, time: float) -> Array:
@@ -52,14 +55,17 @@ def with_play(rudder: Array, play: float) -> Array:
 
 TIMES = np.arange(0.02, 0.29, 0.02)
 SERVOS = {
-    "rudder_lag": Servo("time_constant", "s", lagged, TIMES),
-    "rudder_delay": Servo("delay", "s", delayed, TIMES),
-    "rudder_backlash": Servo("play", "rad", with_play, np.arange(0.02, 0.15, 0.02)),
+    "rudder_lag": Servo("time_constant", "s", lagged, 0.0, TIMES),
+    "rudder_delay": Servo("delay", "s", delayed, 0.0, TIMES),
+    "rudder_backlash": Servo("play", "rad", with_play, 0.0, np.arange(0.02, 0.15, 0.02)),
     "rudder_gain": Servo(
-        "factor", "1", lambda rudder, factor: factor * rudder,
+        "factor", "1", lambda rudder, factor: factor * rudder, 1.0,
         np.array([0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.5]),
     ),
+    # no values: what it adds to the mean yaw rate is also the gyro's bias
+    "rudder_offset": Servo("offset", "rad", lambda rudder, offset: rudder + offset, 0.0),
 }  # fmt: skip
+ANSWERED = {name: servo for name, servo in SERVOS.items() if len(servo.tried)}
 
 
 def with_servo(experiment: Experiment, name: str, value: float) -> Experiment:

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sysid.diagnosis.change.candidates import PARAMETER, POOL_AND_SENSORS
+from fish_sysid.diagnosis.change.candidates import PARAMETER, POOL_AND_SENSORS, SIMULATED
 from fish_sysid.diagnosis.change.channels import CHANNELS
 from fish_sysid.diagnosis.change.rows import FIRST_NOISE, GYRO_BIAS, TrialRows
 
@@ -25,6 +25,11 @@ ROBUST = 3.0  # standard deviations
 SMALLEST_SCALE = 0.3  # of the robust spread
 CHANGE = 10.0  # deviation of a candidate's strength in NEW, in typical ones
 GYRO = (2, 3)  # channels with the gyro's bias
+
+
+def by_old_trials(key: Key) -> bool:
+    """Whether a candidate is a form of `other_commands`, which the black box has anyhow."""
+    return key[0] in SIMULATED and key[1] > 0
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ def settled(old: Sequence[TrialRows]) -> Settled:
     """Noise of the channels and the ridge, by leaving OLD's trials out."""
     at, count = _places(old[0])
     keys = list(at)
-    shared_keys = [k for k in keys if k[0] != PARAMETER + "all drags"]
+    shared_keys = [k for k in keys if k[0] != PARAMETER + "all drags" and not by_old_trials(k)]
     columns = [np.hstack([t.black_box, *(t.candidates[k] for k in keys)]) for t in old]
     noise = FIRST_NOISE
     groups = _groups(old[0].black_box.shape[1], count, at, shared_keys)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.permutation_test import SETS, rank, sets_in_place
-from fish_sysid.diagnosis.change.servos import SERVOS, lagged
+from fish_sysid.diagnosis.change.servos import ANSWERED, SERVOS, lagged
 from fish_sysid.diagnosis.change.swap_test import Index
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.diagnosis.symmetry.regression import jackknife
@@ -90,7 +90,7 @@ class _Trial:
             return None
         power = np.sqrt(lagged(rotor**2, SMOOTH))
         y = gyro[at] - gyro[at].mean()
-        passed = [rudder, *(s.act(rudder, v) for s in SERVOS.values() for v in s.tried.tolist())]
+        passed = [rudder, *(s.act(rudder, v) for s in ANSWERED.values() for v in s.tried.tolist())]
         grams, moments = [], []
         for command in passed:
             X = _past((command * power, rotor, np.gradient(command, DT)), at)
@@ -147,7 +147,7 @@ def _judged(trials: Sequence[_Trial], rows: Index) -> dict[str, tuple[Array, Arr
     response = np.linalg.solve(G + RIDGE * np.diag(np.maximum(np.diag(G), 1e-9)), h)
     losses = np.log([trials[i].losses(response) for i in rows])
     found, first = {}, 1
-    for name, servo in SERVOS.items():
+    for name, servo in ANSWERED.items():
         own = np.hstack([losses[:, :1], losses[:, first : first + len(servo.tried)]])
         first += len(servo.tried)
         best = [int((own.sum(axis=0) - row).argmin()) for row in own]

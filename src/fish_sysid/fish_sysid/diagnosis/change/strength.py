@@ -16,7 +16,7 @@ from fish_sysid.diagnosis.change.candidates import PROBES, SIMULATED, typical
 from fish_sysid.diagnosis.change.channels import Swim
 from fish_sysid.diagnosis.change.naming import Judged
 from fish_sysid.diagnosis.change.rows import TrialRows
-from fish_sysid.diagnosis.change.shared_fit import CHANGE, Regression, scaled_rows
+from fish_sysid.diagnosis.change.shared_fit import CHANGE, Regression, by_old_trials, scaled_rows
 from fish_sysid.diagnosis.change.simulation import Variant, simulate
 from fish_sysid.diagnosis.degenerate import degenerate
 from fish_sysid.diagnosis.symmetry.finding import Estimate
@@ -57,8 +57,8 @@ def refit(
     Written-down candidates are linear. Simulated ones are linearised again where they are, ROUNDS times.
     """
     name = judged.name
-    if name not in SIMULATED:
-        return _refitted(name, *_linear(judged), judged.by_trial)
+    if name not in SIMULATED or by_old_trials(judged.key):
+        return refitted(name, *_linear(judged), judged.by_trial)
     keys = PLACED.get(name, effect_class(name).strength)
     unit = np.array([scale_of(effect_class(name).parameters[k]) for k in keys])
     values, left_out, gains = _start(name, keys), np.zeros((0, len(keys))), judged.by_trial
@@ -69,10 +69,10 @@ def refit(
         step = np.clip(stepper.solved(None, offset)[0], -1.0, 1.0)
         found = [stepper.solved(m, offset) for m in range(len(new))]
         left_out = np.array([values + unit * d for d, _ in found])
-        gains = np.array([stepper.gain(m, *one) for m, one in enumerate(found)])
+        gains = np.array([stepper.gain(m, *one) for m, one in enumerate(found)]) / judged.dispersion
         values = _clipped(name, keys, values + unit * step)
     std = jackknife(left_out)
-    return _refitted(name, dict(zip(keys, values.tolist(), strict=True)),
+    return refitted(name, dict(zip(keys, values.tolist(), strict=True)),
                      dict(zip(keys, std.tolist(), strict=True)), gains)  # fmt: skip
 
 
@@ -199,9 +199,10 @@ def _clipped(name: str, keys: Sequence[str], values: Array) -> Array:
     return np.clip(values, lowest, _highest(name, keys))
 
 
-def _refitted(
+def refitted(
     name: str, values: dict[str, float], errors: dict[str, float], by_trial: Array
 ) -> Refitted:
+    """Values of a name with their standard errors, and whether they are such an effect."""
     effect = effect_class(name)
     found = {k: Estimate(v, errors[k], effect.parameters[k].unit) for k, v in values.items()}
     return Refitted(found, degenerate(name, values) or _too_weak(name, values), by_trial)

@@ -149,7 +149,7 @@ class Gains:
             beside = fit.gram[:, i][:, :, fixed] * is_new[:, None, None]
             both = np.concatenate([fit.gram[:, i, :S], beside], axis=2)
             own = fit.gram[:, i][:, :, i]
-            self._columns.append((key[0], _Column(both, own, fit.moment[:, i], inverse, right)))
+            self._columns.append((key, _Column(both, own, fit.moment[:, i], inverse, right)))
 
     def of(self, sets: Sequence[Index]) -> Array:
         """F (sets, names) of `_Column`, the best form of each."""
@@ -157,9 +157,21 @@ class Gains:
         for row, rows in zip(chosen, sets, strict=True):
             row[rows] = 1.0
         best = {name: np.zeros(len(sets)) for name in self.names}
-        for name, column in self._columns:
+        for (name, _), column in self._columns:
             best[name] = np.maximum(best[name], column.ratio(chosen))
         return np.column_stack(list(best.values()))
+
+    def dispersion(self) -> dict[Key, float]:
+        """How much more OLD's trials differ along what each candidate is in NEW than noise lets them, 1 at least.
+
+        The mean of chi squared of one degree of freedom each (McCullagh and Nelder 1989, 4.5).
+        """
+        chosen = np.isin(np.arange(self._trials), self.new).astype(float)
+        old = self._trials - len(self.new)
+        return {
+            key: max(1.0, float(column.dispersion(chosen)[:old].mean()))
+            for key, column in self._columns
+        }
 
 
 class _Column:
@@ -183,6 +195,19 @@ class _Column:
 
         chosen (sets, M): 1 for the trials of a set.
         """
+        score, strength, left = self._fitted(chosen)
+        each = 0.5 * np.einsum("nmi,mij,nmj->nm", left, self._each, left)
+        gain = 0.5 * np.einsum("ni,ni->n", score, strength)
+        return np.asarray(gain / np.maximum(each.mean(axis=1), SMALLEST))
+
+    def dispersion(self, chosen: Array) -> Array:
+        """(M,) squares of what is left of each trial along the strength of the trials chosen (M,), over those of noise."""
+        _, (strength,), (left,) = self._fitted(chosen[None])
+        noise = np.einsum("i,mij,j->m", strength, self._own + self._prior, strength)
+        return np.asarray((left @ strength) ** 2 / np.maximum(noise, 1e-12))
+
+    def _fitted(self, chosen: Array) -> tuple[Array, Array, Array]:
+        """Score and strength (sets, K) of the trials of each set, and the score that is left of each trial (sets, M, K)."""
         B = np.einsum("nm,mib->nib", chosen, self._both)
         W = B @ self._inverse
         score = chosen @ self._score
@@ -192,6 +217,4 @@ class _Column:
         shared = np.einsum("nib,ni->nb", W, strength)
         left = self._score + np.einsum("mib,nb->nmi", self._both, shared)
         left -= chosen[..., None] * np.einsum("mij,nj->nmi", self._own, strength)
-        each = 0.5 * np.einsum("nmi,mij,nmj->nm", left, self._each, left)
-        gain = 0.5 * np.einsum("ni,ni->n", score, strength)
-        return np.asarray(gain / np.maximum(each.mean(axis=1), SMALLEST))
+        return score, strength, left
