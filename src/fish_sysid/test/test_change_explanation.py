@@ -93,6 +93,19 @@ def test_of_names_that_predict_as_well_the_rarer_one_is_first() -> None:
     assert sum(weights) == pytest.approx(1.0)
 
 
+def test_what_explains_as_much_and_cannot_be_makes_the_best_name_unsure() -> None:
+    best = contender("dry_friction", 6.0, 0.4, 6.0)
+    as_good = contender("rotor_lag", 5.9, 0.0, 8.0)
+    worse = contender("imu_latency", -40.0, 0.0, 8.0)
+    alike, (sure,) = weighed([best], [worse])
+    _, (unsure,) = weighed([best], [as_good])
+    assert names(alike) == ["dry_friction"]
+    assert sure == 1.0
+    assert unsure < 0.3
+    tip, wake = contender("tip_slip", 6.0, 0.4), contender("wake_memory", 6.0, 0.0)
+    assert weighed([tip], [wake])[1] == [1.0]
+
+
 def test_a_family_is_named_without_numbers_where_its_members_explain_most() -> None:
     rarity = {"tip_slip": 6.7, "wake_memory": 6.7, "payload": 4.0}
     seen = swapped(0.001, np.zeros(1), **rarity)

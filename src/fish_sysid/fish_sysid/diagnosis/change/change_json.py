@@ -113,8 +113,11 @@ def _words(named: Named) -> str:
     )
     text = f"{named.name} ({values or 'how much, the model of OLD cannot say'})"
     others = [m.name for m in named.members[1:]]
-    if not others or named.members[0].probability >= SURE:
+    if named.members[0].probability >= SURE:
         return text
+    if not others:
+        chance_of_it = f"probability {named.members[0].probability:.2f}"
+        return f"{text} or something that has no name ({chance_of_it} for {named.name})"
     family = f" ({named.family})" if named.family else ""
     return f"{text} or, which these recordings cannot tell apart{family}, {', '.join(others)}"
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fish_sysid.diagnosis.change.candidates import PARAMETER
 from fish_sysid.diagnosis.change.case import Case
@@ -53,17 +53,20 @@ def next_change(
     unless they predict trials left out clearly worse.
     """
     found: list[Contender] = []
+    impossible: list[Contender] = []
     for one in _asked(swapped, judged):
         values = refit(case.fit, case.rows, case.robot, case.new, case.days, one)
+        rarity = swapped.rarity.get(one.name, 0.0)
         if values.refused:
             refused.append(values.refused)
+            as_found = replace(values, by_trial=one.by_trial)
+            impossible.append(Contender(one, as_found, 0.0, rarity))
         elif values.by_trial.mean() > 0.0:
             left = swap_test(case.fit, case.strata, FEW_SWAPS, taken=(*taken, one.key))
-            rarity = swapped.rarity.get(one.name, 0.0)
             found.append(Contender(one, values, left.p_value, rarity))
     if not found:
         return family_alone(swapped, judged)
-    alike, weights = weighed(found)
+    alike, weights = weighed(found, impossible)
     members = tuple(
         Member(
             one.judged.name,
@@ -108,16 +111,28 @@ def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named,
     return Named(members, family, *mean_gain(kin[0].by_trial)), kin[0].key
 
 
-def weighed(found: Sequence[Contender]) -> tuple[list[Contender], list[float]]:
-    """Those that the data cannot tell from the best, the likeliest first, and their probabilities."""
+def weighed(
+    found: Sequence[Contender], impossible: Sequence[Contender] = ()
+) -> tuple[list[Contender], list[float]]:
+    """Those that the data cannot tell from the best, the likeliest first, and their probabilities.
+
+    A name that explains as much with values that it cannot have says that what changed may have no name: its weight is missing in
+    the sum.
+    """
     top = max(found, key=lambda one: one.refitted.by_trial.mean()).refitted.by_trial
     alike = [one for one in found if not apart(top, one.refitted.by_trial)]
     alike = [one for one in alike if one.survives] or alike
     kept = {one.judged.name for one in alike}
     alike = [one for one in alike if SPECIAL_CASE.get(one.judged.name) not in kept]
     best = max(alike, key=lambda one: one.refitted.by_trial.mean()).refitted.by_trial
+    doubt = [
+        one
+        for one in impossible
+        if SPECIAL_CASE.get(one.judged.name) not in kept and not apart(best, one.refitted.by_trial)
+    ]
     weight = {
-        one.judged.name: tie(best, one.refitted.by_trial) * math.exp(one.rarity) for one in alike
+        one.judged.name: tie(best, one.refitted.by_trial) * math.exp(one.rarity)
+        for one in (*alike, *doubt)
     }
     alike.sort(key=lambda one: -weight[one.judged.name])
     return alike, [weight[one.judged.name] / sum(weight.values()) for one in alike]
