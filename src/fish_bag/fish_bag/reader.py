@@ -291,5 +291,8 @@ class _Assembly:
         clock = self.clocks.get(raw.topic, self.topics.rules[role].clock if role else MASTER)
         stamp_ns = stamps_of_prefixes(raw)
         t_arrival = axis.arrived(raw.arrival_ns)
-        t = t_arrival if stamp_ns is None else axis.measured(clock, stamp_ns)
-        return summarise(raw, role, t, t_arrival, stamp_ns is not None)
+        if stamp_ns is None:
+            return summarise(raw, role, t_arrival, t_arrival, np.zeros(len(t_arrival), dtype=bool))
+        stamped = stamp_ns != 0  # ROS: a time of zero is none
+        t = np.where(stamped, axis.measured(clock, stamp_ns), t_arrival)
+        return summarise(raw, role, t, t_arrival, stamped)

@@ -11,12 +11,13 @@ from fish_bag.trial import TopicSummary
 
 
 def summarise(
-    raw: RawTopic, role: str, t: np.ndarray, t_arrival: np.ndarray, stamped: bool
+    raw: RawTopic, role: str, t: np.ndarray, t_arrival: np.ndarray, stamped: np.ndarray
 ) -> TopicSummary:
-    """One topic; `t` is the moment of measurement, or the arrival where there is no usable stamp."""
+    """One topic; `t` is the moment of measurement, or the arrival of messages that are not stamped (N,)."""
     steps = np.diff(np.sort(t))
     span = float(np.sum(steps))
-    latency = np.quantile(t_arrival - t, [0.01, 0.5, 0.99]) if stamped and len(t) else [np.nan] * 3
+    ages = (t_arrival - t)[stamped]
+    latency = np.quantile(ages, [0.01, 0.5, 0.99]) if len(ages) else [np.nan] * 3
     return TopicSummary(
         topic=raw.topic,
         type=raw.type,
@@ -26,5 +27,5 @@ def summarise(
         longest_gap_s=float(steps.max()) if len(steps) else np.nan,
         latency_s=(float(latency[0]), float(latency[1]), float(latency[2])),
         role=role,
-        stamped=stamped,
+        stamped=bool(stamped.any()),
     )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fish_bag import RecordingError, TopicMap, read_trial
+from fish_bag import message_build as build
 from fish_bag import sample_recordings as samples
 from fish_bag.sample_formats import WRITERS
 from fish_bag.topic_map import DEFAULT_RULES, TopicRule
@@ -64,6 +65,18 @@ def test_custom_data_and_counts(sources):
     assert imu.rate_hz == pytest.approx(100, rel=1e-6)
     np.testing.assert_allclose(imu.latency_s, 0.002, atol=1e-8)
     assert by_topic["/fish/control/gains"].stamped is False
+
+
+def test_a_stamp_of_zero_is_none(tmp_path):
+    points = np.array([[0.0, 0.0], [1.0, 0.5]])
+    messages = [
+        (arrival, topic, build.path(0, "pool", points) if topic.endswith("/path") else message)
+        for arrival, topic, message in samples.robot_messages()
+    ]
+    trial = read_trial(samples.write_mcap(tmp_path / "trial", messages))
+    (topic,) = (t for t in trial.topics if t.topic.endswith("reference/path"))
+    assert (topic.count, topic.stamped) == (1, False)
+    assert np.isnan(topic.latency_s).all()
 
 
 def test_arrival_times_by_map(sources):
