@@ -34,7 +34,7 @@ def cpu_table(end: SwimEnd) -> Table:
         "CPU",
         ["node", "of one core"],
         rows,
-        f"In real time; mean over {end.robot_s:.0f} s of swimming, which took {end.seconds:.0f} s.",
+        f"Processor time for the robot's own time, over {end.robot_s:.0f} s of swimming, which took {end.seconds:.0f} s.",
     )
 
 

@@ -29,7 +29,7 @@ class RecordedOffset:
     """What a recording says."""
 
     estimate: ClockEstimate
-    age: float  # s, median age of an image when its pose arrives
+    age: float  # s, median age of an image when its pose arrives, by the newest IMU stamp
     pairs: int  # of poses that were compared
     blocks: tuple[ClockEstimate, ...]  # one for each BLOCK, near the estimate
 

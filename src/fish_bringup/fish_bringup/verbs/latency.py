@@ -132,6 +132,7 @@ def table(found: list[tuple[str, Measured]]) -> Table:
     header += ["age s", "parts s", "pairs"]
     note = (
         "Offset: added to the camera's stamps, to the clock of the IMU's heading. Lead: of that heading on the gyro. "
-        "To gyro: offset to the gyro's clock. Age: of an image when its pose arrives. Parts: of 5 s each."
+        "To gyro: offset to the gyro's clock. Age: of an image when its pose arrives, by the newest stamp of the IMU, which is a "
+        "little old itself. Parts: of 5 s each."
     )
     return Table("Camera and IMU", header, rows, note)

@@ -54,11 +54,12 @@ def explained(change: Change, looks: Sequence[Case], seen: Sequence[Swapped]) ->
         one, key = answer
         if one.gain < SHARE * _simulated_gain(steps):
             break
-        if one.name == "camera_latency":
+        numbers = one.members[0].refitted.parameters
+        if numbers and one.name == "camera_latency":
             age, one = exact_age(case.new, one)
             looks = [with_new(case, moved_back(case.new, age)) for case in looks]
             steps.append(_Step(one, None))
-        elif by_old_trials(key):
+        elif numbers and by_old_trials(key):
             looks, one = with_its_commands(looks, one, key, _taken(steps))
             if one.members[0].refitted.refused:
                 refused.append(one.members[0].refitted.refused)
@@ -67,7 +68,7 @@ def explained(change: Change, looks: Sequence[Case], seen: Sequence[Swapped]) ->
         else:
             steps.append(_Step(one, key))
         seen = swapped_in(looks, _taken(steps))
-        if one.name in SIMULATED and not one.members[0].refitted.parameters:
+        if one.name in SIMULATED and not numbers:
             break  # the model does not have the shape of what changed: it cannot say what else there is
     steps, seen = needed(looks, steps, seen)
     named = list(change.named)
