@@ -10,7 +10,7 @@ from collections import Counter, deque
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fish_control.camera_clock import CameraClock
+from fish_control.camera_clock import LOOKS_BACK, CameraClock
 from fish_control.estimate import Estimate, to_estimate
 from fish_control.fusion_config import FusionConfig
 from fish_control.imu_checks import unusable_sample
@@ -49,15 +49,16 @@ class Fusion:
         self.noise_scale = NoiseScale()
         self._filter = StrapdownFilter(self.config, self.noise_scale)
         self._models = MotionModels(self.config, self.noise_scale)
-        self._clear()
+        given = self.config.camera_offset, self.config.camera_offset_std
+        self._clear(CameraClock(*given))
 
-    def _clear(self) -> None:
+    def _clear(self, clock: CameraClock) -> None:
         c = self.config
         self._imu = ImuHistory(c.imu_timeout, (c.imu_x, c.imu_y))
         noise = HeadingNoise(c.gyro_noise, c.gyro_drift, c.coasting_yaw_rate, c.imu_timeout)
         self.imu_heading = ImuHeading(noise)
-        self.camera_clock = CameraClock(c.camera_offset, c.camera_offset_std)
-        self._applied, self._jumps = c.camera_offset, 0
+        self.camera_clock = clock
+        self._applied, self._jumps = clock.current.offset, 0
         self._raw, self._waiting = deque[RawPose](), deque[RawPose]()  # fused, ahead of the IMU
         self._timeline: Timeline | None = None
         self._candidates = AgreeingPoses()
@@ -70,7 +71,7 @@ class Fusion:
         self._filter.model = self._models.current
 
     def _restart(self) -> None:
-        self._clear()
+        self._clear(self.camera_clock.anew())
         self.counts["restarted"] += 1
 
     @property
@@ -113,7 +114,8 @@ class Fusion:
         if self._timeline is not None:
             self._timeline.imu_came(previous)
             self._forget(time)
-        self._imu.forget(time - self.config.history - 2.0 * self.config.imu_timeout)
+        history = self.config.history + 2.0 * self.config.imu_timeout
+        self._imu.forget(time - max(history, LOOKS_BACK))
         self._fuse_waiting(time + self.config.imu_timeout, imu_lives=True)
         return True
 

@@ -15,8 +15,8 @@ from fish_control.imu_heading import HeadingStep
 Array = NDArray[np.float64]
 CAPACITY = 4096  # rows; the older half is dropped when they are full
 
-TIME, YAW, RATE, FORWARD, LEFT, SPREAD, YAW_KNOWN, ACCEL_KNOWN = range(8)  # columns
-COLUMNS = 8
+TIME, YAW, RATE, FORWARD, LEFT, SPREAD, YAW_KNOWN, ACCEL_KNOWN, GAPS = range(9)  # columns
+COLUMNS = 9
 
 
 class InertialSample(NamedTuple):
@@ -66,6 +66,7 @@ class ImuHistory:
 
     def __init__(self, reach: float, place: tuple[float, float] = (0.0, 0.0)) -> None:
         self.reach, self._place = reach, place
+        self._near = reach + 1e-9  # s, up to which two samples say what was between them
         self._rows = np.zeros((CAPACITY, COLUMNS))
         self._begin = self._end = 0
 
@@ -98,7 +99,10 @@ class ImuHistory:
             kept = self._rows[max(self._begin, CAPACITY // 2) : self._end].copy()
             self._begin, self._end = 0, len(kept)
             self._rows[: self._end] = kept
-        s = sample
+        s, gaps = sample, 0.0
+        if len(self):
+            before = self._rows[self._end - 1]
+            gaps = before[GAPS] + (not s.yaw_known or time - before[TIME] > self._near)
         self._rows[self._end] = (
             time,
             s.yaw,
@@ -108,6 +112,7 @@ class ImuHistory:
             s.yaw_variance,
             s.yaw_known,
             s.accel_known,
+            gaps,
         )
         self._end += 1
 
@@ -128,6 +133,14 @@ class ImuHistory:
     def heading(self, times: Array) -> Array:
         """Continuous heading [rad] at `times` [s], linear between the samples and constant beyond them."""
         return np.interp(times, self.times, self.yaw)
+
+    def gaps(self, times: Array) -> Array:
+        """How many gaps of the heading are before `times` [s], and the share of one that a time is in; NaN beyond the samples.
+
+        The change of the heading was measured between times with the same number.
+        """
+        gaps = self._rows[self._begin : self._end, GAPS]
+        return np.interp(times, self.times, gaps, math.nan, math.nan)
 
     def between(self, start: float, end: float) -> list[Step]:
         """The IMU from `start` to `end` [s], cut at its samples.
@@ -161,7 +174,7 @@ class ImuHistory:
             apart = max(after.time - b[TIME], b[TIME] - before.time)
         else:
             share = min(max(dt / apart, 0.0), 1.0)
-        near = apart <= self.reach + 1e-9
+        near = apart <= self._near
         x, y = self._place
         alpha = (after.rate - before.rate) / dt if dt > 0.0 else 0.0
         square = (before.rate**2 + before.rate * after.rate + after.rate**2) / 3.0

@@ -121,7 +121,7 @@ def _squares(
 
 def _sums(squares: Array) -> OffsetSums:
     sums = OffsetSums(math.inf, squares.shape[1])
-    sums.squares, sums.pairs = squares.sum(axis=0), float(len(squares))
+    sums.add(squares.sum(axis=0), pairs=len(squares))
     return sums
 
 

@@ -538,6 +538,28 @@ def test_both_clocks_set_back_by_less_than_the_history_start_anew(back):
     assert fusion.applied_offset == pytest.approx(0.0, abs=0.005)
 
 
+@pytest.mark.parametrize(
+    ("latency", "late", "back", "first", "last"),
+    [(0.75, 0.26, 0.058, 8.34, 8.68), (0.64, 0.43, 0.05, 8.9, 10.5), (0.53, 0.15, 0.3, 7.0, 7.5)],
+)
+def test_both_clocks_set_back_and_a_silent_imu_make_no_other_stroke_sure(
+    latency, late, back, first, last
+):
+    fusion, rows = Fusion(), []
+    for arrival, kind, stamp, values in gap(swum(14.0, latency), first, last):
+        ahead = -back if stamp > 8.0 else 0.0
+        feed(fusion, [(arrival, kind, stamp + ahead + late * (kind == "camera"), values)])
+        estimate = fusion.estimate()
+        if estimate is not None and arrival > 4.0 and estimate.time == stamp + ahead:
+            error = np.hypot(*(estimate.pose - true_pose(stamp))[:2])
+            std = np.sqrt(np.trace(estimate.pose_covariance[:2, :2]))
+            rows.append((error, std, fusion.camera_clock.current.sure))
+    error, std, sure = np.transpose(rows)
+    assert np.all((error < 6.0 * std) | (error < 0.02))
+    assert error[-100:].max() < 0.02
+    assert sure[-1]
+
+
 def test_a_few_imu_samples_out_of_order_set_no_clock_back():
     fusion = Fusion()
     for k, event in enumerate(measurements(3.0)):

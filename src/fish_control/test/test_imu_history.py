@@ -69,6 +69,15 @@ def test_a_gap_longer_than_the_reach_is_unknown():
     assert imu.yaw_rate(1.95) == 0.0
 
 
+def test_gaps_tell_between_which_times_the_heading_was_measured():
+    imu = history()
+    imu.add(1.02, InertialSample(0.5, 0.0, 0.0, 0.0, yaw_known=False))
+    imu.add(2.02, InertialSample(5.0, 0.0, 0.0, 0.0))
+    imu.add(2.03, InertialSample(5.0, 0.0, 0.0, 0.0))
+    gaps = imu.gaps(np.array([0.99, 1.0, 1.005, 1.01, 1.015, 1.02, 1.52, 2.02, 2.03, 2.04]))
+    np.testing.assert_allclose(gaps, [np.nan, 0.0, 0.0, 0.0, 0.5, 1.0, 1.5, 2.0, 2.0, np.nan])
+
+
 def test_without_samples_nothing_is_known():
     (step,) = ImuHistory(reach=0.1).between(1.0, 2.0)
     assert step == (1.0, 0.0, 0.0, 0.0, 0.0, False, False)
