@@ -62,6 +62,7 @@ SIZE, LAGGED = (
     4,
     3,
 )  # numbers of the estimate; further numbers that are neither estimate nor covariance
+UPPER = tuple((i, j) for i in range(SIZE) for j in range(i, SIZE))  # places of the covariance
 
 
 class WaterState(NamedTuple):
@@ -148,12 +149,9 @@ def _correct(state: WaterState, h: tuple[Any, ...], missing: Any, variance: Any)
     Ph = [w * h_w + x * h_x + y * h_y + e * h_e for w, x, y, e in _matrix(state)]
     S = Ph[0] * h_w + Ph[1] * h_x + Ph[2] * h_y + Ph[3] * h_e + variance
     K = [value / S for value in Ph]
-    P = [
-        [value - k * other for value, other in zip(row, Ph, strict=True)]
-        for row, k in zip(_matrix(state), K, strict=True)
-    ]
     x = [value + k * missing for value, k in zip(state[:SIZE], K, strict=True)]
-    return _state(x, [state.rudder, state.throttle, state.early], P)
+    P = [value - K[i] * Ph[j] for value, (i, j) in zip(state[SIZE + LAGGED :], UPPER, strict=True)]
+    return WaterState._make((*x, state.rudder, state.throttle, state.early, *P))
 
 
 def _matrix(state: WaterState) -> list[list[Any]]:

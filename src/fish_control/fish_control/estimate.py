@@ -14,6 +14,7 @@ from fish_control.measurement_buffer import Moment
 
 Array = NDArray[np.float64]
 LOST_VARIANCE = 1e4  # of a twist without IMU: unusable, in any unit
+LOST: Array = np.eye(3) * LOST_VARIANCE
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ def to_estimate(
     c, s = math.cos(psi), math.sin(psi)
     u, v = c * vx + s * vy, c * vy - s * vx  # pool to body
     r = 0.0 if yaw_rate is None else yaw_rate - bias
-    twist_P = np.eye(3) * LOST_VARIANCE
+    twist_P = LOST.copy()
     if not imu_lost:
         J = np.array(((v, c, s), (-u, -s, c)))  # d (u, v) / d (psi, v_x, v_y)
         twist_P[:2, :2] = J @ moment.P[2:5, 2:5] @ J.T

@@ -152,9 +152,8 @@ class Fusion:
         """
         if self._timeline is None:
             return None
-        newest = max(self._last_imu_time, self._timeline.last.time)
-        now = newest + max(0.0, silence)
-        imu_lost = now - self._last_imu_time > self.config.imu_timeout
+        now = max(self._last_imu_time, self._timeline.last.time) + max(0.0, silence)
+        imu_lost = self.imu_lost(silence)
         # a camera whose clock is a little ahead must not hold the estimate at its stamp until the IMU is there
         time = self._timeline.last.time if imu_lost else self._last_imu_time
         if time < self._timeline.first.time:
@@ -164,6 +163,12 @@ class Fusion:
         std = self.camera_clock.current.std if not imu_lost else self.config.camera_offset_std
         rate, noise = self._imu.yaw_rate(moment.time), self.config.gyro_noise
         return to_estimate(moment, rate, std, noise, camera_lost, imu_lost)
+
+    def imu_lost(self, silence: float = 0.0) -> bool:
+        """Whether no IMU sample has come for too long; silence: as for `estimate`."""
+        newest = self._last_imu_time if self._timeline is None else self._timeline.last.time
+        ahead = max(0.0, newest - self._last_imu_time)
+        return ahead + max(0.0, silence) > self.config.imu_timeout
 
     def _refuse(self, reason: str) -> bool:
         self.counts[reason] += 1

@@ -37,7 +37,7 @@ class Preintegration:
         """x: state at the start (8,); accel_used: False if the accelerometer drives nothing."""
         self.steps = steps
         self.duration = T = sum(step.dt for step in steps)
-        psi, bias, bias_forward, bias_left = (float(x[k]) for k in (2, 5, 6, 7))
+        _, _, psi, _, _, bias, bias_forward, bias_left = x.tolist()
         turn = since = known = dvx = dvy = left_dvx = left_dvy = 0.0
         since_dvx = since_dvy = both_dvx = both_dvy = 0.0  # sums of since dv and of left since dv
         along = left_along = across = left_across = (

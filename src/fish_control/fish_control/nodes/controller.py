@@ -20,6 +20,7 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 
@@ -110,14 +111,15 @@ class ControllerNode(Node):
             signs, self._config.largest_variance
         ):  # the water is learned from it
             self._controller.observe(self._odometry_time, motion_of(message))
-        if self._waits and self._calls_for_a_command():
+        now = self.get_clock().now()
+        if self._waits and self._calls_for_a_command(now.nanoseconds * 1e-9):
             self._commanded = self._odometry_time
             self._timer.reset()
-            self._tick()
+            self._step(now)
 
-    def _calls_for_a_command(self) -> bool:
+    def _calls_for_a_command(self, now: float) -> bool:
         """Whether the estimate is new and not one of several that waited: the timer then commands with the last of them."""
-        age = self.get_clock().now().nanoseconds * 1e-9 - self._odometry_time
+        age = now - self._odometry_time
         new = abs(self._odometry_time - self._commanded) > EARLY * self._period
         return new and age < MISSED * self._period
 
@@ -137,8 +139,11 @@ class ControllerNode(Node):
             self._target_time = seconds(message.header.stamp)
 
     def _tick(self) -> None:
+        """What the timer does."""
+        self._step(self.get_clock().now())
+
+    def _step(self, clock: Time) -> None:
         """One command; where a period of control has passed, one decision."""
-        clock = self.get_clock().now()
         now = clock.nanoseconds * 1e-9
         dt = self._period if math.isnan(self._now) else now - self._now
         dt = min(max(dt, 0.0), LONGEST_PERIOD)

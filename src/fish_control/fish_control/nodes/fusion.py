@@ -90,7 +90,7 @@ class FusionNode(Node):
     def _on_imu(self, message: Imu) -> None:
         if self._fusion.add_imu(seconds(message.header.stamp), *inertial_values(message)):
             self._used = self._now()
-            self._publish(self._estimate())
+            self._publish(self._fusion.estimate())
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         frame = message.header.frame_id
@@ -108,9 +108,8 @@ class FusionNode(Node):
             self._used, self._refusal = self._now(), ""
         elif self._fusion.refused in REFUSALS:
             self._refuse(*REFUSALS[self._fusion.refused])
-        estimate = self._estimate()
-        if estimate is not None and estimate.imu_lost:  # no IMU message will publish it
-            self._publish(estimate)
+        if self._fusion.imu_lost(self._silence()):  # no IMU message will publish the estimate
+            self._publish(self._estimate())
 
     def _refuse(self, reason: str, remedy: str) -> None:
         """Note why a pose is not fused; the first of its kind is logged."""
@@ -124,11 +123,13 @@ class FusionNode(Node):
 
     def _estimate(self) -> Estimate | None:
         """Lost is what is silent for too long, even where the sensors' clock is not this node's."""
+        return self._fusion.estimate(self._silence())
+
+    def _silence(self) -> float:
+        """s since a measurement was used; a clock that was set back does not vouch for what is silent."""
         now = self._now()
-        self._used = min(
-            self._used, now
-        )  # a clock that was set back does not vouch for what is silent
-        return self._fusion.estimate(now - self._used)
+        self._used = min(self._used, now)
+        return now - self._used
 
     def _publish(self, estimate: Estimate | None) -> None:
         if estimate is None:

@@ -3,6 +3,8 @@
 """Messages to values and back."""
 
 import math
+from collections.abc import Sequence
+from operator import itemgetter
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -20,7 +22,8 @@ from fish_node.arming import largest_of
 NOT_MEASURED = -1.0  # first covariance of what an Imu message does not measure
 PLANAR = (0, 1, 5)  # x, y and rotation about z among the six of a ROS covariance
 PLANAR_BLOCK = np.array([6 * i + k for i in PLANAR for k in PLANAR])  # places among its 36 numbers
-PLANAR_VARIANCES = np.array([7 * k for k in PLANAR])  # and of their variances
+planar_block = itemgetter(*PLANAR_BLOCK.tolist())  # their numbers
+planar_variances = itemgetter(*(7 * k for k in PLANAR))  # and those of the diagonal
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -76,9 +79,9 @@ def motion_of(message: Odometry) -> Motion:
     )
 
 
-def planar_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def planar_covariance(covariance: Sequence[float]) -> NDArray[np.float64]:
     """(36,) of a message to (3, 3) of x, y and yaw."""
-    return np.reshape(covariance[PLANAR_BLOCK], (3, 3))
+    return np.reshape(planar_block(covariance), (3, 3))
 
 
 def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
@@ -86,8 +89,8 @@ def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
     return EstimateHealth(
         age=now - seconds(message.header.stamp),
         finite=motion_is_finite(motion_of(message)),
-        pose_variance=largest_of(message.pose.covariance[PLANAR_VARIANCES].tolist()),
-        twist_variance=largest_of(message.twist.covariance[PLANAR_VARIANCES].tolist()),
+        pose_variance=largest_of(planar_variances(message.pose.covariance)),
+        twist_variance=largest_of(planar_variances(message.twist.covariance)),
     )
 
 

@@ -11,10 +11,9 @@ four bytes of encapsulation; a string after the number of its bytes, with a zero
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import (
     PoseStamped,
@@ -23,7 +22,6 @@ from geometry_msgs.msg import (
     Vector3Stamped,
 )
 from nav_msgs.msg import Odometry
-from numpy.typing import NDArray
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
@@ -37,10 +35,10 @@ STAMPS = (
     STAMP,
 )  # by the encapsulation's second byte: big endian, little endian
 LENGTH = struct.Struct("<I")
-POSE = struct.Struct("<7d")
-TWIST = struct.Struct("<6d")
-VECTOR, QUATERNION = struct.Struct("<3d"), struct.Struct("<4d")
-Covariance = NDArray[np.float64]
+# all numbers of a message
+VECTOR, TWIST, POSE = struct.Struct("<3d"), struct.Struct("<6d"), struct.Struct("<7d")
+POSE_WITH_COVARIANCE, IMU, ODOMETRY = (struct.Struct(f"<{count}d") for count in (43, 37, 85))
+Covariance = Sequence[float]
 
 
 class Vector3(NamedTuple):
@@ -150,34 +148,20 @@ def read_odometry(data: bytes) -> QuickOdometry:
     """A nav_msgs/Odometry from its bytes."""
     header, at = _header(data)
     child, at = _string(data, at)
-    at = _aligned(at)
-    place = POSE.unpack_from(data, at)
-    motion = TWIST.unpack_from(data, at + 43 * 8)
+    n = ODOMETRY.unpack_from(data, _aligned(at))
+    pose = Pose(Vector3(*n[:3]), Quaternion(*n[3:7]))
+    twist = Twist(Vector3(*n[43:46]), Vector3(*n[46:49]))
     return QuickOdometry(
-        header,
-        child,
-        PoseWithCovariance(
-            Pose(Vector3(*place[:3]), Quaternion(*place[3:])), _numbers(data, at + 7 * 8, 36)
-        ),
-        TwistWithCovariance(
-            Twist(Vector3(*motion[:3]), Vector3(*motion[3:])), _numbers(data, at + 49 * 8, 36)
-        ),
+        header, child, PoseWithCovariance(pose, n[7:43]), TwistWithCovariance(twist, n[49:])
     )
 
 
 def read_imu(data: bytes) -> QuickImu:
     """A sensor_msgs/Imu from its bytes."""
     header, at = _header(data)
-    at = _aligned(at)
-    return QuickImu(
-        header,
-        Quaternion(*QUATERNION.unpack_from(data, at)),
-        _numbers(data, at + 4 * 8, 9),
-        Vector3(*VECTOR.unpack_from(data, at + 13 * 8)),
-        _numbers(data, at + 16 * 8, 9),
-        Vector3(*VECTOR.unpack_from(data, at + 25 * 8)),
-        _numbers(data, at + 28 * 8, 9),
-    )
+    n = IMU.unpack_from(data, _aligned(at))
+    orientation, rate, force = Quaternion(*n[:4]), Vector3(*n[13:16]), Vector3(*n[25:28])
+    return QuickImu(header, orientation, n[4:13], rate, n[16:25], force, n[28:])
 
 
 def read_vector(data: bytes) -> QuickVector3:
@@ -203,10 +187,9 @@ def read_pose(data: bytes) -> QuickPose:
 def read_pose_with_covariance(data: bytes) -> QuickPose:
     """A geometry_msgs/PoseWithCovarianceStamped from its bytes."""
     header, at = _header(data)
-    at = _aligned(at)
-    place = POSE.unpack_from(data, at)
-    pose = Pose(Vector3(*place[:3]), Quaternion(*place[3:]))
-    return QuickPose(header, PoseWithCovariance(pose, _numbers(data, at + POSE.size, 36)))
+    n = POSE_WITH_COVARIANCE.unpack_from(data, _aligned(at))
+    pose = Pose(Vector3(*n[:3]), Quaternion(*n[3:7]))
+    return QuickPose(header, PoseWithCovariance(pose, n[7:]))
 
 
 READERS: dict[type, Callable[[bytes], Any]] = {
@@ -228,7 +211,9 @@ def read_stamp(data: bytes) -> Time:
 def _header(data: bytes) -> tuple[Header, int]:
     seconds, nanoseconds = STAMP.unpack_from(data, BODY)
     frame, at = _string(data, BODY + STAMP.size)
-    return Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame), at
+    header = Header(frame_id=frame)  # makes a stamp of its own, which costs as much as its numbers
+    header.stamp.sec, header.stamp.nanosec = seconds, nanoseconds
+    return header, at
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:
@@ -241,7 +226,3 @@ def _string(data: bytes, at: int) -> tuple[str, int]:
 def _aligned(at: int) -> int:
     """The next place for numbers of 8 bytes."""
     return -(-(at - BODY) // 8) * 8 + BODY
-
-
-def _numbers(data: bytes, at: int, count: int) -> Covariance:
-    return np.frombuffer(data, "<f8", count, at)
