@@ -49,8 +49,7 @@ class Fusion:
         self.noise_scale = NoiseScale()
         self._filter = StrapdownFilter(self.config, self.noise_scale)
         self._models = MotionModels(self.config, self.noise_scale)
-        given = self.config.camera_offset, self.config.camera_offset_std
-        self._clear(CameraClock(*given))
+        self._clear(CameraClock(self.config.camera_offset, self.config.camera_offset_std))
 
     def _clear(self, clock: CameraClock) -> None:
         c = self.config
@@ -61,8 +60,7 @@ class Fusion:
         self._applied, self._jumps = clock.current.offset, 0
         self._raw, self._waiting = deque[RawPose](), deque[RawPose]()  # fused, ahead of the IMU
         self._timeline: Timeline | None = None
-        self._candidates = AgreeingPoses()
-        self._repeated = RepeatedPose()
+        self._candidates, self._repeated = AgreeingPoses(), RepeatedPose()
         # s, the last of the sensors' clock when a pose was accepted
         self._last_pose_time = self._last_imu_time = self._accepted_at = -math.inf
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
@@ -158,17 +156,17 @@ class Fusion:
         time = self._timeline.last.time if imu_lost else self._last_imu_time
         if time < self._timeline.first.time:
             return None
-        moment = self._timeline.at(time)
-        camera_lost = now - self._accepted_at > self.config.camera_timeout
-        std = self.camera_clock.current.std if not imu_lost else self.config.camera_offset_std
-        rate, noise = self._imu.yaw_rate(moment.time), self.config.gyro_noise
-        return to_estimate(moment, rate, std, noise, camera_lost, imu_lost)
+        moment, c = self._timeline.at(time), self.config
+        camera_lost = now - self._accepted_at > c.camera_timeout
+        std = self.camera_clock.current.std if not imu_lost else c.camera_offset_std
+        rate = self._imu.yaw_rate(moment.time)
+        return to_estimate(moment, rate, std, c.gyro_noise, camera_lost, imu_lost)
 
     def imu_lost(self, silence: float = 0.0) -> bool:
         """Whether no IMU sample has come for too long; silence: as for `estimate`."""
         newest = self._last_imu_time if self._timeline is None else self._timeline.last.time
-        ahead = max(0.0, newest - self._last_imu_time)
-        return ahead + max(0.0, silence) > self.config.imu_timeout
+        unheard = max(0.0, newest - self._last_imu_time) + max(0.0, silence)
+        return unheard > self.config.imu_timeout
 
     def _refuse(self, reason: str) -> bool:
         self.counts[reason] += 1

@@ -25,6 +25,7 @@ LARGEST_RATIO = 1e5  # of the gyro's variance to the given one
 WILD = 9.0  # squared innovations count no more than this many variances
 RESET = 1.0  # rad, an orientation that jumps by more has a new zero
 BIAS_STD = 0.05  # rad/s, of the gyro's bias at first
+ROUNDING = 1e-9  # s, of the time between two samples
 
 
 class HeadingNoise(NamedTuple):
@@ -78,7 +79,7 @@ class ImuHeading:
     ) -> HeadingStep:
         """Take a sample at `time` [s]: yaw rate [rad/s], yaw of the orientation [rad]; None: not measured."""
         dt = 0.0 if self._time is None else time - self._time
-        near = dt <= self._noise.reach
+        near = dt <= self._noise.reach + ROUNDING
         before, self._rate, self._time = self._rate, rate, time
         measured = rate is not None and near
         mean = 0.0

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.imu_heading import HeadingStep
+from fish_control.imu_heading import ROUNDING, HeadingStep
 
 Array = NDArray[np.float64]
 CAPACITY = 4096  # rows; the older half is dropped when they are full
@@ -66,7 +66,7 @@ class ImuHistory:
 
     def __init__(self, reach: float, place: tuple[float, float] = (0.0, 0.0)) -> None:
         self.reach, self._place = reach, place
-        self._near = reach + 1e-9  # s, up to which two samples say what was between them
+        self._near = reach + ROUNDING  # s, up to which two samples say what was between them
         self._rows = np.zeros((CAPACITY, COLUMNS))
         self._begin = self._end = 0
 

@@ -28,6 +28,11 @@ def run(gyro_scale=1.0, bias=0.0, use_gyro=True, use_yaw=True, seconds=20.0):
     return np.std(late), heading
 
 
+def test_samples_exactly_as_far_apart_as_they_reach_measure_the_heading():
+    heading = ImuHeading(NOISE)
+    assert all(heading.add(0.1 * k, 1.0).known for k in range(100))
+
+
 def test_a_good_gyro_smooths_the_orientation():
     spread, heading = run(bias=0.03)
     assert spread < 0.0015  # half of the orientation's noise

@@ -1,0 +1,84 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The camera's clock where the IMU does not know all that the grid of offsets asks for."""
+
+import numpy as np
+import pytest
+
+from fish_control.camera_clock import CameraClock
+from fish_control.imu_history import ImuHistory, InertialSample
+
+PERIOD, FRAME, NOISE = 0.01, 1.0 / 30.0, 0.012  # s, s, rad
+PRIOR_STD = 0.02  # s
+
+
+def steady(t):
+    """Heading of a fish that has swum for ever, by equal strokes on a course that bends a little."""
+    return 0.2 * np.sin(4.0 * np.pi * t) + 0.3 * np.sin(0.5 * t)
+
+
+def varied(t):
+    """The same by strokes that change."""
+    return steady(t) + 0.1 * np.sin(4.0 * np.pi * t) * np.sin(0.7 * t) + 0.3 * np.sin(0.8 * t)
+
+
+def watched(clock, heading, age, late, seconds=12.0, gap=(0.0, 0.0), seed=1):
+    """(N, 4) time, error of the offset and its standard deviation [s], whether it is sure: after each pose.
+
+    The IMU begins at 0 and is silent in the gap; images come `age` s after they were taken, stamped `late` s too late.
+    """
+    rng, imu, rows = np.random.default_rng(seed), ImuHistory(reach=0.1), []
+    taken = 0.005 - age
+    for t in np.arange(0.0, seconds, PERIOD).tolist():
+        if not gap[0] <= t < gap[1]:
+            imu.add(t, InertialSample(float(heading(t)), 0.0, 0.0, 0.0))
+        while taken + age <= t:
+            clock.add(
+                taken + late, float(heading(taken) + rng.normal(0.0, NOISE)), imu, imu.last_time
+            )
+            rows.append((t, clock.current.offset + late, clock.current.std, clock.current.sure))
+            taken += FRAME
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("gap", [(0.0, 0.0), (3.0, 3.6)])
+@pytest.mark.parametrize("age", [0.5, 0.7, 0.9, 1.2])
+def test_what_the_imu_did_not_measure_excludes_no_offset(age, gap):
+    """Of old images the right offset is known last; one stroke beside it equal strokes look the same."""
+    _, error, _, sure = watched(CameraClock(0.0, PRIOR_STD), steady, age, 0.26, gap=gap).T
+    assert np.abs(error[sure > 0]).max(initial=0.0) < 0.01
+
+
+@pytest.mark.parametrize("gap", [(0.0, 0.0), (3.0, 3.6)])
+@pytest.mark.parametrize("age", [0.1, 0.7, 1.2])
+def test_strokes_that_change_tell_the_offset_all_the_same(age, gap):
+    time, error, std, sure = watched(CameraClock(0.0, PRIOR_STD), varied, age, 0.26, gap=gap).T
+    assert np.all(sure[time > 5.0])
+    assert np.all(np.abs(error[sure > 0]) < np.maximum(0.005, 4.0 * std[sure > 0]))
+
+
+def test_equal_strokes_leave_an_offset_that_was_known_sure():
+    """Before the IMU's first sample nothing is known; what was known beforehand decides."""
+    time, error, _, sure = watched(CameraClock(-0.26, PRIOR_STD), steady, 0.1, 0.26).T
+    assert np.all(sure[time > 1.5])
+    assert np.abs(error[sure > 0]).max() < 0.005
+
+
+@pytest.mark.parametrize("age", [0.3, 0.5, 0.7, 1.2])
+def test_an_offset_of_several_that_fit_is_as_uncertain_as_they_are_apart(age):
+    time, error, std, _ = watched(CameraClock(0.0, PRIOR_STD), steady, age, 0.26).T
+    late = time > 3.0
+    assert np.all(np.abs(error[late]) < 3.0 * std[late])
+
+
+@pytest.mark.parametrize(("camera", "imu"), [(-0.3, -0.3), (0.0, -0.3), (0.0, 0.0)])
+def test_a_new_start_knows_the_offset_of_before(camera, imu):
+    """The images on their way were stamped before the clocks were set."""
+    age, late = 0.5, 0.26
+    before = CameraClock(0.0, PRIOR_STD)
+    watched(before, varied, age, late)
+    clock = before.anew()
+    for _ in range(4):
+        clock.add(0.0, 0.0, ImuHistory(reach=0.1), age - late + imu - camera)
+    assert clock.current.offset == pytest.approx(-late + imu - camera, abs=0.03)
+    assert not clock.current.sure
