@@ -20,7 +20,7 @@ from fish_sysid.dataset.injection import INJECTIONS, with_injection
 from fish_sysid.dataset.read import read_experiment
 from fish_sysid.diagnosis.change.candidates import typical
 from fish_sysid.diagnosis.change.change import Change
-from fish_sysid.diagnosis.change.compare import compare, model_of
+from fish_sysid.diagnosis.change.compare import compare
 from fish_sysid.estimation.parametrization import effect_class
 
 
@@ -31,7 +31,6 @@ def main() -> None:
     parser.add_argument("--new", type=int, default=4, help="trials of NEW (default 4)")
     parser.add_argument("--splits", type=int, default=3, help="default 3")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--fit", action="store_true", help="fit OLD, instead of the nominal robot")
     args = parser.parse_args()
     experiment, _ = read_experiment(args.dataset)
     random, right = np.random.default_rng(args.seed), dict.fromkeys(("", *INJECTIONS), 0)
@@ -39,12 +38,11 @@ def main() -> None:
         order = random.permutation(len(experiment.names))
         new = experiment.select(sorted(order[: args.new]))
         old = experiment.select(sorted(order[args.new :]))
-        robot = model_of(old, Robot()) if args.fit else Robot()
         for name in right:
             began = time.process_time()
             values = {k: typical(name, k) for k in effect_class(name).strength} if name else {}
             changed = with_injection(new, name, values) if name else new
-            change = compare(changed, [old], robot, make_model=lambda _, given: given)
+            change = compare(changed, [old], Robot(), fit=False)
             members = [m.name for named in change.named for m in named.members]
             right[name] += name in members if name else change.verdict == "unchanged"
             print(line(name, change, time.process_time() - began), flush=True)

@@ -23,6 +23,7 @@ from fish_sysid.diagnosis.change.explanation import explained, swapped_in, telli
 from fish_sysid.diagnosis.change.naming import Judged
 from fish_sysid.diagnosis.change.other_commands import OldAnswer
 from fish_sysid.diagnosis.change.permutation_test import (
+    largest,
     permutation_p_value,
     rank,
     sets_in_place,
@@ -215,6 +216,17 @@ def test_where_nothing_changed_every_rank_is_as_likely_as_any() -> None:
         gains.append(rank(means)[0])
     assert np.sort(gains) == pytest.approx(np.arange(1, 71) / 70, abs=1 / 70 + 1e-9)
     assert np.mean(np.array(gains) <= 0.1) <= 0.1
+
+
+def test_a_set_is_not_compared_with_sets_that_have_most_of_it() -> None:
+    gains = np.exp(np.random.default_rng(9).normal(size=(200, 3)))
+    gains[:60, 1] *= 8.0  # NEW and those that share most trials with it
+    near = np.zeros((200, 200), dtype=bool)
+    near[:60, :60] = True
+    near |= np.eye(200, dtype=bool)
+    assert largest(gains, near)[0] > 2.5 * largest(gains, np.eye(200, dtype=bool))[0]
+    scaled = gains * np.array([1.0, 1e4, 1e-3])  # a name's own scale does not count
+    assert largest(scaled, near) == pytest.approx(largest(gains, near))
 
 
 def test_a_flow_is_the_rarest_of_all_sets_and_nothing_is_not(days, looks_at) -> None:

@@ -144,6 +144,17 @@ def test_every_stage_can_be_switched_off(stage):
     assert [name for name, _ in STAGES if not task.runs(name)] == [stage]
 
 
+def test_the_answer_is_the_same_without_the_stages_that_have_not_changed_the_search():
+    data = swim(fish(current={"x": 0.03, "y": -0.02}), kinds=("sines", "steps"), duration=3.0)
+    names = ("current", "rudder_offset")
+    whole = pipeline.diagnose(data, GIVEN, names=names)
+    idle = {name for name, _ in STAGES} - whole.task.acted
+    assert {"overtaking", "model order", "can the model follow"} <= idle
+    assert whole.task.acted < {name for name, _ in STAGES}
+    without = pipeline.diagnose(data, GIVEN, names=names, without=idle)
+    assert json.dumps(answer(without)) == json.dumps(answer(whole))
+
+
 def test_an_unknown_stage_is_refused():
     data = swim(GIVEN, duration=1.0)
     with pytest.raises(ValueError, match="stage 'magic': expected one of anneal, "):

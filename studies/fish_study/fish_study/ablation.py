@@ -67,7 +67,7 @@ def run_ablation(
 ) -> None:
     """Run every scenario of every study that has no result yet.
 
-    A search that does not come to a stage gives the same answer without it: that answer is taken and not computed again.
+    A search that a stage has not changed gives the same answer without it: that answer is taken and not computed again.
     """
     for name, study in studies.items():
         tool = DIAGNOSE if name == COMPLETE else (*DIAGNOSE, "--without", name)
@@ -78,7 +78,7 @@ def run_ablation(
 
 
 def take_same_answers(complete: Study, study: Study, stage: str) -> list[str]:
-    """Copy the answers of the complete search where it did not come to this stage; names of these scenarios."""
+    """Copy the answers of the complete search where this stage did not change it; names of these scenarios."""
     taken, results = [], complete.results
     for name in study.pending:
         result = results[name]

@@ -33,7 +33,7 @@ def missed_by(task: Task) -> float | None:
     own = known_effects(task.robot)
     effects = [name for name in (*INTRINSIC, FLOW) if name in task.robot.table and name not in own]
     left = missed_with(effects, task.robot, task)
-    return left if left > TOO_FAR else None
+    return task.kept("can the model follow", None, left if left > TOO_FAR else None)
 
 
 def missed_with(effects: Iterable[str], robot: Robot, task: Task) -> float:

@@ -46,11 +46,13 @@ def conclude(state: State, settled: Fit | None, task: Task) -> Diagnosis:
     found = Diagnosis(task, state, force, parts, wrenches, remaining, noise, held, settled=settled)
     if named(found) or not much_is_left(found) or not task.runs("surrogate model"):
         return found
-    helpful = dict.fromkeys((*names, *(name for name in STRUCTURAL if name in task.names)))
+    structural = tuple(dict.fromkeys((*names, *(n for n in STRUCTURAL if n in task.names))))
+    helpful = structural
     if task.runs("surrogate's own choice"):
-        helpful |= dict.fromkeys(task.names)
-    model, asked = surrogate_model(settled or nominal, tuple(helpful), training, task.progress)
-    return replace(found, surrogate=model, predicted=asked)
+        every = tuple(dict.fromkeys((*structural, *task.names)))
+        helpful = task.kept("surrogate's own choice", structural, every)
+    model, asked = surrogate_model(settled or nominal, helpful, training, task.progress)
+    return task.kept("surrogate model", found, replace(found, surrogate=model, predicted=asked))
 
 
 def by_predictions(d: Diagnosis) -> Diagnosis:

@@ -51,7 +51,7 @@ def select_effects(base: Fit, task: Task) -> Selection:
         accepted = (*selection.accepted, Accepted(name, found, found.refitted))
         fit = found.refitted[name]
         if task.runs("anneal"):
-            fit = anneal_if_suspect(fit, task.trials.searched)
+            fit = task.kept("anneal", fit, anneal_if_suspect(fit, task.trials.searched))
         selection = Selection(fit, rounds, accepted)
         task.progress(f"found {name}: {found.gain(name):.0f} nats")
     return selection
@@ -70,13 +70,16 @@ def choose(found: Round, task: Task) -> str | None:
         for name in good
         if not checked or predicts_unseen(base, found.refitted[name], trials, tried, level)
     }
+    if len(confirmed) < len(good):
+        task.acted.add("check on unseen trials")
     if not confirmed:
         return None
     best = simplest(max(confirmed, key=lambda name: evidence(confirmed[name])), confirmed, level)
     rivals = {n: found.refitted[n] for n in good if n not in confirmed and look_alike(n, best)}
-    return (
-        overtaken(best, confirmed[best], rivals, base, trials) if task.runs("overtaking") else best
-    )
+    if not task.runs("overtaking"):
+        return best
+    ahead = overtaken(best, confirmed[best], rivals, base, trials)
+    return task.kept("overtaking", best, ahead)
 
 
 def significant(found: Round, tried: int, level: Level) -> list[str]:

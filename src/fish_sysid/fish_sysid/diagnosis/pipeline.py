@@ -31,7 +31,7 @@ from fish_sysid.diagnosis.task import Progress, Task, make_task
 from fish_sysid.estimation.global_fit import global_fit
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.parametrization import EffectTable
-from fish_sysid.estimation.refit import refit, refit_on
+from fish_sysid.estimation.refit import anneal_if_grown, refit, refit_on
 from fish_sysid.estimation.sensor_noise import usual_noise
 
 
@@ -68,19 +68,19 @@ def searched(nominal: Fit, task: Task) -> State:
     selection = select_effects(nominal, task)
     state = on_training(selection, task)
     if task.runs("model order"):
-        finer = better_order(selection, state.law, task)
+        finer = task.kept("model order", None, better_order(selection, state.law, task))
         state = state if finer is None else on_training(select_effects(finer, task), task)
     if task.runs("law replaced by a name") and not state.accepted:
-        state = name_or_law(state, task)
-    if task.runs("backward elimination"):
+        state = task.kept("law replaced by a name", state, name_or_law(state, task))
+    if task.runs("backward elimination") and len(state.accepted) > 1:
         final, accepted = eliminate(state.final, state.accepted, task)
-        state = with_final(state, final, accepted, task)
+        state = task.kept("backward elimination", state, with_final(state, final, accepted, task))
     return state
 
 
 def unsearched(nominal: Fit, task: Task) -> State:
     """The nominal model alone, and the law that it leaves."""
-    fit = refit_on(nominal, task.trials.training, anneal=False)
+    fit = refit_on(nominal, task.trials.training)
     return State((), (), fit, fit, residual_law(fit, task.trials.training))
 
 
@@ -98,7 +98,7 @@ def with_symmetry_found(
     start = evaluate(
         replace(nominal.hypothesis, robot=robot), nominal.theta, training, nominal.noise
     )
-    return refit_on(start, training, anneal=False)
+    return refit_on(start, training)
 
 
 def fit_nominal(task: Task) -> Fit:
@@ -114,12 +114,17 @@ def on_training(selection: Selection, task: Task) -> State:
     task.progress("fitting all training trials")
     nominal, final = selection.rounds[0].base, selection.base
     same = nominal.hypothesis.names == final.hypothesis.names  # the last base is the better optimum
-    training, anneal = task.trials.training, task.runs("anneal")
-    fits = on_all_cores(
-        lambda fit: refit_on(fit, training, anneal), [final] if same else [nominal, final]
-    )
-    law = residual_law(fits[-1], training)
+    fits = on_all_cores(lambda fit: refitted(fit, task), [final] if same else [nominal, final])
+    law = residual_law(fits[-1], task.trials.training)
     return State(selection.rounds, selection.accepted, fits[0], fits[-1], law)
+
+
+def refitted(fit: Fit, task: Task) -> Fit:
+    """A fit of the searched trials on all training trials, annealed where it needs far more process noise there."""
+    found = refit_on(fit, task.trials.training)
+    if not task.runs("anneal"):
+        return found
+    return task.kept("anneal", found, anneal_if_grown(found, fit, task.trials.training))
 
 
 def name_or_law(state: State, task: Task) -> State:
@@ -128,8 +133,7 @@ def name_or_law(state: State, task: Task) -> State:
     if not accepted:
         return state
     fit = accepted[0].contest[accepted[0].name]
-    final = refit_on(fit, task.trials.training, task.runs("anneal"))
-    return with_final(state, final, accepted, task)
+    return with_final(state, refitted(fit, task), accepted, task)
 
 
 def with_final(state: State, final: Fit, accepted: tuple[Accepted, ...], task: Task) -> State:

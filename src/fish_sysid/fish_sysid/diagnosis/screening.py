@@ -92,7 +92,10 @@ def _local(base: Fit, short: Experiment, task: Task) -> Method:
     start = evaluate(base.hypothesis, base.theta, short, base.noise)
     reference = climb(start, short, POLISH_ITERATIONS)
     near = base.largest_ratio < RATIO_SUSPECT
-    far = partial(place_far, short=short, nominal=task.runs("nominal start"))
+    nominal = not near and task.runs("nominal start")
+    if nominal:
+        task.acted.add("nominal start")
+    far = partial(place_far, short=short, nominal=nominal)
 
     def polish(fit: Fit, promising: bool) -> Fit:
         return climb(fit, short, POLISH_ITERATIONS) if promising else fit

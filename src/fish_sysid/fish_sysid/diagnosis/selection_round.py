@@ -52,7 +52,7 @@ def run_round(base: Fit, task: Task) -> Round:
             return found
         best = found.refitted[found.best]
         task.progress("refitting without it, from its optimum")
-        restarted = restart_base(base, best, task.trials)
+        restarted = task.kept("base restart", base, restart_base(base, best, task.trials))
         found = replace(found, base=restarted)
         reached = restarted.log_posterior - base.log_posterior
         if reached <= max(POOR_BASE * (best.log_posterior - base.log_posterior), least):
@@ -68,6 +68,8 @@ def screen_and_refit(base: Fit, needed: Mapping[str, float], task: Task) -> Roun
     locally where that finds nothing.
     """
     far = base.largest_ratio > RATIO_REJECT and task.runs("annealed screening")
+    if far:
+        task.acted.add("annealed screening")
     for annealed in (True, False) if far else (False,):
         ranking = screen(base, tuple(needed), task, annealed)
         gains = ", ".join(f"{one.name} {one.gain:.0f}" for one in ranking[:5])
@@ -86,7 +88,8 @@ def screen_and_refit(base: Fit, needed: Mapping[str, float], task: Task) -> Roun
             break
     if not task.runs("look-alike refits"):
         return found
-    return with_look_alikes(found, tuple(needed), min(needed.values()), task)
+    compared = with_look_alikes(found, tuple(needed), min(needed.values()), task)
+    return task.kept("look-alike refits", found, compared)
 
 
 def shortlist(ranking: Sequence[Screened], task: Task, annealed: bool) -> list[Screened]:
@@ -119,7 +122,9 @@ def refit_candidate(base: Fit, one: Screened, task: Task) -> Fit:
     start = evaluate(hypothesis, one.theta, experiment, base.noise)
     noise = estimate_noise(start, experiment)
     fit = refit(hypothesis, one.theta, experiment, noise, REFIT)
-    return anneal_if_unexplained(fit, experiment) if task.runs("anneal unexplained") else fit
+    if not task.runs("anneal unexplained"):
+        return fit
+    return task.kept("anneal unexplained", fit, anneal_if_unexplained(fit, experiment))
 
 
 def refit_annealed(base: Fit, one: Screened, task: Task) -> Fit:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
@@ -18,6 +19,7 @@ from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import EffectTable, effect_class
 
 Progress = Callable[[str], None]
+Found = TypeVar("Found")
 
 # name and meaning of every stage that an ablation study may switch off
 STAGES = (
@@ -56,14 +58,19 @@ class Task:
     progress: Progress
     without: frozenset[str]  # stages that are switched off
     ahead: float = 0.0  # m, of the camera's point; taken out of experiment and robot
-    asked: set[str] = field(default_factory=set, compare=False)  # stages that the search came to
+    acted: set[str] = field(default_factory=set, compare=False)  # stages that changed the search
 
     def runs(self, stage: str) -> bool:
         """Whether a stage of STAGES is on."""
         if stage not in STAGE_NAMES:
             raise ValueError(f"stage {stage!r}: expected one of {', '.join(sorted(STAGE_NAMES))}")
-        self.asked.add(stage)
         return stage not in self.without
+
+    def kept(self, stage: str, before: Found, after: Found) -> Found:
+        """What a stage makes of what was there; where that is another object, the stage has changed the search."""
+        if after is not before:
+            self.acted.add(stage)
+        return after
 
     def needed(self, base: Fit) -> dict[str, float]:
         """Nats that each name which the base lacks must gain over it on the searched trials."""

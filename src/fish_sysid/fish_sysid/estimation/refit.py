@@ -143,9 +143,12 @@ def anneal_if_unexplained(fit: Fit, experiment: Experiment) -> Fit:
     return best_of_restart(fit, theta, experiment, usual_noise(experiment), ANNEAL_SHORT_HELD)
 
 
-def refit_on(fit: Fit, experiment: Experiment, anneal: bool = True) -> Fit:
-    """A fit of some trials refitted on others; annealed, if wanted, where it needs far more process noise there."""
-    found = refit(fit.hypothesis, fit.theta, experiment, fit.noise)
-    if anneal and found.largest_ratio > RATIO_GROWTH * fit.largest_ratio:
-        return anneal_if_suspect(found, experiment)
-    return found
+def anneal_if_grown(fit: Fit, before: Fit, experiment: Experiment) -> Fit:
+    """The fit, annealed if it is suspect, where it needs far more process noise than one of other trials before it."""
+    grown = fit.largest_ratio > RATIO_GROWTH * before.largest_ratio
+    return anneal_if_suspect(fit, experiment) if grown else fit
+
+
+def refit_on(fit: Fit, experiment: Experiment) -> Fit:
+    """A fit of some trials refitted on others."""
+    return refit(fit.hypothesis, fit.theta, experiment, fit.noise)

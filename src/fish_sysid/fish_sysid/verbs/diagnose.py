@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
             )
         except NoCandidateError as error:
             raise UserError(str(error)) from error
-        content = {**answer(result), "left_out": left_out, "stages": sorted(result.task.asked)}
+        content = {**answer(result), "left_out": left_out, "stages": sorted(result.task.acted)}
     write_json(args.out / "diagnosis.json", content)
     fit = corrected(result)
     save_robot(

@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The method on one page: comparable? a model of OLD, rows, swap test, names, strengths, remainder."""
+"""The method on one page: comparable? rows, permutation test, names, strengths, remainder, and OLD's best model."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from fish_sysid.estimation.shooting.schedule import can_be_predicted
 Report = Callable[[str], None]
 
 LOOKS = {"mean motion": MEAN_MOTION, "strokes": STROKES}
-LEVEL = 0.01  # of the two looks together, and of the rudder's answer: at most 2 % of nulls are called changed
+LEVEL = 0.01  # of all names in both looks together, and of the rudder's answer: at most 2 % of nulls are called changed
 
 
 def compare(
@@ -53,16 +53,20 @@ def compare(
     olds: Sequence[Experiment],
     robot: Robot,
     report: Report = lambda _: None,
-    make_model: Callable[[Experiment, Robot], Robot] | None = None,
+    fit: bool = True,
 ) -> Change:
     """What changed in NEW against the days OLD; "not_comparable" with the reason where that cannot be said.
 
-    make_model: OLD's trials and the robot as given -> the robot whose columns are taken; None: `model_of`.
+    robot: what the candidates' shapes are simulated with; fit: `Change.robot` is OLD's best model, else this one.
     """
     try:
-        return _compare(new, olds, robot, report, make_model or model_of)
+        change = _compare(new, olds, robot, report)
     except NotComparableError as error:
         return Change("not_comparable", reason=str(error))
+    if fit and change.old is not None:
+        report("fitting OLD by predictions")
+        return replace(change, robot=model_of(in_still_water(change.old, change.symmetry), robot))
+    return change
 
 
 def _compare(
@@ -70,7 +74,6 @@ def _compare(
     olds: Sequence[Experiment],
     robot: Robot,
     report: Report,
-    make_model: Callable[[Experiment, Robot], Robot],
 ) -> Change:
     old = joined(olds)
     check_sensors(old, new)
@@ -83,20 +86,19 @@ def _compare(
     check_counts(old_days, new_days)
     report("the rudder's answer")
     strata = kinds(old_days, new_days)
-    used, moved = _of(old, old_days), _of(new, new_days)
-    answer = rudder_change(used, moved, strata)
+    old, new = _of(old, old_days), _of(new, new_days)
+    answer = rudder_change(old, new, strata)
     servo = answer if answer is not None and answer.p_value <= LEVEL else None
+    passed = new
     if servo is not None:
-        new, new_days = _as_passed_on(new, new_days, servo)
-    report("fitting OLD by predictions")
-    model = make_model(in_still_water(used, symmetry), robot)
+        passed, new_days = _as_passed_on(new, new_days, servo)
     report("what each candidate would change")
-    old_rows = trial_rows(model, old, old_days, NAMES)
-    new_rows = trial_rows(model, new, new_days, NAMES)
+    old_rows = trial_rows(robot, old, old_days, NAMES)
+    new_rows = trial_rows(robot, passed, new_days, NAMES)
     answered = OldAnswer.of(old_rows)
     old_rows, new_rows = (
         answered.added(old_rows, old_days, old),
-        answered.added(new_rows, new_days, new),
+        answered.added(new_rows, new_days, passed),
     )
     report("exchanging trials")
     found: dict[str, tuple[Case, Swapped]] = {}
@@ -109,7 +111,7 @@ def _compare(
             f"OLD {s}: out of the other trials' family" for s in strange if s not in " ".join(told)
         ]
         case = Case(
-            channels, fit, kept_old, kept_new, strata, day_of, model, new, new_days, answered
+            channels, fit, kept_old, kept_new, strata, day_of, robot, passed, new_days, answered
         )
         found[name] = case, swap_test(fit, strata, days=day_of)
     looks, tests = [case for case, _ in found.values()], [swapped for _, swapped in found.values()]
@@ -117,7 +119,7 @@ def _compare(
     by_trials = permutation_p_value([case.fit for case in looks], strata)
     p_value = max(by_trials, found[seen][1].of_days)
     base = Change(
-        "unchanged", p_value=p_value, look=seen, left_out=(*told, *more), robot=model, old=old, new=new,
+        "unchanged", p_value=p_value, look=seen, left_out=(*told, *more), robot=robot, old=old, new=new,
         camera_delay=delay, symmetry=symmetry, rarities=found[seen][1].rarity,
     )  # fmt: skip
     if servo is not None:

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Is NEW different, at the level that is asked? NEW's rank among sets of trials that stand in its place.
 
-`swap_test` says how rare what NEW shows is among sets that share few trials with NEW. That is powerful, and small too often where
-nothing changed: these sets lack whatever single trials of NEW are odd. Here the same is asked of every set of trials in NEW's
-place, each against the sets that share few trials with it. Where nothing changed NEW is one of these sets at random, and its rank
-is an exact p-value (Lehmann and Romano 2005, 15.2). Of several looks the smallest p-value counts, ranked in the same way (min-p).
+Each name has a statistic F_j (`swap_test.Gains`) of its own scale. A set S of trials in NEW's place shows
+
+    T(S) = max over names j of both looks of F_j(S) / q_j(S)
+    q_j(S): QUANTILE of F_j among the sets that share few trials with S
+
+so that a change is not compared with sets that have most of it. Where nothing changed NEW is one of these sets at random, and the
+rank of T(NEW) is an exact p-value (Lehmann and Romano 2005, 15.2).
 """
 
 from __future__ import annotations
@@ -18,23 +21,25 @@ from numpy.typing import NDArray
 from fish_sysid.diagnosis.change.candidates import PARAMETER
 from fish_sysid.diagnosis.change.shared_fit import Regression
 from fish_sysid.diagnosis.change.swap_test import TRIES, Gains, Index, drawn, most_shared
-from fish_sysid.diagnosis.change.tail_probability import Tails
 
 Array = NDArray[np.float64]
 
 SETS = 500
+QUANTILE = 0.9
 
 
 def permutation_p_value(
     looks: Sequence[Regression], strata: Sequence[int], count: int = SETS, seed: int = 0
 ) -> float:
-    """The p-value of all looks together. strata (M,): trials are exchanged within them; OLD's come first, then NEW's."""
+    """The p-value of all names in all looks together.
+
+    strata (M,): trials are exchanged within them; OLD's come first, then NEW's.
+    """
     new = np.arange(looks[0].old, len(looks[0].names))
     sets = sets_in_place(strata, new, np.random.default_rng(seed), count)
     near = shared(sets, len(looks[0].names)) > most_shared(strata, new)
-    ranks = [rank(surprises(_named_gains(fit, sets), near)) for fit in looks]
-    smallest = np.min(ranks, axis=0)
-    return float((smallest <= smallest[0]).mean())
+    gains = np.hstack([_named_gains(fit, sets) for fit in looks])
+    return float(rank(largest(gains, near))[0])
 
 
 def sets_in_place(
@@ -57,12 +62,12 @@ def shared(sets: Sequence[Index], trials: int) -> NDArray[np.int64]:
     return np.asarray(chosen @ chosen.T)
 
 
-def surprises(gains: Array, near: NDArray[np.bool_]) -> Array:
-    """(S,) - log p of the rarest name of each set: gains (S, J), against the sets that are not near (S, S) it."""
+def largest(gains: Array, near: NDArray[np.bool_]) -> Array:
+    """T (S,) of gains (S, J): the largest over its QUANTILE among the sets that are not near (S, S) it."""
     return np.array(
         [
-            -np.log(Tails.of(gains[~near[s]]).probability(gains[[s]])[0].min())
-            for s in range(len(gains))
+            (own / np.quantile(gains[~near[s]], QUANTILE, axis=0)).max()
+            for s, own in enumerate(gains)
         ]
     )
 
