@@ -8,6 +8,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fish_sysid.diagnosis.change.candidates import PARAMETER
 from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Member, Named
@@ -17,6 +20,8 @@ from fish_sysid.diagnosis.change.shared_fit import Key
 from fish_sysid.diagnosis.change.strength import Refitted, refit
 from fish_sysid.diagnosis.change.swap_test import REMAINDER, Swapped, swap_test
 from fish_sysid.diagnosis.families import family_of
+
+Array = NDArray[np.float64]
 
 CONTENDS = 0.5  # of the largest - log p of a name that a contender has
 REFITTED = 3  # contenders of any family by their gain, and as many by their rarity
@@ -33,6 +38,11 @@ class Contender:
     refitted: Refitted
     remainder: float  # p-value once it is taken out
     rarity: float  # - log p of its own gain among exchanged trials
+
+    @property
+    def nats(self) -> Array:
+        """On each of NEW's trials (M,), left out, not divided by the dispersion."""
+        return self.refitted.by_trial * self.judged.dispersion
 
     @property
     def survives(self) -> bool:
@@ -85,15 +95,15 @@ def next_change(
 def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named, Key] | None:
     """A family without numbers, where its members explain most and the model of OLD gives none of them a strength that can be.
 
-    On a plant of another structure an effect may work the other way round than in the model.
+    On a plant of another structure an effect may work the other way round than in the model. That what changed has no name is
+    then as likely as all names together.
     """
     names = _contenders(swapped, judged)
     if not names:
         return None
-    alike = [one for one in names if not apart(names[0].by_trial, one.by_trial)]
+    alike = [one for one in names if not apart(names[0].nats, one.nats)]
     weight = {
-        one.name: tie(names[0].by_trial, one.by_trial) * math.exp(swapped.rarity[one.name])
-        for one in alike
+        one.name: tie(names[0].nats, one.nats) * math.exp(swapped.rarity[one.name]) for one in alike
     }
     family = family_of(names[0].name)
     kin = [one for one in alike if family_of(one.name) == family != ""]
@@ -101,7 +111,7 @@ def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named,
     if len(kin) < 2 or share < MOST:
         return None
     kin.sort(key=lambda one: -weight[one.name])
-    total = sum(weight[one.name] for one in kin)
+    total = 2.0 * sum(weight.values())
     members = tuple(
         Member(
             one.name, weight[one.name] / total, one.gain, math.nan, Refitted({}, "", one.by_trial)
@@ -119,20 +129,18 @@ def weighed(
     A name that explains as much with values that it cannot have says that what changed may have no name: its weight is missing in
     the sum.
     """
-    top = max(found, key=lambda one: one.refitted.by_trial.mean()).refitted.by_trial
-    alike = [one for one in found if not apart(top, one.refitted.by_trial)]
+    alike = [one for one in found if not any(apart(other.nats, one.nats) for other in found)]
     alike = [one for one in alike if one.survives] or alike
     kept = {one.judged.name for one in alike}
     alike = [one for one in alike if SPECIAL_CASE.get(one.judged.name) not in kept]
-    best = max(alike, key=lambda one: one.refitted.by_trial.mean()).refitted.by_trial
+    best = max(alike, key=lambda one: one.nats.mean()).nats
     doubt = [
         one
         for one in impossible
-        if SPECIAL_CASE.get(one.judged.name) not in kept and not apart(best, one.refitted.by_trial)
+        if SPECIAL_CASE.get(one.judged.name) not in kept and not apart(best, one.nats)
     ]
     weight = {
-        one.judged.name: tie(best, one.refitted.by_trial) * math.exp(one.rarity)
-        for one in (*alike, *doubt)
+        one.judged.name: tie(best, one.nats) * math.exp(one.rarity) for one in (*alike, *doubt)
     }
     alike.sort(key=lambda one: -weight[one.judged.name])
     return alike, [weight[one.judged.name] / sum(weight.values()) for one in alike]
@@ -148,7 +156,7 @@ def _contenders(swapped: Swapped, judged: Mapping[str, Judged]) -> list[Judged]:
     ]
     contenders = sorted(strong, key=lambda one: -one.gain)
     names = [one for one in contenders if not one.name.startswith(PARAMETER)]
-    if not names or apart(contenders[0].by_trial, names[0].by_trial):
+    if not names or apart(contenders[0].nats, names[0].nats):
         return []
     return names
 

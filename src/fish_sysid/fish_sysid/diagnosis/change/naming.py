@@ -37,9 +37,12 @@ class Judged:
         return self.key[0]
 
     @property
-    def lower(self) -> float:
-        """The gain less its standard error."""
-        return self.gain - self.std
+    def nats(self) -> Array:
+        """On each of NEW's trials (M,), left out, not divided by the dispersion.
+
+        Two explanations of the same trials are told apart by the spread of their difference, which has all dispersion in it.
+        """
+        return self.by_trial * self.dispersion
 
 
 def judge_all(fit: Regression, taken: Sequence[Key] = ()) -> dict[str, Judged]:
