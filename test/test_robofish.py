@@ -61,6 +61,14 @@ def test_unknown_verb(capsys):
     assert "unknown verb 'swim_faster'; known: " in capsys.readouterr().err
 
 
+def test_an_option_is_written_out(capsys):
+    """--path is not taken for --path-args."""
+    with pytest.raises(SystemExit) as end:
+        command.main(["demo", "--path", "R"])
+    assert end.value.code == 2
+    assert "unrecognized arguments: --path R" in capsys.readouterr().err
+
+
 def test_no_such_entry_point():
     with pytest.raises(AttributeError, match="swim_faster"):
         command.swim_faster  # noqa: B018

@@ -367,14 +367,20 @@ def test_planner_publishes_path_target_twist_error_and_speed(bench):
     assert b.heard["reference/speed"][0].data == 0.15
 
 
+def hear_odometry(b, message):
+    """Say odometry to the planner, until it has been heard."""
+    before = b.node._heard
+    b.say("odometry/filtered", message)
+    b.until(lambda: b.node._heard != before)
+
+
 def test_planner_plans_at_half_the_rate_of_the_odometry(bench):
     b = bench(PlannerNode, path="I")
     b.listen("control/target", PoseStamped)
     t = b.now()
     for k in range(100):
-        b.say("odometry/filtered", odometry(t + 0.01 * k, y=-0.8, yaw=1.57))
-        b.spin(0.002)
-    b.until(lambda: len(b.heard["control/target"]) >= 50)
+        hear_odometry(b, odometry(t + 0.01 * k, y=-0.8, yaw=1.57))
+        b.until(lambda k=k: len(b.heard["control/target"]) >= (k + 1) // 2)
     b.spin(0.2)
     assert len(b.heard["control/target"]) == 50
 
@@ -429,8 +435,7 @@ def test_planner_that_was_killed_resumes_where_it_was(bench, tmp_path):
     first.listen("tracking/error", Vector3Stamped)
     t = first.now()
     for k in range(40):
-        first.say("odometry/filtered", odometry(t + 0.02 * k, y=-0.85 + 0.02 * k, yaw=1.57))
-        first.spin(0.002)
+        hear_odometry(first, odometry(t + 0.02 * k, y=-0.85 + 0.02 * k, yaw=1.57))
     first.until(lambda: len(first.heard["tracking/error"]) >= 40)
     left_behind = (tmp_path / "progress.json").read_text()
     second = bench(PlannerNode, path="I", state_file=str(tmp_path / "second.json"))
@@ -452,12 +457,12 @@ def test_planner_follows_a_path_from_a_topic_and_refuses_one_through_the_wall(be
 
     b.say("reference/path", path_message(3.0), LATCHED)
     b.until(lambda: b.said(b"\x02", "path refused: path 'reference/path' reaches"))
-    b.say("odometry/filtered", odometry(b.now(), x=-0.9))
+    hear_odometry(b, odometry(b.now(), x=-0.9))
     b.spin(0.3)
     assert not b.heard["control/target"]
     b.say("reference/path", path_message(1.0), LATCHED)
-    b.spin(0.3)
-    b.say("odometry/filtered", odometry(b.now(), x=-0.9))
+    b.until(lambda: b.node._planner is not None)
+    hear_odometry(b, odometry(b.now(), x=-0.9))
     b.until(lambda: b.heard["control/target"])
     assert b.heard["control/target"][0].pose.position.x == pytest.approx(-0.5, abs=1e-3)
 

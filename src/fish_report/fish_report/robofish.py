@@ -17,7 +17,7 @@ from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from io import TextIOWrapper
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from fish_report.errors import UserError
 from fish_report.printable import plain
@@ -56,7 +56,10 @@ BRINGS_PACKAGES = "`make setup`, or `pip install -r requirements-diagnose.txt -r
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong with an argument in one line; usage comes with --help."""
+    """Says what is wrong with an argument in one line; usage comes with --help. Options are written out."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"allow_abbrev": False, **options})
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
