@@ -149,7 +149,7 @@ def test_diagnose_of_the_folder_one_is_in_is_called_after_it(tmp_path, monkeypat
     titles, robot = [], SimpleNamespace(robot=Robot(), standard_errors={})
     for name, stand_in in {
         "fish_sysid.diagnosis.pipeline.diagnose": lambda *_, **__: SimpleNamespace(
-            task=SimpleNamespace(ahead=0.0, asked=set())
+            task=SimpleNamespace(ahead=0.0, acted=set())
         ),
         "fish_sysid.diagnosis.diagnosis_json.answer": lambda _: {},
         "fish_sysid.diagnosis.corrected_model.corrected": lambda _: robot,
