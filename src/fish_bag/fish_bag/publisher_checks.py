@@ -15,8 +15,6 @@ from fish_bag.trial import NOT_FINITE, UNREADABLE, Commands, Stream
 FEWEST = 40  # samples
 ALTERNATES = 2.0  # steps to the next sample against those to the one after it; 0.5 where values change steadily, 1 for noise
 ALONE = 0.05  # share of commands that lie apart from both neighbours
-# of the median period: distances of stamps that alternate by more come from two senders
-UNEVEN = 0.3
 
 
 def check_publishers(stream: Stream) -> Iterator[Problem]:

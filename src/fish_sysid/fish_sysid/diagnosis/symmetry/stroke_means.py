@@ -25,7 +25,6 @@ ROTOR, RUDDER = 50.0, 0.25  # rad/s and rad, units of the features
 SHORT_PAST = ((-0.5, 1.0), (0.5, 1.0))  # (lag, width) in s
 PAST = (*SHORT_PAST, (1.5, 1.5))
 LONG_PAST = (*PAST, (3.0, 3.0))
-EVEN, ODD = 12, 8  # features
 
 
 @dataclass(frozen=True)
