@@ -39,6 +39,7 @@ MAY_IMPORT = {
 PACKAGES = tuple(MAY_IMPORT)
 FOLDERS = {name: ROOT / ("studies" if name == "fish_study" else "src") / name for name in PACKAGES}
 ROS = ("rclpy", "rcl_interfaces", "launch", "launch_ros", "rosgraph_msgs", "builtin_interfaces")
+LONGEST_MODULE, LONGEST_FUNCTION = 300, 60  # lines
 GRAPH_FOLDERS = ("nodes", "launch", "test", "benchmarks")
 SOURCES = [
     (name, path) for name, folder in FOLDERS.items() for path in sorted(folder.rglob("*.py"))
@@ -87,6 +88,24 @@ def test_only_nodes_know_ros():
         for line, name in imported(path)
         if is_ros(name)
     ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_modules_and_functions_are_small():
+    """One page of screen for a function, five for a module; tests and benchmarks may be longer."""
+    wrong = []
+    for _, path in SOURCES:
+        if {"test", "benchmarks"} & set(path.parts):
+            continue
+        text = path.read_text()
+        if len(text.splitlines()) > LONGEST_MODULE:
+            wrong.append(f"{path.relative_to(ROOT)}: more than {LONGEST_MODULE} lines")
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                lines = node.end_lineno - node.lineno + 1
+                if lines > LONGEST_FUNCTION:
+                    place = f"{path.relative_to(ROOT)}:{node.lineno}"
+                    wrong.append(f"{place} {node.name}: {lines} lines, at most {LONGEST_FUNCTION}")
     assert not wrong, "\n".join(wrong)
 
 

@@ -35,7 +35,7 @@ from fish_sysid.diagnosis.change.rudder_change import (
 )
 from fish_sysid.diagnosis.change.servos import with_servo
 from fish_sysid.diagnosis.change.shared_fit import regression
-from fish_sysid.diagnosis.change.swap_test import Swapped, swap_test
+from fish_sysid.diagnosis.change.swap_test import swap_test
 from fish_sysid.diagnosis.symmetry.applied import in_still_water
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
@@ -93,34 +93,24 @@ def _compare(
     if servo is not None:
         passed, new_days = _as_passed_on(new, new_days, servo)
     report("what each candidate would change")
-    old_rows = trial_rows(robot, old, old_days, NAMES)
-    new_rows = trial_rows(robot, passed, new_days, NAMES)
-    answered = OldAnswer.of(old_rows)
-    old_rows, new_rows = (
-        answered.added(old_rows, old_days, old),
-        answered.added(new_rows, new_days, passed),
-    )
-    report("exchanging trials")
-    found: dict[str, tuple[Case, Swapped]] = {}
     day_of = days_of(olds, [s.name for s in old_days], len(new_days))
-    for name, channels in LOOKS.items():
-        kept_old, kept_new = look(old_rows, channels), look(new_rows, channels)
-        fit = regression(kept_old, kept_new)
-        strange = far_out(fit.names, fit.rest, fit.old)
-        told += [
-            f"OLD {s}: out of the other trials' family" for s in strange if s not in " ".join(told)
-        ]
-        case = Case(
-            channels, fit, kept_old, kept_new, strata, day_of, robot, passed, new_days, answered
-        )
-        found[name] = case, swap_test(fit, strata, days=day_of)
-    looks, tests = [case for case, _ in found.values()], [swapped for _, swapped in found.values()]
-    seen = min(found, key=lambda name: found[name][1].p_value)
-    by_trials = permutation_p_value([case.fit for case in looks], strata)
-    p_value = max(by_trials, found[seen][1].of_days)
+    looks = _looks(robot, (old, old_days), (passed, new_days), strata, day_of)
+    strange = {
+        trial: None
+        for case in looks.values()
+        for trial in far_out(case.fit.names, case.fit.rest, case.fit.old)
+    }
+    told += [
+        f"OLD {s}: out of the other trials' family" for s in strange if s not in " ".join(told)
+    ]
+    report("exchanging trials")
+    tests = {name: swap_test(case.fit, strata, days=day_of) for name, case in looks.items()}
+    seen = min(tests, key=lambda name: tests[name].p_value)
+    by_trials = permutation_p_value([case.fit for case in looks.values()], strata)
+    p_value = max(by_trials, tests[seen].of_days)
     base = Change(
         "unchanged", p_value=p_value, look=seen, left_out=(*told, *more), robot=robot, old=old, new=new,
-        camera_delay=delay, symmetry=symmetry, rarities=found[seen][1].rarity,
+        camera_delay=delay, symmetry=symmetry, rarities=tests[seen].rarity,
     )  # fmt: skip
     if servo is not None:
         base = replace(
@@ -130,11 +120,33 @@ def _compare(
     if p_value > LEVEL:
         return base
     report("naming what changed")
-    found_names = explained(replace(base, verdict="changed"), looks, tests)
+    found_names = explained(
+        replace(base, verdict="changed"), list(looks.values()), list(tests.values())
+    )
     if servo is None:
         named = with_second_opinion(found_names.named, answer)
         found_names = replace(found_names, named=tuple(named))
     return found_names
+
+
+def _looks(
+    robot: Robot,
+    old: tuple[Experiment, Sequence[Swim]],
+    new: tuple[Experiment, tuple[Swim, ...]],
+    strata: list[int],
+    day_of: list[int],
+) -> dict[str, Case]:
+    """OLD and NEW in each look; the robot's candidates, and those that OLD's answer to its commands makes."""
+    old_rows = trial_rows(robot, *old, NAMES)
+    answered = OldAnswer.of(old_rows)
+    old_rows = answered.added(old_rows, old[1], old[0])
+    new_rows = answered.added(trial_rows(robot, *new, NAMES), new[1], new[0])
+    found = {}
+    for name, channels in LOOKS.items():
+        kept_old, kept_new = look(old_rows, channels), look(new_rows, channels)
+        fit = regression(kept_old, kept_new)
+        found[name] = Case(channels, fit, kept_old, kept_new, strata, day_of, robot, *new, answered)
+    return found
 
 
 def _of(experiment: Experiment, days: Sequence[Swim]) -> Experiment:
