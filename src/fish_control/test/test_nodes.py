@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -437,6 +438,7 @@ def test_planner_that_was_killed_resumes_where_it_was(bench, tmp_path):
     for k in range(40):
         hear_odometry(first, odometry(t + 0.02 * k, y=-0.85 + 0.02 * k, yaw=1.57))
     first.until(lambda: len(first.heard["tracking/error"]) >= 40)
+    first.node._progress.settle()
     left_behind = (tmp_path / "progress.json").read_text()
     second = bench(PlannerNode, path="I", state_file=str(tmp_path / "second.json"))
     (tmp_path / "second.json").write_text(left_behind)
@@ -710,16 +712,17 @@ def drive(b, duration, **changes):
 
 
 def _feed(b, time, changes):
-    without, stamp = changes.get("without", ()), seconds(to_stamp(time - AGE))
+    without, time = changes.get("without", ()), time - changes.get("age", AGE)
+    stamp = seconds(to_stamp(time))
     if "odometry" not in without:
-        b.say("odometry/filtered", odometry(time - AGE, **changes.get("odometry", {})))
+        b.say("odometry/filtered", odometry(time, **changes.get("odometry", {})))
         b.until(lambda: b.node._odometry_time == stamp)
     if "target" not in without:
         twist = TwistStamped()
         twist.twist.linear.x = changes.get("speed", 0.2)
         twist.twist.angular.z = changes.get("yaw_rate", 0.1)
         target = PoseStamped()
-        target.header.stamp = to_stamp(time - AGE)
+        target.header.stamp = to_stamp(time)
         target.pose.orientation = to_quaternion(0.3)
         b.say("control/twist", twist)
         b.say("tracking/error", Vector3Stamped())
@@ -768,6 +771,7 @@ def test_a_command_follows_each_new_odometry_and_in_simulated_time_the_clock(
     b = controller_bench(bench, use_sim_time=simulated, odometry_timeout=0.5)
     b.executor.remove_node(b.node)  # no timer runs
     start = b.now()
+    b.node.get_clock = lambda: SimpleNamespace(now=lambda: Time(nanoseconds=round(1e9 * start)))
     for k in range(5):
         b.node._on_odometry(odometry(start + 0.01 * k))
         b.node._on_odometry(b.node._odometry)  # the same once more
@@ -846,10 +850,18 @@ def test_controller_glides_when_no_speed_is_wanted(bench):
 
 def test_controller_reports_its_latency(bench):
     b = controller_bench(bench)
-    drive(b, 1.5)
+    for _ in range(15):
+        drive(b, 0.09)
+        drive(b, 0.01, age=0.009)
     b.until(lambda: "latency_p50_ms" in b.values())
     assert float(b.values()["latency_p50_ms"]) == pytest.approx(1e3 * AGE, abs=0.1)
-    assert float(b.values()["latency_p99_ms"]) == pytest.approx(1e3 * AGE, abs=0.1)
+    assert float(b.values()["latency_p99_ms"]) == pytest.approx(9.0, abs=0.1)
+
+
+def test_controller_commands_rest_by_its_own_timer_while_no_odometry_comes(bench):
+    b = controller_bench(bench, use_sim_time=False)
+    b.until(lambda: len(b.heard["joint_command"]) >= 5)
+    np.testing.assert_allclose(commands(b, 5)[:, 1:], 0.0)
 
 
 PROGRAM = [{"t": 0, "amplitude": 8, "frequency": 2, "rudder": 0.3}]

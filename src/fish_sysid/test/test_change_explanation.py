@@ -229,14 +229,21 @@ def test_where_nothing_changed_every_rank_is_as_likely_as_any() -> None:
 
 
 def test_a_set_is_not_compared_with_sets_that_have_most_of_it() -> None:
-    gains = np.exp(np.random.default_rng(9).normal(size=(200, 3)))
+    gains = 10.0 * np.exp(np.random.default_rng(9).normal(size=(200, 3)))
     gains[:60, 1] *= 8.0  # NEW and those that share most trials with it
-    near = np.zeros((200, 200), dtype=bool)
+    itself = np.eye(200, dtype=bool)
+    near = itself.copy()
     near[:60, :60] = True
-    near |= np.eye(200, dtype=bool)
-    assert largest(gains, near)[0] > 2.5 * largest(gains, np.eye(200, dtype=bool))[0]
-    scaled = gains * np.array([1.0, 1e4, 1e-3])  # a name's own scale does not count
-    assert largest(scaled, near) == pytest.approx(largest(gains, near))
+    assert largest(gains, gains, near)[0] > 2.5 * largest(gains, gains, itself)[0]
+    scaled = gains * np.array([1.0, 1e4, 10.0])  # a name's own scale does not count
+    assert largest(scaled, scaled, near) == pytest.approx(largest(gains, gains, near))
+
+
+def test_names_that_do_not_act_in_most_sets_hide_no_change() -> None:
+    gains = 10.0 * np.exp(np.random.default_rng(10).normal(size=(200, 4)))
+    gains[:, 2], gains[:, 3] = 0.0, np.where(np.arange(200) % 20 == 7, 0.3, 0.0)
+    gains[0, 0] = 1e3
+    assert rank(largest(gains, gains, np.eye(200, dtype=bool)))[0] == 1 / 200
 
 
 def test_a_flow_is_the_rarest_of_all_sets_and_nothing_is_not(days, looks_at) -> None:
@@ -249,3 +256,6 @@ def test_a_flow_is_the_rarest_of_all_sets_and_nothing_is_not(days, looks_at) -> 
     )
     assert changed == pytest.approx(1 / 201)
     assert unchanged > 0.02
+    days = [0] * 5 + [1] * (OLD - 5) + [2] * NEW
+    assert permutation_p_value([c.fit for c in flow], strata, 200, days=days) == changed
+    assert permutation_p_value([c.fit for c in same], strata, 200, days=days) >= unchanged

@@ -18,7 +18,7 @@ from fish_report.page import Table
 from fish_study.asked_table import ASKED
 from fish_study.new_study import Asked, begin_or_go_on
 from fish_study.runner import DIAGNOSE, run_study
-from fish_study.score import Score
+from fish_study.score import Score, study_scores
 from fish_study.share import Share
 from fish_study.study import Study, StudyError
 
@@ -30,7 +30,8 @@ HEADER = [
     "false alarms",
     "both of two",
     "unexplained right",
-    "s, median",
+    "searches changed",
+    "s of these, with and without it",
 ]
 
 
@@ -77,21 +78,36 @@ def run_ablation(
         run_study(study, jobs, done, tool, cluster=cluster)
 
 
+def _seconds(complete: Study, without: Study, names: Sequence[str]) -> str:
+    """Median time of these searches, complete and without a stage."""
+    if not names:
+        return "–"
+    both = [[study.results[name]["seconds"] for name in names] for study in (complete, without)]
+    return ", ".join(f"{np.median(seconds):.0f}" for seconds in both)
+
+
 def take_same_answers(complete: Study, study: Study, stage: str) -> list[str]:
     """Copy the answers of the complete search where this stage did not change it; names of these scenarios."""
-    taken, results = [], complete.results
-    for name in study.pending:
-        result = results[name]
-        diagnosis = result["diagnosis"]
-        if diagnosis is not None and stage not in diagnosis.get("stages", [stage]):
-            study.folder_of(name).mkdir(parents=True, exist_ok=True)
-            write_json(study.folder_of(name) / "result.json", result)
-            taken.append(name)
-    return taken
+    changed = set(changed_by(complete, stage))
+    same = [name for name in study.pending if name not in changed]
+    for name in same:
+        study.folder_of(name).mkdir(parents=True, exist_ok=True)
+        write_json(study.folder_of(name) / "result.json", complete.results[name])
+    return same
 
 
-def ablation_table(scores: Mapping[str, Sequence[Score]]) -> Table:
+def changed_by(complete: Study, stage: str) -> list[str]:
+    """Names of the scenarios whose search a stage has changed."""
+    return [
+        name
+        for name, result in complete.results.items()
+        if result["diagnosis"] is None or stage in result["diagnosis"].get("stages", [stage])
+    ]
+
+
+def ablation_table(studies: Mapping[str, Study]) -> Table:
     """One row for each stage left out, the complete diagnosis first."""
+    scores = {name: study_scores(study) for name, study in studies.items()}
     asked = {row.what: row for row in ASKED}
 
     def count(own: Sequence[Score], what: str) -> str:
@@ -100,6 +116,7 @@ def ablation_table(scores: Mapping[str, Sequence[Score]]) -> Table:
     rows = []
     for name, own in scores.items():
         named = [s for s in own if len(s.truth) == 1]
+        changed = [] if name == COMPLETE else changed_by(studies[COMPLETE], name)
         rows.append(
             [
                 "nothing" if name == COMPLETE else name,
@@ -108,11 +125,12 @@ def ablation_table(scores: Mapping[str, Sequence[Score]]) -> Table:
                 count(own, "false alarms, nothing hidden"),
                 count(own, "both of two effects"),
                 count(own, "no name exists: called unexplained"),
-                f"{np.median([s.seconds for s in own]):.0f}",
+                "–" if name == COMPLETE else f"{len(changed)}/{len(own)}",
+                _seconds(studies[COMPLETE], studies[name], changed),
             ]
         )
     note = (
         "Every row is of the same scenarios. Right name first and truth in the set: scenarios of all groups with one hidden "
-        "name. False alarms: nothing hidden. Unexplained right: something hidden that has no name."
+        "name. False alarms: nothing hidden. Unexplained right: something hidden that has no name. Seconds are medians."
     )
     return Table("Each stage of the search left out in turn", HEADER, rows, note)

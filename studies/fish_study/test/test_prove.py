@@ -21,7 +21,6 @@ from fish_study.ablation import (
 )
 from fish_study.archive import pack_studies
 from fish_study.new_study import Asked, begin_or_go_on
-from fish_study.score import study_scores
 from fish_study.study import Study, StudyError, read_json
 
 NULLS = Asked(3, ["null"], 4, 20.0, 5, frozenset({"scenarios", "groups", "trials", "seed"}))
@@ -116,12 +115,12 @@ def test_an_ablation_diagnoses_the_same_scenarios_without_each_stage(tmp_path: P
         ablation_studies(tmp_path, Asked(5, ["null"], 4, 20.0, None, frozenset({"scenarios"})), [])
     answer_all(studies[COMPLETE])
     answer_all(studies["first"], "unexplained", 9.0)
-    table = ablation_table({n: study_scores(studies[n]) for n in (COMPLETE, "first")})
+    table = ablation_table({n: studies[n] for n in (COMPLETE, "first")})
     nulls = sum(s.group == "null" for s in drawn[0])
     others = 4 - nulls
     assert table.rows == [
-        ["nothing", "–", "–", f"0/{nulls}", "–", f"0/{others}", "1"],
-        ["first", "–", "–", f"{nulls}/{nulls}", "–", f"{others}/{others}", "9"],
+        ["nothing", "–", "–", f"0/{nulls}", "–", f"0/{others}", "–", "–"],
+        ["first", "–", "–", f"{nulls}/{nulls}", "–", f"{others}/{others}", "4/4", "1, 9"],
     ]
 
 

@@ -81,7 +81,10 @@ def _named(content: Content) -> Table:
 
 def _rarities(change: Change) -> Table:
     best = sorted(change.rarities.items(), key=lambda item: -item[1])[:8]
-    note = "The smallest of these is compared with that of exchanged trials: the swap test."
+    note = (
+        "Of each name alone: how rare what it gains in NEW is among exchanged trials (swap test). The p-value of the change "
+        "counts all names."
+    )
     header = ("candidate", "p among exchanged trials, by itself")
     return Table("What differs most", header, [[n, f"{np.exp(-r):.2g}"] for n, r in best], note)
 

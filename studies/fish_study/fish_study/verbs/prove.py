@@ -226,14 +226,13 @@ def _ablation(args: argparse.Namespace, asked: Asked, console: Console) -> int:
         check_stages,
         run_ablation,
     )
-    from fish_study.score import study_scores
 
     check_stages(args.without)
     studies = ablation_studies(args.out, asked, args.without)
     left = sum(len(study.pending) for study in studies.values())
     with _progress(console, "diagnoses", left) as done:
         run_ablation(studies, args.jobs, done, args.cluster)
-    table = ablation_table({name: study_scores(study) for name, study in studies.items()})
+    table = ablation_table(studies)
     print_table(console, table)
     (first, *_) = studies.values()
     lead = f"{len(first.scenarios)} scenarios of seed {first.about['seed']}."

@@ -111,7 +111,7 @@ def _words(named: Named) -> str:
         f"{key} {p.value:.3g} ± {p.std:.2g} {p.unit}".rstrip(" 1")
         for key, p in named.members[0].refitted.parameters.items()
     )
-    text = f"{named.name} ({values or 'how much, the model of OLD cannot say'})"
+    text = f"{named.name} ({values or 'how much, the model cannot say'})"
     others = [m.name for m in named.members[1:]]
     if named.members[0].probability >= SURE:
         return text

@@ -19,6 +19,7 @@ from fish_sysid.diagnosis.symmetry.stroke_means import ROTOR
 Array = NDArray[np.float64]
 
 FEWEST_OLD, FEWEST_NEW = 6, 3  # trials
+FEWEST_WAYS = 100  # in which NEW's number of trials is chosen of all; with fewer nothing is rare at the level of 1 %
 SENSORS = (("gyro", "a gyro"), ("accel", "an accelerometer"), ("encoder", "an encoder"))
 UNITS = 8.0  # ratio of sizes that no change of a fish makes: degrees to radians are 57, millimetres to metres 1000
 NEAR = 0.5  # of a command's spread: commands within it are alike
@@ -76,6 +77,12 @@ def check_counts(old: Sequence[Swim], new: Sequence[Swim]) -> None:
             raise NotComparableError(
                 f"{which} has {len(days)} usable trials; expected at least {fewest}; record more with the same programs"
             )
+    ways = comb(len(old) + len(new), len(new))
+    if ways < FEWEST_WAYS:
+        raise NotComparableError(
+            f"{len(old)} usable trials of OLD and {len(new)} of NEW can be exchanged in {ways} ways; "
+            f"expected at least {FEWEST_WAYS}, as of seven and three; record more with the same programs"
+        )
     a, b = (np.concatenate([_commands(s) for s in days]) for days in (old, new))
     spread = np.maximum(a.std(axis=0), 1e-2)
     distance, _ = cKDTree(a / spread).query(b / spread)

@@ -106,8 +106,7 @@ def _compare(
     report("exchanging trials")
     tests = {name: swap_test(case.fit, strata, days=day_of) for name, case in looks.items()}
     seen = min(tests, key=lambda name: tests[name].p_value)
-    by_trials = permutation_p_value([case.fit for case in looks.values()], strata)
-    p_value = max(by_trials, tests[seen].of_days)
+    p_value = permutation_p_value([case.fit for case in looks.values()], strata, days=day_of)
     base = Change(
         "unchanged", p_value=p_value, look=seen, left_out=(*told, *more), robot=robot, old=old, new=new,
         camera_delay=delay, symmetry=symmetry, rarities=tests[seen].rarity,

@@ -93,7 +93,7 @@ def next_change(
 
 
 def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named, Key] | None:
-    """A family without numbers, where its members explain most and the model of OLD gives none of them a strength that can be.
+    """A family without numbers, where its members explain most and the model gives none of them a strength that can be.
 
     On a plant of another structure an effect may work the other way round than in the model. That what changed has no name is
     then as likely as all names together.
@@ -101,11 +101,12 @@ def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named,
     names = _contenders(swapped, judged)
     if not names:
         return None
-    alike = [one for one in names if not apart(names[0].nats, one.nats)]
+    alike = [one for one in names if not any(apart(other.nats, one.nats) for other in names)]
+    best = max(alike, key=lambda one: one.nats.mean())
     weight = {
-        one.name: tie(names[0].nats, one.nats) * math.exp(swapped.rarity[one.name]) for one in alike
+        one.name: tie(best.nats, one.nats) * math.exp(swapped.rarity[one.name]) for one in alike
     }
-    family = family_of(names[0].name)
+    family = family_of(best.name)
     kin = [one for one in alike if family_of(one.name) == family != ""]
     share = sum(weight[one.name] for one in kin) / sum(weight.values())
     if len(kin) < 2 or share < MOST:
@@ -156,9 +157,9 @@ def _contenders(swapped: Swapped, judged: Mapping[str, Judged]) -> list[Judged]:
     ]
     contenders = sorted(strong, key=lambda one: -one.gain)
     names = [one for one in contenders if not one.name.startswith(PARAMETER)]
-    if not names or apart(contenders[0].nats, names[0].nats):
-        return []
-    return names
+    own = [one for one in contenders if one.name.startswith(PARAMETER)]
+    beaten = [name for name in names if any(apart(one.nats, name.nats) for one in own)]
+    return [] if len(beaten) == len(names) else names
 
 
 def _asked(swapped: Swapped, judged: Mapping[str, Judged]) -> list[Judged]:

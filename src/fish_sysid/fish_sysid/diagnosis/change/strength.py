@@ -221,4 +221,4 @@ def _too_weak(name: str, values: dict[str, float]) -> str:
     if not sizes or max(sizes) >= WEAKEST:
         return ""
     said = ", ".join(f"{k} {v:.2g} {effect.parameters[k].unit}" for k, v in known.items())
-    return f"{name}: {said} is too little of it to be told from what the model of OLD lacks"
+    return f"{name}: {said} is too little of it to be told from what the model lacks"
