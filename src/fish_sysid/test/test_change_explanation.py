@@ -84,6 +84,18 @@ def test_a_name_that_leaves_nothing_and_predicts_clearly_worse_does_not() -> Non
     assert names(weighed(found)[0]) == ["payload"]
 
 
+def test_kin_that_leaves_something_stays_in_the_family_with_less_weight() -> None:
+    whole = contender("wake_memory", 23.0, 0.03)
+    ratios = []
+    for remainder in (0.004, 0.002):
+        alike, (first, second) = weighed([whole, contender("tail_hardening", 20.0, remainder)])
+        assert names(alike) == ["wake_memory", "tail_hardening"]
+        ratios.append(second / first)
+    assert ratios[1] == pytest.approx(0.5 * ratios[0])
+    tip = contender("tip_slip", 23.0, 0.03)
+    assert names(weighed([tip, contender("wake_memory", 23.0, 0.002)])[0]) == ["tip_slip"]
+
+
 def test_of_names_that_predict_as_well_the_rarer_one_is_first() -> None:
     found = [
         contender("hull_asymmetry", 10.0, 0.001, 6.7),

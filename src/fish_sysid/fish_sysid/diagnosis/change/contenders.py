@@ -24,7 +24,7 @@ from fish_sysid.diagnosis.families import family_of
 Array = NDArray[np.float64]
 
 CONTENDS = 0.5  # of the largest - log p of a name that a contender has
-REFITTED = 3  # contenders of any family by their gain, and as many by their rarity
+REFITTED = 4  # contenders of any family by their gain, as many by it undivided, and as many by their rarity
 MOST = 2 / 3  # of the weight of all contenders, that a family has which is named without numbers
 KIN = 6  # further members of the best one's family
 FEW_SWAPS = 150  # of a contender's remainder
@@ -127,11 +127,12 @@ def weighed(
 ) -> tuple[list[Contender], list[float]]:
     """Those that the data cannot tell from the best, the likeliest first, and their probabilities.
 
-    A name that explains as much with values that it cannot have says that what changed may have no name: its weight is missing in
-    the sum.
+    Of those that leave nothing; kin of the likeliest that leave something stay, with a weight that falls with what they leave.
+    A name that explains as much with values that it cannot have says that what changed may have no name: its weight is missing
+    in the sum.
     """
-    alike = [one for one in found if not any(apart(other.nats, one.nats) for other in found)]
-    alike = [one for one in alike if one.survives] or alike
+    tied = [one for one in found if not any(apart(other.nats, one.nats) for other in found)]
+    alike = [one for one in tied if one.survives] or tied
     kept = {one.judged.name for one in alike}
     alike = [one for one in alike if SPECIAL_CASE.get(one.judged.name) not in kept]
     best = max(alike, key=lambda one: one.nats.mean()).nats
@@ -141,10 +142,20 @@ def weighed(
         if SPECIAL_CASE.get(one.judged.name) not in kept and not apart(best, one.nats)
     ]
     weight = {
-        one.judged.name: tie(best, one.nats) * math.exp(one.rarity) for one in (*alike, *doubt)
+        one.judged.name: tie(best, one.nats) * math.exp(one.rarity) for one in (*tied, *doubt)
     }
+    first = max(alike, key=lambda one: weight[one.judged.name])
+    for one in tied:
+        if one.judged.name not in kept and _kin(one.judged.name, first.judged.name):
+            weight[one.judged.name] *= one.remainder / REMAINDER
+            alike.append(one)
+    total = sum(weight[one.judged.name] for one in (*alike, *doubt))
     alike.sort(key=lambda one: -weight[one.judged.name])
-    return alike, [weight[one.judged.name] / sum(weight.values()) for one in alike]
+    return alike, [weight[one.judged.name] / total for one in alike]
+
+
+def _kin(name: str, other: str) -> bool:
+    return family_of(name) == family_of(other) != "" and SPECIAL_CASE.get(name) != other
 
 
 def _contenders(swapped: Swapped, judged: Mapping[str, Judged]) -> list[Judged]:
@@ -163,11 +174,12 @@ def _contenders(swapped: Swapped, judged: Mapping[str, Judged]) -> list[Judged]:
 
 
 def _asked(swapped: Swapped, judged: Mapping[str, Judged]) -> list[Judged]:
-    """The candidates that are refitted: the best, its kin, the next, and the rarest."""
+    """The candidates that are refitted: the best with and without its dispersion, the best one's kin, and the rarest."""
     names = _contenders(swapped, judged)
     if not names:
         return []
     kin = [one for one in names[1:] if family_of(one.name) == family_of(names[0].name) != ""]
     rare = sorted(names, key=lambda one: -swapped.rarity[one.name])[:REFITTED]
-    asked = [names[0], *kin[:KIN], *names[1:REFITTED], *rare]
+    undivided = sorted(names, key=lambda one: -one.nats.mean())[:REFITTED]
+    asked = [names[0], *kin[:KIN], *names[1:REFITTED], *undivided, *rare]
     return list({one.name: one for one in asked}.values())
