@@ -134,6 +134,9 @@ def test_days_that_cannot_be_compared_say_why_and_what_is_needed(days) -> None:
         assert change.verdict == "not_comparable"
         assert text in change.reason
         assert answer(change)["change"]["verdict"] == "not_comparable"
+    few = compare(new.select([0, 1, 2]), [old.select(range(6))], Robot())
+    assert "6 usable trials of OLD and 3 of NEW can be exchanged in 84 ways" in few.reason
+    assert "expected at least 100" in few.reason
 
 
 def test_a_trial_that_swims_backwards_is_named_and_left_out(days) -> None:
