@@ -200,3 +200,24 @@ def test_a_change_is_added_to_what_the_robot_has() -> None:
 def test_a_few_hundred_exchanges_are_not_said_to_show_one_in_millions() -> None:
     assert chance(8.7e-8) == "p < 0.001"
     assert chance(0.0033) == "p = 0.0033"
+
+
+def test_the_standard_error_is_that_of_new_less_old(days) -> None:
+    """A marker that sits a little otherwise in every trial: the difference of two means of these offsets is as uncertain."""
+    random, (old, new) = np.random.default_rng(5), days
+    trials = [e.select([m]) for e in (old, new) for m in range(len(e.names))]
+    offsets = random.normal(scale=0.03, size=len(trials))
+    rows = []
+    for trial, offset in zip(trials, offsets, strict=True):
+        moved = with_injection(trial, "camera_heading_offset", {"offset": offset})
+        rows += look(
+            trial_rows(Robot(), moved, swims(moved), ("camera_heading_offset",)), MEAN_MOTION
+        )
+    variances = []
+    for _ in range(12):
+        order = random.permutation(len(rows))
+        fit = regression([rows[i] for i in order[NEW:]], [rows[i] for i in order[:NEW]])
+        variances.append(judge_all(fit)["camera_heading_offset"].covariance[0, 0])
+    typical = 0.06  # rad, unit of a strength
+    expected = np.var(offsets / typical, ddof=1) * (1 / OLD + 1 / NEW)
+    assert np.mean(variances) == pytest.approx(expected, rel=0.25)

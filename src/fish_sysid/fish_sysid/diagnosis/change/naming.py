@@ -28,7 +28,7 @@ class Judged:
     std: float  # standard error of that mean
     by_trial: Array  # (M,)
     strengths: Array  # (K,) in typical ones
-    covariance: Array  # (K, K), by the jackknife over trials
+    covariance: Array  # (K, K), by the jackknife over trials, of NEW less OLD
     whole: float  # nats on the trials that it was fitted to
     dispersion: float  # by which all these nats are divided
 
@@ -85,7 +85,7 @@ def _judge(
     gains /= dispersion
     values = np.array([b[-K:] for b, _ in left_out])
     spread = values - values.mean(axis=0)
-    covariance = (len(new) - 1) / len(new) * spread.T @ spread
+    covariance = fit.of_difference * (len(new) - 1) / len(new) * spread.T @ spread
     std = float(gains.std(ddof=1) / np.sqrt(len(gains))) if len(gains) > 1 else np.inf
     return Judged(
         key, float(gains.mean()), std, gains, fitter.coefficients[-K:], covariance,

@@ -56,6 +56,11 @@ class Regression:
     def shared(self) -> int:
         return len(self.precision)
 
+    @property
+    def of_difference(self) -> float:
+        """Variance of NEW less OLD over that of NEW's mean, which the jackknife over NEW's trials gives."""
+        return 1.0 + (len(self.names) - self.old) / self.old
+
 
 @dataclass(frozen=True)
 class Settled:

@@ -71,7 +71,7 @@ def refit(
         left_out = np.array([values + unit * d for d, _ in found])
         gains = np.array([stepper.gain(m, *one) for m, one in enumerate(found)]) / judged.dispersion
         values = _clipped(name, keys, values + unit * step)
-    std = jackknife(left_out)
+    std = np.sqrt(fit.of_difference) * jackknife(left_out)
     return refitted(name, dict(zip(keys, values.tolist(), strict=True)),
                      dict(zip(keys, std.tolist(), strict=True)), gains)  # fmt: skip
 
