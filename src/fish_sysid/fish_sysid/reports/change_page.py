@@ -12,11 +12,14 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fish_report.page import Figure, Table, Text, styled, write_page
+from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import changed_robot
+from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.prediction.kept_noise import kept_noise
 from fish_sysid.prediction.prediction import predict
 from fish_sysid.prediction.stroke_average import stroke_mean
 from fish_sysid.reports.identify_page_figures import MEASURED, SIMULATED
@@ -60,14 +63,14 @@ def _named(content: Content) -> Table:
                 for k, p in member["parameters"].items()
             ),
             f"{member['probability']:.2f}",
-            f"{member['remainder_p_value']:.2g}",
+            _p_value(member["remainder_p_value"]),
         ]
         for entry in content["effects"]
         for i, member in enumerate(entry["family"]["members"])
     ]
     note = (
         "Members of a family explain the change about equally well on trials of NEW that are left out in turn. p of the rest: of "
-        "the swap test once this one is taken out; small where it leaves something."
+        "the swap test once this one is taken out; small where it leaves something; – of a name that the gyro's answer alone gives."
     )
     header = (
         "changed",
@@ -77,6 +80,11 @@ def _named(content: Content) -> Table:
         "p of the rest",
     )
     return Table("What changed", header, rows, note)
+
+
+def _p_value(p: float) -> str:
+    """Of the rest; nothing of a name that the gyro's answer alone gives."""
+    return f"{p:.2g}" if np.isfinite(p) else "–"
 
 
 def _rarities(change: Change) -> Table:
@@ -122,10 +130,20 @@ def _measured(one: Experiment) -> tuple[Array, Array]:
 
 
 def _predicted(one: Experiment, robot: Robot) -> tuple[Array, Array]:
-    """Times and motion (F, 6) by predictions of HORIZON, NaN between two of them."""
-    run = predict(one, robot, usual_noise(one), HORIZON, HORIZON)
-    frames, seen = one.frames[0], run.seen(0)[:, 0]
-    return frames.t, stroke_mean(frames.t, frames.t)(seen)
+    """Times and motion (F, 6) of the trial by one prediction of HORIZON after the other, each from an estimated state.
+
+    With the noise of `robofish predict`: a filter that trusts a wrong model too much loses the fish.
+    """
+    noise = kept_noise(robot) or initial_noise(one, robot, usual_noise(one))
+    run = predict(one, robot, noise, HORIZON, HORIZON)
+    t, seen = one.frames[0].t, run.seen(0)
+    motion = np.full((len(t), 6), np.nan)
+    for s, start in enumerate(run.start * DT):
+        own = (t >= start) & (t < start + HORIZON)
+        known = np.isfinite(seen[:, s]).all(axis=1)
+        if own.any() and known.sum() > 1:
+            motion[own] = stroke_mean(t[known], t[own])(seen[known, s])
+    return t, motion
 
 
 def _line(figure: go.Figure, t: Array, motion: Array, label: str, colour: str, column: int) -> None:
