@@ -69,6 +69,13 @@ def test_an_option_is_written_out(capsys):
     assert "unrecognized arguments: --path R" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["--candidates", "--false-alarms", "--without"])
+def test_a_comparison_has_no_choice_of_the_search(option, tmp_path, capsys):
+    days = [str(tmp_path), "--baseline", str(tmp_path), "--out", str(tmp_path / "out")]
+    assert command.main(["diagnose", *days, option, "0.1"]) == 1
+    assert f"{option}: got it with --baseline" in capsys.readouterr().err
+
+
 def test_no_such_entry_point():
     with pytest.raises(AttributeError, match="swim_faster"):
         command.swim_faster  # noqa: B018

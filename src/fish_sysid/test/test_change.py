@@ -16,7 +16,7 @@ from fish_sysid.dataset.injection import INJECTIONS, with_injection
 from fish_sysid.dataset.joined import joined
 from fish_sysid.diagnosis.change import comparable
 from fish_sysid.diagnosis.change.change import Change
-from fish_sysid.diagnosis.change.change_json import answer, chance, with_change
+from fish_sysid.diagnosis.change.change_json import answer, chance, sentence, with_change
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import compare, days_of
 from fish_sysid.diagnosis.change.harmonics import StrokeWeights
@@ -200,6 +200,25 @@ def test_a_change_is_added_to_what_the_robot_has() -> None:
 def test_a_few_hundred_exchanges_are_not_said_to_show_one_in_millions() -> None:
     assert chance(8.7e-8) == "p < 0.001"
     assert chance(0.0033) == "p = 0.0033"
+
+
+def test_the_sentence_says_numbers_and_what_is_left() -> None:
+    from fish_sysid.diagnosis.change.change import Member, Named
+    from fish_sysid.diagnosis.change.strength import Refitted
+    from fish_sysid.diagnosis.symmetry.finding import Estimate
+
+    values = {"factor": Estimate(0.71, 0.011, "1")}
+    named = Named(
+        (Member("rudder_gain", 1.0, 9.0, 0.5, Refitted(values, "", np.zeros(3))),), "", 9.0, 1.0
+    )
+    change = Change("changed", p_value=0.002, named=(named,), remainder_p_value=0.4)
+    assert "rudder_gain (factor 0.71 ± 0.011) (p = 0.002)" in sentence(change)
+    assert "looks like exchanged trials (p = 0.4)" in sentence(change)
+    hardly = sentence(replace(change, remainder_p_value=0.01))
+    assert "more than most exchanged trials show, and too little to be named (p = 0.01)" in hardly
+    none = answer(Change("not_comparable", reason="no gyro; record one"))
+    assert none["next_experiment"] == {"program": [], "why": "no gyro; record one"}
+    assert none["unexplained"]["description"] == "not known: NEW and OLD cannot be compared"
 
 
 def test_the_standard_error_is_that_of_new_less_old(days) -> None:

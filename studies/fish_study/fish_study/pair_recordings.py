@@ -19,7 +19,7 @@ from fish_study.trial_injection import InjectionError, with_effects
 
 OLD, NEW = "old", "new"  # folders of a pair
 NEW_SHARE = 1 / 3  # of a user's recordings
-FEWEST = 9  # recordings of a user: six of OLD and three of NEW are the least that are compared
+FEWEST = 10  # recordings of a user: seven of OLD and three of NEW are the least that are compared
 
 
 def make_pair(scenario: Scenario, folder: Path) -> dict[str, float]:
@@ -57,13 +57,19 @@ def folder_name(trial: str) -> str:
     return trial.replace("/", "_").removesuffix(".mcap")
 
 
-def split(trials: Sequence[Trial], seed: int) -> tuple[list[Trial], list[Trial]]:
-    """(OLD, NEW): runs chosen at random, NEW_SHARE of them NEW. Raises ScenarioError for too few."""
+def enough(trials: Sequence[Trial]) -> list[Trial]:
+    """Those with commands and camera. Raises ScenarioError for too few."""
     usable = [trial for trial in trials if trial.commands is not None and trial.camera is not None]
     if len(usable) < FEWEST:
         raise ScenarioError(
             f"got {len(usable)} recordings with commands and camera; expected at least {FEWEST}, which are split into OLD and NEW"
         )
+    return usable
+
+
+def split(trials: Sequence[Trial], seed: int) -> tuple[list[Trial], list[Trial]]:
+    """(OLD, NEW): runs chosen at random, NEW_SHARE of them NEW. Raises ScenarioError for too few."""
+    usable = enough(trials)
     order = np.random.default_rng(seed).permutation(len(usable))
     count = max(3, round(NEW_SHARE * len(usable)))
     new, old = sorted(order[:count].tolist()), sorted(order[count:].tolist())

@@ -34,9 +34,9 @@ TOOL = (sys.executable, str(Path(__file__).with_name("fake_tool.py")))
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Nine short recordings, as a user has them."""
+    """Ten short recordings, as a user has them."""
     place = tmp_path_factory.mktemp("user") / "set"
-    make_recordings(replace(small("null"), count=9), place)
+    make_recordings(replace(small("null"), count=10), place)
     return place
 
 
@@ -89,7 +89,7 @@ def test_an_effect_that_cannot_be_put_in_is_refused(trials) -> None:
 
 
 def test_old_and_new_are_of_different_runs_and_new_alone_has_the_effect(
-    folder: Path, trials, tmp_path: Path
+    folder: Path, trials, tmp_path: Path, capsys
 ) -> None:
     values = {"x": 0.03, "y": -0.02}
     scenario = Scenario(
@@ -98,7 +98,7 @@ def test_old_and_new_are_of_different_runs_and_new_alone_has_the_effect(
     make_pair(scenario, tmp_path / "pair")
     old, new = (list(read_dataset(tmp_path / "pair" / name)) for name in ("old", "new"))
     assert {t.name for t in old} | {t.name for t in new} == {t.name for t in trials}
-    assert len(old) == 6
+    assert len(old) == 7
     assert len(new) == 3
     was = {t.name: t for t in trials}
     for trial in old:
@@ -106,8 +106,18 @@ def test_old_and_new_are_of_different_runs_and_new_alone_has_the_effect(
     for trial in new:
         drift = trial.camera.y - was[trial.name].camera.y
         assert np.polyfit(trial.camera.t, drift, 1)[0] == pytest.approx(-0.02)
-    with pytest.raises(ScenarioError, match="expected at least 9"):
+    with pytest.raises(ScenarioError, match="expected at least 10"):
         split(trials[:8], 0)
+    asked = [
+        "prove",
+        "--recordings",
+        str(tmp_path / "pair" / "old"),
+        "--out",
+        str(tmp_path / "few"),
+    ]
+    assert main(asked) == 1
+    assert "got 7 recordings" in capsys.readouterr().err
+    assert not (tmp_path / "few").exists()
 
 
 def test_runs_whose_names_differ_after_a_dot_stay_apart() -> None:

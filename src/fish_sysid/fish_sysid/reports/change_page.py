@@ -17,6 +17,7 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import changed_robot
+from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.prediction.kept_noise import kept_noise
@@ -32,7 +33,8 @@ HORIZON = 2.0  # s, of the predictions that are drawn
 SHOWN = 3  # trials of OLD and of NEW
 UNCHANGED = "#8fbcbb"
 NOTE = (
-    f"Grey: measured, averaged over strokes. Lines: predicted {HORIZON:g} s ahead from estimated states, again and again, "
+    "The first trials of each day. Grey: measured, averaged over strokes. "
+    f"Lines: predicted {HORIZON:g} s ahead from estimated states, again and again, "
     "with the recorded commands, by OLD's model and by OLD's model with the change."
 )
 
@@ -45,7 +47,7 @@ def write_change_page(path: Path, name: str, content: Content, change: Change) -
     if change.robot is not None and change.old is not None and change.new is not None:
         blocks.append(side_by_side(change))
         blocks.append(_rarities(change))
-        blocks.append(symmetry_table(content["symmetry"]))
+        blocks.append(symmetry_table(content["symmetry"], "Symmetry tests of OLD"))
     blocks += [Text("Next experiment", content["next_experiment"]["why"])]
     blocks += [Text("Left out", text) for text in content["left_out"]]
     blocks += [Text("Refused", text) for text in content["change"]["refused"]]
@@ -58,10 +60,7 @@ def _named(content: Content) -> Table:
         [
             entry["name"] if i == 0 else "",
             member["name"],
-            ", ".join(
-                f"{k} {p['value']:.3g} ± {p['std']:.2g} {p['unit']}"
-                for k, p in member["parameters"].items()
-            ),
+            ", ".join(f"{key} {Estimate(**p)}" for key, p in member["parameters"].items()),
             f"{member['probability']:.2f}",
             _p_value(member["remainder_p_value"]),
         ]
@@ -70,7 +69,7 @@ def _named(content: Content) -> Table:
     ]
     note = (
         "Members of a family explain the change about equally well on trials of NEW that are left out in turn. p of the rest: of "
-        "the swap test once this one is taken out; small where it leaves something; – of a name that the gyro's answer alone gives."
+        "the swap test once this one is taken out; small where it leaves something; – of one that only the gyro's answer gives."
     )
     header = (
         "changed",
@@ -103,14 +102,20 @@ def side_by_side(change: Change) -> Figure:
     days = [(day, e) for day, e in (("OLD", change.old), ("NEW", change.new)) if e is not None]
     shown = [(day, e.select([m])) for day, e in days for m in range(min(SHOWN, len(e.names)))]
     titles = [f"{day} {one.names[0]}" for day, one in shown]
-    figure = make_subplots(2, len(shown), subplot_titles=titles, horizontal_spacing=0.04)
+    figure = make_subplots(
+        2, len(shown), subplot_titles=titles, shared_yaxes=True, horizontal_spacing=0.02
+    )
+    first_of_new = 1 + next((i for i, (day, _) in enumerate(shown) if day == "NEW"), 0)
     for column, (day, one) in enumerate(shown, 1):
         t, mean = _measured(one)
-        _line(figure, t, mean, "measured", MEASURED, column)
+        _line(figure, t, mean, "measured", MEASURED, column, column == 1)
         if change.robot is not None:
-            _line(figure, *_predicted(one, change.robot), "OLD's model", UNCHANGED, column)
+            curve = _predicted(one, change.robot)
+            _line(figure, *curve, "OLD's model", UNCHANGED, column, column == 1)
         if day == "NEW" and change.named:
-            _line(figure, *_predicted(one, changed), "with the change", SIMULATED, column)
+            curve = _predicted(one, changed)
+            named = column == first_of_new
+            _line(figure, *curve, "with the change", SIMULATED, column, named)
         figure.update_xaxes(title="time (s)", row=2, col=column)
     figure.update_yaxes(title="surge speed (m/s)", row=1, col=1)
     figure.update_yaxes(title="yaw rate (rad/s)", row=2, col=1)
@@ -146,7 +151,9 @@ def _predicted(one: Experiment, robot: Robot) -> tuple[Array, Array]:
     return t, motion
 
 
-def _line(figure: go.Figure, t: Array, motion: Array, label: str, colour: str, column: int) -> None:
+def _line(
+    figure: go.Figure, t: Array, motion: Array, label: str, colour: str, column: int, legend: bool
+) -> None:
     shared = {
         "name": label,
         "legendgroup": label,
@@ -154,7 +161,5 @@ def _line(figure: go.Figure, t: Array, motion: Array, label: str, colour: str, c
         "mode": "lines",
         "col": column,
     }
-    figure.add_scatter(
-        x=t, y=motion[:, 3], showlegend=column == 1 or label == "with the change", row=1, **shared
-    )
+    figure.add_scatter(x=t, y=motion[:, 3], showlegend=legend, row=1, **shared)
     figure.add_scatter(x=t, y=motion[:, 5], showlegend=False, row=2, **shared)

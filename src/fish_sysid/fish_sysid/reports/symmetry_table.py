@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fish_report.page import Table
+from fish_sysid.diagnosis.symmetry.finding import Estimate
 
 HEADER = ("test for", "answer", "numbers", "log gain on left-out trials", "assumes", "needs")
 NOTE = (
@@ -17,16 +18,13 @@ NOTE = (
 )
 
 
-def symmetry_table(tests: Sequence[Mapping[str, Any]]) -> Table:
+def symmetry_table(tests: Sequence[Mapping[str, Any]], title: str = "Symmetry tests") -> Table:
     """Every test of diagnosis.json's `symmetry`."""
-    return Table("Symmetry tests", HEADER, [_row(test) for test in tests], NOTE)
+    return Table(title, HEADER, [_row(test) for test in tests], NOTE)
 
 
 def _row(test: Mapping[str, Any]) -> list[str]:
-    numbers = ", ".join(
-        f"{key} {p['value']:.3g} ± {p['std']:.2g} {p['unit']}"
-        for key, p in test["parameters"].items()
-    )
+    numbers = ", ".join(f"{key} {Estimate(**p)}" for key, p in test["parameters"].items())
     told = test["evidence"]
     gain = ""
     if told:

@@ -20,6 +20,7 @@ Entry = dict[str, Any]
 NOT_A_NUMBER = float("nan")
 SURE = 0.9  # probability from which one member of a family is named alone
 LEAST_SAID = 0.001  # p-value
+SURVIVES = 0.05  # p-value of a remainder above which it looks like exchanged trials
 
 
 def answer(change: Change) -> Entry:
@@ -43,7 +44,7 @@ def answer(change: Change) -> Entry:
                 m.name
                 for named in change.named
                 for m in named.members
-                if m.remainder_p_value > 0.05
+                if m.remainder_p_value > SURVIVES
             ],
             "suspects": list(change.suspects),
             "refused": list(change.refused),
@@ -85,16 +86,22 @@ def sentence(change: Change) -> str:
     if not change.named:
         return f"The fish changed ({chance(change.p_value)}), and no name explains it: {remainder(change)}.{lacks}"
     parts = [_words(named) for named in change.named]
-    left = (
-        f" Something else changed too: {remainder(change)}."
-        if change.suspects
-        else f" What is left looks like exchanged trials ({chance(change.remainder_p_value)})."
-    )
-    return f"Since OLD the fish has {' and '.join(parts)} ({chance(change.p_value)}).{left}{lacks}"
+    return f"Since OLD the fish has {' and '.join(parts)} ({chance(change.p_value)}). {_left(change)}{lacks}"
+
+
+def _left(change: Change) -> str:
+    if change.suspects:
+        return f"Something else changed too: {remainder(change)}."
+    p_value = chance(change.remainder_p_value)
+    if change.remainder_p_value > SURVIVES:
+        return f"What is left looks like exchanged trials ({p_value})."
+    return f"What is left is more than most exchanged trials show, and too little to be named ({p_value})."
 
 
 def remainder(change: Change) -> str:
     """What of the change has no name."""
+    if change.verdict == "not_comparable":
+        return "not known: NEW and OLD cannot be compared"
     if not change.suspects:
         return "nothing of the change"
     return f"most alike are {', '.join(change.suspects)}, and none of them explains it"
@@ -108,8 +115,7 @@ def in_every_recording(change: Change) -> str:
 
 def _words(named: Named) -> str:
     values = ", ".join(
-        f"{key} {p.value:.3g} ± {p.std:.2g} {p.unit}".rstrip(" 1")
-        for key, p in named.members[0].refitted.parameters.items()
+        f"{key} {estimate}" for key, estimate in named.members[0].refitted.parameters.items()
     )
     text = f"{named.name} ({values or 'how much, the model cannot say'})"
     others = [m.name for m in named.members[1:]]
@@ -164,7 +170,9 @@ def _parameters(member: Member) -> Entry:
 
 
 def _next_experiment(change: Change) -> Entry:
-    """The manoeuvre that separates the members of the first family."""
+    """The manoeuvre that separates the members of the first family; none where the days cannot be compared."""
+    if change.verdict == "not_comparable":
+        return {"program": [], "why": change.reason}
     apart = separating([[m.name for m in named.members] for named in change.named])
     return apart or next_experiment([named.name for named in change.named], [])
 

@@ -19,6 +19,9 @@ class Estimate:
     std: float
     unit: str
 
+    def __str__(self) -> str:
+        return f"{self.value:.3g} ± {self.std:.2g}" + ("" if self.unit == "1" else f" {self.unit}")
+
 
 @dataclass(frozen=True)
 class Evidence:
