@@ -175,3 +175,12 @@ def test_images_that_are_all_refused_say_why(tmp_path):
     samples.write_mcap(tmp_path / "a", messages)
     with pytest.raises(UserError, match=r"no camera/pose.*expected metres"):
         read_experiment(tmp_path)
+
+
+def test_options_of_the_search_are_refused_with_a_baseline(tmp_path, capsys):
+    for option, value in (
+        ("--candidates", "payload"), ("--false-alarms", "0.1"), ("--without", "base restart"),
+    ):  # fmt: skip
+        given = [str(tmp_path), "--baseline", str(tmp_path), "--out", str(tmp_path / "out")]
+        assert command.main(["diagnose", *given, option, value]) == 1
+        assert f"{option} goes without --baseline" in " ".join(capsys.readouterr().err.split())

@@ -42,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--false-alarms",
         type=float,
-        default=0.02,
         help="tolerated share of false alarms (default 0.02)",
     )
     parser.add_argument(
@@ -74,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     console, start = terminal(stderr=True), time.monotonic()
     robot = read_model(args.robot)
     with user_errors():
-        level = Level(args.false_alarms)
+        level = Level() if args.false_alarms is None else Level(args.false_alarms)
         names = known(args.candidates.split(",")) if args.candidates else None
     experiment, left_out = read_experiment(*args.dataset, topics=topic_map(args))
     writable_folder(args.out)
@@ -118,6 +117,12 @@ def _compare(args: argparse.Namespace) -> int:
     from fish_sysid.diagnosis.change.compare import compare
     from fish_sysid.reports.change_page import write_change_page
 
+    for option in ("candidates", "false_alarms", "without"):
+        if getattr(args, option) is not None:
+            name = option.replace("_", "-")
+            raise UserError(
+                f"--{name} goes without --baseline; a comparison has its own level and names"
+            )
     console, start = terminal(stderr=True), time.monotonic()
     robot = read_model(args.robot)
     new, olds, left_out, unlike = read_days(args.dataset, args.baseline, topic_map(args))
