@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_bag.dataset import read_dataset
+from fish_bag.dataset import find_trials, read_dataset
 from fish_bag.trial import Trial
 from fish_study.build import make_recordings
 from fish_study.scenario import Scenario, ScenarioError
@@ -19,7 +19,7 @@ from fish_study.trial_injection import InjectionError, with_effects
 
 OLD, NEW = "old", "new"  # folders of a pair
 NEW_SHARE = 1 / 3  # of a user's recordings
-FEWEST = 9  # recordings of a user: six of OLD and three of NEW are the least that are compared
+FEWEST = 10  # recordings of a user: seven of OLD and three of NEW are the least that are compared
 
 
 def make_pair(scenario: Scenario, folder: Path) -> dict[str, float]:
@@ -55,6 +55,14 @@ def _injected(scenario: Scenario, folder: Path) -> None:
 def folder_name(trial: str) -> str:
     """Name of a trial's folder; no two trials share it, though their names have dots or lie in folders."""
     return trial.replace("/", "_").removesuffix(".mcap")
+
+
+def check_count(folder: Path) -> None:
+    """Raises ScenarioError where a folder holds fewer recordings than are split."""
+    if (found := len(find_trials(folder))) < FEWEST:
+        raise ScenarioError(
+            f"--recordings {folder}: {found} recordings; expected at least {FEWEST}"
+        )
 
 
 def split(trials: Sequence[Trial], seed: int) -> tuple[list[Trial], list[Trial]]:
