@@ -123,10 +123,12 @@ def test_days_that_cannot_be_compared_say_why_and_what_is_needed(days) -> None:
     old, new = days
     blind = replace(new, gyro=np.full_like(new.gyro, np.nan))
     degrees = replace(new, commands=new.commands * [1.0, 180.0 / np.pi])
+    silent = replace(new, commands=new.commands * [1.0, 0.0])
     straight = kinematic_swims(World(turns=False, speeds=(10.0, 12.0)), 3, 4)
     for other, text in (
         (blind, "same topics"),
         (degrees, "equal units"),
+        (silent, "rudder: 0 throughout NEW and not in OLD"),
         (new.select([0, 1]), "expected at least 3"),
         (straight, "programs of OLD"),
     ):
@@ -144,9 +146,23 @@ def test_a_trial_that_swims_backwards_is_named_and_left_out(days) -> None:
     frames = old.frames[2]
     turned = replace(frames, pose=frames.pose + [0.0, 0.0, np.pi])
     backwards = replace(old, frames=(*old.frames[:2], turned, *old.frames[3:]))
-    kept, told = comparable.screened(swims(backwards), "OLD")
+    kept, told = comparable.screened(backwards, "OLD")
     assert len(kept) == OLD - 1
     assert told == ["OLD swim_2: swims backwards in the mean"]
+    all_of_them = tuple(replace(f, pose=f.pose + [0.0, 0.0, np.pi]) for f in old.frames)
+    change = compare(replace(old, frames=all_of_them), [old], Robot())
+    assert "NEW has 0 usable trials" in change.reason
+    assert change.left_out == tuple(
+        f"NEW swim_{m}: swims backwards in the mean" for m in range(OLD)
+    )
+
+
+def test_a_trial_too_short_for_stroke_means_is_named(days) -> None:
+    old, _ = days
+    short = replace(old, steps=np.array([150, *old.steps[1:]]))
+    kept, told = comparable.screened(short, "NEW")
+    assert len(kept) == OLD - 1
+    assert told == ["NEW swim_0: too short, or too few images"]
 
 
 def test_a_change_that_old_makes_from_day_to_day_is_none(days) -> None:

@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings as an experiment: what cannot be used is said, and robots are not mixed."""
 
+import shutil
+
 import numpy as np
 import pytest
 
 from fish_bag import sample_recordings as samples
 from fish_report import robofish as command
 from fish_report.errors import UserError
-from fish_sysid.dataset.read import read_experiment
+from fish_sysid.dataset.read import heading, read_days, read_experiment
 
 
 def test_what_cannot_be_read_is_left_out_and_said(tmp_path):
@@ -126,3 +128,59 @@ def test_an_effect_that_nobody_knows_is_refused_before_anything_is_read(tmp_path
     for given in ("tip_slipp", "choose,tip_slip"):
         assert command.main(["identify", str(tmp_path), "--effects", given]) == 1
         assert f"unknown candidate '{given.split(',')[0]}'" in capsys.readouterr().err
+
+
+def moved(messages, metres, topic="/fish/camera/pose"):
+    """The messages with what the camera shows moved along x, so that no two days have the same images."""
+    for _, name, message, *_ in messages:
+        if name == topic:
+            message.pose.pose.position.x += metres
+    return messages
+
+
+def test_a_recording_of_two_days_is_refused_also_as_a_copy(tmp_path):
+    for day in ("new", "old", "copy"):
+        samples.write_mcap(tmp_path / day / "a", moved(samples.robot_messages(), len(day) * 0.001))
+    read_days([tmp_path / "new"], [tmp_path / "copy"])
+    shutil.copytree(tmp_path / "old" / "a", tmp_path / "copy" / "b")
+    for olds in (["new"], ["old", "old"], ["old", "copy"]):
+        with pytest.raises(UserError, match="same recording; expected every recording once"):
+            read_days([tmp_path / "new"], [tmp_path / day for day in olds])
+
+
+def test_a_unit_of_one_day_alone_makes_it_not_comparable(tmp_path):
+    for day, metres in (("old", 0.0), ("new", 0.001)):
+        samples.write_mcap(tmp_path / day / "a", moved(samples.robot_messages(), metres))
+    assert read_days([tmp_path / "new"], [tmp_path / "old"])[2:] == ([], None)
+    messages = moved(samples.robot_messages(), 0.002)
+    for _, topic, message, *_ in messages:
+        if topic == "/fish/imu/data":
+            for axis in "xyz":
+                force = message.linear_acceleration
+                setattr(force, axis, getattr(force, axis) / 9.81)
+    samples.write_mcap(tmp_path / "in_g" / "a", messages)
+    _, _, told, why = read_days([tmp_path / "in_g"], [tmp_path / "old"])
+    assert "(g?)" in why
+    assert "in 1 of 1 trials of NEW and in none of OLD" in why
+    assert [heading(text) for text in told] == ["Used with a fault"]
+    assert told[0].startswith("NEW a /fish/imu/data")
+
+
+def test_images_that_are_all_refused_say_why(tmp_path):
+    messages = samples.robot_messages()
+    random = np.random.default_rng(0)
+    for _, topic, message, *_ in messages:
+        if topic == "/fish/camera/pose":  # millimetres, with noise
+            message.pose.pose.position.x = 1000.0 * random.uniform(-1.0, 1.0)
+    samples.write_mcap(tmp_path / "a", messages)
+    with pytest.raises(UserError, match=r"no camera/pose.*expected metres"):
+        read_experiment(tmp_path)
+
+
+def test_options_of_the_search_are_refused_with_a_baseline(tmp_path, capsys):
+    for option, value in (
+        ("--candidates", "payload"), ("--false-alarms", "0.1"), ("--without", "base restart"),
+    ):  # fmt: skip
+        given = [str(tmp_path), "--baseline", str(tmp_path), "--out", str(tmp_path / "out")]
+        assert command.main(["diagnose", *given, option, value]) == 1
+        assert f"{option} goes without --baseline" in " ".join(capsys.readouterr().err.split())

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from math import comb
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from fish_study.trial_file import write_trial_file
 from fish_study.trial_injection import INJECTIONS, InjectionError, with_effects
 from fish_sysid.dataset.experiment import Experiment, build_experiment
 from fish_sysid.dataset.injection import with_injection
+from fish_sysid.diagnosis.change.comparable import FEWEST_WAYS
 
 TOOL = (sys.executable, str(Path(__file__).with_name("fake_tool.py")))
 
@@ -97,6 +99,7 @@ def test_old_and_new_are_of_different_runs_and_new_alone_has_the_effect(
     )
     make_pair(scenario, tmp_path / "pair")
     old, new = (list(read_dataset(tmp_path / "pair" / name)) for name in ("old", "new"))
+    assert comb(len(trials), len(new)) >= FEWEST_WAYS
     assert {t.name for t in old} | {t.name for t in new} == {t.name for t in trials}
     assert len(old) == 7
     assert len(new) == 3
@@ -188,11 +191,19 @@ def test_answers_are_counted_by_what_was_changed() -> None:
 
 
 def test_recordings_go_with_their_own_group_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = str(tmp_path / "out")
+    out, nine = str(tmp_path / "out"), tmp_path / "nine"
+    nine.mkdir()
+    for recording in sorted(folder.iterdir())[:9]:
+        (nine / recording.name).symlink_to(recording)
     for arguments, message in (
         (["--recordings", str(tmp_path), "--groups", "null"], "expected injected"),
+        (["--recordings", str(tmp_path)], "no recording; expected a rosbag2 directory"),
+        (
+            ["--recordings", str(nine)],
+            "nine: got 9 recordings with commands and camera; expected at least 10",
+        ),
         (["--groups", "injected"], "got None; expected a folder"),
         (["--recordings", str(tmp_path / "none")], "expected a folder of recordings"),
     ):

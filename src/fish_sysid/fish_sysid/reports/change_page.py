@@ -15,6 +15,7 @@ from fish_report.page import Figure, Table, Text, styled, write_page
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.read import heading
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import changed_robot
 from fish_sysid.diagnosis.symmetry.finding import Estimate
@@ -49,7 +50,7 @@ def write_change_page(path: Path, name: str, content: Content, change: Change) -
         blocks.append(_rarities(change))
         blocks.append(symmetry_table(content["symmetry"], "Symmetry tests of OLD"))
     blocks += [Text("Next experiment", content["next_experiment"]["why"])]
-    blocks += [Text("Left out", text) for text in content["left_out"]]
+    blocks += [Text(heading(text), text) for text in content["left_out"]]
     blocks += [Text("Refused", text) for text in content["change"]["refused"]]
     blocks.append(Text("What remains", content["unexplained"]["description"]))
     write_page(path, f"What changed in {name}", content["sentence"], blocks)

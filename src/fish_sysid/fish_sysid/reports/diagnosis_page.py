@@ -16,6 +16,7 @@ from fish_report.page import (
     Text,
     write_page,
 )
+from fish_sysid.dataset.read import heading
 from fish_sysid.diagnosis.diagnosis_json import LAGS
 from fish_sysid.diagnosis.known_effects import known_effects, known_parameters
 from fish_sysid.diagnosis.result import Diagnosis, Round, Screened
@@ -72,7 +73,7 @@ def write_diagnosis_page(path: Path, name: str, content: Content, d: Diagnosis) 
         Text("Next experiment", content["next_experiment"]["why"]),
         Figure("Its program", program(content)),
         Text("Out of reach", _unreachable(d)),
-        *(Text("Left out", text) for text in content.get("left_out", ())),
+        *(Text(heading(text), text) for text in content.get("left_out", ())),
         Text("What remains", content["unexplained"]["description"]),
     ]
     write_page(path, f"Diagnosis of {name}", sentence(content), blocks)

@@ -13,6 +13,7 @@ from fish_report.page import (
     Text,
     write_page,
 )
+from fish_sysid.dataset.read import heading
 from fish_sysid.identification_result import Identification
 from fish_sysid.reports.identify_page_figures import correlations, motion_figures, residual_figures
 from fish_sysid.reports.identify_tables import (
@@ -27,7 +28,7 @@ from fish_sysid.reports.identify_tables import (
 def write_identify_page(path: Path, result: Identification, left_out: Sequence[str] = ()) -> None:
     """Write the self-contained page."""
     blocks: list[Block] = [Text("", text) for text in result.statements]
-    blocks += [Text("Left out", text) for text in left_out]
+    blocks += [Text(heading(text), text) for text in left_out]
     where = "trials left out of the fit" if result.held_out else "trials that took part in the fit"
     tables = [error_table(result.errors, f"Prediction error on {where}"), parameter_table(result)]
     tables += [entangled_table(result), bias_table(result), noise_table(result)]

@@ -16,7 +16,7 @@ from fish_report.terminal import PARAGRAPH, cell, say, terminal
 from fish_report.writable import writable_folder
 from fish_sim.robot_argument import read_model
 from fish_sim.robot_file import save_robot
-from fish_sysid.dataset.read import read_days, read_experiment
+from fish_sysid.dataset.read import heading, read_days, read_experiment
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
         args.out / "report.html", named_path(args.dataset[0]).name, content, result
     )
     files = f"{args.out}/diagnosis.json, model.yaml, report.html"
-    for text in [*(f"left out: {text}" for text in left_out), sentence(content)]:
+    for text in [*(f"{heading(text).lower()}: {text}" for text in left_out), sentence(content)]:
         say(terminal(), text, PARAGRAPH)
     say(terminal(), f"{files} ({time.monotonic() - start:.0f} s)")
     return 0
@@ -122,10 +122,10 @@ def _compare(args: argparse.Namespace) -> int:
         if getattr(args, option) is not None:
             said = option.replace("_", "-")
             raise UserError(
-                f"--{said}: got it with --baseline, which has no such choice; leave it out"
+                f"--{said} goes without --baseline: a comparison has its own level and names; leave it out"
             )
     robot = read_model(args.robot)
-    new, olds, left_out, several = read_days(args.dataset, args.baseline, topic_map(args))
+    new, olds, left_out, unlike = read_days(args.dataset, args.baseline, topic_map(args))
     writable_folder(args.out)
 
     def progress(text: str) -> None:
@@ -133,8 +133,8 @@ def _compare(args: argparse.Namespace) -> int:
 
     change = (
         compare(new, olds, robot, progress)
-        if several is None
-        else Change("not_comparable", reason=f"{several}; record NEW and OLD with the same robot")
+        if unlike is None
+        else Change("not_comparable", reason=unlike)
     )
     content = answer(change)
     content["left_out"] = [*left_out, *content["left_out"]]
@@ -144,7 +144,8 @@ def _compare(args: argparse.Namespace) -> int:
         save_robot(changed_robot(change), args.out / "model.yaml", notes=sentence(change))
         written = "diagnosis.json, model.yaml, report.html"
     write_change_page(args.out / "report.html", named_path(args.dataset[0]).name, content, change)
-    for text in [*(f"left out: {text}" for text in content["left_out"]), sentence(change)]:
+    lines = [f"{heading(text).lower()}: {text}" for text in content["left_out"]]
+    for text in [*lines, sentence(change)]:
         say(terminal(), text, PARAGRAPH)
     say(terminal(), f"{args.out}/{written} ({time.monotonic() - start:.0f} s)")
     return 0

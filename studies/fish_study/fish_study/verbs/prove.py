@@ -28,7 +28,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from fish_report.errors import UserError
+from fish_report.errors import UserError, user_errors
 from fish_report.terminal import say
 
 if TYPE_CHECKING:
@@ -93,7 +93,6 @@ def _add_other_ways(add: Callable[..., Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Create or go on, run, open, print, write."""
-    from fish_report.errors import user_errors
     from fish_report.terminal import terminal
 
     given = frozenset(name for name in DEFAULTS if getattr(args, name) is not None)
@@ -119,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _recordings(args: argparse.Namespace, given: frozenset[str]) -> str:
-    """The folder of --recordings, whose only group is `injected`; "" without it. Raises UserError for other groups."""
+    """The folder of --recordings, whose only group is `injected`; "" without it. UserError for other groups or too few."""
     if args.recordings is None and INJECTED not in args.groups:
         return ""
     if args.recordings is None or not args.recordings.is_dir():
@@ -251,7 +250,6 @@ def _ablation(args: argparse.Namespace, asked: Asked, console: Console) -> int:
 
 def _close_loop(args: argparse.Namespace, console: Console) -> int:
     """Recordings of the second plant, trainings on each model, a search on the plant, one table and page."""
-    from fish_report.errors import user_errors
     from fish_report.page import Block, Figure, write_page
     from fish_report.terminal import print_table
     from fish_study.close_loop import Plan, close_loop, loop_scenario

@@ -13,7 +13,7 @@ from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial import cKDTree
 
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.change.channels import Swim
+from fish_sysid.diagnosis.change.channels import Swim, swims
 from fish_sysid.diagnosis.symmetry.stroke_means import ROTOR
 
 Array = NDArray[np.float64]
@@ -32,6 +32,10 @@ FAR_OUT = 6.0  # times the median of the other trials' residuals, in mean square
 class NotComparableError(ValueError):
     """OLD and NEW cannot be compared; the message says why and what would be needed."""
 
+    def __init__(self, text: str, left_out: Sequence[str] = ()) -> None:
+        super().__init__(text)
+        self.left_out = tuple(left_out)  # trials that were, and why
+
 
 def check_sensors(old: Experiment, new: Experiment) -> None:
     """Raises NotComparableError where a sensor is missing in one of them, or its numbers are of another unit."""
@@ -48,9 +52,13 @@ def check_sensors(old: Experiment, new: Experiment) -> None:
         ("position", _places(old), _places(new)),
         ("yaw rate of the gyro", old.gyro, new.gyro),
     ):
-        sizes = [
-            float(np.nanquantile(np.abs(x), 0.9)) if np.isfinite(x).any() else 0.0 for x in (a, b)
-        ]
+        sizes = [_size(x, 0.9) for x in (a, b)]
+        if (_size(a, 1.0) > 0.0) != (_size(b, 1.0) > 0.0):
+            still, other = ("NEW", "OLD") if _size(a, 1.0) > 0.0 else ("OLD", "NEW")
+            raise NotComparableError(
+                f"{text}: 0 throughout {still} and not in {other}; expected it to move in both; "
+                f"record {still} with programs of {other}, and look whether this is logged"
+            )
         if min(sizes) > 0.0 and max(sizes) / min(sizes) > UNITS:
             raise NotComparableError(
                 f"{text}: 90 % are below {sizes[0]:.3g} in OLD and below {sizes[1]:.3g} in NEW; expected equal units; "
@@ -58,30 +66,44 @@ def check_sensors(old: Experiment, new: Experiment) -> None:
             )
 
 
+def _size(values: Array, share: float) -> float:
+    """What this share of the values is below; 0 without any."""
+    return float(np.nanquantile(np.abs(values), share)) if np.isfinite(values).any() else 0.0
+
+
 def _places(experiment: Experiment) -> Array:
     """Positions less where each trial starts."""
     return np.concatenate([(f.pose[:, :2] - f.pose[0, :2]).ravel() for f in experiment.frames])
 
 
-def screened(days: Sequence[Swim], which: str) -> tuple[tuple[Swim, ...], list[str]]:
-    """The swims that go ahead, and why each other one is left out."""
+def screened(experiment: Experiment, which: str) -> tuple[tuple[Swim, ...], list[str]]:
+    """The swims that go ahead, and why each other trial is left out."""
+    days = swims(experiment)
     kept = tuple(swim for swim in days if not swim.backwards)
     told = [f"{which} {swim.name}: swims backwards in the mean" for swim in days if swim.backwards]
+    long = {swim.name for swim in days}
+    told += [
+        f"{which} {name}: too short, or too few images"
+        for name in experiment.names
+        if name not in long
+    ]
     return kept, told
 
 
-def check_counts(old: Sequence[Swim], new: Sequence[Swim]) -> None:
-    """Raises NotComparableError for too few trials, or without common commands."""
+def check_counts(old: Sequence[Swim], new: Sequence[Swim], left_out: Sequence[str] = ()) -> None:
+    """Raises NotComparableError, with what was left out, for too few trials, or without common commands."""
     for which, days, fewest in (("OLD", old, FEWEST_OLD), ("NEW", new, FEWEST_NEW)):
         if len(days) < fewest:
             raise NotComparableError(
-                f"{which} has {len(days)} usable trials; expected at least {fewest}; record more with the same programs"
+                f"{which} has {len(days)} usable trials; expected at least {fewest}; record more with the same programs",
+                left_out,
             )
     ways = comb(len(old) + len(new), len(new))
     if ways < FEWEST_WAYS:
         raise NotComparableError(
             f"{len(old)} usable trials of OLD and {len(new)} of NEW can be exchanged in {ways} ways; "
-            f"expected at least {FEWEST_WAYS}, as of seven and three; record more with the same programs"
+            f"expected at least {FEWEST_WAYS}, as of seven and three; record more with the same programs",
+            left_out,
         )
     a, b = (np.concatenate([_commands(s) for s in days]) for days in (old, new))
     spread = np.maximum(a.std(axis=0), 1e-2)
@@ -89,8 +111,9 @@ def check_counts(old: Sequence[Swim], new: Sequence[Swim]) -> None:
     common = float((distance < NEAR).mean())
     if common < COMMON:
         raise NotComparableError(
-            f"{common:.0%} of NEW swims as OLD did (throttle, rudder); expected at least {COMMON:.0%}; "
-            "record NEW with programs of OLD"
+            f"{common:.1%} of NEW swims as OLD did (throttle, rudder); expected at least {COMMON:.0%}; "
+            "record NEW with programs of OLD",
+            left_out,
         )
 
 

@@ -13,6 +13,7 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.camera_time_offset import align, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.joined import joined
+from fish_sysid.dataset.read import LESS
 from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.channels import Swim, swims
@@ -62,7 +63,7 @@ def compare(
     try:
         change = _compare(new, olds, robot, report)
     except NotComparableError as error:
-        return Change("not_comparable", reason=str(error))
+        return Change("not_comparable", reason=str(error), left_out=error.left_out)
     if fit and change.old is not None:
         report("fitting OLD by predictions")
         return replace(change, robot=model_of(in_still_water(change.old, change.symmetry), robot))
@@ -81,9 +82,9 @@ def _compare(
     report("testing symmetries of OLD")
     symmetry = symmetry_findings(old, robot)
     old, new = moved_back(old, delay), moved_back(new, delay)
-    old_days, told = screened(swims(old), "OLD")
-    new_days, more = screened(swims(new), "NEW")
-    check_counts(old_days, new_days)
+    old_days, told = screened(old, "OLD")
+    new_days, more = screened(new, "NEW")
+    check_counts(old_days, new_days, (*told, *more))
     report("the rudder's answer")
     strata = kinds(old_days, new_days)
     old, new = _of(old, old_days), _of(new, new_days)
@@ -101,7 +102,9 @@ def _compare(
         for trial in far_out(case.fit.names, case.fit.rest, case.fit.old)
     }
     told += [
-        f"OLD {s}: out of the other trials' family" for s in strange if s not in " ".join(told)
+        f"OLD {s}: out of the other trials' family; {LESS}"
+        for s in strange
+        if s not in " ".join(told)
     ]
     report("exchanging trials")
     tests = {name: swap_test(case.fit, strata, days=day_of) for name, case in looks.items()}
