@@ -59,10 +59,13 @@ def compare(
 ) -> Change:
     """What changed in NEW against the days OLD; "not_comparable" with the reason where that cannot be said.
 
-    robot: what the candidates' shapes are simulated with; fit: `Change.robot` is OLD's best model, else this one.
+    robot: what the candidates' shapes are simulated with; fit: `Change.robot` is OLD's best model, else this one, for images
+    at the moment they were taken: how old OLD's are, camera and gyro say, and the robot only without a gyro.
     """
+    given = robot.sensors.get("camera_latency", {}).get("delay", 0.0)
+    robot = robot.without_effect("camera_latency")
     try:
-        change = _compare(new, olds, robot, report)
+        change = _compare(new, olds, robot, given, report)
     except NotComparableError as error:
         return Change("not_comparable", reason=str(error), left_out=error.left_out)
     if fit and change.old is not None:
@@ -75,11 +78,14 @@ def _compare(
     new: Experiment,
     olds: Sequence[Experiment],
     robot: Robot,
+    given: float,
     report: Report,
 ) -> Change:
+    """The answer with the robot as it is given; given: s, by which its camera is late."""
     old = joined(olds)
     check_sensors(old, new)
-    delay = align(old).delay
+    aligned = align(old)
+    delay = aligned.delay if np.isfinite(aligned.rms) else given
     report("testing symmetries of OLD")
     symmetry = symmetry_findings(old, robot)
     age = age_change(old, new)
