@@ -16,10 +16,17 @@ from fish_sysid.dataset.injection import INJECTIONS, with_injection
 from fish_sysid.dataset.joined import joined
 from fish_sysid.diagnosis.change import comparable
 from fish_sysid.diagnosis.change.change import Change
-from fish_sysid.diagnosis.change.change_json import answer, chance, sentence, with_change
+from fish_sysid.diagnosis.change.change_json import (
+    answer,
+    chance,
+    changed_robot,
+    sentence,
+    with_change,
+)
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import compare, days_of
 from fish_sysid.diagnosis.change.harmonics import StrokeWeights
+from fish_sysid.diagnosis.change.image_age import age_change
 from fish_sysid.diagnosis.change.naming import judge_all
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, look, trial_rows
 from fish_sysid.diagnosis.change.shared_fit import regression
@@ -182,6 +189,34 @@ def test_a_change_that_old_makes_from_day_to_day_is_none(days) -> None:
     assert p_value(first, second) <= 0.01
     assert p_value(with_injection(first, "current", flow), second) > 0.01
     assert single_days([0, 0, 0, 1], 3) == []
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.0, 0.5), (0.5, 0.0)])
+def test_images_much_older_in_one_day_are_said_before_anything_else(days, before, after) -> None:
+    old, new = (
+        with_injection(e, "camera_latency", {"delay": age})
+        for e, age in zip(days, (before, after), strict=True)
+    )
+    robot = Robot().with_effect("camera_latency", delay=0.2)  # not of these images
+    change = compare(new, [old], robot, fit=False)
+    assert change.look == "the images' age"
+    assert change.p_value <= 0.01
+    assert change.named[0].name == "camera_latency"
+    delay = change.named[0].members[0].refitted.parameters["delay"]
+    assert delay.value == pytest.approx(after - before, abs=0.01)
+    assert changed_robot(change).sensors["camera_latency"]["delay"] == pytest.approx(
+        after, abs=0.02
+    )
+    assert "as well as NEW: images" not in sentence(change)
+    assert ("OLD had: images are 0.50 s older" in sentence(change)) == (before > 0.0)
+
+
+def test_without_a_change_of_the_images_age_the_regression_looks_for_one(days) -> None:
+    old, new = days
+    assert age_change(old, new) is None
+    assert age_change(old, with_injection(new, "camera_latency", {"delay": 0.1})) is None
+    blind = replace(new, gyro=np.full_like(new.gyro, np.nan))
+    assert age_change(old, blind) is None
 
 
 def test_kinds_leave_enough_exchanges(days) -> None:

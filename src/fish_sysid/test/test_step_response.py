@@ -129,3 +129,12 @@ def _named(first: str, **members: float) -> Named:
     none = Refitted({}, "", np.zeros(3))
     made = tuple(Member(name, p, 1.0, 0.5, none) for name, p in members.items())
     return Named(made, family_of(first), 1.0, 0.1)
+
+
+def test_a_number_at_an_end_of_those_tried_is_not_said_to_be_exact() -> None:
+    old, new = swum(1, OLD), with_injection(swum(2, NEW), "rudder_gain", {"factor": 0.4})
+    answer = step_response(old, new, STRATA, 20)
+    assert answer is not None
+    gain = next(servo for servo in answer.servos if servo.name == "rudder_gain").estimate
+    assert gain.value == pytest.approx(0.5)  # the least that is tried
+    assert gain.std == pytest.approx(0.1 / 12**0.5)

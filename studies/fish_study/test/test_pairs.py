@@ -202,7 +202,7 @@ def test_recordings_go_with_their_own_group_alone(
         (["--recordings", str(tmp_path)], "no recording; expected a rosbag2 directory"),
         (
             ["--recordings", str(nine)],
-            "nine: got 9 recordings with commands and camera; expected at least 10",
+            "got 9 recordings with commands and camera; expected at least 10",
         ),
         (["--groups", "injected"], "got None; expected a folder"),
         (["--recordings", str(tmp_path / "none")], "expected a folder of recordings"),

@@ -99,7 +99,8 @@ def _rarities(change: Change) -> Table:
 
 def side_by_side(change: Change) -> Figure:
     """Surge speed and yaw rate of some trials of OLD and NEW, measured and predicted."""
-    changed = _without_age(changed_robot(change))
+    # these images are at the moment they were taken
+    changed = changed_robot(change).without_effect("camera_latency")
     days = [(day, e) for day, e in (("OLD", change.old), ("NEW", change.new)) if e is not None]
     shown = [(day, e.select([m])) for day, e in days for m in range(min(SHOWN, len(e.names)))]
     titles = [f"{day} {one.names[0]}" for day, one in shown]
@@ -121,13 +122,6 @@ def side_by_side(change: Change) -> Figure:
     figure.update_yaxes(title="surge speed (m/s)", row=1, col=1)
     figure.update_yaxes(title="yaw rate (rad/s)", row=2, col=1)
     return Figure("OLD, NEW, and NEW with the change", styled(figure, 560, titled=True), NOTE)
-
-
-def _without_age(robot: Robot) -> Robot:
-    """The robot for recordings whose images are at the moment they were taken."""
-    from dataclasses import replace
-
-    return replace(robot, sensors={k: v for k, v in robot.sensors.items() if k != "camera_latency"})
 
 
 def _measured(one: Experiment) -> tuple[Array, Array]:

@@ -129,12 +129,9 @@ def _recordings(args: argparse.Namespace, given: frozenset[str]) -> str:
         )
     from fish_bag.dataset import read_dataset
     from fish_study.pair_recordings import enough
-    from fish_study.scenario import ScenarioError
 
-    try:
+    with user_errors():
         enough(list(read_dataset(args.recordings)))
-    except ScenarioError as error:
-        raise UserError(f"--recordings {args.recordings}: {error}") from error
     args.groups = [INJECTED]
     return str(args.recordings.resolve())
 

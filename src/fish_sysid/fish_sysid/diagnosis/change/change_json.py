@@ -109,8 +109,12 @@ def remainder(change: Change) -> str:
 
 def in_every_recording(change: Change) -> str:
     """What OLD shows already, by tests that need no model of the fish."""
-    found = [finding.statement for finding in stated(change.symmetry)]
-    return f" OLD as well as NEW: {'; '.join(found)}." if found else ""
+    changed = {named.name for named in change.named}
+    found = stated(change.symmetry)
+    both = [f.statement for f in found if f.name not in changed]
+    told = [f" OLD as well as NEW: {'; '.join(both)}."] if both else []
+    old = [f.statement for f in found if f.name in changed]
+    return "".join([*told, f" OLD had: {'; '.join(old)}." if old else ""])
 
 
 def _words(named: Named) -> str:

@@ -26,6 +26,7 @@ from fish_sysid.diagnosis.change.comparable import (
     screened,
 )
 from fish_sysid.diagnosis.change.explanation import NAMES, explained
+from fish_sysid.diagnosis.change.image_age import AgeChange, age_change
 from fish_sysid.diagnosis.change.other_commands import OldAnswer
 from fish_sysid.diagnosis.change.permutation_test import permutation_p_value
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, STROKES, look, trial_rows
@@ -58,10 +59,13 @@ def compare(
 ) -> Change:
     """What changed in NEW against the days OLD; "not_comparable" with the reason where that cannot be said.
 
-    robot: what the candidates' shapes are simulated with; fit: `Change.robot` is OLD's best model, else this one.
+    robot: what the candidates' shapes are simulated with; fit: `Change.robot` is OLD's best model, else this one, for images
+    at the moment they were taken: how old OLD's are, camera and gyro say, and the robot only without a gyro.
     """
+    given = robot.sensors.get("camera_latency", {}).get("delay", 0.0)
+    robot = robot.without_effect("camera_latency")
     try:
-        change = _compare(new, olds, robot, report)
+        change = _compare(new, olds, robot, given, report)
     except NotComparableError as error:
         return Change("not_comparable", reason=str(error), left_out=error.left_out)
     if fit and change.old is not None:
@@ -74,14 +78,19 @@ def _compare(
     new: Experiment,
     olds: Sequence[Experiment],
     robot: Robot,
+    given: float,
     report: Report,
 ) -> Change:
+    """The answer with the robot as it is given; given: s, by which its camera is late."""
     old = joined(olds)
     check_sensors(old, new)
-    delay = align(old).delay
+    aligned = align(old)
+    delay = aligned.delay if np.isfinite(aligned.rms) else given
     report("testing symmetries of OLD")
     symmetry = symmetry_findings(old, robot)
-    old, new = moved_back(old, delay), moved_back(new, delay)
+    age = age_change(old, new)
+    age = age if age is not None and age.p_value <= LEVEL else None
+    old, new = moved_back(old, delay), moved_back(new, delay if age is None else age.of_new)
     old_days, told = screened(old, "OLD")
     new_days, more = screened(new, "NEW")
     check_counts(old_days, new_days, (*told, *more))
@@ -114,11 +123,7 @@ def _compare(
         "unchanged", p_value=p_value, look=seen, left_out=(*told, *more), robot=robot, old=old, new=new,
         camera_delay=delay, symmetry=symmetry, rarities=tests[seen].rarity,
     )  # fmt: skip
-    if servo is not None:
-        base = replace(
-            base, verdict="changed", p_value=servo.p_value, look="the rudder's answer", named=(servo.named,),
-            remainder_p_value=p_value,
-        )  # fmt: skip
+    base = _with_what_was_taken_out(base, age, servo)
     if p_value > LEVEL:
         return base
     report("naming what changed")
@@ -129,6 +134,21 @@ def _compare(
         named = with_second_opinion(found_names.named, answer)
         found_names = replace(found_names, named=tuple(named))
     return found_names
+
+
+def _with_what_was_taken_out(
+    base: Change, age: AgeChange | None, servo: RudderChange | None
+) -> Change:
+    """The answer with what camera and gyro, and the gyro's answer to the rudder, had said before; the rest is its remainder."""
+    first = {"the images' age": age, "the rudder's answer": servo}
+    told = {look: one for look, one in first.items() if one is not None}
+    if not told:
+        return base
+    look = next(iter(told))
+    return replace(
+        base, verdict="changed", p_value=told[look].p_value, look=look, named=tuple(one.named for one in told.values()),
+        remainder_p_value=base.p_value,
+    )  # fmt: skip
 
 
 def _looks(

@@ -157,10 +157,16 @@ def _judged(trials: Sequence[_Trial], rows: Index) -> dict[str, tuple[Array, Arr
 
 
 def _estimate(name: str, losses: Array) -> Estimate:
-    """The number that suits all trials best, between those tried by a parabola, with its jackknife error."""
+    """The number that suits all trials best, between those tried by a parabola, with its jackknife error.
+
+    At an end of those tried there is no parabola: it is known no better than to the last step between them.
+    """
     servo, total = SERVOS[name], losses[:, 1:].sum(axis=0)
     left_out = [_lowest(servo.tried, total - row) for row in losses[:, 1:]]
     std = float(jackknife(np.array(left_out)[:, None])[0])
+    if (k := int(total.argmin())) in (0, len(total) - 1):
+        step = abs(float(servo.tried[k] - servo.tried[1 if k == 0 else k - 1]))
+        std = max(std, step / np.sqrt(12.0))  # of a uniform distribution
     return Estimate(_lowest(servo.tried, total), std, servo.unit)
 
 
