@@ -10,6 +10,7 @@ from pathlib import Path
 
 from fish_control.paths import PATHS
 from fish_sim.robot import Robot, nominal_parameters
+from fish_sysid.diagnosis.task import STAGES
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -26,6 +27,12 @@ def test_the_table_of_the_fish_has_every_parameter_with_unit_and_value():
     table = page.split("<!-- parameters: begin -->")[1].split("<!-- parameters: end -->")[0]
     shown = {row[0].strip("`"): (row[2], row[3]) for row in rows(table)[2:]}
     assert shown == {name: (p.unit, f"{p.value:.6g}") for name, p in nominal_parameters().items()}
+
+
+def test_the_table_of_stages_has_all_that_can_be_left_out():
+    page = (DOCS / "explanation" / "diagnosis.md").read_text()
+    table = page.split("## Stages that can be left out")[1].split("\n## ")[0]
+    assert [tuple(row) for row in rows(table)[2:]] == list(STAGES)
 
 
 def test_the_picture_of_the_fish_is_current():
