@@ -26,6 +26,13 @@ HEADER = (
 )
 
 
+# fixed before any study
+ASKED = {
+    "mujoco-pair": ("60", "nulls: at most 2 %", "at least 75 %", "at least 90 %", "at most 5 %", "–", "60 (180)"),
+    "injected": ("100", "nulls: at most 2 %", "–", "of each kind at least 90 %", "–", "–", "60 (180)"),
+}  # fmt: skip
+
+
 def pair_tables(scores: Sequence[Score]) -> list[Table]:
     """One row for each kind of change of each group, then their sums; nothing without such groups."""
     rows = []
@@ -36,6 +43,7 @@ def pair_tables(scores: Sequence[Score]) -> list[Table]:
         hidden = [s for s in own if s.scenario.names]
         if hidden:
             rows.append(_row(group, ("any",), hidden))
+            rows.append([group, "asked", *ASKED[group]])
     if not rows:
         return []
     note = (

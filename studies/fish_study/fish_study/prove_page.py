@@ -31,7 +31,10 @@ from fish_study.score import Score
 
 
 def tables(scores: Sequence[Score], oracle: OracleScores | None = None) -> list[Table]:
-    """Everything that is printed as well."""
+    """Everything that is printed as well; of pairs of days alone what is asked of these."""
+    failed = [failure_table(scores)] if any(not s.has_answer for s in scores) else []
+    if all(s.scenario.pair for s in scores):
+        return [*pair_tables(scores), calibration_table(scores), *failed]
     steps = power(scores, oracle.detected if oracle else None)
     nulls = null_table(scores)
     shown = [
@@ -45,7 +48,7 @@ def tables(scores: Sequence[Score], oracle: OracleScores | None = None) -> list[
     shown += [oracle_table(scores, oracle), competitor_table(scores, oracle)] if oracle else []
     shown += [nulls] if nulls else []
     shown.append(name_table(scores))
-    return shown + ([failure_table(scores)] if any(not s.has_answer for s in scores) else [])
+    return shown + failed
 
 
 def write_prove_page(

@@ -187,6 +187,7 @@ def test_answers_are_counted_by_what_was_changed() -> None:
     assert cells == ["4", "3/4", "1/4", "2/4", "1/4"]
     assert rows["nothing"][3].startswith("0/2")
     assert rows["nothing"][7] == "1"
+    assert rows["asked"][5] == "of each kind at least 90 %"
     assert pair_tables([score_scenario(small("null"), said("unchanged"))]) == []
 
 
