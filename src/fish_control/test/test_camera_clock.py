@@ -44,7 +44,7 @@ def watched(clock, heading, age, late, seconds=12.0, gap=(0.0, 0.0), seed=1):
 @pytest.mark.parametrize("gap", [(0.0, 0.0), (3.0, 3.6)])
 @pytest.mark.parametrize("age", [0.5, 0.7, 0.9, 1.2])
 def test_what_the_imu_did_not_measure_excludes_no_offset(age, gap):
-    """Of old images the right offset is known last; one stroke beside it equal strokes look the same."""
+    """With old images the IMU tells of the right offset last. Until then an offset that is wrong by one stroke fits as well."""
     _, error, _, sure = watched(CameraClock(0.0, PRIOR_STD), steady, age, 0.26, gap=gap).T
     assert np.abs(error[sure > 0]).max(initial=0.0) < 0.01
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,9 @@ class Contender:
     def survives(self) -> bool:
         """Whether what it leaves looks like exchanged trials."""
         return self.remainder > REMAINDER
+
+
+Rival = TypeVar("Rival", Judged, Contender)
 
 
 def next_change(
@@ -101,7 +105,7 @@ def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named,
     names = _contenders(swapped, judged)
     if not names:
         return None
-    alike = [one for one in names if not any(apart(other.nats, one.nats) for other in names)]
+    alike = _unbeaten(names)
     best = max(alike, key=lambda one: one.nats.mean())
     weight = {
         one.name: tie(best.nats, one.nats) * math.exp(swapped.rarity[one.name]) for one in alike
@@ -131,7 +135,7 @@ def weighed(
     A name that explains as much with values that it cannot have says that what changed may have no name: its weight is missing
     in the sum.
     """
-    tied = [one for one in found if not any(apart(other.nats, one.nats) for other in found)]
+    tied = _unbeaten(found)
     alike = [one for one in tied if one.survives] or tied
     kept = {one.judged.name for one in alike}
     alike = [one for one in alike if SPECIAL_CASE.get(one.judged.name) not in kept]
@@ -152,6 +156,11 @@ def weighed(
     total = sum(weight[one.judged.name] for one in (*alike, *doubt))
     alike.sort(key=lambda one: -weight[one.judged.name])
     return alike, [weight[one.judged.name] / total for one in alike]
+
+
+def _unbeaten(rivals: Sequence[Rival]) -> list[Rival]:
+    """Those that no other one predicts clearly better than."""
+    return [one for one in rivals if not any(apart(other.nats, one.nats) for other in rivals)]
 
 
 def _kin(name: str, other: str) -> bool:
