@@ -271,3 +271,5 @@ def test_a_flow_is_the_rarest_of_all_sets_and_nothing_is_not(days, looks_at) -> 
     days = [0] * 5 + [1] * (OLD - 5) + [2] * NEW
     assert permutation_p_value([c.fit for c in flow], strata, 200, days=days) == changed
     assert permutation_p_value([c.fit for c in same], strata, 200, days=days) >= unchanged
+    unequal = [0] * (OLD - 1) + [1] + [2] * NEW
+    assert permutation_p_value([c.fit for c in flow], strata, 200, days=unequal) == changed

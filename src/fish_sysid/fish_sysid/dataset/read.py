@@ -95,6 +95,11 @@ def heading(text: str) -> str:
     return "Used with a fault" if text.endswith((USED, ONCE, LESS)) else "Left out"
 
 
+def line(text: str) -> str:
+    """Such a line as the verbs print it."""
+    return f"{heading(text).lower()}: {text}"
+
+
 def mixed(trials: Sequence[Trial]) -> str | None:
     """Why the trials are of several robots; None: of one."""
     texts = (problem.text for problem in check_set(trials) if problem.kind == "mixed_robots")

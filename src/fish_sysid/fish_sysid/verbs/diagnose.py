@@ -16,7 +16,7 @@ from fish_report.terminal import PARAGRAPH, cell, say, terminal
 from fish_report.writable import writable_folder
 from fish_sim.robot_argument import read_model
 from fish_sim.robot_file import save_robot
-from fish_sysid.dataset.read import heading, read_days, read_experiment
+from fish_sysid.dataset.read import line, read_days, read_experiment
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
         args.out / "report.html", named_path(args.dataset[0]).name, content, result
     )
     files = f"{args.out}/diagnosis.json, model.yaml, report.html"
-    for text in [*(f"{heading(text).lower()}: {text}" for text in left_out), sentence(content)]:
+    for text in [*map(line, left_out), sentence(content)]:
         say(terminal(), text, PARAGRAPH)
     say(terminal(), f"{files} ({time.monotonic() - start:.0f} s)")
     return 0
@@ -144,8 +144,7 @@ def _compare(args: argparse.Namespace) -> int:
         save_robot(changed_robot(change), args.out / "model.yaml", notes=sentence(change))
         written = "diagnosis.json, model.yaml, report.html"
     write_change_page(args.out / "report.html", named_path(args.dataset[0]).name, content, change)
-    lines = [f"{heading(text).lower()}: {text}" for text in content["left_out"]]
-    for text in [*lines, sentence(change)]:
+    for text in [*map(line, content["left_out"]), sentence(change)]:
         say(terminal(), text, PARAGRAPH)
     say(terminal(), f"{args.out}/{written} ({time.monotonic() - start:.0f} s)")
     return 0

@@ -18,7 +18,7 @@ from fish_report.errors import user_errors
 from fish_report.terminal import PARAGRAPH, plain, say, terminal
 from fish_report.writable import writable_folder
 from fish_sim.robot_argument import read_model
-from fish_sysid.dataset.read import heading, read_experiment
+from fish_sysid.dataset.read import line, read_experiment
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     write_identify_page(args.out / "report.html", result, left_out)
     print_table(console, parameter_table(result))
     print_table(console, error_table(result.errors))
-    for text in [*(f"{heading(text).lower()}: {text}" for text in left_out), *result.statements]:
+    for text in [*map(line, left_out), *result.statements]:
         say(console, f"- {text}", PARAGRAPH)
     files = "robot.yaml, identification.json and report.html"
     say(console, f"{result.seconds:.0f} s; {files} in {args.out}")

@@ -17,7 +17,7 @@ from fish_bag.topic_arguments import add_topic_arguments, topic_map
 from fish_report.errors import user_errors
 from fish_report.terminal import say, terminal
 from fish_sim.robot_argument import read_model
-from fish_sysid.dataset.read import heading, read_experiment
+from fish_sysid.dataset.read import line, read_experiment
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
             predict(experiment, model, noise, args.horizon, 1.0, WARM_UP), horizons
         )
     for text in left_out:
-        say(console, f"{heading(text).lower()}: {text}")
+        say(console, line(text))
     if errors.counts.any():
         print_table(console, error_table({"model": errors}))
     else:

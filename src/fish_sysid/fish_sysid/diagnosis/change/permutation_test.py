@@ -58,7 +58,8 @@ def permutation_p_value(
     some_days = single_days(days, looks[0].old)
     if not some_days:
         return p_value
-    near = shared(some_days, sets, trials) > most
+    common = shared(some_days, sets, trials)  # a large day shares many with every set
+    near = common > np.maximum(most, common.mean(axis=1, keepdims=True))
     of_days = largest(_named_gains(looks, some_days), gains, near)
     return max(p_value, float((of_days >= of_sets[0]).mean()))
 
