@@ -14,6 +14,7 @@ import pytest
 from waiting import wait_until
 
 from fish_hw.devices import vertiq_registers as reg
+from fish_hw.devices import vertiq_search
 from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.leak_sensor import LeakSensor
 from fish_hw.devices.reconnect import Loss
@@ -410,7 +411,8 @@ def test_a_wrong_baud_rate_is_told():
         emulator.close()
 
 
-def test_a_firmware_without_the_speed_command_is_told(vertiq_emulator):
+def test_a_firmware_without_the_speed_command_is_told(vertiq_emulator, monkeypatch):
+    monkeypatch.setattr(vertiq_search, "ANSWER_S", 0.5)  # of a busy computer
     vertiq_emulator.mangle = lambda reply: b"" if reply[2] == reg.TIMEOUT.type else reply
     assert "needs the speed firmware" in complaint(vertiq_emulator)
 

@@ -29,7 +29,7 @@ def explain(
     try:
         stream = open_at(baud)
         try:
-            if _answers(stream, module_id, clock):
+            if _answers_in_time(stream, module_id, clock):
                 return (
                     f"module {module_id} answers, but has no register for the speed command: it needs the speed firmware, "
                     "not that of a servo"
@@ -55,9 +55,14 @@ def _answers_at(
 ) -> bool:
     stream = open_at(baud)
     try:
-        return any(_answers(stream, module_id, clock) for _ in range(TRIES))
+        return _answers_in_time(stream, module_id, clock)
     finally:
         stream.close()
+
+
+def _answers_in_time(stream: ByteStream, module_id: int, clock: Callable[[], float]) -> bool:
+    """Asked TRIES times: one answer may be lost."""
+    return any(_answers(stream, module_id, clock) for _ in range(TRIES))
 
 
 def _answers(stream: ByteStream, module_id: int, clock: Callable[[], float]) -> bool:
