@@ -31,8 +31,7 @@ from fish_sim.chain import (
     turned,
 )
 from fish_sim.effects.effect import BodyMotion, Drive, Grip
-from fish_sim.factorisation import back_substitute, dot, factorise, reduce
-from fish_sim.ops import Scalar
+from fish_sim.ops import Scalar, back_substitute, dot, factorise, reduce
 
 # 1/s, Baumgarte rate of the tip constraint: slip decays within 10 ms; RK4 at 10 ms is stable up to 278
 SLIP_DECAY = 100.0

@@ -1,17 +1,57 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Which method integrates a period of 10 ms in how many steps."""
+"""Which method integrates a period of 10 ms in how many steps, and whether they are fine enough.
+
+A step is fine enough where the method's stability function lets none of the fish's own modes about rest grow.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fish_sim.methods import METHODS
-from fish_sim.model import DT
-from fish_sim.robot import Robot
-from fish_sim.stability import GROWTH, MAX_SUBSTEPS, enough_substeps, growth, modes_at_rest
+from fish_sim.methods import METHODS, Method
+from fish_sim.model import DT, Layout, functions
+from fish_sim.robot import Robot, Structure
+
+Modes = NDArray[np.complex128]
+
+MAX_SUBSTEPS = 256
+GROWTH = 1e-6  # of an undamped mode per step that still counts as stable
+
+
+def modes_at_rest(structure: Structure, parameters: NDArray[np.float64]) -> Modes:
+    """Eigenvalues [1/s] of the motion linearised about rest with a straight tail; parameters (NP,)."""
+    size = len(Layout(structure).motion)
+    rest, still = np.zeros((size, size)), np.zeros((4, size))
+    p = np.tile(np.reshape(parameters, (-1, 1)), size)
+    _, jacobian = functions(structure).rate_jvp(
+        rest, still, p, np.eye(size), still, np.zeros_like(p)
+    )
+    return np.linalg.eigvals(jacobian.full()).astype(complex)
+
+
+def growth(method: Method, modes: Modes, substeps: int) -> float:
+    """Largest factor |R(h s)| by which a step of h = DT / substeps multiplies a mode s that does not grow by itself."""
+    decaying = modes[modes.real <= GROWTH]
+    return max(abs(_stability_function(method, s * DT / substeps)) for s in decaying)
+
+
+def enough_substeps(method: Method, modes: Modes) -> int | None:
+    """Smallest stable number of steps in a command period, or None."""
+    numbers = range(1, MAX_SUBSTEPS + 1)
+    return next((k for k in numbers if growth(method, modes, k) <= 1.0 + GROWTH), None)
+
+
+def _stability_function(method: Method, z: complex) -> complex:
+    """R(z): what one step of an explicit method makes of y' = z y, y = 1; k_i = z (1 + sum_j a_ij k_j), R = 1 + sum_i b_i k_i."""
+    slopes: list[complex] = []
+    for row in method.A:
+        slopes.append(z * (1.0 + sum(a * k for a, k in zip(row, slopes, strict=False))))
+    return 1.0 + sum(b * k for b, k in zip(method.B, slopes, strict=True))
+
 
 DEFAULT_METHOD = "cfmr7"
 # for 1, 2 .. 12 links: the fastest mode turns by at most 0.86 rad a step; n = 3 keeps its energy to 2e-7 per second

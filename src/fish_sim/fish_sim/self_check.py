@@ -20,8 +20,7 @@ from fish_sim.methods import METHODS
 from fish_sim.model import DRIVE_NAMES, DT, Layout
 from fish_sim.parameter import Parameter
 from fish_sim.robot import Structure, nominal_parameters
-from fish_sim.scheme import Scheme
-from fish_sim.stability import modes_at_rest
+from fish_sim.scheme import Scheme, modes_at_rest
 
 Array = NDArray[np.float64]
 

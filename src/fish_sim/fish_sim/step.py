@@ -13,8 +13,8 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_sim.checks import check_finite
 from fish_sim.compiled import compiler, lanes, library
-from fish_sim.finite import check_finite
 from fish_sim.interpreted import InterpretedKernel
 from fish_sim.kernel import CompiledKernel, Part
 from fish_sim.kernel_source import kernel_source

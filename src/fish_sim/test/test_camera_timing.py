@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from fish_sim.camera.timing import FrameClock, History
+from fish_sim.camera.model import FrameClock, History
 
 
 def test_history_interpolates_linearly_and_holds_the_ends() -> None:

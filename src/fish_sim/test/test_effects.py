@@ -11,7 +11,7 @@ from scipy.signal import lsim
 from fish_sim import pool
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import BodyMotion, Drive
-from fish_sim.effects.nonuniform_current import LENGTH, WIDTH
+from fish_sim.effects.surroundings import BASIN_LENGTH, BASIN_WIDTH
 from fish_sim.ops import NUMPY
 from fish_sim.robot import Robot
 from fish_sim.step import Scheme, Stepper
@@ -192,11 +192,13 @@ def test_nonuniform_current_is_incompressible_closed_beyond_the_walls_and_has_it
         assert gradient[0][0] + gradient[1][1] == pytest.approx(0.0, abs=1e-15)
     gyres = namespace("nonuniform_current", strain=0.0, shear_x=0.0, shear_y=0.0)
     for s in (-0.4, 0.0, 0.3):
-        assert flow(gyres, LENGTH / 2, s, z, NUMPY)[0][0] == pytest.approx(0.0, abs=1e-15)
-        assert flow(gyres, s, WIDTH / 2, z, NUMPY)[0][1] == pytest.approx(0.0, abs=1e-15)
+        assert flow(gyres, BASIN_LENGTH / 2, s, z, NUMPY)[0][0] == pytest.approx(0.0, abs=1e-15)
+        assert flow(gyres, s, BASIN_WIDTH / 2, z, NUMPY)[0][1] == pytest.approx(0.0, abs=1e-15)
     others = {key: 0.0 for key in vars(gyres) if key != "gyre_11"}
     one = namespace("nonuniform_current", **others)
-    assert flow(one, 0.0, -WIDTH / 2, z, NUMPY)[0][0] == pytest.approx(0.03)  # counter-clockwise
+    assert flow(one, 0.0, -BASIN_WIDTH / 2, z, NUMPY)[0][0] == pytest.approx(
+        0.03
+    )  # counter-clockwise
 
 
 def test_nonuniform_current_is_a_linear_part_and_the_eddies_of_its_stream_function():
@@ -204,7 +206,7 @@ def test_nonuniform_current_is_a_linear_part_and_the_eddies_of_its_stream_functi
     random = np.random.default_rng(4)
     p = namespace("nonuniform_current")
     p = SimpleNamespace(**{key: random.uniform(-0.1, 0.1) for key in vars(p)})
-    L, W, h = LENGTH, WIDTH, 1e-5
+    L, W, h = BASIN_LENGTH, BASIN_WIDTH, 1e-5
 
     def psi(x, y):
         a, b = x / L + 0.5, y / W + 0.5

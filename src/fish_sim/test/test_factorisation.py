@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from fish_sim.factorisation import back_substitute, factorise, reduce
+from fish_sim.ops import back_substitute, factorise, reduce
 
 
 @pytest.mark.parametrize("size", [1, 2, 5, 8])

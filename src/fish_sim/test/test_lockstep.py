@@ -3,7 +3,7 @@
 """Waiting for the loop on made-up clocks."""
 
 from fish_sim.model import DT
-from fish_sim.nodes.lockstep import LOOSEN, Lockstep
+from fish_sim.nodes.pacing import LOOSEN, Lockstep
 
 
 def test_nobody_is_waited_for_before_the_first_word():

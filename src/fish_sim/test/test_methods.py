@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import DOP853, solve_ivp
 
 from fish_sim.methods import METHODS
-from fish_sim.stability import growth
+from fish_sim.scheme import growth
 
 ORDERS = {"euler": 1, "rk4": 4, "cfmr7": 7, "dop853": 8}
 

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from fish_sim.nodes.pacer import MAX_LAG, Pacer
+from fish_sim.nodes.pacing import MAX_LAG, Pacer
 
 
 def run(factor, times):

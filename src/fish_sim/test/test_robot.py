@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from fish_sim.effects import EFFECTS
-from fish_sim.effects.quadratic_drag import QuadraticDrag
+from fish_sim.effects.hull import QuadraticDrag
 from fish_sim.robot import Robot, RobotError, nominal_parameters, parameter_names
 from fish_sim.robot_file import load_robot, save_robot
 from fish_sim.sensors import SENSOR_EFFECTS

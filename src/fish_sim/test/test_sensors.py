@@ -10,10 +10,8 @@ import pytest
 
 from fish_sim.ops import NUMPY
 from fish_sim.sensors import SENSOR_EFFECTS
-from fish_sim.sensors.battery import Battery
 from fish_sim.sensors.distortion import SensorDistortion
-from fish_sim.sensors.encoder import Encoder
-from fish_sim.sensors.imu import Imu
+from fish_sim.sensors.onboard import Battery, Encoder, Imu
 from fish_sim.sensors.overhead_camera import OverheadCamera
 from fish_sim.sensors.settings import SensorSettings
 from fish_sim.simulation_config import SimulatorConfig

@@ -14,7 +14,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 
 from fish_sim.nodes import simulator_messages as messages
-from fish_sim.sensors.imu import ImuSample
+from fish_sim.sensors.onboard import ImuSample
 from fish_sim.sensors.overhead_camera import CameraPose
 from fish_sim.sensors.settings import SensorSettings
 from fish_sim.simulation import Truth

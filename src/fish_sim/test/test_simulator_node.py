@@ -24,7 +24,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from fish_node import rivals
-from fish_sim.nodes.lockstep import AHEAD
+from fish_sim.nodes.pacing import AHEAD
 from fish_sim.nodes.simulator import SimulatorNode
 from fish_sim.pool import LENGTH
 from fish_sim.robot import Robot, RobotError

@@ -12,14 +12,12 @@ import torch
 from scipy.integrate import solve_ivp
 
 from fish_sim import torch_step
-from fish_sim.checks import diverged
+from fish_sim.checks import check_finite, diverged
 from fish_sim.effects import EFFECTS
-from fish_sim.finite import check_finite
 from fish_sim.model import DT, Layout, motion_rate
 from fish_sim.ops import NUMPY
 from fish_sim.robot import Robot
-from fish_sim.scheme import Scheme, check_scheme, default_scheme, stable_scheme
-from fish_sim.stability import modes_at_rest
+from fish_sim.scheme import Scheme, check_scheme, default_scheme, modes_at_rest, stable_scheme
 from fish_sim.step import Stepper
 
 # together they use states, memory, grip, water, joint torques and every elementary function

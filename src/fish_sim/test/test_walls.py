@@ -10,9 +10,8 @@ import pytest
 from fish_sim.model import DT
 from fish_sim.pool import LENGTH, WIDTH
 from fish_sim.robot import Robot
-from fish_sim.simulation import Readings, Simulation
+from fish_sim.simulation import APART, EDGE, Readings, Simulation, Walls
 from fish_sim.simulation_config import SimulationConfig
-from fish_sim.walls import APART, EDGE, Walls
 
 EXACT = {
     "gyro_noise": 0.0,

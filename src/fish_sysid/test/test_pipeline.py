@@ -12,7 +12,7 @@ import pytest
 from swims import GIVEN, fish, swim
 
 from fish_sim.effects import EFFECTS
-from fish_sim.effects.quadratic_drag import QuadraticDrag
+from fish_sim.effects.hull import QuadraticDrag
 from fish_sim.robot_file import load_robot, save_robot
 from fish_sysid.diagnosis import pipeline
 from fish_sysid.diagnosis.can_follow import missed_by

@@ -20,7 +20,7 @@ from fish_control.policy_spec import INPUTS, PolicySpec
 from fish_report.errors import UserError
 from fish_sim.methods import METHODS
 from fish_sim.robot import Robot
-from fish_sim.stability import growth, modes_at_rest
+from fish_sim.scheme import growth, modes_at_rest
 from fish_train.evaluation.candidates import read_candidate
 from fish_train.training import parallel_runs
 from fish_train.training.batch_state import WindowResult

@@ -30,8 +30,8 @@ from fish_node.nodes.start import read_parameters, run
 from fish_node.nodes.status_log import StatusLog
 from fish_sim.camera.config import CameraConfig
 from fish_sim.camera.fish import FishPose
+from fish_sim.camera.model import FrameClock, History
 from fish_sim.camera.renderer import PoolRenderer
-from fish_sim.camera.timing import FrameClock, History
 
 QUEUE = 10
 KEPT = 100  # messages of the simulation: a picture drawn between two samples that are far apart shows a wrong heading

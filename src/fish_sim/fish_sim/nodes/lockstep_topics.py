@@ -19,7 +19,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from fish_node.nodes.quick_messages import read_stamp
-from fish_sim.nodes.lockstep import Lockstep
+from fish_sim.nodes.pacing import Lockstep
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 QUEUE = 10

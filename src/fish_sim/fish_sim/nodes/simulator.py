@@ -43,10 +43,9 @@ from fish_node.nodes.status_log import StatusLog
 from fish_node.rivals import Rivals
 from fish_sim.model import DT
 from fish_sim.nodes import simulator_messages as messages
-from fish_sim.nodes.lockstep import Lockstep
 from fish_sim.nodes.lockstep_topics import hear_lockstep
-from fish_sim.nodes.pacer import MAX_LAG, Pacer
-from fish_sim.nodes.simulator_health import health
+from fish_sim.nodes.pacing import MAX_LAG, Lockstep, Pacer
+from fish_sim.nodes.simulator_messages import health
 from fish_sim.robot import Robot
 from fish_sim.robot_file import load_robot
 from fish_sim.simulation import Readings, Simulation

@@ -1,6 +1,8 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of the simulator node from the values of the simulation, and back."""
+"""Messages of the simulator node from the values of the simulation, and back; its state as a line of /diagnostics."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Mapping
@@ -14,7 +16,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 
 from fish_node.nodes.message_bytes import MessageBytes, mark
-from fish_sim.sensors.imu import ImuSample
+from fish_sim.sensors.onboard import ImuSample
 from fish_sim.sensors.overhead_camera import CameraPose
 from fish_sim.sensors.settings import SensorSettings
 from fish_sim.simulation import Truth
@@ -144,3 +146,38 @@ def _diagonal(std: tuple[float, ...]) -> list[float]:
     """Covariance matrix, row by row, of independent errors."""
     size = len(std)
     return [std[i] ** 2 if i == j else 0.0 for i in range(size) for j in range(size)]
+
+
+SLOW = 0.95  # share of the asked pace below which the node says that it lags
+
+
+def health(
+    divergences: int,
+    refusal: str,
+    paused: bool,
+    lost: float,
+    awaited: str,
+    pace: float,
+    asked: float,
+    disarmed: str,
+) -> tuple[bytes, str]:
+    """(level, text), the worst news first.
+
+    refusal: why the last command was refused; lost: s of real time that were skipped; awaited: what lockstep waits for; pace,
+    asked: simulated seconds in a second; disarmed: the reason. A text is empty where there is nothing to say.
+    """
+    if divergences:
+        return DiagnosticStatus.ERROR, f"the motion diverged {divergences} times"
+    if refusal:
+        return DiagnosticStatus.WARN, f"joint_command refused: {refusal}"
+    if paused:
+        return DiagnosticStatus.OK, "paused"
+    if lost > 0.0:
+        return DiagnosticStatus.WARN, f"behind real time, {lost:.2f} s skipped in the last second"
+    if awaited:
+        return DiagnosticStatus.WARN, f"waits for {awaited}"
+    if pace < SLOW * asked:
+        return DiagnosticStatus.WARN, f"behind real time, running at {pace:.2f}"
+    if disarmed:
+        return DiagnosticStatus.WARN, f"disarmed: {disarmed}"
+    return DiagnosticStatus.OK, "running"

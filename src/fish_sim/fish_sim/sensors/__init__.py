@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Models of the robot's sensors: what they do wrong (SENSOR_EFFECTS) and how they are noisy."""
 
-from fish_sim.sensors.camera_heading_offset import CameraHeadingOffset
-from fish_sim.sensors.camera_latency import CameraLatency
-from fish_sim.sensors.camera_marker import CameraMarker
-from fish_sim.sensors.camera_scale import CameraScale
-from fish_sim.sensors.gyro_scale import GyroScale
-from fish_sim.sensors.imu_latency import ImuLatency
-from fish_sim.sensors.imu_misalignment import ImuMisalignment
+from fish_sim.sensors.errors import (
+    CameraHeadingOffset,
+    CameraLatency,
+    CameraMarker,
+    CameraScale,
+    GyroScale,
+    ImuLatency,
+    ImuMisalignment,
+)
 from fish_sim.sensors.sensor_effect import SensorEffect
 
 SENSOR_EFFECTS: dict[str, type[SensorEffect]] = {

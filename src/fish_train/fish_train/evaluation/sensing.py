@@ -15,7 +15,7 @@ from fish_control.fusion import Fusion
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.sensors.distortion import SensorDistortion
-from fish_sim.sensors.imu import Imu
+from fish_sim.sensors.onboard import Imu
 from fish_sim.sensors.overhead_camera import OverheadCamera
 from fish_sim.sensors.settings import SensorSettings
 

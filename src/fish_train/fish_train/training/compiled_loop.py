@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from fish_control.path_batch import LOOKAHEAD_SEARCH
 from fish_sim.compiled import Check, lanes, library
-from fish_sim.emit import emit
-from fish_sim.kernel_source import kernel_source
+from fish_sim.kernel_source import emit, kernel_source
 from fish_sim.step import Stepper
 from fish_train.training.batch_state import (
     HISTORY,

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.effects.nonuniform_current import NonuniformCurrent
+from fish_sim.effects.surroundings import NonuniformCurrent
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.channels import AT_CENTRES, MEANS, Swim, parts

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.effects.nonuniform_current import NonuniformCurrent
+from fish_sim.effects.surroundings import NonuniformCurrent
 from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding
 from fish_sysid.diagnosis.symmetry.galilei import (

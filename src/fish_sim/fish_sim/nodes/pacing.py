@@ -1,10 +1,47 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the nodes that close the loop have kept up with the simulation."""
+"""How fast the simulation may run: with real time, and no faster than the nodes that close the loop. Knows no ROS."""
 
 from __future__ import annotations
 
+import math
+
 from fish_sim.model import DT
+
+ROUNDING = 1e-6  # periods
+MAX_LAG = 0.2  # s of real time; a simulation further behind gives up what it missed
+
+
+class Pacer:
+    """Keeps simulated time at `factor` times real time; factor 0 is as fast as possible.
+
+    It is never ahead of real time: stamps from the future look like another clock. A short lag is caught up with; after a
+    longer one the lost time is skipped and counted.
+    """
+
+    def __init__(self, factor: float, period: float, now: float) -> None:
+        self._factor, self._period = factor, period
+        self.lost = 0.0  # s of real time skipped
+        self.restart(now)
+
+    def restart(self, now: float) -> None:
+        """Count from this moment [s]."""
+        self._anchor, self._done = now, 0
+
+    def due(self, now: float) -> int:
+        """Number of periods to run now; they count as run. Negative never."""
+        if self._factor == 0.0:
+            return 1
+        behind = (
+            math.floor((now - self._anchor) * self._factor / self._period + ROUNDING) - self._done
+        )
+        if behind * self._period > MAX_LAG * max(1.0, self._factor):
+            self.lost += behind * self._period / self._factor
+            self.restart(now)
+            return 0
+        self._done += max(0, behind)
+        return max(0, behind)
+
 
 AHEAD = 0.03  # s of simulated time that the simulation may at most be ahead of those it waits for
 STRICT = 0.5 * DT  # s, of who answers to every period
