@@ -24,7 +24,7 @@ import numpy as np
 from fish_bag import Trial, find_trials, read_trial
 from fish_control.fusion import Fusion
 from fish_control.fusion_config import FusionConfig
-from fish_control.heading_lead import against_gyro
+from fish_control.imu_heading import against_gyro
 
 HEADER = (
     "recording     poses accepted  refused repeated reacquired   offset +- std  to gyro +- std"

@@ -12,7 +12,7 @@ from plotly.subplots import make_subplots
 
 from fish_bag.trial import Commands, Gains, Trial
 from fish_bringup.score import RunScore
-from fish_control.approach import stroke_mean
+from fish_control.path_tracker import stroke_mean
 from fish_control.pool import HALF_LENGTH, HALF_WIDTH
 from fish_report.page import (
     Block,

@@ -21,8 +21,14 @@ from numpy.typing import NDArray
 
 from fish_bag.trial import Odometry, ReferenceSpeed, Trial
 from fish_bag.trial import ReferencePath as RecordedPath
-from fish_control.approach import NEAR_HEADING, NEAR_PATH, NEAR_SPEED, first_settled, stroke_mean
-from fish_control.path_tracker import PathTracker
+from fish_control.path_tracker import (
+    NEAR_HEADING,
+    NEAR_PATH,
+    NEAR_SPEED,
+    PathTracker,
+    first_settled,
+    stroke_mean,
+)
 from fish_control.reference_path import PathError, ReferencePath
 from fish_report.errors import UserError
 

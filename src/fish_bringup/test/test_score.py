@@ -26,7 +26,7 @@ from fish_bringup.score import (
     what_is_missing,
 )
 from fish_bringup.score_table import error_table
-from fish_control.approach import stroke_mean
+from fish_control.path_tracker import stroke_mean
 from fish_control.paths import make_path
 from fish_control.reference_path import ReferencePath
 from fish_report import robofish as command

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.imu_history import ImuHistory
-from fish_control.latency_watch import LEAST_STEP, LatencyWatch
+from fish_control.latency import LEAST_STEP, LatencyWatch
 from fish_control.offset_sums import (
     CLEAR,
     CLIP,

@@ -24,13 +24,13 @@ from fish_control.control_law import (
 from fish_control.line_of_sight import (
     GuidanceState,
     Motion,
+    MotionObserver,
     has_listened,
     heading_error,
     mean_heading,
     observe,
     through_water,
 )
-from fish_control.motion_observer import MotionObserver
 from fish_control.policy import Policy, policy_inputs
 
 STANDING_SPEED = 0.02  # m/s, a gliding fish that is slower has stopped

@@ -1,6 +1,9 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""An open-loop swim, from the estimate's arrival to rest: when it begins, and what ends it. No ROS, no clock."""
+"""An open-loop swim, from the estimate's arrival to rest: when it begins, and what ends it. No ROS, no clock.
+
+A fish that does not look where it swims is stopped before a wall.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,28 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from fish_control.controller import Command
 from fish_control.excitation import LIMITS, Excitation
 from fish_control.line_of_sight import Motion
 from fish_control.node_configs import ExciterConfig
-from fish_control.wall_guard import heads_for_a_wall, stopping_rudder
+from fish_control.pool import stopping_side, wall_distance
 from fish_control.watchdog import EstimateHealth, estimate_fault
+
+
+def heads_for_a_wall(motion: Motion, horizon: float, margin: float) -> bool:
+    """Whether `horizon` [s] on, at its present velocity, the fish is nearer to a wall than `margin` [m] and than it is now."""
+    cos, sin = math.cos(motion.heading), math.sin(motion.heading)
+    vx, vy = motion.surge * cos - motion.sway * sin, motion.surge * sin + motion.sway * cos
+    ahead = wall_distance(np.array([[motion.x + horizon * vx, motion.y + horizon * vy]]))
+    return ahead < margin and ahead < wall_distance(np.array([[motion.x, motion.y]]))
+
+
+def stopping_rudder(motion: Motion, rudder_range: float) -> float:
+    """Rudder [rad] hard over to the side on which the fish comes to rest farther from the walls."""
+    return stopping_side(motion.x, motion.y, motion.heading) * rudder_range
+
 
 AT_REST = Command(0.0, 0.0, 0.0)
 State = Literal["waiting", "resting", "swimming", "ended", "before a wall", "lost", "disarmed"]

@@ -13,16 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 from fish_control.camera_clock import LOOKS_BACK, CameraClock
 from fish_control.estimate import Estimate, to_estimate
 from fish_control.fusion_config import FusionConfig
-from fish_control.imu_checks import unusable_sample
 from fish_control.imu_heading import HeadingNoise, ImuHeading
 from fish_control.imu_history import ImuHistory, inertial_sample
 from fish_control.measurement_buffer import CameraPose, Moment, RawPose, Timeline, start_moment
+from fish_control.measurement_checks import (
+    AgreeingPoses,
+    RepeatedPose,
+    StaleStamps,
+    doubts_motion,
+    given_covariance,
+    unusable,
+    unusable_sample,
+    weighted,
+)
 from fish_control.motion_models import MotionModels
-from fish_control.noise_scale import NoiseScale
-from fish_control.pose_checks import AgreeingPoses, RepeatedPose, doubts_motion
-from fish_control.pose_weight import given_covariance, unusable, weighted
-from fish_control.stale_stamps import StaleStamps
-from fish_control.strapdown import MotionModel, StrapdownFilter
+from fish_control.strapdown import MotionModel, NoiseScale, StrapdownFilter
 
 Array = NDArray[np.float64]
 SILENT_POSES = 3  # in a row without an IMU sample in between: the IMU is dead; stamps cannot say it

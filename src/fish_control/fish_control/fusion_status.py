@@ -8,7 +8,7 @@ import math
 
 from fish_control.estimate import Estimate
 from fish_control.fusion import Fusion
-from fish_control.heading_lead import against_gyro
+from fish_control.imu_heading import against_gyro
 
 NOTABLE_OFFSET = 0.02  # s, difference to camera_offset that is worth a warning
 

@@ -22,9 +22,9 @@ Source: line of sight: Fossen 2021, sect. 12.3; corner compensation, slip and cu
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from fish_control.control_law import ControlLimits, Setpoint
 from fish_control.current_observer import WaterState, bounded, see_across, see_ahead, swim
@@ -208,3 +208,28 @@ def mean_heading(stroke: StrokeState, motion: Motion) -> Any:
 def wrap(angle: Any, xp: Any) -> Any:
     """Angle within +-pi [rad], differentiable everywhere but at the seam."""
     return xp.arctan2(xp.sin(angle), xp.cos(angle))
+
+
+# s, a longer gap between odometry messages, or a longer step back, restarts the filters
+LONGEST_STEP = 0.1
+State = TypeVar("State")
+
+
+class MotionObserver(Generic[State]):
+    """Feeds `advance(state, motion, dt)` with the time dt [s] that has passed between stamps."""
+
+    def __init__(self, start: State, advance: Callable[[State, Motion, float], State]) -> None:
+        self._start, self._advance = start, advance
+        self._time: float | None = None
+        self.state = start
+
+    def add(self, time: float, motion: Motion) -> None:
+        """Take in odometry stamped `time` [s]; what repeats a stamp or comes a little out of order is ignored."""
+        dt = math.inf if self._time is None else time - self._time
+        if abs(dt) > LONGEST_STEP:  # a gap, or a clock that was set back
+            self.state = self._start
+        elif dt > 0.0:
+            self.state = self._advance(self.state, motion, dt)
+        else:
+            return
+        self._time = time

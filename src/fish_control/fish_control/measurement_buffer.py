@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.imu_history import ImuHistory
-from fish_control.preintegration import SIZE
-from fish_control.strapdown import START_STD, StrapdownFilter
+from fish_control.strapdown import SIZE, START_STD, StrapdownFilter
 
 Array = NDArray[np.float64]
 LONGEST_SILENCE = 0.05  # s, of the camera before the history; less is not worth a prediction

@@ -4,18 +4,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Array = NDArray[np.float64]
+
+
 # m, nominal; a tenth of the smallest error that matters (cross-track of a few cm)
 SAMPLE_SPACING = 0.005
 LONGEST = 200.0  # m; the tables with which so long a path is followed take 1 GB
 
 End = Literal["stop", "loop"]
-Array = NDArray[np.float64]
 
 
 class PathError(ValueError):
@@ -172,3 +175,10 @@ def _curvature(heading: Array, spacing: float, closed: bool) -> Array:
     ahead, behind = np.roll(heading, -1), np.roll(heading, 1)
     turned: Array = np.angle(np.exp(1j * (ahead - behind)))
     return turned / (2.0 * spacing)
+
+
+def require_positive(family: str, **values: float) -> None:
+    """Raise PathError naming the first value that is not a positive finite number."""
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise PathError(f"{family}: {name} is {value!r}, expected a positive number")

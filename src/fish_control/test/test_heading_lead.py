@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fish_control.heading_lead import HeadingLead, against_gyro
+from fish_control.imu_heading import HeadingLead, against_gyro
 from fish_control.offset_sums import ClockEstimate
 
 

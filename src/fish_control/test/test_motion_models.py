@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from fish_control.filter_bank import FilterBank
 from fish_control.fusion import Fusion
+from fish_control.motion_models import FilterBank
 
 LATENCY, REST = 0.6, 1.0  # s
 CAMERA = np.array([0.002, 0.002, 0.012])  # m, m, rad

@@ -4,8 +4,7 @@
 
 import pytest
 
-from fish_control.line_of_sight import Motion
-from fish_control.motion_observer import MotionObserver
+from fish_control.line_of_sight import Motion, MotionObserver
 
 STILL = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

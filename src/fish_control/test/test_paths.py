@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fish_control.paths import PATHS, make_path, read_arguments
-from fish_control.paths.letter_strokes import STROKES
+from fish_control.paths.letter import STROKES
 from fish_control.pool import check_inside_pool
 from fish_control.reference_path import PathError
 

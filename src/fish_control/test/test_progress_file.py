@@ -9,7 +9,7 @@ import threading
 import pytest
 
 from fish_control.paths import make_path
-from fish_control.progress_file import ProgressFile, path_digest
+from fish_control.planner import ProgressFile, path_digest
 
 
 @pytest.fixture

@@ -5,10 +5,9 @@
 import numpy as np
 import pytest
 
+from fish_control.fusion_config import MotionNoise
 from fish_control.imu_history import Step
-from fish_control.motion_noise import MotionNoise
-from fish_control.preintegration import SIZE
-from fish_control.strapdown import START_STD, StrapdownFilter, pose_residual
+from fish_control.strapdown import SIZE, START_STD, StrapdownFilter, pose_residual
 
 
 def started(x):

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from fish_control.exciter import heads_for_a_wall, stopping_rudder
 from fish_control.line_of_sight import Motion
 from fish_control.pool import HALF_LENGTH, HALF_WIDTH, stopping_turn, wall_distance
-from fish_control.wall_guard import heads_for_a_wall, stopping_rudder
 
 
 @pytest.mark.parametrize(

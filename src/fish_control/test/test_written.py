@@ -16,8 +16,13 @@ from std_msgs.msg import Header
 from fish_control.controller import Command
 from fish_control.estimate import Estimate
 from fish_control.line_of_sight import Motion
-from fish_control.nodes.messages import planar_covariance, yaw_of
-from fish_control.nodes.written import CommandBytes, OdometryBytes, PlanBytes
+from fish_control.nodes.messages import (
+    CommandBytes,
+    OdometryBytes,
+    PlanBytes,
+    planar_covariance,
+    yaw_of,
+)
 from fish_control.paths import make_path
 from fish_control.planner import Planner
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.placement import find_start
+from fish_control.excursions import find_start
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.sensors import SENSOR_EFFECTS

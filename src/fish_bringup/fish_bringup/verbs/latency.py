@@ -20,8 +20,7 @@ import numpy as np
 from fish_bag import Trial, find_trials, read_trial
 from fish_bag.topic_arguments import add_topic_arguments, topic_map
 from fish_control.fusion_config import FusionConfig
-from fish_control.heading_lead import against_gyro
-from fish_control.imu_heading import HeadingNoise, ImuHeading
+from fish_control.imu_heading import HeadingNoise, ImuHeading, against_gyro
 from fish_control.offset_sums import ClockEstimate
 from fish_control.recorded_offset import RecordedOffset, pooled, recorded_offset
 from fish_report.errors import UserError, user_errors

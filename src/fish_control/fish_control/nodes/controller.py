@@ -32,13 +32,13 @@ from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
+    CommandBytes,
+    Reporter,
     estimate_signs,
     motion_of,
     seconds,
     yaw_of,
 )
-from fish_control.nodes.reporter import Reporter
-from fish_control.nodes.written import CommandBytes
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.changes import Changes

@@ -25,11 +25,11 @@ from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
+    CommandBytes,
+    Reporter,
     estimate_signs,
     motion_of,
 )
-from fish_control.nodes.reporter import Reporter
-from fish_control.nodes.written import CommandBytes
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.start import read_parameters, run

@@ -25,6 +25,8 @@ from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
+    OdometryBytes,
+    Reporter,
     inertial_values,
     planar_covariance,
     seconds,
@@ -32,8 +34,6 @@ from fish_control.nodes.messages import (
     to_stamp,
     yaw_of,
 )
-from fish_control.nodes.reporter import Reporter
-from fish_control.nodes.written import OdometryBytes
 from fish_node.nodes.frame_broadcaster import FrameBroadcaster
 from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.robot_clock import timer_clock

@@ -30,22 +30,22 @@ from fish_control.nodes.messages import (
     ERROR,
     OK,
     WARN,
+    PlanBytes,
+    Reporter,
     estimate_signs,
     motion_of,
     seconds,
 )
-from fish_control.nodes.path_messages import (
+from fish_control.nodes.path_service import (
+    PathService,
+    State,
     check_frames,
     configured_path,
     default_state_file,
     to_message,
 )
-from fish_control.nodes.path_service import PathService, State
-from fish_control.nodes.reporter import Reporter
-from fish_control.nodes.written import PlanBytes
-from fish_control.planner import Plan, Planner
+from fish_control.planner import Plan, Planner, ProgressFile, path_digest
 from fish_control.pool import check_inside_pool
-from fish_control.progress_file import ProgressFile, path_digest
 from fish_control.reference_path import PathError, ReferencePath
 from fish_control.watchdog import pose_loss
 from fish_node.nodes.changes import Changes

@@ -1,20 +1,17 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Reference paths by name: one family a file, one line a family here."""
+"""Reference paths by name, one line a family here, and their arguments as a user types them."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
 
-from fish_control.paths.arguments import read_arguments
-from fish_control.paths.circle import circle
-from fish_control.paths.figure_eight import figure_eight
+import yaml
+
+from fish_control.paths.closed_form import circle, figure_eight, sinusoid, square_wave, straight
 from fish_control.paths.letter import letter
 from fish_control.paths.polyline import polyline
-from fish_control.paths.sinusoid import sinusoid
-from fish_control.paths.square_wave import square_wave
-from fish_control.paths.straight import straight
 from fish_control.reference_path import PathError, ReferencePath
 
 PATHS: dict[str, Callable[..., ReferencePath]] = {
@@ -52,6 +49,23 @@ def make_path(name: str, **arguments: object) -> ReferencePath:
         return PATHS[name](**arguments)
     except TypeError as error:
         raise PathError(f"path '{name}': an argument has the wrong type ({error})") from error
+
+
+def read_arguments(text: str, name: str) -> dict[str, object]:
+    """The table of a YAML text such as '{radius: 0.6}'; none where it is empty. `name`: what the user calls the text.
+
+    Raises:
+        PathError: no table of names and values.
+    """
+    try:
+        arguments = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError):  # ValueError: a date that is none, 2020-13-45
+        arguments = text
+    if arguments is None:
+        return {}
+    if not isinstance(arguments, dict) or not all(isinstance(key, str) for key in arguments):
+        raise PathError(f"{name} is {text!r}, expected YAML such as '{{radius: 0.6}}'")
+    return arguments
 
 
 __all__ = ["PATHS", "make_path", "read_arguments"]

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.excitation import FASTEST_ROTOR, Program, ProgramError, Row, command_table
-from fish_control.excursions import COAST, excursions
-from fish_control.placement import find_start
+from fish_control.excursions import COAST, excursions, find_start
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.way import way_from_rest

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.approach import first_settled, stroke_mean
+from fish_control.path_tracker import first_settled, stroke_mean
 from fish_control.reference_path import ReferencePath
 from fish_train.evaluation.follow import Trace
 from fish_train.training.closed_loop_equations import CONTROL_PERIOD

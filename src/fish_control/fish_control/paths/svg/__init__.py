@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_control.paths.svg.coordinates import METRES_PER_PIXEL
 from fish_control.paths.svg.document import read_parts
 from fish_control.paths.svg.part import Part
-from fish_control.paths.svg.units import METRES_PER_PIXEL
 from fish_control.reference_path import PathError
 
 

@@ -14,10 +14,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_control.paths.svg.clip import Clip, read_clip
+from fish_control.paths.svg.coordinates import pixels, place, transform, viewbox_transform
 from fish_control.paths.svg.outline import SHAPES, Viewport, outlines
-from fish_control.paths.svg.part import NO_LINE, Part
-from fish_control.paths.svg.placement import place, transform, viewbox_transform
+from fish_control.paths.svg.part import NO_LINE, Clip, Part, read_clip
 from fish_control.paths.svg.style import (
     INITIAL,
     Rule,
@@ -29,7 +28,6 @@ from fish_control.paths.svg.style import (
     read_rules,
     removed,
 )
-from fish_control.paths.svg.units import pixels
 from fish_control.reference_path import PathError
 
 SVG = "http://www.w3.org/2000/svg"

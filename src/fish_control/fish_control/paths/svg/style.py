@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 import svgelements
 
-from fish_control.paths.svg.units import pixels, ratio
+from fish_control.paths.svg.coordinates import pixels, ratio
 from fish_control.reference_path import PathError
 
 Style = dict[str, str]
