@@ -12,21 +12,18 @@ import numpy as np
 import pytest
 from waiting import wait_until
 
-from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.imu_driver import ImuDriver
 from fish_hw.devices.rotor_watch import RotorWatch
 from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.devices.usb_camera import UsbCamera
 from fish_hw.devices.vertiq import Vertiq
+from fish_hw.emulators.bno085 import Felt
 from fish_hw.emulators.fake_robot import IMU_ADDRESS, FakeRobot
-from fish_hw.emulators.fed_bno085 import Felt
+from fish_hw.protocol import iquart
 from fish_hw.protocol.iquart import encode
-from fish_hw.settings.camera import CameraSettings
-from fish_hw.settings.imu import ImuSettings
-from fish_hw.settings.rotor import RotorSettings
-from fish_hw.settings.rudder import RudderSettings
-from fish_hw.transport.errors import PortUnavailable, TransportError
+from fish_hw.settings import CameraSettings, ImuSettings, RotorSettings, RudderSettings
+from fish_hw.transport.interfaces import PortUnavailable, TransportError
 from fish_hw.transport.serial_port import SerialPort
 from fish_hw.transport.unix_socket import SocketCamera, SocketI2c
 
@@ -198,9 +195,9 @@ def test_a_camera_waits_for_no_driver_and_shows_it_the_newest_picture(robot):
 
 def test_a_rotor_whose_answers_nobody_reads_obeys_its_own_watchdog(robot):
     port = SerialPort(str(robot.parameters()["rotor"]["port"]), 115200)
-    port.write(encode(reg.CTRL_VELOCITY.set(0, 50.0)))
+    port.write(encode(iquart.CTRL_VELOCITY.set(0, 50.0)))
     assert wait_until(lambda: robot.rotor_speed() > 40.0, TIMEOUT_S)
-    questions = b"".join(encode(reg.TELEMETRY.get(0)) for _ in range(100))
+    questions = b"".join(encode(iquart.TELEMETRY.get(0)) for _ in range(100))
     for _ in range(20):  # 46 kB of answers
         port.write(questions)
     assert wait_until(lambda: robot.rotor_speed() < 1.0, TIMEOUT_S)

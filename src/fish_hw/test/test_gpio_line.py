@@ -10,8 +10,8 @@ import time
 
 import pytest
 
-from fish_hw.transport.errors import PortUnavailable, TransportError
 from fish_hw.transport.gpio_line import InterruptLine
+from fish_hw.transport.interfaces import PortUnavailable, TransportError
 
 
 def iowr(number: int, size: int) -> int:

@@ -9,12 +9,12 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "fish_hw"
 LAYERS = {
-    "settings": {"settings"},
+    "settings": set(),
     "protocol": {"protocol"},
     "transport": {"transport", "settings"},
     "devices": {"devices", "protocol", "transport", "settings"},
     "emulators": {"emulators", "devices", "protocol", "transport", "settings"},
-    "commands": {"devices", "transport", "settings"},
+    "safe_stop": {"devices", "transport", "settings"},
     "nodes": {"nodes", "emulators", "devices", "protocol", "transport", "settings"},
 }
 PORTS = {"serial", "smbus2"}
@@ -51,7 +51,7 @@ def imports(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_imports(path):
-    layer = path.relative_to(PACKAGE).parts[0] if path.parent != PACKAGE else ""
+    layer = path.relative_to(PACKAGE).with_suffix("").parts[0]
     names = imports(path)
     roots = {name.split(".")[0] for name in names}
     assert not roots & OTHERS

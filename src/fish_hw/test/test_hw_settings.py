@@ -8,11 +8,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fish_hw.settings.camera import CameraSettings
-from fish_hw.settings.fake_robot import FakeRobotSettings
-from fish_hw.settings.imu import ImuSettings
-from fish_hw.settings.rotor import RotorSettings
-from fish_hw.settings.rudder import RudderSettings
+from fish_hw.settings import (
+    CameraSettings,
+    FakeRobotSettings,
+    ImuSettings,
+    RotorSettings,
+    RudderSettings,
+)
 
 SETTINGS = {
     "rotor": RotorSettings,

@@ -11,9 +11,9 @@ from fake_kernel import FakeKernel
 
 from fish_hw.devices.bno085 import Bno085
 from fish_hw.emulators.bno085 import Bno085Emulator
-from fish_hw.emulators.pca9685 import Pca9685Emulator
-from fish_hw.transport.errors import PortUnavailable, TransportError
+from fish_hw.emulators.pwm import Pca9685Emulator
 from fish_hw.transport.i2c_bus import KernelI2c
+from fish_hw.transport.interfaces import PortUnavailable, TransportError
 
 
 @pytest.fixture

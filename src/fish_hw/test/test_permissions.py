@@ -16,8 +16,8 @@ import pytest
 NOBODY = 65534
 OPEN = """
 import os
-from fish_hw.settings.camera import CameraSettings
-from fish_hw.transport.errors import PortUnavailable
+from fish_hw.settings import CameraSettings
+from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.gpio_line import InterruptLine
 from fish_hw.transport.i2c_bus import KernelI2c
 from fish_hw.transport.serial_port import SerialPort

@@ -8,9 +8,16 @@ import random
 import numpy as np
 import pytest
 
-from fish_hw.devices.imu_sample import ImuSample, Mounting
-from fish_hw.devices.rotation import from_yaw_pitch_roll, mean_rate, multiply, norm, rotate
-from fish_hw.settings.imu import ImuSettings
+from fish_hw.devices.imu_sample import (
+    ImuSample,
+    Mounting,
+    from_yaw_pitch_roll,
+    mean_rate,
+    multiply,
+    norm,
+    rotate,
+)
+from fish_hw.settings import ImuSettings
 
 
 def matrix(yaw: float, pitch: float, roll: float) -> np.ndarray:

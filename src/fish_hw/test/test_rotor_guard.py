@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from fish_hw.devices.rotor_guard import Phase, RotorGuard
-from fish_hw.settings.rotor import RotorSettings
+from fish_hw.settings import RotorSettings
 
 SETTINGS = RotorSettings()
 DT = 0.01

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from fish_hw.devices.rotor_health import RotorHealth
+from fish_hw.devices.rotor_watch import RotorHealth
 from fish_hw.devices.vertiq import RotorTelemetry
-from fish_hw.settings.rotor import RotorSettings
+from fish_hw.settings import RotorSettings
 
 SETTINGS = RotorSettings()  # 4 cells, warn 3.5, stop 3.3 V
 WELL = RotorTelemetry(35.0, 40.0, 15.6, 0.5, 10.0, 0, 1.0, 1)

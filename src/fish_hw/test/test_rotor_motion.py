@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fish_hw.devices.rotor_motion import MotionCheck
+from fish_hw.devices.rotor_watch import MotionCheck
 from fish_hw.devices.vertiq import RotorSample
 
 DT = 0.01

@@ -10,13 +10,13 @@ import yaml
 from waiting import wait_until
 
 from fish_hw.commands import safe_stop
-from fish_hw.commands.safe_stop import main
-from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.rudder_output import open_output
-from fish_hw.emulators.pwm_chip import PwmChipEmulator
+from fish_hw.emulators.pwm import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
-from fish_hw.settings.rudder import RudderSettings
-from fish_hw.transport.errors import TransportError
+from fish_hw.protocol import iquart
+from fish_hw.safe_stop import main
+from fish_hw.settings import RudderSettings
+from fish_hw.transport.interfaces import TransportError
 from fish_hw.transport.sysfs_pwm import SysfsPwm
 from fish_node.parameter_file import read_settings
 
@@ -34,21 +34,21 @@ def test_both_are_stopped(tmp_path, vertiq_emulator):
     rotor = parameter_file(tmp_path / "rotor.yaml", port=vertiq_emulator.port)
     rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip))
     assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 0
-    assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
+    assert wait_until(lambda: vertiq_emulator.mode == iquart.COAST)
     assert vertiq_emulator.timeouts == 0
     assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
 
 
 def test_the_module_of_the_file_is_stopped(tmp_path):
     emulator = VertiqEmulator(module=5)
-    emulator.written[reg.TIMEOUT.type, reg.TIMEOUT.param] = struct.pack(
+    emulator.written[iquart.TIMEOUT.type, iquart.TIMEOUT.param] = struct.pack(
         "<f", 60.0
     )  # not by its own watchdog
     emulator.mode, emulator.commanded = VELOCITY_MODE, 50.0
     try:
         rotor = parameter_file(tmp_path / "rotor.yaml", port=emulator.port, module_id=5)
         assert main(["--rotor", str(rotor)]) == 0
-        assert wait_until(lambda: emulator.mode == reg.COAST)
+        assert wait_until(lambda: emulator.mode == iquart.COAST)
         assert emulator.timeouts == 0
     finally:
         emulator.close()
@@ -123,7 +123,7 @@ def test_a_wrong_value_that_a_stop_does_not_need_keeps_nothing_from_being_stoppe
     wrong = {"armed_timeout_s": 9.0, "stale_s": "fast"}
     rudder = parameter_file(tmp_path / "rudder.yaml", chip=str(chip.chip), **wrong)
     assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 0
-    assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
+    assert wait_until(lambda: vertiq_emulator.mode == iquart.COAST)
     assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
 
 
@@ -170,7 +170,7 @@ def test_unknown_parameters_are_said_but_the_robot_is_stopped(tmp_path, capsys, 
         tmp_path / "rudder.yaml", chip=str(chip.chip), chanel=1, **{"qos_overrides.x": 1}
     )
     assert main(["--rotor", str(rotor), "--rudder", str(rudder)]) == 0
-    assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
+    assert wait_until(lambda: vertiq_emulator.mode == iquart.COAST)
     assert (chip.read("duty_cycle"), chip.read("enable")) == (1_500_000, 0)
     error = capsys.readouterr().err
     assert error.startswith(

@@ -10,7 +10,7 @@ import tty
 
 import pytest
 
-from fish_hw.transport.errors import PortUnavailable, TransportError
+from fish_hw.transport.interfaces import PortUnavailable, TransportError
 from fish_hw.transport.serial_port import SerialPort
 
 

@@ -7,7 +7,7 @@ import struct
 
 import pytest
 
-from fish_hw.protocol import sh2, shtp
+from fish_hw.protocol import sh2
 from fish_hw.protocol.sh2 import Drops, parse_reports
 
 T = 100.0  # s, when the packets below were read
@@ -34,26 +34,24 @@ def parse(packet: str | bytes, drops: Drops | None = None) -> list:
 
 
 def test_feature_requests_with_counted_sequence():
-    writer = shtp.Writer()
+    writer = sh2.Writer()
     for report_id, interval_us, expected in REQUESTS:
-        framed = writer.frame(shtp.CONTROL, sh2.set_feature(report_id, interval_us))
+        framed = writer.frame(sh2.CONTROL, sh2.set_feature(report_id, interval_us))
         assert framed == bytes.fromhex(expected)
 
 
 def test_reset_and_product_id_request():
-    assert shtp.Writer().frame(shtp.EXECUTABLE, sh2.RESET_COMMAND) == bytes.fromhex(
-        "05 00 01 00 01"
-    )
-    assert shtp.Writer().frame(shtp.CONTROL, sh2.product_id_request()) == bytes.fromhex(
+    assert sh2.Writer().frame(sh2.EXECUTABLE, sh2.RESET_COMMAND) == bytes.fromhex("05 00 01 00 01")
+    assert sh2.Writer().frame(sh2.CONTROL, sh2.product_id_request()) == bytes.fromhex(
         "06 00 02 00 f9 00"
     )
 
 
 def test_sequence_wraps_and_is_kept_per_channel():
-    writer = shtp.Writer()
-    numbers = [writer.frame(shtp.CONTROL, b"x")[3] for _ in range(257)]
+    writer = sh2.Writer()
+    numbers = [writer.frame(sh2.CONTROL, b"x")[3] for _ in range(257)]
     assert numbers[-2:] == [255, 0]
-    assert writer.frame(shtp.EXECUTABLE, b"x")[3] == 0
+    assert writer.frame(sh2.EXECUTABLE, b"x")[3] == 0
 
 
 def test_product_id():
@@ -149,7 +147,7 @@ def test_random_bytes_never_raise():
     generator = random.Random(2)
     for _ in range(2000):
         data = generator.randbytes(generator.randrange(4, 60))
-        shtp.parse_header(data)
+        sh2.parse_header(data)
         for report in parse_reports(data, T, Drops()):
             assert all(math.isfinite(v) for v in report.values)
 
@@ -164,19 +162,19 @@ def test_random_bytes_never_raise():
     ],
 )
 def test_headers_that_no_hub_sends(data, reason):
-    assert shtp.parse_header(bytes.fromhex(data)) is None, reason
+    assert sh2.parse_header(bytes.fromhex(data)) is None, reason
 
 
 def test_empty_and_continued_headers():
-    assert shtp.parse_header(bytes(4)).empty
-    header = shtp.parse_header(bytes.fromhex("13 80 03 07"))
+    assert sh2.parse_header(bytes(4)).empty
+    header = sh2.parse_header(bytes.fromhex("13 80 03 07"))
     assert (header.length, header.channel, header.sequence, header.continuation) == (
         0x13,
         3,
         7,
         True,
     )
-    assert not shtp.parse_header(bytes.fromhex("13 00 03 07")).continuation
+    assert not sh2.parse_header(bytes.fromhex("13 00 03 07")).continuation
 
 
 @pytest.mark.parametrize(
@@ -185,37 +183,37 @@ def test_empty_and_continued_headers():
 def test_the_shortest_and_the_longest_cargo_and_the_last_channel_are_accepted(
     data, length, channel
 ):
-    header = shtp.parse_header(bytes.fromhex(data))
+    header = sh2.parse_header(bytes.fromhex(data))
     assert (header.length, header.channel) == (length, channel)
 
 
 def test_fragments_are_joined():
-    joined = shtp.Reassembler()
-    first = shtp.Header(4 + 10, 0, 5, False)
-    rest = shtp.Header(4 + 4, 0, 6, True)
+    joined = sh2.Reassembler()
+    first = sh2.Header(4 + 10, 0, 5, False)
+    rest = sh2.Header(4 + 4, 0, 6, True)
     assert joined.feed(first, b"abcdef") is None
     assert joined.feed(rest, b"ghij").payload == b"abcdefghij"
     assert (joined.orphans, joined.sequence_gaps) == (0, 0)
 
 
 def test_fragment_without_beginning_and_beginning_without_end():
-    joined = shtp.Reassembler()
-    assert joined.feed(shtp.Header(8, 0, 1, True), b"ghij") is None
-    assert joined.feed(shtp.Header(14, 0, 2, False), b"abc") is None
-    assert joined.feed(shtp.Header(6, 0, 3, False), b"xy").payload == b"xy"
+    joined = sh2.Reassembler()
+    assert joined.feed(sh2.Header(8, 0, 1, True), b"ghij") is None
+    assert joined.feed(sh2.Header(14, 0, 2, False), b"abc") is None
+    assert joined.feed(sh2.Header(6, 0, 3, False), b"xy").payload == b"xy"
     assert joined.orphans == 2
 
 
 def test_after_a_reset_nothing_is_missed():
-    joined = shtp.Reassembler()
-    joined.feed(shtp.Header(14, 3, 7, False), b"abc")
+    joined = sh2.Reassembler()
+    joined.feed(sh2.Header(14, 3, 7, False), b"abc")
     joined.reset()
-    assert joined.feed(shtp.Header(6, 3, 0, False), b"xy").payload == b"xy"
+    assert joined.feed(sh2.Header(6, 3, 0, False), b"xy").payload == b"xy"
     assert (joined.orphans, joined.sequence_gaps) == (0, 0)
 
 
 def test_sequence_gap_is_counted_per_channel():
-    joined = shtp.Reassembler()
+    joined = sh2.Reassembler()
     for channel, sequence in ((3, 254), (3, 255), (3, 0), (2, 9), (3, 1), (3, 4)):
-        joined.feed(shtp.Header(5, channel, sequence, False), b"x")
+        joined.feed(sh2.Header(5, channel, sequence, False), b"x")
     assert joined.sequence_gaps == 1

@@ -15,9 +15,8 @@ from pathlib import Path
 from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.devices.vertiq import Vertiq
-from fish_hw.settings.rotor import RotorSettings
-from fish_hw.settings.rudder import RudderSettings
-from fish_hw.transport.errors import TransportError
+from fish_hw.settings import RotorSettings, RudderSettings
+from fish_hw.transport.interfaces import TransportError
 from fish_hw.transport.serial_port import SerialPort
 from fish_node.parameter_file import read_settings
 

@@ -21,7 +21,7 @@ class RecordedStream:
         """Keep data for the test to look at."""
         self.written.append(bytes(data))
 
-    def read(self, timeout_s: float) -> bytes:  # noqa: ARG002
+    def read(self, timeout_s: float) -> bytes:
         """The next recorded chunk."""
         if not self.chunks:
             return b""
