@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recorded import RecordedStream
+from fakes import RecordedStream
 
 from fish_hw.devices import bno085
 from fish_hw.devices.bno085 import Bno085

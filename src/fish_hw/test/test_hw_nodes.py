@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from fakes import wait_until
 from rclpy.clock import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
@@ -23,7 +24,6 @@ from sensor_msgs.msg import BatteryState, CameraInfo, CompressedImage, Image, Im
 from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
-from waiting import wait_until
 
 from fish_hw.devices.imu_sample import ImuSample
 from fish_hw.devices.reconnect import Doubt, Loss

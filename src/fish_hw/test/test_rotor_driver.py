@@ -11,7 +11,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from waiting import wait_until
+from fakes import wait_until
 
 from fish_hw.devices import vertiq_search
 from fish_hw.devices.leak_sensor import LeakSensor

@@ -11,8 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fake_kernel import refuse_as_sysfs_does
-from waiting import wait_until
+from fakes import refuse_as_sysfs_does, wait_until
 
 from fish_hw.devices import rudder_output
 from fish_hw.devices.reconnect import ERROR, OK, WARN, Loss

@@ -8,7 +8,7 @@ import threading
 import cv2
 import numpy as np
 import pytest
-from waiting import wait_until
+from fakes import wait_until
 
 from fish_hw.devices import usb_camera
 from fish_hw.devices.reconnect import ERROR, OK, WARN, Loss

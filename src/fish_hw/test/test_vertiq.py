@@ -6,8 +6,7 @@ import math
 import struct
 
 import pytest
-from recorded import RecordedStream
-from waiting import wait_until
+from fakes import RecordedStream, wait_until
 
 from fish_hw.devices.reconnect import DeviceError
 from fish_hw.devices.vertiq import RotorTelemetry, Vertiq

@@ -1,17 +1,61 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Stands in for the kernel: its I2C driver, so that the real smbus2 runs, and its rules for PWM files."""
+"""What the tests share: waiting with an end, recorded bytes as a port, and stand-ins for the kernel.
+
+FakeKernel is its I2C driver, so that the real smbus2 runs; refuse_as_sysfs_does has its rules for PWM files.
+"""
 
 import ctypes
 import errno
 import os
-from collections.abc import Callable
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
 import smbus2.smbus2
 
 READ = 1  # I2C_M_RD
+
+
+def wait_until(condition: Callable[[], bool], timeout_s: float = 5.0) -> bool:
+    """Whether condition came true within timeout_s."""
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline:
+        if condition():
+            return True
+        time.sleep(0.002)
+    return condition()
+
+
+class RecordedStream:
+    """ByteStream: every read returns the next chunk, an exception in the list is raised, writes are kept.
+
+    Reads past the end return nothing, as a silent line does.
+    """
+
+    def __init__(self, chunks: Iterable[bytes | Exception] = ()) -> None:
+        self.chunks = deque(chunks)
+        self.written: list[bytes] = []
+        self.closed = False
+
+    def write(self, data: bytes) -> None:
+        """Keep data for the test to look at."""
+        self.written.append(bytes(data))
+
+    def read(self, timeout_s: float) -> bytes:
+        """The next recorded chunk."""
+        if not self.chunks:
+            return b""
+        chunk = self.chunks.popleft()
+        if isinstance(chunk, Exception):
+            raise chunk
+        return chunk
+
+    def close(self) -> None:
+        """Note that the port was given back."""
+        self.closed = True
 
 
 class FakeKernel:
