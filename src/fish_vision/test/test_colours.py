@@ -5,7 +5,7 @@
 import pytest
 from pool_picture import CONFIG
 
-from fish_vision.colours import MARKERS, Colours, middle
+from fish_vision.spots import MARKERS, Colours, middle
 
 
 def taught(pictures: int, shift: float, value: float) -> Colours:

@@ -19,11 +19,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from pool_picture import CONFIG, calibration, discs_of_fish, draw, with_tag
 
+from fish_vision import check_image
 from fish_vision.calibration import lens_document
-from fish_vision.commands import calibrate, check_image
 from fish_vision.config import config_from_file
 from fish_vision.tags import tag_picture
 from fish_vision.tracker import Detection, Tracker
+from fish_vision.verbs import calibrate
 
 DATA = Path(__file__).parent / "data"
 
@@ -235,7 +236,7 @@ class Person:
     """Runs a command that serves a page, and clicks there."""
 
     def __init__(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "fish_vision.commands.calibrate", *arguments]
+        command = [sys.executable, "-m", "fish_vision.verbs.calibrate", *arguments]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         line = self.process.stdout.readline()
         self.address = re.search(r"http://127\.0\.0\.1:\d+/", line)[0]

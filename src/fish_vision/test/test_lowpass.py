@@ -7,7 +7,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from fish_vision.lowpass import PoseLowPass
+from fish_vision.detections import PoseLowPass
 from fish_vision.pose import HeadPose
 from fish_vision.tracker import Detection
 

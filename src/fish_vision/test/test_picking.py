@@ -10,7 +10,7 @@ import urllib.request
 import numpy as np
 import pytest
 
-from fish_vision.picking import PickingPage, Points
+from fish_vision.verbs.pictures import PickingPage, Points
 
 
 class Visit:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fish_vision.choice import Reason
+from fish_vision.detections import SPACINGS, Statistics
 from fish_vision.pose import HeadPose
-from fish_vision.statistics import SPACINGS, Statistics
 from fish_vision.tracker import Detection, Lost
 
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from fish_vision.calibration import CalibrationError
-from fish_vision.commands import calibrate
-from fish_vision.tag_sheet import MARGIN, PAGES, RULER, tag_sheet
-from fish_vision.tags import TagDetector
+from fish_vision.tags import MARGIN, PAGES, RULER, TagDetector, tag_sheet
+from fish_vision.verbs import calibrate
 
 SCALE = 10  # pixels a mm
 SVG = "{http://www.w3.org/2000/svg}"

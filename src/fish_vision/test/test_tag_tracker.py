@@ -17,8 +17,7 @@ from pool_picture import CONFIG, calibration, draw, with_tag
 
 from fish_vision.calibration import Calibration, Lens
 from fish_vision.choice import Reason
-from fish_vision.follower import make_follower
-from fish_vision.tag_tracker import TagTracker
+from fish_vision.follower import TagTracker, make_follower
 from fish_vision.tags import TagDetector, tag_picture, tags_in
 from fish_vision.tracker import Detection, Lost, Tracker
 

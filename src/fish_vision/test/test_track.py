@@ -19,9 +19,8 @@ from pool_picture import CONFIG, SIZE, calibration, discs_of_fish, draw
 
 from fish_report.errors import UserError
 from fish_vision.calibration import lens_document
-from fish_vision.picture import PictureError
+from fish_vision.picture import PictureError, frames
 from fish_vision.verbs import track
-from fish_vision.video import frames
 
 POSES = [(0.02 * k, 0.1, 0.3 + 0.05 * k) for k in range(6)]
 

@@ -11,7 +11,13 @@ import numpy as np
 import yaml
 
 from fish_vision.annotate import drawn_pool
-from fish_vision.calibrate import POINTS_MIN, mount_from_points
+from fish_vision.calibrate import (
+    POINTS_MIN,
+    KnownPoints,
+    mount_from_points,
+    pool_corners,
+    read_points,
+)
 from fish_vision.calibration import (
     POOL,
     Array,
@@ -21,17 +27,17 @@ from fish_vision.calibration import (
     Mount,
     read_lens,
 )
-from fish_vision.commands.pictures import (
+from fish_vision.pool_outline import X_POINTS, find_pool
+from fish_vision.segmentation import Image
+from fish_vision.tags import TagDetector
+from fish_vision.verbs.pictures import (
+    PickingPage,
+    Points,
     add_picture_arguments,
     new_file,
     one_picture,
     write_picture,
 )
-from fish_vision.known_points import KnownPoints, pool_corners, read_points
-from fish_vision.picking import PickingPage, Points
-from fish_vision.pool_outline import X_POINTS, find_pool
-from fish_vision.segmentation import Image
-from fish_vision.tags import TagDetector
 
 RMS_LIMIT = 5.0  # pixels; worse points are swapped or mistyped
 TAG_LEAST = 12.0  # pixels, shortest side of a tag that is looked for

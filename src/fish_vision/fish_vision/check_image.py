@@ -10,12 +10,12 @@ import numpy as np
 
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, read_lens
-from fish_vision.commands.pictures import read_picture, write_picture
 from fish_vision.config import TrackerConfig, config_from_file
 from fish_vision.follower import make_follower
 from fish_vision.segmentation import hsv_of
 from fish_vision.spots import SpotFinder
 from fish_vision.tracker import Lost
+from fish_vision.verbs.pictures import read_picture, write_picture
 
 MARKERS = ("front", "rear", "tail_odd", "tail_even")
 

@@ -13,8 +13,8 @@ import yaml
 
 from fish_vision.calibrate import LensFit, find_board, lens_from_chessboards
 from fish_vision.calibration import CalibrationError, lens_document
-from fish_vision.commands.pictures import from_topic, new_file, read_pictures, write_picture
 from fish_vision.segmentation import Image
+from fish_vision.verbs.pictures import from_topic, new_file, read_pictures, write_picture
 
 MOVED = 0.06  # share of the picture's width by which a board must have moved to be another view
 LARGE_RMS = 0.5  # pixels; a usual camera gives less than 0.3
