@@ -1,10 +1,14 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The tracker node in this process: messages in and out, and bad input of every kind."""
+"""The tracker node in this process, and pictures of a camera's topic for the commands.
+
+Messages in and out, and bad input of every kind; pictures that are accepted, and silence.
+"""
 
 import os
 import re
 import sys
+import threading
 from collections.abc import Iterator
 from math import atan2, exp, pi
 from pathlib import Path
@@ -19,6 +23,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from pool_picture import CONFIG, discs_of_fish, draw, lens_fields, with_tag
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
@@ -27,12 +32,14 @@ from std_msgs.msg import Header
 
 from fish_node import rivals
 from fish_vision.config import config_from_file
+from fish_vision.nodes.picture_source import collect
 from fish_vision.nodes.tracker import TrackerNode
-from fish_vision.picture import to_jpeg
+from fish_vision.picture import PictureError, to_jpeg
 from fish_vision.tags import tag_picture
 
 pytestmark = pytest.mark.ros
 DOMAIN = 142
+PICTURES_DOMAIN = "175"  # above those that tests of other packages draw
 POSE = (0.5, 0.2, 1.0)
 PICTURE = draw(discs_of_fish(*POSE, (0.3, -0.2, 0.1)))
 MOUNT = {"camera_position": list(CONFIG.camera_position), "camera_tilt": list(CONFIG.camera_tilt)}
@@ -357,3 +364,53 @@ def test_bad_parameters_are_refused_with_their_name() -> None:
         with pytest.raises(ValueError, match=name):
             Bench({name: value})
         rclpy.try_shutdown()
+
+
+class Camera:
+    """Publishes grey pictures of 32 x 24 pixels, each 10 levels lighter, until it is closed."""
+
+    def __init__(self) -> None:
+        self._context = Context()
+        rclpy.init(context=self._context)
+        self._node = Node("camera", context=self._context)
+        self._jpeg = self._node.create_publisher(CompressedImage, "/image/compressed", 1)
+        self._raw = self._node.create_publisher(Image, "/image", 1)
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._publish)
+        self._thread.start()
+
+    def _publish(self) -> None:
+        level = 0
+        while not self._end.wait(0.05):
+            level = (level + 10) % 250
+            picture = np.full((24, 32, 3), level, np.uint8)
+            self._jpeg.publish(CompressedImage(format="jpeg", data=to_jpeg(picture)))
+            self._raw.publish(
+                Image(height=24, width=32, encoding="bgr8", step=96, data=picture.tobytes())
+            )
+
+    def close(self) -> None:
+        self._end.set()
+        self._thread.join()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+
+@pytest.fixture
+def camera(monkeypatch: pytest.MonkeyPatch) -> Iterator[Camera]:
+    monkeypatch.setenv("ROS_DOMAIN_ID", PICTURES_DOMAIN)
+    made = Camera()
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("topic", ["/image/compressed", "/image"])
+def test_only_accepted_pictures_are_collected(camera: Camera, topic: str) -> None:
+    pictures = collect(topic, lambda p: int(p[0, 0, 0]) % 20 > 5, count=3, silence=60.0)
+    assert len(pictures) == 3
+    assert all(p.shape == (24, 32, 3) and int(p[0, 0, 0]) % 20 > 5 for p in pictures)
+
+
+def test_silence_is_an_error_that_names_the_topic(camera: Camera) -> None:
+    with pytest.raises(PictureError, match=r"/nobody: no picture for 0\.5 s .*is the camera"):
+        collect("/nobody", lambda _: True, count=1, silence=0.5)
