@@ -30,11 +30,13 @@ from fish_control.node_configs import (
     PlannerConfig,
 )
 from fish_description.joint_angles import JointAnglesConfig
-from fish_hw.settings.camera import CameraSettings
-from fish_hw.settings.fake_robot import FakeRobotSettings
-from fish_hw.settings.imu import ImuSettings
-from fish_hw.settings.rotor import RotorSettings
-from fish_hw.settings.rudder import RudderSettings
+from fish_hw.settings import (
+    CameraSettings,
+    FakeRobotSettings,
+    ImuSettings,
+    RotorSettings,
+    RudderSettings,
+)
 from fish_node.parameter_docs import parameter_docs
 from fish_sim.camera.config import CameraConfig
 from fish_sim.simulation_config import SimulatorConfig

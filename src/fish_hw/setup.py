@@ -32,7 +32,7 @@ setup(
             "imu = fish_hw.nodes.entry:imu",
             "camera = fish_hw.nodes.entry:camera",
             "fake_robot = fish_hw.nodes.entry:fake_robot",
-            "safe_stop = fish_hw.commands.safe_stop:main",
+            "safe_stop = fish_hw.safe_stop:main",
         ],
     },
 )

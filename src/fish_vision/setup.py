@@ -17,7 +17,7 @@ setup(
         ("share/" + NAME + "/config", glob("config/*")),
         ("share/" + NAME + "/launch", glob("launch/*")),
     ],
-    package_data={NAME: ["py.typed", "picking_page.html"]},
+    package_data={NAME: ["py.typed", "verbs/picking_page.html"]},
     install_requires=["setuptools"],
     zip_safe=False,
     maintainer="Robot fish maintainers",
@@ -29,9 +29,9 @@ setup(
         "robofish.verbs": [f"{verb} = {NAME}.verbs.{verb}" for verb in VERBS],
         "console_scripts": [
             "tracker = fish_vision.nodes.entry:tracker",
-            "calibrate = fish_vision.commands.calibrate:main",
+            "calibrate = fish_vision.verbs.calibrate:main",
             "track = fish_report.robofish:track",
-            "check_image = fish_vision.commands.check_image:main",
+            "check_image = fish_vision.check_image:main",
         ],
     },
 )

@@ -11,21 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fakes import RecordedStream
 
 from fish_hw.devices import bno085
 from fish_hw.devices.bno085 import Bno085
 from fish_hw.devices.bno085_rvc import Bno085Rvc, attitude
-from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.imu_driver import ImuDriver
-from fish_hw.devices.reconnect import Doubt, Loss
-from fish_hw.devices.rotation import conjugate, rotate
-from fish_hw.devices.status import ERROR, OK, WARN
+from fish_hw.devices.imu_sample import conjugate, rotate
+from fish_hw.devices.reconnect import ERROR, OK, WARN, DeviceError, Doubt, Loss
 from fish_hw.emulators.bno085 import YAW_FREQUENCY, YAW_RATE, Bno085Emulator
 from fish_hw.emulators.i2c_bus import I2cBusEmulator
-from fish_hw.protocol import rvc, sh2, shtp
-from fish_hw.settings.imu import ImuSettings
-from fish_hw.transport.errors import PortUnavailable, TransportError
-from fish_hw.transport.recorded import RecordedStream
+from fish_hw.protocol import rvc, sh2
+from fish_hw.settings import ImuSettings
+from fish_hw.transport.interfaces import PortUnavailable, TransportError
 
 INTERVAL_S = 0.01
 
@@ -227,12 +225,10 @@ def test_implausible_values_are_dropped(bench):
     bench.run(0.1)
     base = b"\xfb\x00\x00\x00\x00"
     bench.hub.push(
-        shtp.REPORTS, base + bytes.fromhex("08 00 03 00 ff 7f ff 7f ff 7f ff 7f")
+        sh2.REPORTS, base + bytes.fromhex("08 00 03 00 ff 7f ff 7f ff 7f ff 7f")
     )  # |q| = 4
-    bench.hub.push(shtp.REPORTS, base + bytes.fromhex("01 00 03 00 ff 7f ff 7f ff 7f"))  # 22 g
-    bench.hub.push(
-        shtp.REPORTS, base + bytes.fromhex("02 00 03 00 ff 7f ff 7f ff 7f")
-    )  # 6350 deg/s
+    bench.hub.push(sh2.REPORTS, base + bytes.fromhex("01 00 03 00 ff 7f ff 7f ff 7f"))  # 22 g
+    bench.hub.push(sh2.REPORTS, base + bytes.fromhex("02 00 03 00 ff 7f ff 7f ff 7f"))  # 6350 deg/s
     bench.run(0.1)
     assert bench.bno.counters.implausible == 3
 
@@ -259,7 +255,7 @@ def flip_in_time_base(byte: int, mask: int):
     """Damage: bits of one byte of every time base."""
 
     def damage(packet: bytes) -> bytes:
-        if len(packet) <= 9 or packet[2] != shtp.REPORTS or packet[4] != 0xFB:
+        if len(packet) <= 9 or packet[2] != sh2.REPORTS or packet[4] != 0xFB:
             return packet
         return packet[: 5 + byte] + bytes([packet[5 + byte] ^ mask]) + packet[6 + byte :]
 
@@ -289,7 +285,7 @@ def test_reports_a_little_early_or_late_are_kept(bench, lead_s):
 
 def test_reports_that_nobody_asked_for_change_nothing(bench):
     bench.run(0.1)
-    bench.hub.push(shtp.REPORTS, b"\xfb\0\0\0\0" + bytes.fromhex("04 09 02 00 40 00 c0 ff 20 00"))
+    bench.hub.push(sh2.REPORTS, b"\xfb\0\0\0\0" + bytes.fromhex("04 09 02 00 40 00 c0 ff 20 00"))
     assert len(bench.run(0.5)) >= 45
 
 
@@ -329,15 +325,15 @@ def test_reset_of_the_hub_switches_the_reports_on_again(bench):
 
 def test_other_words_on_the_resets_channel_and_its_word_on_others_are_no_reset(bench):
     bench.run(0.1)
-    bench.hub.push(shtp.EXECUTABLE, b"\x02")
-    bench.hub.push(shtp.COMMAND, sh2.RESET_COMPLETE)
+    bench.hub.push(sh2.EXECUTABLE, b"\x02")
+    bench.hub.push(sh2.COMMAND, sh2.RESET_COMPLETE)
     bench.run(0.2)
     assert bench.bno.counters.resets == 1
 
 
 def test_sequence_gaps_are_counted(bench):
     bench.run(0.1)
-    bench.hub._sequence[shtp.REPORTS] += 3
+    bench.hub._sequence[sh2.REPORTS] += 3
     bench.run(0.1)
     assert bench.bno.reassembler.sequence_gaps == 1
 

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from fakes import wait_until
 from rclpy.clock import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
@@ -23,14 +24,12 @@ from sensor_msgs.msg import BatteryState, CameraInfo, CompressedImage, Image, Im
 from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
-from waiting import wait_until
 
-from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.imu_sample import ImuSample
 from fish_hw.devices.reconnect import Doubt, Loss
 from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.usb_camera import jpeg_size
-from fish_hw.emulators.pwm_chip import PwmChipEmulator
+from fish_hw.emulators.pwm import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
 from fish_hw.nodes.camera import CameraNode
 from fish_hw.nodes.device_node import run
@@ -38,6 +37,7 @@ from fish_hw.nodes.imu import ImuNode
 from fish_hw.nodes.rotor import RotorNode
 from fish_hw.nodes.rudder import RudderNode
 from fish_hw.nodes.worker import Worker
+from fish_hw.protocol import iquart
 from fish_hw.transport.sysfs_pwm import SysfsPwm
 from fish_node import rivals
 from fish_node.camera_file import CameraFileError, read_camera_file
@@ -173,7 +173,7 @@ def test_rotor_coasts_when_commands_end(graph, vertiq_emulator):
     )
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, g.arming(publisher))
-    assert g.spin(lambda: vertiq_emulator.mode == reg.COAST)
+    assert g.spin(lambda: vertiq_emulator.mode == iquart.COAST)
     assert vertiq_emulator.timeouts == 0  # told to, not left to its own watchdog
 
 
@@ -199,7 +199,7 @@ def test_rotor_survives_bad_commands(graph, vertiq_emulator, bad):
     )
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     assert g.spin(lambda: g.node._driver.rejected > 3, lambda: publisher.publish(bad))
-    assert vertiq_emulator.mode == reg.COAST
+    assert vertiq_emulator.mode == iquart.COAST
     assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, g.arming(publisher))
 
 
@@ -220,13 +220,13 @@ def test_rotor_moves_only_while_a_person_has_armed_it(graph, vertiq_emulator):
         publisher.publish(command(rotor=50.0))
 
     assert g.spin(lambda: len(states) > 20, drive)
-    assert vertiq_emulator.mode == reg.COAST
+    assert vertiq_emulator.mode == iquart.COAST
     assert states[-1].status[0].level == DiagnosticStatus.WARN
     assert states[-1].status[0].message == "not armed since the start"
     assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, g.arming(publisher))
     assert g.spin(lambda: states[-1].status[0].message == "armed", drive)
     assert g.call(SetBool, "arm", SetBool.Request(data=False)).success
-    assert g.spin(lambda: vertiq_emulator.mode == reg.COAST, drive)
+    assert g.spin(lambda: vertiq_emulator.mode == iquart.COAST, drive)
     assert states[-1].status[0].message == "disarmed by the operator"
     vertiq_emulator.faults_ever = 2
     assert g.call(Trigger, "rotor/clear_faults", Trigger.Request()).success
@@ -262,7 +262,7 @@ def test_other_nodes_and_the_emergency_stop_disarm(
         publisher.publish(command(rotor=50.0))
         other.publish(kind(data=data))
 
-    assert g.spin(lambda: vertiq_emulator.mode == reg.COAST, each)
+    assert g.spin(lambda: vertiq_emulator.mode == iquart.COAST, each)
     assert g.node._driver.arming.reason == reason
 
 
@@ -324,7 +324,7 @@ def test_a_deadman_that_is_let_go_for_a_moment_disarms(graph, vertiq_emulator):
     for held in (False, True):
         deadman.publish(Bool(data=held))
     assert g.spin(
-        lambda: vertiq_emulator.mode == reg.COAST, lambda: publisher.publish(command(rotor=50.0))
+        lambda: vertiq_emulator.mode == iquart.COAST, lambda: publisher.publish(command(rotor=50.0))
     )
     assert g.node._driver.arming.reason == "the operator let the deadman go"
 
@@ -341,11 +341,11 @@ def test_another_owner_of_the_arming_state_forbids_to_arm_while_it_is_there(grap
         simulator.publish(DiagnosticArray(status=[status]))
         asks()
 
-    assert g.spin(lambda: vertiq_emulator.mode == reg.COAST, each)
+    assert g.spin(lambda: vertiq_emulator.mode == iquart.COAST, each)
     assert g.node._driver.arming.reason.startswith("/fish/simulator says arming/state, too")
     end = time.monotonic() + 1.0
     assert g.spin(lambda: time.monotonic() > end, each)
-    assert vertiq_emulator.mode == reg.COAST
+    assert vertiq_emulator.mode == iquart.COAST
     assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, asks)  # it is gone
 
 
@@ -697,7 +697,7 @@ def test_sigterm_coasts_a_spinning_rotor(graph, vertiq_emulator):
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0
-    assert vertiq_emulator.mode == reg.COAST
+    assert vertiq_emulator.mode == iquart.COAST
     assert vertiq_emulator.timeouts == 0
 
 
@@ -705,7 +705,7 @@ def test_sigkill_leaves_it_to_the_modules_own_watchdog(graph, vertiq_emulator):
     process, _ = driven_rotor(vertiq_emulator, graph)
     process.kill()
     process.communicate(timeout=TIMEOUT_S)
-    assert wait_until(lambda: vertiq_emulator.mode == reg.COAST)
+    assert wait_until(lambda: vertiq_emulator.mode == iquart.COAST)
     assert vertiq_emulator.timeouts >= 1
     assert vertiq_emulator.timeout_s == 0.25
 

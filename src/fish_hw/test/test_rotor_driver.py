@@ -11,20 +11,18 @@ import time
 from dataclasses import replace
 
 import pytest
-from waiting import wait_until
+from fakes import wait_until
 
-from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices import vertiq_search
-from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.leak_sensor import LeakSensor
-from fish_hw.devices.reconnect import Loss
+from fish_hw.devices.reconnect import ERROR, OK, WARN, DeviceError, Loss
 from fish_hw.devices.rotor_driver import RotorDriver
 from fish_hw.devices.rotor_guard import Phase
-from fish_hw.devices.status import ERROR, OK, WARN
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
+from fish_hw.protocol import iquart
 from fish_hw.protocol.iquart import GET
-from fish_hw.settings.rotor import RotorSettings
-from fish_hw.transport.errors import PortUnavailable
+from fish_hw.settings import RotorSettings
+from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.serial_port import SerialPort
 
 # generous times: a loaded machine keeps the emulator waiting, and that is not what is tested here
@@ -96,7 +94,7 @@ def test_a_driver_that_stood_still_until_the_module_coasted_is_disarmed(bench):
         time.sleep(DT)
     bench.run(0.2, steady, arm=False)
     assert bench.driver.arming.reason == "no rotor module for 0.5 s"
-    assert bench.emulator.mode == reg.COAST
+    assert bench.emulator.mode == iquart.COAST
 
 
 def test_oscillation_is_followed_and_measured(bench):
@@ -141,11 +139,11 @@ def test_a_mirrored_module_turns_the_other_way_until_it_stands():
         )
         orders = len(emulator.log)
         assert bench.run(15.0, until=lambda: bench.driver.guard.phase is Phase.COASTING)
-        assert wait_until(lambda: emulator.mode == reg.COAST)
+        assert wait_until(lambda: emulator.mode == iquart.COAST)
         ordered = [
             struct.unpack("<f", m.data)[0]
             for m in emulator.log[orders:]
-            if m.param == reg.CTRL_VELOCITY.param
+            if m.param == iquart.CTRL_VELOCITY.param
         ]
         assert ordered
         assert max(ordered) < 0.0
@@ -160,7 +158,7 @@ def test_stale_command_coasts_without_polling(bench):
     asked = sum(m.access == GET for m in bench.emulator.log)
     bench.run(0.2)
     assert sum(m.access == GET for m in bench.emulator.log) == asked
-    assert bench.emulator.mode == reg.COAST
+    assert bench.emulator.mode == iquart.COAST
     assert bench.emulator.timeouts == 0
     assert bench.driver.status().level == WARN
     assert any("no joint_command for 0.4 s" in event for event in bench.events)
@@ -171,16 +169,16 @@ def test_module_stops_by_itself_if_coast_is_lost(bench):
     bench.run(0.3, steady)
     bench.driver._vertiq.coast = lambda: None
     assert bench.run(15.0, until=lambda: bench.emulator.timeouts == 1)
-    assert bench.emulator.mode == reg.COAST
+    assert bench.emulator.mode == iquart.COAST
 
 
 def test_module_that_was_left_driving_coasts_from_the_start(vertiq_emulator):
     """As after a node that was killed and is back before the module's own watchdog fires."""
-    vertiq_emulator.written[reg.TIMEOUT.type, reg.TIMEOUT.param] = struct.pack("<f", 60.0)
+    vertiq_emulator.written[iquart.TIMEOUT.type, iquart.TIMEOUT.param] = struct.pack("<f", 60.0)
     vertiq_emulator.mode, vertiq_emulator.commanded = VELOCITY_MODE, 50.0
     bench = Bench(vertiq_emulator)
     bench.connect()
-    assert vertiq_emulator.mode == reg.COAST
+    assert vertiq_emulator.mode == iquart.COAST
     assert vertiq_emulator.timeouts == 0
     bench.driver.close()
 
@@ -188,7 +186,7 @@ def test_module_that_was_left_driving_coasts_from_the_start(vertiq_emulator):
 def test_module_that_drives_on_its_own_is_told_to_coast(bench):
     bench.emulator.mode, bench.emulator.commanded = VELOCITY_MODE, 50.0
     assert bench.run(15.0, until=lambda: any("drove although" in e for e in bench.events))
-    assert bench.run(15.0, until=lambda: bench.emulator.mode == reg.COAST)
+    assert bench.run(15.0, until=lambda: bench.emulator.mode == iquart.COAST)
 
 
 def test_module_that_does_not_say_its_mode_is_not_accused(vertiq_emulator):
@@ -207,7 +205,7 @@ def test_restarted_module_is_set_up_again_before_it_moves(bench):
     assert bench.emulator.timeout_s == 1.0
     assert bench.run(15.0, steady, until=lambda: any("restarted" in e for e in bench.events))
     assert bench.emulator.timeout_s == SETTINGS.module_timeout_s
-    assert bench.emulator.mode == reg.COAST
+    assert bench.emulator.mode == iquart.COAST
 
 
 def test_unplugged_then_plugged_again(bench):
@@ -224,7 +222,7 @@ def test_unplugged_then_plugged_again(bench):
     try:
         assert bench.run(15.0, steady, until=lambda: bench.driver.connected, arm=False)
         bench.run(1.0, steady, arm=False)
-        assert bench.emulator.mode == reg.COAST  # it is back, and nobody armed it
+        assert bench.emulator.mode == iquart.COAST  # it is back, and nobody armed it
         assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     finally:
         bench.driver.close()
@@ -248,14 +246,14 @@ def test_low_battery_stops_and_stays_stopped(vertiq_emulator):
     assert bench.run(15.0, steady, until=lambda: bench.driver.guard.phase is Phase.COASTING)
     said = "battery at 3.20 V per cell"
     assert said in bench.driver.arming.reason
-    driven = sum(m == reg.CTRL_VELOCITY.set(0, 60.0) for m in bench.emulator.log)
+    driven = sum(m == iquart.CTRL_VELOCITY.set(0, 60.0) for m in bench.emulator.log)
     assert bench.run(15.0, steady, until=lambda: bench.driver.guard.phase is Phase.RESTING)
     bench.run(0.3, steady)  # the operator tries to arm all the time
-    assert sum(m == reg.CTRL_VELOCITY.set(0, 60.0) for m in bench.emulator.log) == driven
+    assert sum(m == iquart.CTRL_VELOCITY.set(0, 60.0) for m in bench.emulator.log) == driven
     assert said in bench.driver.status().message
     bench.emulator.volts = 4 * 3.8
     bench.run(1.0, steady, arm=False)
-    assert bench.emulator.mode == reg.COAST  # a battery that recovered arms nothing
+    assert bench.emulator.mode == iquart.COAST  # a battery that recovered arms nothing
     assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     bench.driver.close()
 
@@ -264,7 +262,7 @@ def test_low_battery_stops_and_stays_stopped(vertiq_emulator):
 def test_a_command_that_is_no_number_disarms(bench, speed):
     assert bench.run(15.0, steady, until=lambda: bench.emulator.mode == VELOCITY_MODE)
     bench.driver.command(speed)
-    assert bench.run(15.0, steady, arm=False, until=lambda: bench.emulator.mode == reg.COAST)
+    assert bench.run(15.0, steady, arm=False, until=lambda: bench.emulator.mode == iquart.COAST)
     assert f"commanded speed is {speed}" in bench.driver.arming.reason
 
 
@@ -302,7 +300,7 @@ def test_water_in_the_hull_disarms_and_forbids_to_arm(vertiq_emulator):
     bench.connect()
     assert bench.run(15.0, steady, until=lambda: vertiq_emulator.mode == VELOCITY_MODE)
     wire.low = True
-    assert bench.run(15.0, steady, until=lambda: vertiq_emulator.mode == reg.COAST)
+    assert bench.run(15.0, steady, until=lambda: vertiq_emulator.mode == iquart.COAST)
     assert driver.arming.reason == "leak: water in the hull"
     assert "leak" in driver.arming.arm(time.monotonic())
     assert driver.status().message.startswith("leak: water in the hull")  # whatever disarmed it
@@ -337,9 +335,9 @@ def test_clearing_faults_does_not_break_the_silence_of_a_stop(bench):
     assert bench.run(15.0, until=lambda: bench.driver.guard.phase is Phase.COASTING)
     bench.emulator.faults_ever = 0b10
     bench.driver.clear_faults()
-    asked = sum(m.type == reg.FAULT_EVER.type for m in bench.emulator.log)
+    asked = sum(m.type == iquart.FAULT_EVER.type for m in bench.emulator.log)
     while bench.driver.guard.phase is Phase.COASTING:
-        assert sum(m.type == reg.FAULT_EVER.type for m in bench.emulator.log) == asked
+        assert sum(m.type == iquart.FAULT_EVER.type for m in bench.emulator.log) == asked
         bench.run(DT)
     assert bench.run(15.0, until=lambda: any("it held: input voltage" in e for e in bench.events))
 
@@ -371,7 +369,7 @@ def test_close_coasts(bench):
     bench.run(0.3, steady)
     assert bench.emulator.mode == VELOCITY_MODE
     bench.driver.close()
-    assert wait_until(lambda: bench.emulator.mode == reg.COAST)
+    assert wait_until(lambda: bench.emulator.mode == iquart.COAST)
     assert bench.emulator.timeouts == 0
 
 
@@ -413,7 +411,7 @@ def test_a_wrong_baud_rate_is_told():
 
 def test_a_firmware_without_the_speed_command_is_told(vertiq_emulator, monkeypatch):
     monkeypatch.setattr(vertiq_search, "ANSWER_S", 0.5)  # of a busy computer
-    vertiq_emulator.mangle = lambda reply: b"" if reply[2] == reg.TIMEOUT.type else reply
+    vertiq_emulator.mangle = lambda reply: b"" if reply[2] == iquart.TIMEOUT.type else reply
     assert "needs the speed firmware" in complaint(vertiq_emulator)
 
 

@@ -11,21 +11,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fake_kernel import refuse_as_sysfs_does
-from waiting import wait_until
+from fakes import refuse_as_sysfs_does, wait_until
 
 from fish_hw.devices import rudder_output
-from fish_hw.devices.pca9685 import Pca9685Pwm, prescale
-from fish_hw.devices.reconnect import Loss
-from fish_hw.devices.rudder_driver import RudderDriver
-from fish_hw.devices.rudder_output import open_output
-from fish_hw.devices.rudder_servo import RudderServo
-from fish_hw.devices.status import ERROR, OK, WARN
+from fish_hw.devices.reconnect import ERROR, OK, WARN, Loss
+from fish_hw.devices.rudder_driver import RudderDriver, RudderServo
+from fish_hw.devices.rudder_output import Pca9685Pwm, open_output, prescale
 from fish_hw.emulators.i2c_bus import I2cBusEmulator
-from fish_hw.emulators.pca9685 import Pca9685Emulator
-from fish_hw.emulators.pwm_chip import PwmChipEmulator
-from fish_hw.settings.rudder import RudderSettings
-from fish_hw.transport.errors import PortUnavailable, TransportError
+from fish_hw.emulators.pwm import Pca9685Emulator, PwmChipEmulator
+from fish_hw.settings import RudderSettings
+from fish_hw.transport.interfaces import PortUnavailable, TransportError
 from fish_hw.transport.sysfs_pwm import SysfsPwm
 
 SETTINGS = RudderSettings()

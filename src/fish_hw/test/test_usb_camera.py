@@ -8,15 +8,14 @@ import threading
 import cv2
 import numpy as np
 import pytest
-from waiting import wait_until
+from fakes import wait_until
 
 from fish_hw.devices import usb_camera
-from fish_hw.devices.reconnect import Loss
-from fish_hw.devices.status import ERROR, OK, WARN
+from fish_hw.devices.reconnect import ERROR, OK, WARN, Loss
 from fish_hw.devices.usb_camera import UsbCamera, decode_jpeg, encode_jpeg, jpeg_size
 from fish_hw.emulators.walking_square import WalkingSquare
-from fish_hw.settings.camera import CameraSettings
-from fish_hw.transport.errors import PortUnavailable
+from fish_hw.settings import CameraSettings
+from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.video_capture import Frame, VideoCapture, compressed_frame
 
 SETTINGS = CameraSettings(device="emulator", width=64, height=48)

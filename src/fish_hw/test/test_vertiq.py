@@ -6,13 +6,12 @@ import math
 import struct
 
 import pytest
-from waiting import wait_until
+from fakes import RecordedStream, wait_until
 
-from fish_hw.devices import vertiq_registers as reg
-from fish_hw.devices.errors import DeviceError
+from fish_hw.devices.reconnect import DeviceError
 from fish_hw.devices.vertiq import RotorTelemetry, Vertiq
+from fish_hw.protocol import iquart
 from fish_hw.protocol.iquart import REPLY, SET, Message, encode
-from fish_hw.transport.recorded import RecordedStream
 from fish_hw.transport.serial_port import SerialPort
 
 VELOCITY_REPLY = bytes.fromhex("55 06 32 0d 03 00 00 18 41 35 fa")  # 9.5 rad/s, vendor's library
@@ -110,7 +109,7 @@ def test_a_sample_behind_an_unanswered_question_is_stamped_between_its_own_quest
     clock = SteppedClock()
     stream = TimedStream(clock)
     vertiq = Vertiq(stream, clock=clock)
-    assert vertiq.read(reg.DERATE) == [None]  # older firmware has no such register
+    assert vertiq.read(iquart.DERATE) == [None]  # older firmware has no such register
     stream.chunks.extend([b"", b"", VELOCITY_REPLY + ANGLE_REPLY])
     sample = ask(vertiq)
     assert sample.time_s == pytest.approx((stream.sent[-1] + clock.now) / 2, abs=0.0005)
@@ -173,11 +172,13 @@ def test_messages_that_are_no_answer_are_counted(wrong):
     assert vertiq.counters.unexpected == 1
 
 
-@pytest.mark.parametrize("register", [reg.OBS_VELOCITY, reg.OBS_ANGLE], ids=["speed", "angle"])
+@pytest.mark.parametrize(
+    "register", [iquart.OBS_VELOCITY, iquart.OBS_ANGLE], ids=["speed", "angle"]
+)
 def test_value_that_is_no_number_is_no_sample(register):
     nan = encode(Message(register.type, register.param, REPLY, 0, struct.pack("<f", math.nan)))
     vertiq, _ = recorded(
-        b"", nan + (ANGLE_REPLY if register is reg.OBS_VELOCITY else VELOCITY_REPLY)
+        b"", nan + (ANGLE_REPLY if register is iquart.OBS_VELOCITY else VELOCITY_REPLY)
     )
     assert vertiq.measure() is None
     assert vertiq.counters.unexpected == 1
@@ -200,7 +201,8 @@ def test_angle_is_continuous_through_many_turns():
 def test_configure_writes_and_reads_back(module):
     vertiq, emulator = module
     coast_quietly = [
-        (r.type, r.param) for r in (reg.TIMEOUT_BEHAVIOR, reg.TIMEOUT_MEANING, reg.TIMEOUT_SONG)
+        (r.type, r.param)
+        for r in (iquart.TIMEOUT_BEHAVIOR, iquart.TIMEOUT_MEANING, iquart.TIMEOUT_SONG)
     ]
     emulator.written |= dict.fromkeys(coast_quietly, b"\1")
     assert vertiq.configure(0.25) == []
@@ -210,7 +212,9 @@ def test_configure_writes_and_reads_back(module):
 
 def test_a_module_that_refuses_its_watchdog_is_not_used(module):
     vertiq, emulator = module
-    kept = encode(Message(reg.TIMEOUT.type, reg.TIMEOUT.param, REPLY, 0, struct.pack("<f", 1.0)))
+    kept = encode(
+        Message(iquart.TIMEOUT.type, iquart.TIMEOUT.param, REPLY, 0, struct.pack("<f", 1.0))
+    )
     emulator.mangle = lambda reply: kept if reply[2:4] == kept[2:4] else reply
     with pytest.raises(DeviceError, match=r"refuses a timeout of 0.25 s"):
         vertiq.configure(0.25)
@@ -219,8 +223,8 @@ def test_a_module_that_refuses_its_watchdog_is_not_used(module):
 def test_tuning_is_what_the_module_has_and_what_it_lacks_is_left_out(module):
     vertiq, emulator = module
     vertiq._reply_timeout_s = 0.05
-    del emulator.written[reg.FIRMWARE.type, reg.FIRMWARE.param]
-    emulator.written[reg.INPUT_FILTER.type, reg.INPUT_FILTER.param] = struct.pack("<I", 500)
+    del emulator.written[iquart.FIRMWARE.type, iquart.FIRMWARE.param]
+    emulator.written[iquart.INPUT_FILTER.type, iquart.INPUT_FILTER.param] = struct.pack("<I", 500)
     tuning = vertiq.tuning()
     assert tuning["command filter [Hz]"] == 500
     assert tuning["velocity feed-forward [V s/rad]"] == pytest.approx(0.0258)
@@ -230,7 +234,7 @@ def test_tuning_is_what_the_module_has_and_what_it_lacks_is_left_out(module):
 def test_configure_names_settings_that_the_firmware_lacks(module):
     vertiq, emulator = module
     vertiq._reply_timeout_s = 0.02
-    del emulator.written[reg.TIMEOUT_SONG.type, reg.TIMEOUT_SONG.param]
+    del emulator.written[iquart.TIMEOUT_SONG.type, iquart.TIMEOUT_SONG.param]
     assert vertiq.configure(0.25) == ["module does not take timeout song = 0"]
 
 
@@ -249,8 +253,8 @@ def test_telemetry(module):
     assert (telemetry.volts, telemetry.amps) == pytest.approx((14.2, 3.5))
     assert (telemetry.controller_c, telemetry.coil_c) == pytest.approx((36.5, 51.5))
     assert telemetry.uptime_s == pytest.approx(3600.0, abs=5.0)
-    assert reg.fault_names(telemetry.faults) == ["reference voltage", "controller temperature"]
-    assert (telemetry.derate, telemetry.mode) == (1.0, reg.COAST)
+    assert iquart.fault_names(telemetry.faults) == ["reference voltage", "controller temperature"]
+    assert (telemetry.derate, telemetry.mode) == (1.0, iquart.COAST)
 
 
 def telemetry_of(vertiq: Vertiq) -> RotorTelemetry:
@@ -258,7 +262,7 @@ def telemetry_of(vertiq: Vertiq) -> RotorTelemetry:
     return vertiq.power().completed(vertiq.state())
 
 
-def dropping(*registers: reg.Register):
+def dropping(*registers: iquart.Register):
     """Damage: no answers of these registers."""
     silent = [(register.type, register.param) for register in registers]
     return lambda reply: b"" if (reply[2], reply[3]) in silent else reply
@@ -267,37 +271,39 @@ def dropping(*registers: reg.Register):
 def test_telemetry_keeps_the_answers_that_came(module):
     vertiq, emulator = module
     emulator.faults = 0b10
-    emulator.mangle = dropping(reg.DERATE)
+    emulator.mangle = dropping(iquart.DERATE)
     telemetry = telemetry_of(vertiq)
     assert (telemetry.volts, telemetry.faults, telemetry.derate) == (
         pytest.approx(14.8),
         0b10,
         None,
     )
-    emulator.mangle = dropping(reg.TELEMETRY)
+    emulator.mangle = dropping(iquart.TELEMETRY)
     telemetry = telemetry_of(vertiq)
     assert (telemetry.volts, telemetry.faults, telemetry.derate) == (None, 0b10, 1.0)
-    emulator.mangle = dropping(reg.FAULT_NOW, reg.CTRL_MODE)
+    emulator.mangle = dropping(iquart.FAULT_NOW, iquart.CTRL_MODE)
     telemetry = telemetry_of(vertiq)
     assert (telemetry.volts, telemetry.faults, telemetry.mode) == (pytest.approx(14.8), None, None)
 
 
 def test_a_register_that_is_never_answered_is_not_asked_for_ever(module):
     vertiq, emulator = module
-    emulator.mangle = dropping(reg.DERATE)
+    emulator.mangle = dropping(iquart.DERATE)
     for _ in range(5):
         assert vertiq.state().faults == 0
-    asked = sum((m.type, m.param) == (reg.DERATE.type, reg.DERATE.param) for m in emulator.log)
+    asked = sum(
+        (m.type, m.param) == (iquart.DERATE.type, iquart.DERATE.param) for m in emulator.log
+    )
     assert asked == 3
 
 
 def test_fault_memory_that_could_not_be_read_is_not_erased(module):
     vertiq, emulator = module
     emulator.faults_ever = 0b10
-    emulator.mangle = dropping(reg.FAULT_EVER)
+    emulator.mangle = dropping(iquart.FAULT_EVER)
     assert vertiq.clear_faults() is None
     emulator.mangle = lambda reply: reply
-    assert vertiq.read(reg.FAULT_EVER) == [
+    assert vertiq.read(iquart.FAULT_EVER) == [
         (0b10,)
     ]  # by now the module would have taken an order to erase
 

@@ -1,8 +1,9 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The picture with what the tracker saw in it, for people."""
+"""Pictures for people: with what the tracker saw in it, or with the pixels that colour ranges hold."""
 
 import itertools
+from collections.abc import Mapping, Sequence
 from math import cos, sin
 
 import cv2
@@ -10,7 +11,7 @@ import numpy as np
 
 from fish_vision.calibration import POOL, Calibration
 from fish_vision.config import TrackerConfig
-from fish_vision.segmentation import Image
+from fish_vision.segmentation import ColourRange, Image, hsv_of
 from fish_vision.tracker import Detection, Lost
 
 GREEN, RED, WHITE = (60, 230, 60), (50, 50, 255), (255, 255, 255)  # blue, green, red
@@ -40,6 +41,17 @@ def drawn_pool(image: Image, calibration: Calibration, sides: tuple[float, float
     picture = image.copy()
     _line(picture, calibration, _outline(sides), WHITE, closed=True)
     return picture
+
+
+def tinted(picture: Image, found: Mapping[str, Sequence[int]]) -> Image:
+    """Copy of a picture, grey but for the pixels in the ranges found."""
+    hsv = hsv_of(picture, (0, 0, picture.shape[1], picture.shape[0]))
+    masks = [ColourRange(*colour).mask(hsv) > 0 for colour in found.values()]
+    grey = cv2.cvtColor(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+    held = np.any(masks, axis=0)
+    result: Image = grey // 2
+    result[held] = picture[held]
+    return result
 
 
 def tail_points(found: Detection, config: TrackerConfig) -> np.ndarray:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from fish_vision.calibration import POOL
 from fish_vision.config import TrackerConfig
-from fish_vision.continuity import Track, alike, assign
-from fish_vision.heads import Head
+from fish_vision.heads import Head, Track, alike, assign
 from fish_vision.pose import HeadPose, wrap
 
 Array = NDArray[Any]  # float64

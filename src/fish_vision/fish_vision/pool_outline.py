@@ -12,9 +12,8 @@ import numpy as np
 from fish_vision.calibrate import mount_from_points
 from fish_vision.calibration import Array, Calibration, CalibrationError, Lens, Mount, project
 from fish_vision.outline_fit import OutlineFit, OutlineFitter
-from fish_vision.rectangles import rectangles
+from fish_vision.rectangles import ideal_picture, rectangles, straight_lines
 from fish_vision.segmentation import Image
-from fish_vision.straight_lines import ideal_picture, straight_lines
 
 SIDE, ALL = 0.4, 0.7  # share of each side, and of all, along which the edge must be seen
 RMS_LIMIT = 0.0015  # share of the picture's longer side

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from fish_vision.calibration import Calibration
 from fish_vision.choice import Choice, Reason
-from fish_vision.colours import CASTS, Colours
 from fish_vision.config import TrackerConfig
 from fish_vision.heads import Head, HeadFinder
 from fish_vision.pose import HeadPose, link_ends
 from fish_vision.segmentation import Box, Image, around, hsv_of
-from fish_vision.spots import SpotFinder
+from fish_vision.spots import CASTS, Colours, SpotFinder
 
 Array = NDArray[Any]  # float64
 

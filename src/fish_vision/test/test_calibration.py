@@ -1,28 +1,76 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Calibration against similar triangles and formulas written out here."""
+"""Calibration: formulas, calibrating, and the pool's outline.
 
+Against similar triangles and formulas written out here; a camera that made the pictures, drawn here ray by ray, is recovered; the
+pool's outline is found in drawn pictures in several lights and lenses, and what must be refused is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import yaml
 
-from fish_vision.calibrate import mount_from_points
+from fish_vision import calibrate
+from fish_vision.calibrate import lens_from_chessboards, mount_from_points
 from fish_vision.calibration import (
     Calibration,
     CalibrationError,
     Lens,
     Mount,
     lens_document,
+    project,
     read_lens,
     undistort,
 )
+from fish_vision.pool_outline import find_pool
 
 WIDE = (-0.26, 0.07, 0.0008, -0.0005, 0.0)
 RATIONAL = (0.31, -0.12, 0.0006, -0.0004, 0.02, 0.55, 0.03, -0.01)  # k1 k2 p1 p2 k3 k4 k5 k6
 MOUNT = Mount((0.05, -0.08, 3.2), (-0.022, 0.018, 0.010))
 FILE = Path(__file__).parents[1] / "config" / "simulated_camera.yaml"
+
+FISHEYE = (0.057, 0.038, -0.025, 0.004)  # k1 .. k4
+
+SIZE, SQUARE, CORNERS = (480, 360), 0.05, (7, 5)
+TRUE = Lens.from_camera_info(
+    *SIZE, "plumb_bob", [400, 0, 243, 0, 404, 176, 0, 0, 1], [-0.2, 0.05, 0.001, -0.001, 0]
+)
+
+SIDES = (4.27, 2.13)
+POOL_MOUNT = Mount((0.06, -0.09, 3.2), (-0.03, 0.025, 0.02))
+WEBCAM = Lens.from_camera_info(
+    960,
+    540,
+    "plumb_bob",
+    [750.0, 0, 474, 0, 750.0, 275, 0, 0, 1],
+    [-0.26, 0.07, 0.0008, -0.0005, 0],
+)
+FISHEYE_LENS = Lens.from_camera_info(
+    960, 720, "equidistant", [420.0, 0, 484, 0, 420.0, 352, 0, 0, 1], [0.02, -0.01, 0.003, 0.0]
+)
+DECK, TOP, WALL, FLOOR, GROUT = (
+    (112, 116, 118),
+    (205, 205, 200),
+    (126, 105, 53),
+    (196, 172, 96),
+    (172, 148, 78),
+)
+FINE = 3  # subpixels of a pixel in each direction
+APPARENT_DEPTH = 0.45  # m, at which refraction shows the floor
+
+Thing = tuple[float, float, float, float, tuple[int, int, int]]  # middle, sides, m, colour
+CLUTTER: tuple[Thing, ...] = (
+    (-2.3, 1.0, 0.3, 0.5, (40, 60, 180)),  # over a corner
+    (0.8, 1.05, 1.3, 0.25, (60, 60, 60)),  # over a third of a side
+    (1.2, -0.3, 0.4, 0.4, (30, 200, 220)),  # in the water
+    (-0.5, 1.28, 0.9, 0.12, (230, 230, 230)),  # on the deck
+    (0.2, -1.2, 0.06, 0.5, (220, 220, 220)),  # a ladder
+)
 
 
 def lens(d: tuple[float, ...] = WIDE, focal: float = 1000.0) -> Lens:
@@ -53,9 +101,6 @@ def test_undistort_inverts_the_plumb_bob_formula_at_the_image_edge() -> None:
     y_d = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
     pixels = np.column_stack([634 + 1000 * x_d, 366 + 1000 * y_d])
     np.testing.assert_allclose(undistort(pixels, lens()), np.column_stack([x, y]), atol=1e-8)
-
-
-FISHEYE = (0.057, 0.038, -0.025, 0.004)  # k1 .. k4
 
 
 def fisheye_lens() -> Lens:
@@ -258,3 +303,373 @@ def test_the_quaternion_turns_optical_axes_into_the_pool(tilt: tuple[float, ...]
         assert turned == pytest.approx(mount.R.T @ column, abs=1e-9)
     if not any(tilt):
         assert mount.quaternion == pytest.approx((1.0, 0.0, 0.0, 0.0))
+
+
+def rays_of_pixels(fine: int) -> np.ndarray:
+    """(N, 3) directions of all subpixels: the plumb_bob formula inverted by repeated substitution."""
+    u, v = np.meshgrid(np.arange(SIZE[0] * fine), np.arange(SIZE[1] * fine))
+    pixels = (np.column_stack([u.ravel(), v.ravel()]) + 0.5) / fine - 0.5
+    k1, k2, p1, p2, _ = TRUE.D
+    x_d, y_d = ((pixels - TRUE.K[:2, 2]) / np.diag(TRUE.K)[:2]).T
+    x, y = x_d, y_d
+    for _ in range(15):
+        r2 = x * x + y * y
+        radial = 1 + k1 * r2 + k2 * r2 * r2
+        x, y = (
+            (x_d - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial,
+            (y_d - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial,
+        )
+    return np.column_stack([x, y, np.ones(len(x))])
+
+
+def board_picture(
+    rays: np.ndarray, fine: int, rotation: tuple[float, float, float], t: tuple[float, float, float]
+) -> np.ndarray:
+    """Chessboard seen through the true lens: each subpixel's ray is cut with the board's plane."""
+    R = cv2.Rodrigues(np.array(rotation))[0]
+    depth = (R[:, 2] @ np.array(t)) / (rays @ R[:, 2])
+    board = (rays * depth[:, None] - np.array(t)) @ R[
+        :, :2
+    ] / SQUARE + 1.0  # in squares; (1, 1) = first corner
+    inside = np.all((board > 0) & (board < np.array(CORNERS) + 1), axis=1)
+    dark = (np.floor(board).astype(int).sum(axis=1) % 2 == 0) & inside
+    grey = np.where(dark, 30, 220).astype(np.uint8).reshape(SIZE[1] * fine, SIZE[0] * fine)
+    return cv2.cvtColor(cv2.resize(grey, SIZE, interpolation=cv2.INTER_AREA), cv2.COLOR_GRAY2BGR)
+
+
+@pytest.fixture(scope="module")
+def rays() -> np.ndarray:
+    return rays_of_pixels(3)
+
+
+@pytest.fixture(scope="module")
+def pictures(rays: np.ndarray) -> list[np.ndarray]:
+    poses = [
+        ((0.0, 0.0, 0.0), (-0.15, -0.1, 0.5)),
+        ((0.5, 0.0, 0.1), (-0.25, -0.15, 0.6)),
+        ((-0.5, 0.1, 0.0), (-0.05, -0.12, 0.55)),
+        ((0.1, 0.5, 0.0), (-0.20, -0.02, 0.6)),
+        ((0.0, -0.5, 0.2), (-0.10, -0.20, 0.6)),
+        ((0.4, 0.4, -0.2), (-0.15, -0.05, 0.5)),
+    ]
+    return [board_picture(rays, 3, *pose) for pose in poses]
+
+
+def test_lens_is_recovered_from_chessboards(pictures: list[np.ndarray]) -> None:
+    fit = lens_from_chessboards([*pictures, np.zeros_like(pictures[0])], CORNERS, SQUARE)
+    lens = fit.lens
+    assert fit.used == tuple(range(6))
+    assert fit.rms < 0.15
+    assert lens.size == SIZE
+    assert np.abs(np.vstack(fit.seen) - np.vstack(fit.shown)).max() < 1.0
+    u, v = np.meshgrid(np.linspace(60, 420, 9), np.linspace(50, 310, 7))  # where boards were
+    pixels = np.column_stack([u.ravel(), v.ravel()])
+    error = (undistort(pixels, lens) - undistort(pixels, TRUE)) * 400  # in pixels
+    assert np.std(error, axis=0).max() < 0.3  # a common shift is taken up by the mount
+    assert np.abs(error.mean(axis=0)).max() < 1.0
+
+
+def test_a_fisheye_is_recovered_from_chessboards() -> None:
+    """Rays of the equidistant formula r = f (theta + k1 theta^3), inverted by repeated substitution."""
+    f, k1, fine = 170.0, 0.03, 3
+    u, v = np.meshgrid(np.arange(SIZE[0] * fine), np.arange(SIZE[1] * fine))
+    x, y = (u.ravel() + 0.5) / fine - 0.5 - 243.0, (v.ravel() + 0.5) / fine - 0.5 - 176.0
+    r = np.hypot(x, y)
+    theta = r / f
+    for _ in range(30):
+        theta = r / f / (1 + k1 * theta**2)
+    sine = np.sin(theta) / np.maximum(r, 1e-9)
+    rays = np.column_stack([x * sine, y * sine, np.cos(theta)])
+    rays[:, 2] = np.maximum(rays[:, 2], 1e-3)
+    poses = [
+        ((0.0, 0.0, 0.0), (-0.15, -0.1, 0.2)),
+        ((0.5, 0.0, 0.1), (-0.25, -0.15, 0.25)),
+        ((-0.5, 0.1, 0.0), (-0.05, -0.12, 0.25)),
+        ((0.1, 0.5, 0.0), (-0.30, -0.02, 0.25)),
+        ((0.0, -0.5, 0.2), (-0.00, -0.20, 0.25)),
+        ((0.4, 0.4, -0.2), (-0.15, -0.05, 0.2)),
+    ]
+    pictures = [board_picture(rays, fine, *pose) for pose in poses]
+    fit = lens_from_chessboards(pictures, CORNERS, SQUARE, fisheye=True)
+    assert fit.lens.model == "equidistant"
+    assert len(fit.used) >= 5
+    assert fit.rms < 0.4
+    assert fit.lens.K[0, 0] == pytest.approx(f, rel=0.01)
+    mount, _ = mount_from_points(fit.lens, *corners_and_pixels_of(fit.lens))
+    np.testing.assert_allclose(mount.position, MOUNT.position, atol=1e-4)
+
+
+def corners_and_pixels_of(lens: Lens) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array([[2.0, 1.0], [-2.0, 1.0], [-2.0, -1.0], [2.0, -1.0]])
+    return np.column_stack([points, np.zeros(4)]), Calibration(lens, MOUNT).pool_to_pixel(points)
+
+
+def test_too_few_boards_are_refused(pictures: list[np.ndarray]) -> None:
+    with pytest.raises(CalibrationError, match="found in 2 of 3"):
+        lens_from_chessboards([*pictures[:2], np.zeros_like(pictures[0])], CORNERS, SQUARE)
+
+
+@pytest.mark.parametrize("number", [0, 1], ids=["square to the camera", "tilted"])
+def test_copies_of_one_picture_are_refused(pictures: list[np.ndarray], number: int) -> None:
+    with pytest.raises(CalibrationError, match=r"tilts differ by 0.0 deg.*tilt the board"):
+        lens_from_chessboards([pictures[number]] * 4, CORNERS, SQUARE)
+
+
+def test_boards_that_are_not_tilted_are_refused(rays: np.ndarray) -> None:
+    places = [(-0.15, -0.1, 0.5), (-0.25, -0.15, 0.6), (-0.05, -0.12, 0.55), (-0.2, -0.02, 0.6)]
+    flat = [board_picture(rays, 3, (0.0, 0.0, 0.0), place) for place in places]
+    with pytest.raises(CalibrationError, match=r"tilts differ by .* expected 15 or more"):
+        lens_from_chessboards(flat, CORNERS, SQUARE)
+
+
+def test_an_uncertain_focal_length_is_refused(pictures: list[np.ndarray]) -> None:
+    """Two poses, one of them square to the camera: the fit is good, and its focal length is wrong.
+
+    How uncertain it is depends on the version of OpenCV.
+    """
+    few = [pictures[0], pictures[0], pictures[1], pictures[1]]
+    with pytest.raises(
+        CalibrationError, match=r"focal length uncertain by [\d.]+ %: expected 3 % at most"
+    ):
+        lens_from_chessboards(few, CORNERS, SQUARE)
+
+
+def test_a_usual_set_of_pictures_is_far_from_being_refused(
+    pictures: list[np.ndarray], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(calibrate, "FOCAL_STD_MAX", calibrate.FOCAL_STD_MAX / 20)
+    monkeypatch.setattr(calibrate, "TILT_MIN", 3 * calibrate.TILT_MIN)
+    fit = lens_from_chessboards(pictures, CORNERS, SQUARE)
+    assert fit.used == tuple(range(len(pictures)))
+
+
+def test_pictures_of_different_sizes_are_refused(pictures: list[np.ndarray]) -> None:
+    with pytest.raises(CalibrationError, match="different sizes"):
+        lens_from_chessboards([pictures[0], pictures[1][:100]], CORNERS, SQUARE)
+
+
+def corners_and_pixels(height: float) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array(
+        [[2.135, 1.065], [-2.135, 1.065], [-2.135, -1.065], [2.135, -1.065], [0.0, 1.065]]
+    )
+    lens = Lens.from_camera_info(
+        1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07]
+    )
+    return np.column_stack([points, np.full(5, height)]), Calibration(
+        lens, MOUNT, height
+    ).pool_to_pixel(points)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.2])
+def test_mount_is_recovered_from_the_pool_corners(height: float) -> None:
+    lens = Lens.from_camera_info(
+        1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07]
+    )
+    mount, rms = mount_from_points(lens, *corners_and_pixels(height))
+    np.testing.assert_allclose(mount.position, MOUNT.position, atol=1e-5)
+    np.testing.assert_allclose(mount.tilt, MOUNT.tilt, atol=1e-5)
+    assert rms < 1e-3
+
+
+def test_mount_from_points_read_to_a_pixel_is_good_to_millimetres() -> None:
+    lens = Lens.from_camera_info(
+        1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07]
+    )
+    points, pixels = corners_and_pixels(0.0)
+    mount, rms = mount_from_points(lens, points, np.round(pixels))
+    assert 0.0 < rms < 1.0
+    places = Calibration(lens, mount).pixel_to_pool(pixels)
+    assert np.abs(places - points[:, :2]).max() < 0.005
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_points_that_are_no_numbers_are_refused(bad: float) -> None:
+    points, pixels = corners_and_pixels(0.0)
+    pixels[2, 1] = bad
+    with pytest.raises(CalibrationError, match="not all finite"):
+        mount_from_points(TRUE, points, pixels)
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "at least 4"),
+        ([[x, 0, 0] for x in range(5)], "one line"),
+    ],
+)
+def test_points_that_fix_no_pose_are_refused(points: list, message: str) -> None:
+    with pytest.raises(CalibrationError, match=message):
+        mount_from_points(TRUE, points, [[float(i), 0.0] for i in range(len(points))])
+
+
+@pytest.mark.parametrize("height", [0.0, 0.2])
+def test_a_camera_below_the_points_is_refused(height: float) -> None:
+    points, pixels = corners_and_pixels(height)
+    lens = Lens.from_camera_info(
+        1280, 720, "plumb_bob", [1000, 0, 634, 0, 1000, 366, 0, 0, 1], [-0.26, 0.07]
+    )
+    for mirrored in (points * [1, -1, 1], points[[3, 2, 1, 0, 4]]):
+        with pytest.raises(CalibrationError, match=r"not above the points.*is y counted downwards"):
+            mount_from_points(lens, mirrored[:4], pixels[:4])
+
+
+def test_points_that_all_have_the_same_pixel_are_refused() -> None:
+    points, pixels = corners_and_pixels(0.0)
+    with pytest.raises(CalibrationError, match="no camera sees the points at these pixels"):
+        mount_from_points(TRUE, points, np.full_like(pixels, 100.0))
+
+
+@dataclass(frozen=True)
+class View:
+    """What is before the camera."""
+
+    lens: Lens = WEBCAM
+    mount: Mount = POOL_MOUNT
+    pools: Sequence[tuple[float, float]] = ((0.0, 0.0),)  # middles, m
+    clutter: Sequence[Thing] = ()
+    light: tuple[float, float, float] = (1.0, 1.0, 1.0)  # gains of blue, green, red
+    shade: float = 0.0  # share of light that is lost from the left to the right edge
+    noise: float = 3.0
+    rim: float = 0.05  # m
+    tiles: bool = True
+    sides: tuple[float, float] = field(default=SIDES)
+
+
+def picture(view: View) -> np.ndarray:
+    """A pool with a rim, walls and a tiled floor, things on the deck and over the rim, light and noise."""
+    width, height = view.lens.size
+    canvas = np.empty((height * FINE, width * FINE, 3), np.uint8)
+    canvas[:] = DECK
+
+    def fill(
+        x: float,
+        y: float,
+        length: float,
+        breadth: float,
+        colour: tuple[int, int, int],
+        z: float = 0.0,
+    ) -> None:
+        corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * np.array([length, breadth]) / 2
+        share = np.linspace(0, 1, 30, endpoint=False)[:, None]
+        ends = np.roll(corners, -1, axis=0)
+        line = np.vstack([a + share * (b - a) for a, b in zip(corners, ends, strict=True)]) + [x, y]
+        solid = np.column_stack([line, np.full(len(line), z)])
+        R = view.mount.R
+        pixels = project(solid, cv2.Rodrigues(R)[0], -R @ np.array(view.mount.position), view.lens)
+        fine = np.round(((pixels + 0.5) * FINE - 0.5) * 16).astype(np.int32)
+        cv2.fillPoly(canvas, [fine], colour, shift=4)
+
+    length, breadth = view.sides
+    for x, y in view.pools:
+        fill(x, y, length + 2 * view.rim, breadth + 2 * view.rim, TOP)
+        fill(x, y, length, breadth, WALL)
+        fill(x, y, length, breadth, FLOOR, -APPARENT_DEPTH)
+        for line in np.arange(-length / 2, length / 2, 0.305) if view.tiles else ():
+            fill(x + line, y, 0.012, breadth, GROUT, -APPARENT_DEPTH)
+        for line in np.arange(-breadth / 2, breadth / 2, 0.305) if view.tiles else ():
+            fill(x, y + line, length, 0.012, GROUT, -APPARENT_DEPTH)
+    for x, y, length, breadth, colour in view.clutter:
+        fill(x, y, length, breadth, colour)
+    seen = cv2.resize(canvas, view.lens.size, interpolation=cv2.INTER_AREA).astype(float)
+    seen *= np.array(view.light) * (1.0 - view.shade * np.linspace(0, 1, width)[:, None])
+    seen += np.random.default_rng(1).normal(0.0, view.noise, seen.shape)
+    return np.clip(np.round(seen), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("view", "millimetres"),
+    [
+        (View(), 2.0),
+        (View(light=(0.3, 0.3, 0.3)), 3.0),
+        (View(light=(0.6, 0.95, 1.2)), 2.0),
+        (View(light=(1.3, 1.1, 0.9)), 2.0),
+        (View(shade=0.7), 3.0),
+        (View(noise=10.0), 4.0),
+        (View(clutter=CLUTTER), 3.0),
+        (View(lens=FISHEYE_LENS), 4.0),
+        (View(lens=FISHEYE_LENS, clutter=CLUTTER, shade=0.5), 5.0),
+        (View(mount=Mount((0.5, -0.6, 3.4), (-0.15, 0.1, 0.05))), 4.0),
+        (View(rim=0.02), 2.0),
+    ],
+    ids=[
+        "plain",
+        "dark",
+        "warm",
+        "bright",
+        "shade",
+        "noise",
+        "clutter",
+        "fisheye",
+        "fisheye_clutter",
+        "tilted",
+        "thin_rim",
+    ],
+)
+def test_the_outline_gives_the_camera_in_any_light_and_lens(view: View, millimetres: float) -> None:
+    """Errors are those of the corners as the camera found would place them on the water."""
+    found = find_pool(picture(view), view.lens, SIDES, 0.0, "right")
+    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * np.array(SIDES) / 2
+    solid = np.column_stack([corners, np.zeros(4)])
+    R, R_found = view.mount.R, found.mount.R
+    true = project(solid, cv2.Rodrigues(R)[0], -R @ np.array(view.mount.position), view.lens)
+    seen = project(
+        solid, cv2.Rodrigues(R_found)[0], -R_found @ np.array(found.mount.position), view.lens
+    )
+    each_pixel = 1e3 * view.mount.position[2] / view.lens.K[0, 0]  # mm
+    assert np.abs(seen - true).max() * each_pixel < millimetres
+    assert found.rms < 0.6
+    assert np.abs(found.mount.position - np.array(view.mount.position)).max() < 0.02
+
+
+def test_hidden_parts_of_a_side_are_reported() -> None:
+    found = find_pool(picture(View(clutter=CLUTTER)), WEBCAM, SIDES, 0.0, "right")
+    above, left, below, right = found.seen  # +y, -x, -y, +x
+    assert 0.5 < above < 0.8
+    assert 0.6 < left <= 1.0
+    assert min(below, right) > 0.9
+
+
+@pytest.mark.parametrize(("x_points", "turn"), [("right", 0.0), ("left", np.pi)])
+def test_x_points_says_which_way_round_the_pool_is(x_points: str, turn: float) -> None:
+    found = find_pool(picture(View()), WEBCAM, SIDES, 0.0, x_points)
+    ahead = found.mount.R @ [1.0, 0.0, 0.0]
+    assert (
+        np.arctan2(-ahead[1], ahead[0]) % (2 * np.pi) == pytest.approx(turn, abs=0.05)
+        or turn == 0.0
+    )
+    assert np.sign(ahead[0]) == np.cos(turn)
+
+
+def test_the_outline_may_lie_above_the_water() -> None:
+    found = find_pool(picture(View()), WEBCAM, SIDES, 0.1, "right")
+    assert found.mount.position[2] == pytest.approx(POOL_MOUNT.position[2] + 0.1, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("view", "sides", "x_points", "message"),
+    [
+        (View(pools=()), SIDES, "right", "no rectangle of 4.27 x 2.13 m"),
+        (View(pools=((1.4, 0.0),)), SIDES, "right", "no rectangle of 4.27 x 2.13 m"),
+        (View(), (5.0, 2.13), "right", "no rectangle of 5 x 2.13 m"),
+        (View(clutter=((0.0, 1.05, 4.5, 0.4, (60, 60, 60)),)), SIDES, "right", "no rectangle of"),
+        (View(light=(0.02, 0.02, 0.02)), SIDES, "right", "no rectangle of"),
+        (
+            View(
+                pools=((0.0, 1.3), (0.0, -1.3)),
+                tiles=False,
+                mount=Mount((0.0, 0.0, 7.5), (0.0, 0.0, 0.0)),
+            ),
+            SIDES,
+            "right",
+            "more than one rectangle",
+        ),
+        (View(), SIDES, "up", "degrees off --x-points up one way or the other"),
+    ],
+    ids=["no pool", "out of view", "another size", "a hidden side", "night", "two pools", "turned"],
+)
+def test_no_mount_is_better_than_a_wrong_one(
+    view: View, sides: tuple[float, float], x_points: str, message: str
+) -> None:
+    with pytest.raises(CalibrationError, match=message) as refused:
+        find_pool(picture(view), view.lens, sides, 0.0, x_points)
+    assert "\n" not in str(refused.value)

@@ -1,25 +1,25 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The tracker on drawn pictures: poses, reasons when there is none, what it refuses."""
+"""The tracker on drawn pictures: poses, reasons when there is none, what it refuses; the low-pass over its poses; counts and
+judgements for the diagnostics.
+"""
 
-import sys
 from dataclasses import replace
-from math import cos, pi, sin
-from pathlib import Path
+from math import cos, pi, sin, sqrt
 
 import cv2
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from pool_picture import BODY, CONFIG, SCALE, SIZE, calibration, discs_of_fish, draw, lens_fields
 
 from fish_vision.annotate import annotated, tail_points
 from fish_vision.calibration import POOL, Calibration, Lens
 from fish_vision.choice import Reason
-from fish_vision.pose import wrap
+from fish_vision.detections import SPACINGS, PoseLowPass, Statistics
+from fish_vision.pose import HeadPose, wrap
 from fish_vision.tracker import Detection, Lost, Tracker
+
+CUTOFF, RATE = 2.0, 200.0  # Hz
 
 
 @pytest.fixture
@@ -393,3 +393,119 @@ def test_errors_of_partly_hidden_markers_are_as_large_as_the_covariance_says() -
             nees.append(error @ np.linalg.solve(head.covariance, error))
     assert len(nees) > 15
     assert np.median(nees) < 5.0  # 2.4 where the covariance is right
+
+
+def detection(
+    t: float, x: float, heading: float = 0.0, tail: tuple[float, ...] | None = None
+) -> Detection:
+    head = HeadPose(x, -x, (heading + pi) % (2 * pi) - pi, np.eye(3))
+    return Detection(t, head, tail, 1.0, (0, 0, 1, 1), False)
+
+
+def test_off_gives_every_pose_back() -> None:
+    found = detection(3.0, 0.1)
+    assert PoseLowPass(0.0, 0.5).filtered(found) is found
+
+
+def test_steady_motion_is_right_at_its_stamp_with_irregular_frames() -> None:
+    rng, lowpass, t = np.random.default_rng(0), PoseLowPass(CUTOFF, 0.5), 100.0
+    for _ in range(200):
+        t += rng.uniform(0.01, 0.08)
+        out = lowpass.filtered(detection(t, 0.3 * t, 0.9 * t, (0.2 * t, -0.1 * t)))
+        assert out.head.x == pytest.approx(0.3 * out.stamp, abs=1e-9)
+        assert sin(out.head.heading - 0.9 * out.stamp) == pytest.approx(0.0, abs=1e-9)
+        assert cos(out.head.heading - 0.9 * out.stamp) > 0
+        assert out.tail == pytest.approx((0.2 * out.stamp, -0.1 * out.stamp), abs=1e-9)
+        assert -pi <= out.head.heading < pi
+    assert t - out.stamp == pytest.approx(1 / (2 * pi * CUTOFF), rel=0.5)
+
+
+def test_delay_is_the_time_constant_less_half_a_frame() -> None:
+    lowpass = PoseLowPass(CUTOFF, 0.5)
+    times = np.arange(400) / RATE
+    delays = [t - lowpass.filtered(detection(t, 0.0)).stamp for t in times]
+    assert delays[0] == 0.0
+    assert delays[-1] == pytest.approx(1 / (2 * pi * CUTOFF) - 0.5 / RATE, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "gain"), [(0.05, 1.0), (CUTOFF, 1 / sqrt(2)), (10 * CUTOFF, 0.1)]
+)
+def test_gain_is_that_of_a_first_order_filter(frequency: float, gain: float) -> None:
+    lowpass, times = PoseLowPass(CUTOFF, 0.5), np.arange(0.0, 20.0 / frequency, 0.02 / frequency)
+    times = times if times[1] < 1 / RATE else np.arange(0.0, 3.0 / frequency, 1 / RATE)
+    out = [lowpass.filtered(detection(t, sin(2 * pi * frequency * t))).head.x for t in times]
+    last = out[len(out) // 2 :]
+    assert (max(last) - min(last)) / 2 == pytest.approx(gain, rel=0.05)
+
+
+def test_it_starts_again_after_a_gap_or_a_clock_that_jumps_back() -> None:
+    lowpass = PoseLowPass(CUTOFF, 0.5)
+    for k in range(50):
+        lowpass.filtered(detection(k / RATE, 0.0))
+    after_gap = lowpass.filtered(detection(5.0, 1.0))
+    assert (after_gap.stamp, after_gap.head.x) == (5.0, 1.0)
+    back = lowpass.filtered(detection(1.0, 2.0))
+    assert (back.stamp, back.head.x) == (1.0, 2.0)
+
+
+def test_a_tail_that_comes_back_waits_until_its_time_is_the_head_s() -> None:
+    lowpass = PoseLowPass(CUTOFF, 0.5)
+    for k in range(200):
+        lowpass.filtered(detection(k / RATE, 0.0))
+    out = [lowpass.filtered(detection(k / RATE, 0.0, 0.0, (0.1,))) for k in range(200, 400)]
+    assert out[0].tail is None
+    assert out[-1].tail == pytest.approx((0.1,))
+    waited = next(k for k, found in enumerate(out) if found.tail is not None) / RATE
+    assert waited == pytest.approx(3 / (2 * pi * CUTOFF), rel=0.1)
+
+
+def of_spacing(spacing: float, whole_image: bool = False) -> Detection:
+    return Detection(
+        0.0, HeadPose(0.0, 0.0, 0.0, np.eye(3)), None, spacing, (0, 0, 1, 1), whole_image
+    )
+
+
+def test_results_and_refusals_are_counted_by_kind() -> None:
+    statistics = Statistics()
+    assert statistics.values() == {"tracked": "0", "from_whole_image": "0"}
+    statistics.add(of_spacing(1.0, whole_image=True), 0.004, 0.06)
+    statistics.add(Lost(0.0, Reason.JUMP), 0.006, 0.06)
+    statistics.refuse("bad image", "JPEG cut off")
+    values = statistics.values()
+    assert statistics.images == 2
+    assert values["tracked"] == values["from_whole_image"] == "1"
+    assert values["refused: bad image"] == "1"
+    assert statistics.last_error == "JPEG cut off"
+    assert statistics.last_reason == Reason.JUMP.value
+    assert values[f"lost: {Reason.JUMP.value}"] == "1"
+    assert float(values["processing_ms_p50"]) == pytest.approx(5.0)
+    assert float(values["stamp_to_pose_ms_p99"]) == pytest.approx(60.0)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "wrong"), [(1.0, False), (1.014, False), (1.016, True), (0.984, True)]
+)
+def test_a_wrong_marker_spacing_shows_after_enough_poses(spacing: float, wrong: bool) -> None:
+    statistics = Statistics()
+    for _ in range(SPACINGS - 1):
+        statistics.add(of_spacing(spacing), 0.0, 0.0)
+    assert statistics.spacing_error() is None
+    statistics.add(of_spacing(spacing), 0.0, 0.0)
+    assert statistics.spacing_error() == (pytest.approx(spacing - 1.0) if wrong else None)
+
+
+def test_images_refused_for_one_scale_say_so() -> None:
+    statistics = Statistics()
+    for _ in range(SPACINGS):
+        statistics.add(Lost(0.0, Reason.NO_PAIR, 0.05), 0.0, 0.0)
+    assert statistics.refused_spacing() == pytest.approx(0.05)
+    statistics.add(of_spacing(1.0), 0.0, 0.0)
+    assert statistics.refused_spacing() is None
+
+
+def test_images_refused_for_many_spacings_show_no_scale() -> None:
+    statistics = Statistics()
+    for k in range(SPACINGS):
+        statistics.add(Lost(0.0, Reason.NO_PAIR, 0.1 if k % 2 else -0.1), 0.0, 0.0)
+    assert statistics.refused_spacing() is None

@@ -17,14 +17,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.imu_sample import ImuSample
-from fish_hw.devices.rotation import norm
-from fish_hw.protocol import sh2, shtp
-from fish_hw.protocol.sh2 import ProductId, Report
-from fish_hw.protocol.shtp import Cargo, Header
-from fish_hw.transport.errors import TransportError
-from fish_hw.transport.interfaces import DataReady, I2cBus
+from fish_hw.devices.imu_sample import ImuSample, norm
+from fish_hw.devices.reconnect import DeviceError
+from fish_hw.protocol import sh2
+from fish_hw.protocol.sh2 import Cargo, Header, ProductId, Report
+from fish_hw.transport.interfaces import DataReady, I2cBus, TransportError
 
 FEATURES = (sh2.ACCELEROMETER, sh2.GYROSCOPE, sh2.GAME_ROTATION_VECTOR)
 RESET_WAIT_S = 0.3
@@ -73,7 +70,7 @@ class Bno085:
     ) -> None:
         self.counters = BnoCounters()
         self.drops = sh2.Drops()
-        self.reassembler = shtp.Reassembler()
+        self.reassembler = sh2.Reassembler()
         self.intervals_us: dict[int, int] = {}  # as the hub really runs them
         self._bus = bus
         self._address = address
@@ -81,7 +78,7 @@ class Bno085:
         self._data_ready = data_ready
         self._clock = clock
         self._sleep = sleep
-        self._writer = shtp.Writer()
+        self._writer = sh2.Writer()
         self._newest: dict[int, Report] = {}
         self._product: ProductId | None = None
         self._restarted = False
@@ -91,11 +88,11 @@ class Bno085:
     def start(self) -> ProductId:
         """Reset, identify, switch the reports on; DeviceError if no BNO085 answers."""
         try:
-            self._send(shtp.EXECUTABLE, sh2.RESET_COMMAND)
+            self._send(sh2.EXECUTABLE, sh2.RESET_COMMAND)
             self._sleep(RESET_WAIT_S)
             self.reassembler.reset()
             self._drain()
-            self._send(shtp.CONTROL, sh2.product_id_request())
+            self._send(sh2.CONTROL, sh2.product_id_request())
         except TransportError as error:
             raise DeviceError(f"no BNO085 at 0x{self._address:02x}: {error}; {HINT}") from error
         product = self._wait_for_product()
@@ -160,19 +157,19 @@ class Bno085:
     def _request_features(self) -> None:
         self._newest.clear()
         for report_id in FEATURES:
-            self._send(shtp.CONTROL, sh2.set_feature(report_id, self._interval_us))
+            self._send(sh2.CONTROL, sh2.set_feature(report_id, self._interval_us))
 
     def _send(self, channel: int, payload: bytes) -> None:
         self._bus.write(self._address, self._writer.frame(channel, payload))
 
     def _take(self, cargo: Cargo, time_s: float) -> list[ImuSample]:
-        if cargo.channel in (shtp.REPORTS, shtp.WAKE_REPORTS):
+        if cargo.channel in (sh2.REPORTS, sh2.WAKE_REPORTS):
             return self._take_reports(cargo.payload, time_s)
-        if cargo.channel == shtp.EXECUTABLE and cargo.payload == sh2.RESET_COMPLETE:
+        if cargo.channel == sh2.EXECUTABLE and cargo.payload == sh2.RESET_COMPLETE:
             self._restarted = True  # after start() this means a brown-out: the reports are off now
             self.counters.resets += 1
             self.reassembler.reset()
-        if cargo.channel == shtp.CONTROL:
+        if cargo.channel == sh2.CONTROL:
             self._product = sh2.parse_product_id(cargo.payload) or self._product
             self._note_feature(cargo.payload)
         return []
@@ -222,13 +219,13 @@ class Bno085:
         return None
 
     def _read_header(self) -> Header | None:
-        data = self._read(shtp.HEADER_BYTES)
+        data = self._read(sh2.HEADER_BYTES)
         self._read_s = (
             self._clock()
         )  # after the read: the hub may have stretched it until it had data
         if data is None:
             return None
-        header = shtp.parse_header(data)
+        header = sh2.parse_header(data)
         self.counters.bad_packets += header is None
         return header
 
@@ -237,14 +234,14 @@ class Bno085:
         data = self._read(min(header.length, LONGEST_READ))
         if data is None:
             return None
-        repeated = shtp.parse_header(data)
+        repeated = sh2.parse_header(data)
         if repeated is None or (repeated.length, repeated.channel) != (
             header.length,
             header.channel,
         ):
             self.counters.bad_packets += 1
             return None
-        return data[shtp.HEADER_BYTES :]
+        return data[sh2.HEADER_BYTES :]
 
     def _read(self, count: int) -> bytes | None:
         try:

@@ -16,8 +16,13 @@ There is no gyroscope in the stream. The angular velocity is the difference of t
 import time
 from collections.abc import Callable
 
-from fish_hw.devices.imu_sample import ImuSample
-from fish_hw.devices.rotation import Quaternion, from_yaw_pitch_roll, mean_rate, multiply
+from fish_hw.devices.imu_sample import (
+    ImuSample,
+    Quaternion,
+    from_yaw_pitch_roll,
+    mean_rate,
+    multiply,
+)
 from fish_hw.protocol.rvc import FRAME_BYTES, PERIOD_S, RvcMessage, RvcParser
 from fish_hw.transport.interfaces import ByteStream
 

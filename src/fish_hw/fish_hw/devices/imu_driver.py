@@ -9,16 +9,12 @@ from dataclasses import dataclass, field, replace
 
 from fish_hw.devices.bno085 import Bno085
 from fish_hw.devices.bno085_rvc import Bno085Rvc
-from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.gravity_check import GravityCheck
-from fish_hw.devices.imu_plausibility import STANDS_STILL, ImuPlausibility
+from fish_hw.devices.imu_plausibility import STANDS_STILL, GravityCheck, ImuPlausibility
 from fish_hw.devices.imu_sample import ImuSample, Mounting
-from fish_hw.devices.reconnect import Doubt, Link
-from fish_hw.devices.status import ERROR, OK, WARN, Status
+from fish_hw.devices.reconnect import ERROR, OK, WARN, DeviceError, Doubt, Link, Status
 from fish_hw.protocol.rvc import PERIOD_S
-from fish_hw.settings.imu import ImuSettings
-from fish_hw.transport.errors import TransportError
-from fish_hw.transport.interfaces import ByteStream, DataReady, I2cBus
+from fish_hw.settings import ImuSettings
+from fish_hw.transport.interfaces import ByteStream, DataReady, I2cBus, TransportError
 
 UNRELIABLE = 0
 DOUBTFUL = 3  # refused samples in a row that are worth a line of the log

@@ -1,17 +1,18 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Which IMU samples can be used: values that stand still, that jump, or that contradict each other are not.
+"""Which IMU samples can be used, and whether attitude and acceleration agree on where up is.
 
-A bit error may leave every value within the sensor's range, so that only its rate of change betrays it. The fish cannot turn
-faster than its rotor can: 0.19 N m on 0.0024 kg m^2 are 80 rad/s^2.
+Values that stand still, that jump, or that contradict each other are not used. A bit error may leave every value within the
+sensor's range, so that only its rate of change betrays it. The fish cannot turn faster than its rotor can: 0.19 N m on
+0.0024 kg m^2 are 80 rad/s^2.
 """
 
 import math
 from collections import deque
 from dataclasses import dataclass
 
-from fish_hw.devices.imu_sample import ImuSample
-from fish_hw.devices.rotation import mean_rate
+from fish_hw.devices.imu_sample import ImuSample, Vector, mean_rate, rotate
+from fish_hw.devices.reconnect import Doubt
 
 LARGEST_TURN_ACCELERATION = 200.0  # rad/s^2, of the gyroscope between two samples
 TURN_NOISE = 0.5  # rad/s, allowed beside it
@@ -21,6 +22,12 @@ DISAGREEMENT = 3.0  # rad/s between gyroscope and orientation; in strokes they d
 WINDOW = 11  # samples over which the two are compared: stamps may be a period late
 NEW_LEVEL = 8  # periods; after so long a jump is a new level, unless the two disagree
 STANDS_STILL = "values stand still"
+
+STANDARD_GRAVITY = 9.80665  # m/s^2
+QUIET = 0.05  # share of 1 g; samples that are further from it say little about where up is
+# of quiet samples: a strong sway tilts single ones by 15 deg, its mean stays upright
+QUIET_WINDOW_S = 2.0
+TILT_LIMIT_DEG = 10.0  # the sensor's worst is 3.5 deg
 
 
 @dataclass
@@ -108,3 +115,44 @@ class ImuPlausibility:
 
 def _values(sample: ImuSample) -> tuple[object, ...]:
     return sample.orientation, sample.angular_velocity, sample.acceleration
+
+
+class GravityCheck:
+    """Compares the mean acceleration of quiet windows, turned into the level frame, with the vertical.
+
+    The mounting does not matter: it turns attitude and acceleration alike.
+    """
+
+    def __init__(self) -> None:
+        self.trouble = ""  # of the newest window
+        self._said = False
+        self._since_s: float | None = None
+        self._sum: Vector = (0.0, 0.0, 0.0)
+
+    def restart(self) -> None:
+        """Begin again with a sensor that was started again; what was said is not said again."""
+        self.trouble, self._since_s = "", None
+
+    def add(self, sample: ImuSample) -> list[str]:
+        """Take a sample; the event, once, if a window ends with which the attitude disagrees."""
+        if abs(math.hypot(*sample.acceleration) / STANDARD_GRAVITY - 1.0) > QUIET:
+            self._since_s = None
+            return []
+        if self._since_s is None:
+            self._since_s, self._sum = sample.time_s, (0.0, 0.0, 0.0)
+        x, y, z = rotate(sample.orientation, sample.acceleration)
+        self._sum = (self._sum[0] + x, self._sum[1] + y, self._sum[2] + z)
+        if sample.time_s - self._since_s < QUIET_WINDOW_S:
+            return []
+        self._since_s = None
+        return self._judge()
+
+    def _judge(self) -> list[str]:
+        x, y, z = self._sum
+        angle = math.degrees(math.atan2(math.hypot(x, y), z))
+        if angle <= TILT_LIMIT_DEG:
+            self.trouble = ""
+            return []
+        self.trouble = f"attitude and acceleration disagree by {angle:.0f} deg on where up is: roll and pitch are wrong"
+        said, self._said = self._said, True
+        return [] if said else [Doubt(f"IMU: {self.trouble}")]

@@ -4,8 +4,7 @@
 
 from collections.abc import Callable
 
-from fish_hw.transport.errors import TransportError
-from fish_hw.transport.interfaces import DataReady
+from fish_hw.transport.interfaces import DataReady, TransportError
 
 PERIOD_S = 0.05  # s between two looks
 

@@ -1,9 +1,28 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What a driver does about a device that comes and goes: when to try it again, and what the log says of it."""
+"""What all drivers share about a device that comes and goes: its error, its state for diagnostics, when to try it again,
+and what the log says of it.
+"""
+
+from dataclasses import dataclass, field
+
+OK, WARN, ERROR = 0, 1, 2  # as in diagnostic_msgs/DiagnosticStatus
 
 FIRST_WAIT_S = 0.5
 LONGEST_WAIT_S = 5.0
+
+
+class DeviceError(Exception):
+    """The port works, the device behind it does not answer or refuses a setting."""
+
+
+@dataclass(frozen=True)
+class Status:
+    """Level, one line, and named values."""
+
+    level: int
+    message: str
+    values: dict[str, object] = field(default_factory=dict)
 
 
 class Loss(str):

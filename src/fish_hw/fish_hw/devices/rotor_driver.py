@@ -11,18 +11,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from fish_hw.devices.errors import DeviceError
 from fish_hw.devices.leak_sensor import LeakSensor
-from fish_hw.devices.reconnect import Link
+from fish_hw.devices.reconnect import ERROR, OK, WARN, DeviceError, Link, Status
 from fish_hw.devices.rotor_guard import Action, RotorGuard
 from fish_hw.devices.rotor_watch import RotorWatch
-from fish_hw.devices.status import ERROR, OK, WARN, Status
 from fish_hw.devices.vertiq import NoAnswer, RotorSample, RotorTelemetry, Vertiq
-from fish_hw.devices.vertiq_registers import fault_names
 from fish_hw.devices.vertiq_search import explain
-from fish_hw.settings.rotor import RotorSettings
-from fish_hw.transport.errors import TransportError
-from fish_hw.transport.interfaces import ByteStream
+from fish_hw.protocol.iquart import fault_names
+from fish_hw.settings import RotorSettings
+from fish_hw.transport.interfaces import ByteStream, TransportError
 from fish_node.arming import Arming, Source, operator_and_estimate
 
 COMMAND, RUDDER = "joint_command", "word of the rudder"  # sources of the arming state

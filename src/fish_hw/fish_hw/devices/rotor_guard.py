@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from fish_hw.settings.rotor import RotorSettings
+from fish_hw.settings import RotorSettings
 
 AT_REST = 0.5  # rad/s; a ramp that is below has ended, 1/300 of full speed
 QUIET_MARGIN_S = 0.1  # silence beyond the module's own timeout

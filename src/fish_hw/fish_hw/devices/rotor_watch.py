@@ -1,17 +1,175 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What the rotor's own device says against moving: telemetry, its silence, motion against the command, forgotten set-up."""
+"""What the rotor's own device says against moving: telemetry, its silence, motion against the command, forgotten set-up.
+
+Motion is compared over windows: commanded way L_c = integral of |omega_c|, measured way L_m = sum of |delta theta|. It
+shows a jam, a stuck encoder and a runaway.
+"""
+
+import math
+from dataclasses import dataclass, field
 
 from fish_hw.devices.rotor_guard import Phase
-from fish_hw.devices.rotor_health import Health, RotorHealth
-from fish_hw.devices.rotor_motion import MotionCheck
 from fish_hw.devices.vertiq import RotorSample, RotorTelemetry, Vertiq
-from fish_hw.devices.vertiq_registers import RESTING_MODES
-from fish_hw.settings.rotor import RotorSettings
+from fish_hw.protocol.iquart import RESTING_MODES, fault_names
+from fish_hw.settings import RotorSettings
+
+HIGH_ANSWERS = 2  # in a row with too high a voltage
+
+WINDOW_S = 0.1  # shortest window; the module's velocity loop settles in some 0.02 s
+WAY = 2.0  # rad, shortest commanded way that is judged
+LEAST_SHARE = 0.3  # of the commanded way; a rotor with less is held
+STUCK_SAMPLES = 10  # equal speeds in a row while the command changes
+STUCK_CHANGE = 10.0  # rad/s, change of the command meanwhile
+LONGEST_GAP_S = 0.05  # between samples; over a longer one neither way is known
+RUNAWAY = 60.0  # rad/s beyond every command of the last two windows
 
 TELEMETRY_S = 0.1  # between two answered questions of one kind
 AGAIN_S = 0.02  # until an unanswered question is asked again
 FEWEST_QUESTIONS = 5  # unanswered before it is called silence: a stalled computer asks few
+
+
+@dataclass(frozen=True)
+class Health:
+    """Reasons to warn and reasons to stop, in words; both empty when all is well."""
+
+    warnings: tuple[str, ...] = field(default=())
+    stops: tuple[str, ...] = field(default=())
+
+
+class RotorHealth:
+    """Judges telemetry.
+
+    The battery is judged by its filtered voltage, v += (1 - exp(-dt / battery_filter_s)) (v_measured - v):
+    the load ripples at 4 Hz. Once it stopped the rotor it must recover above the warning level. Too high a voltage stops
+    it when two answers in a row say so: a single one may be the peak of a braking rotor.
+    """
+
+    def __init__(self, settings: RotorSettings) -> None:
+        self.filtered_volts = math.nan
+        self._settings = settings
+        self._known = RotorTelemetry()
+        self._last_time = 0.0
+        self._battery_stopped = False
+        self._high = 0  # answers in a row
+
+    def judge(self, telemetry: RotorTelemetry, now: float) -> Health:
+        """Warnings and stops for the newest telemetry; now in s.
+
+        Where answers are missing the older ones hold: a stop does not end because the module fell silent.
+        """
+        if telemetry.volts is not None:
+            self._filter(telemetry.volts, now)
+            high = telemetry.volts / self._settings.battery_cells > self._settings.cell_over_v
+            self._high = self._high + 1 if high else 0
+        telemetry = self._known = telemetry.completed(self._known)
+        warnings: list[str] = []
+        stops: list[str] = []
+        if telemetry.volts is not None:
+            self._judge_battery(telemetry.volts, warnings, stops)
+        self._judge_temperature(telemetry, warnings, stops)
+        if telemetry.derate is not None and telemetry.derate < 1.0:
+            warnings.append(f"module gives {telemetry.derate:.0%} of its power")
+        if telemetry.faults:
+            stops.append("module faults: " + ", ".join(fault_names(telemetry.faults)))
+        return Health(tuple(warnings), tuple(stops))
+
+    def _filter(self, volts: float, now: float) -> None:
+        tau = self._settings.battery_filter_s
+        if math.isnan(self.filtered_volts) or tau == 0.0:
+            self.filtered_volts = volts
+        else:
+            gain = 1.0 - math.exp(-(now - self._last_time) / tau)
+            self.filtered_volts += gain * (volts - self.filtered_volts)
+        self._last_time = now
+
+    def _judge_battery(self, volts: float, warnings: list[str], stops: list[str]) -> None:
+        settings = self._settings
+        cell = self.filtered_volts / settings.battery_cells
+        limit = settings.cell_warn_v if self._battery_stopped else settings.cell_stop_v
+        self._battery_stopped = cell < limit
+        if self._battery_stopped:
+            stops.append(f"battery at {cell:.2f} V per cell")
+        elif cell < settings.cell_warn_v:
+            warnings.append(f"battery at {cell:.2f} V per cell")
+        if self._high:
+            found = stops if self._high >= HIGH_ANSWERS else warnings
+            found.append(f"battery driven up to {volts / settings.battery_cells:.2f} V per cell")
+
+    def _judge_temperature(
+        self, telemetry: RotorTelemetry, warnings: list[str], stops: list[str]
+    ) -> None:
+        for name, value in (("controller", telemetry.controller_c), ("coil", telemetry.coil_c)):
+            if value is None:
+                continue
+            if value > self._settings.temperature_stop_c:
+                stops.append(f"{name} at {value:.0f} deg C")
+            elif value > self._settings.temperature_warn_c:
+                warnings.append(f"{name} at {value:.0f} deg C")
+
+
+class MotionCheck:
+    """Judges samples against the commands that were sent for them."""
+
+    def __init__(self) -> None:
+        self._last: RotorSample | None = None
+        self._before = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin again, when the rotor begins to be driven."""
+        self._last = None
+        self._since_s: float | None = None
+        self._commanded = self._measured = 0.0
+        self._largest = self._largest_before = 0.0
+        self._equal = 0
+        self._lowest, self._highest = math.inf, -math.inf
+
+    def add(self, command: float, sample: RotorSample) -> str:
+        """Take the speed that was sent [rad/s] and the sample after it; what is wrong, or an empty text."""
+        last, self._last = self._last, sample
+        acted, self._before = (
+            self._before,
+            command,
+        )  # a sample is of the moment in which its command arrives
+        self._largest = max(self._largest, abs(command))
+        if last is None:
+            self._since_s = sample.time_s
+            return ""
+        dt = sample.time_s - last.time_s
+        if dt > LONGEST_GAP_S:
+            self.restart()
+            return ""
+        self._commanded += abs(command) * dt
+        self._measured += abs(sample.angle - last.angle)
+        return self._stuck(acted, sample, last) or self._runaway(sample) or self._jam(sample)
+
+    def _stuck(self, command: float, sample: RotorSample, last: RotorSample) -> str:
+        if sample.velocity != last.velocity:
+            self._equal, self._lowest, self._highest = 0, math.inf, -math.inf
+            return ""
+        self._equal += 1
+        self._lowest, self._highest = min(self._lowest, command), max(self._highest, command)
+        if self._equal >= STUCK_SAMPLES and self._highest - self._lowest > STUCK_CHANGE:
+            return f"rotor jammed or encoder stuck: measured speed stands still at {sample.velocity:.1f} rad/s"
+        return ""
+
+    def _runaway(self, sample: RotorSample) -> str:
+        limit = max(self._largest, self._largest_before) + RUNAWAY
+        if abs(sample.velocity) > limit:
+            return f"rotor runs away: {sample.velocity:.0f} rad/s measured, {limit - RUNAWAY:.0f} commanded at most"
+        return ""
+
+    def _jam(self, sample: RotorSample) -> str:
+        since_s = sample.time_s if self._since_s is None else self._since_s
+        if sample.time_s - since_s < WINDOW_S or self._commanded < WAY:
+            return ""
+        commanded, measured = self._commanded, self._measured
+        self._since_s, self._commanded, self._measured = sample.time_s, 0.0, 0.0
+        self._largest_before, self._largest = self._largest, 0.0
+        if measured < LEAST_SHARE * commanded:
+            return f"rotor jammed or encoder stuck: it turned {measured:.1f} of {commanded:.1f} rad"
+        return ""
 
 
 class Silence:

@@ -13,11 +13,9 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.reconnect import Link
-from fish_hw.devices.status import ERROR, OK, WARN, Status
-from fish_hw.settings.camera import CameraSettings
-from fish_hw.transport.errors import PortUnavailable
+from fish_hw.devices.reconnect import ERROR, OK, WARN, DeviceError, Link, Status
+from fish_hw.settings import CameraSettings
+from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.video_capture import Frame
 
 LIVE = ("/dev/", "unix:")  # devices with noise of their own; a file may hold equal pictures

@@ -13,10 +13,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from fish_hw.devices import vertiq_registers as reg
-from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.vertiq_registers import Register
-from fish_hw.protocol.iquart import REPLY, Message, Parser, encode
+from fish_hw.devices.reconnect import DeviceError
+from fish_hw.protocol import iquart
+from fish_hw.protocol.iquart import REPLY, Message, Parser, Register, encode
 from fish_hw.transport.interfaces import ByteStream
 
 COAST_REPEATS = 3  # a lost byte must not keep the rotor spinning
@@ -96,11 +95,11 @@ class Vertiq:
 
     def drive(self, velocity: float) -> RotorSample | None:
         """Command a speed [rad/s] and measure, in one exchange; None if the answer is missing."""
-        return self._measure([reg.CTRL_VELOCITY.set(self._module, self._sign * velocity)])
+        return self._measure([iquart.CTRL_VELOCITY.set(self._module, self._sign * velocity)])
 
     def command(self, velocity: float) -> None:
         """Command a speed [rad/s] without a question."""
-        self._stream.write(encode(reg.CTRL_VELOCITY.set(self._module, self._sign * velocity)))
+        self._stream.write(encode(iquart.CTRL_VELOCITY.set(self._module, self._sign * velocity)))
 
     def measure(self) -> RotorSample | None:
         """Measure without a command."""
@@ -108,21 +107,21 @@ class Vertiq:
 
     def coast(self) -> None:
         """Let the rotor run out, said several times."""
-        self._stream.write(encode(reg.CTRL_COAST.set(self._module)) * COAST_REPEATS)
+        self._stream.write(encode(iquart.CTRL_COAST.set(self._module)) * COAST_REPEATS)
 
     def clear_faults(self) -> int | None:
         """Clear the fault memory and return what was in it; None, and nothing cleared, if the module did not
         answer.
         """
-        (ever,) = self.read(reg.FAULT_EVER)
+        (ever,) = self.read(iquart.FAULT_EVER)
         if ever is None:
             return None
-        self._stream.write(encode(reg.FAULT_EVER.set(self._module, 0)))
+        self._stream.write(encode(iquart.FAULT_EVER.set(self._module, 0)))
         return int(ever[0])
 
     def power(self) -> RotorTelemetry:
         """Battery, temperatures and time since the module's start, if it answers."""
-        (slow,) = self.read(reg.TELEMETRY)
+        (slow,) = self.read(iquart.TELEMETRY)
         if slow is None:
             return RotorTelemetry()
         controller, coil, volts, amps, _, _, uptime = slow
@@ -130,7 +129,7 @@ class Vertiq:
 
     def state(self) -> RotorTelemetry:
         """Faults, control mode and derating, as far as the module answers."""
-        asked = (reg.FAULT_NOW, reg.CTRL_MODE, reg.DERATE)
+        asked = (iquart.FAULT_NOW, iquart.CTRL_MODE, iquart.DERATE)
         faults, mode, derate = (*self.read(*asked[: 3 if self._has_derate else 2]), None)[:3]
         if faults is not None and mode is not None:
             self._derate_tries = 0 if derate is not None else self._derate_tries + 1
@@ -138,7 +137,7 @@ class Vertiq:
         if faults is not None:
             values["faults"] = int(faults[0])
         if derate is not None:
-            values["derate"] = derate[0] / reg.DERATE_NONE
+            values["derate"] = derate[0] / iquart.DERATE_NONE
         if mode is not None:
             values["mode"] = int(mode[0])
         return RotorTelemetry(**values)
@@ -159,7 +158,7 @@ class Vertiq:
             NoAnswer: the module does not answer.
             DeviceError: it refuses the timeout.
         """
-        verified = self._verified(reg.TIMEOUT, timeout_s)
+        verified = self._verified(iquart.TIMEOUT, timeout_s)
         if verified is None:
             raise NoAnswer(
                 f"no Vertiq module {self._module} answers ({self.parser.skipped_bytes} bytes of noise,"
@@ -167,14 +166,18 @@ class Vertiq:
             )
         if not verified:
             raise DeviceError(f"module {self._module} refuses a timeout of {timeout_s} s")
-        wanted = ((reg.TIMEOUT_BEHAVIOR, 0), (reg.TIMEOUT_MEANING, 0), (reg.TIMEOUT_SONG, 0))
+        wanted = (
+            (iquart.TIMEOUT_BEHAVIOR, 0),
+            (iquart.TIMEOUT_MEANING, 0),
+            (iquart.TIMEOUT_SONG, 0),
+        )
         return [
             f"module does not take {r.name} = {v}" for r, v in wanted if not self._verified(r, v)
         ]
 
     def tuning(self) -> dict[str, float]:
         """Gains, filter and firmware version as the module has them, for the log."""
-        found = {register.name: self.read(register)[0] for register in reg.TUNING}
+        found = {register.name: self.read(register)[0] for register in iquart.TUNING}
         return {name: value[0] for name, value in found.items() if value is not None}
 
     def read(self, *registers: Register) -> list[tuple[float, ...] | None]:
@@ -192,7 +195,7 @@ class Vertiq:
         return None if answer is None else False
 
     def _measure(self, commands: list[Message]) -> RotorSample | None:
-        velocity, angle = self._exchange(commands, (reg.OBS_VELOCITY, reg.OBS_ANGLE))
+        velocity, angle = self._exchange(commands, (iquart.OBS_VELOCITY, iquart.OBS_ANGLE))
         if velocity is None or angle is None:
             return None
         speed, wrapped = velocity[0], angle[0]

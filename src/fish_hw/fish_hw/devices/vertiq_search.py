@@ -5,10 +5,9 @@
 import time
 from collections.abc import Callable
 
-from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.vertiq import Vertiq
-from fish_hw.transport.errors import TransportError
-from fish_hw.transport.interfaces import ByteStream
+from fish_hw.protocol import iquart
+from fish_hw.transport.interfaces import ByteStream, TransportError
 
 BAUDS = (9600, 57600, 115200, 230400, 460800, 921600, 1_000_000, 2_000_000)
 IDS = range(64)
@@ -66,5 +65,5 @@ def _answers_in_time(stream: ByteStream, module_id: int, clock: Callable[[], flo
 
 
 def _answers(stream: ByteStream, module_id: int, clock: Callable[[], float]) -> bool:
-    (version,) = Vertiq(stream, module_id, 1, ANSWER_S, clock).read(reg.FIRMWARE)
+    (version,) = Vertiq(stream, module_id, 1, ANSWER_S, clock).read(iquart.FIRMWARE)
     return version is not None

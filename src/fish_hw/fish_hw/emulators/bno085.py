@@ -2,18 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """A BNO085 at the level of its I2C messages: advertisement, product id, features, reports, damage on request.
 
-The sensor turns about its z axis: yaw rate 0.5 cos(2 pi 0.2 Hz t) rad/s, plus seeded noise on the
-accelerometer.
+By itself the sensor turns about its z axis: yaw rate 0.5 cos(2 pi 0.2 Hz t) rad/s, plus seeded noise on the
+accelerometer. FedBno085 measures what it is given: the simulator's IMU behind the hub's protocol.
 """
 
 import math
 import random
 import struct
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 
-from fish_hw.protocol import sh2, shtp
+from fish_hw.devices.imu_sample import Quaternion, Vector
+from fish_hw.protocol import sh2
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 YAW_RATE = 0.5  # rad/s
@@ -21,7 +24,9 @@ YAW_FREQUENCY = math.tau * 0.2  # rad/s
 PRODUCT_ID = bytes.fromhex("f8010302 98a49800 72010000 0700 0000")
 ADVERTISEMENT = bytes(range(1, 9)) * 34  # 272 bytes; what they say does not matter to the driver
 UNSOLICITED_INIT = bytes([sh2.COMMAND_RESPONSE, 0, 0x84]) + bytes(13)
-NOTHING = bytes(shtp.HEADER_BYTES)
+NOTHING = bytes(sh2.HEADER_BYTES)
+
+BACKLOG = 10  # measurements that a driver which lags may still read
 
 
 class Bno085Emulator:
@@ -57,9 +62,9 @@ class Bno085Emulator:
         self._open = None
         self._queue.clear()
         self._sequence = [0] * 6
-        self.push(shtp.COMMAND, ADVERTISEMENT)
-        self.push(shtp.EXECUTABLE, sh2.RESET_COMPLETE)
-        self.push(shtp.CONTROL, UNSOLICITED_INIT)
+        self.push(sh2.COMMAND, ADVERTISEMENT)
+        self.push(sh2.EXECUTABLE, sh2.RESET_COMPLETE)
+        self.push(sh2.CONTROL, UNSOLICITED_INIT)
 
     def push(self, channel: int, payload: bytes) -> None:
         """Queue a cargo for the reader."""
@@ -68,11 +73,11 @@ class Bno085Emulator:
     def write(self, data: bytes) -> None:
         """One packet from the host."""
         self.written.append(bytes(data))
-        channel, payload = data[2], bytes(data[shtp.HEADER_BYTES :])
-        if channel == shtp.EXECUTABLE and payload == sh2.RESET_COMMAND:
+        channel, payload = data[2], bytes(data[sh2.HEADER_BYTES :])
+        if channel == sh2.EXECUTABLE and payload == sh2.RESET_COMMAND:
             self.reset()
         elif payload[:1] == bytes([sh2.PRODUCT_ID_REQUEST]):
-            self.push(shtp.CONTROL, PRODUCT_ID)
+            self.push(sh2.CONTROL, PRODUCT_ID)
         elif payload[:1] == bytes([sh2.SET_FEATURE]):
             self._set_feature(payload)
 
@@ -83,10 +88,10 @@ class Bno085Emulator:
         if self._open is None:
             return NOTHING.ljust(count, b"\0")
         channel, sequence, rest, continuation = self._open
-        length = shtp.HEADER_BYTES + len(rest) | (shtp.CONTINUATION if continuation else 0)
+        length = sh2.HEADER_BYTES + len(rest) | (sh2.CONTINUATION if continuation else 0)
         packet = struct.pack("<HBB", length, channel, sequence) + rest
-        if count > shtp.HEADER_BYTES:
-            left = rest[count - shtp.HEADER_BYTES :]
+        if count > sh2.HEADER_BYTES:
+            left = rest[count - sh2.HEADER_BYTES :]
             self._open = (channel, sequence, left, True) if left else None
         return self.damage(packet[:count].ljust(count, b"\0"))
 
@@ -103,7 +108,7 @@ class Bno085Emulator:
         report_id, _, _, interval_us = struct.unpack("<BBHI", payload[1:9])
         self.intervals_us[report_id] = interval_us
         self._due = self._clock()
-        self.push(shtp.CONTROL, bytes([sh2.FEATURE_RESPONSE]) + payload[1:])
+        self.push(sh2.CONTROL, bytes([sh2.FEATURE_RESPONSE]) + payload[1:])
 
     def _measure(self) -> None:
         """One cargo with all reports that are on, whenever their interval is over."""
@@ -118,7 +123,7 @@ class Bno085Emulator:
             self._values = self._motion(taken - self._started)
         ticks = round((now - taken) / sh2.TICK_S)
         reports = b"".join(self._report(report_id) for report_id in sorted(self.intervals_us))
-        self.push(shtp.REPORTS, struct.pack("<Bi", sh2.BASE_TIMESTAMP, ticks) + reports)
+        self.push(sh2.REPORTS, struct.pack("<Bi", sh2.BASE_TIMESTAMP, ticks) + reports)
 
     def _motion(self, t: float) -> tuple[float, float, tuple[float, float, float]]:
         """Yaw [rad], yaw rate [rad/s], specific force [m/s^2]."""
@@ -140,3 +145,51 @@ class Bno085Emulator:
         self._report_sequence = (self._report_sequence + 1) & 0xFF
         head = bytes([report_id, self._report_sequence, 3, 0])
         return head + struct.pack(f"<{len(values)}h", *(round(value * scale) for value in values))
+
+
+@dataclass(frozen=True)
+class Felt:
+    """One measurement in the sensor's axes: rad/s, m/s^2, s of the monotonic clock."""
+
+    time_s: float
+    orientation: Quaternion
+    angular_velocity: Vector
+    acceleration: Vector
+
+
+class FedBno085(Bno085Emulator):
+    """Reports every measurement once, with its age at the moment of the read.
+
+    `alter` is a test's way to falsify measurements; None holds one back.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(clock)
+        self.alter: Callable[[Felt], Felt | None] = lambda felt: felt
+        self._felt: deque[Felt] = deque(maxlen=BACKLOG)
+        self._now = Felt(clock(), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self._guard = threading.Lock()
+
+    def feel(self, felt: Felt) -> None:
+        """Take a measurement; called from another thread than the reads."""
+        altered = self.alter(felt)
+        if altered is not None:
+            with self._guard:
+                self._felt.append(altered)
+
+    def _measure(self) -> None:
+        if not self.intervals_us:
+            return
+        with self._guard:
+            waiting, self._felt = list(self._felt), deque(maxlen=BACKLOG)
+        for self._now in waiting:
+            ticks = round((self._clock() - self._now.time_s) / sh2.TICK_S)
+            reports = b"".join(self._report(report_id) for report_id in sorted(self.intervals_us))
+            self.push(sh2.REPORTS, struct.pack("<Bi", sh2.BASE_TIMESTAMP, ticks) + reports)
+
+    def _values_of(self, report_id: int) -> tuple[float, ...]:
+        return {
+            sh2.ACCELEROMETER: self._now.acceleration,
+            sh2.GYROSCOPE: self._now.angular_velocity,
+            sh2.GAME_ROTATION_VECTOR: self._now.orientation,
+        }[report_id]

@@ -15,11 +15,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from fish_hw.emulators.fed_bno085 import FedBno085, Felt
-from fish_hw.emulators.pwm_chip import PwmChipEmulator
+from fish_hw.emulators.bno085 import FedBno085, Felt
+from fish_hw.emulators.pwm import PwmChipEmulator
 from fish_hw.emulators.socket_devices import SocketBus, SocketPictures
 from fish_hw.emulators.vertiq import VertiqEmulator
-from fish_hw.settings.rudder import RudderSettings
+from fish_hw.settings import RudderSettings
 from fish_hw.transport.unix_socket import PREFIX
 
 IMU_ADDRESS = 0x4A

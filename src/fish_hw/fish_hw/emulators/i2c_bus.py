@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from typing import Protocol
 
-from fish_hw.transport.errors import TransportError
+from fish_hw.transport.interfaces import TransportError
 
 
 class I2cDevice(Protocol):

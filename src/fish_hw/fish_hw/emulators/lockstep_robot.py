@@ -18,15 +18,12 @@ from fish_hw.devices.imu_driver import ImuDriver
 from fish_hw.devices.rotor_driver import RUDDER
 from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.usb_camera import UsbCamera
-from fish_hw.emulators.fed_bno085 import FedBno085, Felt
+from fish_hw.emulators.bno085 import FedBno085, Felt
 from fish_hw.emulators.i2c_bus import I2cBusEmulator
 from fish_hw.emulators.lockstep_rotor import DT, LockstepRotor
-from fish_hw.emulators.pwm_chip import PwmChipEmulator
-from fish_hw.settings.camera import CameraSettings
-from fish_hw.settings.imu import ImuSettings
-from fish_hw.settings.rotor import RotorSettings
-from fish_hw.settings.rudder import RudderSettings
-from fish_hw.transport.errors import PortUnavailable
+from fish_hw.emulators.pwm import PwmChipEmulator
+from fish_hw.settings import CameraSettings, ImuSettings, RotorSettings, RudderSettings
+from fish_hw.transport.interfaces import PortUnavailable
 from fish_hw.transport.sysfs_pwm import SysfsPwm
 from fish_hw.transport.video_capture import Frame
 from fish_node.arming import CAMERA, DEADMAN, ODOMETRY

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from fish_hw.devices.leak_sensor import LeakSensor
 from fish_hw.devices.rotor_driver import RUDDER, RotorDriver
-from fish_hw.emulators.vertiq_module import VertiqModule
-from fish_hw.settings.rotor import RotorSettings
-from fish_hw.transport.errors import TransportError
+from fish_hw.emulators.vertiq import VertiqModule
+from fish_hw.settings import RotorSettings
+from fish_hw.transport.interfaces import TransportError
 from fish_node.arming import CAMERA, DEADMAN, ODOMETRY
 
 DT = 0.01  # s, of the driver

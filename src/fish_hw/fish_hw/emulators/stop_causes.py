@@ -7,10 +7,10 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fish_hw.devices import vertiq_registers as reg
 from fish_hw.devices.rotor_driver import RUDDER
 from fish_hw.emulators.lockstep_rotor import LockstepRotor
-from fish_hw.emulators.vertiq_module import DRIVEN_MODES
+from fish_hw.emulators.vertiq import DRIVEN_MODES
+from fish_hw.protocol import iquart
 from fish_node.arming import CAMERA, DEADMAN, ESTOP, ODOMETRY, PAUSE
 
 LIMIT_S = 0.35
@@ -48,7 +48,7 @@ def module(**values: object) -> Cause:
     return happen
 
 
-def unanswered(*registers: reg.Register) -> Cause:
+def unanswered(*registers: iquart.Register) -> Cause:
     """Questions for some registers (none given: for any) are not answered."""
     silent = {(register.type, register.param) for register in registers}
 
@@ -117,9 +117,9 @@ CAUSES: dict[str, Cause] = {
     "rotor jammed": module(jammed=True),
     "encoder stuck": _speed_stuck,
     "module silent": unanswered(),
-    "speed and angle not answered": unanswered(reg.OBS_VELOCITY, reg.OBS_ANGLE),
-    "battery and temperature not answered": unanswered(reg.TELEMETRY),
-    "faults not answered": unanswered(reg.FAULT_NOW),
+    "speed and angle not answered": unanswered(iquart.OBS_VELOCITY, iquart.OBS_ANGLE),
+    "battery and temperature not answered": unanswered(iquart.TELEMETRY),
+    "faults not answered": unanswered(iquart.FAULT_NOW),
     "port unplugged": _unplugged,
     "module restarted (brown-out)": _brown_out,
     "battery too high": module(volts=4 * 4.5),

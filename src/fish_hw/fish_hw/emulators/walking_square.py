@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fish_hw.settings.camera import CameraSettings
+from fish_hw.settings import CameraSettings
 from fish_hw.transport.video_capture import Frame
 
 GREY, BRIGHT = 90, 230

@@ -1,7 +1,7 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What the four driver nodes share: parameters, the thread that owns the device, diagnostics, the way to
-end.
+end, a joint of a JointState.
 """
 
 import signal
@@ -17,12 +17,11 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 
-from fish_hw.devices.errors import DeviceError
-from fish_hw.devices.reconnect import Doubt, Loss
-from fish_hw.devices.status import WARN, Status
+from fish_hw.devices.reconnect import WARN, DeviceError, Doubt, Loss, Status
 from fish_hw.nodes.worker import Worker
-from fish_hw.transport.errors import TransportError
+from fish_hw.transport.interfaces import TransportError
 from fish_node.nodes.executor import KeptWaitSetExecutor
 from fish_node.nodes.robot_clock import RobotClock
 from fish_node.nodes.start import read_parameters, shut_down
@@ -249,3 +248,12 @@ def run(make_node: Callable[[], DeviceNode], name: str) -> None:
 def one_line(error: Exception) -> str:
     """The error's text without line breaks."""
     return " ".join(str(error).split())
+
+
+def joint_value(message: JointState, name: str, field: str) -> float | None:
+    """message.<field> of the joint `name`; None if the joint is absent or has no such value."""
+    values = getattr(message, field)
+    if name not in message.name:
+        return None
+    index = message.name.index(name)
+    return float(values[index]) if index < len(values) else None

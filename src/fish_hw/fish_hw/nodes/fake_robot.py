@@ -22,10 +22,9 @@ from sensor_msgs.msg import BatteryState, CompressedImage, Imu, JointState
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool
 
+from fish_hw.emulators.bno085 import Felt
 from fish_hw.emulators.fake_robot import FakeRobot
-from fish_hw.emulators.fed_bno085 import Felt
-from fish_hw.settings.fake_robot import FakeRobotSettings
-from fish_hw.settings.rudder import RudderSettings
+from fish_hw.settings import FakeRobotSettings, RudderSettings
 from fish_node.nodes.robot_clock import RobotClock
 from fish_node.nodes.start import read_parameters, run
 

@@ -15,7 +15,7 @@ from fish_hw.devices.imu_sample import ImuSample
 from fish_hw.emulators.bno085 import Bno085Emulator
 from fish_hw.emulators.i2c_bus import I2cBusEmulator
 from fish_hw.nodes.device_node import DeviceNode, run
-from fish_hw.settings.imu import ImuSettings
+from fish_hw.settings import ImuSettings
 from fish_hw.transport.gpio_line import InterruptLine
 from fish_hw.transport.i2c_bus import KernelI2c
 from fish_hw.transport.interfaces import DataReady, I2cBus

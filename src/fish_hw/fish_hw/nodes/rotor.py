@@ -24,9 +24,8 @@ from fish_hw.devices.leak_sensor import LeakSensor
 from fish_hw.devices.rotor_driver import RUDDER, RotorDriver
 from fish_hw.devices.vertiq import RotorTelemetry
 from fish_hw.emulators.vertiq import VertiqEmulator
-from fish_hw.nodes.device_node import DeviceNode, run
-from fish_hw.nodes.joint_message import joint_value
-from fish_hw.settings.rotor import RotorSettings
+from fish_hw.nodes.device_node import DeviceNode, joint_value, run
+from fish_hw.settings import RotorSettings
 from fish_hw.transport.gpio_line import InterruptLine
 from fish_hw.transport.interfaces import ByteStream
 from fish_hw.transport.serial_port import SerialPort

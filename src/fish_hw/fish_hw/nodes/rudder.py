@@ -17,10 +17,9 @@ from std_msgs.msg import String
 
 from fish_hw.devices.rudder_driver import PwmOutput, RudderDriver
 from fish_hw.devices.rudder_output import open_output
-from fish_hw.emulators.pwm_chip import PwmChipEmulator
-from fish_hw.nodes.device_node import DeviceNode, run
-from fish_hw.nodes.joint_message import joint_value
-from fish_hw.settings.rudder import RudderSettings
+from fish_hw.emulators.pwm import PwmChipEmulator
+from fish_hw.nodes.device_node import DeviceNode, joint_value, run
+from fish_hw.settings import RudderSettings
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.robot_clock import timer_clock
 

@@ -1,17 +1,122 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""SH-2, what the BNO085 says on its channels: feature requests, product id, input reports.
+"""What the BNO085 says on I2C: SHTP, its packets, and SH-2, the messages in them.
 
-An input cargo is 0xFB, base i32 (100 us), then reports. A report is id, sequence, status, delay, data:
+SHTP: headers, sequence numbers, fragments.
+
+    length u16 (bit 15: continuation of the previous cargo; header included) | channel u8 | sequence u8 |
+    payload
+
+SH-2: feature requests, product id, input reports. An input cargo is 0xFB, base i32 (100 us), then reports. A report is
+id, sequence, status, delay, data:
 
     t = t_read - 100 us * base + 100 us * delay,   delay = (status & 0xFC) << 6 | delay byte
 
 and 0xFA adds to the base. Report lengths depend on the id, so an unknown id ends the cargo.
-Source: SH-2 reference manual 1000-3625, sections 6.5 and 7.2.
+Source: CEVA 1000-3535 as described by the BNO08X datasheet 1000-3927; SH-2 reference manual 1000-3625, sections 6.5
+and 7.2.
 """
 
 import struct
 from dataclasses import dataclass
+
+HEADER_BYTES = 4
+CONTINUATION = 0x8000
+LENGTH_FAILED = 0xFFFF  # the peripheral does not answer for itself
+MAX_CHANNEL = 5
+MAX_LENGTH = 32766
+
+COMMAND, EXECUTABLE, CONTROL, REPORTS, WAKE_REPORTS, GYRO_ROTATION = range(6)
+
+
+@dataclass(frozen=True)
+class Header:
+    """The four bytes in front of each packet; length includes them."""
+
+    length: int
+    channel: int
+    sequence: int
+    continuation: bool
+
+    @property
+    def empty(self) -> bool:
+        """The hub has nothing to say."""
+        return self.length == 0
+
+
+@dataclass(frozen=True)
+class Cargo:
+    """A complete message of one channel."""
+
+    channel: int
+    sequence: int
+    payload: bytes
+
+
+def parse_header(data: bytes) -> Header | None:
+    """Header of at least four bytes, or None when no hub would send it (failed hub, noise)."""
+    length, channel, sequence = struct.unpack("<HBB", data[:HEADER_BYTES])
+    if length == LENGTH_FAILED:
+        return None
+    size = length & ~CONTINUATION
+    if size == 0:
+        return Header(0, channel, sequence, False)
+    if channel > MAX_CHANNEL or not HEADER_BYTES <= size <= MAX_LENGTH:
+        return None
+    return Header(size, channel, sequence, bool(length & CONTINUATION))
+
+
+class Writer:
+    """Frames payloads and counts the sequence numbers, one per channel."""
+
+    def __init__(self) -> None:
+        self._sequence = [0] * (MAX_CHANNEL + 1)
+
+    def frame(self, channel: int, payload: bytes) -> bytes:
+        """One unfragmented packet (the hub does not accept fragments)."""
+        sequence = self._sequence[channel]
+        self._sequence[channel] = (sequence + 1) & 0xFF
+        return struct.pack("<HBB", HEADER_BYTES + len(payload), channel, sequence) + payload
+
+
+class Reassembler:
+    """Joins packets to cargoes; counts fragments without a beginning and gaps in the sequence."""
+
+    def __init__(self) -> None:
+        self.orphans = 0
+        self.sequence_gaps = 0
+        self._last: dict[int, int] = {}
+        self._open: dict[
+            int, tuple[int, bytearray]
+        ] = {}  # channel: total payload size, bytes so far
+
+    def feed(self, header: Header, body: bytes) -> Cargo | None:
+        """Take one packet (body without header); return the cargo if it is complete."""
+        self._check_sequence(header)
+        if header.continuation and header.channel not in self._open:
+            self.orphans += 1
+            return None
+        if not header.continuation:
+            self.orphans += header.channel in self._open  # a cargo began and never ended
+            self._open[header.channel] = (header.length - HEADER_BYTES, bytearray())
+        total, payload = self._open[header.channel]
+        payload += body
+        if len(payload) < total:
+            return None
+        del self._open[header.channel]
+        return Cargo(header.channel, header.sequence, bytes(payload[:total]))
+
+    def reset(self) -> None:
+        """Forget fragments and sequence numbers: the hub has restarted."""
+        self._last.clear()
+        self._open.clear()
+
+    def _check_sequence(self, header: Header) -> None:
+        last = self._last.get(header.channel)
+        if last is not None and not header.continuation and header.sequence != (last + 1) & 0xFF:
+            self.sequence_gaps += 1
+        self._last[header.channel] = header.sequence
+
 
 SET_FEATURE, FEATURE_RESPONSE = 0xFD, 0xFC
 PRODUCT_ID_REQUEST, PRODUCT_ID_RESPONSE = 0xF9, 0xF8
@@ -24,7 +129,7 @@ RESET_COMPLETE = b"\x01"  # the hub's answer there
 TICK_S = 100e-6
 TIMESTAMP_BYTES = 5
 OVERFLOW_TICKS = 0x7FFFFFFF
-HEADER_BYTES = 4  # id, sequence, status, delay
+REPORT_HEADER_BYTES = 4  # id, sequence, status, delay
 
 
 @dataclass(frozen=True)
@@ -161,9 +266,9 @@ def _base(payload: bytes, read_time_s: float, base_s: float | None) -> float | N
 
 
 def _report(payload: bytes, base_s: float) -> Report:
-    kind, sequence, status, delay = payload[:HEADER_BYTES]
+    kind, sequence, status, delay = payload[:REPORT_HEADER_BYTES]
     layout = LAYOUTS[kind]
     ticks = (status & 0xFC) << 6 | delay
-    raw = struct.unpack_from(f"<{layout.count}h", payload, HEADER_BYTES)
+    raw = struct.unpack_from(f"<{layout.count}h", payload, REPORT_HEADER_BYTES)
     values = tuple(value / (1 << layout.q) for value in raw)
     return Report(kind, sequence, status & 3, base_s + ticks * TICK_S, values)

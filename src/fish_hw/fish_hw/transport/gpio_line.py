@@ -13,7 +13,7 @@ import select
 import struct
 from glob import glob
 
-from fish_hw.transport.errors import TransportError, unavailable
+from fish_hw.transport.interfaces import TransportError, unavailable
 
 GET_LINE = 0xC250B407  # GPIO_V2_GET_LINE_IOCTL
 GET_VALUES = 0xC010B40E  # GPIO_V2_LINE_GET_VALUES_IOCTL

@@ -7,7 +7,7 @@ from glob import glob
 from types import ModuleType
 from typing import Any
 
-from fish_hw.transport.errors import PortUnavailable, TransportError, unavailable
+from fish_hw.transport.interfaces import PortUnavailable, TransportError, unavailable
 
 REASONS = {
     errno.ENOENT: "there is no such bus (enable it: dtparam=i2c_arm=on)",

@@ -1,8 +1,22 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The two kinds of port that devices are written against."""
+"""The kinds of port that devices are written against, and what can go wrong with a port."""
 
 from typing import Protocol
+
+
+class TransportError(Exception):
+    """A port failed while it was in use: unplugged, bus error, time-out."""
+
+
+class PortUnavailable(TransportError):
+    """A port cannot be opened; the message names the port, the reason and the alternatives."""
+
+
+def unavailable(port: str, reason: str, alternatives: list[str]) -> PortUnavailable:
+    """PortUnavailable with one line: what was asked for, why not, what there is instead."""
+    found = ", ".join(alternatives) if alternatives else "none found"
+    return PortUnavailable(f"cannot open {port}: {reason}; available: {found}")
 
 
 class ByteStream(Protocol):

@@ -9,7 +9,7 @@ import termios
 import time
 from typing import Any
 
-from fish_hw.transport.errors import PortUnavailable, TransportError, unavailable
+from fish_hw.transport.interfaces import PortUnavailable, TransportError, unavailable
 
 WRITE_TIMEOUT_S = 0.1  # 1000 bytes at 115200 baud take 87 ms
 READ_BYTES = 4096

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from glob import glob
 from pathlib import Path
 
-from fish_hw.transport.errors import TransportError, unavailable
+from fish_hw.transport.interfaces import TransportError, unavailable
 
 EXPORT_WAIT_S = 0.5  # udev needs some tenths of a second to hand the new files to the group
 RETRY_S = 0.01

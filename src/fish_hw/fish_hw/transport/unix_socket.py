@@ -12,7 +12,7 @@ import socket
 import struct
 import time
 
-from fish_hw.transport.errors import TransportError, unavailable
+from fish_hw.transport.interfaces import TransportError, unavailable
 from fish_hw.transport.video_capture import Frame, compressed_frame
 
 PREFIX = "unix:"

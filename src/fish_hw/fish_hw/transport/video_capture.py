@@ -15,8 +15,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from fish_hw.settings.camera import CameraSettings
-from fish_hw.transport.errors import unavailable
+from fish_hw.settings import CameraSettings
+from fish_hw.transport.interfaces import unavailable
 
 AUTO_EXPOSURE, MANUAL_EXPOSURE = 3, 1  # V4L2_EXPOSURE_APERTURE_PRIORITY, V4L2_EXPOSURE_MANUAL
 MJPG = cv2.VideoWriter.fourcc(*"MJPG")

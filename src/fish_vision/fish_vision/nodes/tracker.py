@@ -39,10 +39,9 @@ from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, CalibrationError, Lens
 from fish_vision.choice import Reason
 from fish_vision.config import TrackerConfig
+from fish_vision.detections import PoseLowPass, Statistics
 from fish_vision.follower import Follower, make_follower
-from fish_vision.lowpass import PoseLowPass
 from fish_vision.picture import PictureError, Repeats, from_compressed, from_raw, to_jpeg
-from fish_vision.statistics import Statistics
 from fish_vision.tracker import Detection, Lost
 
 SETTABLE = ("front_colour", "rear_colour", "tail_odd_colour", "tail_even_colour")

@@ -43,13 +43,12 @@ def _track(args: argparse.Namespace) -> int:
     """Write poses and a picture; 1 if the fish is seen nowhere."""
     from fish_vision.annotate import annotated
     from fish_vision.calibration import read_lens
-    from fish_vision.commands.pictures import write_picture
     from fish_vision.config import TrackerConfig, config_from_file
+    from fish_vision.detections import PoseLowPass
     from fish_vision.follower import make_follower
-    from fish_vision.lowpass import PoseLowPass
-    from fish_vision.picture import Repeats
+    from fish_vision.picture import Repeats, frames
     from fish_vision.tracker import Detection
-    from fish_vision.video import frames
+    from fish_vision.verbs.pictures import write_picture
 
     config = config_from_file(args.params) if args.params else TrackerConfig()
     calibration = config.calibration(read_lens(args.lens))

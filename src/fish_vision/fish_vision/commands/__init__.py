@@ -1,3 +1,0 @@
-# Copyright 2026 Robot fish maintainers
-# SPDX-License-Identifier: Apache-2.0
-"""Commands of the tracker's package."""
