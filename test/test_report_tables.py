@@ -14,15 +14,13 @@ import pytest
 from fish_bag import read_trial
 from fish_bag import sample_recordings as samples
 from fish_bag.problem import Problem
-from fish_bag.recording_figures import (
+from fish_bag.recording_page import (
+    clocks_table,
     figures,
     over_time,
     path_figure,
-    timing_figure,
-)
-from fish_bag.recording_tables import (
-    clocks_table,
     problems_table,
+    timing_figure,
     topics_table,
     trials_table,
 )

@@ -20,8 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from fish_bag.damage import KINDS, check, damaged, make_sample
-from fish_bag.sample_formats import WRITERS
-from fish_bag.sample_recordings import robot_messages
+from fish_bag.sample_recordings import WRITERS, robot_messages
 
 
 def main() -> int:

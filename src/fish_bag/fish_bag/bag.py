@@ -13,15 +13,22 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_bag.compression import DAMAGE as PACKING_DAMAGE
-from fish_bag.compression import name_by_magic, unpack, unpack_message
+from fish_bag.bag_metadata import parse_metadata
 from fish_bag.mcap_scan import scan_mcap
 from fish_bag.problem import RecordingError
 from fish_bag.recording_files import RecordingFiles, bare_name, file_kind, find_files
 from fish_bag.ros1_scan import scan_ros1
 from fish_bag.sqlite_scan import companions, scan_sqlite
-from fish_bag.stated_metadata import parse_metadata
-from fish_bag.storage import Buffer, Contents, Keep, StoredTopic
+from fish_bag.storage import (
+    PACKING_DAMAGE,
+    Buffer,
+    Contents,
+    Keep,
+    StoredTopic,
+    name_by_magic,
+    unpack,
+    unpack_message,
+)
 
 STAMP_PREFIX = 16  # bytes kept of messages nobody decodes: enough for the stamp of a header
 LATEST_NS = 2**63 - 1

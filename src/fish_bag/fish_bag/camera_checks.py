@@ -1,6 +1,9 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Unit and axes of the camera's poses: size of the way, direction of motion against heading, the accelerometer's scale."""
+"""The camera's poses: single frames that no fish could have, unit and axes.
+
+Unit and axes show in the size of the way, the direction of motion against the heading, and the accelerometer's scale.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fish_bag.felt_acceleration import FITS, FeltAcceleration
+from fish_bag.accelerometer_checks import FITS, FeltAcceleration
 from fish_bag.problem import Problem
 from fish_bag.record_comparison import (
     FOLLOWS,
@@ -22,6 +25,12 @@ from fish_bag.record_comparison import (
 )
 from fish_bag.trial import Camera
 
+NEIGHBOURS = 4  # on each side
+POSITION_M, SPEED_M_S = (
+    0.10,
+    0.6,
+)  # allowed distance from the neighbours: so much, and so much per second between
+HEADING_RAD, TURN_RAD_S = 0.8, 3.0
 LARGEST_WAY_M, LARGEST_SPEED_M_S = 50.0, 5.0  # of a fish in a pool
 WAY_M, STEP_M = 0.3, 0.03  # m; way of the camera's pose that shows a direction, and steps of it
 FEWEST_STEPS = 10
@@ -30,6 +39,39 @@ HELD = 0.8  # length of the mean direction from which an angle is constant
 CLEARER = (
     0.15  # by which the mean direction of a mirrored path must be longer than that of the path
 )
+
+
+def find_jumps(t: np.ndarray, x: np.ndarray, y: np.ndarray, psi: np.ndarray) -> np.ndarray:
+    """(N,) bool: pose far from the median of its neighbours in time.
+
+    Sample i jumps if |p_i - median_j p_j| > POSITION + SPEED dt or |median_j wrap(psi_j - psi_i)| > HEADING
+    + TURN dt, where j runs over the finite neighbours and dt is their median distance in time. Up to three
+    bad frames in a row are found.
+
+    Args:
+        t, x, y, psi: (N,) in order of arrival [s, m, m, rad], NaN allowed (never a jump).
+    """
+    finite = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(psi))
+    jumps = np.zeros(len(t), bool)
+    if len(finite) < 2 * NEIGHBOURS:
+        return jumps
+    around = np.concatenate([np.arange(-NEIGHBOURS, 0), np.arange(1, NEIGHBOURS + 1)])
+    place = np.arange(len(finite))[:, None] + around
+    outside = (place < 0) | (place >= len(finite))
+    j = finite[np.clip(place, 0, len(finite) - 1)]
+    i = finite[:, None]
+    dt = _median(np.abs(t[j] - t[i]), outside)
+    distance = np.hypot(_median(x[j] - x[i], outside), _median(y[j] - y[i], outside))
+    turn = np.abs(_median(np.mod(psi[j] - psi[i] + np.pi, 2 * np.pi) - np.pi, outside))
+    jumps[finite] = (distance > POSITION_M + SPEED_M_S * dt) | (
+        turn > HEADING_RAD + TURN_RAD_S * dt
+    )
+    return jumps
+
+
+def _median(values: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """(N,) median over the neighbours that exist."""
+    return np.nanmedian(np.where(outside, np.nan, values), axis=1)
 
 
 def check_size(camera: Camera) -> Iterator[Problem]:

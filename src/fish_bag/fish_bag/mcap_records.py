@@ -1,14 +1,16 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Records of an MCAP file as the mcap package reads them, with the checks that it leaves out, and the file's summary.
+"""Records, chunks and summary of an MCAP file, as the mcap package reads them, with the checks that it leaves out.
 
 Source: MCAP specification (mcap.dev/spec).
 """
 
 from __future__ import annotations
 
+import re
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -21,7 +23,7 @@ from mcap.records import Channel, Footer, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from fish_bag.message_types import ros2_type_name
-from fish_bag.storage import Buffer, StoredTopic
+from fish_bag.storage import PACKING_DAMAGE, Buffer, Contents, StoredTopic, unpack
 
 HEAD = struct.Struct("<BQ")  # opcode, length
 FOOTER_BYTES = HEAD.size + 20
@@ -34,6 +36,14 @@ OF_DATA = frozenset(
     }
 )  # records that no summary has
 DAMAGE = (McapError, struct.error, ValueError)  # of parsing a damaged record
+CHUNK_HEAD = struct.Struct(
+    "<QQQII"
+)  # first and last time, unpacked size, checksum, length of the name
+LONGEST_NAME = 16  # of a compression
+CHUNK_START = re.compile(
+    rb"\x06.{36}(?:\x00\x00\x00\x00|\x03\x00\x00\x00lz4|\x04\x00\x00\x00zstd)", re.DOTALL
+)
+PRIVATE = 0x80  # from here on opcodes of applications
 
 
 @dataclass
@@ -170,3 +180,91 @@ def checksum_holds(data: Buffer, data_end: int, checksum: int) -> bool:
 def another_file(data: Buffer, after: int) -> int:
     """The byte from `after` on at which a second file begins, as joining two files leaves it; 0: none."""
     return max(0, data.find(MCAP0_MAGIC + bytes([Opcode.HEADER]), after))
+
+
+@dataclass(frozen=True)
+class ChunkHead:
+    """What a chunk says of itself."""
+
+    compression: str
+    size: int  # unpacked
+    checksum: int  # of the unpacked records, 0: none
+    body: int  # byte at which the packed records begin
+    end: int  # byte after them
+
+
+def chunk_head(data: Buffer, position: int, content_end: int) -> ChunkHead | None:
+    """The head of the chunk at `position`, None where it is cut or makes no sense."""
+    start = position + HEAD.size
+    if start + CHUNK_HEAD.size > content_end:
+        return None
+    _, _, size, checksum, name_length = CHUNK_HEAD.unpack_from(data, start)
+    body = start + CHUNK_HEAD.size + name_length + 8
+    if name_length > LONGEST_NAME or body > content_end:
+        return None
+    name = bytes(data[body - 8 - name_length : body - 8]).decode(errors="replace")
+    (packed,) = struct.unpack_from("<Q", data, body - 8)
+    return ChunkHead(name, size, checksum, body, body + packed)
+
+
+def whole_chunk(
+    data: Buffer, position: int, end: int, content_end: int
+) -> tuple[bytes, int] | None:
+    """Records of the chunk at `position` and where the next record is; None if the chunk is not whole.
+
+    The length stands in the chunk twice. Either is tried, and the checksum decides.
+
+    Args:
+        end: byte at which the data section ends at the latest.
+        content_end: byte after which there are only zeros.
+    """
+    head = chunk_head(data, position, content_end)
+    if head is None:
+        return None
+    _, length = HEAD.unpack_from(data, position)
+    for chunk_end in dict.fromkeys((head.end, position + HEAD.size + length)):
+        if not head.body <= chunk_end <= end:
+            continue
+        try:
+            records, _ = unpack(head.compression, bytes(data[head.body : chunk_end]))
+        except PACKING_DAMAGE:
+            continue
+        if head.checksum:
+            sure = zlib.crc32(records) == head.checksum
+        else:  # the writer gave none
+            sure = len(records) == head.size and chunk_end <= content_end
+        if sure:
+            return records, chunk_end
+    return None
+
+
+def cut_chunk(data: Buffer, head: ChunkHead, content_end: int) -> tuple[bytes, int]:
+    """What is left of the records of a chunk that is cut, and after how many bytes only zeros follow."""
+    if not head.compression:
+        return bytes(data[head.body : head.end]), content_end - head.body
+    try:
+        records, _ = unpack(head.compression, bytes(data[head.body : content_end]))
+    except PACKING_DAMAGE:
+        return b"", 0
+    return records, len(records)
+
+
+def compare_statistics(contents: Contents, summary: Summary | None, strange: Counter[int]) -> None:
+    """Say every difference in `contents`.
+
+    Args:
+        summary: of the file, None without one.
+        strange: opcode -> records of a kind that is not known.
+    """
+    counts, total = (summary.counts, summary.total) if summary else (None, None)
+    if counts is not None:
+        contents.compare_counts(counts, "its statistics")
+    agree = counts == {c: len(m) for c, m in contents.messages.items() if len(m)}
+    if total not in (None, contents.count) and (counts is None or agree):
+        contents.notes.append(
+            f"{contents.count} messages are in the file, its statistics say {total}"
+        )
+    if strange:
+        kinds = ", ".join(f"{opcode:#04x} ({n})" for opcode, n in sorted(strange.items()))
+        said = contents.notes if agree or min(strange) >= PRIVATE else contents.lost
+        said.append(f"records of kinds that MCAP does not define: {kinds}; they are left out")

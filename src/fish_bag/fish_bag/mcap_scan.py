@@ -20,22 +20,26 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from fish_bag.compression import KNOWN
-from fish_bag.mcap_chunk import CHUNK_START, chunk_head, cut_chunk, whole_chunk
 from fish_bag.mcap_records import (
+    CHUNK_START,
     DAMAGE,
     HEAD,
     OPCODES,
+    PRIVATE,
     another_file,
     begins_record,
     check_length,
     checksum_holds,
+    chunk_head,
+    compare_statistics,
+    cut_chunk,
     read_summary,
     topics_of,
+    whole_chunk,
     whole_record,
 )
-from fish_bag.mcap_statistics import PRIVATE, compare_statistics
 from fish_bag.storage import (
+    COMPRESSIONS,
     CUSTOM_NAMES,
     ROSBAG2_NAME,
     Buffer,
@@ -236,7 +240,7 @@ class _Scan:
                 self.lost.append(f"the chunk at byte {position}, of which only the head is left")
                 return None
             return self.nonsense(position)
-        if head.compression not in KNOWN:
+        if head.compression not in COMPRESSIONS:
             name = repr(head.compression)
             self.lost.append(
                 f"chunk at byte {position} is compressed as {name}, which is not known; left out"

@@ -18,20 +18,18 @@ from fish_bag.bag import (
     is_pool_bag,
     read_bag,
 )
+from fish_bag.checks import check_publishers
 from fish_bag.decode import NOT_MEASURED, PATH_ROLE, PATH_TYPE, ROLES
-from fish_bag.definitions import types_of
-from fish_bag.message_types import typestore
-from fish_bag.namespace import find_namespace, full_name
+from fish_bag.message_types import types_of, typestore
 from fish_bag.problem import Problem, RecordingError
-from fish_bag.publisher_checks import check_publishers
 from fish_bag.sensor_checks import check_sensors
 from fish_bag.streams import (
     Decoded,
     decode_paths,
     decode_topic,
     stamps_of_prefixes,
+    summarise,
 )
-from fish_bag.summary import summarise
 from fish_bag.time_axis import (
     MASTER,
     Stamps,
@@ -39,7 +37,7 @@ from fish_bag.time_axis import (
     build_axis,
     clocks_apart,
 )
-from fish_bag.topic_map import TopicMap, TopicRule
+from fish_bag.topic_map import TopicMap, TopicRule, find_namespace, full_name
 from fish_bag.trial import (
     ReferencePath,
     Stream,

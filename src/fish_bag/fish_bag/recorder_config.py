@@ -10,7 +10,7 @@ from datetime import datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from fish_bag.qos import Qos
+from fish_bag.bag_metadata import Qos
 
 DEFAULT_TOPICS = (
     "joint_command",

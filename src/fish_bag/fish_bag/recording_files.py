@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fish_bag.compression import name_by_magic
+from fish_bag.bag_metadata import FILE_NAME, LFS_START, StatedMetadata, read_metadata
 from fish_bag.problem import RecordingError
-from fish_bag.stated_metadata import FILE_NAME, LFS_START, StatedMetadata, read_metadata
+from fish_bag.storage import name_by_magic
 
 PARTS = (".mcap", ".db3")  # of files in a rosbag2 folder
 PACKED = (".zstd", ".zst", ".lz4")  # a whole file compressed, as rosbag2's mode `file` leaves it

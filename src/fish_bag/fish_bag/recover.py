@@ -11,11 +11,11 @@ from pathlib import Path
 from rosbags.rosbag1 import Writer as BagWriter
 
 from fish_bag.bag import RawBag, RawTopic, salvage_bag
+from fish_bag.bag_metadata import parse_qos
 from fish_bag.mcap_writer import McapRecording
 from fish_bag.message_types import MessageType, message_type
 from fish_bag.playback import in_order
 from fish_bag.problem import RecordingError
-from fish_bag.qos import parse_qos
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ import re
 import struct
 from collections import Counter
 
-from fish_bag.compression import DAMAGE as PACKING_DAMAGE
-from fish_bag.compression import unpack
 from fish_bag.message_types import ros2_type_name
 from fish_bag.storage import (
+    PACKING_DAMAGE,
     Buffer,
     Contents,
     Keep,
@@ -24,6 +23,7 @@ from fish_bag.storage import (
     end_of_content,
     ends_like_others,
     keep_whole,
+    unpack,
 )
 
 MAGIC = b"#ROSBAG V2.0\n"

@@ -13,13 +13,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fish_bag.accelerometer_checks import check_directions, check_gravity
+from fish_bag.accelerometer_checks import check_directions, check_gravity, felt_acceleration
+from fish_bag.actuator_checks import (
+    check_commanded_speed,
+    check_encoder,
+    check_rotor,
+    check_rudder,
+    check_tail,
+)
 from fish_bag.camera_checks import check_course, check_size, check_unit
-from fish_bag.felt_acceleration import felt_acceleration
 from fish_bag.problem import Problem
 from fish_bag.record_comparison import FEWEST
-from fish_bag.rotor_checks import check_commanded_speed, check_encoder, check_rotor
-from fish_bag.rudder_checks import check_rudder, check_tail
 from fish_bag.trial import JUMP, Camera, Trial
 from fish_bag.yaw_checks import check_yaw
 

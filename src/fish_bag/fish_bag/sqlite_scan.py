@@ -20,8 +20,7 @@ from tempfile import TemporaryDirectory
 
 from fish_bag.message_types import ros2_type_name
 from fish_bag.problem import RecordingError
-from fish_bag.sqlite_log import Log, read_log
-from fish_bag.sqlite_pages import NO_GAPS, Gaps, Row, Value, rows
+from fish_bag.sqlite_pages import NO_GAPS, Gaps, Log, Row, Value, read_log, rows
 from fish_bag.storage import (
     ENOUGH_OTHERS,
     Contents,

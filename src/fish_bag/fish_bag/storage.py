@@ -1,18 +1,30 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What one storage file of a recording holds: topics, messages, and what is wrong with the file."""
+"""What one storage file of a recording holds: topics, messages, and what is wrong with the file.
+
+The compression of a whole file, a chunk or a single message is known by its first bytes.
+"""
 
 from __future__ import annotations
 
+from bz2 import BZ2Decompressor
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from mmap import mmap
+from typing import Any
+
+import lz4.frame
+import zstandard
 
 Buffer = bytes | mmap
 CUSTOM_NAMES = ("fish_bag", "fish_train")  # of MCAP metadata records with a recording's custom data
 ROSBAG2_NAME = "rosbag2"  # of the MCAP metadata record with a copy of metadata.yaml
 BLOCK = 1 << 16
 ENOUGH_OTHERS = 8  # messages that show in how many zeros those of a topic end
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # no serialised message begins like this: CDR begins with a zero
+LZ4_MAGIC = b"\x04\x22\x4d\x18"
+COMPRESSIONS = ("", "none", "zstd", "lz4", "bz2")  # names of compressions; the first two are none
+PACKING_DAMAGE = (zstandard.ZstdError, RuntimeError, MemoryError, OSError, EOFError, ValueError)
 
 
 @dataclass(frozen=True)
@@ -115,3 +127,51 @@ def filled(raw: bytes, data: Buffer, position: int) -> bool:
     """Whether only one byte value follows from `position` on, as in flash memory that was erased, and `raw` ends in it."""
     fill = bytes(data[-1:])
     return raw.endswith(fill) and not bytes(data[position:]).strip(fill)
+
+
+def _decompressor(name: str) -> Any:
+    if name == "zstd":
+        return zstandard.ZstdDecompressor().decompressobj()
+    if name == "lz4":
+        return lz4.frame.LZ4FrameDecompressor()
+    if name == "bz2":
+        return BZ2Decompressor()
+    raise ValueError(f"compression {name!r} is not known; expected zstd, lz4, bz2 or none")
+
+
+def unpack(name: str, packed: bytes) -> tuple[bytes, bool]:
+    """Unpack all that there is, also where the end is cut off, and whether it is whole.
+
+    Args:
+        name: "zstd", "lz4", "bz2", or "" or "none" for data that are not packed.
+
+    Raises:
+        one of DAMAGE: the bytes make no sense, or the compression is unknown.
+    """
+    if name in COMPRESSIONS[:2]:
+        return packed, True
+    parts = []
+    while packed:
+        decompressor = _decompressor(name)
+        parts.append(bytes(decompressor.decompress(packed)))
+        if not decompressor.eof:
+            return b"".join(parts), False
+        packed = decompressor.unused_data or b""
+    return b"".join(parts), True
+
+
+def name_by_magic(head: bytes) -> str:
+    """The compression that bytes begin with, "" for none."""
+    return {ZSTD_MAGIC: "zstd", LZ4_MAGIC: "lz4"}.get(head[:4], "")
+
+
+def unpack_message(raw: bytes) -> bytes | None:
+    """A message without the compression of rosbag2's mode `message`; None where it is packed and not whole."""
+    name = name_by_magic(raw)
+    if not name:
+        return raw
+    try:
+        data, whole = unpack(name, raw)
+    except PACKING_DAMAGE:
+        return None
+    return data if whole else None

@@ -1,6 +1,9 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Typed streams from raw topics: header stamps, frames and values of every message, nothing left out."""
+"""Typed streams from raw topics: header stamps, frames and values of every message, nothing left out.
+
+Every topic is counted, mapped or not: rates, gaps and latencies.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,9 @@ import numpy as np
 
 from fish_bag.bag import RawTopic
 from fish_bag.decode import Role
-from fish_bag.definitions import types_of
 from fish_bag.layout import Block, decode_blocks
-from fish_bag.message_types import typestore
+from fish_bag.message_types import types_of, typestore
+from fish_bag.trial import TopicSummary
 
 NS_PER_S = 1_000_000_000
 
@@ -142,3 +145,24 @@ def _put(
         have[index, : values.shape[1]] = values
     else:
         have[index] = values
+
+
+def summarise(
+    raw: RawTopic, role: str, t: np.ndarray, t_arrival: np.ndarray, stamped: np.ndarray
+) -> TopicSummary:
+    """One topic; `t` is the moment of measurement, or the arrival of messages that are not stamped (N,)."""
+    steps = np.diff(np.sort(t))
+    span = float(np.sum(steps))
+    ages = (t_arrival - t)[stamped]
+    latency = np.quantile(ages, [0.01, 0.5, 0.99]) if len(ages) else [np.nan] * 3
+    return TopicSummary(
+        topic=raw.topic,
+        type=raw.type,
+        count=len(t),
+        rate_hz=(len(t) - 1) / span if span > 0 else np.nan,
+        period_s=float(np.median(steps)) if len(steps) else np.nan,
+        longest_gap_s=float(steps.max()) if len(steps) else np.nan,
+        latency_s=(float(latency[0]), float(latency[1]), float(latency[2])),
+        role=role,
+        stamped=bool(stamped.any()),
+    )

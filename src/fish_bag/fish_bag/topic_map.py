@@ -1,18 +1,23 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Which topic plays which role, on which clock and in which frame: the default names, or a YAML file."""
+"""Which topic plays which role, on which clock and in which frame: the default names, or a YAML file.
+
+The namespace that the topics stand in says which robot a recording is of.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import argparse
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from fish_bag.decode import PATH_ROLE, ROLES
+from fish_bag.decode import PATH_ROLE, PATH_TYPE, ROLES
 from fish_bag.problem import RecordingError
+from fish_report.errors import user_errors
 
 TIMES = ("stamp", "arrival")
 KNOWN_ROLES = (*ROLES, PATH_ROLE)
@@ -25,6 +30,10 @@ RULE_KEYS = {
     "required": bool,
 }  # of one role in it
 KIND_NAMES = {str: "text", (int, float): "a number", dict: "a mapping", bool: "true or false"}
+SIGNS_OF_A_ROBOT = (
+    "commands",
+    "imu",
+)  # two namespaces with one of these are two robots; sim/joint_states is none
 
 
 @dataclass(frozen=True)
@@ -127,3 +136,57 @@ def _checked(where: str, given: object, kinds: Mapping[str, Any]) -> dict[str, A
         if not isinstance(value, kinds[key]):
             raise RecordingError(f"{where}: got {key} {value!r}; expected {KIND_NAMES[kinds[key]]}")
     return values
+
+
+def full_name(namespace: str, topic: str) -> str:
+    """Absolute topic name."""
+    return topic if topic.startswith("/") else f"{namespace.rstrip('/')}/{topic}"
+
+
+def message_types(namespace: str) -> dict[str, str]:
+    """Message type of each default topic of the robot in `namespace`, by the topic's full name."""
+    return {
+        full_name(namespace, rule.topic): PATH_TYPE if role == PATH_ROLE else ROLES[role].type
+        for role, rule in DEFAULT_RULES.items()
+    }
+
+
+def find_namespace(recorded: Iterable[str], topics: TopicMap) -> str:
+    """The namespace that holds most of the mapped topics, "" for the root.
+
+    Raises:
+        RecordingError: topics of more than one robot are in it.
+    """
+    roles: dict[str, set[str]] = {}
+    for topic in recorded:
+        for role, rule in topics.rules.items():
+            if not rule.topic.startswith("/") and topic.endswith(f"/{rule.topic}"):
+                roles.setdefault(topic[: -len(rule.topic) - 1], set()).add(role)
+    robots = sorted(ns for ns, found in roles.items() if found & set(SIGNS_OF_A_ROBOT))
+    if len(robots) > 1:
+        raise RecordingError(
+            f"the recording holds {len(robots)} robots ({', '.join(ns or '/' for ns in robots)}); "
+            "say which one with --namespace or 'namespace:' in the topic map"
+        )
+    if robots:
+        return robots[0]
+    return max(sorted(roles), key=lambda ns: len(roles[ns] & set(ROLES)), default="")
+
+
+def add_topic_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add --topics and --namespace."""
+    parser.add_argument(
+        "--topics", type=Path, help="YAML topic map (default: the names of the format)"
+    )
+    parser.add_argument("--namespace", help="robot's namespace (default: found from the topics)")
+
+
+def topic_map(args: argparse.Namespace) -> TopicMap:
+    """The topic map that these arguments give.
+
+    Raises:
+        UserError: the file is no topic map.
+    """
+    with user_errors():
+        topics = load_topic_map(args.topics) if args.topics else TopicMap()
+    return topics if args.namespace is None else replace(topics, namespace=args.namespace)

@@ -23,8 +23,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from fish_bag.clock import ClockEstimate
 from fish_bag.problem import Problem
+from fish_bag.time_axis import ClockEstimate
 
 # bits of Stream.flags
 DUPLICATE = 1  # the stamp repeats an earlier one

@@ -8,7 +8,7 @@ import pytest
 from fish_bag import TopicMap, read_trial, trial
 from fish_bag import message_build as build
 from fish_bag import sample_recordings as samples
-from fish_bag.jumps import find_jumps
+from fish_bag.camera_checks import find_jumps
 
 
 def read(tmp_path, messages):

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from fish_bag.clock import estimate_clock
+from fish_bag.time_axis import estimate_clock
 
 EPOCH = 1_700_000_000_000_000_000
 

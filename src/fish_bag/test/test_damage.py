@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from fish_bag import read_trial
 from fish_bag import sample_recordings as samples
 from fish_bag.bag import read_bag, salvage_bag
+from fish_bag.bag_metadata import parse_metadata
 from fish_bag.damage import KINDS, PROTECTED, check, damaged, make_sample, messages_of
 from fish_bag.mcap_writer import McapRecording
 from fish_bag.message_types import MessageType
-from fish_bag.sample_formats import SQLITE, WRITERS, write_rosbag2
+from fish_bag.sample_recordings import SQLITE, WRITERS, write_rosbag2
 from fish_bag.sqlite_pages import LEAF
-from fish_bag.stated_metadata import parse_metadata
 from fish_bag.storage import ends_like_others
 
 SOME = settings(

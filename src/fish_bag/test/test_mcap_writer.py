@@ -15,9 +15,8 @@ from rosbags.rosbag2 import Reader
 
 from fish_bag import RecordingError, read_trial
 from fish_bag import sample_recordings as samples
-from fish_bag.mcap_writer import McapRecording
-from fish_bag.qos import Qos
-from fish_bag.record_file import RESERVE_NAME, DiskFullError
+from fish_bag.bag_metadata import Qos
+from fish_bag.mcap_writer import RESERVE_NAME, DiskFullError, McapRecording
 from fish_bag.recover import recover
 
 IMU = "sensor_msgs/msg/Imu"

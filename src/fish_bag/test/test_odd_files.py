@@ -19,7 +19,6 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
 from fish_bag import RecordingError, read_dataset, read_trial
-from fish_bag import sample_formats as formats
 from fish_bag import sample_recordings as samples
 from fish_bag.bag import salvage_bag
 from fish_bag.message_types import message_type, typestore
@@ -169,7 +168,7 @@ def test_the_same_topic_in_another_serialisation_hides_nothing(tmp_path):
 
 def stated(path, **changes):
     """A sqlite3 recording with changed fields in metadata.yaml."""
-    formats.write_rosbag2(path, MESSAGES, formats.SQLITE)
+    samples.write_rosbag2(path, MESSAGES, samples.SQLITE)
     document = yaml.safe_load((path / "metadata.yaml").read_text())
     document["rosbag2_bagfile_information"] |= changes
     (path / "metadata.yaml").write_text(yaml.safe_dump(document))
@@ -242,7 +241,7 @@ def test_no_message_that_reaches_into_erased_flash_is_saved(tmp_path):
 
 @pytest.mark.parametrize("name", ["trial_03", "SQLITE3", "2026_11_27"])
 def test_a_number_in_a_name_is_no_part(tmp_path, name):
-    path = formats.write_rosbag2(tmp_path / name, MESSAGES, formats.SQLITE)
+    path = samples.write_rosbag2(tmp_path / name, MESSAGES, samples.SQLITE)
     (path / "metadata.yaml").unlink()
     assert holds_the_robot(read_trial(path)) == ""
 
@@ -291,7 +290,7 @@ def test_metadata_that_is_a_pointer_is_named(tmp_path):
 
 def with_log(folder, change=lambda data: data):
     """A recording in a write-ahead log that is damaged, and its messages without damage."""
-    path = formats.write_sqlite_with_log(folder / "a", MESSAGES)
+    path = samples.write_sqlite_with_log(folder / "a", MESSAGES)
     log = next(path.glob("*-wal"))
     log.write_bytes(change(log.read_bytes()))
     return path
@@ -334,8 +333,8 @@ def test_what_is_whole_in_a_cut_log_is_saved(tmp_path):
 @pytest.mark.parametrize("cut", [0, 3000])
 def test_a_log_of_another_recording_is_named_and_left_out(tmp_path, logged, cut):
     foreign = [(time_ns + 10**12, topic, message) for time_ns, topic, message in MESSAGES]
-    other = formats.write_sqlite_with_log(tmp_path / "other", foreign)
-    path = formats.write_rosbag2(tmp_path / "mine", MESSAGES, formats.SQLITE)
+    other = samples.write_sqlite_with_log(tmp_path / "other", foreign)
+    path = samples.write_rosbag2(tmp_path / "mine", MESSAGES, samples.SQLITE)
     if logged:
         connection = sqlite3.connect(path / "mine.db3")
         connection.execute("PRAGMA journal_mode=WAL")
@@ -383,7 +382,7 @@ def test_a_log_without_its_database_is_named(tmp_path):
 
 
 def test_old_pages_behind_the_log_are_no_damage(tmp_path):
-    path = formats.write_rosbag2(tmp_path / "a", MESSAGES, formats.SQLITE)
+    path = samples.write_rosbag2(tmp_path / "a", MESSAGES, samples.SQLITE)
     file = path / "a.db3"
     connection = sqlite3.connect(file)
     connection.execute("PRAGMA journal_mode=WAL")
@@ -413,7 +412,7 @@ def test_rows_whose_time_is_no_number_are_said(tmp_path):
 
 
 def test_a_link_to_a_database_brings_its_log(tmp_path):
-    path = formats.write_sqlite_with_log(tmp_path / "a", MESSAGES)
+    path = samples.write_sqlite_with_log(tmp_path / "a", MESSAGES)
     (tmp_path / "link.db3").symlink_to(path / "a.db3")
     assert "a.db3-wal is taken in" in holds_the_robot(read_trial(tmp_path / "link.db3"))
 

@@ -11,10 +11,10 @@ import yaml
 
 from fish_bag import RecordingError
 from fish_bag import sample_recordings as samples
+from fish_bag.bag_metadata import Qos, parse_qos
 from fish_bag.playback import Playback, PlaybackClock, ReplayerConfig
-from fish_bag.qos import Qos, parse_qos
 from fish_bag.recorder_config import RecorderConfig, common_qos, is_selected
-from fish_bag.sample_formats import write_rosbag1
+from fish_bag.sample_recordings import write_rosbag1
 
 CONFIG = Path(__file__).parents[1] / "config"
 

@@ -8,7 +8,7 @@ import pytest
 from fish_bag import RecordingError, TopicMap, read_trial
 from fish_bag import message_build as build
 from fish_bag import sample_recordings as samples
-from fish_bag.sample_formats import WRITERS
+from fish_bag.sample_recordings import WRITERS
 from fish_bag.topic_map import DEFAULT_RULES, TopicRule
 
 

@@ -192,7 +192,7 @@ def test_bad_parameters_are_one_line(peer, node, parameters, text):
 FULL_DISK = '''
 import errno, sys
 from fish_bag.nodes import recorder
-from fish_bag.record_file import RecordFile
+from fish_bag.mcap_writer import RecordFile
 
 class Full:
     """A disk with room for 60 kB and for what the reserve gives back."""

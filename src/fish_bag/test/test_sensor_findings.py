@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from stroke_swim import Course, stroke_swim
 
+from fish_bag.camera_checks import find_jumps
 from fish_bag.checks import check_rotor_sign
-from fish_bag.jumps import find_jumps
 from fish_bag.sensor_checks import check_sensors
 from fish_bag.trial import JUMP
 

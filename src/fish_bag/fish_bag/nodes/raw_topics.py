@@ -8,8 +8,8 @@ from importlib import import_module
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from fish_bag.bag_metadata import Qos
 from fish_bag.problem import RecordingError
-from fish_bag.qos import Qos
 
 
 def message_class(msgtype: str) -> type:

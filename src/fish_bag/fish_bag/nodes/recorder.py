@@ -24,12 +24,12 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
+from fish_bag.bag_metadata import Qos
 from fish_bag.mcap_writer import McapRecording, Topic
 from fish_bag.message_types import message_type
-from fish_bag.namespace import message_types
 from fish_bag.nodes.raw_topics import from_profile, message_class, to_profile
-from fish_bag.qos import Qos
 from fish_bag.recorder_config import RecorderConfig, common_qos, is_selected
+from fish_bag.topic_map import message_types
 from fish_node.nodes.executor import Polled, take_all
 from fish_node.nodes.start import read_parameters, run
 from fish_report.errors import UserError

@@ -24,10 +24,10 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool
 
 from fish_bag.bag import RawTopic
+from fish_bag.bag_metadata import parse_qos
 from fish_bag.nodes.raw_topics import message_class, to_profile
 from fish_bag.playback import Playback, PlaybackClock, ReplayerConfig
 from fish_bag.problem import RecordingError
-from fish_bag.qos import parse_qos
 from fish_node.nodes.start import read_parameters, run
 from fish_report.errors import UserError
 from fish_report.printable import plain

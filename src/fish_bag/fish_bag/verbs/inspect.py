@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from fish_bag.topic_arguments import add_topic_arguments, topic_map
+from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_report.named_path import named_path
 from fish_report.terminal import cell, say, terminal
 
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from fish_bag import read_dataset
-    from fish_bag.recording_tables import problems_table, tables, trials_table
+    from fish_bag.recording_page import problems_table, tables, trials_table
 
     data = read_dataset(named_path(args.recording), topic_map(args), progress=True)
     console = terminal()

@@ -11,9 +11,9 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from fish_bag.message_types import message_type
-from fish_bag.namespace import message_types
 from fish_bag.nodes.raw_topics import from_profile, message_class, to_profile
 from fish_bag.recorder_config import common_qos
+from fish_bag.topic_map import message_types
 from fish_report.printable import plain
 
 LOOK_PERIOD = 1.0  # s between looks for new topics

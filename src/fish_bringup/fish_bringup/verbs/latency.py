@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fish_bag import Trial, find_trials, read_trial
-from fish_bag.topic_arguments import add_topic_arguments, topic_map
+from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_control.fusion_config import FusionConfig
 from fish_control.imu_heading import HeadingNoise, ImuHeading, against_gyro
 from fish_control.offset_sums import ClockEstimate

@@ -12,7 +12,7 @@ import argparse
 from pathlib import Path
 
 from fish_bag import read_trial
-from fish_bag.topic_arguments import add_topic_arguments, topic_map
+from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_bringup.run_page import write_run_page
 from fish_bringup.score import score_trial, what_is_missing
 from fish_bringup.score_table import error_table

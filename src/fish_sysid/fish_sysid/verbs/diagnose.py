@@ -8,7 +8,7 @@ import argparse
 import time
 from pathlib import Path
 
-from fish_bag.topic_arguments import add_topic_arguments, topic_map
+from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_report.errors import UserError, user_errors
 from fish_report.json_file import write_json
 from fish_report.named_path import named_path

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from fish_bag.topic_arguments import add_topic_arguments, topic_map
+from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_report.errors import user_errors
 from fish_report.terminal import PARAGRAPH, plain, say, terminal
 from fish_report.writable import writable_folder

@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from fish_bag.topic_arguments import add_topic_arguments, topic_map
+from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_report.errors import user_errors
 from fish_report.terminal import say, terminal
 from fish_sim.robot_argument import read_model
