@@ -7,7 +7,7 @@ refitted    `identify` on recordings of the plant
 corrected   `diagnose` on the same recordings
 true        gains searched on the plant itself (`gain_search`)
 
-Each with the feed-forward of what its gains were made on (`feed_forward`), the plant's from swims in still water. All
+Each with the feed-forward of what its gains were made on (`law_of_plant`), the plant's from swims in still water. All
 trainings are alike (TRAINING), several of each model, as one says little: all of them are compared. The search has other
 seeds (start and water) than the runs that are compared.
 """
@@ -34,12 +34,11 @@ from fish_study.mujoco_effects import CONCEALED
 from fish_study.mujoco_plant import MujocoError, MujocoPlant
 from fish_study.scenario import Scenario
 from fish_study.swim_cache import swim_each
-from fish_train.evaluation.candidates import read_policy
+from fish_train.evaluation.candidates import Candidate, PolicyGains, read_policy
 from fish_train.evaluation.cells import make_cells
-from fish_train.evaluation.feed_forward import law_of_plant
-from fish_train.evaluation.gains_source import PolicyGains
+from fish_train.evaluation.open_loop import law_of_plant
 from fish_train.evaluation.plant import Plant
-from fish_train.evaluation.study import Candidate, Condition, Row
+from fish_train.evaluation.study import Condition, Row
 from fish_train.training.closed_loop_equations import Law
 
 Array = NDArray[np.float64]

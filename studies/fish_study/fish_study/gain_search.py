@@ -18,14 +18,9 @@ from fish_control.policy import Policy
 from fish_control.policy_spec import OUTPUTS
 from fish_report.json_file import write_json
 from fish_study.study import read_json
+from fish_train.evaluation.candidates import Candidate, PolicyGains
 from fish_train.evaluation.cells import Cell
-from fish_train.evaluation.gains_source import PolicyGains
-from fish_train.evaluation.study import (
-    Candidate,
-    Condition,
-    Row,
-    run_study,
-)
+from fish_train.evaluation.study import Condition, Row, run_study
 from fish_train.training.closed_loop_equations import Law
 
 Array = NDArray[np.float64]

@@ -14,15 +14,10 @@ from typing import Any
 from fish_report.json_file import number, write_json
 from fish_study.gain_search import Say
 from fish_study.study import read_json
+from fish_train.evaluation.candidates import Candidate, PolicyGains
 from fish_train.evaluation.cells import Cell
-from fish_train.evaluation.gains_source import PolicyGains
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
-from fish_train.evaluation.study import (
-    Candidate,
-    Condition,
-    Row,
-    run_study,
-)
+from fish_train.evaluation.follow import ErrorSizes, RunMetrics
+from fish_train.evaluation.study import Condition, Row, run_study
 
 
 def swim_each(

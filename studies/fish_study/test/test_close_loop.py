@@ -31,8 +31,8 @@ from fish_study.gain_search import search
 from fish_study.mujoco_plant import MujocoError, MujocoPlant
 from fish_study.verbs import prove
 from fish_train.evaluation.cells import Cell
-from fish_train.evaluation.feed_forward import law_of_robot
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
+from fish_train.evaluation.follow import ErrorSizes, RunMetrics
+from fish_train.evaluation.open_loop import law_of_robot
 from fish_train.evaluation.plant import FishSimPlant
 from fish_train.evaluation.study import Condition, Row
 from fish_train.training.closed_loop_equations import Law

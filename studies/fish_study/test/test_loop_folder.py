@@ -20,10 +20,10 @@ from fish_study import (
 from fish_study.close_loop import Plan, loop_scenario
 from fish_study.loop_folder import prepare
 from fish_study.study import StudyError
+from fish_train.evaluation.candidates import Candidate, PolicyGains
 from fish_train.evaluation.cells import Cell
-from fish_train.evaluation.gains_source import PolicyGains
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
-from fish_train.evaluation.study import Candidate, Condition, Row
+from fish_train.evaluation.follow import ErrorSizes, RunMetrics
+from fish_train.evaluation.study import Condition, Row
 from fish_train.training.closed_loop_equations import Law
 
 CELL = Cell("S", 0.1, 1)

@@ -16,7 +16,7 @@ from fish_study.loop_page import (
     speed_table,
 )
 from fish_train.evaluation.cells import Cell
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
+from fish_train.evaluation.follow import ErrorSizes, RunMetrics
 from fish_train.evaluation.study import Row
 
 CELL = Cell("S", 0.1, 1)
