@@ -13,7 +13,6 @@ from pathlib import Path
 
 from fish_report.errors import user_errors
 from fish_report.terminal import print_table, terminal
-from fish_study.archive import opened_studies
 from fish_study.recorded_comparison import (
     Comparison,
     comparison_tables,
@@ -22,7 +21,7 @@ from fish_study.recorded_comparison import (
 )
 from fish_study.runner import Job, run_scenario, spread
 from fish_study.scenario_groups import GROUPS
-from fish_study.study import read_json
+from fish_study.study import opened_studies, read_json
 from fish_study.tool_version import tool_digest
 
 NEWEST = Path(__file__).parent / "data" / "blind_study_26.tar.xz"

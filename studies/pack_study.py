@@ -5,8 +5,7 @@
 import sys
 from pathlib import Path
 
-from fish_study.archive import pack_studies
-from fish_study.study import Study
+from fish_study.study import Study, pack_studies
 
 if __name__ == "__main__":
     if len(sys.argv) < 3:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fish_report.page import Table
 from fish_report.terminal import print_table, terminal
-from fish_study.archive import opened_studies
+from fish_study.study import opened_studies
 
 NEWEST = Path(__file__).parent / "data" / "pairs.tar.xz"
 # parameter of the plant -> parameter of the vocabulary, its unit; without one the ratio is told

@@ -4,8 +4,7 @@
 
 from pathlib import Path
 
-from fish_study.markdown import write_generated_part
-from fish_study.results_page import results_text
+from fish_study.results_page import results_text, write_generated_part
 
 STUDIES = Path(__file__).parent
 

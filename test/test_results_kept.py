@@ -11,7 +11,7 @@ import pytest
 from fish_bag import sample_recordings as samples
 from fish_report import robofish as command
 from fish_sysid.coverage import Repetition
-from fish_train.evaluation.metrics import NO_SIZES, RunMetrics
+from fish_train.evaluation.follow import NO_SIZES, RunMetrics
 from fish_train.evaluation.study import Row
 
 GAINS = "0.3,0.3,0.03,0.6,0.05,0"

@@ -31,14 +31,13 @@ from fish_control.paths import make_path
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme
 from fish_sim.step import Stepper
-from fish_train.training.batch_state import BatchState
+from fish_train.training.batch import BatchState, PathBank
 from fish_train.training.closed_loop_equations import (
     SIZES,
     Law,
 )
 from fish_train.training.compiled_loop import CompiledLoop
 from fish_train.training.network import initial_weights
-from fish_train.training.path_bank import PathBank
 
 STEPS = 15
 COST = np.array([1.0, 10.0, 10.0, 0.1, 0.01, 0.1])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fish_control.path_batch import LOOKAHEAD_SEARCH
 from fish_sim.model import DT
 from fish_sim.step import Stepper
+from fish_train.training.batch import PathBank
 from fish_train.training.closed_loop_equations import (
     PHYSICS_STEPS,
     SIZES,
@@ -25,7 +26,6 @@ from fish_train.training.closed_loop_equations import (
     sense,
 )
 from fish_train.training.network import split
-from fish_train.training.path_bank import PathBank
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from fish_control.line_of_sight import GuidanceConfig
 from fish_report.robofish import main
 from fish_sim.robot import Robot
 from fish_sim.robot_file import save_robot
-from fish_train.evaluation.feed_forward import law_of_robot
+from fish_train.evaluation.open_loop import law_of_robot
 from fish_train.verbs.train import command_line
 
 SETTINGS = [

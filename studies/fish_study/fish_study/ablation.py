@@ -15,7 +15,7 @@ import numpy as np
 
 from fish_report.json_file import write_json
 from fish_report.page import Table
-from fish_study.asked_table import ASKED
+from fish_study.answer_tables import ASKED
 from fish_study.new_study import Asked, begin_or_go_on
 from fish_study.runner import DIAGNOSE, run_study
 from fish_study.score import Score, study_scores

@@ -5,41 +5,49 @@
 nominal     the robot file as it is
 refitted    `identify` on recordings of the plant
 corrected   `diagnose` on the same recordings
-true        gains searched on the plant itself (`gain_search`)
+true        gains searched on the plant itself (`plant_swims.search`)
 
-Each with the feed-forward of what its gains were made on (`feed_forward`), the plant's from swims in still water. All
+Each with the feed-forward of what its gains were made on (`law_of_plant`), the plant's from swims in still water. All
 trainings are alike (TRAINING), several of each model, as one says little: all of them are compared. The search has other
 seeds (start and water) than the runs that are compared.
+
+The folder of a closed loop says for which scenario it was made, so that nothing in it is taken for another scenario's:
+
+loop.json    the scenario and the arguments on which what is kept depends
+recordings   of the second plant, all trials or none
 """
 
 from __future__ import annotations
 
 import contextlib
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.policy import Policy
 from fish_report.errors import UserError
+from fish_report.json_file import plain, write_json
 from fish_report.parallel import on_threads
 from fish_sim.robot import Robot
-from fish_study.gain_search import Say, search
+from fish_study.build import make_recordings
 from fish_study.mujoco_effects import CONCEALED
 from fish_study.mujoco_plant import MujocoError, MujocoPlant
+from fish_study.plant_swims import Say, search, swim_each
 from fish_study.scenario import Scenario
-from fish_study.swim_cache import swim_each
-from fish_train.evaluation.candidates import read_policy
+from fish_study.study import StudyError, read_json
+from fish_train.evaluation.candidates import Candidate, PolicyGains, read_policy
 from fish_train.evaluation.cells import make_cells
-from fish_train.evaluation.feed_forward import law_of_plant
-from fish_train.evaluation.gains_source import PolicyGains
+from fish_train.evaluation.open_loop import law_of_plant
 from fish_train.evaluation.plant import Plant
-from fish_train.evaluation.study import Candidate, Condition, Row
+from fish_train.evaluation.study import Condition, Row
 from fish_train.training.closed_loop_equations import Law
 
 Array = NDArray[np.float64]
@@ -211,3 +219,49 @@ def _verb(*arguments: str) -> None:
     if done.returncode != 0:
         said = (done.stderr.strip() or done.stdout.strip())[-500:]
         raise UserError(f"robofish {arguments[0]} ended with {done.returncode}: {said}")
+
+
+def prepare(plan: Plan) -> None:
+    """Make a new folder with the recordings, or go on in the same plan's. Raises StudyError where it is none of this plan."""
+    _claim(plan)
+    if plan.recordings.exists():
+        return
+    part = plan.recordings.with_suffix(".part")  # half a set must not pass for a whole one
+    shutil.rmtree(part, ignore_errors=True)
+    make_recordings(plan.scenario, part)
+    part.rename(plan.recordings)
+
+
+def _claim(plan: Plan) -> None:
+    path, asked = plan.out / "loop.json", _asked(plan)
+    if not path.exists():
+        if plan.out.exists() and any(plan.out.iterdir()):
+            raise StudyError(
+                f"{plan.out}: has no loop.json, so nothing says for which scenario its files were made; expected a new or empty"
+                " folder: choose another --out, or move these files away"
+            )
+        plan.out.mkdir(parents=True, exist_ok=True)
+        write_json(path, asked)
+    made = read_json(path)
+    differ = [key for key in {**made, **asked} if made.get(key) != asked.get(key)]
+    if differ:
+        said = "; ".join(f"{key} {made.get(key)}, got {asked.get(key)}" for key in differ)
+        raise StudyError(
+            f"{plan.out}: holds a loop of {said}: ask for the same, or choose another --out"
+        )
+
+
+def _asked(plan: Plan) -> dict[str, Any]:
+    """As JSON gives it back. What is made anew at every run, the number of trainings and of tries in the search are no part."""
+    return dict(
+        plain(
+            {
+                **plan.scenario.label(),
+                "robot": None if plan.nominal is None else str(plan.nominal.resolve()),
+                "paths": plan.paths,
+                "speeds": plan.speeds,
+                "search seeds": SEARCH_SEEDS,
+                "training": plan.training,
+            }
+        )
+    )

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from fish_sim.water_push import WaterPush
 from fish_study.scenario import Scenario, ScenarioError
-from fish_study.sensor_models import SensorErrors
-from fish_study.swim import Inertial
+from fish_study.swim import Inertial, SensorErrors
 
 Array = NDArray[np.float64]
 

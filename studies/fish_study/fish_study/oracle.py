@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from fish_report.json_file import number
 from fish_sim.robot import Robot
-from fish_study.out_of_vocabulary import PLANT_EFFECTS
+from fish_study.plant_effects import PLANT_EFFECTS
 from fish_study.scenario import Scenario
 from fish_study.swim import Readings, kept_trials
 from fish_sysid.dataset.experiment import Experiment, Frames

@@ -1,6 +1,9 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""After the labels are open: the oracle on every scenario, and the scores of an answer that need the truth."""
+"""After the labels are open: the oracle on every scenario, and the scores of an answer that need the truth.
+
+Among them: where localised effects really act, and how well an answer's times and covariates agree with that.
+"""
 
 from __future__ import annotations
 
@@ -10,40 +13,79 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fish_report.json_file import write_json
+from fish_sim.model import DT
 from fish_study.build import make_readings
 from fish_study.competitors import CompetitorScores, compete
-from fish_study.localisation import (
-    dof_overlap,
-    overlap,
-    stated_range,
-    stated_times,
-    true_wrench,
-)
 from fish_study.oracle import (
     as_experiment,
     fit_oracle,
+    with_truth,
 )
-from fish_study.out_of_vocabulary import OUTSIDE
+from fish_study.plant_effects import OUTSIDE
 from fish_study.runner import spread
 from fish_study.scenario import Scenario, ScenarioError
 from fish_study.score import vocabulary
 from fish_study.study import Study, StudyError, read_json
 from fish_study.tool_version import checked_version, tool_digest
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.effect_wrench import acting, f1
-from fish_sysid.diagnosis.latent_force import dof_shares
+from fish_sysid.diagnosis.effect_wrench import acting, effect_wrench, f1
+from fish_sysid.diagnosis.latent_force import MissingForce, dof_shares
 from fish_sysid.diagnosis.trial_split import split_trials
 from fish_sysid.diagnosis.vocabulary import candidates
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.map_fit import Fit
+from fish_sysid.estimation.map_fit import Fit, evaluate
 
+LOCALISED = ("wall_effect", "wave_drag", "tether")  # they act here and not there
 HORIZON = 1  # index of 2 s among the oracle's horizons
 # of other scenarios no structure that the oracle could fit is the true one
 COMPARABLE = "the simulator's fish with three tail links, no vortex among them"
 
 Compete = Callable[[Fit, Experiment, Experiment], CompetitorScores]  # nominal, training, held out
+
+
+def true_wrench(scenario: Scenario, experiment: Experiment) -> MissingForce | None:
+    """What a scenario's only effect does on these trials if it is localised: the true robot along the motion it smooths."""
+    if len(scenario.effects) != 1 or scenario.plant != "fish_sim" or scenario.links != 3:
+        return None
+    name = next(iter(scenario.effects))
+    if name not in LOCALISED:
+        return None
+    hypothesis, theta = with_truth(scenario, (name,))
+    return effect_wrench(evaluate(hypothesis, theta, experiment, Noise()), name, experiment)
+
+
+def dof_overlap(stated: Mapping[str, float], true: Mapping[str, float]) -> float:
+    """1 where two sets of shares over the degrees of freedom are equal, 0 where they have nothing in common."""
+    return float(sum(min(share, true.get(name, 0.0)) for name, share in stated.items()))
+
+
+def stated_times(
+    stated: Sequence[Mapping[str, Any]], names: Sequence[str], length: int
+) -> NDArray[np.bool_]:
+    """(T, M) when the intervals stated say that an effect acts, on the trials `names`."""
+    said = np.zeros((length, len(names)), dtype=bool)
+    for interval in stated:
+        if interval["trial"] in names:
+            begin, end = round(interval["from"] / DT), round(interval["to"] / DT)
+            said[begin:end, list(names).index(interval["trial"])] = True
+    return said
+
+
+def stated_range(
+    stated: Sequence[Mapping[str, Any]], covariates: Mapping[str, NDArray[np.float64]]
+) -> NDArray[np.bool_]:
+    """(T, M) when the first covariate stated is in its range: the same said without knowing the recording."""
+    value, (low, high) = covariates[stated[0]["name"]], stated[0]["range"]
+    inside: NDArray[np.bool_] = (value >= low) & (value <= high)
+    return inside
+
+
+def overlap(said: NDArray[np.bool_], true: NDArray[np.bool_]) -> float:
+    """Intersection over union."""
+    return float((said & true).sum() / max((said | true).sum(), 1))
 
 
 @dataclass(frozen=True)

@@ -27,17 +27,11 @@ from fish_study.paper_figures import (
     throttle_figure,
     training_figure,
 )
+from fish_train.evaluation.candidates import Candidate
 from fish_train.evaluation.cells import Cell, read_path
-from fish_train.evaluation.follow import Trace
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics, measure
+from fish_train.evaluation.follow import ErrorSizes, RunMetrics, Trace, measure
 from fish_train.evaluation.open_loop import speed_of_throttle, swing
-from fish_train.evaluation.study import (
-    Candidate,
-    Condition,
-    Row,
-    mean_sizes,
-    swim,
-)
+from fish_train.evaluation.study import Condition, Row, mean_sizes, swim
 from fish_train.training.run_log import CurveRow
 
 PORTRAIT_TIME = 20.0  # s

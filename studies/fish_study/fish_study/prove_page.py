@@ -19,14 +19,24 @@ from fish_report.page import (
     styled,
     write_page,
 )
-from fish_study.asked_table import asked_table
-from fish_study.calibration import Bin, calibration, calibration_table
-from fish_study.group_tables import failure_table, group_table, name_table
-from fish_study.information_criteria import criterion_table
-from fish_study.nulls import null_table
+from fish_study.answer_tables import (
+    asked_table,
+    failure_table,
+    group_table,
+    name_table,
+    pair_tables,
+)
+from fish_study.calibration import (
+    Bin,
+    Power,
+    calibration,
+    calibration_table,
+    null_table,
+    power,
+    power_table,
+)
+from fish_study.competitors import criterion_table
 from fish_study.oracle_tables import OracleScores, competitor_table, oracle_table
-from fish_study.pair_table import pair_tables
-from fish_study.power import Power, power, power_table
 from fish_study.score import Score
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The newest study's tables as they stand in docs/results/blind_studies.md."""
+"""The newest study's tables as Markdown, as they stand between two marks of docs/results/blind_studies.md."""
 
 from __future__ import annotations
 
@@ -8,17 +8,43 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fish_report.page import Table
-from fish_study.archive import opened_studies
-from fish_study.asked_table import asked_table
-from fish_study.calibration import calibration_table
-from fish_study.group_tables import group_table
-from fish_study.information_criteria import criterion_table
-from fish_study.markdown import markdown_table
+from fish_study.answer_tables import asked_table, group_table
+from fish_study.calibration import calibration_table, power, power_table
+from fish_study.competitors import criterion_table
 from fish_study.oracle_scores import score_studies
 from fish_study.oracle_tables import OracleScores, competitor_table, oracle_table
-from fish_study.power import power, power_table
 from fish_study.score import Score, study_scores
-from fish_study.study import Study
+from fish_study.study import Study, opened_studies
+
+BEGIN, END = "<!-- generated: begin -->", "<!-- generated: end -->"
+
+
+def markdown_table(table: Table, level: int = 3) -> str:
+    """A heading, the table and its note."""
+    lines = [f"{'#' * level} {table.title}", ""]
+    for row in (table.header, ["---"] * len(table.header), *table.rows):
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |")
+    return "\n".join([*lines, "", *([table.note, ""] if table.note else [])])
+
+
+def generated_part(page: Path) -> str:
+    """What stands between the marks. Raises ValueError where a mark is missing."""
+    return _parts(page)[1]
+
+
+def write_generated_part(page: Path, text: str) -> None:
+    """Put this between the marks. Raises ValueError where a mark is missing."""
+    before, _, after = _parts(page)
+    page.write_text(f"{before}{BEGIN}\n{text}{END}{after}", encoding="utf-8")
+
+
+def _parts(page: Path) -> tuple[str, str, str]:
+    text = page.read_text(encoding="utf-8")
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        raise ValueError(f"{page}: expected one line {BEGIN} and after it one line {END}")
+    before, rest = text.split(BEGIN)
+    own, after = rest.split(END)
+    return before, own.removeprefix("\n"), after
 
 
 def results_text(archive: Path) -> str:

@@ -15,8 +15,7 @@ from fish_sim.effects.effect import Effect
 from fish_sim.parameter import Parameter
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_sim.sensors.sensor_effect import SensorEffect
-from fish_study.other_forms import OTHER_FORMS
-from fish_study.out_of_vocabulary import OUTSIDE
+from fish_study.plant_effects import OTHER_FORMS, OUTSIDE
 from fish_study.scenario import Scenario
 from fish_sysid.diagnosis.vocabulary import candidates
 from fish_sysid.estimation.parametrization import SENSOR_FIELDS

@@ -13,6 +13,7 @@ import numpy as np
 from fish_report.json_file import number
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
+from fish_study.plant_effects import MEANS
 from fish_study.scenario import Scenario
 from fish_study.study import Study
 
@@ -20,6 +21,16 @@ CONFIDENT = 0.9  # stated probability from which a wrong name counts as given wi
 NOTHING = "no_mismatch"
 FAILED = "failed"  # in place of a verdict
 CHANGED = {"changed": True, "unchanged": False}
+
+
+def true_names(scenario: Scenario) -> tuple[str, ...] | None:
+    """Names of the vocabulary; None: the hidden effects' own names."""
+    if scenario.plant != "mujoco":
+        other = set(scenario.names) & set(MEANS)
+        return tuple(MEANS.get(name, name) for name in scenario.names) if other else None
+    from fish_study.mujoco_effects import CONCEALED
+
+    return tuple(name for hidden in scenario.names for name in CONCEALED[hidden].names)
 
 
 @dataclass(frozen=True)
@@ -196,8 +207,6 @@ def _parameter_errors(scenario: Scenario, effect: Mapping[str, Any]) -> list[Par
 
 def study_scores(study: Study) -> list[Score]:
     """Scores of every scenario of a study. Opens its labels; raises StudyError where that is too early."""
-    from fish_study.true_names import true_names
-
     results = study.results
     return [
         score_scenario(scenario, results[name], true_names(scenario))

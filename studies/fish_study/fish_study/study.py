@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A study on disk: commitments to labels, one result per scenario, everything there to go on after a kill.
+"""A study on disk: commitments to labels, one result per scenario, everything there to go on after a kill; and its archive.
 
 study.json        what was asked for, and of which version of the tool
 commitments.json  scenario -> SHA-256 of salt and label; written before any run
@@ -8,19 +8,60 @@ openings.json     salts and labels (mode 0600); nothing passes it to the tool
 scenarios/scenario_0001/{recordings, tool, result.json}
                   result.json has the version that answered, and so has oracle.json beside it
 labels.json       the opened labels; written when every scenario has a result
+
+A commitment is the hash of a random salt and the label's JSON, published before the run and checked after it. An archive is
+finished studies as one file: a tar archive, compressed by xz, with the folder of each study in it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import lzma
+import secrets
+import tarfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from fish_report.json_file import write_json
-from fish_study.commitment import Opening, broken_commitments, commit
 from fish_study.scenario import Scenario
+
+OF_STUDY = ("study.json", "commitments.json", "openings.json")
+OF_SCENARIO = ("result.json", "oracle.json")
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What opens a commitment: the label and the salt that keeps its hash from being guessed."""
+
+    salt: str
+    label: Mapping[str, Any]
+
+    @property
+    def commitment(self) -> str:
+        """What is published before the run."""
+        text = json.dumps(self.label, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(f"{self.salt}:{text}".encode()).hexdigest()
+
+
+def commit(label: Mapping[str, Any]) -> Opening:
+    """A label with a fresh salt."""
+    return Opening(secrets.token_hex(16), label)
+
+
+def broken_commitments(
+    commitments: Mapping[str, str], openings: Mapping[str, Opening]
+) -> list[str]:
+    """Names whose label is not the one that was committed to, is missing, or has no commitment."""
+    names = {*commitments, *openings}
+    return sorted(
+        n for n in names if n not in openings or commitments.get(n) != openings[n].commitment
+    )
 
 
 class StudyError(ValueError):
@@ -160,3 +201,55 @@ def read_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError) as error:
         raise StudyError(f"{path}: cannot be read ({error})") from error
+
+
+@contextmanager
+def opened_studies(paths: Sequence[Path]) -> Iterator[list[Study]]:
+    """Studies of folders and archives, those of an archive in the order of their names, in a folder that goes afterwards.
+
+    Raises StudyError for what is neither.
+    """
+    with TemporaryDirectory() as scratch:
+        studies = []
+        for k, path in enumerate(paths):
+            studies += [Study(path)] if path.is_dir() else _unpacked(path, Path(scratch) / str(k))
+        yield studies
+
+
+def pack_studies(studies: Sequence[Study], file: Path) -> None:
+    """Write finished studies as an archive: commitments, labels, results, the oracle's scores.
+
+    The same studies give the same bytes.
+    """
+    with tarfile.open(file, "w:xz", preset=9) as archive:
+        for number, study in enumerate(studies, 1):
+            part = f"{number:02d}"
+            for name in OF_STUDY:
+                _add(archive, f"{part}/{name}", read_json(study.folder / name))
+            for scenario in study.scenarios:
+                for name in OF_SCENARIO:
+                    path = study.folder_of(scenario) / name
+                    if path.exists():
+                        _add(archive, f"{part}/scenarios/{scenario}/{name}", read_json(path))
+
+
+def _add(archive: tarfile.TarFile, name: str, content: Any) -> None:
+    data = json.dumps(content, separators=(",", ":")).encode()
+    info = tarfile.TarInfo(name)
+    info.size = len(data)
+    archive.addfile(info, BytesIO(data))
+
+
+def _unpacked(file: Path, folder: Path) -> list[Study]:
+    try:
+        with tarfile.open(file, "r:xz") as archive:
+            archive.extractall(folder, filter="data")
+    except (OSError, EOFError, lzma.LZMAError, tarfile.TarError) as error:
+        raise StudyError(
+            f"{file}: cannot be read as studies ({error}); expected the folder of a study, or an archive such as"
+            " studies/data/blind_study_26.tar.xz"
+        ) from error
+    studies = [Study(path.parent) for path in sorted(folder.glob("*/study.json"))]
+    if not studies:
+        raise StudyError(f"{file}: has no folder with a study.json: it is no archive of studies")
+    return studies

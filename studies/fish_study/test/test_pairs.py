@@ -16,17 +16,23 @@ from prove_samples import small
 from fish_bag import read_dataset
 from fish_report.robofish import main
 from fish_study import scenario_groups
+from fish_study.answer_tables import pair_tables
 from fish_study.build import make_recordings
 from fish_study.new_study import Asked
-from fish_study.pair_recordings import folder_name, make_pair, split
-from fish_study.pair_table import pair_tables
+from fish_study.pair_recordings import (
+    INJECTIONS,
+    InjectionError,
+    folder_name,
+    make_pair,
+    split,
+    with_effects,
+    write_trial_file,
+)
 from fish_study.runner import Job, run_scenario
 from fish_study.scenario import Scenario, ScenarioError
 from fish_study.scenario_groups import INJECTED
 from fish_study.score import score_scenario
 from fish_study.study import read_json
-from fish_study.trial_file import write_trial_file
-from fish_study.trial_injection import INJECTIONS, InjectionError, with_effects
 from fish_sysid.dataset.experiment import Experiment, build_experiment
 from fish_sysid.dataset.injection import with_injection
 from fish_sysid.diagnosis.change.comparable import FEWEST_WAYS

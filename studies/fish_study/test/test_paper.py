@@ -14,7 +14,7 @@ from fish_study import paper_numbers as paper
 from fish_study.paper_page import better_cells, training_blocks
 from fish_study.verbs.paper import trained
 from fish_train.evaluation.cells import Cell
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics
+from fish_train.evaluation.follow import ErrorSizes, RunMetrics
 from fish_train.evaluation.study import Row
 from fish_train.training.closed_loop_equations import Law
 from fish_train.training.run_log import CurveRow
@@ -63,7 +63,7 @@ def test_the_papers_training_on_a_robot_has_that_robots_law(
 ) -> None:
     jobs = []
     own = Law(limits=replace(Law().limits, curvature_gain=0.3))
-    monkeypatch.setattr("fish_train.evaluation.feed_forward.law_of_robot", lambda _: own)
+    monkeypatch.setattr("fish_train.evaluation.open_loop.law_of_robot", lambda _: own)
     monkeypatch.setattr(
         "fish_train.training.parallel_runs.run_all", lambda todo, *_: jobs.extend(todo)
     )

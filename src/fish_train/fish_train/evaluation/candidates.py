@@ -1,24 +1,75 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Gains to be compared, read from what training wrote or from the command line."""
+"""Gains to be compared: the policy of a weights file or a baseline's form, read from files or from the command line."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fish_control.control_law import Gains
 from fish_control.gains_file import GainsFileError, read_gains_file, require_fit
 from fish_control.path_batch import TrackerConfig
-from fish_control.policy import Policy
+from fish_control.policy import Policy, policy_inputs
 from fish_control.policy_spec import OUTPUTS, PolicySpec
 from fish_report.errors import UserError
-from fish_train.evaluation.gains_source import PolicyGains, ScheduledGains
-from fish_train.evaluation.study import Candidate
-from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law
-from fish_train.training.network import FORMS, weight_count
+from fish_sim.ops import NUMPY
+from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law, gains_of, schedule_inputs
+from fish_train.training.network import FORMS, split, weight_count
+
+Array = NDArray[np.float64]
+# the values of `policy_inputs` in its order, each (B,)
+Situation = tuple[Array, Array, Array, Array, Array, Array]
+
+
+class GainsSource(Protocol):
+    """Gains for a batch of situations."""
+
+    def gains(self, situation: Situation, speed: Array, curvature: Array) -> Gains:
+        """Situations, wanted speed (B,) [m/s], path curvature (B,) [1/m] -> gains, each (B,)."""
+
+
+@dataclass(frozen=True)
+class PolicyGains:
+    """A weights file's policy, with a network or constant."""
+
+    policy: Policy
+
+    def gains(self, situation: Situation, speed: Array, curvature: Array) -> Gains:  # noqa: ARG002
+        """The policy looks at its inputs only, in the scales of its own contract."""
+        inputs = policy_inputs(*situation, np, self.policy.contract.inputs)
+        return self.policy.gains(np.stack(inputs, axis=-1))
+
+
+@dataclass(frozen=True)
+class ScheduledGains:
+    """Gains that follow wanted speed and curvature smoothly: tanh(W x + b), scaled to the ranges.
+
+    x = ((u - 0.2) / 0.1, |kappa| / 3); weights: flat (18,), W (6, 2) then b (6,).
+    """
+
+    weights: Array
+
+    def gains(self, situation: Situation, speed: Array, curvature: Array) -> Gains:  # noqa: ARG002
+        """By wanted speed and curvature only."""
+        [(W, b)] = split(np.asarray(self.weights), FORMS["schedule"].layers)
+        x = np.stack(schedule_inputs(speed, curvature, NUMPY), axis=-1)
+        return gains_of(list(np.moveaxis(x @ W.T + b, -1, 0)), NUMPY)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Gains and the constants of the law they were made for."""
+
+    name: str
+    gains: GainsSource
+    law: Law = field(default_factory=Law)
+
 
 # of a schedule, with the names and checks of a weights file's contract
 LAW_KEYS = ("lookahead", "limits", "guidance")

@@ -7,7 +7,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +16,16 @@ import numpy as np
 from fish_report.worker_pool import worker_pool
 from fish_sim.robot import Robot
 from fish_sim.sensors.settings import SensorSettings
+from fish_train.evaluation.candidates import Candidate
 from fish_train.evaluation.cells import (
     Cell,
     longest,
     read_path,
     start_pose,
 )
-from fish_train.evaluation.follow import Trace, follow
-from fish_train.evaluation.gains_source import GainsSource
-from fish_train.evaluation.metrics import ErrorSizes, RunMetrics, measure
-from fish_train.evaluation.plant import FishSimPlant, Plant
-from fish_train.evaluation.sensing import FusedSensing, PerfectSensing, Sensing
-from fish_train.training.closed_loop_equations import Law
-from fish_train.training.episodes import CERTAIN
+from fish_train.evaluation.follow import ErrorSizes, RunMetrics, Trace, follow, measure
+from fish_train.evaluation.plant import FishSimPlant, FusedSensing, PerfectSensing, Plant, Sensing
+from fish_train.training.curriculum import CERTAIN
 
 LARGEST_BATCH = 16  # runs
 MakePlant = Callable[[Sequence[Robot], Sequence[int], float], Plant]
@@ -45,15 +42,6 @@ class Condition:
     sensors: SensorSettings = field(default_factory=SensorSettings)
     disturbance: float = 0.002  # N, as in the simulator node
     plant: MakePlant = FishSimPlant
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """Gains and the constants of the law they were made for."""
-
-    name: str
-    gains: GainsSource
-    law: Law = field(default_factory=Law)
 
 
 @dataclass(frozen=True)
@@ -197,3 +185,54 @@ def write_rows(path: Path, rows: Sequence[Row]) -> None:
                 table = csv.DictWriter(stream, list(values))
                 table.writeheader()
             table.writerow(values)
+
+
+ROBUST_OFF = 0.3  # of the uncertain parameters
+ROBUST_LATENCY = 0.3  # s, of the camera
+ROBUST_CURRENT = 0.03  # m/s, across the pool's long side
+
+
+def make_condition(
+    robot: Robot,
+    off: float = 0.0,
+    current: float = 0.0,
+    latency: float | None = None,
+    perfect: bool = False,
+) -> Condition:
+    """A named condition; what is not given stays as in the simulator node.
+
+    Raises:
+        ValueError: a value out of range; says what came and what was expected.
+    """
+    if not 0.0 <= off < 1.0:
+        raise ValueError(f"off: got {off:g}; expected a share from 0 to below 1 (0.3 is 30 %)")
+    parts = [robot.name if robot != Robot() else "nominal"]
+    if perfect:
+        parts.append("perfect state" if current else "perfect state, still water")
+    if off:
+        parts.append(f"parameters off by up to {off:.0%}")
+    if current:
+        robot = robot.with_effect("current", x=0.0, y=current)
+        parts.append(f"current {current:g} m/s")
+    sensors = SensorSettings()
+    if latency is not None:
+        sensors = replace(sensors, camera_latency=latency)
+        parts.append(f"camera latency {latency:g} s")
+    return Condition(
+        name=", ".join(parts),
+        robot=robot,
+        off=off,
+        fused=not perfect,
+        sensors=sensors,
+        disturbance=0.0 if perfect else Condition.disturbance,
+    )
+
+
+def robust_conditions(robot: Robot) -> list[Condition]:
+    """Nominal, and one thing wrong at a time."""
+    return [
+        make_condition(robot),
+        make_condition(robot, off=ROBUST_OFF),
+        make_condition(robot, latency=ROBUST_LATENCY),
+        make_condition(robot, current=ROBUST_CURRENT),
+    ]

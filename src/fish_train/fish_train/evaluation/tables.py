@@ -1,16 +1,18 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What a study found, as tables for terminal and page."""
+"""What a study found: tables for terminal and page, and the page."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fish_report.page import Table
-from fish_train.evaluation.metrics import ErrorSizes
+from fish_report.page import Block, Table, write_page
+from fish_train.evaluation.cells import LAPS
+from fish_train.evaluation.follow import ErrorSizes
 from fish_train.evaluation.study import Row, mean_sizes
 
 SUMMARY_COLUMNS = (
@@ -173,3 +175,17 @@ def _cell(runs: Sequence[Row]) -> str:
     sizes, failed = mean_sizes(good), len(runs) - len(good)
     said = f" ({failed} of {len(runs)} failed)" if failed else ""
     return f"{1e3 * sizes.cross_track_rmse:.1f} / {1e3 * sizes.speed_rmse:.1f}{said}"
+
+
+def write_study_page(path: Path, rows: Sequence[Row], nominal: str | None = None) -> None:
+    """Tables of a study; nominal: the condition that the others are compared with, None: the first."""
+    conditions = unique(rows, lambda r: r.condition)
+    blocks: list[Block] = [summary_table(rows, "Tracking")]
+    if len(conditions) > 1:
+        blocks.append(ratio_table(rows, nominal or conditions[0], "Robustness"))
+    for candidate in unique(rows, lambda r: r.candidate):
+        for condition in conditions:
+            mine = [r for r in rows if (r.candidate, r.condition) == (candidate, condition)]
+            blocks.append(cell_table(mine, f"{candidate}: {condition}"))
+    lead = f"{len(rows)} simulated runs from rest: an open path to its end, a closed one for the time of {LAPS:g} laps."
+    write_page(path, "Evaluation", lead, blocks)

@@ -15,9 +15,10 @@ from fish_control.path_batch import LOOKAHEAD_SEARCH
 from fish_sim.compiled import Check, lanes, library
 from fish_sim.kernel_source import emit, kernel_source
 from fish_sim.step import Stepper
-from fish_train.training.batch_state import (
+from fish_train.training.batch import (
     HISTORY,
     BatchState,
+    PathBank,
     WindowResult,
     check_hold,
 )
@@ -28,19 +29,17 @@ from fish_train.training.closed_loop_equations import (
     SIZES,
     Law,
 )
-from fish_train.training.expressions import expressions
-from fish_train.training.loop_arguments import (
+from fish_train.training.kernel import (
     MAX_LAYERS,
     POINTER,
     NetworkArguments,
     PathArguments,
     SearchArguments,
     WindowArguments,
+    expressions,
 )
-from fish_train.training.loop_check import loop_errors
 from fish_train.training.network import LAYERS, split, weight_count
-from fish_train.training.path_bank import PathBank
-from fish_train.training.torch_loop import TorchLoop
+from fish_train.training.torch_loop import TorchLoop, loop_errors
 
 Array = NDArray[np.float64]
 BLOCK = 8

@@ -15,7 +15,7 @@ import yaml
 from fish_control.policy_spec import OUTPUTS
 from fish_report.errors import UserError
 from fish_sim.model import DT
-from fish_train.training.batch_state import LONGEST_DELAY
+from fish_train.training.batch import LONGEST_DELAY
 from fish_train.training.closed_loop_equations import COST_NAMES
 
 

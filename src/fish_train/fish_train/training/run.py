@@ -17,7 +17,6 @@ from fish_control.gains_file import GainsFileError, read_gains_file
 from fish_control.policy_spec import INPUTS, OUTPUTS
 from fish_report.errors import UserError
 from fish_sim.robot import Robot
-from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
 from fish_train.training.closed_loop_equations import Law
 from fish_train.training.config import TrainConfig
 from fish_train.training.network import (
@@ -26,16 +25,18 @@ from fish_train.training.network import (
     Array,
     from_tensors,
 )
-from fish_train.training.run_log import RunLog
-from fish_train.training.search import search
-from fish_train.training.trainer import Progress, Trainer, TrainingDiverged
-from fish_train.training.weights_output import (
+from fish_train.training.run_files import (
     CARD,
     holds_weights,
+    load_checkpoint,
+    save_checkpoint,
     training_state,
     write_card,
     write_weights,
 )
+from fish_train.training.run_log import RunLog
+from fish_train.training.search import search
+from fish_train.training.trainer import Progress, Trainer, TrainingDiverged
 
 CHECKPOINT = "checkpoint.npz"
 CHECKPOINT_PERIOD = 5.0  # s

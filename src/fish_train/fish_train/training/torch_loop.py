@@ -2,26 +2,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """The closed loop as torch operations: slow, for machines without a C compiler, and the check of the compiled one.
 
-The same equations (`loop`), differentiated by torch's autograd instead of by hand; physics through fish_sim.torch_step.
+The same equations (`loop`), differentiated by torch's autograd instead of by hand; physics through fish_sim.torch_step. The
+check compares with the interpreted kernel and its own adjoint: nothing of the reference is compiled here.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from fish_control.paths import make_path
 from fish_sim import torch_step
 from fish_sim.ops import torch_ops
+from fish_sim.self_check import heaviness, random_parameters, random_states, relative_error
 from fish_sim.step import Stepper
-from fish_train.training.batch_state import (
+from fish_train.training.batch import (
     HISTORY,
+    LONGEST_DELAY,
     BatchState,
+    PathBank,
     WindowResult,
     check_hold,
+    locate,
 )
 from fish_train.training.closed_loop_equations import (
+    COST_NAMES,
+    INPUT_COUNTS,
     PHYSICS_STEPS,
     SIZES,
     Law,
@@ -30,12 +41,15 @@ from fish_train.training.closed_loop_equations import (
     motion,
     sense,
 )
-from fish_train.training.network import LAYERS, split
-from fish_train.training.path_bank import PathBank
-from fish_train.training.path_search import locate
+from fish_train.training.network import LAYERS, split, weight_count
 
 Array = NDArray[np.float64]
 XP = torch_ops()
+# of fewer no actuator falls behind its set-point again, and nothing travels back through its memory
+PERIODS, HOLD = 6, 2
+HIDDEN = 9  # units, one more than a panel of weights
+SEED = 3
+FLEET = ("plant", "memory", "place", "history")
 
 
 class TorchLoop:
@@ -44,7 +58,7 @@ class TorchLoop:
     def __init__(
         self, stepper: Stepper, law: Law, bank: PathBank, layers: tuple[int, ...] = LAYERS
     ) -> None:
-        self._stepper, self._law, self.layers = stepper, law, layers
+        self.stepper, self.law, self.layers = stepper, law, layers
         self.set_bank(bank)
 
     def set_bank(self, bank: PathBank) -> None:
@@ -91,20 +105,12 @@ class TorchLoop:
     def find(self, batch_state: BatchState, which: int, position: Tensor) -> list[Tensor]:
         """Geometry of every fish on its path; `which` place (0 seen, 1 true) moves on."""
         geometry = [
-            locate(self.bank.tables[k], self._law.tracker, place[2 * which : 2 * which + 2], xy)
+            locate(self.bank.tables[k], self.law.tracker, place[2 * which : 2 * which + 2], xy)
             for k, place, xy in zip(
                 batch_state.path, batch_state.place, position.detach().numpy(), strict=True
             )
         ]
         return list(torch.from_numpy(np.array(geometry)).unbind(-1))
-
-    @property
-    def stepper(self) -> Stepper:
-        return self._stepper
-
-    @property
-    def law(self) -> Law:
-        return self._law
 
 
 class _Window:
@@ -207,3 +213,83 @@ class _Window:
 def _stack(values: list[Tensor]) -> Tensor:
     same_shape: list[Tensor] = torch.broadcast_tensors(*values)  # type: ignore[no-untyped-call]
     return torch.stack(same_shape, dim=-1)
+
+
+class Loop(Protocol):
+    """What both forms of the loop can do."""
+
+    def window(
+        self,
+        weights: Array,
+        batch_state: BatchState,
+        steps: int,
+        cost: Array,
+        noise: Array | None,
+        gradient: bool,
+        hold: int,
+    ) -> WindowResult: ...
+
+
+def loop_errors(
+    stepper: Stepper, law: Law, width: int, make: Callable[[PathBank, tuple[int, ...]], Loop]
+) -> dict[str, float]:
+    """Largest relative errors of a window with gradient; `make` wraps the library that is checked.
+
+    One fish more than a vector holds, on a closed and an open path; what they see is late and noisy.
+    """
+    random = np.random.default_rng(SEED)
+    bank = PathBank(
+        [make_path("circle", radius=0.8), make_path("straight", length=3.0)], law.tracker
+    )
+    layers = (INPUT_COUNTS[law.inputs], HIDDEN, SIZES["gains"])
+    slow = TorchLoop(
+        Stepper(stepper.layout.structure, stepper.scheme, compiled=False), law, bank, layers
+    )
+    weights = 0.3 * random.standard_normal(weight_count(layers))
+    cost, noise = (
+        np.full(len(COST_NAMES), 0.5),
+        1e-3 * random.standard_normal((PERIODS + 1, width + 1, 6)),
+    )
+    batch_state = _batch_state(stepper, bank, width + 1, random)
+    batch_states = [batch_state.copy(), batch_state.copy()]
+    right, found = (
+        loop.window(weights, batch_state, PERIODS, cost, noise, True, HOLD)
+        for loop, batch_state in zip((slow, make(bank, layers)), batch_states, strict=True)
+    )
+    assert right.gradient is not None
+    assert found.gradient is not None
+    errors = {"cost": abs(found.cost / right.cost - 1.0)}
+    errors["gradient"] = relative_error(found.gradient[:, None], right.gradient[:, None])
+    errors |= {
+        name: relative_error(getattr(found, name), getattr(right, name))
+        for name in ("report", "applied")
+    }
+    errors |= {
+        name: relative_error(
+            *(getattr(batch_state, name) for batch_state in reversed(batch_states))
+        )
+        for name in FLEET
+    }
+    return errors
+
+
+def _batch_state(
+    stepper: Stepper, bank: PathBank, batch: int, random: np.random.Generator
+) -> BatchState:
+    """Fish beside their paths, in motion."""
+    layout = stepper.layout
+    path = np.arange(batch) % len(bank)
+    poses = np.array([[*bank.paths[k].point(0.3), bank.paths[k].heading_at(0.3)] for k in path])
+    poses += random.normal(0.0, [0.02, 0.02, 0.1], (batch, 3))
+    plant = random_states(layout, (batch,), random)
+    plant[:, 3 : layout.links + 3] += poses[:, 2:] - plant[:, 2:3]
+    plant[:, :3] = poses
+    seen = np.column_stack([poses, random.uniform(-0.1, 0.2, (batch, 3))])
+    delay = np.arange(batch) % (LONGEST_DELAY + 1)
+    parameters = random_parameters(layout, batch, random)
+    parameters *= heaviness(layout, stepper.scheme, parameters)
+    batch_state = BatchState.at(
+        plant, parameters, path, random.uniform(0.1, 0.3, batch), seen, delay
+    )
+    batch_state.place[:, [0, 2]] = 0.3
+    return batch_state

@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sim.scheme import Scheme, default_scheme, stable_scheme
 from fish_sim.step import Stepper
-from fish_train.training.batch_state import BatchState, WindowResult
+from fish_train.training.batch import BatchState, PathBank, WindowResult
 from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law
 from fish_train.training.compiled_loop import fastest_loop
 from fish_train.training.config import TrainConfig
-from fish_train.training.curriculum import SlidingCriterion, make_levels
-from fish_train.training.episodes import Episodes, SeenNoise
+from fish_train.training.curriculum import Episodes, SeenNoise, SlidingCriterion, make_levels
 from fish_train.training.network import FORMS, Form, initial_weights
-from fish_train.training.path_bank import PathBank
 
 Array = NDArray[np.float64]
 POLISH_PHASES = 2  # sinusoids of each level while polishing

@@ -84,8 +84,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_sim.robot_argument import read_model
     from fish_train.evaluation.candidates import constant_candidate, read_candidate
     from fish_train.evaluation.cells import make_cells, read_path
-    from fish_train.evaluation.conditions import make_condition, robust_conditions
-    from fish_train.evaluation.study import run_study
+    from fish_train.evaluation.study import make_condition, robust_conditions, run_study
     from fish_train.evaluation.tables import ratio_table, summary_table
 
     check_conditions(args)
@@ -163,8 +162,8 @@ def _say_failures(failed: list[Row], console: Console) -> None:
 
 def write_study(table: Path, page: Path, rows: list[Row], nominal: str) -> None:
     """All runs as CSV, and the page; nominal: the condition that the others are compared with."""
-    from fish_train.evaluation.page import write_study_page
     from fish_train.evaluation.study import write_rows
+    from fish_train.evaluation.tables import write_study_page
 
     write_rows(table, rows)
     write_study_page(page, rows, nominal)

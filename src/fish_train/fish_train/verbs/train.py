@@ -87,8 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Train; 0 when every run finished its recipe."""
     from fish_train.training.config import load_config, make_config
-    from fish_train.training.display import Display
-    from fish_train.training.parallel_runs import run_all
+    from fish_train.training.parallel_runs import Display, run_all
     from fish_train.training.run import Job
 
     if args.seeds < 1 or args.jobs < 1 or args.seed < 0:
@@ -131,7 +130,7 @@ def run(args: argparse.Namespace) -> int:
 
 def robot_law(robot: Robot, file: Path | None, console: Console) -> Law:
     """The law with the feed-forward of the robot in `file`, the nominal one's without a file."""
-    from fish_train.evaluation.feed_forward import DoesNotSwim, law_of_robot
+    from fish_train.evaluation.open_loop import DoesNotSwim, law_of_robot
     from fish_train.training.closed_loop_equations import Law
 
     if file is None:

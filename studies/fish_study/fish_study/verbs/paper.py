@@ -62,8 +62,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from fish_train.evaluation.candidates import read_policy
     from fish_train.evaluation.cells import make_cells
-    from fish_train.evaluation.conditions import make_condition
-    from fish_train.evaluation.study import swim_all
+    from fish_train.evaluation.study import make_condition, swim_all
 
     if min(args.seeds, args.jobs, args.training_seeds) < 1:
         raise UserError("--seeds, --jobs and --training-seeds: expected at least 1")
@@ -103,8 +102,7 @@ def trained(
     """Curves of the seeds, trained or continued where they are not finished; and the number of levels. file: the robot's."""
     from fish_train.training.config import TrainConfig
     from fish_train.training.curriculum import make_levels
-    from fish_train.training.display import Display
-    from fish_train.training.parallel_runs import run_all
+    from fish_train.training.parallel_runs import Display, run_all
     from fish_train.training.run import Job
     from fish_train.training.run_log import read_curve
     from fish_train.verbs.train import robot_law

@@ -103,8 +103,8 @@ def run(args: argparse.Namespace) -> int:
     if args.close_loop:
         return _close_loop(args, console)
     with user_errors():
-        from fish_study.archive import opened_studies
         from fish_study.new_study import Asked
+        from fish_study.study import opened_studies
 
         asked = Asked(
             args.scenarios, args.groups, args.trials, args.duration, args.seed, given, recordings
@@ -249,8 +249,7 @@ def _close_loop(args: argparse.Namespace, console: Console) -> int:
     """Recordings of the second plant, trainings on each model, a search on the plant, one table and page."""
     from fish_report.page import Block, Figure, write_page
     from fish_report.terminal import print_table
-    from fish_study.close_loop import Plan, close_loop, loop_scenario
-    from fish_study.loop_folder import prepare
+    from fish_study.close_loop import Plan, close_loop, loop_scenario, prepare
     from fish_study.loop_page import loop_figure, loop_table, speed_table
     from fish_train.evaluation.study import write_rows
 

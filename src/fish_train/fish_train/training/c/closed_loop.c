@@ -1,7 +1,7 @@
 /* A window of the closed loop, forward and backward, LANES fish at a time.
 
    Before this text stand fish_sim's kernel (V, step, step_vjp, NS, NC, NP), the functions emitted from
-   expressions.py and mlp.h, path_search.h. One period: sense, policy (every `hold` periods; its gains are kept in
+   kernel.py and mlp.h, path_search.h. One period: sense, policy (every `hold` periods; its gains are kept in
    between), act, PHYSICS times (drive, step).
    Sizes: NO motion, NU guidance, NK control, NA actuator, NL last, NI inputs, NE errors, NR report, NGAIN gains,
    NCOST cost weights, HISTORY past motions (one a

@@ -4,7 +4,7 @@
    samples are nearest and ahead; the emitted `sense` does the rest. */
 
 #define ROW 5
-#define NG 15 /* GEOMETRY_NAMES of loop.py */
+#define NG 15 /* GEOMETRY_NAMES of closed_loop_equations.py */
 
 typedef struct {
   const double *table; /* (rows, ROW) */

@@ -1,6 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A run on disk: exact resume, roll-back of diverging training, weights that the controller reads."""
+"""Recipes, curriculum and runs on disk.
+
+The shipped YAML is the default, and what cannot work is refused by name. A run resumes exactly, a diverging one rolls back, the
+controller reads the weights.
+"""
 
 import json
 import os
@@ -23,11 +27,10 @@ from fish_sim.robot import Robot
 from fish_sim.scheme import growth, modes_at_rest
 from fish_train.evaluation.candidates import read_candidate
 from fish_train.training import parallel_runs
-from fish_train.training.batch_state import WindowResult
-from fish_train.training.checkpoint import load_checkpoint, save_checkpoint
+from fish_train.training.batch import WindowResult
 from fish_train.training.closed_loop_equations import Law
-from fish_train.training.config import TrainConfig, make_config
-from fish_train.training.episodes import CERTAIN
+from fish_train.training.config import TrainConfig, load_config, make_config
+from fish_train.training.curriculum import CERTAIN, SlidingCriterion, make_levels
 from fish_train.training.network import (
     FORMS,
     from_tensors,
@@ -41,11 +44,13 @@ from fish_train.training.run import (
     Status,
     run,
 )
+from fish_train.training.run_files import SCHEDULE, load_checkpoint, save_checkpoint, write_weights
 from fish_train.training.run_log import RunLog, read_curve
 from fish_train.training.search import search
 from fish_train.training.trainer import Trainer, TrainingDiverged, training_scheme
-from fish_train.training.weights_output import SCHEDULE, write_weights
+from fish_train.verbs.train import parse_settings
 
+RECIPE = Path(__file__).parents[1] / "config" / "train.yaml"
 SHORT = {
     "batch": 3,
     "unroll": 4,
@@ -62,6 +67,111 @@ SHORT = {
     "latency": 0.05,
     "randomise": 0.2,
 }
+
+
+def test_the_shipped_recipe_is_the_default() -> None:
+    content = load_config(RECIPE)
+    assert list(content) == list(TrainConfig().to_plain())
+    assert make_config(content) == TrainConfig()
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"batch": 0}, "batch: got 0"),
+        ({"unroll": 2.5}, "unroll: got 2.5; expected a whole number"),
+        ({"slowest": 0.3, "fastest": 0.1}, "slowest: got 0.3 m/s; expected at most fastest"),
+        ({"fastest": 0.9}, "fastest: got 0.9"),
+        ({"radii": [1.0, 0.01]}, "radii: got 0.01"),
+        ({"radii": []}, "radii: got ()"),
+        ({"thresholds": [0.01, 0.03]}, "thresholds: got .* falling"),
+        ({"sinusoid_length": 3.0}, "turns within 0.06 m; expected at least 0.15 m"),
+        ({"approach": 20.0}, "approach: got 20.0 s; expected less than an episode"),
+        ({"latency": 2.0}, "latency: got 2.0"),
+        ({"learning_rate": float("nan")}, "learning_rate: got nan"),
+        ({"start_speed_ki": 0.5}, "start_speed_ki: got 0.5"),
+        ({"lerning_rate": 1e-3}, "unknown name 'lerning_rate'; known: batch"),
+    ],
+)
+def test_what_cannot_work_is_refused_by_name(values: dict, said: str) -> None:
+    with pytest.raises(UserError, match=said.replace("(", r"\(").replace(")", r"\)")):
+        make_config(values)
+
+
+def test_settings_of_the_command_line() -> None:
+    assert parse_settings(["batch=4", "learning_rate=3e-4", "radii=[1.0, 0.8]"]) == {
+        "batch": 4,
+        "learning_rate": 3e-4,
+        "radii": [1.0, 0.8],
+    }
+    with pytest.raises(UserError, match="--set batch: expected KEY=VALUE"):
+        parse_settings(["batch"])
+    with pytest.raises(UserError, match="expected a number"):
+        parse_settings(["batch=many"])
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"batch: 2020-13-45", "cannot be read as YAML: month must be in 1..12"),
+        (b"batch: [1", "cannot be read as YAML: while parsing"),
+        (b"name: \xff", "cannot be read as YAML: 'utf-8' codec"),
+        (b"[batch]", "got list; expected a table of name: value"),
+    ],
+)
+def test_a_recipe_that_is_no_table_is_refused_with_its_name(
+    content: bytes, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "recipe.yaml").write_bytes(content)
+    with pytest.raises(UserError, match=f"recipe.yaml: {said}"):
+        load_config(tmp_path / "recipe.yaml")
+
+
+def test_an_empty_recipe_is_the_default(tmp_path: Path) -> None:
+    (tmp_path / "recipe.yaml").write_text("# all as shipped\n")
+    assert make_config(load_config(tmp_path / "recipe.yaml")) == TrainConfig()
+
+
+def test_sinusoids_and_circles_alternate_once_for_each_threshold() -> None:
+    levels = make_levels(make_config({}))
+    assert len(levels) == 24
+    assert [level.family for level in levels[:4]] == ["sinusoid", "circle", "sinusoid", "circle"]
+    assert [level.threshold for level in levels] == [0.03] * 12 + [0.01] * 12
+    assert [level.size for level in levels[1:12:2]] == [1.5, 1.4, 1.3, 1.2, 1.1, 1.0]
+    assert [(level.size, level.cycles) for level in levels[0:12:2]] == [
+        (1.0, 0.5),
+        (1.0, 1.0),
+        (1.0, 2.0),
+        (1.5, 0.5),
+        (1.5, 1.0),
+        (1.5, 2.0),
+    ]
+
+
+def test_paths_of_a_level_have_its_size() -> None:
+    config = make_config({})
+    levels, rng = make_levels(config), np.random.default_rng(1)
+    waves = levels[4].paths(config, rng)
+    assert len({round(float(path.heading_at(0.0)), 3) for path in waves}) > 4  # phases differ
+    for path in waves:
+        assert np.abs(path.points[:, 1]).max() == pytest.approx(levels[4].size, rel=1e-3)
+    left, right = levels[1].paths(config, rng)
+    assert np.median(left.curvature) == pytest.approx(1.0 / 1.5, rel=1e-3)
+    assert np.median(right.curvature) == pytest.approx(-1.0 / 1.5, rel=1e-3)
+
+
+def test_a_level_passes_on_a_full_window_below_its_threshold() -> None:
+    criterion = SlidingCriterion(3)
+    for value in (0.02, 0.02):
+        criterion.add(value)
+        assert not criterion.passed(0.03)  # the window is not full
+    criterion.add(0.08)
+    assert criterion.mean == pytest.approx(0.04)
+    assert not criterion.passed(0.03)
+    criterion.add(0.02)
+    criterion.add(0.02)
+    criterion.add(0.02)  # the bad episode has left the window
+    assert criterion.passed(0.03)
 
 
 def short(**values) -> TrainConfig:

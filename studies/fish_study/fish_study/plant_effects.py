@@ -1,8 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Effects that the vocabulary has no name for: a plant may have them, the tool's table EFFECTS does not hold them.
+"""Effects that a plant may have and the tool's table EFFECTS does not hold.
 
-The right answer to each is `unexplained`, or `no_mismatch` where too weak to see; any name is a wrong name.
+OTHER_FORMS: physics that the vocabulary names, in a form other than the tool's own candidate; the right answer is that name.
+OUTSIDE: physics that the vocabulary has no name for; the right answer to each is `unexplained`, or `no_mismatch` where too
+weak to see; any name is a wrong name.
 """
 
 from __future__ import annotations
@@ -10,12 +12,45 @@ from __future__ import annotations
 from typing import Any
 
 from fish_sim.effects import EFFECTS
-from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
+from fish_sim.effects.effect import BodyMotion, Drive, Effect, Flow, Values, Wrench
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter
-from fish_study.other_forms import OTHER_FORMS
 
+VORTEX_SOURCE = "Taylor vortex (Saffman 1992, Vortex Dynamics, ch. 13); strengths are an assumption"
 SOURCE = "invented for the blind study; not in the vocabulary"
+
+
+class Vortex(Effect):
+    """One vortex somewhere in the pool: V_t = speed (r / core) exp((1 - r^2 / core^2) / 2) about (at_x, at_y).
+
+    r [m]: distance from its middle, where the water rests; `speed` is reached at r = core. Frame: pool.
+    """
+
+    name = "vortex"
+    kind = "physics"
+    equation = "V_t = speed (r/core) exp((1 - r^2/core^2)/2) about (at_x, at_y)"
+    source = VORTEX_SOURCE
+    parameters = {
+        "speed": Parameter(0.0, "m/s", -0.5, 0.5, VORTEX_SOURCE, typical=0.04),
+        "at_x": Parameter(0.3, "m", -2.0, 2.0, VORTEX_SOURCE),
+        "at_y": Parameter(0.2, "m", -1.0, 1.0, VORTEX_SOURCE),
+        "core": Parameter(0.5, "m", 0.05, 2.0, VORTEX_SOURCE),
+    }
+    strength = ("speed",)
+
+    @staticmethod
+    def water(p: Values, x: Scalar, y: Scalar, z: Values, xp: Any) -> Flow:
+        dx, dy, k = x - p.at_x, y - p.at_y, 1.0 / p.core**2
+        turn = p.speed / p.core * xp.exp(0.5 * (1.0 - k * (dx**2 + dy**2)))
+        gradient = (
+            (turn * k * dx * dy, turn * (k * dy**2 - 1.0)),
+            (turn * (1.0 - k * dx**2), -turn * k * dx * dy),
+        )
+        return (-turn * dy, turn * dx), gradient
+
+
+OTHER_FORMS: dict[str, type[Effect]] = {"vortex": Vortex}
+MEANS = {"vortex": "nonuniform_current"}
 
 
 class StrokeAsymmetry(Effect):
