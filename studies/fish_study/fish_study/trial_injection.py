@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Known effects put into a recorded trial exactly, as `fish_sysid.dataset.injection` does on the grid.
+"""Known effects put into a recorded trial exactly, as `fish_sysid.dataset.synthetic` does on the grid.
 
 Nothing but the concealed effect is in the result: no noise, no filter, no interpolation, but for the rudder's delay, which
 takes commands of the trial itself.
