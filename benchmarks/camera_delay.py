@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fish_bag import read_dataset
-from fish_sysid.dataset.camera_time_offset import DELAYS, align, misfits
+from fish_sysid.dataset.camera import DELAYS, align, misfits
 from fish_sysid.dataset.experiment import Experiment, build_experiment
 
 WIDTH, HEIGHT, LEFT, BOTTOM, MARGIN = 560, 300, 56, 44, 12  # pixels

@@ -19,8 +19,8 @@ from pathlib import Path
 
 from fish_report.json_file import write_json
 from fish_sim.robot import Robot
-from fish_sysid.dataset.injection import with_injection
 from fish_sysid.dataset.read import read_experiment
+from fish_sysid.dataset.synthetic import with_injection
 from fish_sysid.diagnosis.diagnosis_json import answer
 from fish_sysid.diagnosis.pipeline import diagnose
 

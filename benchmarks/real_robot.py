@@ -20,15 +20,15 @@ from pathlib import Path
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import align, moved_back
+from fish_sysid.dataset.camera import align, moved_back
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.imu_time_offset import imu_moved_back
+from fish_sysid.dataset.imu import imu_moved_back
 from fish_sysid.dataset.read import read_experiment
 from fish_sysid.diagnosis.vocabulary import choosable
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization
-from fish_sysid.estimation.sensor_noise import usual_noise
-from fish_sysid.estimation.shooting.elimination import INTRINSIC
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
+from fish_sysid.estimation.shooting.selection import INTRINSIC
 from fish_sysid.prediction.baselines import fit_baselines, predict_baseline
 from fish_sysid.prediction.kept_noise import with_noise
 from fish_sysid.prediction.prediction import EVERY, HORIZONS, WARM_UP, predict, prediction_errors

@@ -26,8 +26,7 @@ from fish_sysid.dataset.experiment import Experiment, Headings
 from fish_sysid.dataset.synthetic import KINDS, program, record, sensed
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
-from fish_sysid.estimation.shooting.prediction_band import inside
-from fish_sysid.estimation.shooting.prediction_fit import fit_predictions
+from fish_sysid.estimation.shooting.prediction_fit import fit_predictions, inside
 from fish_sysid.estimation.shooting.schedule import multistep
 
 TRIALS, SEEN = 12, 8

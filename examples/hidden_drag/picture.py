@@ -21,7 +21,7 @@ from fish_sysid.dataset.experiment import build_experiment
 from fish_sysid.diagnosis.pipeline import diagnose
 from fish_sysid.diagnosis.result import Diagnosis
 from fish_sysid.reports.diagnosis_figures import binned_means
-from fish_sysid.reports.identify_page_figures import whole_swims
+from fish_sysid.reports.identify_page import whole_swims
 
 EFFECT = "quadratic_drag"  # concealed in these recordings
 SHOWN = 8  # names of the evidence

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.injection import INJECTIONS, with_injection
 from fish_sysid.dataset.read import read_experiment
+from fish_sysid.dataset.synthetic import INJECTIONS, with_injection
 from fish_sysid.diagnosis.change.candidates import typical
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.compare import compare

@@ -18,9 +18,9 @@ import numpy as np
 from fish_report.page import Table
 from fish_report.terminal import print_table, terminal
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import align, moved_back
-from fish_sysid.dataset.injection import INJECTIONS
+from fish_sysid.dataset.camera import align, moved_back
 from fish_sysid.dataset.read import read_experiment
+from fish_sysid.dataset.synthetic import INJECTIONS
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import LOOKS
 from fish_sysid.diagnosis.change.explanation import NAMES

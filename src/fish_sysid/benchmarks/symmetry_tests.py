@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.injection import with_current, with_image_age
 from fish_sysid.dataset.read import read_experiment
+from fish_sysid.dataset.synthetic import with_current, with_image_age
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 

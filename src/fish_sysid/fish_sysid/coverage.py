@@ -14,15 +14,14 @@ from fish_sim.robot import Robot
 from fish_sim.water_push import USUAL_SIZE
 from fish_sysid.dataset.synthetic import KINDS, program, record
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.global_fit import refit_if_suspect
 from fish_sysid.estimation.map_fit import Fit
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import (
     LOG_PRIOR,
     NOMINAL_FREE,
     nominal_hypothesis,
 )
-from fish_sysid.estimation.refit import ANNEAL_HELD, refit
-from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.refit import ANNEAL_HELD, refit, refit_if_suspect
 
 Array = NDArray[np.float64]
 

@@ -17,21 +17,24 @@ from numpy.typing import NDArray
 
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import Alignment, align, moved_back
+from fish_sysid.dataset.camera import (
+    Alignment,
+    ahead_of,
+    align,
+    at_centre_of_mass,
+    moved_back,
+    with_marker,
+)
 from fish_sysid.dataset.experiment import FEWEST_POSES, Experiment
-from fish_sysid.dataset.imu_time_offset import imu_moved_back
-from fish_sysid.dataset.marker_place import ahead_of, at_centre_of_mass, with_marker
+from fish_sysid.dataset.imu import imu_moved_back
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.global_fit import refit_if_suspect
-from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
+from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Parametrization, nominal_hypothesis
-from fish_sysid.estimation.refit import ANNEAL_HELD, refit
-from fish_sysid.estimation.sensor_noise import usual_noise
-from fish_sysid.estimation.shooting.elimination import INTRINSIC
-from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
+from fish_sysid.estimation.refit import ANNEAL_HELD, refit, refit_if_suspect
 from fish_sysid.estimation.shooting.prediction_fit import LINKS, PredictionFit, fit_predictions
-from fish_sysid.estimation.shooting.schedule import can_be_predicted
+from fish_sysid.estimation.shooting.schedule import TOO_FAR, can_be_predicted, misfit
+from fish_sysid.estimation.shooting.selection import INTRINSIC
 from fish_sysid.estimation.thresholds import INNOVATION_RMS_REJECT, RATIO_REJECT
 from fish_sysid.identification_result import Identification, trust_of
 from fish_sysid.identification_statements import (
@@ -44,10 +47,9 @@ from fish_sysid.identification_statements import (
     start_statements,
     verdict,
 )
-from fish_sysid.prediction.better_states import better_states
-from fish_sysid.prediction.held_out_errors import judge
+from fish_sysid.prediction.baselines import judge
 from fish_sysid.prediction.kept_noise import with_noise
-from fish_sysid.prediction.prediction import estimate
+from fish_sysid.prediction.prediction import better_states, estimate
 
 Array = NDArray[np.float64]
 

@@ -1,18 +1,24 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What an identification gives: the robot with its errors, the trials, and how well it predicts those left out."""
+"""What an identification gives: the robot with its errors, the trials, predictions of those left out; and its files."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_report.json_file import write_json
 from fish_sim.robot import Robot
+from fish_sim.robot_file import save_robot
+from fish_sysid.dataset.camera import with_marker
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.marker_place import with_marker
 from fish_sysid.estimation.map_fit import Fit
+from fish_sysid.estimation.shooting.left_out import Step
 from fish_sysid.estimation.shooting.prediction_fit import PredictionFit
 from fish_sysid.estimation.shooting.residuals import Scale
 from fish_sysid.estimation.shooting.start_states import START_TRUST
@@ -70,3 +76,76 @@ class Identification:
 def trust_of(predicted: PredictionFit | None) -> Scale:
     """How far start states trust the sensors."""
     return START_TRUST if predicted is None else predicted.found.trust
+
+
+def write_identification(folder: Path, result: Identification, left_out: Sequence[str]) -> None:
+    """Write robot.yaml and identification.json into an existing folder."""
+    notes = f"Identified from {', '.join(result.training.names)}."
+    save_robot(result.robot, folder / "robot.yaml", result.fit.standard_errors, notes)
+    write_json(folder / "identification.json", as_record(result, left_out))
+
+
+def as_record(result: Identification, left_out: Sequence[str]) -> dict[str, Any]:
+    """Plain data: parameters, correlation, biases, noise, errors, statements."""
+    fit, unknown = result.fit, set(result.undetermined)
+    parameters = {
+        name: {"value": value, "std": fit.standard_errors[name], "determined": name not in unknown}
+        for name, value in fit.values.items()
+    }
+    biases = {
+        name: {
+            "value": result.estimates.bias[m].tolist(),
+            "std": result.estimates.bias_std[m].tolist(),
+        }
+        for m, name in enumerate(result.training.names)
+    }
+    return {
+        "training_trials": list(result.training.names),
+        "held_out_trials": list(result.held_out.names) if result.held_out else [],
+        "left_out": list(left_out),
+        "parameters": parameters,
+        "correlation": {
+            "names": list(fit.hypothesis.free),
+            "matrix": np.round(result.correlation, 4).tolist(),
+        },
+        "biases": {"order": ["gyro_z", "accel_forward", "accel_left"], "trials": biases},
+        "noise": asdict(fit.noise),
+        "camera_delay": result.camera_delay,
+        "imu_delay": result.imu_delay,
+        **_predicted(result),
+        "log_likelihood": float(fit.log_likelihood.sum()),
+        "samples": float(fit.result.samples.sum()),
+        "errors": {name: sizes.as_table() for name, sizes in result.errors.items()},
+        "statements": list(result.statements),
+        "seconds": result.seconds,
+    }
+
+
+def _predicted(result: Identification) -> dict[str, Any]:
+    """What a fit to predictions says beyond its parameters."""
+    found = result.predicted
+    if found is None:
+        return {"fitted_to": "likelihood"}
+    return {
+        "fitted_to": "predictions",
+        "links": found.robot.links,
+        "links_judged": [_step(step) for step in found.links_judged],
+        "trust": asdict(found.found.trust),
+        "spread_over_folds": found.parameter_spread,
+        "sensors": {
+            name: {"value": value, "std": found.sensor_errors[name]}
+            for name, value in found.sensors.items()
+        },
+        "effects_judged": [_step(step) for step in found.steps],
+    }
+
+
+def _step(step: Step) -> dict[str, Any]:
+    """What one candidate did to trials left out."""
+    return {
+        "name": step.name,
+        "gain": step.gain,
+        "std": step.deviation,
+        "added": step.added,
+        "alike": list(step.alike),
+    }

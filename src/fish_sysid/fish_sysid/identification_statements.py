@@ -7,15 +7,15 @@ from __future__ import annotations
 import numpy as np
 
 from fish_sim.model import DT
-from fish_sysid.dataset.camera_time_offset import Alignment
+from fish_sysid.dataset.camera import Alignment
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import Parametrization, zeros
-from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.left_out import Step, step_text
 from fish_sysid.estimation.shooting.prediction_fit import IMU_CLOCK, PLACE, PredictionFit
-from fish_sysid.estimation.shooting.rudder_end import RANGE, WIDEST
-from fish_sysid.prediction.held_out_errors import AHEAD, BASELINES, PEEK
+from fish_sysid.estimation.shooting.rollout import ShotParametrization
+from fish_sysid.estimation.shooting.selection import RANGE, WIDEST
+from fish_sysid.prediction.baselines import AHEAD, BASELINES, PEEK
 from fish_sysid.prediction.prediction import HORIZONS, WARM_UP, ErrorSizes
 from fish_sysid.prediction.stroke_average import stroke_mean
 

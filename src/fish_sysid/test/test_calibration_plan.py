@@ -6,19 +6,20 @@ import pytest
 from fish_report.errors import UserError
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import record
-from fish_sysid.design.calibration_plan import plan_calibration, robots_like
-from fish_sysid.design.candidate_swims import MARGIN, candidates, placed, swims_of
-from fish_sysid.design.noise_free import SensorSet, states
-from fish_sysid.design.shortest_set import (
+from fish_sysid.design.calibration_plan import (
+    plan_calibration,
     reachable,
+    robots_like,
     shortest_possible,
     shortest_set,
     standard_errors,
 )
+from fish_sysid.design.candidate_swims import MARGIN, candidates, placed, swims_of
+from fish_sysid.design.sensitivity import SensorSet, states
 from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.refit import REFIT, refit
-from fish_sysid.estimation.sensor_noise import usual_noise
 
 ROBOT = Robot(links=1)
 FREE = (

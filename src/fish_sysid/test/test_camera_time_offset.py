@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import DELAYS, align, misfits, moved_back
+from fish_sysid.dataset.camera import DELAYS, align, misfits, moved_back
+from fish_sysid.dataset.commands import driven, standing
 from fish_sysid.dataset.experiment import Experiment, Frames
-from fish_sysid.dataset.imu_leveling import level
-from fish_sysid.dataset.rotor_coasting import driven, standing
+from fish_sysid.dataset.grid import level
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 

@@ -12,8 +12,8 @@ from kinematic_swims import World, kinematic_swims
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
-from fish_sysid.dataset.injection import INJECTIONS, with_injection
-from fish_sysid.dataset.joined import joined
+from fish_sysid.dataset.experiment import joined
+from fish_sysid.dataset.synthetic import INJECTIONS, with_injection
 from fish_sysid.diagnosis.change import comparable
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import (

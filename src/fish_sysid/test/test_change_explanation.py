@@ -13,7 +13,7 @@ import pytest
 from kinematic_swims import World, kinematic_swims
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.injection import with_injection
+from fish_sysid.dataset.synthetic import with_injection
 from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.channels import swims

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.command_gaps import LostCommandsError, commands_on_grid, holes
+from fish_sysid.dataset.commands import LostCommandsError, commands_on_grid, holes
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise

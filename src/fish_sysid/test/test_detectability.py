@@ -9,8 +9,13 @@ from fish_control.excitation import Program, Row
 from fish_sim.robot import Robot
 from fish_sysid.design.candidate_swims import swims_of_program
 from fish_sysid.design.detectability import detectability, vocabulary
-from fish_sysid.design.noise_free import SensorSet, shown
-from fish_sysid.design.sensitivity import information, innovations, signals_of_parameters
+from fish_sysid.design.sensitivity import (
+    SensorSet,
+    information,
+    innovations,
+    shown,
+    signals_of_parameters,
+)
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 

@@ -25,10 +25,9 @@ from fish_sysid.estimation.ekf_types import (
     SensorModel,
     place_frames,
 )
-from fish_sysid.estimation.fixed_lag import smoothed
 from fish_sysid.estimation.map_fit import evaluate
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, nominal_hypothesis
-from fish_sysid.estimation.smoother import smooth
+from fish_sysid.estimation.smoother import smooth, smoothed
 
 SENSORS = (
     "camera_latency",

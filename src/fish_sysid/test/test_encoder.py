@@ -10,10 +10,9 @@ from scipy.stats import norm
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import program, record
-from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.encoder import commanded_residual, encoder_noise, encoder_terms
+from fish_sysid.estimation.ekf_types import Noise, encoder_terms
 from fish_sysid.estimation.map_fit import evaluate
-from fish_sysid.estimation.noise_estimation import estimate_noise
+from fish_sysid.estimation.noise_estimation import commanded_residual, encoder_noise, estimate_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
+from fish_sysid.dataset.commands import held_rudder
 from fish_sysid.dataset.experiment import Headings
-from fish_sysid.dataset.imu_time_offset import imu_moved_back
-from fish_sysid.dataset.rotor_coasting import held_rudder
+from fish_sysid.dataset.imu import imu_moved_back
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.identification_statements import incomplete

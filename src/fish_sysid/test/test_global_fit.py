@@ -11,11 +11,10 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.model_order import with_links
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.global_fit import global_fit, multistart_fit
 from fish_sysid.estimation.map_fit import Fit, evaluate, likelihoods
 from fish_sysid.estimation.noise_estimation import Reach, estimate_noise
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, Hypothesis, nominal_hypothesis
-from fish_sysid.estimation.refit import ANNEAL, REFIT, refit
+from fish_sysid.estimation.refit import ANNEAL, REFIT, global_fit, multistart_fit, refit
 from fish_sysid.estimation.thresholds import SHORTEST_WRENCH
 
 

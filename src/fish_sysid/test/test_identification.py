@@ -31,7 +31,7 @@ from fish_sysid.identification import (
     split,
     with_poses_left,
 )
-from fish_sysid.identification_json import write_identification
+from fish_sysid.identification_result import write_identification
 from fish_sysid.identification_statements import (
     AGE_UNKNOWN,
     data_statements,

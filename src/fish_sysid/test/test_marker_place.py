@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fish_sim.robot import Robot
+from fish_sysid.dataset.camera import ahead_of, at_centre_of_mass, forward, with_marker
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.marker_place import ahead_of, at_centre_of_mass, forward, with_marker
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.diagnosis.known_effects import known_effects
 from fish_sysid.diagnosis.task import make_task

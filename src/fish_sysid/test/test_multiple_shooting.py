@@ -11,8 +11,8 @@ import pytest
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
+from fish_sysid.dataset.camera import at_centre_of_mass
 from fish_sysid.dataset.experiment import Experiment, Headings
-from fish_sysid.dataset.marker_place import at_centre_of_mass
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import (
@@ -20,16 +20,23 @@ from fish_sysid.estimation.parametrization import (
     Parametrization,
     nominal_hypothesis,
 )
-from fish_sysid.estimation.shooting.clustered_errors import clustered_covariance, scores_by_trial
-from fish_sysid.estimation.shooting.coordinates import ShotParametrization
+from fish_sysid.estimation.shooting.least_squares import (
+    Blocks,
+    clustered_covariance,
+    eliminate,
+    scores_by_trial,
+)
 from fish_sysid.estimation.shooting.multiple_shooting import Shooting
 from fish_sysid.estimation.shooting.multistep import Multistep
 from fish_sysid.estimation.shooting.prediction_fit import with_links
-from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
-from fish_sysid.estimation.shooting.rollout import Directions, memories, poses_and_slopes
-from fish_sysid.estimation.shooting.schur import Blocks, eliminate
+from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS, cut, regular_starts
+from fish_sysid.estimation.shooting.rollout import (
+    Directions,
+    ShotParametrization,
+    memories,
+    poses_and_slopes,
+)
 from fish_sysid.estimation.shooting.start_states import shot_states
-from fish_sysid.estimation.shooting.windows import cut, regular_starts
 
 FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
 NOISE = Noise(wrench=(5e-4, 1e-3, 3e-5))

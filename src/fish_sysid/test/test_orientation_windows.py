@@ -10,8 +10,8 @@ from kinematic_swims import World, kinematic_swims
 
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment, Headings
-from fish_sysid.dataset.injection import with_gyro_scale
-from fish_sysid.dataset.orientation_windows import WINDOW, orientation_windows
+from fish_sysid.dataset.imu import WINDOW, orientation_windows
+from fish_sysid.dataset.synthetic import with_gyro_scale
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from kinematic_swims import World, kinematic_swims
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.injection import with_injection
+from fish_sysid.dataset.synthetic import with_injection
 from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.channels import swims

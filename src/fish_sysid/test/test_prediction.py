@@ -12,16 +12,16 @@ import pytest
 
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
+from fish_sysid.dataset.camera import forward
 from fish_sysid.dataset.experiment import Experiment, Frames
-from fish_sysid.dataset.marker_place import forward
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import FilterResult, Noise
 from fish_sysid.prediction import prediction
 from fish_sysid.prediction.baselines import constant, fit_baselines, predict_baseline
 from fish_sysid.prediction.prediction import predict, prediction_errors
-from fish_sysid.prediction.prediction_table import COLUMNS, write_predictions
 from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
+from fish_sysid.reports.identify_tables import COLUMNS, write_predictions
 
 QUIET = Noise(
     wrench=(1e-6, 1e-6, 1e-8),

@@ -10,13 +10,11 @@ import numpy as np
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
-from fish_sysid.dataset.experiment import Experiment, Headings
-from fish_sysid.dataset.joined import joined
+from fish_sysid.dataset.experiment import Experiment, Headings, joined
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
-from fish_sysid.estimation.shooting.prediction_band import NORMAL, inside, missed
-from fish_sysid.estimation.shooting.prediction_fit import uncertainty
+from fish_sysid.estimation.shooting.prediction_fit import NORMAL, inside, missed, uncertainty
 from fish_sysid.estimation.shooting.residuals import SENSORS
 from fish_sysid.estimation.shooting.schedule import Found, multistep, polished
 

@@ -15,10 +15,13 @@ from fish_sysid.dataset.experiment import Experiment, Frames, Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
-from fish_sysid.estimation.shooting.coordinates import ShotParametrization
-from fish_sysid.estimation.shooting.elimination import eliminate, without
-from fish_sysid.estimation.shooting.fold_steps import fold_steps
-from fish_sysid.estimation.shooting.left_out import LEVEL, converged, judged, left_out_costs
+from fish_sysid.estimation.shooting.left_out import (
+    LEVEL,
+    converged,
+    fold_steps,
+    judged,
+    left_out_costs,
+)
 from fish_sysid.estimation.shooting.multistep import LARGEST_STEP
 from fish_sysid.estimation.shooting.prediction_fit import (
     fit_predictions,
@@ -26,15 +29,19 @@ from fish_sysid.estimation.shooting.prediction_fit import (
     prediction_hypothesis,
 )
 from fish_sysid.estimation.shooting.residuals import SENSORS
-from fish_sysid.estimation.shooting.rudder_end import (
+from fish_sysid.estimation.shooting.rollout import ShotParametrization
+from fish_sysid.estimation.shooting.schedule import Found, multistep, polished, trusted
+from fish_sysid.estimation.shooting.selection import (
+    GLANCE,
     WIDEST,
+    choose,
+    eliminate,
     ends,
+    extended,
     judged_end,
     largest_command,
+    without,
 )
-from fish_sysid.estimation.shooting.schedule import Found, multistep, polished
-from fish_sysid.estimation.shooting.selection import GLANCE, choose, extended
-from fish_sysid.estimation.shooting.trust import trusted
 
 FREE = ("head_drag_surge", "head_drag_yaw")
 TRIALS = 8

@@ -11,6 +11,7 @@ from fish_sim.robot import Robot
 from fish_sysid.diagnosis.model_order import with_links
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import better
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.refit import (
     ANNEAL,
@@ -23,7 +24,6 @@ from fish_sysid.estimation.refit import (
     refit,
     refit_on,
 )
-from fish_sysid.estimation.sensor_noise import usual_noise
 
 FREE = ("head_drag_surge", "head_drag_sway", "tail_stiffness")
 TRUE = np.log([1.3, 0.8, 1.1])

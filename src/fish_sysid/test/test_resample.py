@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from fish_sysid.dataset.resample import apart, on_grid
+from fish_sysid.dataset.grid import apart, on_grid
 
 DT = 0.01
 GRID = DT * np.arange(2000)

@@ -12,7 +12,7 @@ import pytest
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, Frames
-from fish_sysid.dataset.rest_detection import starts_at_rest
+from fish_sysid.dataset.grid import starts_at_rest
 from fish_sysid.dataset.synthetic import (
     FULL_SPEED,
     KINDS,

@@ -12,7 +12,7 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation.ekf_types import Noise
-from fish_sysid.estimation.sensor_noise import (
+from fish_sysid.estimation.noise_estimation import (
     FEWEST,
     SMALLEST,
     usual_noise,

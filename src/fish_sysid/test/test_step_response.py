@@ -11,7 +11,7 @@ import pytest
 
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment, Frames
-from fish_sysid.dataset.injection import with_injection
+from fish_sysid.dataset.synthetic import with_injection
 from fish_sysid.diagnosis.change.change import Member, Named
 from fish_sysid.diagnosis.change.rudder_change import (
     RudderChange,

@@ -17,7 +17,7 @@ from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 from fish_sysid.estimation.shooting.left_out import Step
 from fish_sysid.estimation.shooting.schedule import Found
-from fish_sysid.prediction.better_states import prediction_size
+from fish_sysid.prediction.prediction import prediction_size
 
 FREE = ("head_drag_surge", "head_drag_yaw", "tail_stiffness")
 WATER = Noise(wrench=(0.002, 0.004, 1e-4))

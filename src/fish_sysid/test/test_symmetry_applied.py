@@ -9,7 +9,7 @@ import pytest
 from kinematic_swims import World, kinematic_swims
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.injection import with_current
+from fish_sysid.dataset.synthetic import with_current
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import changed_robot
 from fish_sysid.diagnosis.symmetry.applied import applicable, in_still_water, with_findings

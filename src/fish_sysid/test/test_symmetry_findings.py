@@ -12,7 +12,7 @@ from kinematic_swims import World, kinematic_swims
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.injection import with_current, with_image_age
+from fish_sysid.dataset.synthetic import with_current, with_image_age
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import GIVEN, symmetry_findings
 from fish_sysid.diagnosis.symmetry.symmetry_json import stated

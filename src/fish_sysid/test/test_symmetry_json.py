@@ -12,7 +12,7 @@ from fish_report.json_file import plain
 from fish_sim.effects import EFFECTS
 from fish_sysid.diagnosis.symmetry.finding import Estimate, Evidence, SymmetryFinding
 from fish_sysid.diagnosis.symmetry.symmetry_json import stated, symmetry_entry, with_symmetry
-from fish_sysid.reports.symmetry_table import symmetry_table
+from fish_sysid.reports.diagnosis_page import symmetry_table
 from fish_sysid.reports.verdict_sentence import sentence
 
 FLOW = SymmetryFinding(

@@ -34,7 +34,7 @@ from fish_study.scenario_groups import INJECTED
 from fish_study.score import score_scenario
 from fish_study.study import read_json
 from fish_sysid.dataset.experiment import Experiment, build_experiment
-from fish_sysid.dataset.injection import with_injection
+from fish_sysid.dataset.synthetic import with_injection
 from fish_sysid.diagnosis.change.comparable import FEWEST_WAYS
 
 TOOL = (sys.executable, str(Path(__file__).with_name("fake_tool.py")))

@@ -15,11 +15,8 @@ from numpy.typing import NDArray
 
 from fish_bag.trial import Commands, Imu, Trial
 from fish_sim.model import DT
-from fish_sysid.dataset.command_gaps import LostCommandsError, commands_on_grid
-from fish_sysid.dataset.imu_leveling import heading, level
-from fish_sysid.dataset.resample import apart, on_grid
-from fish_sysid.dataset.rest_detection import starts_at_rest
-from fish_sysid.dataset.rotor_coasting import driven, held_rudder
+from fish_sysid.dataset.commands import LostCommandsError, commands_on_grid, driven, held_rudder
+from fish_sysid.dataset.grid import apart, heading, level, on_grid, starts_at_rest
 
 Array = NDArray[np.float64]
 
@@ -231,3 +228,32 @@ def shorten(experiment: Experiment, steps: int) -> Experiment:
     """The first `steps` grid points of every trial."""
     arrays = {k: getattr(experiment, k)[:steps] for k in ("commands", "gyro", "accel", "encoder")}
     return replace(experiment, steps=np.minimum(experiment.steps, steps), **arrays)
+
+
+def joined(days: Sequence[Experiment]) -> Experiment:
+    """All trials of these experiments; the names of those after the first day get its number where they are taken."""
+    if len(days) == 1:
+        return days[0]
+    longest = max(day.length for day in days)
+    arrays = {}
+    for key in ("commands", "gyro", "accel", "encoder"):
+        filler = 0.0 if key == "commands" else np.nan
+        padded = [
+            np.concatenate([a, np.full((longest - len(a), *a.shape[1:]), filler)])
+            for a in (getattr(day, key) for day in days)
+        ]
+        arrays[key] = np.concatenate(padded, axis=1)
+    names: list[str] = []
+    for number, day in enumerate(days, 1):
+        names += [f"{name} of day {number}" if name in names else name for name in day.names]
+    return replace(
+        days[0],
+        names=tuple(names),
+        steps=np.concatenate([day.steps for day in days]),
+        frames=tuple(f for day in days for f in day.frames),
+        headings=tuple(
+            h for day in days for h in (day.headings or (NO_HEADINGS,) * len(day.names))
+        ),
+        start_at_rest=all(day.start_at_rest for day in days),
+        **arrays,
+    )

@@ -16,7 +16,7 @@ from fish_control.excursions import COAST, excursions, find_start
 from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.way import way_from_rest
-from fish_sysid.design.noise_free import Swims, states
+from fish_sysid.design.sensitivity import Swims, states
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,13 @@ from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
 from fish_sim.sensors import SENSOR_EFFECTS
-from fish_sysid.design.noise_free import SensorSet, Swims, shown
-from fish_sysid.design.sensitivity import innovations, signals_of_parameters
+from fish_sysid.design.sensitivity import (
+    SensorSet,
+    Swims,
+    innovations,
+    shown,
+    signals_of_parameters,
+)
 from fish_sysid.diagnosis.significance import Level
 from fish_sysid.diagnosis.vocabulary import NOT_A_NAME
 from fish_sysid.estimation.ekf_types import Noise

@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import align, moved_back
+from fish_sysid.dataset.camera import align, moved_back
 from fish_sysid.diagnosis.known_effects import known_effects
 from fish_sysid.diagnosis.task import Task
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
-from fish_sysid.estimation.sensor_noise import usual_noise
-from fish_sysid.estimation.shooting.elimination import INTRINSIC
-from fish_sysid.estimation.shooting.misfit import TOO_FAR, misfit
+from fish_sysid.estimation.shooting.schedule import TOO_FAR, misfit
+from fish_sysid.estimation.shooting.selection import INTRINSIC
 
 FLOW = "current"  # the one effect of the pool that displaces a fish by more than the camera's noise in two seconds
 

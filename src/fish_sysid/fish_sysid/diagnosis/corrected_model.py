@@ -16,7 +16,7 @@ from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.shooting.misfit import TOO_FAR
+from fish_sysid.estimation.shooting.schedule import TOO_FAR
 from fish_sysid.estimation.thresholds import MOST_UNEXPLAINED, RATIO_REJECT
 from fish_sysid.prediction.prediction import EVERY, WARM_UP, predict, prediction_errors
 

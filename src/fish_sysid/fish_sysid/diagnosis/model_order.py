@@ -15,11 +15,10 @@ from fish_sysid.diagnosis.forward_selection import Selection
 from fish_sysid.diagnosis.residual_regression import Law, residual_law
 from fish_sysid.diagnosis.significance import evidence
 from fish_sysid.diagnosis.task import Task
-from fish_sysid.estimation.global_fit import multistart_fit
 from fish_sysid.estimation.map_fit import Fit, better
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
-from fish_sysid.estimation.refit import ANNEAL, ANNEAL_HELD, ANNEAL_NEAR, refit
-from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.refit import ANNEAL, ANNEAL_HELD, ANNEAL_NEAR, multistart_fit, refit
 from fish_sysid.estimation.thresholds import (
     MORE_LINKS,
     PROMISING_RATIO,

@@ -28,11 +28,10 @@ from fish_sysid.diagnosis.symmetry.applied import with_findings
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
 from fish_sysid.diagnosis.task import Progress, Task, make_task
-from fish_sysid.estimation.global_fit import global_fit
 from fish_sysid.estimation.map_fit import Fit, evaluate
+from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import EffectTable
-from fish_sysid.estimation.refit import anneal_if_grown, refit, refit_on
-from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.refit import anneal_if_grown, global_fit, refit, refit_on
 
 
 def diagnose(

@@ -17,7 +17,7 @@ from fish_sysid.diagnosis.significance import look_alike
 from fish_sysid.diagnosis.task import Task
 from fish_sysid.diagnosis.trial_split import Trials
 from fish_sysid.estimation.map_fit import Fit, better, climb, evaluate, log_posterior
-from fish_sysid.estimation.noise_estimation import estimate_noise
+from fish_sysid.estimation.noise_estimation import estimate_noise, usual_noise
 from fish_sysid.estimation.refit import (
     ANNEAL_SHORT_HELD,
     CONTINUE,
@@ -26,7 +26,6 @@ from fish_sysid.estimation.refit import (
     best_of_restart,
     refit,
 )
-from fish_sysid.estimation.sensor_noise import usual_noise
 from fish_sysid.estimation.thresholds import (
     ANNEALED_SHORTLIST,
     LARGE_EFFECT,

@@ -17,19 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
+from fish_sysid.dataset.camera import AHEAD, MARKER, ahead_of, at_centre_of_mass
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.marker_place import AHEAD, MARKER, ahead_of, at_centre_of_mass
 from fish_sysid.diagnosis.prediction_rivals import Named, with_rivals
 from fish_sysid.estimation.ekf_types import SensorModel
-from fish_sysid.estimation.initial_noise import initial_noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.sensor_noise import usual_noise
-from fish_sysid.estimation.shooting.elimination import INTRINSIC
+from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
 from fish_sysid.estimation.shooting.prediction_fit import PLACE, PredictionFit, fit_predictions
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
+from fish_sysid.estimation.shooting.selection import INTRINSIC
 from fish_sysid.estimation.shooting.start_states import without_sensor_errors
-from fish_sysid.prediction.better_states import better_states, prediction_size
 from fish_sysid.prediction.kept_noise import with_noise
+from fish_sysid.prediction.prediction import better_states, prediction_size
 
 Array = NDArray[np.float64]
 

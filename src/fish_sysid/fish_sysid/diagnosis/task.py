@@ -10,8 +10,8 @@ from typing import TypeVar
 
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
+from fish_sysid.dataset.camera import ahead_of, at_centre_of_mass, with_marker
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.marker_place import ahead_of, at_centre_of_mass, with_marker
 from fish_sysid.diagnosis.significance import Level
 from fish_sysid.diagnosis.trial_split import Split, Trials, split_trials, trials_of
 from fish_sysid.diagnosis.vocabulary import NoCandidateError, candidates, known, not_judged

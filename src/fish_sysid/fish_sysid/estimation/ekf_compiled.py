@@ -31,12 +31,12 @@ from fish_sysid.estimation.ekf_types import (
     Noise,
     Problem,
     SensorModel,
+    encoder_terms,
     first_commands,
     first_memory,
     first_state,
     place_frames,
 )
-from fish_sysid.estimation.encoder import encoder_terms
 
 ROTOR = 1  # of the memory: its speed
 

@@ -17,12 +17,12 @@ from fish_sysid.estimation.ekf_types import (
     Noise,
     Problem,
     drive_at,
+    encoder_terms,
     first_commands,
     first_memory,
     first_state,
     place_frames,
 )
-from fish_sysid.estimation.encoder import encoder_terms
 
 
 class Filter:

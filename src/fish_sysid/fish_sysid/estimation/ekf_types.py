@@ -9,6 +9,9 @@ State xi = [motion (q, q', states of effects), wrench on the head (3), biases of
 One pass gives the innovations, their covariance and, with the filter's gains held fixed, the derivative of every
 innovation with respect to every free parameter (prediction-error method; Ljung 1999, ch. 7 and 10). Gauss-Newton,
 score tests and the screening of candidates all come from the normal matrices that the pass adds up per trial.
+
+The encoder needs no filter: the rotor's speed follows from the commands alone. Single samples of a real one can be far off (a
+held rotor, a wrong stamp). A residual beyond the gate costs a constant and has no gradient.
 """
 
 from __future__ import annotations
@@ -205,3 +208,37 @@ def _until_seen(gyro: Array, late: float, noise: Noise) -> tuple[float, float, f
     felt, waited = np.isfinite(before), late - AT_ONCE
     unsure = noise.gyro_bias * waited + FASTEST_TURN * DT * float((~felt).sum())
     return DT * float(before[felt].sum()), FASTEST * waited, unsure
+
+
+@dataclass(frozen=True)
+class EncoderTerms:
+    """What the encoder adds to a pass over M trials with K free parameters."""
+
+    # (M,) sum of -min(r^2, gate) / 2 - log(sd sqrt(2 pi)), r = (encoder - rotor) / sd
+    log_likelihood: Array
+    samples: Array  # (M,)
+    gradient: Array  # (M, K) of -log likelihood
+    normal: Array  # (M, K, K)
+    whitened: Array  # (T, M) r, NaN without a sample
+
+
+def encoder_terms(
+    experiment: Experiment, noise: Noise, rotor: Array, d_rotor: Array
+) -> EncoderTerms:
+    """Terms of the model's rotor speed (T, M) [rad/s] and of its derivatives (T, M, K)."""
+    sampled = np.isfinite(experiment.encoder) & (
+        np.arange(experiment.length)[:, None] < experiment.steps
+    )
+    r = np.where(sampled, (experiment.encoder - rotor) / noise.encoder, 0.0)
+    inside = sampled & (r**2 < noise.gate_encoder)
+    pull, J = np.where(inside, r, 0.0), -np.where(inside[..., None], d_rotor, 0.0) / noise.encoder
+    samples = sampled.sum(axis=0)
+    rows, columns = J.transpose(1, 2, 0), J.transpose(1, 0, 2)  # by trial
+    return EncoderTerms(
+        -0.5 * np.sum(np.minimum(r**2, noise.gate_encoder), axis=0)
+        - samples * np.log(noise.encoder * np.sqrt(2.0 * np.pi)),
+        samples,
+        (rows @ pull.T[..., None])[..., 0],
+        rows @ columns,
+        np.where(sampled, r, np.nan),
+    )

@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What a physics model has to beat: three predictors that know nothing of the fish's mechanics.
+"""What a physics model has to beat, three predictors that know nothing of the fish's mechanics, and the errors of all.
 
     constant    speed and yaw rate stay as they are
     arx         linear: y_k = A1 y_k-1 + A2 y_k-2 + B1 w_k + B2 w_k-1 + c, y = (u, v, r), w = (sqrt(throttle), alpha)
@@ -8,7 +8,7 @@
 
 fitted to stroke means of the training trials by least squares. They start from the camera's stroke means. One at the start
 point would know half a second of what comes; to be judged in earnest they start from the last mean that ends there (`lead` =
-HALF_WINDOW) and run half a second longer.
+HALF_WINDOW) and run half a second longer. Errors are those of trials that took no part in a fit.
 """
 
 from __future__ import annotations
@@ -21,8 +21,19 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from fish_sim.model import DT
+from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.prediction.prediction import Predictions
+from fish_sysid.estimation.ekf_types import Noise
+from fish_sysid.estimation.noise_estimation import initial_noise
+from fish_sysid.prediction.prediction import (
+    EVERY,
+    HORIZONS,
+    WARM_UP,
+    ErrorSizes,
+    Predictions,
+    predict,
+    prediction_errors,
+)
 from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
@@ -33,6 +44,8 @@ STEP = 0.25  # s, period of the baselines
 STRIDE = round(STEP / DT)
 OUTLOOK = 3.0  # s, over which the bilinear model's surge is fitted
 RIDGE = 1e-6  # of each regressor's mean square: keeps constant commands solvable
+BASELINES = ("constant", "arx", "bilinear")
+AHEAD, PEEK = "_ahead", HALF_WINDOW  # suffix of predictors that know so many s of what comes
 
 
 @dataclass(frozen=True)
@@ -222,3 +235,25 @@ def _measured(like: Predictions, lag: int) -> Array:
         centres = np.maximum((like.start[which] - lag) * DT, frames.t[0] + HALF_WINDOW)
         out[which] = stroke_mean(frames.t, centres)(frames.pose)
     return out
+
+
+def judge(
+    training: Experiment, held_out: Experiment | None, start: Robot, fitted: Robot, noise: Noise
+) -> tuple[Predictions, dict[str, ErrorSizes], list[str]]:
+    """Predictions, errors of both robots and of the baselines, and what could not be had, on the held-out trials."""
+    unseen = held_out or training
+    longest = max(HORIZONS)
+    judged = predict(unseen, fitted, noise, longest, EVERY, WARM_UP)
+    peeking = predict(unseen, fitted, noise, longest, EVERY, WARM_UP, PEEK)
+    before = predict(unseen, start, initial_noise(unseen, start, noise), longest, EVERY, WARM_UP)
+    errors = {"start": prediction_errors(before), "identified": prediction_errors(judged)}
+    try:
+        baselines = fit_baselines(training)
+    except ValueError as error:
+        return judged, errors, [f"no baselines: {error}"]
+    for name, advance in baselines.items():
+        errors[name] = prediction_errors(predict_baseline(advance, judged, HALF_WINDOW))
+    errors["identified" + AHEAD] = prediction_errors(peeking)
+    for name, advance in baselines.items():
+        errors[name + AHEAD] = prediction_errors(predict_baseline(advance, judged))
+    return judged, errors, []

@@ -19,13 +19,12 @@ from fish_sysid.dataset.read import heading
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import changed_robot
 from fish_sysid.diagnosis.symmetry.finding import Estimate
-from fish_sysid.estimation.initial_noise import initial_noise
-from fish_sysid.estimation.sensor_noise import usual_noise
+from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
 from fish_sysid.prediction.kept_noise import kept_noise
 from fish_sysid.prediction.prediction import predict
 from fish_sysid.prediction.stroke_average import stroke_mean
-from fish_sysid.reports.identify_page_figures import MEASURED, SIMULATED
-from fish_sysid.reports.symmetry_table import symmetry_table
+from fish_sysid.reports.diagnosis_page import symmetry_table
+from fish_sysid.reports.identify_page import MEASURED, SIMULATED
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Content = dict[str, Any]

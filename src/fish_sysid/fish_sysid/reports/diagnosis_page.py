@@ -1,10 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of a diagnosis: verdict first, then where, evidence, rivals, before and after, what to try next."""
+"""The page of a diagnosis: verdict first, then where, symmetry tests, evidence, rivals, before and after, what to try next."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,10 @@ from fish_sysid.dataset.read import heading
 from fish_sysid.diagnosis.diagnosis_json import LAGS
 from fish_sysid.diagnosis.known_effects import known_effects, known_parameters
 from fish_sysid.diagnosis.result import Diagnosis, Round, Screened
+from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.reports.before_after import before_after
 from fish_sysid.reports.diagnosis_figures import (
+    before_after,
     force_against_covariates,
     force_over_the_pool,
     force_over_time,
@@ -32,7 +33,6 @@ from fish_sysid.reports.diagnosis_figures import (
     water_over_the_pool,
     when_it_acts,
 )
-from fish_sysid.reports.symmetry_table import symmetry_table
 from fish_sysid.reports.verdict_sentence import by_prediction, by_symmetry, sentence
 
 Content = dict[str, Any]
@@ -40,6 +40,12 @@ Content = dict[str, Any]
 DENSITY = "log_density_per_sample"
 NAT = (
     "A nat is a unit of log-likelihood: by n nats more, what was measured is e^n times as probable."
+)
+HEADER = ("test for", "answer", "numbers", "log gain on left-out trials", "assumes", "needs")
+NOTE = (
+    "Symmetries that no fish can break are broken by the pool, a clock or a sensor only, so these tests need no model of the "
+    "fish. Log gain: logarithm of the mean square without the effect over that with it, on trials that took no part in the fit, "
+    "with its standard error. Tests that assume a mirror-symmetric fish are shown and name nothing."
 )
 
 
@@ -222,3 +228,18 @@ def _unreachable(d: Diagnosis) -> str:
         "; ".join(f"{name}: {why}" for name, why in d.task.not_judged.items())
         or "All candidates could be judged."
     )
+
+
+def symmetry_table(tests: Sequence[Mapping[str, Any]], title: str = "Symmetry tests") -> Table:
+    """Every test of diagnosis.json's `symmetry`."""
+    return Table(title, HEADER, [_row(test) for test in tests], NOTE)
+
+
+def _row(test: Mapping[str, Any]) -> list[str]:
+    numbers = ", ".join(f"{key} {Estimate(**p)}" for key, p in test["parameters"].items())
+    told = test["evidence"]
+    gain = ""
+    if told:
+        gain = f"{told['left_out_log_gain']:.2f} ± {told['left_out_log_gain_std']:.2f}"
+    answer = ": ".join(part for part in (test["status"], test["reason"]) if part)
+    return [test["name"], answer, numbers, gain, test["assumes"], test["needs"]]

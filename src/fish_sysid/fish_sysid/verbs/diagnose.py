@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write the three files, print the verdict."""
-    from fish_sysid.dataset.marker_place import with_marker
+    from fish_sysid.dataset.camera import with_marker
     from fish_sysid.diagnosis.corrected_model import corrected
     from fish_sysid.diagnosis.diagnosis_json import answer
     from fish_sysid.diagnosis.pipeline import diagnose

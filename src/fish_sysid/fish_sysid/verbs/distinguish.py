@@ -19,7 +19,7 @@ from fish_report.json_file import write_json
 from fish_report.terminal import print_table, terminal
 from fish_report.writable import writable_file
 from fish_sim.robot_argument import read_model
-from fish_sysid.verbs.sensor_arguments import add_sensor_arguments, sensor_set
+from fish_sysid.verbs.plan_calibration import add_sensor_arguments, sensor_set
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_control.excitation import read_program
     from fish_sysid.design.candidate_swims import swims_of_every_kind, swims_of_program
     from fish_sysid.design.detectability import detectability, vocabulary
-    from fish_sysid.reports.distinguish_table import as_record, distinguish_table
+    from fish_sysid.reports.design_tables import as_record, distinguish_table
 
     console, robot = terminal(), read_model(args.robot)
     with user_errors():

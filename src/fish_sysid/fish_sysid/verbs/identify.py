@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     from fish_report.terminal import print_table
     from fish_sysid.diagnosis.vocabulary import choosable, known
     from fish_sysid.identification import identify
-    from fish_sysid.identification_json import write_identification
+    from fish_sysid.identification_result import write_identification
     from fish_sysid.reports.identify_page import write_identify_page
     from fish_sysid.reports.identify_tables import error_table, parameter_table
 

@@ -12,12 +12,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fish_report.errors import UserError, user_errors
 from fish_report.terminal import print_table, terminal
 from fish_report.writable import writable_file
 from fish_sim.robot_argument import read_model
-from fish_sysid.verbs.sensor_arguments import add_sensor_arguments, sensor_set
+
+if TYPE_CHECKING:
+    from fish_sysid.design.sensitivity import SensorSet
+
 
 ERROR = 0.05
 
@@ -46,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plan, print, write."""
     from fish_sysid.design.calibration_plan import plan_calibration, write_plan
-    from fish_sysid.reports.calibration_tables import error_table, swim_table
+    from fish_sysid.reports.design_tables import error_table, swim_table
 
     console = terminal()
     with user_errors():
@@ -81,3 +85,23 @@ def single_errors(text: str) -> dict[str, float]:
                 f"--errors: got {part!r}; expected NAME=SHARE, for example head_inertia=0.02"
             ) from None
     return found
+
+
+def add_sensor_arguments(parser: argparse.ArgumentParser) -> None:
+    """Rates of camera, IMU and encoder."""
+    for name, rate in (("camera", 30.0), ("imu", 100.0), ("encoder", 100.0)):
+        none = "" if name == "camera" else "; 0: none"
+        parser.add_argument(
+            f"--{name}-rate",
+            type=float,
+            default=rate,
+            metavar="HZ",
+            help=f"samples of the {name} per second{none} (default: %(default)s)",
+        )
+
+
+def sensor_set(args: argparse.Namespace) -> SensorSet:
+    """The sensors that the arguments describe."""
+    from fish_sysid.design.sensitivity import SensorSet
+
+    return SensorSet(args.camera_rate, args.imu_rate, args.encoder_rate)

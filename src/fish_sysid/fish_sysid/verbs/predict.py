@@ -36,12 +36,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the table, print the errors."""
     from fish_report.terminal import print_table
-    from fish_sysid.estimation.initial_noise import initial_noise
-    from fish_sysid.estimation.sensor_noise import usual_noise
+    from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
     from fish_sysid.prediction.kept_noise import kept_noise
     from fish_sysid.prediction.prediction import WARM_UP, predict, prediction_errors
-    from fish_sysid.prediction.prediction_table import write_predictions
-    from fish_sysid.reports.identify_tables import error_table
+    from fish_sysid.reports.identify_tables import error_table, write_predictions
 
     console = terminal()
     model = read_model(args.model)

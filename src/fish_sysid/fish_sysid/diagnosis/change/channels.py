@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
-from fish_sysid.dataset.camera_time_offset import gyro_windows
+from fish_sysid.dataset.camera import gyro_windows
 from fish_sysid.dataset.experiment import Experiment, Frames
-from fish_sysid.dataset.orientation_windows import orientation_windows
+from fish_sysid.dataset.imu import orientation_windows
 from fish_sysid.diagnosis.change.harmonics import HARMONICS, StrokeWeights
 from fish_sysid.diagnosis.symmetry.accelerometer import force_rows
 from fish_sysid.diagnosis.symmetry.regression import Rows

@@ -10,9 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import align, moved_back
-from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.joined import joined
+from fish_sysid.dataset.camera import align, moved_back
+from fish_sysid.dataset.experiment import Experiment, joined
 from fish_sysid.dataset.read import LESS
 from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fish_sysid.dataset.camera_time_offset import fine_delay, moved_back
+from fish_sysid.dataset.camera import fine_delay, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.candidates import (
     COLUMNS,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sysid.dataset.camera_time_offset import DELAYS, STEP, align, fine_delay, misfits
+from fish_sysid.dataset.camera import DELAYS, STEP, align, fine_delay, misfits
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.change import Member, Named
 from fish_sysid.diagnosis.change.contest import mean_gain

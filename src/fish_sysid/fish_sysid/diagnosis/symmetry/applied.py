@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.injection import with_current
+from fish_sysid.dataset.synthetic import with_current
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
 from fish_sysid.diagnosis.symmetry.symmetry_json import stated
 from fish_sysid.estimation.parametrization import effect_class

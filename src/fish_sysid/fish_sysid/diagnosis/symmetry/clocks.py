@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
-from fish_sysid.dataset.camera_time_offset import DELAYS, Alignment, misfits
+from fish_sysid.dataset.camera import DELAYS, Alignment, misfits
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding
 from fish_sysid.diagnosis.symmetry.regression import evidence, jackknife

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import align, moved_back
+from fish_sysid.dataset.camera import align, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.symmetry.accelerometer import accelerations, marker_or_imu
 from fish_sysid.diagnosis.symmetry.clocks import camera_clock, encoder_clock, imu_clock

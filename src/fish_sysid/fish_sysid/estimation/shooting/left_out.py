@@ -2,9 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an effect does to trials that the model was not fitted to, against a control.
 
-A fit goes on for a few iterations from where it stands and predicts every fold of trials by its parameters without that fold
-(`fold_steps`). The control is the same fit without the effect, with as many iterations, so that iterations are not taken for
-evidence.
+A fit goes on for a few iterations from where it stands and predicts every fold of trials by its parameters without that fold. The
+control is the same fit without the effect, with as many iterations, so that iterations are not taken for evidence. Parameters
+without a fold are one Gauss-Newton step from those of all trials:
+
+    z_f = z - (N - sum over f of J' W J)^-1 (g - sum over f of J' W e)
+
+N, g: Gauss-Newton matrix and gradient of all trials, with the prior. Near the optimum this is the fit to the rest of the trials
+to second order, at a fraction of the time (Beirami et al. 2017; Giordano et al. 2019).
 """
 
 from __future__ import annotations
@@ -17,15 +22,63 @@ from numpy.typing import NDArray
 from scipy.stats import norm, t
 
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.estimation.shooting.fold_steps import fold_of, without_folds
-from fish_sysid.estimation.shooting.multistep import SETTLED
+from fish_sysid.estimation.shooting.least_squares import weight
+from fish_sysid.estimation.shooting.multistep import LARGEST_STEP, SETTLED, Multistep
 from fish_sysid.estimation.shooting.schedule import Found, multistep
 
 Array = NDArray[np.float64]
 
+FOLDS = 4
+DAMPINGS = (0.0, 0.01, 0.1, 1.0)
 EVERY = 4.0  # s between start points
 LEVEL = float(norm.sf(2.0))  # probability that chance lets any of the effects looked at gain enough
 ROUNDS, ITERATIONS = 2, 2  # of a fit and its control alike
+
+
+def fold_of(trials: int) -> NDArray[np.int64]:
+    """(M,) which fold each of so many trials is in."""
+    return np.arange(trials) % FOLDS
+
+
+def fold_steps(
+    e: Array,
+    J: Array,
+    gradient: Array,
+    normal: Array,
+    fold: NDArray[np.int64],
+    damping: float = 0.0,
+) -> Array:
+    """(F, P) Gauss-Newton steps of the cost without the rows of each fold.
+
+    e: (R, 4) errors; J: (R, 4, P) slopes; gradient (P,) and normal (P, P) of the whole cost; fold: (R,) that of each row;
+    damping: of the diagonal (Marquardt 1963).
+    """
+    weighted, out = weight(e), []
+    for f in range(fold.max() + 1):
+        own, w, rows = e[fold == f], weighted[fold == f], J[fold == f]
+        rest = normal - np.einsum("rsp,rs,rsq->pq", rows, w, rows)
+        rest += damping * np.diag(np.diag(rest))
+        out.append(-np.linalg.solve(rest, gradient - np.einsum("rsp,rs->p", rows, w * own)))
+    clipped: Array = np.clip(np.array(out), -LARGEST_STEP, LARGEST_STEP)
+    return clipped
+
+
+def without_folds(cost: Multistep, z: Array, states: Array) -> Array:
+    """(F, P) parameters without each fold of trials, from z (P,) and its start states (S, NS).
+
+    Of steps with more and more damping the one that lowers the cost of the rest of the trials most.
+    """
+    e, J = cost.errors(z, states, slopes=True)
+    fold = fold_of(len(cost.experiment.names))[cost.targets.trial]
+    gradient, normal = cost.normal(z, e, J)
+    steps = np.stack([fold_steps(e, J, gradient, normal, fold, d) for d in DAMPINGS], axis=1)
+    steps[..., cost.imu_clock] = 0.0
+    out = []
+    for f, own in enumerate(steps):
+        tried = [cost.clip(z + step) for step in own]
+        sizes = [cost.total(t, cost.errors(t, states)[0][fold != f]) for t in tried]
+        out.append(tried[int(np.argmin(sizes))])
+    return np.array(out)
 
 
 @dataclass(frozen=True)

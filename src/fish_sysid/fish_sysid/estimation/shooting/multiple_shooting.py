@@ -17,14 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
+from fish_sysid.dataset.camera import forward
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.marker_place import forward
 from fish_sysid.estimation.parametrization import Parametrization
-from fish_sysid.estimation.shooting.huber import huber, weight
+from fish_sysid.estimation.shooting.least_squares import Blocks, Reduced, eliminate, huber, weight
 from fish_sysid.estimation.shooting.residuals import (
     SENSORS,
     Residuals,
     Scale,
+    Windows,
     ahead_in,
     residuals,
 )
@@ -34,8 +35,6 @@ from fish_sysid.estimation.shooting.rollout import (
     poses,
     poses_and_slopes,
 )
-from fish_sysid.estimation.shooting.schur import Blocks, Reduced, eliminate
-from fish_sysid.estimation.shooting.windows import Windows
 
 Array = NDArray[np.float64]
 

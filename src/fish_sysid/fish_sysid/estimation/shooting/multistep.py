@@ -18,15 +18,14 @@ from numpy.typing import NDArray
 
 from fish_report.parallel import cores, on_all_cores
 from fish_sim.model import DT
+from fish_sysid.dataset.camera import forward
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.marker_place import forward
 from fish_sysid.estimation.parametrization import Parametrization
-from fish_sysid.estimation.shooting.huber import huber, weight
+from fish_sysid.estimation.shooting.least_squares import huber, weight
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS, Scale
 from fish_sysid.estimation.shooting.rollout import STEP
 from fish_sysid.estimation.shooting.start_states import PAST, START_TRUST, shot_states
-from fish_sysid.estimation.shooting.stroke_targets import HORIZONS, targets_of
-from fish_sysid.prediction.stroke_average import HALF_WINDOW
+from fish_sysid.prediction.stroke_average import HALF_WINDOW, HORIZONS, targets_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

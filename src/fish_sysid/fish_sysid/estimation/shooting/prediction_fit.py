@@ -1,6 +1,15 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot fitted to what it shall predict: number of links, starts, effects, polish, and errors clustered by trial."""
+"""A robot fitted to what it shall predict: number of links, starts, effects, polish, errors clustered by trial, and bands.
+
+How far off a prediction may be is what its parameters leave open, and what the model misses in trials left out:
+
+    band^2 = t^2 (J C J' + s^2)
+
+J: slope of the predicted stroke mean; C: covariance clustered by trial; s: robust spread of the training trials' errors at the
+same horizon, each fold of trials predicted by the parameters without it; t: 97.5 % quantile of Student's t with M - 1 degrees of
+freedom, as M training trials say how far trials differ. The first term alone would be the band of a model that is right.
+"""
 
 from __future__ import annotations
 
@@ -9,28 +18,47 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot, nominal_parameters
+from fish_sysid.dataset.camera import AHEAD, MARKER
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.dataset.marker_place import AHEAD, MARKER
 from fish_sysid.estimation.parametrization import Hypothesis, nominal_hypothesis
-from fish_sysid.estimation.shooting.clustered_errors import clustered_covariance, scores_by_trial
-from fish_sysid.estimation.shooting.coordinates import ShotParametrization
-from fish_sysid.estimation.shooting.elimination import eliminate
-from fish_sysid.estimation.shooting.fold_steps import FOLDS, without_folds
-from fish_sysid.estimation.shooting.huber import weight
-from fish_sysid.estimation.shooting.left_out import EVERY, Step, judged, left_out_costs
+from fish_sysid.estimation.shooting.least_squares import (
+    clustered_covariance,
+    scores_by_trial,
+    weight,
+)
+from fish_sysid.estimation.shooting.left_out import (
+    EVERY,
+    FOLDS,
+    Step,
+    fold_of,
+    judged,
+    left_out_costs,
+    without_folds,
+)
+from fish_sysid.estimation.shooting.multistep import Multistep
 from fish_sysid.estimation.shooting.residuals import SENSOR_SCALE, SENSORS
-from fish_sysid.estimation.shooting.rudder_end import (
+from fish_sysid.estimation.shooting.rollout import ShotParametrization
+from fish_sysid.estimation.shooting.schedule import (
+    FINE,
+    Found,
+    best_start,
+    multistep,
+    polished,
+    trusted,
+)
+from fish_sysid.estimation.shooting.selection import (
+    GLANCE,
     RANGE,
+    choose,
+    eliminate,
     judged_end,
     with_end,
     without_false_end,
 )
-from fish_sysid.estimation.shooting.schedule import FINE, Found, best_start, multistep, polished
-from fish_sysid.estimation.shooting.selection import GLANCE, choose
-from fish_sysid.estimation.shooting.trust import trusted
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -40,6 +68,7 @@ MOST_STARTS, QUICK_ROUNDS = 120, 2  # of a quick fit
 HELD = ("servo_rate_limit",)  # takes the place of any delay of the rudder
 PLACE = f"{MARKER}.{AHEAD}"  # of the camera's point
 IMU_CLOCK = "imu_latency.delay"  # free in windows alone: predictions hardly feel it
+NORMAL = 1.96  # standard deviations on both sides that hold 95 % of a normal distribution
 
 
 @dataclass(frozen=True)
@@ -222,3 +251,29 @@ def uncertainty(experiment: Experiment, found: Found) -> tuple[Array, Array]:
     count = len(moved)
     spread = np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0))
     return clustered_covariance(scores, normal, cost.prior), spread
+
+
+def missed(training: Multistep, z: Array) -> dict[float, Array]:
+    """Horizon -> (4,) spread of scaled errors on trials left out, by the quantile that a 95 % band needs."""
+    states, horizon = training.states(z), training.targets.horizon
+    fold = fold_of(len(training.experiment.names))[training.targets.trial]
+    e = np.empty((len(fold), 4))
+    for f, without in enumerate(without_folds(training, z, states)):
+        e[fold == f] = training.errors(without, states)[0][fold == f]
+    return {
+        float(h): np.quantile(np.abs(e[horizon == h]), 0.95, axis=0) / NORMAL
+        for h in np.unique(horizon)
+    }
+
+
+def inside(
+    training: Multistep, unseen: Multistep, z: Array, covariance: Array, horizon: float
+) -> NDArray[np.bool_]:
+    """(R, 4) whether each error of unseen trials at a horizon [s] lies in its 95 % band: x, y, heading, speed."""
+    e, J = unseen.errors(z, unseen.states(z), slopes=True)
+    rows = unseen.targets.horizon == horizon
+    e, J = e[rows], J[rows]
+    open_left = np.einsum("rip,pq,riq->ri", J, covariance, J)
+    trials = len(training.experiment.names)
+    band = t.ppf(0.975, trials - 1) * np.sqrt(open_left + missed(training, z)[horizon] ** 2)
+    return np.asarray(np.abs(e) <= band)

@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
-from fish_sysid.dataset.camera_time_offset import moved_back
+from fish_sysid.dataset.camera import moved_back
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.estimation.ekf_types import SensorModel
 from fish_sysid.estimation.parametrization import nominal_hypothesis
-from fish_sysid.estimation.shooting.coordinates import ShotParametrization
 from fish_sysid.estimation.shooting.multiple_shooting import Shooting
-from fish_sysid.estimation.shooting.residuals import SENSORS, Scale
-from fish_sysid.estimation.shooting.rollout import Directions, memories
-from fish_sysid.estimation.shooting.windows import cut
+from fish_sysid.estimation.shooting.residuals import SENSORS, Scale, cut
+from fish_sysid.estimation.shooting.rollout import Directions, ShotParametrization, memories
 
 Array = NDArray[np.float64]
 

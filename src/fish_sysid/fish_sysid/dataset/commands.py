@@ -1,13 +1,16 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Gaps in `joint_command`: commands that the robot followed but the recorder lost.
+"""Commands as the robot followed them: those that the recorder lost, and those that were forgotten.
 
 A command held over a gap drives the model with a constant rotor speed, which the robot's was not: 10 ms of it cost 400 nats,
 50 ms 5000, which a diagnosis takes for a force. The encoder measured the rotor's speed. Where it is silent too, a curve through
 two commands on each side follows the strokes. The rudder, which is not measured and may jump, is interpolated linearly.
-
 Commands that come late or on events were held by the robot as well. Only where nearly all come at a regular interval is a
 missed one a loss.
+
+A controller that has ended leaves its last command standing while the motor is off and the rotor runs down. The model is
+driven by the measured speed there, and the encoder's distance from the forgotten command is no residual. A servo has no
+feedback: it keeps the last command that it was given.
 """
 
 from __future__ import annotations
@@ -26,6 +29,8 @@ REGULAR = 0.8  # share of intervals on the beat; one in ten messages may be lost
 MISSED = 1.8  # medians; a lost message makes two of it, a late one rarely so much
 LONGEST = 0.1  # s between two commands; over more the rudder is unknown
 AROUND = 2  # commands on each side that the curve runs through
+STANDING = 0.5  # s; a command unchanged for longer may be a forgotten one
+APART = 5.0  # rad/s, median distance of the encoder that says it was
 
 
 class LostCommandsError(ValueError):
@@ -69,3 +74,40 @@ def commands_on_grid(t: Array, given: Array, grid: Array, encoder: Array) -> tup
 
 def _beat(t: Array) -> float:
     return float(np.median(np.diff(t)))
+
+
+def driven(command: Array, encoder: Array) -> tuple[Array, Array]:
+    """(rotor speed (T,) that drives the model, encoder (T,) less what was used for it), both [rad/s] on the grid of 10 ms.
+
+    encoder: NaN at grid points without a sample.
+    """
+    speed, left = command.copy(), encoder.copy()
+    for first, last in standing(command):
+        inside = np.flatnonzero(np.isfinite(encoder[first:last])) + first
+        if len(inside) < 2 or np.median(np.abs(encoder[inside] - command[inside])) < APART:
+            continue
+        speed[first:last] = np.interp(np.arange(first, last), inside, encoder[inside])
+        left[first:last] = np.nan
+    return speed, left
+
+
+def held_rudder(rotor: Array, rudder: Array) -> Array:
+    """Rudder (T,) [rad] that a servo has which keeps its last command when the controller has ended.
+
+    rotor (T,) [rad/s], rudder (T,) [rad]: commands. Where the rotor's command stands until the end of the trial the controller
+    has ended; a rudder that is exactly 0 throughout that time was told nothing, and a servo told nothing stays where it is.
+    """
+    out = rudder.copy()
+    stretches = [(a, b) for a, b in standing(rotor) if b == len(rotor) and a > 0]
+    for first, _ in stretches:
+        told = np.flatnonzero(rudder[: first + 1])
+        if len(told) and not rudder[first:].any() and (first - told[-1]) * DT < STANDING:
+            out[told[-1] + 1 :] = rudder[told[-1]]
+    return out
+
+
+def standing(command: Array) -> list[tuple[int, int]]:
+    """(first, last) grid points, last excluded, of stretches in which a speed other than 0 stays the same."""
+    edges = np.flatnonzero(np.diff(command, prepend=np.nan, append=np.nan) != 0)
+    pairs = zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+    return [(a, b) for a, b in pairs if (b - a) * DT > STANDING and command[a] != 0.0]

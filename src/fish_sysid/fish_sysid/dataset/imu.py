@@ -1,18 +1,20 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""How the gyro differs from the IMU's own orientation, which the IMU integrates at a rate of its own.
+"""The IMU's clock, and how its gyro differs from its own orientation, which it integrates at a rate of its own.
 
 A gyro that is read seldom loses fast turns, and the camera sees them seldom; the orientation of the same message lacks neither.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from fish_sim.model import DT
-from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.experiment import Experiment, Headings
 
 Array = NDArray[np.float64]
 
@@ -22,6 +24,31 @@ HOLE = 0.1  # s between samples of the gyro, across which nobody knows how it tu
 FEWEST = 20  # turns in a window
 CLIP = 3.0  # robust deviations; larger differences are lost samples
 FEWEST_SAMPLES = 4  # of the gyro
+
+
+def imu_moved_back(experiment: Experiment, delay: float) -> Experiment:
+    """The experiment with gyro and accelerometer `delay` [s] earlier, to the nearest grid point, and orientation exactly."""
+    if delay == 0.0:
+        return experiment
+    steps = round(delay / DT)
+    headings = tuple(Headings(h.t - delay, h.psi) for h in experiment.headings)
+    return replace(
+        experiment,
+        gyro=_earlier(experiment.gyro, steps),
+        accel=_earlier(experiment.accel, steps),
+        headings=headings,
+    )
+
+
+def _earlier(values: Array, steps: int) -> Array:
+    """Values (T, ...) a number of grid points earlier; NaN where none are left."""
+    out = np.full_like(values, np.nan)
+    kept = max(len(values) - abs(steps), 0)
+    if steps >= 0:
+        out[:kept] = values[len(values) - kept :]
+    else:
+        out[len(values) - kept :] = values[:kept]
+    return out
 
 
 def orientation_windows(experiment: Experiment, m: int) -> Array:

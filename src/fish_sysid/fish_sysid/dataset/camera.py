@@ -1,13 +1,14 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""How much older than its stamp the camera's image is, from camera and gyro alone.
+"""The camera's clock and the point that it follows, both taken out of recordings before anything is fitted.
 
 The heading that the camera shows at t is the fish's at t - d, whose changes the gyro measures:
 
     d = argmin of sum over windows | psi_camera(t) - integral of r up to (t - d), less a straight line |^2
 
 The straight line takes the gyro's bias and the unknown start away; no model of the fish is needed. The likelihood of a model
-has many optima in d, one per stroke, as soon as d is more than a quarter of one: this finds the right one.
+has many optima in d, one per stroke, as soon as d is more than a quarter of one: this finds the right one. Poses of the
+point that the camera follows become those of the head's centre of mass.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
+from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, Frames
 
 Array = NDArray[np.float64]
@@ -31,6 +33,7 @@ CLIP = 0.5  # rad; windows in which the markers were swapped count no more than 
 CLEAR = 0.7  # rms at the best delay over rms at none, below which a delay is stated
 HOLE = 0.25  # s between gyro samples, beyond which nobody knows how the fish turned
 SMALLEST = 0.03  # s, about a frame; below it the filter's own parameter finds it
+MARKER, AHEAD = "camera_marker", "ahead"
 
 
 @dataclass(frozen=True)
@@ -163,3 +166,31 @@ def moved_back(experiment: Experiment, delay: float) -> Experiment:
 def _moved(frames: Frames, delay: float) -> Frames:
     keep = frames.t >= delay
     return Frames(frames.t[keep] - delay, frames.pose[keep])
+
+
+def ahead_of(robot: Robot) -> float:
+    """How far the point that the camera follows lies ahead of the head's centre of mass [m]."""
+    return float(robot.sensors.get(MARKER, {}).get(AHEAD, 0.0))
+
+
+def with_marker(robot: Robot, ahead: float) -> Robot:
+    """The robot whose camera follows a point `ahead` [m] of the one that it followed; without the entry where that is 0."""
+    place = ahead_of(robot) + ahead
+    sensors = {name: values for name, values in robot.sensors.items() if name != MARKER}
+    return replace(robot, sensors=sensors | ({MARKER: {AHEAD: place}} if place else {}))
+
+
+def at_centre_of_mass(experiment: Experiment, ahead: float) -> Experiment:
+    """The experiment as a camera would see it that follows the centre of mass, `ahead` [m] behind the point it follows."""
+    if ahead == 0.0:
+        return experiment
+    frames = tuple(Frames(f.t, forward(f.pose, -ahead)) for f in experiment.frames)
+    return replace(experiment, frames=frames)
+
+
+def forward(pose: Array, ahead: float | Array) -> Array:
+    """Poses (..., 3) of a point `ahead` [m] of another one on the same head; (...) or one for all."""
+    moved = pose.copy()
+    moved[..., 0] += ahead * np.cos(pose[..., 2])
+    moved[..., 1] += ahead * np.sin(pose[..., 2])
+    return moved
