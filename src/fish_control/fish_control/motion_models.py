@@ -11,8 +11,8 @@ A head that rolls as it swings leaks gravity into its accelerometer; where that 
 acceleration, the second model predicts better. Candidates of the heading: psi' = w_imu - b_g, with the variance of each
 turn multiplied by a factor. A bank of linear Kalman filters with one candidate each follows the poses. The score of a
 candidate is the sum of the log densities that it gave to the measurements before it knew them, less that of the best one;
-older ones fade. With the prior it gives the candidate's share, and the shares choose the model and its noise. The mean of a noise over
-its candidates is cautious while the poses leave much open, since the largest ones weigh most.
+older ones fade. With the prior it gives the candidate's share, and the shares choose the model and its noise. The mean of a noise
+over its candidates is cautious while the poses leave much open, since the largest ones weigh most.
 Sources: Magill, Optimal adaptive estimation of sampled stochastic processes, 1965; Dawid, Prequential approach, 1984.
 """
 
