@@ -1,10 +1,12 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""README and docs: links lead somewhere, examples run, commands exist, generated pages are current."""
+"""The documentation: links, quoted messages, code that runs, generated pages."""
 
 import argparse
 import ast
 import importlib
+import importlib.util
+import inspect
 import re
 import subprocess
 import sys
@@ -13,10 +15,13 @@ from pathlib import Path
 
 import pytest
 
+from fish_control.paths import PATHS
 from fish_report.robofish import BROUGHT_BY, installed_verbs
 from fish_sim.effects import EFFECTS
-from fish_sim.robot import Robot
+from fish_sim.robot import Robot, nominal_parameters
+from fish_sim.robot_file import load_robot
 from fish_sim.step import Stepper
+from fish_sysid.diagnosis.task import STAGES
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -276,3 +281,124 @@ def test_every_dependency_is_pinned_and_has_a_reason(file):
     constraints = (ROOT / "constraints.txt").read_text().lower().splitlines()
     if file.name != "requirements-bench.txt":
         assert {re.sub(r"\[.*?\]", "", pin.lower()) for pin in pins} <= set(constraints)
+
+
+CODE_DOCS = Path(__file__).parents[1] / "docs"
+BLOCK = re.compile(r"<!-- test: (\w+) -->\n```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+CODE_PAGES = [page for page in sorted(CODE_DOCS.rglob("*.md")) if "<!-- test:" in page.read_text()]
+
+
+def blocks(page, kind):
+    """(first line, text) of the blocks of one kind."""
+    text = page.read_text()
+    return [
+        (text[: match.start(3)].count("\n") + 1, match[3])
+        for match in BLOCK.finditer(text)
+        if match[1] == kind
+    ]
+
+
+def program(page):
+    """The blocks as one program, each line where it stands on the page."""
+    lines = []
+    for first, text in blocks(page, "run"):
+        lines += [""] * (first - 1 - len(lines)) + text.splitlines()
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.timeout(1800)  # half a minute of processor time, longer on a busy computer
+@pytest.mark.parametrize("page", CODE_PAGES, ids=lambda page: page.stem)
+def test_the_pages_code_runs(page, tmp_path):
+    """In a process of its own: a page may add an effect to the table."""
+    script = tmp_path / f"{page.stem}.py"
+    script.write_text(program(page))
+    command = [sys.executable, str(script)]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert result.returncode == 0, f"{page}, with its own line numbers:\n{result.stderr}"
+
+
+@pytest.mark.parametrize("page", CODE_PAGES, ids=lambda page: page.stem)
+def test_every_marked_block_is_found(page):
+    assert len(BLOCK.findall(page.read_text())) == page.read_text().count("<!-- test:")
+
+
+def test_a_robot_file_on_a_page_can_be_read(tmp_path):
+    ((_, text),) = blocks(CODE_DOCS / "explanation" / "the_fish.md", "robot")
+    file = tmp_path / "robot.yaml"
+    file.write_text(text)
+    robot = load_robot(file)
+    assert robot.parameters["head_mass"] == 3.9
+    assert robot.effects["quadratic_drag"]["surge"] == 0.6
+
+
+def rows(text):
+    """The cells of every table row, without headings' rules."""
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    return [[c.strip() for c in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
+
+
+def test_the_table_of_the_fish_has_every_parameter_with_unit_and_value():
+    page = (DOCS / "explanation" / "the_fish.md").read_text()
+    table = page.split("<!-- parameters: begin -->")[1].split("<!-- parameters: end -->")[0]
+    shown = {row[0].strip("`"): (row[2], row[3]) for row in rows(table)[2:]}
+    assert shown == {name: (p.unit, f"{p.value:.6g}") for name, p in nominal_parameters().items()}
+
+
+def test_the_table_of_stages_has_all_that_can_be_left_out():
+    page = (DOCS / "explanation" / "diagnosis.md").read_text()
+    table = page.split("## Stages that can be left out")[1].split("\n## ")[0]
+    assert [tuple(row) for row in rows(table)[2:]] == list(STAGES)
+
+
+def test_the_picture_of_the_fish_is_current():
+    script = DOCS / "images" / "the_fish.py"
+    spec = importlib.util.spec_from_file_location("the_fish", script)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.drawing(Robot()) == script.with_suffix(".svg").read_text()
+
+
+def test_the_table_of_paths_has_every_argument_with_its_default():
+    page = (DOCS / "how_to" / "paths.md").read_text().split("## Families")[1].split("\n## ")[0]
+    shown, family = {}, ""
+    for row in rows(page)[2:]:
+        family = row[0].strip("`") or family
+        names, defaults = row[1].replace("`", "").split(", "), row[2].split(", ")
+        shown.setdefault(family, {}).update(zip(names, defaults, strict=True))
+    assert list(shown) == sorted(PATHS)
+    for family, arguments in shown.items():
+        parameters = inspect.signature(PATHS[family]).parameters
+        own = {name: p.default for name, p in parameters.items() if name != "end"}
+        assert set(arguments) == set(own), family
+        for name, default in own.items():
+            text = (
+                "none"
+                if default in (None, "")
+                else f"{default:.4g}"
+                if name == "start"
+                else str(default)
+            )
+            assert arguments[name] == text, f"{family}: {name}"
+
+
+def source_strings():
+    """Every string of the packages' sources; what an f-string inserts is the character 0."""
+    for file in sorted((ROOT / "src").glob("*/fish_*/**/*.py")):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                yield node.value
+            elif isinstance(node, ast.JoinedStr):
+                yield "".join(v.value if isinstance(v, ast.Constant) else "\0" for v in node.values)
+
+
+def test_every_message_that_is_explained_is_in_the_source():
+    page = (DOCS / "how_to" / "something_went_wrong.md").read_text()
+    said = [row[0].strip("`") for row in rows(page) if row[0].startswith("`")]
+    source = "\n".join(source_strings())
+    assert len(said) > 50
+    missing = [
+        line
+        for line in said
+        if not re.search(".*".join(re.escape(part) for part in line.split("...")), source)
+    ]
+    assert missing == []

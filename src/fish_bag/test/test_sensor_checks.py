@@ -1,14 +1,282 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors that do not fit each other are errors, whatever the fault; a faultless swim has none."""
+"""Checks of recordings: what they find, and that they find nothing in sound ones."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from stroke_swim import Course, stroke_swim
 
+from fish_bag import TopicMap, read_trial, trial
 from fish_bag import message_build as build
-from fish_bag import read_trial
 from fish_bag import sample_recordings as samples
-from fish_bag.trial import NOT_MEASURED
+from fish_bag.camera_checks import find_jumps
+from fish_bag.checks import check_rotor_sign
+from fish_bag.sensor_checks import check_sensors
+from fish_bag.trial import JUMP, NOT_MEASURED
+
+
+def read(tmp_path, messages):
+    return read_trial(samples.write_mcap(tmp_path / "trial", messages))
+
+
+def problem(result, kind, topic=""):
+    found = [p for p in result.problems if p.kind == kind and p.topic.endswith(topic)]
+    assert len(found) == 1, f"{kind} on {topic}: {[str(p) for p in result.problems]}"
+    return found[0]
+
+
+def test_faultless_recording_has_no_problem(tmp_path):
+    result = read(tmp_path, samples.robot_messages())
+    assert result.problems == ()
+    assert all(not stream.flags.any() for stream in result.streams.values())
+
+
+def test_gap(tmp_path):
+    messages = samples.changed(
+        samples.robot_messages(),
+        "/fish/imu/data",
+        lambda i, t, m: None if 50 <= i < 120 else (t, m),
+    )
+    result = read(tmp_path, messages)
+    gap = problem(result, "gap", "imu/data")
+    assert gap.severity == "warning"
+    assert "about 70 messages" in gap.text
+    assert gap.t == pytest.approx(0.49, abs=1e-6)
+    assert len(result.imu) == 130
+
+
+def test_duplicates_are_kept_and_flagged(tmp_path):
+    messages = samples.robot_messages()
+    repeated = [m for m in messages if m[1] == "/fish/imu/data"][10:15]
+    messages = sorted(
+        messages + [(t + 1000, topic, m) for t, topic, m in repeated], key=lambda m: m[0]
+    )
+    result = read(tmp_path, messages)
+    assert problem(result, "duplicate", "imu/data").count == 5
+    assert len(result.imu) == 205
+    assert np.count_nonzero(result.imu.flags == trial.DUPLICATE) == 5
+    clean = result.clean().imu
+    assert len(clean) == 200
+    assert np.all(np.diff(clean.t) > 0)
+
+
+def test_time_going_back(tmp_path):
+    def back(i, t, m):
+        return t, samples.shift_stamp(m, -0.055) if 100 <= i < 103 else m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/imu/data", back))
+    assert problem(result, "time_back", "imu/data").count == 3
+    assert np.flatnonzero(result.imu.flags & trial.TIME_BACK).tolist() == [100, 101, 102]
+    assert np.all(np.diff(result.clean().imu.t) > 0)
+
+
+def test_arrivals_out_of_order_in_the_file(tmp_path):
+    messages = samples.robot_messages()
+    rng = np.random.default_rng(1)
+    shuffled = [
+        messages[i]
+        for i in np.argsort(np.arange(len(messages)) + rng.uniform(0, 30, len(messages)))
+    ]
+    result = read(tmp_path, shuffled)
+    np.testing.assert_allclose(result.imu.t, np.arange(0, 2, 0.01), atol=2e-9)
+    assert result.problems == ()
+
+
+def test_not_a_number(tmp_path):
+    def broken(i, t, m):
+        if i in (3, 4):
+            m.angular_velocity.y = np.nan if i == 3 else np.inf
+        return t, m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/imu/data", broken))
+    assert problem(result, "nan", "imu/data").count == 2
+    assert np.flatnonzero(result.imu.flags).tolist() == [3, 4]
+
+
+def test_joint_missing_from_some_messages(tmp_path):
+    def without_rudder(i, t, m):
+        return t, build.joints(samples.ns(i * 0.01), ["rotor"], [1.0], [2.0]) if i < 7 else m
+
+    result = read(
+        tmp_path, samples.changed(samples.robot_messages(), "/fish/joint_command", without_rudder)
+    )
+    assert problem(result, "nan", "joint_command").count == 7
+    assert np.isnan(result.commands.rudder[:7]).all()
+    assert np.isfinite(result.commands.rudder[7:]).all()
+    assert result.commands.rotor_speed[0] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("topic", "severity"), [("joint_command", "error"), ("joint_states", "warning")]
+)
+def test_joints_under_other_names_are_said(tmp_path, topic, severity):
+    def renamed(_, t, m):
+        m.name = [name.capitalize() for name in m.name]
+        return t, m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), f"/fish/{topic}", renamed))
+    said = [p for p in result.problems if p.kind == "joint"]
+    assert {p.severity for p in said} == {severity}
+    assert all("'Rotor'" in p.text for p in said)
+
+
+@pytest.mark.parametrize("ahead", [7200.0, -1.6e9, 3.0])
+def test_stamps_of_another_clock_move_no_other_topic(tmp_path, ahead):
+    """A time zone, seconds since the start of a computer, a wrong second: the other topics keep their times."""
+
+    def moved(_, t, m):
+        return t, samples.shift_stamp(m, ahead)
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/imu/data", moved))
+    assert f"stamps are {ahead - 0.002:+.3f} s" in problem(result, "clock_apart", "imu/data").text
+    assert result.axis == "recorder"
+    np.testing.assert_allclose(result.commands.t, np.arange(0, 2, 0.01), atol=1e-6)
+    np.testing.assert_allclose(result.imu.t, np.arange(0, 2, 0.01) + 0.002, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("topic", "severity"),
+    [
+        ("joint_command", "error"),
+        ("camera/pose", "error"),
+        ("imu/data", "warning"),
+        ("joint_states", "info"),
+    ],
+)
+def test_missing_topic(tmp_path, topic, severity):
+    messages = [m for m in samples.robot_messages() if m[1] != f"/fish/{topic}"]
+    assert problem(read(tmp_path, messages), "missing_topic", topic).severity == severity
+
+
+def test_wrong_type(tmp_path):
+    messages = samples.changed(
+        samples.robot_messages(), "/fish/imu/data", lambda _i, t, _m: (t, build.number(1.0))
+    )
+    result = read(tmp_path, messages)
+    assert result.imu is None
+    assert (
+        "std_msgs/msg/Float64, expected sensor_msgs/msg/Imu"
+        in problem(result, "wrong_type", "imu/data").text
+    )
+
+
+@pytest.mark.parametrize("first", [0, 40])
+def test_wrong_frame(tmp_path, first):
+    def other(i, t, m):
+        m.header = build.header(samples.ns(0.005 + i / 30), "map" if i >= first else "pool")
+        return t, m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/camera/pose", other))
+    text = problem(result, "wrong_frame", "camera/pose").text
+    assert f"{60 - first} of 60 messages in frame 'map', expected 'pool'" in text
+    assert len(result.camera) == 60
+    kept = result.clean().camera
+    assert (0 if kept is None else len(kept)) == first
+
+
+def test_stamps_never_set(tmp_path):
+    def unset(i, t, m):
+        m.header = build.header(0, "imu_link")
+        return t, m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/imu/data", unset))
+    problem(result, "no_stamps", "imu/data")
+    np.testing.assert_allclose(result.imu.t, np.arange(0, 2, 0.01) + 0.002, atol=2e-9)
+
+
+def test_single_stamps_far_off(tmp_path):
+    def odd(i, t, m):
+        return t, samples.shift_stamp(m, -1e6) if i == 20 else m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/imu/data", odd))
+    assert problem(result, "bad_stamp", "imu/data").count == 1
+    assert np.flatnonzero(result.imu.flags).tolist() == [20]
+    assert result.axis == "recorder"
+
+
+def test_unreadable_messages(tmp_path):
+    messages = samples.robot_messages()
+    with samples.McapRecording(tmp_path / "trial") as recording:
+        for i, (arrival_ns, topic, message) in enumerate(messages):
+            raw = bytes(samples.typestore().serialize_cdr(message, message.__msgtype__))
+            cut = topic == "/fish/imu/data" and i > len(messages) - 100
+            entry = recording.add_topic(topic, message.__msgtype__)
+            recording.write(entry, arrival_ns, raw[:40] if cut else raw)
+    result = read_trial(tmp_path / "trial")
+    bad = problem(result, "unreadable", "imu/data")
+    assert bad.severity == "error"
+    assert bad.count == np.count_nonzero(result.imu.flags == trial.UNREADABLE) > 5
+    assert len(result.imu) == 200
+    assert np.isnan(result.imu.gyro[-1]).all()
+
+
+@pytest.mark.parametrize(
+    "topic", ["imu/data", "control/gains", "camera/pose", "camera/tail", "reference/path"]
+)
+def test_a_topic_that_cannot_be_decoded_at_all_costs_itself_only(tmp_path, topic):
+    with samples.McapRecording(tmp_path / "trial") as recording:
+        for arrival_ns, name, message in samples.robot_messages():
+            raw = bytes(samples.typestore().serialize_cdr(message, message.__msgtype__))
+            entry = recording.add_topic(name, message.__msgtype__)
+            recording.write(entry, arrival_ns, raw[:17] if name == f"/fish/{topic}" else raw)
+    result = read_trial(tmp_path / "trial")
+    bad = problem(result, "unreadable", topic)
+    counted = next(summary for summary in result.topics if summary.topic == f"/fish/{topic}")
+    assert bad.severity == "error"
+    assert bad.count == counted.count
+    whole = read_trial(samples.robot_recording(tmp_path / "whole"))
+    roles = {rule.topic: role for role, rule in TopicMap().rules.items()}
+    assert set(result.streams) == set(whole.streams) - {roles[topic]}
+    assert (
+        result.reference_paths == ()
+        if topic == "reference/path"
+        else len(result.reference_paths) == 1
+    )
+
+
+def test_constant_commands(tmp_path):
+    def still(i, t, m):
+        return t, build.joints(samples.ns(i * 0.01), ["rotor", "rudder"], [0.0, 0.1], [5.0, 0.0])
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/joint_command", still))
+    kinds = [p for p in result.problems if p.kind == "constant_command"]
+    assert {p.severity for p in kinds} == {"warning", "info"}
+    assert "5 rad/s throughout" in kinds[0].text
+
+
+def test_rotor_that_turns_against_its_command(tmp_path):
+    def mirrored(i, t, m):
+        return t, build.joints(
+            samples.ns(i * 0.01), ["rotor"], [0.0], [-samples.rotor_speed(i * 0.01)]
+        )
+
+    result = read(
+        tmp_path, samples.changed(samples.robot_messages(), "/fish/joint_states", mirrored)
+    )
+    assert problem(result, "rotor_sign").severity == "error"
+
+
+def test_swapped_markers_are_jumps(tmp_path):
+    def flipped(i, t, m):
+        if i in (20, 21):
+            m.pose.pose = build.pose(*(samples.pose(0.005 + i / 30) + [0, 0, np.pi]))
+        return t, m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/camera/pose", flipped))
+    assert problem(result, "jump", "camera/pose").count == 2
+    assert np.flatnonzero(result.camera.flags).tolist() == [20, 21]
+
+
+def test_a_fast_wriggling_fish_does_not_jump():
+    t = np.arange(0, 10, 1 / 11)
+    x, y = 0.5 * t, 0.05 * np.sin(12 * t)
+    psi = (
+        0.35 * np.sin(2 * np.pi * 2.5 * t) + 0.6 * t
+    )  # stroke and turn of the real robot, sampled at 11 Hz
+    assert not find_jumps(t, x, y, np.mod(psi, 2 * np.pi)).any()
+
 
 DURATION = 12.0
 
@@ -157,3 +425,280 @@ def test_a_pose_of_which_a_part_is_not_measured_is_used_nowhere(tmp_path, place)
     ]
     assert np.isnan(trial.camera.psi[:5]).all()
     assert len(trial.clean().camera) == len(poses) - 5
+
+
+QUARTER = np.array(
+    [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+)  # body axes in those of an IMU turned to the left
+
+
+def imu(trial, gyro=lambda g: g, accel=lambda a: a):
+    changed = replace(trial.imu, gyro=gyro(trial.imu.gyro), accel=accel(trial.imu.accel))
+    return replace(trial, imu=changed)
+
+
+def camera(trial, pose):
+    seen = pose(trial.camera.pose)
+    psi = np.mod(seen[:, 2] + np.pi, 2 * np.pi) - np.pi
+    jumps = find_jumps(trial.camera.t, seen[:, 0], seen[:, 1], psi)
+    flags = np.where(jumps, JUMP, 0).astype(np.uint8)
+    changed = replace(trial.camera, x=seen[:, 0], y=seen[:, 1], psi=psi, flags=flags)
+    return replace(trial, camera=changed)
+
+
+def commands(trial, rotor=1.0, rudder=lambda a: a):
+    old = trial.commands
+    changed = replace(old, rotor_speed=rotor * old.rotor_speed, rudder=rudder(old.rudder))
+    return replace(trial, commands=changed)
+
+
+def rotor(trial, factor):
+    old = trial.encoder
+    changed = replace(old, speed=factor * old.speed, angle=factor * old.angle)
+    return replace(commands(trial, rotor=factor), encoder=changed)
+
+
+def findings(trial):
+    found = [*check_sensors(trial), *check_rotor_sign(trial.commands, trial.encoder)]
+    return {(problem.severity, problem.kind): problem.text for problem in found}
+
+
+FAULTS = {
+    "gyro in deg/s": (lambda s: imu(s, gyro=np.degrees), "error", "gyro_unit", "57."),
+    "gyro z down": (lambda s: imu(s, gyro=lambda g: -g), "error", "gyro_sign", "change the sign"),
+    "gyro z and y swapped": (
+        lambda s: imu(s, gyro=lambda g: g[:, [0, 2, 1]]),
+        "error",
+        "gyro_axes",
+        "its axis y",
+    ),
+    "IMU turned by 90 deg": (
+        lambda s: imu(s, lambda g: g @ QUARTER.T, lambda a: a @ QUARTER.T),
+        "error",
+        "accel_axes",
+        "turned by 90 deg",
+    ),
+    "IMU turned by -90 deg": (
+        lambda s: imu(s, lambda g: g @ QUARTER, lambda a: a @ QUARTER),
+        "error",
+        "accel_axes",
+        "turned by -90 deg",
+    ),
+    "IMU turned by 180 deg": (
+        lambda s: imu(s, lambda g: g * [-1, -1, 1], lambda a: a * [-1, -1, 1]),
+        "error",
+        "accel_axes",
+        "turned by 180 deg",
+    ),
+    "accelerometer x and y swapped": (
+        lambda s: imu(s, accel=lambda a: a[:, [1, 0, 2]]),
+        "error",
+        "accel_axes",
+        "x and y swapped",
+    ),
+    "accelerometer x mirrored": (
+        lambda s: imu(s, accel=lambda a: a * [-1, 1, 1]),
+        "error",
+        "accel_axes",
+        "the other sign of x",
+    ),
+    "accelerometer y mirrored": (
+        lambda s: imu(s, accel=lambda a: a * [1, -1, 1]),
+        "error",
+        "accel_axes",
+        "the other sign of y",
+    ),
+    "accelerometer z down": (
+        lambda s: imu(s, accel=lambda a: a * [1, -1, -1]),
+        "error",
+        "accel_axes",
+        "along -z",
+    ),
+    "accelerometer in g": (
+        lambda s: imu(s, accel=lambda a: a / 9.81),
+        "error",
+        "accel_unit",
+        "(g?)",
+    ),
+    "accelerometer in mg": (
+        lambda s: imu(s, accel=lambda a: a / 9.81e-3),
+        "error",
+        "accel_unit",
+        "thousandths of g",
+    ),
+    "accelerometer without gravity": (
+        lambda s: imu(s, accel=lambda a: a - [0, 0, 9.81]),
+        "error",
+        "accel_unit",
+        "gravity taken out",
+    ),
+    "camera in feet": (
+        lambda s: camera(s, lambda p: p * [3.281, 3.281, 1]),
+        "error",
+        "camera_unit",
+        "feet",
+    ),
+    "camera in inches": (
+        lambda s: camera(s, lambda p: p * [39.37, 39.37, 1]),
+        "error",
+        "camera_unit",
+        "metres",
+    ),
+    "camera in cm": (
+        lambda s: camera(s, lambda p: p * [100, 100, 1]),
+        "error",
+        "camera_unit",
+        "metres",
+    ),
+    "camera in mm": (
+        lambda s: camera(s, lambda p: p * [1000, 1000, 1]),
+        "error",
+        "camera_unit",
+        "metres",
+    ),
+    "camera y mirrored, heading not": (
+        lambda s: camera(s, lambda p: p * [1, -1, 1]),
+        "error",
+        "camera_axes",
+        "mirrored or swapped",
+    ),
+    "camera x and y swapped, heading not": (
+        lambda s: camera(s, lambda p: p[:, [1, 0, 2]]),
+        "error",
+        "camera_axes",
+        "mirrored or swapped",
+    ),
+    "left-handed camera": (
+        lambda s: camera(s, lambda p: p * [1, -1, -1]),
+        "error",
+        "camera_axes",
+        "left-handed",
+    ),
+    "heading in deg": (
+        lambda s: camera(s, lambda p: p * [1, 1, np.degrees(1)]),
+        "error",
+        "camera_heading",
+        "57.3 times",
+    ),
+    "marker turned by 180 deg": (
+        lambda s: camera(s, lambda p: p + [0, 0, np.pi]),
+        "error",
+        "camera_heading",
+        "180 deg",
+    ),
+    "rudder in deg": (
+        lambda s: commands(s, rudder=np.degrees),
+        "error",
+        "rudder_unit",
+        "deg?",
+    ),
+    "rudder in servo pulses": (
+        lambda s: commands(s, rudder=lambda a: 1500 + 500 * a),
+        "error",
+        "rudder_unit",
+        "servo pulses",
+    ),
+    "rudder from -1 to 1": (
+        lambda s: commands(s, rudder=lambda a: np.clip(5 * a, -1, 1)),
+        "warning",
+        "rudder_unit",
+        "-1 to 1",
+    ),
+    "rudder to the other side": (
+        lambda s: commands(s, rudder=lambda a: -a),
+        "error",
+        "rudder_sign",
+        "against the rudder",
+    ),
+    "rotor in deg/s": (lambda s: rotor(s, 57.3), "error", "rotor_unit", "deg/s"),
+    "rotor in rpm": (lambda s: rotor(s, 9.549), "warning", "rotor_unit", "rpm"),
+    "encoder's angle in deg": (
+        lambda s: replace(s, encoder=replace(s.encoder, angle=np.degrees(s.encoder.angle))),
+        "error",
+        "encoder_unit",
+        "change of the rotor's angle is 57",
+    ),
+    "rotor turned round": (lambda s: rotor(s, -1.0), "error", "rotor_sign", "hull turns with"),
+    "command in rpm": (lambda s: commands(s, rotor=9.549), "error", "rotor_unit", "rpm"),
+    "tail in deg": (
+        lambda s: replace(s, tail=replace(s.tail, angle=np.degrees(s.tail.angle))),
+        "error",
+        "tail_unit",
+        "deg",
+    ),
+    "tail to the other side": (
+        lambda s: replace(s, tail=replace(s.tail, angle=-s.tail.angle)),
+        "error",
+        "tail_sign",
+        "wrong sign",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_found_and_named(name):
+    fault, severity, kind, words = FAULTS[name]
+    assert words in findings(fault(stroke_swim())).get((severity, kind), "")
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "course",
+    [
+        Course(),
+        Course(duration=6.0),
+        Course(turns=0.0, speeds=0.0),
+        Course(turns=0.0),
+        Course(turns=3.0, speeds=0.0),
+        Course(rotor=15.0),
+        Course(rotor=0.0),
+        Course(duration=90.0),
+    ],
+    ids=str,
+)
+def test_a_faultless_swim_has_no_finding(course, seed):
+    assert findings(stroke_swim(course, seed)) == {}
+
+
+def test_a_left_handed_camera_is_one_finding():
+    found = findings(camera(stroke_swim(), lambda p: p * [1, -1, -1]))
+    assert set(found) == {("error", "camera_axes")}
+
+
+def test_a_heading_in_degrees_blames_nothing_else():
+    found = findings(camera(stroke_swim(), lambda p: p * [1, 1, np.degrees(1)]))
+    assert set(found) == {("error", "camera_heading")}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fish_that_glides_straight_ahead_tells_no_directions(seed):
+    """No turns, one speed, no strokes: the accelerometer may lie in any direction."""
+    swim = stroke_swim(Course(turns=0.0, speeds=0.0, rotor=0.0), seed)
+    for direction in (np.diag([-1, -1, 1]), QUARTER):
+        assert findings(imu(swim, accel=lambda a, d=direction: a @ d)) == {}
+
+
+def test_a_straight_swim_leaves_two_directions():
+    """Strokes push the head sideways only, so that y is known to be wrong, and x may be either way."""
+    swim = stroke_swim(Course(turns=0.0, speeds=0.0))
+    text = findings(imu(swim, accel=lambda a: a * [-1, -1, 1]))["error", "accel_axes"]
+    assert "turned by 180 deg" in text
+    assert "the other sign of y" in text
+
+
+def test_a_sensor_of_its_own_tells_nothing():
+    """Without a camera no record shows the accelerometer's direction, without an IMU none the camera's feet."""
+    swim = stroke_swim()
+    alone = replace(imu(swim, accel=lambda a: a * [-1, -1, 1]), camera=None)
+    assert findings(alone) == {}
+    feet = replace(camera(swim, lambda p: p * [3.281, 3.281, 1]), imu=None)
+    assert findings(feet) == {}
+
+
+def test_roll_that_mixes_gravity_into_y_is_no_wrong_sign():
+    """A hull that leans into its turns feels gravity sideways, several times the acceleration of the turn."""
+    swim = stroke_swim(Course(rotor=0.0))
+    roll = 0.1 * np.sin(0.5 * swim.imu.t)
+    rate = np.gradient(roll, swim.imu.t)[:, None] * [1, 0, 0]
+    leaning = imu(swim, lambda g: g + rate, lambda a: a - 9.81 * roll[:, None] * [0, 1, 0])
+    assert findings(leaning) == {}

@@ -1,10 +1,16 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The node table: complete, startable, the same for the pip-only starter and the launch file."""
+"""The table of nodes: their parameters, arguments and processes."""
 
+from __future__ import annotations
+
+import argparse
 import os
 import runpy
+import signal
+import subprocess
 import sys
+import time
 import types
 from pathlib import Path
 
@@ -12,12 +18,17 @@ import ament_index_python.packages
 import pytest
 import yaml
 
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-
-from fish_bringup import node_table
-from fish_bringup.node_table import NodeSpec
+from fish_bringup import node_table, processes
+from fish_bringup.node_table import CONTROL, FAKE, RECORDER, ROBOTS, SIMULATED, NodeSpec, middleware
+from fish_bringup.run_tables import latency_table
+from fish_bringup.run_watch import SwimEnd
+from fish_bringup.verbs import demo
 from fish_control.nodes.pilot import split_arguments
 from fish_report.errors import UserError
+from fish_report.robofish import run_verb
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
 
 SOURCE = Path(__file__).parents[2]
 EVERY_NODE = sorted(
@@ -443,3 +454,225 @@ def test_the_drivers_alone_take_a_robots_own_values_in_the_same_way(launch_names
         assert [node.on_exit.reason for node in nodes] == [f"{name} ended" for name in files]
         assert files == {**installed, "rotor": installed["rotor"] + own}
     assert {argument.args[0] for argument in arguments} == {"config", "namespace", *installed}
+
+
+VERBS = ("arm", "disarm", "drive", "view")
+WRONG = ("bad name!", "", "/fish//two", "/2fish", "/", "/fish__2")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("namespace", WRONG)
+def test_a_namespace_that_ros_does_not_know_is_refused(verb: str, namespace: str, capsys) -> None:
+    assert run_verb(verb, ["--namespace", namespace]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"robofish {verb}: namespace is {namespace!r}, expected")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("domain", ["-1", "233"])
+def test_a_domain_out_of_range_is_refused(verb: str, domain: str, capsys) -> None:
+    assert run_verb(verb, ["--domain", domain]) == 1
+    assert capsys.readouterr().err == f"robofish {verb}: domain is {domain}, expected 0 to 232\n"
+
+
+def changed(*words: str) -> dict:
+    parser = argparse.ArgumentParser()
+    demo.add_arguments(parser)
+    args = parser.parse_args(["--real-time-factor", "1", *words])
+    return demo.node_parameters(args, {"start_x": 0.0}, Path("folder"), Path("devices"))
+
+
+def follow_clock(given: dict, robot: tuple) -> bool:
+    """All but the simulator, which says the time, and the recorder, whose time is the wall clock's."""
+    without = {spec.executable for spec in robot if "use_sim_time" not in given.get(spec, {})}
+    return without == {"simulator", "recorder"}
+
+
+def test_in_lockstep_the_simulator_waits_and_every_node_follows_its_clock(tmp_path) -> None:
+    weights = tmp_path / "gains.safetensors"
+    given = changed("--lockstep", "--weights", str(weights))
+    assert given[SIMULATED[0]]["lockstep"] == demo.LOCKSTEP
+    assert follow_clock(given, ROBOTS["sim"])
+    assert given[CONTROL[3]]["weights_file"] == str(weights)
+    assert given[RECORDER]["name"] == "recording"
+
+
+def test_simulated_time_waits_for_nodes_that_lag_by_more_than_an_image() -> None:
+    given = changed()
+    assert given[SIMULATED[0]]["lockstep"] > 0.0
+    assert 0.0 < given[SIMULATED[0]]["lockstep_slack"] < 0.05
+    assert follow_clock(given, ROBOTS["sim"])
+
+
+def test_simulated_time_waits_for_the_tracker_too() -> None:
+    """With room for the camera's delay and one lost picture, and less than what fusion takes for a step of a clock."""
+    for words in ((), ("--lockstep",)):
+        assert 0.12 < changed(*words)[SIMULATED[0]]["lockstep_camera"] < 0.17
+    assert "lockstep_camera" not in changed("--hardware", "fake")[FAKE[1]]  # which says it itself
+
+
+def test_in_real_time_nodes_follow_their_own_clocks() -> None:
+    given = changed("--real-time")
+    assert not {"lockstep", "lockstep_camera"} & given[SIMULATED[0]].keys()
+    assert not any("use_sim_time" in values for values in given.values())
+
+
+def test_a_run_that_waited_says_how_long() -> None:
+    end = SwimEnd("at the end of the path", seconds=48.0, robot_s=30.0, cpu={})
+    assert "30 s of swimming took 48 s" in demo.waited(end, 1.0)
+    assert demo.waited(end, 0.62) == ""
+
+
+def test_a_computer_that_the_nodes_fill_is_named_with_what_to_do() -> None:
+    shares = [0.3] * 6  # of a core
+    assert "--real-time" in demo.too_slow(shares, cores=2)
+    assert demo.too_slow(shares, cores=4) == ""
+
+
+def test_on_a_slow_clock_every_node_of_a_fake_robot_follows_the_simulator() -> None:
+    given = changed("--hardware", "fake", "--real-time-factor", "0.2")
+    assert given[FAKE[1]]["real_time_factor"] == 0.2
+    assert given[FAKE[1]]["lockstep"] > 0.0
+    assert follow_clock(given, ROBOTS["fake"])
+
+
+def test_a_computer_with_few_cores_gets_a_slower_fake_robot_and_no_slower_simulation() -> None:
+    paces = [demo.pace("fake", cores) for cores in (1, 2, 4, 8, 64)]
+    assert paces == sorted(paces)
+    assert 0.0 < paces[0] < 0.3
+    assert paces[-1] == 1.0
+    assert demo.pace("sim", 1) == 1.0
+
+
+def test_the_latency_is_the_robot_s_own_and_its_texts_can_do_no_harm():
+    said = {"latency [/x]\x1b[31m": "m" * 5000, "commands": "7"}
+    table = latency_table({"evil/controller": {"latency": "1"}, "fish/controller": said})
+    ((key, value),) = table.rows
+    assert key == "latency [/x]\\x1b[31m"
+    assert len(value) < 500
+
+
+def test_a_shell_takes_the_lines_over(capsys):
+    assert run_verb("loopback", []) == 0
+    lines = capsys.readouterr().out
+    wanted = middleware()
+    shown = subprocess.run(
+        ["bash", "-c", lines + "".join(f'echo "${name}"\n' for name in wanted)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={"PATH": "/usr/bin:/bin"},
+    )
+    assert shown.stdout.splitlines() == list(wanted.values())
+
+
+POLITE = """
+import time
+try: print('ready', flush=True); time.sleep(60)
+except KeyboardInterrupt: print('bye')
+"""
+DEAF = """
+import signal, time
+for number in (signal.SIGINT, signal.SIGTERM): signal.signal(number, signal.SIG_IGN)
+print('ready', flush=True); time.sleep(60)
+"""
+BUSY = "print('ready', flush=True)\nwhile True: sum(range(1000))"
+BROKEN = "import sys; print('no such weights', file=sys.stderr); sys.exit(3)"
+PROGRAMS = {"polite": POLITE, "deaf": DEAF, "busy": BUSY, "broken": BROKEN}
+
+
+@pytest.fixture
+def nodes(tmp_path, monkeypatch):
+    """A set of processes that run PROGRAMS by executable name."""
+    monkeypatch.setattr(
+        processes, "command", lambda spec, *_: [sys.executable, "-c", PROGRAMS[spec.executable]]
+    )
+    monkeypatch.setattr(
+        processes, "GRACE", ((signal.SIGINT, 3.0), (signal.SIGTERM, 0.2), (signal.SIGKILL, 3.0))
+    )
+    with processes.NodeProcesses(0, tmp_path / "logs") as nodes:
+        yield nodes
+
+
+def start(nodes, executable):
+    process = nodes.start(NodeSpec("test", executable, "none.yaml"))
+    deadline = time.monotonic() + 10.0
+    while "ready" not in process.log.read_text() and process.status is None:
+        assert time.monotonic() < deadline, "the program did not start"
+        time.sleep(0.01)
+    return process
+
+
+def test_sigint_ends_a_polite_process_with_0(nodes):
+    process = start(nodes, "polite")
+    assert nodes.stop() == {process.spec: 0}
+    assert process.last_words() == "bye"
+
+
+def test_a_deaf_process_is_killed_in_the_end(nodes, monkeypatch):
+    monkeypatch.setattr(
+        processes, "GRACE", ((signal.SIGINT, 0.2), (signal.SIGTERM, 0.2), (signal.SIGKILL, 3.0))
+    )
+    process = start(nodes, "deaf")
+    assert nodes.stop() == {process.spec: -signal.SIGKILL}
+
+
+def test_a_process_that_fails_is_found_with_its_last_words(nodes):
+    process = start(nodes, "broken")
+    assert process.wait(5.0) == 3
+    assert [(ended.spec.executable, ended.last_words()) for ended in nodes.ended()] == [
+        ("broken", "no such weights")
+    ]
+
+
+def test_a_process_can_be_started_again_after_kill(nodes):
+    first = start(nodes, "polite")
+    first.signal(signal.SIGKILL)
+    assert first.wait(5.0) == -signal.SIGKILL
+    second = nodes.start(first.spec)
+    assert second.pid != first.pid
+    assert nodes.ended() == []
+
+
+def test_cpu_time_is_that_of_the_process(nodes):
+    busy, idle = start(nodes, "busy"), start(nodes, "polite")
+    before, began = busy.cpu_time(), time.monotonic()
+    while time.monotonic() - began < 0.5:
+        time.sleep(0.05)
+    assert (
+        0.02 < busy.cpu_time() - before <= time.monotonic() - began + 0.02
+    )  # it may share its core
+    assert idle.cpu_time() < 2.0
+
+
+def test_nothing_survives_the_starter(tmp_path):
+    """kill -9 of the starter ends the node: the kernel sends it SIGTERM."""
+    starter = f"""
+import sys, time
+from pathlib import Path
+from fish_bringup import processes
+from fish_bringup.node_table import NodeSpec
+processes.command = lambda spec, *_: [sys.executable, "-c", {POLITE!r}]
+nodes = processes.NodeProcesses(0, Path({str(tmp_path)!r}))
+print(nodes.start(NodeSpec("test", "polite", "none.yaml")).pid, flush=True)
+time.sleep(60)
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", starter], stdout=subprocess.PIPE, text=True
+    ) as parent:
+        child = int(parent.stdout.readline())
+        parent.kill()
+        parent.wait()
+    deadline = time.monotonic() + 10.0
+    while _alive(child):
+        assert time.monotonic() < deadline, "the node outlived its starter"
+        time.sleep(0.02)
+
+
+def _alive(pid):
+    try:
+        with open(f"/proc/{pid}/stat") as stat:
+            return stat.read().rpartition(")")[2].split()[0] != "Z"  # a zombie waits for init only
+    except FileNotFoundError:
+        return False

@@ -1,9 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Programs: what they command, and what they refuse."""
+"""Programs without a path: excitation, driving by hand, and the distance from walls."""
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,21 @@ from fish_control.excitation import (
     command_table,
     read_program,
 )
+from fish_control.exciter import Exciter, Sight, heads_for_a_wall, stopping_rudder
+from fish_control.line_of_sight import Motion
+from fish_control.manual_drive import STEPS, ManualDrive
+from fish_control.node_configs import ExciterConfig
+from fish_control.paths import make_path
+from fish_control.pool import (
+    HALF_LENGTH,
+    HALF_WIDTH,
+    PathOutsidePoolError,
+    check_inside_pool,
+    stopping_side,
+    stopping_turn,
+    wall_distance,
+)
+from fish_control.watchdog import EstimateHealth
 
 DT = 0.01
 ROW = {"t": 0, "amplitude": 8, "frequency": 2, "rudder": 0.3}
@@ -179,3 +195,254 @@ def test_a_command_table_glides_after_its_end():
     assert table.shape == (500, 2)
     assert np.abs(table[:200, 1]).min() == 0.4
     assert np.abs(table[450:]).max() < 1e-9
+
+
+SURE = EstimateHealth(0.01, True, 1e-5, 1e-4)
+MIDDLE = Sight(Motion(0.0, 0.0, 0.0, 0.2, 0.0, 0.0), SURE)
+
+
+def doubtful(**changes):
+    return replace(MIDDLE, signs=replace(SURE, **changes))
+
+
+def exciter(**parameters):
+    config = ExciterConfig(rest=0.5, **parameters)
+    return Exciter(config, Excitation(Program((Row(0.0, 8.0, 2.0, 0.3),)), 0.0, 2.0))
+
+
+def swim(running, seconds, sight, begin=0.0):
+    """Commands (T, 3) of a while: phase, rotor speed, rudder."""
+    times = begin + DT * np.arange(round(seconds / DT))
+    return np.array([running.command(float(t), DT, sight) for t in times])
+
+
+def test_it_rests_swims_its_part_and_ends_at_rest():
+    running = exciter()
+    assert not swim(running, 1.0, None)[:, 1:].any()
+    assert running.state == "waiting"
+    assert not swim(running, 0.49, MIDDLE, begin=1.0)[:, 1:].any()
+    assert running.reason == "at rest"
+    strokes = swim(running, 1.99, MIDDLE, begin=1.5)
+    assert running.reason == "swimming"
+    assert strokes[-1, 2] == 0.3
+    assert np.abs(strokes[:, 1]).max() > 60.0
+    end = swim(running, 2.0, MIDDLE, begin=3.5)
+    assert running.state == "ended"
+    assert running.reason == "ended at 2.0 s, as programmed"
+    assert not end[-10:, 1:].any()
+
+
+def test_it_begins_when_the_robot_is_armed():
+    running = exciter()
+    for k in range(300):
+        assert running.command(DT * k, DT, MIDDLE, "not armed since the start").rotor_speed == 0.0
+    assert running.reason == "waiting for the robot to be armed: not armed since the start"
+    assert not swim(running, 0.49, MIDDLE, begin=3.0)[:, 1:].any()
+    assert np.abs(swim(running, 1.0, MIDDLE, begin=3.49)[:, 1]).max() > 60.0
+
+
+def test_a_robot_that_is_disarmed_on_the_way_ends_the_swim_for_good():
+    running = exciter()
+    swim(running, 1.5, MIDDLE)
+    running.command(1.5, DT, MIDDLE, "coil at 90 deg C")
+    assert running.state == "disarmed"
+    assert running.reason == "stopped at 1.0 s: disarmed: coil at 90 deg C"
+    assert not swim(running, 4.0, MIDDLE, begin=1.51)[-10:, 1:].any()
+
+
+@pytest.mark.parametrize(
+    ("sight", "state", "said"),
+    [
+        (
+            replace(MIDDLE, motion=Motion(HALF_LENGTH - 0.215, 0.0, 0.0, 0.2, 0.0, 0.0)),
+            "before a wall",
+            "at (1.92, 0.00) m",
+        ),
+        (doubtful(finite=False), "lost", "odometry is not finite"),
+        (doubtful(age=0.6), "lost", "odometry is stale: 0.60 s old, 0.5 s allowed"),
+        (doubtful(age=-5.0), "lost", "odometry is from the future: stamped 5.00 s ahead"),
+        (doubtful(pose_variance=1e4), "lost", "camera lost"),
+        (doubtful(twist_variance=1e4), "lost", "IMU lost"),
+    ],
+)
+def test_a_reason_stops_it_for_good(sight, state, said):
+    running = exciter()
+    swim(running, 1.5, MIDDLE)
+    held = swim(running, 0.02, sight, begin=1.5)[:, 2]
+    assert abs(held[-1]) == (pytest.approx(0.8) if state == "before a wall" else 0.0)  # rad
+    after = swim(running, 4.0, MIDDLE, begin=1.52)
+    assert running.state == state
+    assert running.reason.startswith("stopped at 1.0 s")
+    assert said in running.reason
+    assert not after[-10:, 1:].any()
+
+
+def test_nothing_stops_it_before_it_swims_or_without_its_guard():
+    running = exciter()
+    swim(running, 0.4, doubtful(age=9.0))
+    swim(running, 0.5, MIDDLE, begin=0.4)
+    assert running.state == "swimming"
+    blind = exciter(guard=False)
+    swim(blind, 1.0, None)
+    assert blind.state == "swimming"
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "heading", "surge", "sway", "stopped"),
+    [
+        (HALF_LENGTH - 0.34, 0.0, 0.0, 0.2, 0.0, True),  # 0.14 m from the wall a second later
+        (HALF_LENGTH - 0.36, 0.0, 0.0, 0.2, 0.0, False),
+        (HALF_LENGTH - 0.34, 0.0, math.pi, 0.2, 0.0, False),  # away from it
+        (
+            HALF_LENGTH - 0.05,
+            0.0,
+            math.pi,
+            0.05,
+            0.0,
+            False,
+        ),  # put down near the wall, swimming away
+        (HALF_LENGTH - 0.34, 0.0, math.pi / 2, 0.0, -0.2, True),  # sideways
+        (0.0, HALF_WIDTH - 0.34, 0.0, 0.0, 0.2, True),
+        (0.0, HALF_WIDTH - 0.34, 0.0, 0.0, -0.2, False),
+        (
+            0.0,
+            HALF_WIDTH - 0.34,
+            math.pi / 6,
+            0.3,
+            0.0,
+            False,
+        ),  # 0.15 m of the 0.3 m are towards the wall
+        (
+            0.0,
+            HALF_WIDTH - 0.34,
+            math.pi / 6,
+            0.3,
+            0.2 / math.sqrt(3.0),
+            True,
+        ),  # and 0.1 m more sideways
+        (0.0, 0.0, 0.0, 0.3, 0.0, False),
+    ],
+)
+def test_a_fish_that_heads_for_a_wall_is_seen(x, y, heading, surge, sway, stopped):
+    assert (
+        heads_for_a_wall(Motion(x, y, heading, surge, sway, 0.0), horizon=1.0, margin=0.15)
+        is stopped
+    )
+
+
+def test_the_rudder_goes_to_the_side_with_more_room():
+    motion = Motion(1.9, 0.4, 0.3, 0.2, 0.0, 0.0)
+    rudder = stopping_rudder(motion, 0.8)
+    distances = {side: wall_distance(stopping_turn(1.9, 0.4, 0.3, side)) for side in (-1.0, 1.0)}
+    assert rudder == 0.8 * max(distances, key=distances.get)
+
+
+def test_a_path_inside_passes_up_to_its_margin():
+    path = make_path("circle", radius=0.9)
+    check_inside_pool(path, 0.16)
+    with pytest.raises(PathOutsidePoolError):
+        check_inside_pool(path, 0.17)
+
+
+def test_the_refusal_says_where_how_far_and_what_to_do():
+    path = make_path("straight", length=4.2)
+    with pytest.raises(PathOutsidePoolError) as refusal:
+        check_inside_pool(path, 0.1)
+    assert "straight" in str(refusal.value)
+    assert "(-2.10, " in str(refusal.value)
+    assert "|x| <= 2.035" in str(refusal.value)
+    assert "make it smaller" in str(refusal.value)
+
+
+def test_a_path_that_ends_towards_a_wall_needs_room_to_stop():
+    """It ends at (-0.508, 0.855) m on course 2 rad; the turn's highest point is (1 + cos 2) 0.27 m above."""
+    to_the_wall = {"length": 1.0, "course": 2.0, "x": -0.3, "y": 0.4}
+    with pytest.raises(
+        PathOutsidePoolError, match=r"ends so that .* fish comes to \(-0.7[3-7], 1.01\)"
+    ):
+        check_inside_pool(make_path("straight", **to_the_wall), 0.1)
+    check_inside_pool(make_path("straight", **to_the_wall, end="loop"), 0.1)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_path_that_ends_beside_a_wall_is_passed_as_the_fish_stops_on_the_other_side(side):
+    check_inside_pool(
+        make_path("straight", length=1.0, course=np.pi / 2, x=side * 1.8, y=-0.2), 0.3
+    )
+
+
+def test_a_fish_stops_to_the_side_with_more_room():
+    assert stopping_side(2.0, 0.0, 1.57) == 1.0  # towards +y beside the wall at +x: left
+    assert stopping_side(-2.0, 0.0, 1.57) == -1.0
+    assert (
+        stopping_side(-0.7, -0.7, -1.97) == -1.0
+    )  # down and back: the right turn leaves the wall at -y sooner
+
+
+def test_the_stopping_turn_is_a_circle():
+    turn = stopping_turn(0.1, 0.2, 0.0, 1.0)
+    np.testing.assert_allclose(np.hypot(turn[:, 0] - 0.1, turn[:, 1] - 0.2 - 0.27), 0.27)
+    np.testing.assert_allclose(turn[0], [0.1, 0.2])
+    assert turn[1, 0] > 0.1
+
+
+def driven_by_hand(drive, begin, seconds, hold=True):
+    """Commands of 100 Hz (N, 2): rotor speed [rad/s], rudder [rad]."""
+    rows = []
+    for k in range(round(100 * seconds)):
+        now = begin + 0.01 * k
+        if hold:
+            drive.hold(now)
+        command = drive.command(now, 0.01)
+        rows.append((command.rotor_speed, command.alpha))
+    return np.array(rows)
+
+
+def test_keys_change_throttle_and_rudder_in_steps():
+    drive = ManualDrive(0.5)
+    assert all(drive.press("up") for _ in range(3))
+    assert drive.press("left")
+    assert (drive.throttle, drive.rudder) == pytest.approx((3 / STEPS, 1 / STEPS))
+    for _ in range(2 * STEPS):
+        drive.press("down")
+        drive.press("right")
+    assert (drive.throttle, drive.rudder) == (0.0, -1.0)
+
+
+def test_any_other_key_is_rest_at_once():
+    drive = ManualDrive(0.5)
+    drive.press("up")
+    assert not drive.press(" ")
+    assert (drive.throttle, drive.rudder) == (0.0, 0.0)
+
+
+def test_a_held_deadman_swims_and_steers_left():
+    drive = ManualDrive(0.5)
+    drive.wish(0.5, 0.5)
+    moved = driven_by_hand(drive, 0.0, 1.0)
+    assert np.abs(moved[:, 0]).max() > 20.0
+    assert moved[-1, 1] == pytest.approx(0.4)
+
+
+def test_without_the_operator_it_comes_to_rest_within_time_out_and_run_down():
+    drive = ManualDrive(0.3)
+    drive.wish(1.0, 1.0)
+    driven_by_hand(drive, 0.0, 1.0)
+    silent = driven_by_hand(drive, 1.0, 1.0, hold=False)
+    assert np.abs(silent[:25, 0]).max() > 20.0
+    assert np.abs(silent[-10:]).max() == 0.0
+    drive.hold(2.0)  # back again: from rest
+    assert drive.command(2.0, 0.01).rotor_speed == 0.0
+
+
+@pytest.mark.parametrize("wish", [(math.nan, math.nan), (math.inf, -math.inf)])
+def test_what_is_no_number_is_rest(wish):
+    drive = ManualDrive(0.5)
+    drive.wish(*wish)
+    assert (drive.throttle, drive.rudder) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("timeout", [0.0, 10.0, math.nan])
+def test_a_time_out_that_is_none_is_refused(timeout):
+    with pytest.raises(ValueError, match=r"expected 0\.05 to 5 s"):
+        ManualDrive(timeout)

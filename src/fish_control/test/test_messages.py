@@ -1,14 +1,25 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to values and back, by the conventions of ROS."""
+"""Messages, parameters and watchdogs of the nodes."""
 
 import math
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
 
+from fish_control.excitation import LAST_ROW
+from fish_control.gains_file import read_gains_file
+from fish_control.node_configs import (
+    ControllerConfig,
+    ExciterConfig,
+    FusionNodeConfig,
+    PlannerConfig,
+)
 from fish_control.nodes.messages import (
     estimate_signs,
     motion_of,
@@ -18,7 +29,7 @@ from fish_control.nodes.messages import (
     to_stamp,
     yaw_of,
 )
-from fish_control.watchdog import estimate_fault
+from fish_control.watchdog import EstimateHealth, Health, Watchdog, estimate_fault, loss, pose_loss
 
 # rows of a covariance (x, y, z, rotation about x, y, z): geometry_msgs/PoseWithCovariance
 X, Y, YAW = 0, 1, 5
@@ -109,3 +120,155 @@ def test_an_estimate_with_a_value_that_is_no_number_is_not_finite(spoil):
     else:
         message.pose.pose.orientation = Quaternion(w=0.0)
     assert not estimate_signs(message, now=10.5).finite
+
+
+CONFIG = Path(__file__).parents[1] / "config"
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("fusion", FusionNodeConfig),
+        ("planner", PlannerConfig),
+        ("controller", ControllerConfig),
+        ("exciter", ExciterConfig),
+    ],
+)
+def test_yaml_holds_the_dataclass(name, kind):
+    parameters = yaml.safe_load((CONFIG / f"{name}.yaml").read_text())["/**"]["ros__parameters"]
+    defaults = asdict(kind()).items()
+    assert parameters == {k: list(v) if isinstance(v, tuple) else v for k, v in defaults}
+    assert list(parameters) == list(asdict(kind()))
+
+
+def test_the_exciters_comment_says_how_long_the_last_row_lasts():
+    (end,) = [
+        line for line in (CONFIG / "exciter.yaml").read_text().splitlines() if " end:" in line
+    ]
+    assert end.endswith(f"its end, {LAST_ROW:g} s after its last row begins")
+
+
+def test_shipped_weights_fit_the_shipped_controller():
+    config = ControllerConfig()
+    policy = read_gains_file(CONFIG / "gains.safetensors")
+    assert policy.contract.differences(1.0 / config.rate_hz, config.lookahead) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "value", "expected"),
+    [
+        (PlannerConfig, "speed", 0.6, "0.05 to 0.5 m/s"),
+        (PlannerConfig, "speed", float("nan"), "0.05 to 0.5 m/s"),
+        (PlannerConfig, "end", "bounce", "known: , stop, loop"),
+        (PlannerConfig, "start", "middle", "known: beginning, nearest"),
+        (PlannerConfig, "lookahead", 0.0, "lookahead"),
+        (ControllerConfig, "command_rate_hz", 120.0, "a multiple of rate_hz"),
+        (ControllerConfig, "odometry_timeout", 0.0, "0.02 to 5"),
+        (ExciterConfig, "begin", -1.0, "0 to 3600 s"),
+        (ExciterConfig, "margin", float("nan"), "0 to 1 m"),
+    ],
+)
+def test_a_value_out_of_range_is_named(kind, field, value, expected):
+    with pytest.raises(ValueError) as refusal:
+        kind(**{field: value})
+    assert field in str(refusal.value)
+    assert repr(value) in str(refusal.value)
+    assert expected in str(refusal.value)
+
+
+SURE = EstimateHealth(0.01, True, 1e-5, 1e-4)
+GOOD = Health(SURE, 0.02)
+
+
+def but(**changes):
+    return replace(GOOD, estimate=replace(SURE, **changes))
+
+
+FAULTS = {
+    "odometry is stale": but(age=0.3),
+    "odometry is not finite": but(finite=False),
+    "camera lost": but(pose_variance=1e4),
+    "IMU lost": but(twist_variance=1e4),
+    "target is stale": replace(GOOD, target_age=0.5),
+    "odometry is from the future: stamped 5.00 s ahead": but(age=-5.0),
+    "target is from the future: stamped 0.30 s ahead": replace(GOOD, target_age=-0.3),
+}
+
+
+def swimming(**parameters):
+    dog = Watchdog(ControllerConfig(**parameters))
+    assert dog.check(0.0, GOOD)
+    return dog
+
+
+def test_it_waits_for_odometry_and_target_without_calling_it_a_stop():
+    dog = Watchdog(ControllerConfig())
+    assert not dog.check(0.0, Health(None, None))
+    assert dog.reason == "waiting for odometry"
+    assert dog.fault == ""
+    assert not dog.check(0.1, replace(GOOD, target_age=None))
+    assert (dog.state, dog.stops) == ("waiting", 0)
+    assert dog.check(0.2, GOOD)
+    assert dog.state == "swimming"
+
+
+@pytest.mark.parametrize("said", FAULTS)
+def test_every_fault_stops_at_once_and_is_said(said):
+    dog = swimming()
+    assert not dog.check(0.01, FAULTS[said])
+    assert dog.state == "stopped"
+    assert dog.reason.startswith(said)
+    assert dog.stops == 1
+    assert dog.fault == dog.reason
+    assert not dog.check(0.02, GOOD)  # all is well, and it waits a little
+    assert dog.fault == ""
+
+
+def test_a_disarmed_robot_is_waited_for_without_calling_it_a_stop():
+    dog = swimming()
+    assert not dog.check(0.01, replace(GOOD, disarmed="coil at 90 deg C"))
+    assert (dog.state, dog.stops) == ("waiting", 0)
+    assert dog.reason == "disarmed: coil at 90 deg C"
+    assert dog.check(0.02, GOOD)
+
+
+def test_clocks_that_differ_by_little_are_no_fault():
+    assert swimming().check(0.01, replace(but(age=-0.05), target_age=-0.05))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_variance_that_is_no_number_is_a_fault(value):
+    assert not swimming().check(0.01, but(pose_variance=value))
+
+
+@pytest.mark.parametrize("variance", [1.01, 1e4, math.nan])
+def test_what_is_lost_is_lost_at_any_age(variance):
+    no_pose, no_twist = (
+        replace(SURE, age=99.0, **{k: variance}) for k in ("pose_variance", "twist_variance")
+    )
+    assert (
+        pose_loss(no_pose, 1.0)
+        == loss(no_pose, 1.0)
+        == "camera lost: fusion does not vouch for the pose"
+    )
+    assert pose_loss(no_twist, 1.0) is None
+    assert loss(no_twist, 1.0) == "IMU lost: fusion does not vouch for the velocity"
+    assert loss(replace(SURE, age=99.0), 1.0) is None
+
+
+@pytest.mark.parametrize("said", FAULTS)
+def test_it_goes_on_after_the_delay(said):
+    dog = swimming(resume_delay=0.5)
+    dog.check(0.1, FAULTS[said])
+    assert not dog.check(0.2, GOOD)
+    assert not dog.check(0.6, GOOD)
+    assert dog.check(0.71, GOOD)
+
+
+def test_the_delay_starts_again_with_every_fault():
+    dog = swimming(resume_delay=0.5)
+    dog.check(0.1, FAULTS["camera lost"])
+    dog.check(0.2, GOOD)
+    dog.check(0.6, FAULTS["camera lost"])
+    assert not dog.check(0.8, GOOD)
+    assert dog.stops == 1

@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The arming state: who arms, what disarms, what stays latched."""
+"""Arming, and another node of the same name."""
 
 import math
 
@@ -22,6 +22,7 @@ from fish_node.arming import (
     largest_of,
     operator_and_estimate,
 )
+from fish_node.rivals import Rivals
 
 COMMAND = Source("joint_command", 0.15)
 SETTINGS = ArmingSettings(deadman_timeout_s=0.3)
@@ -215,3 +216,13 @@ def test_texts_of_other_nodes_can_do_no_harm():
     assert len(arming.reason) < 500
     arming.heard("rudder", 1.0, "\x1b]0;title\x07")
     assert arming.arm(1.0) == "\\x1b]0;title\\x07"
+
+
+def test_only_who_stays_is_a_rival():
+    counts = [1, 2, 1, 2, 2, 2, 3, 1, 2, 2, 2]  # once a second
+    times, warned = iter(range(len(counts))), []
+    rivals = Rivals("/fish/x", lambda _: counts.pop(0), warned.append, lambda: float(next(times)))
+    said = [rivals.warning() for _ in range(len(counts))]
+    assert [bool(words) for words in said] == [False] * 5 + [True, True] + [False] * 3 + [True]
+    assert said[5].startswith("another publisher of /fish/x")
+    assert warned == [said[5]] * 2  # once for each

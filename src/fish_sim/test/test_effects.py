@@ -1,20 +1,31 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What single effects do, against closed forms and other ways to the same number."""
+"""Effects: each against its equation, the contract that all keep, one of a user's own, the water's push, the walls."""
 
+import math
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 from scipy.signal import lsim
 
 from fish_sim import pool
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import BodyMotion, Drive
 from fish_sim.effects.surroundings import BASIN_LENGTH, BASIN_WIDTH
+from fish_sim.model import DT
 from fish_sim.ops import NUMPY
-from fish_sim.robot import Robot
+from fish_sim.pool import LENGTH, WIDTH
+from fish_sim.robot import Robot, parameter_names
+from fish_sim.robot_file import load_robot
+from fish_sim.scheme import stable_scheme
+from fish_sim.simulation import APART, EDGE, Readings, Simulation, Walls
+from fish_sim.simulation_config import SimulationConfig
 from fish_sim.step import Scheme, Stepper
+from fish_sim.water_push import WaterPush
 
 STILL = Drive(0.0, 0.0, 0.0, 0.0)
 
@@ -480,3 +491,314 @@ def test_left_rudder_turns_left_and_so_does_a_positive_offset(strokes):
     ]
     assert left > straight + 0.2
     assert offset == pytest.approx(left, abs=5e-3)  # but for the servo's way there, 0.05 s
+
+
+NEAR_WALL = (0.3, 0.85, 0.1)
+MOTION = 8  # q and q' of a fish with one link
+PHYSICS = (
+    "quadratic_drag current nonuniform_current wall_effect tip_slip wake_memory wave_drag sloshing "
+    "hull_asymmetry tail_hardening tail_joint_damping dry_friction tether payload rotor_imbalance"
+).split()
+ACTUATORS = (
+    "rudder_lag rudder_delay rudder_backlash rudder_offset rudder_saturation rudder_gain rudder_placement "
+    "rotor_lag rotor_saturation battery_sag"
+).split()
+
+
+def typical(name):
+    return {
+        key: p.typical if p.typical is not None else p.value
+        for key, p in EFFECTS[name].parameters.items()
+    }
+
+
+def strongest(name):
+    """Every parameter at the upper end of its range, where it has one."""
+    effect = EFFECTS[name]
+    return {
+        k: p.highest if np.isfinite(p.highest) else typical(name)[k]
+        for k, p in effect.parameters.items()
+    }
+
+
+def swim_with(effects, commands, poses=NEAR_WALL, links=1):
+    """States of a fish with effects {name: parameters}, without a compiler; (T + 1, ..., NS)."""
+    robot = Robot(links=links, effects=effects)
+    stepper = Stepper(robot.structure, stable_scheme(robot), compiled=False)
+    start = (
+        np.stack([stepper.rest(pose) for pose in poses])
+        if np.ndim(poses) == 2
+        else stepper.rest(poses)
+    )
+    return stepper.rollout(start, commands, stepper.parameters(robot))
+
+
+def test_every_physics_and_actuator_name_of_the_vocabulary_exists():
+    assert {n: EFFECTS[n].kind for n in PHYSICS} == dict.fromkeys(PHYSICS, "physics")
+    assert [effect.name for effect in EFFECTS.values()] == list(EFFECTS)
+    assert {n: EFFECTS[n].kind for n in ACTUATORS} == dict.fromkeys(ACTUATORS, "actuator")
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_description_is_complete(name):
+    effect = EFFECTS[name]
+    assert effect.name == name
+    assert effect.equation
+    assert effect.source
+    assert effect.__doc__
+    assert effect.strength
+    assert set(effect.strength) <= set(effect.parameters)
+    for key, p in effect.parameters.items():
+        assert p.lowest <= p.value <= p.highest and p.unit and p.source, key
+        assert (p.typical is not None) == (key in effect.strength), key
+        assert p.typical is None or (p.lowest <= p.typical <= p.highest and p.typical != p.value), (
+            key
+        )
+        assert all(p.lowest <= tried <= p.highest for tried in p.tries), key
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_zero_strength_is_the_nominal_model(name, strokes):
+    nominal, neutral = swim_with({}, strokes(60)), swim_with({name: {}}, strokes(60))
+    np.testing.assert_allclose(neutral[:, :MOTION], nominal[:, :MOTION], rtol=0, atol=1e-11)
+
+
+def test_all_effects_together_at_zero_strength_are_the_nominal_model(strokes):
+    off = {name: {} for name in EFFECTS}
+    nominal, neutral = swim_with({}, strokes(60), links=3), swim_with(off, strokes(60), links=3)
+    np.testing.assert_allclose(neutral[..., :12], nominal[..., :12], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_typical_strength_changes_the_motion_and_stays_finite(name, strokes):
+    nominal, changed = swim_with({}, strokes(80)), swim_with({name: typical(name)}, strokes(80))
+    assert np.isfinite(changed).all()
+    assert np.abs(changed[-1, :MOTION] - nominal[-1, :MOTION]).max() > 1e-5
+
+
+def test_all_effects_together_stay_finite(strokes):
+    states = swim_with({name: typical(name) for name in EFFECTS}, strokes(80), links=3)
+    assert np.isfinite(states).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "links"),
+    [*((name, 1) for name in EFFECTS), ("tail_hardening", 3), ("tail_joint_damping", 3)],
+)
+def test_the_upper_end_of_the_ranges_stays_finite(name, links, strokes):
+    commands = strokes(100) * [12 / 9, 1.6]  # full throttle, rudder from end to end
+    assert np.isfinite(swim_with({name: strongest(name)}, commands, (0.0, 0.0, 0.3), links)).all()
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_batch_equals_its_elements(name, strokes):
+    poses = [NEAR_WALL, (-1.0, -0.2, 2.0), (2.0, 0.0, -1.0)]
+    commands = strokes(15)
+    batch = swim_with({name: typical(name)}, commands, poses)
+    for i, pose in enumerate(poses):
+        np.testing.assert_allclose(
+            batch[:, i], swim_with({name: typical(name)}, commands, pose), atol=1e-12
+        )
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_wrenches_act_on_the_head_and_only_those_of_the_walls_on_the_tail_too(name):
+    effect, p = EFFECTS[name], SimpleNamespace(**typical(name))
+    z = SimpleNamespace(**dict.fromkeys(effect.states, 0.3))
+    for body in ("link_1", "fin"):
+        motion = BodyMotion(body, 0.3, 0.85, 0.8, 0.6, 0.2, -0.1, 0.5, 0.2, 1.5, 3e-3)
+        force = effect.wrench(p, motion, z, Drive(0.1, 0.2, 50.0, -300.0), NUMPY) or (0.0, 0.0, 0.0)
+        assert any(force) == (name == "wall_effect")
+
+
+@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.dissipative])
+def test_dissipative_effects_never_give_energy_to_the_fish(name):
+    random = np.random.default_rng(0)
+    effect, p = EFFECTS[name], SimpleNamespace(**typical(name))
+    z = SimpleNamespace(**dict.fromkeys(effect.states, 0.0))
+    drive = Drive(0.1, 0.2, 50.0, -300.0)
+    lost = 0.0
+    for x, y, u, v, w, heading in random.uniform(-1, 1, (200, 6)):
+        body = BodyMotion("head", x, y, np.cos(heading), np.sin(heading), u, v, w, 0.2, 1.5, 3e-3)
+        force = effect.wrench(p, body, z, drive, NUMPY) or (0.0, 0.0, 0.0)
+        power = (
+            force[0] * u + force[1] * v + force[2] * w - effect.joint_torque(p, 1, x, w, NUMPY) * w
+        )
+        assert power <= 0.0
+        lost -= power
+    assert lost > 0.0
+
+
+def test_states_and_memory_start_at_rest_and_parameters_are_named_once():
+    structure = (3, tuple(EFFECTS.values()))
+    stepper = Stepper(structure, compiled=False)
+    assert not stepper.rest()[3:].any()
+    assert len(set(stepper.layout.state)) == len(stepper.layout.state)
+    assert len(set(parameter_names(structure))) == len(parameter_names(structure))
+
+
+PAGE = Path(__file__).parent.parent / "docs" / "adding_an_effect.md"
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(), re.DOTALL)
+
+
+@pytest.fixture
+def table():
+    before = dict(EFFECTS)
+    yield EFFECTS
+    EFFECTS.clear()
+    EFFECTS.update(before)
+
+
+def test_the_example_works_and_says_what_it_does(table, capsys, tmp_path):
+    effect_file, table_line, use = blocks("python")
+    names = {"EFFECTS": table}
+    exec(compile(effect_file, "drag_arm.py", "exec"), names)
+    exec(table_line, names)
+    exec(use, names)
+    headings = re.findall(r"heading (-?[\d.]+) rad", capsys.readouterr().out)
+    assert len(headings) == 2
+    assert headings[0] != headings[1]
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(yaml.safe_dump({"format": 1, **yaml.safe_load(blocks("yaml")[0])}))
+    assert load_robot(robot) == Robot().with_effect("drag_arm", arm=0.02)
+
+
+@pytest.mark.parametrize("water", [WaterPush.usual(2.0), WaterPush.of_force(0.002)])
+def test_the_push_is_stationary_and_correlated_over_its_time(water: WaterPush) -> None:
+    random = np.random.default_rng(0)
+    first = water.first(random.standard_normal((4000, 3)))
+    push = first
+    for _ in range(round(water.time / DT)):
+        push = water.after(push, random.standard_normal(push.shape))
+    for wrench in (first, push):
+        np.testing.assert_allclose(wrench.std(axis=0), water.size, rtol=0.05)
+    correlation = (first * push).mean(axis=0) / (first.std(axis=0) * push.std(axis=0))
+    np.testing.assert_allclose(correlation, np.exp(-1.0), atol=0.05)
+
+
+def test_still_water_does_not_push() -> None:
+    water = WaterPush.of_force(0.0)
+    assert not water.after(water.first(np.ones(3)), np.ones(3)).any()
+
+
+def test_without_fresh_numbers_the_push_decays_exponentially() -> None:
+    water = WaterPush.usual()
+    push = np.array([1.0, -2.0, 0.5])
+    for _ in range(40):
+        push = water.after(push, np.zeros(3))
+    np.testing.assert_allclose(push, np.exp(-40 * DT / water.time) * np.array([1.0, -2.0, 0.5]))
+
+
+EXACT = {
+    "gyro_noise": 0.0,
+    "gyro_bias": 0.0,
+    "accelerometer_noise": 0.0,
+    "accelerometer_bias": 0.0,
+    "disturbance": 0.0,
+}
+# where a fish that swims straight comes to a wall within two seconds: a wall's normal is x or y
+TOWARDS = {
+    "east": ({"start_x": LENGTH / 2 - 0.1}, 0),
+    "north": ({"start_y": WIDTH / 2 - 0.1, "start_heading": 0.5 * math.pi}, 1),
+    "west": ({"start_x": 0.1 - LENGTH / 2, "start_heading": math.pi}, 0),
+}
+
+
+def swim_at_walls(simulation: Simulation, seconds: float) -> list[Readings]:
+    readings = []
+    for _ in range(round(seconds / DT)):
+        simulation.command(110.0 * math.sin(4.0 * math.pi * (simulation.time + DT)), 0.0)
+        readings.append(simulation.advance())
+    return readings
+
+
+def columns(readings: list[Readings]) -> tuple[np.ndarray, np.ndarray]:
+    """Places (N, 2) [m] and velocities (N, 2) [m/s], pool frame."""
+    pose, velocity = (
+        np.array([getattr(r.truth, key) for r in readings]) for key in ("pose", "velocity")
+    )
+    cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    u, v = velocity[:, :2].T
+    return pose[:, :2], np.column_stack([cos * u - sin * v, sin * u + cos * v])
+
+
+@pytest.mark.parametrize(("start", "normal"), TOWARDS.values(), ids=TOWARDS)
+def test_a_fish_that_swims_against_a_wall_stops_there(start, normal):
+    simulation = Simulation(Robot(), SimulationConfig(**EXACT, **start))
+    readings = swim_at_walls(simulation, 6.0)
+    place, velocity = columns(readings)
+    assert np.abs(place[:, normal]).max() == EDGE[normal]
+    at_wall = np.abs(place[:, normal]) == EDGE[normal]
+    assert at_wall.sum() > 100
+    assert (velocity[at_wall, normal] * place[at_wall, normal]).max() < 1e-9  # never outward
+    assert np.abs(velocity).max() < 1.0
+    assert simulation.walls.contacts == 1
+    assert np.abs(simulation.walls.place[normal]) == EDGE[normal]
+
+
+@pytest.mark.parametrize(("start", "normal"), TOWARDS.values(), ids=TOWARDS)
+def test_the_accelerometer_feels_how_the_velocity_changes_at_the_wall(start, normal):
+    """Summed over the contact it is the change of velocity along the normal: neither a push nor an impact is left out."""
+    readings = swim_at_walls(Simulation(Robot(), SimulationConfig(**EXACT, **start)), 6.0)
+    place, velocity = columns(readings)
+    heading = np.array([r.truth.pose[2] for r in readings])
+    felt = np.array([r.imu.specific_force[:2] for r in readings])
+    cos, sin = np.cos(heading), np.sin(heading)
+    pool = np.column_stack(
+        [cos * felt[:, 0] - sin * felt[:, 1], sin * felt[:, 0] + cos * felt[:, 1]]
+    )
+    at_wall = np.flatnonzero(np.abs(place[:, normal]) == EDGE[normal])
+    change = (velocity[at_wall] - velocity[at_wall - 1])[:, normal] / DT
+    np.testing.assert_allclose(pool[at_wall, normal], change, atol=1e-9)
+    assert np.abs(pool).max() < 60.0  # m/s^2, a stop from 0.5 m/s within a period is 50
+
+
+def test_a_fish_that_never_comes_to_a_wall_swims_the_same_to_the_last_bit():
+    with_walls, without = (
+        swim_at_walls(Simulation(Robot(), SimulationConfig(walls=walls)), 5.0)
+        for walls in (True, False)
+    )
+    for a, b in zip(with_walls, without, strict=True):
+        assert a.truth == b.truth
+        assert a.rotor == b.rotor
+        assert a.camera == b.camera
+        assert np.array_equal(a.imu.specific_force, b.imu.specific_force)
+
+
+def test_without_walls_the_water_has_no_end():
+    start, _ = TOWARDS["east"]
+    simulation = Simulation(Robot(), SimulationConfig(walls=False, **EXACT, **start))
+    place, _ = columns(swim_at_walls(simulation, 6.0))
+    assert place[:, 0].max() > EDGE[0] + 0.1
+    assert simulation.walls.contacts == 0
+
+
+def touch(walls: Walls, time: float, x: float) -> tuple[float, float]:
+    position, velocity = np.array([x, 0.0]), np.array([0.2, 0.1])
+    walls.hold(time, position, velocity)
+    return float(position[0]), float(velocity[0])
+
+
+def test_touches_stroke_after_stroke_are_one_contact():
+    walls = Walls()
+    for time in (1.0, 1.5, 2.0, 2.0 + 0.9 * APART):
+        assert touch(walls, time, EDGE[0] + 1e-3) == (EDGE[0], 0.0)
+    assert walls.contacts == 1
+    assert touch(walls, 5.0, 2.0) == (2.0, 0.2)
+    assert not walls.touches(5.0)
+    touch(walls, 5.0 + APART, EDGE[0] + 1e-3)
+    assert walls.contacts == 2
+    assert walls.place == (EDGE[0], 0.0)
+    walls.leave()
+    touch(walls, 5.0 + APART, EDGE[0] + 1e-3)
+    assert walls.contacts == 3
+
+
+def test_a_fish_beyond_the_wall_that_comes_back_keeps_its_velocity():
+    position, velocity = np.array([0.0, EDGE[1] + 0.01]), np.array([0.1, -0.2])
+    assert Walls().hold(0.0, position, velocity).tolist() == [False, True]
+    assert position.tolist() == [0.0, EDGE[1]]
+    assert velocity.tolist() == [0.1, -0.2]

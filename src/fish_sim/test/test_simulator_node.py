@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulator node in this process: topics, clock, services, bad commands, parameters."""
+"""The node simulator: its messages, its clock, and how it ends."""
 
 import itertools
 import math
@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rclpy
 import yaml
@@ -18,20 +19,29 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
+from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from fish_node import rivals
+from fish_sim.nodes import simulator
+from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.pacing import AHEAD
 from fish_sim.nodes.simulator import SimulatorNode
 from fish_sim.pool import LENGTH
 from fish_sim.robot import Robot, RobotError
 from fish_sim.robot_file import save_robot
+from fish_sim.sensors.onboard import ImuSample
+from fish_sim.sensors.overhead_camera import CameraPose
+from fish_sim.sensors.settings import SensorSettings
+from fish_sim.simulation import Truth
 from fish_sim.simulation_config import SimulatorConfig
 
 pytestmark = pytest.mark.ros
+
+
 DOMAIN = 139  # no other test uses it; the tests of fish_node run at the same time, in 143
 FAST = {"real_time_factor": 0.0, "disturbance": 0.0}
 TOPICS = {
@@ -378,3 +388,172 @@ def test_shipped_parameters_are_those_of_the_dataclass():
     file = Path(__file__).parent.parent / "config" / "simulator.yaml"
     values = yaml.safe_load(file.read_text())["/**"]["ros__parameters"]
     assert SimulatorConfig(**values) == SimulatorConfig()
+
+
+HEADER = Header(frame_id="frame")
+STAMP = Time(sec=12, nanosec=345)
+FRAMES = "pool", "fish_2/base_link", "fish_2/imu_link"
+TRUTH = Truth((1.0, 2.0, 2.5), (0.3, -0.2, 1.5), (0.1, -0.1, 0.2))
+
+
+def written(settings: SensorSettings | None = None) -> messages.PeriodMessages:
+    return messages.PeriodMessages(FRAMES, 3, settings or SensorSettings())
+
+
+def heading(orientation) -> float:
+    assert orientation.x == orientation.y == 0.0
+    return 2.0 * math.atan2(orientation.z, orientation.w)
+
+
+@pytest.mark.parametrize(
+    "names", [["rotor", "rudder"], ["rudder", "rotor"], ["other", "rudder", "rotor"]]
+)
+def test_a_command_is_read_by_name(names: list[str]) -> None:
+    positions, speeds = {"rudder": 0.4}, {"rotor": 90.0}
+    msg = JointState(name=names)
+    msg.position = [positions.get(name, 7.0) for name in names]
+    msg.velocity = [speeds.get(name, 7.0) for name in names]
+    assert messages.command(msg) == (90.0, 0.4)
+
+
+def test_odometry_is_the_truth() -> None:
+    msg = deserialize_message(written().odometry(STAMP, TRUTH), Odometry)
+    assert msg.header == Header(stamp=STAMP, frame_id="pool")
+    assert msg.child_frame_id == "fish_2/base_link"
+    assert not msg.pose.covariance.any()
+    p, twist = msg.pose.pose.position, msg.twist.twist
+    assert (p.x, p.y, p.z, heading(msg.pose.pose.orientation)) == pytest.approx(
+        (1.0, 2.0, 0.0, 2.5)
+    )
+    assert (twist.linear.x, twist.linear.y, twist.angular.z) == (0.3, -0.2, 1.5)
+
+
+def test_the_imu_keeps_axes_and_noise_apart() -> None:
+    settings = SensorSettings(orientation_noise=0.1, gyro_noise=0.2, accelerometer_noise=0.3)
+    sample = ImuSample(-0.7, np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]))
+    msg = deserialize_message(written(settings).imu(STAMP, sample), Imu)
+    assert msg.header == Header(stamp=STAMP, frame_id="fish_2/imu_link")
+    w, a = msg.angular_velocity, msg.linear_acceleration
+    assert heading(msg.orientation) == pytest.approx(-0.7)
+    assert (w.x, w.y, w.z, a.x, a.y, a.z) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    for covariance, std in (
+        (msg.orientation_covariance, 0.1),
+        (msg.angular_velocity_covariance, 0.2),
+        (msg.linear_acceleration_covariance, 0.3),
+    ):
+        np.testing.assert_allclose(covariance.reshape(3, 3), std**2 * np.eye(3))
+
+
+def test_a_camera_pose_carries_its_noise_in_x_y_and_yaw() -> None:
+    settings = SensorSettings(camera_position_noise=0.01, camera_heading_noise=0.2)
+    msg = messages.camera_pose(HEADER, CameraPose(1.0, 1.05, -0.5, 0.25, 3.0), settings)
+    p = msg.pose.pose.position
+    assert (p.x, p.y, heading(msg.pose.pose.orientation)) == pytest.approx((-0.5, 0.25, 3.0))
+    expected = np.diag([0.01**2, 0.01**2, 0.0, 0.0, 0.0, 0.2**2])
+    np.testing.assert_allclose(msg.pose.covariance.reshape(6, 6), expected)
+
+
+def test_encoder_and_tail_are_named_joints() -> None:
+    out = written()
+    rotor = deserialize_message(out.rotor(STAMP, (12.0, 80.0)), JointState)
+    tail = deserialize_message(out.tail(STAMP, TRUTH), JointState)
+    assert rotor.header == tail.header == Header(stamp=STAMP, frame_id="fish_2/base_link")
+    assert (rotor.name, list(rotor.position), list(rotor.velocity)) == (["rotor"], [12.0], [80.0])
+    assert (tail.name, list(tail.position)) == (["tail_1", "tail_2", "tail_3"], [0.1, -0.1, 0.2])
+
+
+def test_the_clock_is_the_stamp_and_each_message_has_its_own() -> None:
+    out = written()
+    first, second = out.clock(STAMP), out.clock(Time(sec=13, nanosec=0))
+    assert deserialize_message(first, Clock).clock == STAMP
+    assert deserialize_message(second, Clock).clock == Time(sec=13, nanosec=0)
+
+
+WALL_CLOCK_DOMAIN = 144
+
+
+@pytest.fixture
+def simulated():
+    """simulated(parameter=value, ...): a simulator node."""
+    nodes = []
+
+    def make(**parameters):
+        given = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+        rclpy.init(args=["--ros-args", *given], domain_id=WALL_CLOCK_DOMAIN)
+        nodes.append(simulator.SimulatorNode())
+        return nodes[-1]
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+    if rclpy.ok():
+        rclpy.shutdown()  # unlike try_shutdown it takes the signal handlers away
+
+
+class Clocks:
+    """Stands for the module time, with a wall clock that can be set."""
+
+    def __init__(self):
+        self.steady, self.wall = 50.0, 1.7e9
+
+    def monotonic(self):
+        return self.steady
+
+    def time_ns(self):
+        return round(self.wall * 1e9)
+
+    def run(self, node, seconds):
+        """Tick for a while; returns how much the last stamp is behind the wall clock [s]."""
+        for _ in range(round(100 * seconds)):
+            self.steady, self.wall = self.steady + 0.01, self.wall + 0.01
+            node._tick()
+        return (
+            self.wall
+            - node._stamp(node._simulation.time).sec
+            - 1e-9 * node._stamp(node._simulation.time).nanosec
+        )
+
+
+@pytest.mark.parametrize("step", [3600.0, 0.5, -0.5, -3600.0])
+def test_the_simulator_follows_a_wall_clock_that_is_set(simulated, monkeypatch, capfd, step):
+    clocks = Clocks()
+    monkeypatch.setattr(simulator, "time", clocks)
+    node = simulated()
+    assert abs(clocks.run(node, 1.0)) < 0.02
+    assert node._simulation.time == pytest.approx(1.0, abs=0.02)
+    clocks.wall += step
+    assert abs(clocks.run(node, 1.0)) < 0.03
+    assert node._simulation.time == pytest.approx(2.0, abs=0.05)
+    assert node._pacer.lost == 0.0
+    assert capfd.readouterr().err.count("the wall clock was set") == 1
+
+
+@pytest.mark.parametrize(
+    ("parameters", "step"),
+    [({}, 0.1), ({"use_sim_time": "true"}, 60.0), ({"real_time_factor": 2.0}, 60.0)],
+)
+def test_the_simulators_time_stays_even_where_the_wall_clock_hardly_moved_or_is_not_followed(
+    simulated, monkeypatch, parameters, step
+):
+    clocks = Clocks()
+    monkeypatch.setattr(simulator, "time", clocks)
+    node = simulated(**parameters)
+    before = clocks.run(node, 0.5)
+    clocks.wall += step
+    assert clocks.run(node, 0.01) == pytest.approx(before + step, abs=0.05)
+
+
+def test_a_simulator_that_was_held_up_counts_what_it_lost_and_is_not_called_set(
+    simulated, monkeypatch, capfd
+):
+    clocks = Clocks()
+    monkeypatch.setattr(simulator, "time", clocks)
+    node = simulated()
+    clocks.run(node, 0.5)
+    clocks.steady, clocks.wall = clocks.steady + 3.0, clocks.wall + 3.0
+    assert abs(clocks.run(node, 0.5)) < 0.03
+    assert node._pacer.lost == pytest.approx(3.0, abs=0.02)
+    clocks.steady, clocks.wall = clocks.steady + 0.15, clocks.wall + 0.15  # is caught up with
+    assert abs(clocks.run(node, 0.1)) < 0.03
+    assert node._pacer.lost == pytest.approx(3.0, abs=0.02)
+    assert "the wall clock was set" not in capfd.readouterr().err

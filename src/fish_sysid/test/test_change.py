@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""OLD and NEW of a fish without forces: the stages of the comparison find what was put in, and nothing where nothing was."""
+"""What changed between two days: comparison, null, shapes of the candidates."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kinematic_swims import World, kinematic_swims
+from scipy.stats import f as fisher
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
-from fish_sysid.dataset.experiment import joined
+from fish_sysid.dataset.experiment import Experiment, Frames, joined
 from fish_sysid.dataset.synthetic import INJECTIONS, with_injection
 from fish_sysid.diagnosis.change import comparable
-from fish_sysid.diagnosis.change.change import Change
+from fish_sysid.diagnosis.change.case import Case
+from fish_sysid.diagnosis.change.change import Change, Member, Named
 from fish_sysid.diagnosis.change.change_json import (
     answer,
     chance,
@@ -24,13 +26,27 @@ from fish_sysid.diagnosis.change.change_json import (
     with_change,
 )
 from fish_sysid.diagnosis.change.channels import swims
-from fish_sysid.diagnosis.change.compare import compare, days_of
+from fish_sysid.diagnosis.change.compare import LOOKS, compare, days_of
+from fish_sysid.diagnosis.change.explanation import explained, swapped_in
 from fish_sysid.diagnosis.change.harmonics import StrokeWeights
 from fish_sysid.diagnosis.change.image_age import age_change
 from fish_sysid.diagnosis.change.naming import judge_all
+from fish_sysid.diagnosis.change.other_commands import FORM, OldAnswer
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, look, trial_rows
+from fish_sysid.diagnosis.change.rudder_change import (
+    RudderChange,
+    rudder_change,
+    with_second_opinion,
+)
+from fish_sysid.diagnosis.change.servos import ANSWERED, delayed, lagged, with_play, with_servo
 from fish_sysid.diagnosis.change.shared_fit import regression
-from fish_sysid.diagnosis.change.swap_test import exchanges, single_days, swap_test
+from fish_sysid.diagnosis.change.simulation import AFTER, BEFORE, rollout
+from fish_sysid.diagnosis.change.step_response import step_response
+from fish_sysid.diagnosis.change.strength import Refitted
+from fish_sysid.diagnosis.change.swap_test import Gains, exchanges, single_days, swap_test
+from fish_sysid.diagnosis.change.tail_probability import Tails, tail_probability
+from fish_sysid.diagnosis.families import family_of
+from fish_sysid.estimation.ekf import filter_stepper
 
 NAMES = ("current", "camera_latency", "camera_heading_offset", "gyro_scale", "imu_misalignment")
 OLD, NEW = 10, 5  # trials
@@ -291,3 +307,277 @@ def test_the_standard_error_is_that_of_new_less_old(days) -> None:
     typical = 0.06  # rad, unit of a strength
     expected = np.var(offsets / typical, ddof=1) * (1 / OLD + 1 / NEW)
     assert np.mean(variances) == pytest.approx(expected, rel=0.25)
+
+
+JUMP = 300  # grid point at which the rotor jumps
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """Two equal fish, the second with a rotor that jumps as no motor can."""
+    stepper = filter_stepper(Robot())
+    t = DT * np.arange(900)
+    commands = np.zeros((len(t), 2, 2))
+    commands[:, :, 0] = 40.0 * np.sin(4.0 * np.pi * t)[:, None]
+    commands[JUMP : JUMP + 6, 1, 0] = (4e4, -4e4, 4e4, -4e4, 4e4, -4e4)
+    table = np.repeat(stepper.parameters(Robot())[None], 2, axis=0)
+    return *rollout(stepper, table, commands), stepper.layout.links + 3
+
+
+def test_the_trial_goes_on_where_it_diverged(driven) -> None:
+    x, lost, turn = driven
+    assert np.isfinite(x[:-1]).all()
+    again = JUMP + round((AFTER + 1.0) / DT)
+    assert x[again:-1, 1, turn].mean() == pytest.approx(x[again:-1, 0, turn].mean(), rel=0.1)
+    assert lost[JUMP - round(BEFORE / DT) + 10 : JUMP + round(AFTER / DT), 1].all()
+
+
+def test_its_neighbour_is_as_without_it(driven) -> None:
+    _, lost, _ = driven
+    assert not lost[:, 0].any()
+
+
+SERVO_NAMES = ("current", "camera_scale", "camera_heading_offset", "rudder_offset", "rudder_gain")
+COMMANDED_OLD, COMMANDED_NEW = 12, 6  # trials
+
+
+@pytest.fixture(scope="module")
+def commanded_days() -> tuple[Experiment, Experiment]:
+    return kinematic_swims(World(), 1, COMMANDED_OLD), kinematic_swims(World(), 2, COMMANDED_NEW)
+
+
+@pytest.fixture(scope="module")
+def looks_at(commanded_days):
+    """looks_at(new): both looks at a NEW of the same OLD."""
+    old, _ = commanded_days
+    rows_of_old = trial_rows(Robot(), old, swims(old), SERVO_NAMES)
+    answer = OldAnswer.of(rows_of_old)
+    both = answer.added(rows_of_old, swims(old), old)
+
+    def cases(new: Experiment) -> list[Case]:
+        moved = answer.added(trial_rows(Robot(), new, swims(new), SERVO_NAMES), swims(new), new)
+        found = []
+        for channels in LOOKS.values():
+            kept, cut = look(both, channels), look(moved, channels)
+            fit, strata, day_of = (
+                regression(kept, cut),
+                [0] * (COMMANDED_OLD + COMMANDED_NEW),
+                [0] * COMMANDED_OLD + [1] * COMMANDED_NEW,
+            )
+            days_of_new = tuple(swims(new))
+            found.append(
+                Case(channels, fit, kept, cut, strata, day_of, Robot(), new, days_of_new, answer)
+            )
+        return found
+
+    return cases
+
+
+@pytest.mark.parametrize(("name", "value"), [("rudder_offset", 0.06), ("rudder_gain", 0.8)])
+def test_the_column_is_what_a_fish_of_another_structure_does(
+    commanded_days, looks_at, name, value
+) -> None:
+    _, new = commanded_days
+    key = {"rudder_offset": "offset", "rudder_gain": "factor"}[name]
+    case = looks_at(with_injection(new, name, {key: value}))[0]
+    judged = judge_all(case.fit)
+    assert judged[name].key == (name, FORM)
+    assert judged[name].strengths[0] == pytest.approx(1.0, abs=0.2)
+    assert judged[name].gain == max(one.gain for one in judged.values())
+
+
+def test_another_zero_of_the_servo_is_named_with_its_number(commanded_days, looks_at) -> None:
+    _, new = commanded_days
+    looks = looks_at(with_injection(new, "rudder_offset", {"offset": -0.05}))
+    found = explained(Change("changed"), looks, swapped_in(looks, ()))
+    (named,) = found.named
+    offset = named.members[0].refitted.parameters["offset"]
+    assert named.name == "rudder_offset"
+    assert offset.value == pytest.approx(-0.05, abs=3.0 * offset.std)
+    assert offset.std < 0.01
+    assert found.remainder_p_value > 0.005
+
+
+def test_what_differs_from_trial_to_trial_weighs_less(commanded_days) -> None:
+    """A camera's scale that is drawn for every trial: it gains as little as the trials' own differences let it."""
+    random = np.random.default_rng(5)
+    old, new = (_scaled_trial_by_trial(day, random) for day in commanded_days)
+    gained = {}
+    for case, (yesterday, today) in {"varied": (old, new), "equal": commanded_days}.items():
+        rows = [
+            look(trial_rows(Robot(), day, swims(day), SERVO_NAMES), MEAN_MOTION)
+            for day in (yesterday, today)
+        ]
+        fit = regression(*rows)
+        gained[case] = Gains(fit, ()).dispersion(), judge_all(fit)
+    varied, equal = gained["varied"][0], gained["equal"][0]
+    assert varied["camera_scale", 0] > 5.0 * equal["camera_scale", 0]
+    assert varied["camera_heading_offset", 0] < 0.5 * varied["camera_scale", 0]
+    one = gained["varied"][1]["camera_scale"]
+    assert one.dispersion == varied["camera_scale", 0]
+    assert one.gain < 3.0
+
+
+def _scaled_trial_by_trial(day: Experiment, random: np.random.Generator) -> Experiment:
+    parts = [
+        with_injection(day.select([m]), "camera_scale", {"factor": 1.0 + 0.1 * random.normal()})
+        for m in range(len(day.names))
+    ]
+    frames = tuple(part.frames[0] for part in parts)
+    return Experiment(
+        day.names, day.steps, day.commands, day.gyro, day.accel, day.encoder, frames=frames,
+        start_at_rest=False,
+    )  # fmt: skip
+
+
+STEPPED_OLD, STEPPED_NEW, STEPS = 8, 5, 1000
+STRATA = [0] * (STEPPED_OLD + STEPPED_NEW)
+LEVEL = 0.02
+
+
+def swum(seed: int, count: int) -> Experiment:
+    """A body that answers rotor and a rudder of random steps with a lag of 0.15 s, and a gyro with noise."""
+    random = np.random.default_rng(seed)
+    t = DT * np.arange(STEPS)
+    commands, gyro = np.zeros((STEPS, count, 2)), np.zeros((STEPS, count))
+    for m in range(count):
+        rotor = random.uniform(40.0, 70.0) * np.sin(4.0 * np.pi * t + random.uniform(0.0, 6.0))
+        rudder = np.repeat(random.uniform(-0.4, 0.4, STEPS // 50), 50)
+        commands[:, m] = np.column_stack([rotor, rudder])
+        push = 0.03 * rudder * np.sqrt(lagged(rotor**2, 0.5)) + 0.01 * rotor
+        gyro[:, m] = lagged(push, 0.15) + 0.02 * random.standard_normal(STEPS)
+    frames = tuple(Frames(t[::5], np.zeros((len(t[::5]), 3))) for _ in range(count))
+    names = tuple(f"{seed}_{m}" for m in range(count))
+    nothing = np.full((STEPS, count), np.nan)
+    return Experiment(
+        names, np.full(count, STEPS), commands, gyro, np.full((STEPS, count, 2), np.nan), nothing, frames, True
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def stepped_days() -> tuple[Experiment, Experiment]:
+    return swum(1, STEPPED_OLD), swum(2, STEPPED_NEW)
+
+
+def test_nothing_changed(stepped_days) -> None:
+    answer = step_response(*stepped_days, STRATA, 150)
+    assert answer is not None
+    assert answer.p_value > LEVEL
+    change = rudder_change(*stepped_days, STRATA)
+    assert change is None or change.p_value > LEVEL
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "tolerance"),
+    [("rudder_delay", {"delay": 0.085}, 0.01), ("rudder_gain", {"factor": 0.8}, 0.03)],
+)
+def test_an_injection_is_named_with_its_number(stepped_days, name, values, tolerance) -> None:
+    old, new = stepped_days
+    change = rudder_change(old, with_injection(new, name, values), STRATA)
+    assert change is not None
+    assert change.p_value < LEVEL
+    assert change.named.name == name
+    assert change.named.family == "rudder timing"
+    ((key, value),) = values.items()
+    found = change.named.members[0].refitted.parameters[key]
+    assert found.value == pytest.approx(value, abs=tolerance)
+
+
+def test_a_lag_is_told_from_a_delay(stepped_days) -> None:
+    """The command is what a servo with a lag of 0.12 s would have had to get."""
+    old, new = stepped_days
+    kept = np.exp(-DT / 0.12)
+    rudder = new.commands[..., 1]
+    led = rudder.copy()
+    led[1:] = (rudder[1:] - kept * rudder[:-1]) / (1.0 - kept)
+    change = rudder_change(
+        old, replace(new, commands=np.stack([new.commands[..., 0], led], axis=-1)), STRATA
+    )
+    assert change is not None
+    assert change.p_value < LEVEL
+    assert [m.name for m in change.named.members] == ["rudder_lag"]
+    assert change.named.members[0].refitted.parameters["time_constant"].value == pytest.approx(
+        0.12, abs=0.01
+    )
+
+
+def test_servos_do_to_a_step_what_their_names_say() -> None:
+    step = np.where(DT * np.arange(200) < 1.0, 0.0, 0.3)
+    assert lagged(step, 0.1)[110] == pytest.approx(0.3 * (1.0 - np.exp(-1.1)), abs=0.002)
+    assert delayed(step, 0.1)[108] == 0.0
+    assert delayed(step, 0.1)[112] == pytest.approx(0.3)
+    assert with_play(step, 0.05)[150] == pytest.approx(0.25)
+    with pytest.raises(KeyError):
+        with_servo(swum(1, 1), "payload", 0.1)
+    assert set(ANSWERED) == {"rudder_lag", "rudder_delay", "rudder_backlash", "rudder_gain"}
+
+
+def test_without_a_gyro_there_is_no_answer(stepped_days) -> None:
+    old, new = stepped_days
+    assert step_response(old, replace(new, gyro=np.full_like(new.gyro, np.nan)), STRATA) is None
+
+
+def test_the_gyro_has_a_second_opinion_on_timing_alone() -> None:
+    """The mean motion says placement, the gyro lag; a flow beside it is none of the gyro's business."""
+    by_motion = _named("rudder_placement", rudder_placement=0.7, rudder_delay=0.3)
+    flow = _named("current", current=1.0)
+    by_gyro = RudderChange(0.03, _named("rudder_lag", rudder_lag=0.9, rudder_delay=0.1))
+    timing, same = with_second_opinion([by_motion, flow], by_gyro)
+    assert {m.name: m.probability for m in timing.members} == pytest.approx(
+        {"rudder_lag": 0.45, "rudder_placement": 0.35, "rudder_delay": 0.2}
+    )
+    assert timing.name == "rudder_lag"
+    assert same is flow
+    unsure = RudderChange(0.3, by_gyro.named)
+    assert with_second_opinion([by_motion], unsure) == [by_motion]
+
+
+def _named(first: str, **members: float) -> Named:
+    none = Refitted({}, "", np.zeros(3))
+    made = tuple(Member(name, p, 1.0, 0.5, none) for name, p in members.items())
+    return Named(made, family_of(first), 1.0, 0.1)
+
+
+def test_a_number_at_an_end_of_those_tried_is_not_said_to_be_exact() -> None:
+    old, new = (
+        swum(1, STEPPED_OLD),
+        with_injection(swum(2, STEPPED_NEW), "rudder_gain", {"factor": 0.4}),
+    )
+    answer = step_response(old, new, STRATA, 20)
+    assert answer is not None
+    gain = next(servo for servo in answer.servos if servo.name == "rudder_gain").estimate
+    assert gain.value == pytest.approx(0.5)  # the least that is tried
+    assert gain.std == pytest.approx(0.1 / 12**0.5)
+
+
+DEGREES = (1, 10)
+
+
+def test_the_tail_of_an_f_statistic_is_found_beyond_its_largest_value() -> None:
+    """300 values reach to 0.003; a probability of 0.0003 is found to be small, and never much too small."""
+    random = np.random.default_rng(3)
+    value = float(fisher.isf(3e-4, *DEGREES))
+    found = np.array([tail_probability(random.f(*DEGREES, 300), value) for _ in range(40)])
+    assert (found > 3e-4 / 6).all()
+    assert (found < 0.02).all()
+    assert np.exp(np.log(found).mean()) > 3e-4
+
+
+def test_within_the_null_it_counts() -> None:
+    null = np.arange(1.0, 101.0)
+    assert tail_probability(null, 50.5) == pytest.approx(51 / 101)
+    assert tail_probability(null, 0.5) == 1.0
+
+
+def test_a_tail_is_never_lighter_than_the_median_one() -> None:
+    random = np.random.default_rng(4)
+    null = np.column_stack(
+        [random.f(*DEGREES, 300), random.f(*DEGREES, 300), 1.0 + random.random(300)]
+    )
+    tails = Tails.of(null)
+    assert tails.gamma.min() == np.median(tails.gamma)
+
+
+def test_too_few_exchanged_sets_say_so() -> None:
+    with pytest.raises(ValueError, match="null of 8 values"):
+        tail_probability(np.ones(8), 2.0)

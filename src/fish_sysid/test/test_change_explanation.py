@@ -1,21 +1,24 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Which name, how many, and at which level: the rules by which a change is explained."""
+"""The names of a change, their numbers, and the page."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from kinematic_swims import World, kinematic_swims
+from swims import fish, swim
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import with_injection
 from fish_sysid.diagnosis.change.case import Case
-from fish_sysid.diagnosis.change.change import Change
+from fish_sysid.diagnosis.change.change import Change, Member, Named
+from fish_sysid.diagnosis.change.change_json import answer
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import LOOKS
 from fish_sysid.diagnosis.change.contenders import Contender, family_alone, weighed
@@ -33,6 +36,8 @@ from fish_sysid.diagnosis.change.shared_fit import regression
 from fish_sysid.diagnosis.change.strength import Refitted, refit
 from fish_sysid.diagnosis.change.swap_test import Swapped, at_once
 from fish_sysid.diagnosis.degenerate import degenerate
+from fish_sysid.diagnosis.symmetry.finding import Estimate
+from fish_sysid.reports.change_page import side_by_side, write_change_page
 
 NAMES = ("current", "camera_latency", "camera_heading_offset", "gyro_scale", "imu_misalignment")
 OLD, NEW, TRIALS = 10, 5, 8
@@ -273,3 +278,37 @@ def test_a_flow_is_the_rarest_of_all_sets_and_nothing_is_not(days, looks_at) -> 
     assert permutation_p_value([c.fit for c in same], strata, 200, days=days) >= unchanged
     unequal = [0] * (OLD - 1) + [1] + [2] * NEW
     assert permutation_p_value([c.fit for c in flow], strata, 200, days=unequal) == changed
+
+
+FLOW = {"x": 0.05, "y": 0.0}  # m/s
+
+
+@pytest.fixture(scope="module")
+def change() -> Change:
+    """Water that moves in NEW alone, found by the gyro's answer as it were: without a p-value of the rest."""
+    values = {k: Estimate(v, 0.001, "m/s") for k, v in FLOW.items()}
+    member = Member("current", 1.0, 10.0, float("nan"), Refitted(values, "", np.zeros(3)))
+    return Change(
+        "changed", p_value=0.002, look="mean motion", named=(Named((member,), "", 10.0, 1.0),), remainder_p_value=0.4,
+        robot=fish(), old=swim(fish(), duration=8.0), new=swim(fish(current=FLOW), duration=8.0, seed=1),
+    )  # fmt: skip
+
+
+def test_the_curves_of_new_follow_it_better_with_the_change(change: Change) -> None:
+    figure = side_by_side(change).figure
+    surge = [s for s in figure.data if s.yaxis in ("y4", "y5", "y6")]  # of NEW's trials
+    measured = np.concatenate([np.array(s.y) for s in surge if s.name == "measured"])
+    errors = {}
+    for name in ("OLD's model", "with the change"):
+        apart = np.concatenate([np.array(s.y) for s in surge if s.name == name]) - measured
+        assert np.isfinite(apart).mean() > 0.8
+        errors[name] = np.sqrt(np.nanmean(apart**2))
+    assert errors["with the change"] < 0.01  # m/s
+    assert errors["with the change"] < 0.5 * errors["OLD's model"] < 0.05
+
+
+def test_a_number_that_is_not_known_is_no_nan_on_the_page(change: Change, tmp_path: Path) -> None:
+    write_change_page(tmp_path / "report.html", "today", answer(change), change)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<td>1.00</td><td>–</td>" in page
+    assert "<td>nan</td>" not in page

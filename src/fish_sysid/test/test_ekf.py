@@ -1,32 +1,44 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The filter: the C pass against the NumPy pass, and its statistics where the truth is known."""
+"""The extended Kalman filter and its noise."""
 
 from __future__ import annotations
 
 import tracemalloc
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
+from fish_report.parallel import on_all_cores
 from fish_sim.compiled import lanes
 from fish_sim.effects import EFFECTS
+from fish_sim.model import DT
 from fish_sim.robot import Robot
-from fish_sysid.dataset.experiment import Frames
+from fish_sysid.dataset.experiment import Experiment, Frames, Headings
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.estimation import ekf_compiled
 from fish_sysid.estimation.ekf import filter_stepper, run_filter
 from fish_sysid.estimation.ekf_compiled import compiled_passes
 from fish_sysid.estimation.ekf_numpy import Filter
-from fish_sysid.estimation.ekf_types import (
-    Noise,
-    Problem,
-    SensorModel,
-    place_frames,
+from fish_sysid.estimation.ekf_types import Noise, Problem, SensorModel, encoder_terms, place_frames
+from fish_sysid.estimation.map_fit import Fit, evaluate, likelihoods
+from fish_sysid.estimation.noise_estimation import (
+    FEWEST,
+    NOISE_MOVES,
+    SMALLEST,
+    Reach,
+    commanded_residual,
+    encoder_noise,
+    estimate_noise,
+    octaves,
+    usual_noise,
+    white_noise,
 )
-from fish_sysid.estimation.map_fit import evaluate
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, nominal_hypothesis
+from fish_sysid.estimation.refit import alternate
 from fish_sysid.estimation.smoother import smooth, smoothed
 
 SENSORS = (
@@ -341,3 +353,164 @@ def test_a_fast_tail_gets_the_steps_it_needs():
     robot = Robot().with_parameters(tail_stiffness=1.5).with_effect("disturbance")
     assert filter_stepper(Robot().with_effect("disturbance")).scheme.substeps == 1
     assert filter_stepper(robot).scheme.substeps > 1
+
+
+@pytest.fixture(scope="module")
+def swum():
+    random = np.random.default_rng(3)
+    commands = np.stack([program(kind, 4.0, random) for kind in ("sines", "steps")], axis=1)
+    return record(Robot(), commands, Noise(), random)[0]
+
+
+def test_log_likelihood_gradient_and_gate(swum):
+    rotor, d_rotor = commanded_residual(swum), np.ones((*swum.encoder.shape, 1))
+    model = swum.encoder - rotor
+    terms = encoder_terms(swum, Noise(), model, d_rotor)
+    assert terms.log_likelihood == pytest.approx(norm.logpdf(rotor, scale=0.15).sum(0), rel=1e-12)
+    assert terms.gradient[:, 0] == pytest.approx(-rotor.sum(0) / 0.15**2, rel=1e-9)
+    assert terms.normal[:, 0, 0] == pytest.approx(terms.samples / 0.15**2)
+    wrong = swum.encoder.copy()
+    wrong[100, 0] = np.nan
+    missing = encoder_terms(replace(swum, encoder=wrong), Noise(), model, d_rotor)
+    wrong[100, 0] = 80.0
+    far = encoder_terms(replace(swum, encoder=wrong), Noise(), model, d_rotor)
+    wrong[100, 0] = 40.0
+    near = encoder_terms(replace(swum, encoder=wrong), Noise(), model, d_rotor)
+    assert far.log_likelihood == pytest.approx(near.log_likelihood)
+    assert far.gradient == pytest.approx(missing.gradient)
+    assert far.normal == pytest.approx(missing.normal)
+    assert list(far.samples - missing.samples) == [1, 0]
+
+
+def test_noise_is_not_that_of_a_few_wild_samples(swum):
+    wild = swum.encoder.copy()
+    wild[::40] += 60.0
+    residual = commanded_residual(replace(swum, encoder=wild))
+    assert encoder_noise(residual, 0.15) == pytest.approx(0.15, rel=0.12)
+    assert encoder_noise(np.full(5, np.nan), 0.15) == 0.15
+
+
+def test_an_encoder_worse_than_said_is_noticed_by_the_fit(swum):
+    random = np.random.default_rng(4)
+    rough = replace(swum, encoder=swum.encoder + 1.5 * random.standard_normal(swum.encoder.shape))
+    fit = evaluate(nominal_hypothesis(Robot(), ()), np.zeros(0), rough, Noise())
+    assert estimate_noise(fit, rough).encoder == pytest.approx(1.507, rel=0.1)  # with its own 0.15
+
+
+NOISY_SENSORS = ("gyro", "accel", "camera_position", "camera_heading", "encoder")
+
+
+@pytest.fixture(scope="module", params=[1.0, 3.0])
+def factor(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def swum_with_noise(factor):
+    random, usual = np.random.default_rng(4), Noise()
+    noisy = replace(usual, **{name: factor * getattr(usual, name) for name in NOISY_SENSORS})
+    commands = np.stack([program(kind, 10.0, random) for kind in ("sines", "random")], axis=1)
+    return record(Robot(), commands, noisy, random)[0]
+
+
+@pytest.mark.parametrize("sensor", NOISY_SENSORS)
+def test_noise_is_that_of_the_sensors(swum_with_noise, factor, sensor):
+    found = getattr(usual_noise(swum_with_noise), sensor) / getattr(Noise(), sensor)
+    assert found == pytest.approx(factor, rel=0.12)  # 600 poses
+
+
+def test_a_smooth_signal_and_a_short_one():
+    t = np.linspace(0.0, 5.0, 500)
+    swing = 2.0 * np.sin(2.0 * np.pi * 2.0 * t)
+    assert white_noise([(t, swing)], 0.006) == SMALLEST * 0.006
+    assert white_noise([(t[:FEWEST], swing[:FEWEST])], 0.006) == 0.006
+    assert white_noise([(t, np.full(500, np.nan))], 0.006) == 0.006
+
+
+@pytest.mark.parametrize(("every", "expected"), [(2, 0.02), (5, 0.006)])
+def test_a_slow_sensor_is_measured_as_long_as_it_follows_the_motion(every, expected):
+    t, signal = 0.01 * np.arange(3000), np.full(3000, np.nan)
+    signal[::every] = 0.02 * np.random.default_rng(5).standard_normal(3000 // every)
+    assert white_noise([(t, signal)], 0.006) == pytest.approx(expected, rel=0.15)
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_a_gyro_is_measured_fast_or_slow(swum_with_noise, every):
+    """A fast one by differences of its samples; one at 20 Hz by what the IMU's own orientation says of the turn."""
+    random, t = np.random.default_rng(6), DT * np.arange(swum_with_noise.length)
+    kept = t[::every]
+    gyro = np.full(swum_with_noise.gyro.shape, np.nan)
+    noise = 0.1 * random.standard_normal((len(kept), gyro.shape[1]))
+    gyro[::every] = 0.6 * np.cos(2.0 * kept)[:, None] + noise
+    turned = Headings(kept, 0.3 * np.sin(2.0 * kept))
+    seen = replace(swum_with_noise, gyro=gyro, headings=(turned,) * gyro.shape[1])
+    assert usual_noise(seen).gyro == pytest.approx(0.1, rel=0.15)
+
+
+@pytest.fixture(scope="module")
+def fish() -> Experiment:
+    """A standing wave pushes it, which the model lacks."""
+    random = np.random.default_rng(4)
+    commands = np.stack([program(kind, 7.0, random) for kind in ("sines", "straight")], axis=1)
+    hidden = Robot().with_effect("sloshing", sine=-0.02, cosine=0.01, frequency=0.77)
+    return record(hidden, commands, Noise(), random)[0]
+
+
+def fitted(fish: Experiment, noise: Noise) -> Fit:
+    drags = nominal_hypothesis(Robot(), ("head_drag_surge", "head_drag_sway"))
+    return evaluate(drags, np.zeros(2), fish, noise)
+
+
+def test_the_last_move_keeps_how_fast_the_force_changes() -> None:
+    moved = NOISE_MOVES[-1](Noise(), 3.0)
+    assert moved.wrench_time == pytest.approx(3.0 * Noise().wrench_time)
+    rates = [np.square(n.wrench) / n.wrench_time for n in (moved, Noise())]
+    np.testing.assert_allclose(*rates)
+
+
+def test_a_force_thought_to_last_is_found_to_be_short(fish: Experiment) -> None:
+    """From tau = 2 s at the right sigma^2 / tau: one at a time neither sigma nor tau could move."""
+    short = alternate(fitted(fish, Noise()), fish)
+    wrong = NOISE_MOVES[-1](short.noise, 2.0 / short.noise.wrench_time)
+    long = alternate(fitted(fish, wrong), fish)
+    assert long.log_posterior > short.log_posterior - 3.0
+    assert long.noise.wrench_time < 1.0
+
+
+@pytest.mark.parametrize("reach", [Reach.FAR, Reach.ANYWHERE])
+def test_the_sensor_noise_of_the_fit_is_kept(fish: Experiment, reach: Reach) -> None:
+    """The signals' roughness, from which one start takes it, would say less."""
+    fit = alternate(fitted(fish, Noise()), fish)
+    found = estimate_noise(replace(fit, noise=Noise()), fish, reach=reach)
+    sensors = ("gyro", "accel", "camera_position", "camera_heading")
+    assert [getattr(found, name) for name in sensors] == [
+        getattr(Noise(), name) for name in sensors
+    ]
+    near = estimate_noise(fit, fish, reach=Reach.NEAR)
+    values = likelihoods(fit.hypothesis, fit.theta, fish, [found, near])
+    assert values[0] > values[1] - 10.0
+
+
+def test_likelihoods_together_are_those_alone(fish: Experiment) -> None:
+    fit = fitted(fish, Noise())
+    noises = [Noise(), Noise(wrench=(0.1, 0.1, 0.001))]
+    together = likelihoods(fit.hypothesis, fit.theta, fish, noises)
+    alone = [evaluate(fit.hypothesis, fit.theta, fish, n).log_likelihood.sum() for n in noises]
+    np.testing.assert_allclose(together, alone, rtol=1e-9)
+
+
+def test_items_are_worked_on_in_their_order_and_an_error_is_raised() -> None:
+    assert on_all_cores(lambda n: n * n, range(5)) == [0, 1, 4, 9, 16]
+    with pytest.raises(ZeroDivisionError):
+        on_all_cores(lambda n: 1 // n, [1, 0])
+
+
+def test_a_parabola_leads_to_its_top_and_no_farther_than_two_octaves() -> None:
+    """And no warning of NumPy reaches the user where the filter diverges."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert octaves(-1.0, 0.0, -1.0) == 0.0
+        assert octaves(-4.0, 0.0, 0.0) == pytest.approx(0.5)
+        assert octaves(0.0, 0.0, 5.0) == 2.0  # no top: uphill
+        assert octaves(-np.inf, 0.0, 5.0) == 2.0
+        assert octaves(-np.inf, 0.0, -np.inf) == 0.0

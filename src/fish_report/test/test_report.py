@@ -1,0 +1,148 @@
+# Copyright 2026 Robot fish maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""JSON files, the terminal, and the pool of workers."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from fish_report.json_file import write_json
+from fish_report.page import Table
+from fish_report.printable import LONGEST
+from fish_report.terminal import print_table, say, terminal
+from fish_report.worker_pool import at_end_of_worker, worker_pool
+
+
+def test_what_is_not_finite_is_null_and_all_else_stays(tmp_path):
+    content = {
+        "a": [1, 2.5, np.float64(-np.inf), float("nan")],
+        "b": np.array([[1.0, np.nan]]),
+        "c": (True, None, "x", np.int64(3), np.bool_(True)),
+        "d": {"e": -0.5},
+    }
+    write_json(tmp_path / "f.json", content)
+    text = (tmp_path / "f.json").read_text()
+    assert text.endswith("}\n")
+    assert json.loads(text) == {
+        "a": [1, 2.5, None, None],
+        "b": [[1.0, None]],
+        "c": [True, None, "x", 3, True],
+        "d": {"e": -0.5},
+    }
+
+
+HOSTILE = (
+    "[/x] a closing tag",
+    "[bold]not bold[/bold]",
+    "\x1b[31mred\x1b[0m",
+    "bell \x07",
+    "two\nlines",
+)
+
+
+@pytest.fixture
+def console() -> Console:
+    """As the verbs have it, written to a text."""
+    result = terminal()
+    result.file = StringIO()
+    return result
+
+
+def written(console: Console) -> str:
+    assert isinstance(console.file, StringIO)
+    return console.file.getvalue()
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_a_line_shows_every_character(console: Console, text: str) -> None:
+    say(console, text)
+    line = written(console)
+    assert line.count("\n") == 1
+    assert "\x1b" not in line
+    assert "\x07" not in line
+    assert line.startswith(
+        text[:2] if text.isprintable() else text.encode("unicode_escape").decode()[:5]
+    )
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_a_table_shows_every_character(console: Console, text: str) -> None:
+    print_table(console, Table(text, [text, "number"], [[text, "1"]], text.replace("\n", " ")))
+    shown = written(console)
+    assert "\x1b" not in shown
+    assert "\x07" not in shown
+    if text.startswith("["):
+        assert shown.count(text) == 4
+
+
+def test_the_console_of_the_verbs_knows_no_markup(console: Console) -> None:
+    console.print("[/x] [red]text[/red]")
+    assert written(console) == "[/x] [red]text[/red]\n"
+
+
+def test_a_long_text_is_cut(console: Console) -> None:
+    say(console, "a" * 1_000_000)
+    assert LONGEST < len(written(console)) < 2 * LONGEST
+
+
+_started: list[subprocess.Popen[bytes]] = []
+
+
+def kill_what_was_started() -> None:
+    at_end_of_worker(lambda: [process.kill() for process in _started])
+
+
+def comes_true(condition: Callable[[], object], patience: float = 120.0) -> bool:
+    end = time.monotonic() + patience
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    return bool(condition())
+
+
+def has_ended(pid: int) -> bool:
+    """No such process, or one that nobody has waited for yet."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def wait_for_a_process(note: str) -> None:
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"]) as process:
+        _started.append(process)
+        Path(note).write_text(str(process.pid))
+        process.wait()
+
+
+@pytest.mark.parametrize("method", ["spawn", "fork"])
+def test_work_is_done_in_other_processes(method: str) -> None:
+    with worker_pool(2, method=method) as pool:
+        assert list(pool.map(square, range(4))) == [0, 1, 4, 9]
+        assert pool.submit(os.getpid).result() != os.getpid()
+
+
+def test_an_error_ends_the_workers_and_what_they_have_started(tmp_path: Path) -> None:
+    note = tmp_path / "pid"
+    with (
+        pytest.raises(ValueError, match="given up"),
+        worker_pool(1, kill_what_was_started) as pool,
+    ):
+        pool.submit(wait_for_a_process, str(note))
+        assert comes_true(lambda: note.exists() and note.read_text())
+        raise ValueError("given up")
+    assert comes_true(lambda: has_ended(int(note.read_text())))
