@@ -17,7 +17,7 @@ import json
 import time
 from pathlib import Path
 
-from fish_report.json_file import write_json
+from fish_report.files import write_json
 from fish_sim.robot import Robot
 from fish_sysid.dataset.read import read_experiment
 from fish_sysid.dataset.synthetic import with_injection

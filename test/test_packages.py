@@ -22,7 +22,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from fish_bag.sample_recordings import robot_recording
-from fish_node.parameter_docs import parameter_docs
+from fish_node.parameters import parameter_docs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
 from reference_pages.parameters import CONFIGS

@@ -567,7 +567,7 @@ def test_the_first_error_ends_a_study(tmp_path: Path, workers) -> None:
 
 
 def test_workers_are_prepared_and_gone_when_the_work_is_done(tmp_path: Path, workers) -> None:
-    from fish_report.worker_pool import worker_pool
+    from fish_report.parallel import worker_pool
 
     with worker_pool(1, os.chdir, tmp_path) as pool:
         assert pool.submit(os.getcwd).result() == str(tmp_path)
@@ -576,7 +576,7 @@ def test_workers_are_prepared_and_gone_when_the_work_is_done(tmp_path: Path, wor
 def test_workers_do_not_outlive_a_killed_owner() -> None:
     owner = """
 import os, time
-from fish_report.worker_pool import worker_pool
+from fish_report.parallel import worker_pool
 with worker_pool(1) as pool:
     print(pool.submit(os.getpid).result(), flush=True)
     pool.submit(time.sleep, 60).result()

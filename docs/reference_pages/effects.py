@@ -9,7 +9,7 @@ from typing import Any
 
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
-from reference_pages.markdown import HEADER, bounds, cell, escaped, number, table
+from reference_pages import HEADER, bounds, cell, escaped, number, table
 
 INTRODUCTION = """# Effects
 

@@ -37,11 +37,11 @@ from fish_hw.settings import (
     RotorSettings,
     RudderSettings,
 )
-from fish_node.parameter_docs import parameter_docs
+from fish_node.parameters import parameter_docs
 from fish_sim.camera.config import CameraConfig
 from fish_sim.simulation_config import SimulatorConfig
 from fish_vision.config import TrackerConfig
-from reference_pages.markdown import HEADER, cell, escaped, table
+from reference_pages import HEADER, cell, escaped, table
 
 CONFIGS: dict[str, type[Any]] = {
     "fish_bringup/live_view": ViewConfig,

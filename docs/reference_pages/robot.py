@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from fish_sim.robot import nominal_parameters
-from reference_pages.markdown import HEADER, bounds, cell, number, table
+from reference_pages import HEADER, bounds, cell, number, table
 
 INTRODUCTION = """# The robot file
 

@@ -20,7 +20,7 @@ from fish_bringup.node_table import (
     SIMULATED,
     VIEW,
 )
-from reference_pages.markdown import HEADER, cell, table
+from reference_pages import HEADER, cell, table
 
 SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES, VIEW)
 ARMING = "fish_node.nodes.arming"

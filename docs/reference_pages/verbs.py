@@ -10,7 +10,7 @@ import re
 from typing import Any
 
 from fish_report.robofish import BROUGHT_BY
-from reference_pages.markdown import HEADER, cell, escaped, table
+from reference_pages import HEADER, cell, escaped, table
 
 INTRODUCTION = """# The command `robofish`
 

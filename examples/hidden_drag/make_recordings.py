@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from fish_report.errors import UserError
-from fish_report.output_folder import new_folder
+from fish_report.files import new_folder
 from fish_study.build import make_recordings
 from fish_study.scenario import Scenario
 

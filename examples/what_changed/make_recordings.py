@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from fish_report.errors import UserError
-from fish_report.output_folder import new_folder
+from fish_report.files import new_folder
 from fish_study.pair_recordings import NEW, OLD, make_pair
 from fish_study.scenario import Scenario
 

@@ -16,7 +16,7 @@ from fish_bag.reader import read_trial
 from fish_bag.recording_files import is_recording
 from fish_bag.topic_map import TopicMap
 from fish_bag.trial import DataSet, Trial
-from fish_report.worker_pool import worker_pool
+from fish_report.parallel import worker_pool
 
 PARALLEL_FROM = 16  # trials; below this starting processes costs more than it saves
 

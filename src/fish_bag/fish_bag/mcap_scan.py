@@ -37,7 +37,7 @@ from fish_bag.mcap_records import (
     topics_of,
     whole_chunk,
     whole_record,
-)
+)  # fmt: skip
 from fish_bag.storage import (
     COMPRESSIONS,
     CUSTOM_NAMES,
@@ -62,12 +62,7 @@ MESSAGE = int(Opcode.MESSAGE)
 
 
 def scan_mcap(data: Buffer, keep: Keep = keep_whole) -> Contents:
-    """Collect every message that can be read.
-
-    Args:
-        data: the file.
-        keep: how many bytes of the messages of a topic are kept.
-    """
+    """Collect every message of a file that can be read; keep: how many bytes of the messages of a topic are kept."""
     scan = _Scan(data, keep)
     scan.walk()
     return scan.contents

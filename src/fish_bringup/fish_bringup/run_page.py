@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of one run: where the fish swam, how far off it was, and what the controller did."""
+"""Tables and page of a run."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fish_bag.trial import Commands, Gains, Trial
+from fish_bringup.node_table import NAMESPACE, NodeSpec
+from fish_bringup.run_watch import SwimEnd
 from fish_bringup.score import RunScore
 from fish_control.path_tracker import stroke_mean
 from fish_control.pool import HALF_LENGTH, HALF_WIDTH
@@ -21,6 +23,7 @@ from fish_report.page import (
     styled,
     write_page,
 )
+from fish_report.printable import plain
 
 BLUE, ORANGE, GREY, GREEN = "#1f6fb2", "#e07b39", "#9aa7b2", "#3a9a5b"
 SOURCES = {
@@ -159,3 +162,36 @@ def _commands(commands: Commands) -> go.Figure:
         figure.update_yaxes(title=name, row=row, col=1)
     figure.update_xaxes(title="time in the recording [s]", row=2, col=1)
     return styled(figure, 420)
+
+
+def latency_table(diagnostics: dict[str, dict[str, str]]) -> Table:
+    """What the controller says of its own latency and period."""
+    said = diagnostics.get(f"{NAMESPACE.strip('/')}/controller", {})
+    rows = [
+        [plain(key), plain(value)]
+        for key, value in said.items()
+        if "latency" in key or "period" in key
+    ]
+    return Table(
+        "Controller",
+        ["value", "measured"],
+        rows,
+        "Latency: stamp of the measurement to the command.",
+    )
+
+
+def cpu_table(end: SwimEnd) -> Table:
+    """What each process used."""
+    rows = [[_nodes(spec), f"{100 * share:.0f} %"] for spec, share in end.cpu.items()]
+    rows.append(["all nodes", f"{100 * sum(end.cpu.values()):.0f} %"])
+    return Table(
+        "CPU",
+        ["node", "of one core"],
+        rows,
+        f"Processor time for the robot's own time, over {end.robot_s:.0f} s of swimming, which took {end.seconds:.0f} s.",
+    )
+
+
+def _nodes(spec: NodeSpec) -> str:
+    """The nodes of a process."""
+    return f"{spec.package}/{' + '.join(part.executable for part in spec.parts or (spec,))}"

@@ -10,6 +10,8 @@ The approach phase lasts until, for the first time, the head is within 0.05 m of
 within 0.3 rad of the path's and the surge speed within 20 % of the commanded one (both averaged over a
 stroke), while it follows the path (progress > 0). A run ends where its open path ends, or when the planner says so (speed 0).
 Frame: pool. Errors are wanted minus actual, the cross-track error apart. Source: this project.
+
+The tables of a scored run, for the terminal and for the page: the same cells in both.
 """
 
 from __future__ import annotations
@@ -31,8 +33,10 @@ from fish_control.path_tracker import (
 )
 from fish_control.reference_path import PathError, ReferencePath
 from fish_report.errors import UserError
+from fish_report.page import Table
 
 Array = NDArray[np.float64]
+
 
 CLOSED_GAP = 3.0  # a path whose ends are nearer than so many sample distances is closed
 
@@ -241,3 +245,22 @@ def score_motion(
 
 def _wrap(angle: Array) -> Array:
     return np.asarray(np.angle(np.exp(1j * angle)))
+
+
+def error_table(score: RunScore) -> Table:
+    """RMSE, 95th percentile and maximum of every error, with and without the approach phase."""
+    whole, settled = score.summaries(with_approach=True), score.summaries(with_approach=False)
+    rows = [[name, *_cells(settled[name]), *_cells(whole[name])] for name in whole]
+    header = ["error", "RMSE", "95 %", "max", "RMSE *", "95 % *", "max *"]
+    approach = "never ended" if np.isnan(score.approach_s) else f"took {score.approach_s:.1f} s"
+    note = f"Without the approach phase, which {approach}; * with it. Heading: mean over a stroke of the tail."
+    if not (score.finished or score.path.closed):
+        note += (
+            f" The run ended at {score.progress[-1]:.2f} m of a path of {score.path.length:.2f} m."
+        )
+    return Table("Tracking errors", header, rows, note)
+
+
+def _cells(summary: Summary) -> list[str]:
+    sizes = (summary.rmse, summary.p95, summary.maximum)
+    return [f"{value:.4f}" if np.isfinite(value) else "-" for value in sizes]

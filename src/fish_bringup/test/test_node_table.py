@@ -20,7 +20,7 @@ import yaml
 
 from fish_bringup import node_table, processes
 from fish_bringup.node_table import CONTROL, FAKE, RECORDER, ROBOTS, SIMULATED, NodeSpec, middleware
-from fish_bringup.run_tables import latency_table
+from fish_bringup.run_page import latency_table
 from fish_bringup.run_watch import SwimEnd
 from fish_bringup.verbs import demo
 from fish_control.nodes.pilot import split_arguments

@@ -17,19 +17,25 @@ from rich.console import Console
 
 from fish_bag.trial import Commands, Gains, Odometry, Trial
 from fish_bringup.node_table import ROBOTS, NodeSpec
-from fish_bringup.run_limits import EDGE, LONGEST_AT_EDGE, LONGEST_WITHOUT_CAMERA, RunWatch, Seen
 from fish_bringup.run_page import write_run_page
-from fish_bringup.run_watch import FUSION, Robot, Sight
-from fish_bringup.score import score_motion
-from fish_bringup.score_table import error_table
+from fish_bringup.run_watch import (
+    EDGE,
+    FUSION,
+    LONGEST_AT_EDGE,
+    LONGEST_WITHOUT_CAMERA,
+    Robot,
+    RunWatch,
+    Seen,
+    Sight,
+)
+from fish_bringup.score import error_table, score_motion
 from fish_bringup.verbs import excite
 from fish_control.excitation import Program, ProgramError, Row, command_table
 from fish_control.excursions import COAST, MARGIN, SHORTEST, Excursion, excursions, next_begin
 from fish_control.path_tracker import PathTracker
 from fish_control.paths import make_path
 from fish_control.pool import HALF_LENGTH, HALF_WIDTH, wall_distance
-from fish_report.errors import UserError
-from fish_report.interruption import Interruption
+from fish_report.errors import Interruption, UserError
 from fish_report.page import Figure, Table, Text, styled, write_page
 from fish_sim.robot import Robot as FishModel
 from fish_sim.way import way_from_rest

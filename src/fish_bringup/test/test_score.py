@@ -20,12 +20,12 @@ from fish_bringup.run_page import write_run_page
 from fish_bringup.score import (
     Summary,
     commanded_speed,
+    error_table,
     path_from_points,
     score_motion,
     score_trial,
     what_is_missing,
 )
-from fish_bringup.score_table import error_table
 from fish_control.path_tracker import stroke_mean
 from fish_control.paths import make_path
 from fish_control.reference_path import ReferencePath

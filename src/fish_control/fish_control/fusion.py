@@ -10,22 +10,13 @@ from collections import Counter, deque
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fish_control import measurement_checks as checks
 from fish_control.camera_clock import LOOKS_BACK, CameraClock
 from fish_control.estimate import Estimate, to_estimate
 from fish_control.fusion_config import FusionConfig
 from fish_control.imu_heading import HeadingNoise, ImuHeading
 from fish_control.imu_history import ImuHistory, inertial_sample
 from fish_control.measurement_buffer import CameraPose, Moment, RawPose, Timeline, start_moment
-from fish_control.measurement_checks import (
-    AgreeingPoses,
-    RepeatedPose,
-    StaleStamps,
-    doubts_motion,
-    given_covariance,
-    unusable,
-    unusable_sample,
-    weighted,
-)
 from fish_control.motion_models import MotionModels
 from fish_control.strapdown import MotionModel, NoiseScale, StrapdownFilter
 
@@ -65,11 +56,13 @@ class Fusion:
         self._applied, self._jumps = clock.current.offset, 0
         self._raw, self._waiting = deque[RawPose](), deque[RawPose]()  # fused, ahead of the IMU
         self._timeline: Timeline | None = None
-        self._candidates, self._repeated = AgreeingPoses(), RepeatedPose()
-        # s, the last of the sensors' clock when a pose was accepted
-        self._last_pose_time = self._last_imu_time = self._accepted_at = -math.inf
+        self._candidates, self._repeated = checks.AgreeingPoses(), checks.RepeatedPose()
+        self._last_pose_time = self._last_imu_time = (
+            self._accepted_at
+        ) = -math.inf  # s, by the sensors' clock
         self._poses_in_a_row = SILENT_POSES  # without an IMU sample in between
-        self._stale, self._old_poses = StaleStamps(), 0  # poses in a row from before the history
+        self._stale = checks.StaleStamps()
+        self._old_poses = 0  # in a row from before the history
         self._models.begin()
         self._filter.model = self._models.current
 
@@ -101,7 +94,9 @@ class Fusion:
         None: not measured. False if it was not used. What no fish does is a damaged sample, such as one of a flipped bit:
         it would move a trusted pose, and the camera, which contradicts it, would be refused until reacquire_time.
         """
-        if reason := unusable_sample((time, yaw_rate, forward, left, yaw, yaw_std), self.config):
+        if reason := checks.unusable_sample(
+            (time, yaw_rate, forward, left, yaw, yaw_std), self.config
+        ):
             return self._refuse(reason)
         stale = self._stale.set_back(time, self._last_imu_time)
         if stale or time < self._last_imu_time - self.config.history:
@@ -124,8 +119,8 @@ class Fusion:
 
     def add_pose(self, stamp: float, pose: ArrayLike, covariance: Array | None = None) -> bool:
         """A camera pose (x, y, psi) [m, m, rad] with its stamp [s]; False if it was not used."""
-        camera = CameraPose(np.array(pose, float), given_covariance(covariance, self.config))
-        if reason := unusable(stamp, camera, covariance):
+        camera = CameraPose(np.array(pose, float), checks.given_covariance(covariance, self.config))
+        if reason := checks.unusable(stamp, camera, covariance):
             return self._refuse(reason)
         if any(raw.stamp == stamp for raw in (*self._raw, *self._waiting)):
             return self._refuse("pose_duplicate")
@@ -228,7 +223,7 @@ class Fusion:
         """A pose with what makes it uncertain; the filter must hold its prediction for `time` [s]."""
         rate = self._imu.yaw_rate(time) or 0.0
         motion = np.array([*self._filter.x[3:5], rate])
-        return weighted(camera, self.noise_scale, self.camera_clock.current, motion)
+        return checks.weighted(camera, self.noise_scale, self.camera_clock.current, motion)
 
     def _fuse(self, raw: RawPose, time: float, imu_lives: bool) -> bool:
         assert self._timeline is not None
@@ -249,7 +244,7 @@ class Fusion:
             return self._accept(time, camera)
         known = self.camera_clock.current.sure or not imu_lives
         agree = self._candidates.add(time, pose) >= self.config.start_frames
-        if agree and doubts_motion(y, self._candidates.duration, known):
+        if agree and checks.doubts_motion(y, self._candidates.duration, known):
             fade = float(y @ np.linalg.solve(S, y)) / len(y)
             self.counts["motion_doubted"] += 1
             return self._accept(time, camera._replace(fade=fade))

@@ -7,6 +7,8 @@ clock of its own; times are in s of one clock that is never set.
 
 A trouble disarms when it has lasted for its source's `patience_s`. Most have none. A doubt about the estimate, and a node that
 pauses its commands, are borne for `pause_s`, so that one late message needs no person.
+
+Texts of other nodes are made harmless before they are logged or published again.
 """
 
 from __future__ import annotations
@@ -16,7 +18,16 @@ import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from fish_node.foreign_text import visible
+LONGEST = 400  # characters
+
+
+def visible(text: str) -> str:
+    """The first LONGEST characters of a text; those that a terminal obeys or hides become their escapes."""
+    return "".join(
+        char if char.isprintable() else char.encode("unicode_escape").decode()
+        for char in text[:LONGEST]
+    )
+
 
 ESTIMATES = ("required", "watched", "ignored")
 AT_START = "not armed since the start"

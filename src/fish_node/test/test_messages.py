@@ -20,9 +20,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from fish_node.nodes.frames import static_transform
 from fish_node.nodes.message_bytes import MessageBytes, exact_bytes, mark
 from fish_node.nodes.quick_messages import READERS, from_bytes, read_stamp
-from fish_node.nodes.static_frames import static_transform
 from fish_node.nodes.status_log import QUIET_S, StatusLog
 
 FRAMES = ["", "a", "pool", "fish_2/base_link", "Teich-ö", "x" * 255]

@@ -12,8 +12,8 @@ from rclpy.node import Node
 
 from fish_node import domain
 from fish_node.frames import require_frame, require_frame_prefix
-from fish_node.parameter_docs import ParameterDoc, interval, parameter_docs
 from fish_node.parameter_file import read_node_parameters, read_settings
+from fish_node.parameters import ParameterDoc, interval, parameter_docs
 
 NODE = "/fish/rudder"
 ONE, TWO = "{ros__parameters: {a: 1}}", "{ros__parameters: {a: 2, b: 2}}"

@@ -12,7 +12,7 @@ import argparse
 import ast
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from io import TextIOWrapper
@@ -21,6 +21,12 @@ from typing import Any, NoReturn
 
 from fish_report.errors import UserError
 from fish_report.printable import plain
+
+
+def words_after(verb: str, argv: Sequence[str]) -> list[str]:
+    """Words after the verb, of `robofish VERB ...` as of the verb's own executable."""
+    return list(argv[2:] if argv[1:2] == [verb] else argv[1:])
+
 
 GROUP = "robofish.verbs"
 LONGEST_ERROR = 2000  # characters

@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fish_report.json_file import write_json
+from fish_report.files import write_json
 from fish_report.page import Table
+from fish_report.parallel import at_end_of_worker, worker_pool
 from fish_report.printable import LONGEST
 from fish_report.terminal import print_table, say, terminal
-from fish_report.worker_pool import at_end_of_worker, worker_pool
 
 
 def test_what_is_not_finite_is_null_and_all_else_stays(tmp_path):

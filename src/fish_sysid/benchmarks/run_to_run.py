@@ -25,8 +25,8 @@ from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import LOOKS
 from fish_sysid.diagnosis.change.explanation import NAMES
 from fish_sysid.diagnosis.change.naming import strength_of
-from fish_sysid.diagnosis.change.other_commands import OldAnswer
 from fish_sysid.diagnosis.change.rows import look, trial_rows
+from fish_sysid.diagnosis.change.servos import OldAnswer
 from fish_sysid.diagnosis.change.shared_fit import regression, settled
 
 

@@ -48,8 +48,9 @@ from fish_sysid.identification_statements import (
     verdict,
 )
 from fish_sysid.prediction.baselines import judge
+from fish_sysid.prediction.better_states import better_states
 from fish_sysid.prediction.kept_noise import with_noise
-from fish_sysid.prediction.prediction import better_states, estimate
+from fish_sysid.prediction.prediction import estimate
 
 Array = NDArray[np.float64]
 

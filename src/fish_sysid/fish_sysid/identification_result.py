@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_report.json_file import write_json
+from fish_report.files import write_json
 from fish_sim.robot import Robot
 from fish_sim.robot_file import save_robot
 from fish_sysid.dataset.camera import with_marker

@@ -16,7 +16,6 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, Frames, joined
 from fish_sysid.dataset.synthetic import INJECTIONS, with_injection
 from fish_sysid.diagnosis.change import comparable
-from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change, Member, Named
 from fish_sysid.diagnosis.change.change_json import (
     answer,
@@ -25,27 +24,40 @@ from fish_sysid.diagnosis.change.change_json import (
     sentence,
     with_change,
 )
-from fish_sysid.diagnosis.change.channels import swims
+from fish_sysid.diagnosis.change.channels import StrokeWeights, swims
 from fish_sysid.diagnosis.change.compare import LOOKS, compare, days_of
+from fish_sysid.diagnosis.change.contenders import Case
 from fish_sysid.diagnosis.change.explanation import explained, swapped_in
-from fish_sysid.diagnosis.change.harmonics import StrokeWeights
 from fish_sysid.diagnosis.change.image_age import age_change
 from fish_sysid.diagnosis.change.naming import judge_all
-from fish_sysid.diagnosis.change.other_commands import FORM, OldAnswer
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, look, trial_rows
 from fish_sysid.diagnosis.change.rudder_change import (
     RudderChange,
     rudder_change,
+    step_response,
     with_second_opinion,
 )
-from fish_sysid.diagnosis.change.servos import ANSWERED, delayed, lagged, with_play, with_servo
+from fish_sysid.diagnosis.change.servos import (
+    ANSWERED,
+    FORM,
+    OldAnswer,
+    delayed,
+    lagged,
+    with_play,
+    with_servo,
+)
 from fish_sysid.diagnosis.change.shared_fit import regression
 from fish_sysid.diagnosis.change.simulation import AFTER, BEFORE, rollout
-from fish_sysid.diagnosis.change.step_response import step_response
 from fish_sysid.diagnosis.change.strength import Refitted
-from fish_sysid.diagnosis.change.swap_test import Gains, exchanges, single_days, swap_test
-from fish_sysid.diagnosis.change.tail_probability import Tails, tail_probability
-from fish_sysid.diagnosis.families import family_of
+from fish_sysid.diagnosis.change.swap_test import (
+    Gains,
+    Tails,
+    exchanges,
+    single_days,
+    swap_test,
+    tail_probability,
+)
+from fish_sysid.diagnosis.vocabulary import family_of
 from fish_sysid.estimation.ekf import filter_stepper
 
 NAMES = ("current", "camera_latency", "camera_heading_offset", "gyro_scale", "imu_misalignment")

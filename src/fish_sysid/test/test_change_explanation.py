@@ -16,15 +16,13 @@ from swims import fish, swim
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import with_injection
-from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change, Member, Named
 from fish_sysid.diagnosis.change.change_json import answer
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import LOOKS
-from fish_sysid.diagnosis.change.contenders import Contender, family_alone, weighed
+from fish_sysid.diagnosis.change.contenders import Case, Contender, family_alone, weighed
 from fish_sysid.diagnosis.change.explanation import explained, swapped_in, telling
 from fish_sysid.diagnosis.change.naming import Judged
-from fish_sysid.diagnosis.change.other_commands import OldAnswer
 from fish_sysid.diagnosis.change.permutation_test import (
     largest,
     permutation_p_value,
@@ -32,6 +30,7 @@ from fish_sysid.diagnosis.change.permutation_test import (
     sets_in_place,
 )
 from fish_sysid.diagnosis.change.rows import look, trial_rows
+from fish_sysid.diagnosis.change.servos import OldAnswer
 from fish_sysid.diagnosis.change.shared_fit import regression
 from fish_sysid.diagnosis.change.strength import Refitted, refit
 from fish_sysid.diagnosis.change.swap_test import Swapped, at_once

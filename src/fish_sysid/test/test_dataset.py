@@ -35,8 +35,8 @@ from fish_sysid.dataset.experiment import Experiment, Frames, Headings
 from fish_sysid.dataset.grid import apart, level, on_grid, starts_at_rest
 from fish_sysid.dataset.imu import WINDOW, imu_moved_back, orientation_windows
 from fish_sysid.dataset.synthetic import FULL_SPEED, KINDS, STROKE, program, record, with_gyro_scale
-from fish_sysid.diagnosis.known_effects import known_effects
 from fish_sysid.diagnosis.task import make_task
+from fish_sysid.diagnosis.vocabulary import known_effects
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import evaluate
 from fish_sysid.estimation.parametrization import nominal_hypothesis

@@ -49,7 +49,7 @@ from fish_sysid.estimation.refit import (
 from fish_sysid.estimation.shooting.left_out import Step
 from fish_sysid.estimation.shooting.schedule import Found
 from fish_sysid.estimation.thresholds import SHORTEST_WRENCH
-from fish_sysid.prediction.prediction import prediction_size
+from fish_sysid.prediction.better_states import prediction_size
 
 FREE = ("head_drag_surge", "head_drag_sway", "tail_stiffness")
 TRUE = np.log([1.3, 0.8, 1.1])

@@ -21,7 +21,6 @@ from fish_sysid.diagnosis.backward_elimination import eliminate, exchanged, riva
 from fish_sysid.diagnosis.cross_validation import gain_left_out, gain_unseen, on_all, predicted
 from fish_sysid.diagnosis.diagnosis_json import competition
 from fish_sysid.diagnosis.forward_selection import Selection, choose, predicts_unseen, significant
-from fish_sysid.diagnosis.known_effects import identifiable, known_effects, start_hypothesis
 from fish_sysid.diagnosis.law_or_name import name_for_law
 from fish_sysid.diagnosis.model_order import better_order, fit_links, promises_more, with_links
 from fish_sysid.diagnosis.pipeline import fit_nominal
@@ -43,9 +42,16 @@ from fish_sysid.diagnosis.significance import (
     simplest,
     strength_z,
 )
-from fish_sysid.diagnosis.task import make_task
-from fish_sysid.diagnosis.trial_split import Trials, excitation, split_trials, trials_of
-from fish_sysid.diagnosis.vocabulary import candidates, kind_of, known, not_excited
+from fish_sysid.diagnosis.task import Trials, excitation, make_task, split_trials, trials_of
+from fish_sysid.diagnosis.vocabulary import (
+    candidates,
+    identifiable,
+    kind_of,
+    known,
+    known_effects,
+    not_excited,
+    start_hypothesis,
+)
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import climb, evaluate
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, nominal_hypothesis

@@ -10,17 +10,23 @@ import numpy as np
 import pytest
 from kinematic_swims import World, kinematic_swims
 
-from fish_report.json_file import plain
+from fish_report.files import plain
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.synthetic import with_current, with_image_age
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import changed_robot
-from fish_sysid.diagnosis.symmetry.applied import applicable, in_still_water, with_findings
 from fish_sysid.diagnosis.symmetry.finding import Estimate, Evidence, SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import GIVEN, symmetry_findings
-from fish_sysid.diagnosis.symmetry.symmetry_json import stated, symmetry_entry, with_symmetry
+from fish_sysid.diagnosis.symmetry.outcome import (
+    applicable,
+    in_still_water,
+    stated,
+    symmetry_entry,
+    with_findings,
+    with_symmetry,
+)
 from fish_sysid.reports.diagnosis_page import symmetry_table
 from fish_sysid.reports.verdict_sentence import sentence
 

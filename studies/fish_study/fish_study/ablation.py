@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_report.json_file import write_json
+from fish_report.files import write_json
 from fish_report.page import Table
 from fish_study.answer_tables import ASKED
 from fish_study.new_study import Asked, begin_or_go_on

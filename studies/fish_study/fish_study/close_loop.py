@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from fish_control.policy import Policy
 from fish_report.errors import UserError
-from fish_report.json_file import plain, write_json
+from fish_report.files import plain, write_json
 from fish_report.parallel import on_threads
 from fish_sim.robot import Robot
 from fish_study.build import make_recordings

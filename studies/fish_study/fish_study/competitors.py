@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_report.json_file import number
+from fish_report.files import number
 from fish_report.page import Table
 from fish_sim.effects.effect import BodyMotion, Drive
 from fish_sim.model import DT

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from fish_report.command_words import words_after
+from fish_report.robofish import words_after
 from fish_study.scenario import Scenario
 from fish_study.scenario_groups import draw_scenarios
 from fish_study.study import Study

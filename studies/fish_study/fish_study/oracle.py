@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from fish_report.json_file import number
+from fish_report.files import number
 from fish_sim.robot import Robot
 from fish_study.plant_effects import PLANT_EFFECTS
 from fish_study.scenario import Scenario

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_report.json_file import write_json
+from fish_report.files import write_json
 from fish_sim.model import DT
 from fish_study.build import make_readings
 from fish_study.competitors import CompetitorScores, compete
@@ -33,7 +33,7 @@ from fish_study.tool_version import checked_version, tool_digest
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.effect_wrench import acting, effect_wrench, f1
 from fish_sysid.diagnosis.latent_force import MissingForce, dof_shares
-from fish_sysid.diagnosis.trial_split import split_trials
+from fish_sysid.diagnosis.task import split_trials
 from fish_sysid.diagnosis.vocabulary import candidates
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import Fit, evaluate

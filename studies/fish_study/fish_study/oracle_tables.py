@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_report.json_file import number
+from fish_report.files import number
 from fish_report.page import Table
 from fish_study.oracle import OracleResult, detects
 from fish_study.score import Score

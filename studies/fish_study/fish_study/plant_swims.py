@@ -22,7 +22,7 @@ from fish_control.control_law import Gains
 from fish_control.hand_tuned import HAND_TUNED
 from fish_control.policy import Policy
 from fish_control.policy_spec import OUTPUTS
-from fish_report.json_file import number, write_json
+from fish_report.files import number, write_json
 from fish_study.study import read_json
 from fish_train.evaluation.candidates import Candidate, PolicyGains
 from fish_train.evaluation.cells import Cell

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_report.json_file import number
+from fish_report.files import number
 from fish_report.page import Table
 from fish_study.scenario import Scenario
 from fish_study.scenario_groups import GROUPS

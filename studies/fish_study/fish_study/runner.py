@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fish_report.json_file import write_json
-from fish_report.worker_pool import at_end_of_worker, worker_pool
+from fish_report.files import write_json
+from fish_report.parallel import at_end_of_worker, worker_pool
 from fish_study.build import make_recordings
 from fish_study.pair_recordings import NEW, OLD, make_pair
 from fish_study.scenario import Scenario, ScenarioError

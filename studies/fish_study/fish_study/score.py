@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_report.json_file import number
+from fish_report.files import number
 from fish_sim.effects import EFFECTS
 from fish_sim.sensors import SENSOR_EFFECTS
 from fish_study.plant_effects import MEANS

@@ -28,7 +28,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fish_report.json_file import write_json
+from fish_report.files import write_json
 from fish_study.scenario import Scenario
 
 OF_STUDY = ("study.json", "commitments.json", "openings.json")

@@ -400,9 +400,7 @@ def test_the_scenarios_of_every_part_are_drawn_again_from_its_seed(parts: list[S
 
 def test_the_page_shows_what_the_file_gives() -> None:
     page = ROOT / "docs" / "results" / "blind_studies.md"
-    assert generated_part(page) == results_text(ARCHIVE), (
-        "run python studies/write_blind_studies_page.py"
-    )
+    assert generated_part(page) == results_text(ARCHIVE), "run python studies/newest_study.py page"
 
 
 def test_a_page_without_marks_is_refused(tmp_path: Path) -> None:

@@ -22,9 +22,8 @@ from typing import Any
 import pytest
 from prove_samples import diagnosis, small, three_scenarios
 
-from fish_report.command_words import words_after
-from fish_report.json_file import write_json
-from fish_report.robofish import main
+from fish_report.files import write_json
+from fish_report.robofish import main, words_after
 from fish_study import runner, tool_version
 from fish_study.ablation import (
     COMPLETE,

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from fish_bag.topic_map import add_topic_arguments, topic_map
-from fish_report.named_path import named_path
+from fish_report.files import named_path
 from fish_report.terminal import cell, say, terminal
 
 if TYPE_CHECKING:

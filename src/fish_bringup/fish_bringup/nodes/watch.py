@@ -29,8 +29,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from fish_bringup.node_table import NAMESPACE, middleware
-from fish_bringup.run_limits import Seen
-from fish_bringup.run_watch import Sight
+from fish_bringup.run_watch import Seen, Sight
 from fish_bringup.score import path_from_points
 from fish_control.path_tracker import PathTracker
 from fish_node.nodes.arming import ArmingListener

@@ -40,20 +40,17 @@ from fish_bringup.node_table import (
 )
 from fish_bringup.nodes.watch import watching
 from fish_bringup.processes import NodeProcesses
-from fish_bringup.run_page import write_run_page
-from fish_bringup.run_tables import cpu_table, latency_table
+from fish_bringup.run_page import cpu_table, latency_table, write_run_page
 from fish_bringup.run_watch import Robot, SwimEnd
-from fish_bringup.score import score_trial, what_is_missing
-from fish_bringup.score_table import error_table
+from fish_bringup.score import error_table, score_trial, what_is_missing
 from fish_bringup.view_state import ViewConfig
 from fish_control.gains_file import read_gains_file
 from fish_control.node_configs import PlannerConfig
 from fish_control.paths import make_path, read_arguments
 from fish_control.pool import check_inside_pool
 from fish_node.domain import choose_domain
-from fish_report.errors import UserError, user_errors
-from fish_report.interruption import Interruption
-from fish_report.output_folder import new_folder
+from fish_report.errors import Interruption, UserError, user_errors
+from fish_report.files import new_folder
 from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
 from fish_sim.robot_argument import read_model

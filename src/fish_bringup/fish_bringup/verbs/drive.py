@@ -19,8 +19,7 @@ from fish_bringup.keyboard import Keyboard, keyboard
 from fish_bringup.nodes.hand_drive import HandDrive, Pad, driving
 from fish_bringup.robot_arguments import add_robot, check_robot
 from fish_control.manual_drive import ManualDrive
-from fish_report.errors import UserError, user_errors
-from fish_report.interruption import Interruption
+from fish_report.errors import Interruption, UserError, user_errors
 from fish_report.terminal import say, terminal
 
 TIMEOUT = 1.0  # s; a terminal repeats a key after half a second

@@ -35,10 +35,10 @@ from fish_bringup.node_table import (
 )
 from fish_bringup.nodes.watch import watching
 from fish_bringup.processes import NodeProcesses
-from fish_bringup.run_limits import RunWatch
 from fish_bringup.run_watch import (
     LOOK_PERIOD,
     Patience,
+    RunWatch,
     check_running,
     end_if_due,
 )
@@ -53,9 +53,8 @@ from fish_control.excursions import (
     next_excursion,
 )
 from fish_node.domain import choose_domain
-from fish_report.errors import UserError, user_errors
-from fish_report.interruption import Interruption
-from fish_report.output_folder import new_folder
+from fish_report.errors import Interruption, UserError, user_errors
+from fish_report.files import new_folder
 from fish_report.page import Table
 from fish_report.terminal import cell, print_table, say, terminal
 from fish_sim.robot import Robot

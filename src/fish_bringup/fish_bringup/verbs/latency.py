@@ -24,7 +24,7 @@ from fish_control.imu_heading import HeadingNoise, ImuHeading, against_gyro
 from fish_control.offset_sums import ClockEstimate
 from fish_control.recorded_offset import RecordedOffset, pooled, recorded_offset
 from fish_report.errors import UserError, user_errors
-from fish_report.named_path import named_path
+from fish_report.files import named_path
 from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
 

@@ -14,10 +14,9 @@ from pathlib import Path
 from fish_bag import read_trial
 from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_bringup.run_page import write_run_page
-from fish_bringup.score import score_trial, what_is_missing
-from fish_bringup.score_table import error_table
+from fish_bringup.score import error_table, score_trial, what_is_missing
 from fish_report.errors import UserError
-from fish_report.named_path import named_path
+from fish_report.files import named_path
 from fish_report.terminal import print_table, say, terminal
 
 

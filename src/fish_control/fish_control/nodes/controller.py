@@ -41,7 +41,7 @@ from fish_control.nodes.messages import (
 )
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
-from fish_node.nodes.changes import Changes
+from fish_node.nodes.parameters import Changes
 from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.spin import ByEvents

@@ -34,12 +34,11 @@ from fish_control.nodes.messages import (
     to_stamp,
     yaw_of,
 )
-from fish_node.nodes.frame_broadcaster import FrameBroadcaster
+from fish_node.nodes.frames import FrameBroadcaster, publish_static_frame
 from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
-from fish_node.nodes.static_frames import publish_static_frame
 
 # why fusion does not use a pose, as it counts it -> the reason and what to change
 REFUSALS = {

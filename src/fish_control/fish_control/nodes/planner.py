@@ -48,7 +48,7 @@ from fish_control.planner import Plan, Planner, ProgressFile, path_digest
 from fish_control.pool import check_inside_pool
 from fish_control.reference_path import PathError, ReferencePath
 from fish_control.watchdog import pose_loss
-from fish_node.nodes.changes import Changes
+from fish_node.nodes.parameters import Changes
 from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.robot_clock import timer_clock
 from fish_node.nodes.spin import ByEvents

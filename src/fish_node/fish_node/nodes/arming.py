@@ -38,8 +38,8 @@ from fish_node.arming import (
     ArmingSettings,
     estimate_trouble,
     largest_of,
+    visible,
 )
-from fish_node.foreign_text import visible
 from fish_node.nodes.message_bytes import MessageBytes
 from fish_node.nodes.quick_messages import BODY, STAMP, hear
 

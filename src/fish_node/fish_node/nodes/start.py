@@ -12,7 +12,7 @@ from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-from fish_node.nodes.descriptors import descriptors
+from fish_node.nodes.parameters import descriptors
 from fish_node.nodes.spin import ByWaitSet, Spin
 from fish_node.parameters import in_type_of, unknown_names
 

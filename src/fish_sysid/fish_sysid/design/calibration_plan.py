@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 
 from fish_control.excitation import Program, Row
 from fish_report.errors import UserError
-from fish_report.json_file import write_json
+from fish_report.files import write_json
 from fish_sim.robot import Robot
 from fish_sysid.design.candidate_swims import Candidate, candidates, placed, swim_seconds
 from fish_sysid.design.sensitivity import SensorSet, information

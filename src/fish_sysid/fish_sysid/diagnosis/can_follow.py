@@ -12,8 +12,8 @@ from collections.abc import Iterable
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.camera import align, moved_back
-from fish_sysid.diagnosis.known_effects import known_effects
 from fish_sysid.diagnosis.task import Task
+from fish_sysid.diagnosis.vocabulary import known_effects
 from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
 from fish_sysid.estimation.shooting.schedule import TOO_FAR, misfit

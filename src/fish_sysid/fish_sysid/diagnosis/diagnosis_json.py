@@ -20,21 +20,22 @@ from fish_sysid.diagnosis.corrected_model import (
     unexplained_share,
     verdict,
 )
-from fish_sysid.diagnosis.effect_parameters import effect_parameters
 from fish_sysid.diagnosis.effect_wrench import intervals, regimes
-from fish_sysid.diagnosis.families import family_of, separating
 from fish_sysid.diagnosis.next_experiment import next_experiment
-from fish_sysid.diagnosis.prediction_evidence import prediction_effects, prediction_entries
+from fish_sysid.diagnosis.prediction_evidence import (
+    effect_parameters,
+    prediction_effects,
+    prediction_entries,
+)
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, Round
 from fish_sysid.diagnosis.significance import p_value, p_value_unseen, probabilities
-from fish_sysid.diagnosis.symmetry.symmetry_json import symmetry_entry, with_symmetry
-from fish_sysid.diagnosis.vocabulary import kind_of
+from fish_sysid.diagnosis.symmetry.outcome import symmetry_entry, with_symmetry
+from fish_sysid.diagnosis.vocabulary import family_of, kind_of, separating
 from fish_sysid.estimation.ekf_types import ROWS, Noise
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.thresholds import PLAUSIBLE
-from fish_sysid.prediction.prediction import EVERY, WARM_UP, predict, prediction_errors
+from fish_sysid.prediction.prediction import EVERY, HORIZONS, WARM_UP, predict, prediction_errors
 
-HORIZONS = (1.0, 2.0, 5.0)
 LAGS = 20  # samples of a row over which residuals must be white
 MISSES = (
     "from no start state does the model follow two seconds of swimming, whatever effects it has: it misses by {:.1f} times the "

@@ -18,8 +18,7 @@ from fish_sysid.diagnosis.significance import (
     simplest,
     strength_z,
 )
-from fish_sysid.diagnosis.task import Task
-from fish_sysid.diagnosis.trial_split import Trials
+from fish_sysid.diagnosis.task import Task, Trials
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.refit import anneal_if_suspect
 from fish_sysid.estimation.thresholds import (

@@ -18,16 +18,16 @@ from fish_sysid.diagnosis.backward_elimination import eliminate
 from fish_sysid.diagnosis.can_follow import missed_by
 from fish_sysid.diagnosis.conclusion import by_predictions, conclude
 from fish_sysid.diagnosis.forward_selection import Selection, select_effects
-from fish_sysid.diagnosis.known_effects import start_hypothesis
 from fish_sysid.diagnosis.law_or_name import name_for_law
 from fish_sysid.diagnosis.model_order import better_order
 from fish_sysid.diagnosis.residual_regression import residual_law
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, State
 from fish_sysid.diagnosis.significance import Level
-from fish_sysid.diagnosis.symmetry.applied import with_findings
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
+from fish_sysid.diagnosis.symmetry.outcome import with_findings
 from fish_sysid.diagnosis.task import Progress, Task, make_task
+from fish_sysid.diagnosis.vocabulary import start_hypothesis
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import EffectTable

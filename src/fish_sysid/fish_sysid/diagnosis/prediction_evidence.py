@@ -13,12 +13,25 @@ from typing import Any
 import numpy as np
 
 from fish_sysid.diagnosis.corrected_model import asked_by_predictions
-from fish_sysid.diagnosis.effect_parameters import effect_parameters
-from fish_sysid.diagnosis.families import family_of
 from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.result import Diagnosis
-from fish_sysid.diagnosis.vocabulary import kind_of
+from fish_sysid.diagnosis.vocabulary import family_of, kind_of
+from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import effect_class
+
+
+def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:
+    """Values, standard errors and units of an effect's parameters."""
+    values, errors = fit.values, fit.standard_errors
+    return {
+        key: {
+            "value": values[f"{name}.{key}"],
+            "std": errors[f"{name}.{key}"],
+            "unit": parameter.unit,
+        }
+        for key, parameter in fit.hypothesis.effect(name).parameters.items()
+    }
+
 
 Entry = dict[str, Any]
 NOT_A_NUMBER = float("nan")

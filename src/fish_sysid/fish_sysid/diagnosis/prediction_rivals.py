@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from fish_report.parallel import on_all_cores
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.families import family_of
+from fish_sysid.diagnosis.vocabulary import family_of
 from fish_sysid.estimation.shooting.left_out import Step, converged, judged, left_out_costs
 from fish_sysid.estimation.shooting.residuals import SENSORS
 from fish_sysid.estimation.shooting.rollout import ShotParametrization

@@ -14,8 +14,7 @@ from fish_report.parallel import on_all_cores
 from fish_sysid.diagnosis.result import Round, Screened
 from fish_sysid.diagnosis.screening import best_start, screen
 from fish_sysid.diagnosis.significance import look_alike
-from fish_sysid.diagnosis.task import Task
-from fish_sysid.diagnosis.trial_split import Trials
+from fish_sysid.diagnosis.task import Task, Trials
 from fish_sysid.estimation.map_fit import Fit, better, climb, evaluate, log_posterior
 from fish_sysid.estimation.noise_estimation import estimate_noise, usual_noise
 from fish_sysid.estimation.refit import (

@@ -27,8 +27,8 @@ from fish_sysid.estimation.shooting.prediction_fit import PLACE, PredictionFit, 
 from fish_sysid.estimation.shooting.schedule import can_be_predicted
 from fish_sysid.estimation.shooting.selection import INTRINSIC
 from fish_sysid.estimation.shooting.start_states import without_sensor_errors
+from fish_sysid.prediction.better_states import better_states, prediction_size
 from fish_sysid.prediction.kept_noise import with_noise
-from fish_sysid.prediction.prediction import better_states, prediction_size
 
 Array = NDArray[np.float64]
 

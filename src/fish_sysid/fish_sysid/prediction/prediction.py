@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
-from fish_sim.robot_file import STATES
 from fish_sim.step import Stepper
 from fish_sysid.dataset.camera import ahead_of, at_centre_of_mass, forward
 from fish_sysid.dataset.experiment import Experiment
@@ -24,10 +23,9 @@ from fish_sysid.dataset.imu import imu_moved_back
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import WRENCH, Noise, SensorModel
 from fish_sysid.estimation.parametrization import nominal_hypothesis
-from fish_sysid.estimation.shooting.residuals import Scale
 from fish_sysid.estimation.shooting.start_states import shot_states, without_sensor_errors
 from fish_sysid.estimation.smoother import smoothed
-from fish_sysid.prediction.kept_noise import kept_trust, uses_shooting, with_noise
+from fish_sysid.prediction.kept_noise import kept_trust, uses_shooting
 from fish_sysid.prediction.stroke_average import HALF_WINDOW, stroke_mean
 
 Array = NDArray[np.float64]
@@ -292,17 +290,3 @@ def _squares(t: Array, measured: Array, seen: Array, centres: Array) -> tuple[Ar
         if np.isfinite(row).all():
             total, count = total + row**2, count + 1
     return total, count
-
-
-def better_states(training: Experiment, robot: Robot, noise: Noise, trust: Scale) -> str:
-    """The way to start states, shooting or filter, with the smaller errors of predictions on training trials."""
-    return min(
-        STATES,
-        key=lambda way: prediction_size(training, with_noise(robot, noise, way, trust), noise),
-    )
-
-
-def prediction_size(training: Experiment, robot: Robot, noise: Noise) -> float:
-    """Sum of the logarithms of a robot's prediction errors: position, heading and speed at all horizons."""
-    made = predict(training, robot, noise, max(HORIZONS), EVERY, WARM_UP)
-    return float(np.nansum(np.log(prediction_errors(made).rms)))

@@ -18,9 +18,9 @@ from fish_report.page import (
 )
 from fish_sysid.dataset.read import heading
 from fish_sysid.diagnosis.diagnosis_json import LAGS
-from fish_sysid.diagnosis.known_effects import known_effects, known_parameters
 from fish_sysid.diagnosis.result import Diagnosis, Round, Screened
 from fish_sysid.diagnosis.symmetry.finding import Estimate
+from fish_sysid.diagnosis.vocabulary import known_effects, known_parameters
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.reports.diagnosis_figures import (
     before_after,

@@ -18,9 +18,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from fish_report.errors import UserError
-from fish_report.json_file import write_json
+from fish_report.files import partial_file, writable_file, write_json
 from fish_report.terminal import terminal
-from fish_report.writable import partial_file, writable_file
 
 if TYPE_CHECKING:
     from fish_sysid.coverage import Repetition

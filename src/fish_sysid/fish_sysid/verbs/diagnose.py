@@ -10,10 +10,8 @@ from pathlib import Path
 
 from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_report.errors import UserError, user_errors
-from fish_report.json_file import write_json
-from fish_report.named_path import named_path
+from fish_report.files import named_path, writable_folder, write_json
 from fish_report.terminal import PARAGRAPH, cell, say, terminal
-from fish_report.writable import writable_folder
 from fish_sim.robot_argument import read_model
 from fish_sim.robot_file import save_robot
 from fish_sysid.dataset.read import line, read_days, read_experiment

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fish_report.errors import UserError, user_errors
+from fish_report.files import writable_file
 from fish_report.terminal import print_table, terminal
-from fish_report.writable import writable_file
 from fish_sim.robot_argument import read_model
 
 if TYPE_CHECKING:

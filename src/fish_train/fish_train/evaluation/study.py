@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_report.worker_pool import worker_pool
+from fish_report.parallel import worker_pool
 from fish_sim.robot import Robot
 from fish_sim.sensors.settings import SensorSettings
 from fish_train.evaluation.candidates import Candidate

@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from fish_report.parallel import worker_pool
 from fish_report.terminal import say
-from fish_report.worker_pool import worker_pool
 from fish_train.training.run import (
     Job,
     Status,

@@ -22,7 +22,7 @@ from fish_control.gains_file import read_gains_file, write_gains_file
 from fish_control.policy import Policy
 from fish_control.policy_spec import PolicySpec
 from fish_report.errors import UserError
-from fish_report.json_file import write_json
+from fish_report.files import write_json
 from fish_sim.ops import NUMPY
 from fish_train.training.closed_loop_equations import CONTROL_PERIOD, Law, gains_of
 from fish_train.training.network import FORMS, to_tensors, weight_count

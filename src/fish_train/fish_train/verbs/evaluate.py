@@ -22,8 +22,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from fish_report.errors import UserError
+from fish_report.files import partial_file, writable_folder
 from fish_report.terminal import say, terminal
-from fish_report.writable import partial_file, writable_folder
 
 if TYPE_CHECKING:
     from fish_train.evaluation.study import Row

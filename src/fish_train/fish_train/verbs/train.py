@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from rich.console import Console
 
-from fish_report.command_words import words_after
 from fish_report.errors import UserError
+from fish_report.robofish import words_after
 from fish_report.terminal import say, terminal
 from fish_sim.robot_argument import read_model
 

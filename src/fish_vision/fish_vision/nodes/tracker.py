@@ -28,11 +28,11 @@ from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
-from fish_node.nodes.changes import Changes
+from fish_node.nodes.frames import publish_static_frame
 from fish_node.nodes.heap import keep_freed_memory
+from fish_node.nodes.parameters import Changes
 from fish_node.nodes.spin import ByEvents
 from fish_node.nodes.start import read_parameters, run
-from fish_node.nodes.static_frames import publish_static_frame
 from fish_node.nodes.status_log import StatusLog
 from fish_node.rivals import Rivals
 from fish_vision.annotate import annotated

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fish_report.errors import UserError
-from fish_report.writable import partial_file, writable_file
+from fish_report.files import partial_file, writable_file
 
 if TYPE_CHECKING:
     from fish_vision.tracker import Detection

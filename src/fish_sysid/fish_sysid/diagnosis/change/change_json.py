@@ -9,11 +9,9 @@ from typing import Any
 
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis.change.change import Change, Member, Named
-from fish_sysid.diagnosis.families import separating
 from fish_sysid.diagnosis.next_experiment import next_experiment
-from fish_sysid.diagnosis.symmetry.applied import with_findings
-from fish_sysid.diagnosis.symmetry.symmetry_json import stated, symmetry_entry
-from fish_sysid.diagnosis.vocabulary import kind_of
+from fish_sysid.diagnosis.symmetry.outcome import stated, symmetry_entry, with_findings
+from fish_sysid.diagnosis.vocabulary import kind_of, separating
 from fish_sysid.estimation.parametrization import effect_class
 
 Entry = dict[str, Any]

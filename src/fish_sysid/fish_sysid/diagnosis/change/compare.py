@@ -13,7 +13,6 @@ from fish_sim.robot import Robot
 from fish_sysid.dataset.camera import align, moved_back
 from fish_sysid.dataset.experiment import Experiment, joined
 from fish_sysid.dataset.read import LESS
-from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.channels import Swim, swims
 from fish_sysid.diagnosis.change.comparable import (
@@ -24,9 +23,9 @@ from fish_sysid.diagnosis.change.comparable import (
     kinds,
     screened,
 )
+from fish_sysid.diagnosis.change.contenders import Case
 from fish_sysid.diagnosis.change.explanation import NAMES, explained
 from fish_sysid.diagnosis.change.image_age import AgeChange, age_change
-from fish_sysid.diagnosis.change.other_commands import OldAnswer
 from fish_sysid.diagnosis.change.permutation_test import permutation_p_value
 from fish_sysid.diagnosis.change.rows import MEAN_MOTION, STROKES, look, trial_rows
 from fish_sysid.diagnosis.change.rudder_change import (
@@ -34,11 +33,11 @@ from fish_sysid.diagnosis.change.rudder_change import (
     rudder_change,
     with_second_opinion,
 )
-from fish_sysid.diagnosis.change.servos import with_servo
+from fish_sysid.diagnosis.change.servos import OldAnswer, with_servo
 from fish_sysid.diagnosis.change.shared_fit import regression
 from fish_sysid.diagnosis.change.swap_test import swap_test
-from fish_sysid.diagnosis.symmetry.applied import in_still_water
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
+from fish_sysid.diagnosis.symmetry.outcome import in_still_water
 from fish_sysid.estimation.parametrization import NOMINAL_FREE
 from fish_sysid.estimation.shooting.prediction_fit import quick_robot
 from fish_sysid.estimation.shooting.schedule import can_be_predicted

@@ -12,17 +12,37 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_sim.robot import Robot
+from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.candidates import PARAMETER
-from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Member, Named
-from fish_sysid.diagnosis.change.contest import apart, mean_gain, tie
-from fish_sysid.diagnosis.change.naming import SPECIAL_CASE, Judged
-from fish_sysid.diagnosis.change.shared_fit import Key
+from fish_sysid.diagnosis.change.channels import Swim
+from fish_sysid.diagnosis.change.naming import SPECIAL_CASE, Judged, apart, mean_gain, tie
+from fish_sysid.diagnosis.change.rows import TrialRows
+from fish_sysid.diagnosis.change.servos import OldAnswer
+from fish_sysid.diagnosis.change.shared_fit import Key, Regression
 from fish_sysid.diagnosis.change.strength import Refitted, refit
 from fish_sysid.diagnosis.change.swap_test import REMAINDER, Swapped, swap_test
-from fish_sysid.diagnosis.families import family_of
+from fish_sysid.diagnosis.vocabulary import family_of
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Case:
+    """OLD and NEW in one look."""
+
+    channels: tuple[int, ...]
+    fit: Regression
+    old: list[TrialRows]
+    rows: list[TrialRows]  # of NEW
+    strata: list[int]
+    day_of: list[int]  # of each trial
+    robot: Robot
+    new: Experiment
+    days: tuple[Swim, ...]  # of NEW
+    answer: OldAnswer
+
 
 CONTENDS = 0.5  # of the largest - log p of a name that a contender has
 REFITTED = 4  # contenders of any family by their gain, as many by it undivided, and as many by their rarity

@@ -16,10 +16,9 @@ from fish_sysid.diagnosis.change.candidates import (
     SIMULATED,
     typical,
 )
-from fish_sysid.diagnosis.change.case import Case
 from fish_sysid.diagnosis.change.change import Change, Named
 from fish_sysid.diagnosis.change.channels import swims
-from fish_sysid.diagnosis.change.contenders import next_change
+from fish_sysid.diagnosis.change.contenders import Case, next_change
 from fish_sysid.diagnosis.change.naming import Judged, judge_all, strength_of
 from fish_sysid.diagnosis.change.rows import look, trial_rows
 from fish_sysid.diagnosis.change.servos import SERVOS, with_servo

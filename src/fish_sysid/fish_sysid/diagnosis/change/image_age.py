@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from fish_sysid.dataset.camera import DELAYS, STEP, align, fine_delay, misfits
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.change import Member, Named
-from fish_sysid.diagnosis.change.contest import mean_gain
+from fish_sysid.diagnosis.change.naming import mean_gain
 from fish_sysid.diagnosis.change.permutation_test import SETS, rank, sets_in_place
 from fish_sysid.diagnosis.change.strength import Refitted
-from fish_sysid.diagnosis.families import family_of
 from fish_sysid.diagnosis.symmetry.finding import Estimate
+from fish_sysid.diagnosis.vocabulary import family_of
 
 Array = NDArray[np.float64]
 

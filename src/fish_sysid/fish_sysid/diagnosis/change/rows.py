@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.candidates import SIMULATED, Candidate, simulated, written_down
-from fish_sysid.diagnosis.change.channels import AT_CENTRES, CHANNELS, MEANS, Swim
-from fish_sysid.diagnosis.change.harmonics import HARMONICS
+from fish_sysid.diagnosis.change.channels import AT_CENTRES, CHANNELS, HARMONICS, MEANS, Swim
 from fish_sysid.diagnosis.symmetry.galilei import asymmetric
 from fish_sysid.diagnosis.symmetry.stroke_means import ROTOR
 

@@ -19,8 +19,7 @@ from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.change.channels import AT_CENTRES, MEANS, Swim, parts
-from fish_sysid.diagnosis.change.harmonics import StrokeWeights
+from fish_sysid.diagnosis.change.channels import AT_CENTRES, MEANS, StrokeWeights, Swim, parts
 from fish_sysid.estimation.ekf import filter_stepper
 from fish_sysid.prediction.stroke_average import stroke_mean
 

@@ -7,6 +7,13 @@ among the rarest of exchanged trials is the p-value (Westfall and Young 1993, mi
 less. An exchanged set that keeps most of NEW's trials looks as changed as NEW does and is no null: of a change it would say how
 little the trials weigh that it leaves out. Sets that share more trials with NEW than random sets do in the mean take no part, and
 `permutation_test` says at which level such p-values stand.
+
+How rare a statistic is that exceeds them all: an F statistic of few trials has a tail that is a power law. Hill's estimate
+gives its exponent from the largest of the null (Hill 1975; for p-values of few exchanges Knijnenburg et al. 2009):
+
+    P(X > x) = k / n (x / u)^(-1 / gamma),   gamma = mean of log(x_i / u) over the k values beyond u
+
+One standard error of gamma is added, gamma / sqrt(k), as the exchanged sets share trials.
 """
 
 from __future__ import annotations
@@ -19,10 +26,57 @@ from numpy.typing import NDArray
 
 from fish_sysid.diagnosis.change.candidates import PARAMETER
 from fish_sysid.diagnosis.change.shared_fit import CHANGE, Key, Regression
-from fish_sysid.diagnosis.change.tail_probability import Tails, tail_probability
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+
+TAIL = 0.2  # share of the null that makes the tail
+FEWEST = 10  # values in it
+LEAST_STATISTIC = 1e-6
+
+
+@dataclass(frozen=True)
+class Tails:
+    """The null of several statistics (n, J), and its tails."""
+
+    null: Array  # (n, J) in order of size
+    threshold: Array  # (J,)
+    gamma: Array  # (J,)
+
+    @classmethod
+    def of(cls, null: Array) -> Tails:
+        """Tails of statistics (n, J). One that looks lighter than the median of them has the median one's exponent."""
+        ordered = np.sort(np.maximum(null, LEAST_STATISTIC), axis=0)
+        k = tail_size(len(null))
+        threshold = ordered[-k - 1]
+        gamma = np.log(ordered[-k:] / threshold).mean(axis=0) * (1.0 + 1.0 / np.sqrt(k))
+        return cls(
+            ordered, threshold, np.maximum(np.maximum(gamma, np.median(gamma)), LEAST_STATISTIC)
+        )
+
+    def probability(self, values: Array) -> Array:
+        """Probabilities (Q, J) of at least `values` (Q, J), beyond 1 / n by the tail."""
+        n = len(self.null)
+        below = np.column_stack(
+            [np.searchsorted(x, v, side="left") for x, v in zip(self.null.T, values.T, strict=True)]
+        )
+        beyond = np.maximum(values, self.threshold) / self.threshold
+        by_tail = tail_size(n) / n * beyond ** (-1.0 / self.gamma)
+        return np.where(values > self.threshold, by_tail, (1.0 + n - below) / (1.0 + n))
+
+
+def tail_size(n: int) -> int:
+    """How many of n values make the tail. Raises ValueError where they are too few."""
+    if n <= FEWEST:
+        raise ValueError(f"got a null of {n} values; expected more than {FEWEST}")
+    return max(FEWEST, round(TAIL * n))
+
+
+def tail_probability(null: Array, value: float) -> float:
+    """Probability of at least `value` where the statistic without a change has been (n,)."""
+    return float(Tails.of(null[:, None]).probability(np.array([[value]]))[0, 0])
+
 
 REMAINDER = 0.005  # p-value up to which there is something left to name
 SWAPS = 300

@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Static frames on /tf_static, where tf2_msgs is installed: it is not among the wheels."""
+"""Frames on /tf_static and /tf, where tf2_msgs is installed: it is not among the wheels."""
 
 from collections.abc import Sequence
 
@@ -48,3 +48,20 @@ def static_transform(
     place.x, place.y, place.z = map(float, position)
     turn.x, turn.y, turn.z, turn.w = map(float, rotation)
     return message
+
+
+class FrameBroadcaster:
+    """A node's moving frames on /tf; without tf2_msgs it says nothing.
+
+    Attributes:
+        heard: whether there is a /tf to say them on.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._publisher = node.create_publisher(TFMessage, "/tf", 10) if TFMessage else None
+        self.heard = self._publisher is not None
+
+    def send(self, transform: TransformStamped) -> None:
+        """Publish one transform."""
+        if self._publisher is not None:
+            self._publisher.publish(TFMessage(transforms=[transform]))

@@ -1,16 +1,55 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that a node takes over at run time: checked as a whole first, then taken over, or refused with the reason."""
+"""Parameters of a node: how they are described, and how they change while it runs."""
 
-from collections.abc import Callable
+import math
+import sys
+from collections.abc import Callable, Collection
 from dataclasses import asdict, replace
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from fish_node.parameters import in_type_of
+from fish_node.parameters import ParameterDoc, in_type_of, parameter_docs
+
+LARGEST_INTEGER = 2**63 - 1
+
+
+def descriptors(config: Any, settable: Collection[str] = ()) -> dict[str, ParameterDescriptor]:
+    """One descriptor for each field, with description, constraints in words, and the range of a number.
+
+    Args:
+        config: dataclass of parameters.
+        settable: names of those that are not read-only.
+    """
+    values = asdict(config)
+    return {
+        name: _descriptor(name, doc, values[name], name not in settable)
+        for name, doc in parameter_docs(config).items()
+    }
+
+
+def _descriptor(name: str, doc: ParameterDoc, like: object, read_only: bool) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(name=name, description=doc.description, read_only=read_only)
+    descriptor.additional_constraints = doc.allowed
+    if doc.interval is None:
+        return descriptor
+    low, high = doc.interval
+    if isinstance(like, float):
+        top = sys.float_info.max if math.isinf(high) else high
+        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=top)]
+    elif isinstance(like, int) and not isinstance(like, bool):
+        last = LARGEST_INTEGER if math.isinf(high) else int(high)
+        descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=last)]
+    return descriptor
+
 
 Config = TypeVar("Config")
 Prepare = Callable[[Config, Config], Callable[[], None]]
