@@ -15,7 +15,7 @@ from fish_hw.devices.imu_sample import ImuSample, Vector, mean_rate, rotate
 from fish_hw.devices.reconnect import Doubt
 
 LARGEST_TURN_ACCELERATION = 200.0  # rad/s^2, of the gyroscope between two samples
-TURN_NOISE = 0.5  # rad/s, allowed beside it
+TURN_NOISE = 0.5  # rad/s, allowed on top of it
 LARGEST_ACCELERATION_CHANGE = 15.0  # m/s^2 between two samples
 LARGEST_TURN = 25.0  # rad/s, of the orientation between two samples
 DISAGREEMENT = 3.0  # rad/s between gyroscope and orientation; in strokes they differ by up to 2

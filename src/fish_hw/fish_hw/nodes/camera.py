@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Node `camera`: the overhead USB camera and its calibration.
+"""Node `camera`: the overhead USB camera.
 
 Out: camera/image_raw/compressed (JPEG), camera/camera_info (same stamp and frame), camera/image_raw on
      request,
