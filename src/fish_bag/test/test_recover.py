@@ -490,6 +490,7 @@ def test_unknown_type_is_refused(tmp_path):
 WRITE_AND_STALL = """
     import sys, time
     from pathlib import Path
+    from test_recover import IMU, PAYLOAD
     from fish_bag.mcap_writer import McapRecording
     recording = McapRecording(Path(sys.argv[1]), {"robot": "x"})
     topic = recording.add_topic("/fish/imu/data", IMU)
@@ -523,6 +524,7 @@ def test_kill_loses_less_than_a_second(tmp_path):
 FILL = """
     import signal, sys, resource
     from pathlib import Path
+    from test_recover import IMU, PAYLOAD
     from fish_bag.mcap_writer import McapRecording
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
