@@ -39,7 +39,6 @@ from fish_sysid.estimation.refit import (
     ANNEAL_SHORT,
     REFIT,
     anneal_if_suspect,
-    anneal_if_unexplained,
     best_of_restart,
     global_fit,
     multistart_fit,
@@ -86,8 +85,7 @@ def test_parameters_of_a_large_effect_keep_their_values_while_annealing(data):
 
 
 def test_a_good_fit_stays(data, best):
-    for keep in (anneal_if_suspect, anneal_if_unexplained):
-        assert keep(best, data) is best
+    assert anneal_if_suspect(best, data) is best
     assert best_of_restart(best, best.theta + 0.1, data, best.noise, REFIT) is best
 
 

@@ -21,7 +21,6 @@ from fish_sysid.diagnosis.backward_elimination import eliminate, exchanged, riva
 from fish_sysid.diagnosis.cross_validation import gain_left_out, gain_unseen, on_all, predicted
 from fish_sysid.diagnosis.diagnosis_json import competition
 from fish_sysid.diagnosis.forward_selection import Selection, choose, predicts_unseen, significant
-from fish_sysid.diagnosis.law_or_name import name_for_law
 from fish_sysid.diagnosis.model_order import better_order, fit_links, promises_more, with_links
 from fish_sysid.diagnosis.pipeline import fit_nominal
 from fish_sysid.diagnosis.residual_regression import Law
@@ -37,7 +36,6 @@ from fish_sysid.diagnosis.significance import (
     Level,
     evidence,
     p_value,
-    p_value_unseen,
     probabilities,
     simplest,
     strength_z,
@@ -398,11 +396,6 @@ def test_p_values_are_of_the_tempered_ratio_times_the_names_tried():
     assert p_value(0.1, 2, 30) == 1.0
 
 
-def test_just_enough_on_unseen_trials_has_the_p_value_of_the_level():
-    assert p_value_unseen(Level(0.01).needed_unseen(0.0, 30), 30) == pytest.approx(0.01)
-    assert p_value_unseen(-5.0, 30) == 1.0
-
-
 def test_probabilities_add_up_the_most_probable_first():
     fits = {
         "a": made_fit(-110.0, "current"),
@@ -571,48 +564,6 @@ def test_of_two_that_are_identifiable_only_together_one_is_held():
     assert identifiable(normal, prior, range(1, 3)) in ([0, 1], [0, 2])
     assert identifiable(np.diag(1.0 / prior**2), prior, range(1, 3)) == [0]
     assert identifiable(normal + 100.0 * np.eye(3), prior, range(1, 3)) == [0, 1, 2]
-
-
-@pytest.fixture(scope="module")
-def drag():
-    """A task, and the round in which the true drag and a rudder's offset were refitted."""
-    hidden = {"quadratic_drag": {"surge": 0.3, "sway": 2.0, "yaw": 6e-4}}
-    data = swim(fish(**hidden), kinds=("sines", "steps", "random", "turn"), duration=7.0)
-    task = make_task(data, GIVEN)
-    nominal = nominal_hypothesis(GIVEN, ("head_drag_surge", "head_drag_sway", "tail_stiffness"))
-    theta, trials = np.log([1.3, 0.8, 1.1]), task.trials.searched
-    base = refit(nominal, theta, trials, Noise(), REFIT)
-    fits = {}
-    for name in ("quadratic_drag", "rudder_offset"):
-        hypothesis = nominal.with_effect(name)
-        start = hypothesis.parametrization.origin()
-        start[:3] = theta
-        fits[name] = refit(hypothesis, start, trials, Noise(), REFIT)
-    ranking = tuple(Screened(name, 0.0, fit.theta) for name, fit in fits.items())
-    return task, Round(base, ranking, fits)
-
-
-def law(surge: float) -> Law:
-    return Law({"surge": surge, "sway": 0.0, "yaw": 1.0}, {}, 1e3)
-
-
-def test_the_true_name_stands_for_a_law_that_predicts_no_better(drag):
-    task, found = drag
-    (accepted,) = name_for_law(found, law(34.0), task)
-    assert accepted.name == "quadratic_drag"
-    assert accepted.gain_left_out > 34.0
-    assert accepted.contest == found.refitted
-
-
-@pytest.mark.parametrize("surge", [1e6, 2.0], ids=["predicts better", "is none"])
-def test_no_name_stands_for_a_law_that(surge, drag):
-    task, found = drag
-    assert name_for_law(found, law(surge), task) == ()
-
-
-def test_without_a_refitted_name_the_law_stays(drag):
-    task, found = drag
-    assert name_for_law(Round(found.base, found.ranking, {}), law(34.0), task) == ()
 
 
 NO_LAW = Law({"surge": 0.0, "sway": 0.0, "yaw": 0.0}, {}, 1e4)

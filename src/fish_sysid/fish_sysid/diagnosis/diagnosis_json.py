@@ -28,7 +28,7 @@ from fish_sysid.diagnosis.prediction_evidence import (
     prediction_entries,
 )
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, Round
-from fish_sysid.diagnosis.significance import p_value, p_value_unseen, probabilities
+from fish_sysid.diagnosis.significance import p_value, probabilities
 from fish_sysid.diagnosis.symmetry.outcome import symmetry_entry, with_symmetry
 from fish_sysid.diagnosis.vocabulary import family_of, kind_of, separating
 from fish_sysid.estimation.ekf_types import ROWS, Noise
@@ -86,14 +86,8 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
     """One found effect."""
     name, found = accepted.name, accepted.round
     gains = {a.name: a.round.gain(a.name) for a in d.accepted}
-    tried = len(found.ranking)
     probability = competition(accepted, d.accepted)
-    effect, left_out = d.final.hypothesis.effect(name), accepted.gain_left_out
-    sure = (
-        p_value(gains[name], len(effect.parameters), tried)
-        if left_out is None
-        else p_value_unseen(left_out, tried)
-    )
+    effect = d.final.hypothesis.effect(name)
     return {
         "name": name,
         "kind": kind_of(name, d.task.robot.table),
@@ -102,7 +96,7 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         "evidence": {
             "basis": "likelihood",
             "log_likelihood_gain": gains[name],
-            "p_value": sure,
+            "p_value": p_value(gains[name], len(effect.parameters), len(found.ranking)),
             "probability": probability[name],
         },
         "share": gains[name] / sum(gains.values()),

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fish_sysid.diagnosis.cross_validation import gain_left_out, gain_unseen, on_all
@@ -13,7 +12,6 @@ from fish_sysid.diagnosis.selection_round import run_round
 from fish_sysid.diagnosis.significance import (
     Level,
     evidence,
-    look_alike,
     parameter_count,
     simplest,
     strength_z,
@@ -73,12 +71,7 @@ def choose(found: Round, task: Task) -> str | None:
         task.acted.add("check on unseen trials")
     if not confirmed:
         return None
-    best = simplest(max(confirmed, key=lambda name: evidence(confirmed[name])), confirmed, level)
-    rivals = {n: found.refitted[n] for n in good if n not in confirmed and look_alike(n, best)}
-    if not task.runs("overtaking"):
-        return best
-    ahead = overtaken(best, confirmed[best], rivals, base, trials)
-    return task.kept("overtaking", best, ahead)
+    return simplest(max(confirmed, key=lambda name: evidence(confirmed[name])), confirmed, level)
 
 
 def significant(found: Round, tried: int, level: Level) -> list[str]:
@@ -103,19 +96,3 @@ def predicts_unseen(base: Fit, fit: Fit, trials: Trials, tried: int, level: Leve
         needed = level.needed_unseen(base.samples, tried)
         return gain_left_out(base, everywhere)[0] > needed
     return gain > max(FAIR_SHARE * expected, SMALLEST_CHECK)
-
-
-def overtaken(name: str, fit: Fit, rivals: Mapping[str, Fit], base: Fit, trials: Trials) -> str:
-    """The name, or the look-alike that leads it on the trials of the search and on those of the check as well.
-
-    A look-alike whose form is nearly the true one gains less on the check than it would if it were true, and a poorer one
-    gains its smaller share.
-    """
-    for other, rival in rivals.items():
-        if evidence(rival) > evidence(fit):
-            theirs, mine = (
-                gain_unseen(base, on_all(f, trials.training), trials.check)[0] for f in (rival, fit)
-            )
-            if theirs - mine > SMALLEST_CHECK:
-                name, fit = other, rival
-    return name

@@ -18,7 +18,6 @@ from fish_sysid.diagnosis.backward_elimination import eliminate
 from fish_sysid.diagnosis.can_follow import missed_by
 from fish_sysid.diagnosis.conclusion import by_predictions, conclude
 from fish_sysid.diagnosis.forward_selection import Selection, select_effects
-from fish_sysid.diagnosis.law_or_name import name_for_law
 from fish_sysid.diagnosis.model_order import better_order
 from fish_sysid.diagnosis.residual_regression import residual_law
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, State
@@ -69,8 +68,6 @@ def searched(nominal: Fit, task: Task) -> State:
     if task.runs("model order"):
         finer = task.kept("model order", None, better_order(selection, state.law, task))
         state = state if finer is None else on_training(select_effects(finer, task), task)
-    if task.runs("law replaced by a name") and not state.accepted:
-        state = task.kept("law replaced by a name", state, name_or_law(state, task))
     if task.runs("backward elimination") and len(state.accepted) > 1:
         final, accepted = eliminate(state.final, state.accepted, task)
         state = task.kept("backward elimination", state, with_final(state, final, accepted, task))
@@ -124,15 +121,6 @@ def refitted(fit: Fit, task: Task) -> Fit:
     if not task.runs("anneal"):
         return found
     return task.kept("anneal", found, anneal_if_grown(found, fit, task.trials.training))
-
-
-def name_or_law(state: State, task: Task) -> State:
-    """Without an effect so far: the name that predicts as well as the law which is left, if there is one."""
-    accepted = name_for_law(state.rounds[-1], state.law, task)
-    if not accepted:
-        return state
-    fit = accepted[0].contest[accepted[0].name]
-    return with_final(state, refitted(fit, task), accepted, task)
 
 
 def with_final(state: State, final: Fit, accepted: tuple[Accepted, ...], task: Task) -> State:

@@ -61,7 +61,6 @@ class Accepted:
     name: str
     round: Round
     contest: dict[str, Fit]  # name -> fit, its own among them: of its round, or of the final model
-    gain_left_out: float | None = None  # nats on trials left out in turn, where this decided
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,6 @@ from fish_sysid.estimation.refit import (
     ANNEAL_SHORT_HELD,
     CONTINUE,
     REFIT,
-    anneal_if_unexplained,
     best_of_restart,
     refit,
 )
@@ -119,10 +118,7 @@ def refit_candidate(base: Fit, one: Screened, task: Task) -> Fit:
     experiment, hypothesis = task.trials.searched, base.hypothesis.with_effect(one.name)
     start = evaluate(hypothesis, one.theta, experiment, base.noise)
     noise = estimate_noise(start, experiment)
-    fit = refit(hypothesis, one.theta, experiment, noise, REFIT)
-    if not task.runs("anneal unexplained"):
-        return fit
-    return task.kept("anneal unexplained", fit, anneal_if_unexplained(fit, experiment))
+    return refit(hypothesis, one.theta, experiment, noise, REFIT)
 
 
 def refit_annealed(base: Fit, one: Screened, task: Task) -> Fit:

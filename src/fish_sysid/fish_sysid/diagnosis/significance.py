@@ -46,14 +46,6 @@ def p_value(gain: float, parameters: int, candidates: int) -> float:
     return float(min(1.0, candidates * chi2.sf(2.0 * max(gain, 0.0) / TEMPER, parameters)))
 
 
-def p_value_unseen(gain: float, candidates: int) -> float:
-    """Of a tempered likelihood ratio on unseen data, times the number of candidates tried.
-
-    A bound on one set of unseen trials, approximate where they were left out in turn: see `Level.needed_unseen`.
-    """
-    return float(min(1.0, candidates * np.exp(-max(gain, 0.0) / TEMPER)))
-
-
 def evidence(fit: Fit, temper: float = 1.0) -> float:
     """Laplace approximation of the log evidence (MacKay 2003, ch. 27): an unneeded parameter costs its Occam factor.
 

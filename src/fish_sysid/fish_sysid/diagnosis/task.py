@@ -89,13 +89,7 @@ STAGES = (
     ("look-alike refits", "look-alikes of the best candidate refitted from its optimum"),
     ("base restart", "the base refitted from the best candidate's optimum, and screened again"),
     ("anneal", "a fit that needs more process noise than water annealed"),
-    ("anneal unexplained", "a candidate whose noise does not explain its innovations annealed"),
     ("check on unseen trials", "a candidate must predict trials that the search has not used"),
-    ("overtaking", "a look-alike that predicts unseen trials better takes a candidate's place"),
-    (
-        "law replaced by a name",
-        "a candidate that predicts as well as a law of the residual is named",
-    ),
     ("backward elimination", "every effect tested again with those that were added after it"),
     ("model order", "more tail links tried where much is left"),
     ("surrogate model", "a model fitted by its predictions where no name fits"),

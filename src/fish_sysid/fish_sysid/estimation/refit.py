@@ -143,17 +143,6 @@ def anneal_if_suspect(fit: Fit, experiment: Experiment) -> Fit:
     return best_of_restart(fit, fit.theta, experiment, usual_noise(experiment), ANNEAL_SHORT)
 
 
-def anneal_if_unexplained(fit: Fit, experiment: Experiment) -> Fit:
-    """The fit, or where its own noise does not explain its innovations, a better optimum found by annealing.
-
-    The tail's inertias start at their nominal values: in the poor optimum they imitate a wrong phase of the tail's swing.
-    """
-    if fit.largest_ratio >= RATIO_SUSPECT or fit.max_innovation_rms <= INNOVATION_RMS_SUSPECT:
-        return fit
-    theta = np.where(np.isin(fit.hypothesis.free, TAIL_INERTIAS), 0.0, fit.theta)
-    return best_of_restart(fit, theta, experiment, usual_noise(experiment), ANNEAL_SHORT_HELD)
-
-
 def anneal_if_grown(fit: Fit, before: Fit, experiment: Experiment) -> Fit:
     """The fit, annealed if it is suspect, where it needs far more process noise than one of other trials before it."""
     grown = fit.largest_ratio > RATIO_GROWTH * before.largest_ratio
