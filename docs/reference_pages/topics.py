@@ -23,7 +23,7 @@ from fish_bringup.node_table import (
 from reference_pages import HEADER, cell, table
 
 SPECS = (*SIMULATED, *REAL, FAKE[0], *CONTROL, EXCITER, RECORDER, REPLAYER, JOINT_ANGLES, VIEW)
-ARMING = "fish_node.nodes.arming"
+BY_NAME = ("fish_node.nodes.arming", "fish_node.nodes.frames")
 CREATORS = {
     "create_publisher": "publishes",
     "create_subscription": "takes",
@@ -143,22 +143,22 @@ def interfaces(package: str, executable: str) -> list[tuple[str, str, str]]:
             found += interface(node, types)
             if isinstance(node, ast.ImportFrom) and node.module:
                 near = node.module.rpartition(".")[0]
-                if node.module == ARMING:
-                    found += arming_interfaces({alias.name for alias in node.names})
+                if node.module in BY_NAME:
+                    found += named_interfaces(node.module, {alias.name for alias in node.names})
                 elif near in (f"{package}.nodes", "fish_node.nodes") and node.module not in done:
                     todo.append(node.module)
     return found
 
 
-def arming_interfaces(classes: set[str]) -> list[tuple[str, str, str]]:
-    """(role, type, name) of the arming state's owner or listener, as its classes say."""
-    path = Path(str(importlib.util.find_spec(ARMING).origin))  # type: ignore[union-attr]
+def named_interfaces(module: str, names: set[str]) -> list[tuple[str, str, str]]:
+    """(role, type, name) of the classes and functions that a node imports from a module."""
+    path = Path(str(importlib.util.find_spec(module).origin))  # type: ignore[union-attr]
     tree = ast.parse(path.read_text(encoding="utf-8"))
     types = imported_types(tree)
     return [
         found
         for owner in tree.body
-        if isinstance(owner, ast.ClassDef) and owner.name in classes
+        if isinstance(owner, ast.ClassDef | ast.FunctionDef) and owner.name in names
         for node in ast.walk(owner)
         for found in interface(node, types)
     ]
