@@ -14,15 +14,15 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from reference_pages import effects, parameters, robot, topics, verbs
+from reference_pages import parameters, physics, topics, verbs
 
 REFERENCE = Path(__file__).parent / "reference"
 PAGES: dict[str, Callable[[], str]] = {
     "verbs.md": verbs.page,
     "parameters.md": parameters.page,
     "topics.md": topics.page,
-    "effects.md": effects.page,
-    "robot.md": robot.page,
+    "effects.md": physics.effects_page,
+    "robot.md": physics.robot_page,
 }
 
 

@@ -39,8 +39,17 @@ def folder_of(words: list[str]) -> Path:
     return OWN
 
 
+def as_files(folder: Path) -> None:
+    """A file for each trial in the place of its folder: an MCAP file needs no metadata.yaml."""
+    for file in sorted(folder.glob("*/*.mcap")):
+        file.rename(folder / file.name)
+        shutil.rmtree(file.parent)
+
+
 if __name__ == "__main__":
     try:
-        make_recordings(SCENARIO, folder_of(sys.argv[1:]))
+        folder = folder_of(sys.argv[1:])
+        make_recordings(SCENARIO, folder)
+        as_files(folder)
     except UserError as error:
         sys.exit(str(error))

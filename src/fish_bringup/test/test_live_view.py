@@ -23,9 +23,9 @@ from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool
 
-from fish_bringup.keyboard import Keyboard
-from fish_bringup.nodes.hand_drive import Pad, driving
 from fish_bringup.nodes.live_view import LiveViewNode
+from fish_bringup.nodes.operator import Pad, driving
+from fish_bringup.verbs.drive import Keyboard
 from fish_bringup.view_server import HEADER
 from fish_control.manual_drive import ManualDrive
 

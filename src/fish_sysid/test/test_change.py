@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kinematic_swims import World, kinematic_swims
 from scipy.stats import f as fisher
+from swims import World, kinematic_swims
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot

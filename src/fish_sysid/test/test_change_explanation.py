@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kinematic_swims import World, kinematic_swims
-from swims import fish, swim
+from swims import World, fish, kinematic_swims, swim
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import with_injection

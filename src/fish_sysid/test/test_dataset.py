@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from kinematic_swims import World, kinematic_swims
+from swims import World, kinematic_swims
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot

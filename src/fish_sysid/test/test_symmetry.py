@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kinematic_swims import World, kinematic_swims
+from swims import World, kinematic_swims
 
 from fish_report.files import plain
 from fish_sim.effects import EFFECTS

@@ -12,11 +12,17 @@ is held; a robot with deadman_timeout_s is disarmed when it is released.
 from __future__ import annotations
 
 import argparse
+import os
+import select
+import sys
+import termios
 import time
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import astuple, fields
 
-from fish_bringup.keyboard import Keyboard, keyboard
-from fish_bringup.nodes.hand_drive import HandDrive, Pad, driving
+from fish_bringup.nodes.operator import HandDrive, Pad, driving
 from fish_bringup.robot_arguments import add_robot, check_robot
 from fish_control.manual_drive import ManualDrive
 from fish_report.errors import Interruption, UserError, user_errors
@@ -93,3 +99,42 @@ def _armed(node: HandDrive) -> str:
         return "armed"
     refused = f"; {node.answer}" if node.answer.startswith("not") else ""
     return f"disarmed ({node.arming.reason}); robofish arm or the arm button arms it{refused}"
+
+
+ARROWS = {b"\x1b[A": "up", b"\x1b[B": "down", b"\x1b[C": "right", b"\x1b[D": "left"}
+
+
+class Keyboard:
+    """Reads a terminal by its file descriptor."""
+
+    def __init__(self, terminal: int) -> None:
+        self._terminal = terminal
+
+    def key(self) -> str | None:
+        """`up`, `down`, `left`, `right`, or the character; None if no key was pressed."""
+        if not select.select([self._terminal], [], [], 0.0)[0]:
+            return None
+        pressed = os.read(self._terminal, 64)
+        return ARROWS.get(pressed[-3:], pressed[-1:].decode("latin-1"))
+
+
+@contextmanager
+def keyboard() -> Iterator[Keyboard | None]:
+    """The terminal of standard input, single keys; None where it is no terminal.
+
+    Raises:
+        UserError: the terminal cannot be set.
+    """
+    if not sys.stdin.isatty():
+        yield None
+        return
+    terminal = sys.stdin.fileno()
+    try:
+        before = termios.tcgetattr(terminal)
+        tty.setcbreak(terminal)
+    except termios.error as error:
+        raise UserError(f"the terminal gives no single keys: {error}") from error
+    try:
+        yield Keyboard(terminal)
+    finally:
+        termios.tcsetattr(terminal, termios.TCSADRAIN, before)

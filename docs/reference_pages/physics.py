@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of the effects: what the nominal model may lack, with equation and parameters."""
+"""The pages of the robot file and of the effects: nominal parameters, and what the nominal model may lack."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from fish_sim.effects import EFFECTS
+from fish_sim.robot import nominal_parameters
 from fish_sim.sensors import SENSOR_EFFECTS
 from reference_pages import HEADER, bounds, cell, escaped, number, table
 
-INTRODUCTION = """# Effects
+EFFECTS_PAGE = """# Effects
 
 An effect is what the nominal model leaves out. `diagnose` looks for every effect of this page but `disturbance`; the
 simulator and the training take them from `robot.yaml`:
@@ -27,13 +28,13 @@ With the neutral value the robot is the nominal one. The typical value is a plau
 """
 
 
-def page() -> str:
+def effects_page() -> str:
     """Effects on the fish, then the sensors' errors."""
     count = f"{len(EFFECTS) - 1} effects on fish, water and actuators, {len(SENSOR_EFFECTS)} errors of sensors"
     links = ((f"[`{name}`](#{name})", cell(e.equation)) for name, e in every())
     body = [section(name, effect) for name, effect in every()]
     return "\n".join(
-        [HEADER, INTRODUCTION, f"{count}.\n", table(("name", "equation"), links), *body]
+        [HEADER, EFFECTS_PAGE, f"{count}.\n", table(("name", "equation"), links), *body]
     )
 
 
@@ -73,3 +74,36 @@ def parameter_table(parameters: Mapping[str, Any]) -> str:
     if len(rows) <= 8:
         return table(head, rows)
     return table(head, rows[:8]) + f"\nand {len(rows) - 8} more up to {rows[-1][0]}, alike.\n"
+
+
+ROBOT_FILE = """# The robot file
+
+`robot.yaml` holds a robot's parameters; a parameter that is left out keeps its nominal value. `identify` writes
+one with standard errors, `diagnose` writes `model.yaml` in the same format with the effects that it found. The installed
+file `fish_sim/config/robot.yaml` is the nominal fish. [The fish and its parameters](../explanation/the_fish.md) shows
+what each of them measures.
+
+```yaml
+format: 1
+parameters:
+  head_mass: {value: 0.465, unit: kg}
+```
+
+The values below are those of the default of three tail links. The order is that of the parameter vector in Python.
+"""
+
+
+def robot_page() -> str:
+    """The nominal parameters."""
+    rows = (
+        (
+            f"`{name}`",
+            number(p.value),
+            cell(p.unit or "1"),
+            bounds(p.lowest, p.highest),
+            cell(p.source),
+        )
+        for name, p in nominal_parameters().items()
+    )
+    head = ("parameter", "nominal", "unit", "range", "source")
+    return "\n".join([HEADER, ROBOT_FILE, table(head, rows)])
