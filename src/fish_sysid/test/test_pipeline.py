@@ -15,7 +15,7 @@ from fish_sim.effects import EFFECTS
 from fish_sim.effects.hull import QuadraticDrag
 from fish_sim.robot_file import load_robot, save_robot
 from fish_sysid.diagnosis import pipeline
-from fish_sysid.diagnosis.can_follow import missed_by
+from fish_sysid.diagnosis.can_follow import INTRINSIC, TOO_FAR, missed_by, missed_with
 from fish_sysid.diagnosis.conclusion import shares
 from fish_sysid.diagnosis.corrected_model import corrected
 from fish_sysid.diagnosis.diagnosis_json import answer
@@ -191,6 +191,16 @@ def test_where_the_model_cannot_follow_the_fish_no_name_is_searched_for(tmp_path
 
 def test_a_model_that_lacks_a_strong_current_can_follow_the_fish():
     task = make_task(swim(fish(current={"x": 0.06, "y": -0.05}), duration=7.0), GIVEN)
+    assert missed_by(task) is None
+
+
+def test_a_model_that_lacks_a_flow_which_varies_over_the_pool_can_follow_the_fish():
+    """A uniform flow alone leaves more than twice the camera's noise."""
+    swirl = {"shear_x": 0.4, "shear_y": -0.4}
+    quiet = Noise(gyro=0.003, accel=0.025, camera_position=0.0006, camera_heading=0.003)
+    data = swim(fish(nonuniform_current=swirl), duration=7.0, noise=quiet)
+    task = make_task(data, GIVEN)
+    assert missed_with([*INTRINSIC, "current"], GIVEN, task) > TOO_FAR
     assert missed_by(task) is None
 
 

@@ -19,21 +19,26 @@ from fish_sysid.estimation.parametrization import NOMINAL_FREE
 from fish_sysid.estimation.shooting.schedule import TOO_FAR, misfit
 from fish_sysid.estimation.shooting.selection import INTRINSIC
 
-FLOW = "current"  # the one effect of the pool that displaces a fish by more than the camera's noise in two seconds
+# effects of the pool that displace a fish by more than the camera's noise in two seconds, tried in turn
+OF_POOL = (("current",), ("current", "tether"), ("nonuniform_current",))
 
 
 def missed_by(task: Task) -> float | None:
     """By how many times the camera's noise the model misses two seconds of swimming; None where it can follow the fish.
 
-    Start states, clocks, parameters and the effects of body, actuators and water are free, all at once. Images are first moved
-    back by the age that camera and gyro show.
+    Start states, clocks, parameters and the effects of body, actuators and water are free, all at once; where a uniform flow is
+    not enough, a line that pulls, and then a flow that varies over the pool. Images are first moved back by the age that camera
+    and gyro show.
     """
     if not task.runs("can the model follow"):
         return None
-    own = known_effects(task.robot)
-    effects = [name for name in (*INTRINSIC, FLOW) if name in task.robot.table and name not in own]
-    left = missed_with(effects, task.robot, task)
-    return task.kept("can the model follow", None, left if left > TOO_FAR else None)
+    table, own, left = task.robot.table, known_effects(task.robot), 0.0
+    for pool in OF_POOL:
+        effects = [name for name in (*INTRINSIC, *pool) if name in table and name not in own]
+        left = missed_with(effects, task.robot, task)
+        if left <= TOO_FAR:
+            return None
+    return task.kept("can the model follow", None, left)
 
 
 def missed_with(effects: Iterable[str], robot: Robot, task: Task) -> float:
