@@ -35,6 +35,8 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--study", type=Path, default=NEWEST, help="default: %(default)s")
     parser.add_argument("--limit", type=int, default=60, help="scenarios (default: %(default)s)")
     parser.add_argument("--groups", nargs="+", choices=list(GROUPS), default=list(GROUPS))
+    only = "these alone, by the end of their names, such as scenario_0045"
+    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help=only)
     parser.add_argument("--jobs", type=int, default=1, help="processes (default: %(default)s)")
     parser.add_argument("--out", type=Path, required=True, help="folder of the new answers")
     return parser.parse_args()
@@ -45,6 +47,8 @@ def main() -> None:
     args, console, version = arguments(), terminal(), tool_digest()
     with user_errors(), opened_studies([args.study]) as studies:
         rows = [r for r in recorded_answers(studies) if r.scenario.group in args.groups]
+    if args.only:
+        rows = [r for r in rows if r.name.endswith(tuple(args.only))]
     chosen = rows[: args.limit]
     jobs = [
         Job(r.name, r.scenario, folder_of(args.out, r).resolve(), version=version) for r in chosen

@@ -114,18 +114,18 @@ def test_rudder_and_slip_of_a_curve_are_those_of_the_fish(throttle, rudder, stea
     )
 
 
-def test_the_water_filter_foretells_how_a_change_of_throttle_is_answered():
+def test_the_water_filter_predicts_how_a_change_of_throttle_is_answered():
     throttle = np.full((2800, 2), [0.2, 0.4])
     throttle[2000:] = [0.4, 0.0]  # faster; and gliding
     surge = simulated(np.stack([np.zeros_like(throttle), throttle], axis=-1))[..., 0]
     mean = np.array([np.convolve(column, np.ones(STROKE) / STROKE, "same") for column in surge.T]).T
     at = 2000 + np.arange(0, 700, 100)
     for k, (before, after) in enumerate([(0.2, 0.4), (0.4, 0.0)]):
-        water, foretold = WaterState(speed=mean[1950, k], throttle=before), []
+        water, predicted = WaterState(speed=mean[1950, k], throttle=before), []
         for period in range(2000, 2800):
-            foretold += [water.speed] if period in at else []
+            predicted += [water.speed] if period in at else []
             water = swim_in_water(water, Setpoint(0.0, after), DT, LIMITS)
-        np.testing.assert_allclose(foretold, mean[at, k], atol=0.017)
+        np.testing.assert_allclose(predicted, mean[at, k], atol=0.017)
 
 
 W = 2.0 * np.pi * STROKE_FREQUENCY

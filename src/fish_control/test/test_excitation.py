@@ -372,7 +372,7 @@ def test_a_path_that_ends_beside_a_wall_is_passed_as_the_fish_stops_on_the_other
 
 
 def test_a_fish_stops_to_the_side_with_more_room():
-    assert stopping_side(2.0, 0.0, 1.57) == 1.0  # towards +y beside the wall at +x: left
+    assert stopping_side(2.0, 0.0, 1.57) == 1.0  # towards +y, along the wall at +x: left
     assert stopping_side(-2.0, 0.0, 1.57) == -1.0
     assert (
         stopping_side(-0.7, -0.7, -1.97) == -1.0

@@ -90,7 +90,7 @@ def parameter_docs(config: Any) -> dict[str, ParameterDoc]:
 
 
 def field_comments(kind: type[Any]) -> dict[str, str]:
-    """Field name -> the comment beside its definition, of a dataclass and its bases; empty where no source is at hand."""
+    """Field name -> the comment on its line, of a dataclass and its bases; empty where no source is at hand."""
     found: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         if dataclasses.is_dataclass(base):

@@ -52,7 +52,7 @@ def writable_file(file: Path) -> Path:
 
 
 def partial_file(file: Path) -> Path:
-    """Beside it, what was finished when the work was interrupted: a whole result of before stays."""
+    """The file for what was finished when the work was interrupted; an earlier whole result stays."""
     return file.with_stem(f"{file.stem}_partial")
 
 

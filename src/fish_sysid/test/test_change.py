@@ -530,7 +530,7 @@ def test_without_a_gyro_there_is_no_answer(stepped_days) -> None:
 
 
 def test_the_gyro_has_a_second_opinion_on_timing_alone() -> None:
-    """The mean motion says placement, the gyro lag; a flow beside it is none of the gyro's business."""
+    """The mean motion says placement, the gyro lag. The gyro says nothing of a flow."""
     by_motion = _named("rudder_placement", rudder_placement=0.7, rudder_delay=0.3)
     flow = _named("current", current=1.0)
     by_gyro = RudderChange(0.03, _named("rudder_lag", rudder_lag=0.9, rudder_delay=0.1))

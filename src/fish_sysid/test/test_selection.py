@@ -390,6 +390,12 @@ def test_the_level_is_checked_and_falls_with_the_false_alarms():
     assert Level().needed(1e6, 1, 30) == 1000.0  # a thousandth of a nat per measurement
 
 
+def test_a_law_that_is_not_true_reaches_what_is_needed_as_seldom_as_the_level_says():
+    """Markov's bound on the tempered likelihood ratio, times the tests; and half of a name's gain at least."""
+    assert 30 * np.exp(-Level(0.01).needed_unseen(0.0, 30) / TEMPER) == pytest.approx(0.01)
+    assert Level(0.01).needed_unseen(1e9, 30) == pytest.approx(0.5 * Level(0.01).needed(1e9, 1, 30))
+
+
 def test_p_values_are_of_the_tempered_ratio_times_the_names_tried():
     assert p_value(5.0 * TEMPER, 2, 3) == pytest.approx(3.0 * np.exp(-5.0))
     assert p_value(-1.0, 1, 1) == 1.0
