@@ -16,6 +16,7 @@ from fish_report.files import number
 from fish_report.page import Table
 from fish_study.scenario import Scenario
 from fish_study.scenario_groups import GROUPS
+from fish_study.score import Score, score_scenario, true_names
 from fish_study.share import Share
 from fish_study.study import Study
 
@@ -45,6 +46,20 @@ class Comparison:
         return verdict(self.recorded.result) == verdict(self.result)
 
     @property
+    def right(self) -> tuple[bool, bool]:
+        """Whether the recorded answer is right, and this one."""
+        scenario, results = self.recorded.scenario, (self.recorded.result, self.result)
+        truth = true_names(scenario)
+        before, now = (is_right(score_scenario(scenario, result, truth)) for result in results)
+        return before, now
+
+    @property
+    def error_ratio(self) -> float:
+        """Position error 2 s ahead on held-out trials, of this answer's model over the recorded one's."""
+        before, now = (position_error(result) for result in (self.recorded.result, self.result))
+        return now / before
+
+    @property
     def same_names(self) -> bool:
         """The same effects, in whatever order."""
         return set(effects(self.recorded.result)) == set(effects(self.result))
@@ -71,6 +86,58 @@ def effects(result: Answer) -> dict[str, dict[str, Any]]:
     """Name -> parameters of the effects of an answer."""
     found = result["diagnosis"]["effects"] if result["diagnosis"] else []
     return {effect["name"]: effect["parameters"] for effect in found}
+
+
+def is_right(score: Score) -> bool:
+    """All hidden names and no other; `unexplained` where something without a name is hidden; no alarm where nothing is."""
+    if score.unnamed:
+        return score.verdict == "unexplained"
+    return score.exact if score.truth else score.has_answer and not score.alarm
+
+
+def position_error(result: Answer) -> float:
+    """m, of the answer's model.yaml 2 s ahead on held-out trials; NaN without an answer."""
+    fit = result["diagnosis"]["fit"] if result["diagnosis"] else {"model_yaml": {"rms": {}}}
+    return number(fit["model_yaml"]["rms"].get("2 s", {}).get("position_m"))
+
+
+def changed_by(result: Answer, stage: str) -> bool:
+    """Whether a stage changed the search of an answer."""
+    return bool(result["diagnosis"]) and stage in result["diagnosis"].get("stages", ())
+
+
+def lost(compared: Sequence[Comparison]) -> int:
+    """Right answers of the record that are wrong now, less wrong ones that are right now."""
+    return sum(before - now for before, now in (c.right for c in compared))
+
+
+def stage_table(stage: str, changed: int, compared: Sequence[Comparison]) -> Table:
+    """What the answers are worth without one stage, in scenarios whose search it changed."""
+    right = [c.right for c in compared]
+    ratios = [c.error_ratio for c in compared if np.isfinite(c.error_ratio)]
+    seconds = [[float(r["seconds"]) for r in (c.recorded.result, c.result)] for c in compared]
+    row = [
+        stage,
+        str(changed),
+        str(len(compared)),
+        str(sum(before for before, _ in right)),
+        str(sum(now for _, now in right)),
+        str(sum(not (c.same_names and c.same_verdict) for c in compared)),
+        ", ".join(f"{q:.2f}" for q in np.quantile(ratios, (0.5, 1.0))) if ratios else "–",
+        ", ".join(f"{s:.0f}" for s in np.median(seconds, axis=0)) if seconds else "–",
+    ]
+    header = ["stage left out", "searches that it changed", "run without it", "right with it"]
+    note = (
+        "Right: all hidden names and no other; `unexplained` where something without a name is hidden; no alarm where nothing "
+        "is. Error: of model.yaml's position 2 s ahead on held-out trials, without the stage over with it, median and largest. "
+        "Seconds: medians, which may be of other computers."
+    )
+    return Table(
+        "One stage left out",
+        [*header, "right without it", "other answers", "error", "s, with; without"],
+        [row],
+        note,
+    )
 
 
 def recorded_answers(studies: Sequence[Study]) -> list[Recorded]:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, replace
 from math import log
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,7 +53,15 @@ from fish_study.prove_page import (
     tables,
     write_prove_page,
 )
-from fish_study.recorded_comparison import Comparison, comparison_tables, recorded_answers
+from fish_study.recorded_comparison import (
+    Comparison,
+    Recorded,
+    changed_by,
+    comparison_tables,
+    lost,
+    recorded_answers,
+    stage_table,
+)
 from fish_study.results_page import generated_part, results_text, write_generated_part
 from fish_study.scenario import Scenario, ScenarioError
 from fish_study.scenario_groups import GROUPS, PAIRS_OF_DAYS, draw_scenarios
@@ -438,6 +447,47 @@ def test_a_parameter_is_compared_in_recorded_standard_errors(parts: list[Study])
     compared = Comparison(one, {**one.result, "diagnosis": diagnosis})
     assert compared.largest_difference == pytest.approx(2.5)
     assert comparison_tables([compared])[0].rows[-1][2:5] == ["1/1", "1/1", "0/1"]
+
+
+def again(hidden: tuple[str, ...], before: str, now: str, error: float = 1.0) -> Comparison:
+    """A scenario whose recorded and new answers are one name or a verdict; the new model's error is `error` times as large."""
+
+    def result(answer: str, position: float) -> dict[str, Any]:
+        names = () if answer in ("no_mismatch", "unexplained") else ((answer, "physics", 0.99),)
+        made = diagnosis(*names, verdict="missing_physics" if names else answer)
+        rms = {"2 s": {"position_m": position}}
+        made["diagnosis"]["fit"]["model_yaml"] = {"rms": rms}
+        return {**made, "tool": "v"}
+
+    scenario = Scenario("single", 1, {name: {"x": 0.03} for name in hidden})
+    recorded = Recorded("01_scenario_0000", scenario, result(before, 0.01))
+    return Comparison(recorded, result(now, 0.01 * error))
+
+
+def test_a_stage_is_worth_the_right_answers_that_are_lost_without_it() -> None:
+    one, nothing, unnamed = ("current",), (), ("jet",)
+    compared = [
+        again(one, "current", "tether"),  # lost
+        again(one, "current", "unexplained", 3.0),  # lost
+        again(one, "tether", "current"),  # won
+        again(nothing, "no_mismatch", "tether"),  # lost
+        again(unnamed, "unexplained", "no_mismatch"),  # lost
+        again(unnamed, "tether", "unexplained"),  # won
+        again(one, "current", "current", 0.5),
+    ]
+    assert [c.right for c in compared[:3]] == [(True, False), (True, False), (False, True)]
+    assert lost(compared) == 2
+    (row,) = stage_table("anneal", 9, compared).rows
+    assert row == ["anneal", "9", "7", "5", "3", "6", "1.00, 3.00", "60, 60"]
+
+
+def test_a_search_is_changed_by_the_stages_that_its_answer_has() -> None:
+    result = diagnosis(verdict="no_mismatch")
+    assert not changed_by(result, "anneal")  # of a tool that does not say
+    result["diagnosis"]["stages"] = ["anneal"]
+    assert changed_by(result, "anneal")
+    assert not changed_by(result, "model order")
+    assert not changed_by({"diagnosis": None}, "anneal")
 
 
 def found(gain: float) -> OracleResult:
