@@ -6,8 +6,9 @@
 
 The recordings are diagnosed as they are, then with one exact change at a time: a rudder that goes less or farther, whose zero is
 off or that is late, and water that moves. What is named with a change and not without it, or with other values, is the answer
-to the change. A line per diagnosis: verdict, names with their values, what ties with them. DIR keeps every diagnosis, so that a
-run that was stopped goes on.
+to the change. Two lines per diagnosis: verdict, names with their values and what ties with them, what the symmetry tests found;
+how far model.yaml and the refitted nominal model are off after 1 s on held-out runs. DIR keeps every diagnosis, so that a run
+that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ CHANGES: dict[str, tuple[str, dict[str, float]]] = {
     "gain 1.4": ("rudder_gain", {"factor": 1.4}),
     "zero +0.15": ("rudder_offset", {"offset": 0.15}),
     "zero -0.15": ("rudder_offset", {"offset": -0.15}),
+    "zero +0.06": ("rudder_offset", {"offset": 0.06}),
     "late by 0.25 s": ("rudder_delay", {"delay": 0.25}),
     "water": ("current", {"x": 0.03, "y": -0.02}),
 }
@@ -53,13 +55,23 @@ def main() -> None:
         content = json.loads(kept.read_text())
         named = "; ".join(_named(effect) for effect in content["effects"]) or "no name"
         seconds = time.process_time() - begin
-        print(f"{label:15} {content['verdict']}: {named} ({seconds:.0f} s of one core)", flush=True)
+        print(f"{label:15} {content['verdict']}: {named} ({seconds:.0f} s of one core)")
+        print(f"{'':15} {_found(content)}; {_errors(content['fit'])}", flush=True)
 
 
 def _named(effect: dict) -> str:  # type: ignore[type-arg]
     values = ", ".join(f"{p['value']:.3g}" for p in effect["parameters"].values())
     ties = "".join(f" or {rival['name']}" for rival in effect["rivals"])
     return f"{effect['name']} {values}{ties} [{effect['evidence']['basis']}]"
+
+
+def _found(content: dict) -> str:  # type: ignore[type-arg]
+    return "; ".join(f["statement"] for f in content["symmetry"] if f["statement"]) or "no symmetry"
+
+
+def _errors(fit: dict) -> str:  # type: ignore[type-arg]
+    one, other = (1e3 * fit[m]["rms"]["1 s"]["position_m"] for m in ("model_yaml", "refitted"))
+    return f"model.yaml {one:.0f} mm, refitted nominal model {other:.0f} mm after 1 s"
 
 
 if __name__ == "__main__":

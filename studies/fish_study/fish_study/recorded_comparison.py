@@ -97,8 +97,11 @@ def is_right(score: Score) -> bool:
 
 def position_error(result: Answer) -> float:
     """m, of the answer's model.yaml 2 s ahead on held-out trials; NaN without an answer."""
-    fit = result["diagnosis"]["fit"] if result["diagnosis"] else {"model_yaml": {"rms": {}}}
-    return number(fit["model_yaml"]["rms"].get("2 s", {}).get("position_m"))
+    if not result["diagnosis"]:
+        return np.nan
+    fit = result["diagnosis"]["fit"]
+    model = fit["model_yaml"] or fit[fit["written"]]  # null where it is one of the fits
+    return number(model["rms"].get("2 s", {}).get("position_m"))
 
 
 def changed_by(result: Answer, stage: str) -> bool:

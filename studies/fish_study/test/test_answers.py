@@ -455,8 +455,9 @@ def again(hidden: tuple[str, ...], before: str, now: str, error: float = 1.0) ->
     def result(answer: str, position: float) -> dict[str, Any]:
         names = () if answer in ("no_mismatch", "unexplained") else ((answer, "physics", 0.99),)
         made = diagnosis(*names, verdict="missing_physics" if names else answer)
-        rms = {"2 s": {"position_m": position}}
-        made["diagnosis"]["fit"]["model_yaml"] = {"rms": rms}
+        rms = {"rms": {"2 s": {"position_m": position}}}
+        written = {"written": "with_effects", "with_effects": rms, "model_yaml": None}
+        made["diagnosis"]["fit"] = written if names else {"written": "", "model_yaml": rms}
         return {**made, "tool": "v"}
 
     scenario = Scenario("single", 1, {name: {"x": 0.03} for name in hidden})
