@@ -26,7 +26,6 @@ from fish_sysid.diagnosis.pipeline import fit_nominal
 from fish_sysid.diagnosis.residual_regression import Law
 from fish_sysid.diagnosis.result import Accepted, Round, Screened
 from fish_sysid.diagnosis.selection_round import (
-    refit_look_alike,
     restart_base,
     screen_and_refit,
     shortlist,
@@ -102,14 +101,11 @@ def test_what_gains_far_less_than_it_needs_or_no_more_than_chance_is_not_refitte
     assert worth_a_refit(wave, 30.0, task)
 
 
-def test_a_round_knows_its_best_and_what_comes_near():
+def test_a_round_knows_its_best():
     fits = {"current": made_fit(150.0, "current"), "tether": made_fit(145.0, "tether")}
     found = Round(made_fit(100.0), (), fits)
     assert found.best == "current"
     assert found.gain("tether") == 45.0
-    assert found.near_best("tether", 10.0)
-    assert not found.near_best("tether", 3.0)
-    assert not found.near_best("payload", 10.0)
     assert Round(made_fit(0.0), (), {}).best is None
 
 
@@ -125,24 +121,6 @@ def test_a_gain_is_significant_only_with_a_strength_that_is():
     assert significant(found, 30, Level()) == ["rudder_offset"]
     nothing = Round(made_fit(100.0), (), {"gyro_scale": fits["gyro_scale"]})
     assert choose(nothing, make_task(swim(GIVEN, duration=1.0), GIVEN)) is None
-
-
-def test_a_look_alike_is_refitted_from_the_optimum_of_the_best():
-    """The tip slides; wake_memory with a share of 0 is the same, with two parameters more."""
-    data = swim(fish(tip_slip={"mobility": 1.0 / 6.0}), kinds=("sines", "steps"), duration=8.0)
-    hypothesis = nominal_hypothesis(GIVEN, ("head_drag_surge", "head_drag_sway", "tail_stiffness"))
-    task = make_task(data, GIVEN)
-    experiment = task.trials.searched
-    base = evaluate(hypothesis, np.log([1.3, 0.8, 1.1]), experiment, Noise())
-    wake = hypothesis.with_effect("wake_memory")
-    start = np.array([*base.theta, 1.0, 0.0, 0.0])
-    best = refit(wake, start, experiment, Noise(), REFIT)
-    slip = refit_look_alike(best, base, "tip_slip", 20.0, task)
-    assert slip is not None
-    assert slip.log_posterior > best.log_posterior - 10.0
-    assert slip.values["tip_slip.mobility"] == pytest.approx(1.0 / 6.0, rel=0.1)
-    assert refit_look_alike(best, base, "tail_joint_damping", 20.0, task) is None
-    assert probabilities({"slip": slip, "wake": best})["slip"] > 0.6
 
 
 def test_a_base_at_its_best_optimum_stays_when_restarted_from_a_rival():

@@ -44,11 +44,6 @@ class Round:
         """Name of the best refitted candidate by evidence."""
         return max(self.refitted, key=lambda name: evidence(self.refitted[name]), default=None)
 
-    def near_best(self, name: str, needed: float) -> bool:
-        """Whether a candidate was refitted and comes within `needed` nats of the best."""
-        best = max(fit.log_posterior for fit in self.refitted.values())
-        return name in self.refitted and best - self.refitted[name].log_posterior < needed
-
     def gain(self, name: str) -> float:
         """Nats over the base, both with their own noise."""
         return self.refitted[name].log_posterior - self.base.log_posterior

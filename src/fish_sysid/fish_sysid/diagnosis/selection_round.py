@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""One round of the forward selection: screen all candidates, refit the best, their look-alikes, and the base itself.
+"""One round of the forward selection: screen all candidates, refit the best and the base itself.
 
 Every hypothesis refits all nominal parameters: an effect counts only for what they cannot absorb.
 """
@@ -12,10 +12,10 @@ from dataclasses import replace
 
 from fish_report.parallel import on_all_cores
 from fish_sysid.diagnosis.result import Round, Screened
-from fish_sysid.diagnosis.screening import best_start, screen
+from fish_sysid.diagnosis.screening import screen
 from fish_sysid.diagnosis.significance import look_alike
 from fish_sysid.diagnosis.task import Task, Trials
-from fish_sysid.estimation.map_fit import Fit, better, climb, evaluate, log_posterior
+from fish_sysid.estimation.map_fit import Fit, evaluate, log_posterior
 from fish_sysid.estimation.noise_estimation import estimate_noise, usual_noise
 from fish_sysid.estimation.refit import (
     ANNEAL_SHORT_HELD,
@@ -30,7 +30,6 @@ from fish_sysid.estimation.thresholds import (
     MOST_RESTARTS,
     POOR_BASE,
     RATIO_REJECT,
-    SCREENING_ITERATIONS,
     SHORTLIST,
     WORTH_A_REFIT,
 )
@@ -59,7 +58,7 @@ def run_round(base: Fit, task: Task) -> Round:
 
 
 def screen_and_refit(base: Fit, needed: Mapping[str, float], task: Task) -> Round:
-    """Screen all names on top of the base and refit the shortlist and the look-alikes of its best.
+    """Screen all names on top of the base and refit the shortlist.
 
     needed: nats that each name must gain. A base that needs more process noise than any pool is screened by annealing first, and
     locally where that finds nothing.
@@ -83,10 +82,7 @@ def screen_and_refit(base: Fit, needed: Mapping[str, float], task: Task) -> Roun
         found = Round(base, ranking, dict(zip((one.name for one in chosen), fits, strict=True)))
         if found.best is not None and found.gain(found.best) >= min(needed.values()):
             break
-    if not task.runs("look-alike refits"):
-        return found
-    compared = with_look_alikes(found, tuple(needed), min(needed.values()), task)
-    return task.kept("look-alike refits", found, compared)
+    return found
 
 
 def shortlist(ranking: Sequence[Screened], task: Task, annealed: bool) -> list[Screened]:
@@ -128,35 +124,6 @@ def refit_annealed(base: Fit, one: Screened, task: Task) -> Fit:
     noise = usual_noise(task.trials.short)
     fit = refit(hypothesis, theta, experiment, noise, ANNEAL_SHORT_HELD)
     return refit(hypothesis, fit.theta, experiment, fit.noise)
-
-
-def with_look_alikes(found: Round, names: Sequence[str], margin: float, task: Task) -> Round:
-    """The round with every look-alike of the best that is `margin` nats behind it refitted from the best's optimum."""
-    for name in names:
-        best = found.best
-        if best is None or name == best or not look_alike(name, best):
-            continue
-        if found.near_best(name, margin):
-            continue
-        task.progress(f"refitting {name} from the optimum of {best}")
-        fit = refit_look_alike(found.refitted[best], found.base, name, margin, task)
-        if fit is not None:
-            kept = better(fit, found.refitted.get(name, fit))
-            found = replace(found, refitted={**found.refitted, name: kept})
-    return found
-
-
-def refit_look_alike(best: Fit, base: Fit, name: str, margin: float, task: Task) -> Fit | None:
-    """A rival from the nominal parameters and the noise of the best; None where it stays behind on shortened trials."""
-    experiment, hypothesis = task.trials.searched, base.hypothesis.with_effect(name)
-    short = task.trials.short
-    moved = replace(base, theta=best.theta[: len(base.theta)])
-    theta = best_start(hypothesis, [moved], name, short, best.noise)
-    near = climb(evaluate(hypothesis, theta, short, best.noise), short, SCREENING_ITERATIONS)
-    ahead = log_posterior(best.hypothesis, best.theta, short, best.noise)
-    if not near.log_posterior > ahead - margin:
-        return None
-    return refit(hypothesis, near.theta, experiment, best.noise, REFIT)
 
 
 def restart_base(base: Fit, rival: Fit, trials: Trials) -> Fit:

@@ -86,7 +86,6 @@ STAGES = (
     ("can the model follow", "no search by likelihood where the model cannot follow the fish"),
     ("annealed screening", "candidates annealed from the nominal values where the base is far off"),
     ("nominal start", "candidates screened from the nominal values as well as from the base"),
-    ("look-alike refits", "look-alikes of the best candidate refitted from its optimum"),
     ("base restart", "the base refitted from the best candidate's optimum, and screened again"),
     ("anneal", "a fit that needs more process noise than water annealed"),
     ("check on unseen trials", "a candidate must predict trials that the search has not used"),
