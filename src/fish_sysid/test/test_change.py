@@ -13,6 +13,7 @@ from swims import World, kinematic_swims
 
 from fish_sim.model import DT
 from fish_sim.robot import Robot
+from fish_sysid.dataset.camera import fine_delay
 from fish_sysid.dataset.experiment import Experiment, Frames, joined
 from fish_sysid.dataset.synthetic import INJECTIONS, with_injection
 from fish_sysid.diagnosis.change import comparable
@@ -219,7 +220,7 @@ def test_a_change_that_old_makes_from_day_to_day_is_none(days) -> None:
     assert single_days([0, 0, 0, 1], 3) == []
 
 
-@pytest.mark.parametrize(("before", "after"), [(0.0, 0.5), (0.5, 0.0)])
+@pytest.mark.parametrize(("before", "after"), [(0.0, 0.5), (0.5, 0.0), (0.015, 0.5)])
 def test_images_much_older_in_one_day_are_said_before_anything_else(days, before, after) -> None:
     old, new = (
         with_injection(e, "camera_latency", {"delay": age})
@@ -236,7 +237,9 @@ def test_images_much_older_in_one_day_are_said_before_anything_else(days, before
         after, abs=0.02
     )
     assert "as well as NEW: images" not in sentence(change)
-    assert ("OLD had: images are 0.50 s older" in sentence(change)) == (before > 0.0)
+    assert ("OLD had: images are 0.50 s older" in sentence(change)) == (before == 0.5)
+    # what is compared from then on is equally old in both: also where OLD's age is too small to be moved back
+    assert fine_delay(change.new)[0] == pytest.approx(fine_delay(change.old)[0], abs=0.003)
 
 
 def test_without_a_change_of_the_images_age_the_regression_looks_for_one(days) -> None:

@@ -20,7 +20,7 @@ from fish_sysid.diagnosis.change.change_json import answer
 from fish_sysid.diagnosis.change.channels import swims
 from fish_sysid.diagnosis.change.compare import LOOKS
 from fish_sysid.diagnosis.change.contenders import Case, Contender, family_alone, weighed
-from fish_sysid.diagnosis.change.explanation import explained, swapped_in, telling
+from fish_sysid.diagnosis.change.explanation import exact_age, explained, swapped_in, telling
 from fish_sysid.diagnosis.change.naming import Judged
 from fish_sysid.diagnosis.change.permutation_test import (
     largest,
@@ -217,6 +217,20 @@ def test_the_strokes_name_what_the_mean_motion_does_not_show(days, looks_at) -> 
     assert max(found.values(), key=lambda one: one.gain).name == "imu_misalignment"
     assert telling(flow, swapped_in(flow, ()), ())[0] is flow[0]
     assert case in turned
+
+
+def test_the_age_of_images_is_that_of_new_less_that_of_old(days) -> None:
+    old, new = (
+        with_injection(day, "camera_latency", {"delay": age})
+        for day, age in zip(days, (0.025, 0.125), strict=True)
+    )
+    found = Refitted({"delay": Estimate(0.11, 0.03, "s")}, "", np.ones(NEW))
+    named = Named((Member("camera_latency", 1.0, 1.0, 0.5, found),), "", 1.0, 0.1)
+    age, said = exact_age(old, new, named)
+    assert age == pytest.approx(0.1, abs=0.003)
+    assert said.members[0].refitted.parameters["delay"].value == age
+    unknown = replace(old, gyro=np.full_like(old.gyro, np.nan))
+    assert exact_age(unknown, new, named) == (0.11, named)
 
 
 def test_so_little_of_an_effect_is_not_said(days, looks_at) -> None:

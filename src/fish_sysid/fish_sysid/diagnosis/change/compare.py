@@ -88,7 +88,8 @@ def _compare(
     symmetry = symmetry_findings(old, robot)
     age = age_change(old, new)
     age = age if age is not None and age.p_value <= LEVEL else None
-    old, new = moved_back(old, delay), moved_back(new, delay if age is None else age.of_new)
+    later = 0.0 if age is None else age.later
+    old, new = moved_back(old, delay), moved_back(new, delay + later)
     old_days, told = screened(old, "OLD")
     new_days, more = screened(new, "NEW")
     check_counts(old_days, new_days, (*told, *more))
@@ -108,11 +109,7 @@ def _compare(
         for case in looks.values()
         for trial in far_out(case.fit.names, case.fit.rest, case.fit.old)
     }
-    told += [
-        f"OLD {s}: out of the other trials' family; {LESS}"
-        for s in strange
-        if s not in " ".join(told)
-    ]
+    told += [f"OLD {s}: out of the other trials' family; {LESS}" for s in strange]
     report("exchanging trials")
     tests = {name: swap_test(case.fit, strata, days=day_of) for name, case in looks.items()}
     seen = min(tests, key=lambda name: tests[name].p_value)

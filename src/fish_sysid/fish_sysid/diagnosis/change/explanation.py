@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from fish_sysid.dataset.camera import fine_delay, moved_back
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.candidates import (
@@ -55,7 +57,7 @@ def explained(change: Change, looks: Sequence[Case], seen: Sequence[Swapped]) ->
             break
         numbers = one.members[0].refitted.parameters
         if numbers and one.name == "camera_latency":
-            age, one = exact_age(case.new, one)
+            age, one = exact_age(change.old, case.new, one)
             looks = [with_new(case, moved_back(case.new, age)) for case in looks]
             steps.append(_Step(one, None))
         elif numbers and by_old_trials(key):
@@ -150,14 +152,15 @@ def merged(named: Sequence[Named], one: Named) -> list[Named]:
     return [*named, one]
 
 
-def exact_age(new: Experiment, one: Named) -> tuple[float, Named]:
+def exact_age(old: Experiment | None, new: Experiment, one: Named) -> tuple[float, Named]:
     """How much older NEW's images are than OLD's, by camera and gyro, and the change with that number."""
     first = one.members[0]
-    value, std = fine_delay(new)
-    if not value > 0.0:
+    (before, error), (after, own) = (0.0, 0.0) if old is None else fine_delay(old), fine_delay(new)
+    if not (np.isfinite(before) and after > 0.0):
         return first.refitted.parameters["delay"].value, one
-    values = replace(first.refitted, parameters={"delay": Estimate(value, std, "s")})
-    return value, replace(one, members=(replace(first, refitted=values), *one.members[1:]))
+    age = Estimate(after - before, float(np.hypot(error, own)), "s")
+    values = replace(first.refitted, parameters={"delay": age})
+    return age.value, replace(one, members=(replace(first, refitted=values), *one.members[1:]))
 
 
 def with_its_commands(

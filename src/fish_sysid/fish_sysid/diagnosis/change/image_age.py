@@ -35,7 +35,7 @@ class AgeChange:
 
     p_value: float
     named: Named
-    of_new: float  # s, how much older than their stamps NEW's images are
+    later: float  # s, how much older NEW's images are than OLD's
 
 
 def age_change(old: Experiment, new: Experiment) -> AgeChange | None:
@@ -55,7 +55,8 @@ def age_change(old: Experiment, new: Experiment) -> AgeChange | None:
     member = Member(
         NAME, 1.0, float(gains.mean()), float("nan"), Refitted({"delay": change}, "", gains)
     )
-    return AgeChange(p_value, Named((member,), family_of(NAME), *mean_gain(gains)), of_new)
+    named = Named((member,), family_of(NAME), *mean_gain(gains))
+    return AgeChange(p_value, named, of_new - before)
 
 
 def _ages(squares: Array) -> Array:
