@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,9 +17,10 @@ from fish_report.errors import UserError
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, shorten
 from fish_sysid.dataset.synthetic import program, record
-from fish_sysid.diagnosis.corrected_model import predicts_worse
+from fish_sysid.diagnosis.corrected_model import corrected, predicts_worse
 from fish_sysid.diagnosis.model_order import with_links
 from fish_sysid.diagnosis.prediction_rivals import with_rivals
+from fish_sysid.diagnosis.result import Diagnosis
 from fish_sysid.diagnosis.surrogate_model import moving_effects, surrogate_model
 from fish_sysid.estimation.ekf_types import Noise
 from fish_sysid.estimation.map_fit import Fit, better, evaluate, likelihoods
@@ -374,6 +376,20 @@ def test_the_model_with_the_larger_errors_is_the_worse_one(swum: Experiment) -> 
     right, wrong = fit_of(TRUTH, swum), fit_of(slow, swum)
     assert predicts_worse(wrong, right, swum)
     assert not predicts_worse(right, wrong, swum)
+
+
+def test_steps_that_are_each_as_good_do_not_add_up_to_a_worse_model(swum: Experiment) -> None:
+    """What is written is compared with the refitted nominal model too, not only with what stands between them."""
+    drag = TRUTH.parameters["head_drag_surge"]
+    nominal, settled, surrogate = (
+        fit_of(TRUTH.with_parameters(head_drag_surge=factor * drag), swum)
+        for factor in (2.0, 2.04, 2.08)
+    )
+    assert not predicts_worse(settled, nominal, swum)
+    assert not predicts_worse(surrogate, settled, swum)
+    assert predicts_worse(surrogate, nominal, swum)
+    found = SimpleNamespace(nominal=nominal, settled=settled, surrogate=surrogate, unseen=swum)
+    assert corrected(cast(Diagnosis, found)) is settled
 
 
 def test_what_cannot_be_compared_is_not_worse(swum: Experiment) -> None:

@@ -100,7 +100,8 @@ def corrected(d: Diagnosis) -> Fit:
         fit = d.surrogate
     else:
         fit = d.final if named(d) else base
-    return base if predicts_worse(fit, base, d.unseen) else fit
+    others = [base] if base is d.nominal else [base, d.nominal]
+    return base if any(predicts_worse(fit, other, d.unseen) for other in others) else fit
 
 
 def predicts_worse(fit: Fit, nominal: Fit, unseen: Experiment) -> bool:
