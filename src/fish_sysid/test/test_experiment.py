@@ -275,6 +275,37 @@ def test_a_set_without_a_usable_trial_says_why(tmp_path):
         read_experiment(tmp_path)
 
 
+def _in_another_frame(i, t, m):
+    m.header = build.header(samples.ns(0.01 * i), "world")
+    return t, m
+
+
+def _of_no_number(i, t, m):
+    m.pose.pose.position.x = np.nan
+    return t, m
+
+
+def _of_another_type(i, t, m):
+    return t, build.number(1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (_in_another_frame, "in frame 'world', expected 'pool'"),
+        (_of_no_number, "carry NaN, infinity or lack a value"),
+        (_of_another_type, "of type std_msgs/msg/Float64, expected geometry_msgs"),
+    ],
+)
+def test_poses_that_came_and_are_not_used_are_said(tmp_path, change, text):
+    messages = samples.changed(samples.robot_messages(), "/fish/camera/pose", change)
+    samples.write_mcap(tmp_path / "a", messages)
+    with pytest.raises(
+        UserError, match=f"at least three poses are needed; /fish/camera/pose: .*{text}"
+    ):
+        read_experiment(tmp_path)
+
+
 def test_trials_of_one_name_are_told_apart_by_their_folders(tmp_path):
     for place in ("may/swims/a", "june/swims/a", "june/swims/b"):
         samples.robot_recording(tmp_path / place)

@@ -18,6 +18,7 @@ from fish_report.errors import UserError, user_errors
 from fish_sysid.dataset.experiment import Experiment, ExperimentError, build_experiment
 
 DROPPED = ("unreadable", "wrong_frame")  # errors of samples that are not used
+UNUSED = (*DROPPED, "wrong_type", "nan", "not_measured")  # why samples that came are not used
 USED = "used as it is, which no fit can mend"
 ONCE = "each is used once"
 LESS = "what is far from the others in it is used with less weight"
@@ -125,6 +126,16 @@ def _errors(trial: Trial) -> list[Problem]:
     return [p for p in _of_use(trial) if p.severity == "error" and p.kind not in DROPPED]
 
 
+def _unused(trial: Trial) -> list[str]:
+    """Why samples of a trial are not used, which may be why it is left out."""
+    topics = {problem.topic for problem in _of_use(trial)}
+    return [
+        f"{problem.topic}: {problem.text}"
+        for problem in trial.problems
+        if problem.kind in UNUSED and (problem.topic in topics or problem.kind == "wrong_type")
+    ]
+
+
 def _faults(trial: Trial) -> dict[str, str]:
     """Kind of each such error -> where and what it is."""
     return {p.kind: f"{trial.name} {p.topic}: {p.text}" for p in _errors(trial)}
@@ -152,7 +163,9 @@ def _usable(paths: Sequence[Path], topics: TopicMap | None) -> tuple[list[Trial]
         try:
             build_experiment([trial])
         except ExperimentError as error:
-            left_out.append("; ".join([str(error), *(p.text for p in _errors(trial))]))
+            left_out.append(
+                "; ".join([str(error), *(p.text for p in _errors(trial)), *_unused(trial)])
+            )
         else:
             trials.append(trial)
             left_out += [*repeated(trial), *unusable(trial)]
