@@ -31,6 +31,7 @@ from fish_sim.model import DT
 Array = NDArray[np.float64]
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])  # quaternion x, y, z, w of no turn
+SHORTEST = 0.5  # length of a quaternion that says how the IMU is turned; 1 is right
 DEGREE = 5
 GAP = 2.5  # periods between two samples that no spline bridges
 CLOSE = 0.3  # periods; across samples so close together, noise would throw a curve far off
@@ -46,7 +47,7 @@ GLIDES = 0.02
 
 def level(imu: Imu) -> tuple[Array, Array]:
     """Yaw rate (N,) [rad/s] about the vertical and specific force (N, 2) [m/s^2] level forward and left."""
-    given = np.isfinite(imu.orientation).all(axis=1)
+    given = _oriented(imu)
     R = rotation(np.where(given[:, None], imu.orientation, LEVEL))
     rate, force = np.einsum("nj,nj->n", R[:, 2], imu.gyro), np.einsum("nij,nj->ni", R, imu.accel)
     psi = np.arctan2(R[:, 1, 0], R[:, 0, 0])
@@ -57,10 +58,15 @@ def level(imu: Imu) -> tuple[Array, Array]:
 
 def heading(imu: Imu) -> tuple[Array, Array]:
     """(stamps (Q,) [s], headings (Q,) [rad]) of the readings with an orientation, unwrapped, an unknown constant added."""
-    given = np.isfinite(imu.orientation).all(axis=1)
-    given &= np.linalg.norm(np.nan_to_num(imu.orientation), axis=1) > 0.5
+    given = _oriented(imu)
     R = rotation(imu.orientation[given])
     return imu.t[given], np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0]))
+
+
+def _oriented(imu: Imu) -> NDArray[np.bool_]:
+    """Which readings (N,) have an orientation: finite, and of a length that is no rounding of 0."""
+    length = np.linalg.norm(imu.orientation, axis=1)
+    return np.asarray(np.isfinite(length) & (length > SHORTEST))
 
 
 def rotation(quaternion: Array) -> Array:
