@@ -11,7 +11,7 @@ from made_fits import made_fit
 
 from fish_sim.effects import EFFECTS
 from fish_sysid.diagnosis.corrected_model import much_is_left, named, unexplained_share, verdict
-from fish_sysid.diagnosis.diagnosis_json import law, mean_interval, whiteness
+from fish_sysid.diagnosis.diagnosis_json import law, mean_interval, unexplained_entry, whiteness
 from fish_sysid.diagnosis.latent_force import MissingForce
 from fish_sysid.diagnosis.next_experiment import next_experiment
 from fish_sysid.diagnosis.prediction_evidence import prediction_effects, prediction_entries
@@ -43,7 +43,13 @@ def found(names=(), nominal=1.0, final=1.0, left=NO_LAW):
     task = SimpleNamespace(level=Level(), robot=before.robot)
     state = SimpleNamespace(law=left)
     return SimpleNamespace(
-        task=task, state=state, nominal=before, final=after, accepted=accepted, still_misses=None
+        task=task,
+        state=state,
+        nominal=before,
+        final=after,
+        accepted=accepted,
+        misses=None,
+        still_misses=None,
     )
 
 
@@ -193,6 +199,18 @@ def test_names_by_prediction_are_the_verdict_where_the_model_follows_with_them(
     asked, still_misses, expected
 ):
     assert verdict(far(*asked, still_misses=still_misses)) == expected
+
+
+def test_nothing_is_said_to_be_missing_only_where_a_name_was_searched_for():
+    """Water far rougher than the camera's noise: the model does not follow, and what is left looks like water all the same."""
+    d = found(nominal=20.0, final=20.0)
+    assert verdict(d) == "no_mismatch"
+    assert unexplained_entry(d)["description"] == "the remaining force looks like water noise"
+    d.misses = 2.2
+    assert verdict(d) == "unexplained"
+    said = unexplained_entry(d)["description"]
+    assert "misses by 2.2 times the camera's noise, and no name is searched for" in said
+    assert said.endswith("; the remaining force looks like water noise")
 
 
 def test_a_name_or_rival_by_prediction_in_a_limit_does_not_stand():

@@ -349,7 +349,13 @@ def diagnosed(**place: float):
     accepted = (SimpleNamespace(name="tether"),)
     nominal = made_fit(0.0, ratio=100.0)
     return SimpleNamespace(
-        task=task, state=state, nominal=nominal, final=fit, accepted=accepted, still_misses=None
+        task=task,
+        state=state,
+        nominal=nominal,
+        final=fit,
+        accepted=accepted,
+        misses=None,
+        still_misses=None,
     )
 
 

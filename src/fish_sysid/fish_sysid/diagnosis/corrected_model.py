@@ -29,13 +29,15 @@ WORSE = 1.05  # times the refitted nominal model's error; two models as good dif
 def verdict(d: Diagnosis) -> str:
     """no_mismatch, missing_physics, sensor_or_actuator or unexplained.
 
-    Where the likelihood cannot be asked, names by prediction decide if the model follows the fish with them.
+    Where the likelihood cannot be asked, names by prediction decide if the model follows the fish with them. That nothing is
+    missing it cannot say there: no name was searched for.
     """
     names = [a.name for a in named(d)]
     if d.still_misses is not None and d.still_misses <= TOO_FAR:
         names = [asked.step.name for asked in asked_by_predictions(d)]
     if not names:
-        return "unexplained" if much_is_left(d) or refused(d) else "no_mismatch"
+        told = d.misses is not None or much_is_left(d) or refused(d)
+        return "unexplained" if told else "no_mismatch"
     kinds = {kind_of(name, d.task.robot.table) for name in names}
     return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
 

@@ -171,7 +171,7 @@ def unexplained_entry(d: Diagnosis) -> dict[str, Any]:
             "where": {},
             "nearest": [],
             "by_prediction": [],
-            "description": "; ".join(limits) or text,
+            "description": "; ".join([*unreached(d), *(limits or [text])]),
         }
     scale, ratio = np.array(d.final.noise.wrench), d.final.process_noise_ratio
     laws = [*limits, *(law(d, dof) for dof in d.state.law.lawful(d.task.level))]
