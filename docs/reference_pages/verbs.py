@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import re
-from typing import Any
 
 from fish_report.robofish import BROUGHT_BY
 from reference_pages import HEADER, cell, escaped, table
@@ -17,25 +16,20 @@ INTRODUCTION = """# The command `robofish`
 `robofish VERB` runs one tool. Every verb is also an executable of its package: `ros2 run PACKAGE VERB`. A package of
 your own adds verbs through the entry-point group `robofish.verbs`. Exit status: 0 done, 1 an input cannot be used
 (one line says why), 2 the command line cannot be understood, 130 ended by Ctrl-C.
+`prove` and `paper` need the package `fish_study`: `make install/.studies` builds it, then source the workspace again.
 """
 
 
 class ArgumentList(argparse.ArgumentParser):
-    """A parser that keeps what it declares."""
+    """A parser that tells what it declares."""
 
     def __init__(self, **_: object) -> None:  # the parsers of sub-commands are made with a prog
-        self.declared: list[argparse.Action] = []
         super().__init__(add_help=False)
 
-    def _add_action(self, action: argparse.Action) -> argparse.Action:
-        self.declared.append(action)
-        return super()._add_action(action)
-
-    def add_subparsers(self, **options: Any) -> Any:
-        """Keep the sub-commands as well; argparse puts them into a group of their own."""
-        action = super().add_subparsers(**options)
-        self.declared.append(action)
-        return action
+    @property
+    def declared(self) -> list[argparse.Action]:
+        """All arguments and sub-commands; those of argument groups too."""
+        return self._actions
 
 
 def declared_by(verb: str) -> tuple[str, list[argparse.Action]]:
@@ -88,7 +82,8 @@ def row(action: argparse.Action) -> tuple[str, str, str]:
         name = f"{', '.join(action.option_strings)} {value if takes_value else ''}".strip()
     else:
         name = value
-    default = "" if action.default in (None, False, [], "", argparse.SUPPRESS) else action.default
+    unsaid = action.default is None or action.default is False  # 0 is a default to be told
+    default = "" if unsaid or action.default in ([], "", argparse.SUPPRESS) else action.default
     if action.dest == "jobs":  # the number of processors of the computer that makes this page
         default = "all processors"
     if isinstance(default, list):

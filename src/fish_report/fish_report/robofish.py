@@ -134,7 +134,12 @@ def run_verb(verb: str, argv: list[str] | None = None) -> int:
 
 def _unknown(verb: str, verbs: dict[str, EntryPoint]) -> str:
     if verb in BROUGHT_BY:
-        return f"the verb {verb} comes with the package {BROUGHT_BY[verb]}, which is not installed; build and source it"
+        package = BROUGHT_BY[verb]
+        build = "make install/.studies" if package == "fish_study" else "make build"
+        missing = (
+            f"the verb {verb} comes with package {package}, which is not in this shell's workspace"
+        )
+        return f"{missing}; build it ({build}) and source install/setup.bash"
     return f"unknown verb {verb!r}; known: {', '.join(verbs)}"
 
 
