@@ -14,8 +14,9 @@ from reference_pages import HEADER, bounds, cell, escaped, number, table
 
 EFFECTS_PAGE = """# Effects
 
-An effect is what the nominal model leaves out. `diagnose` looks for every effect of this page but `disturbance`; the
-simulator and the training take them from `robot.yaml`:
+An effect is what the nominal model leaves out. `diagnose` looks for every effect of this page but
+`disturbance` and `camera_marker`, and for `imu_latency` with `--baseline` alone. Simulator and training take effects from
+`robot.yaml`:
 
 ```yaml
 effects:
