@@ -165,7 +165,7 @@ class ExciterConfig:
         ""  # JSON or YAML rows of t, amplitude, frequency, rudder; a diagnosis.json holds them too
     )
     begin: float = 0.0  # s of the program's time
-    end: float = 0.0  # s of the program's time; 0: its end, LAST_ROW after its last row begins
+    end: float = 0.0  # s of the program's time; 0: its end, 8 s after its last row begins
     rest: float = 1.0  # s at rest before the first stroke
     command_rate_hz: float = 100.0  # Hz, joint commands
     guard: bool = (

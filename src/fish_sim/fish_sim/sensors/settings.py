@@ -34,7 +34,7 @@ class SensorSettings:
     camera_heading_noise: float = levels.CAMERA_HEADING  # rad, std
     battery_voltage: float = 12.4  # V, full, without load
     battery_resistance: float = 0.08  # ohm
-    battery_capacity: float = 1.3  # A h; the open-circuit voltage falls by BATTERY_DROP over it
+    battery_capacity: float = 1.3  # A h; the open-circuit voltage falls by 2 V over it
     battery_noise: float = 0.01  # V, std per sample
 
     def __post_init__(self) -> None:
