@@ -15,14 +15,13 @@ are divided by the share of its variance that is no noise, from the difference o
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding
+from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding, SymmetryTest
 from fish_sysid.diagnosis.symmetry.regression import Judged, Rows, judge, least_squares
 from fish_sysid.estimation.thresholds import (
     FEWEST_TRIALS,
@@ -43,15 +42,13 @@ LEAST_FRAMES = 15  # in a window
 AGREE = 3.0  # standard errors
 LARGEST_SPREAD = 0.1  # rad, rms of the camera's heading less the gyro's integral in a trial
 
-scale_finding = partial(
-    SymmetryFinding,
+CAMERA_SCALE = SymmetryTest(
     "camera_scale",
     "sensor",
     assumes="the accelerometer's scale is right",
     needs="an IMU, three trials, turns or changes of speed",
 )
-axes_finding = partial(
-    SymmetryFinding,
+IMU_AXES = SymmetryTest(
     "imu_misalignment",
     "sensor",
     assumes="the course tells whether this angle between marker and IMU is that of the marker",
@@ -77,7 +74,7 @@ def accelerations(experiment: Experiment) -> tuple[SymmetryFinding, SymmetryFind
 
 
 def _both(reason: str) -> tuple[SymmetryFinding, SymmetryFinding]:
-    return scale_finding("cannot tell", reason=reason), axes_finding("cannot tell", reason=reason)
+    return CAMERA_SCALE.cannot_tell(reason), IMU_AXES.cannot_tell(reason)
 
 
 def _conclude(judged: Judged, reliable: float) -> tuple[SymmetryFinding, SymmetryFinding]:
@@ -89,23 +86,11 @@ def _conclude(judged: Judged, reliable: float) -> tuple[SymmetryFinding, Symmetr
     better = judged.evidence.gain > SENSOR_GAIN and judged.evidence.p_value < SYMMETRY_LEVEL
     scaled = better and abs(factor.value - 1.0) > max(SMALLEST_SCALE, SMALLEST_Z * factor.std)
     turned = better and abs(angle.value) > max(SMALLEST_ANGLE, SMALLEST_Z * angle.std)
+    by_scale = f"positions of the camera are {factor.value:.3f} times those felt"
+    by_angle = f"the IMU is turned by {angle.value:.3f} rad against the heading marker"
     return (
-        scale_finding(
-            "found" if scaled else "not found",
-            parameters={"factor": factor},
-            evidence=judged.evidence,
-            statement=f"positions of the camera are {factor.value:.3f} times those felt"
-            if scaled
-            else "",
-        ),
-        axes_finding(
-            "found" if turned else "not found",
-            parameters={"angle": angle},
-            evidence=judged.evidence,
-            statement=f"the IMU is turned by {angle.value:.3f} rad against the heading marker"
-            if turned
-            else "",
-        ),
+        CAMERA_SCALE.answer(scaled, by_scale, {"factor": factor}, judged.evidence),
+        IMU_AXES.answer(turned, by_angle, {"angle": angle}, judged.evidence),
     )
 
 

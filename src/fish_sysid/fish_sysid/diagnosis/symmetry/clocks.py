@@ -4,15 +4,13 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sysid.dataset.camera import DELAYS, Alignment, misfits
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding
+from fish_sysid.diagnosis.symmetry.finding import Estimate, Evidence, SymmetryFinding, SymmetryTest
 from fish_sysid.diagnosis.symmetry.regression import evidence, jackknife
 from fish_sysid.estimation.thresholds import (
     FEWEST_TRIALS,
@@ -34,22 +32,19 @@ STROKE = 0.5  # s; a fish answers its rotor within one stroke
 BEYOND_NOISE = 6.0  # standard deviations of the gyro at rest
 LEAST_NOISE = 1e-3  # rad/s, a gyro's resolution
 
-camera_finding = partial(
-    SymmetryFinding,
+CAMERA_CLOCK = SymmetryTest(
     "camera_latency",
     "sensor",
     assumes="camera and gyro show the same heading; the gyro's bias is constant for four seconds",
     needs="a gyro, three trials of six seconds, turns",
 )
-encoder_finding = partial(
-    SymmetryFinding,
+ENCODER_CLOCK = SymmetryTest(
     "encoder behind the command",
     "actuator",
     assumes="the rotor follows its command: a lag of the rotor and late stamps of the encoder look the same",
     needs="an encoder, three trials, a rotor whose command changes",
 )
-imu_finding = partial(
-    SymmetryFinding,
+IMU_CLOCK = SymmetryTest(
     "IMU beside the command",
     "sensor",
     assumes="a rotor that starts turns the head at once; finer than a stroke no statement is possible without a model",
@@ -62,51 +57,42 @@ def camera_clock(experiment: Experiment, alignment: Alignment) -> SymmetryFindin
     squares, count = misfits(experiment)
     used = squares[count > 0]
     if not np.isfinite(experiment.gyro).any():
-        return camera_finding("cannot tell", reason="no gyro was recorded")
+        return CAMERA_CLOCK.cannot_tell("no gyro was recorded")
     if len(used) < FEWEST_TRIALS:
-        return camera_finding("cannot tell", reason="fewer than three trials are long enough")
+        return CAMERA_CLOCK.cannot_tell("fewer than three trials are long enough")
     total = used.mean(axis=0)
     if total.max() < SHARP * total.min():
-        return camera_finding("cannot tell", reason="no turns: every delay fits as well")
-    best = int(total.argmin())
-    others = [int(np.delete(used, m, 0).mean(axis=0).argmin()) for m in range(len(used))]
-    gains = np.array([np.log(used[m, 0] / used[m, o]) for m, o in enumerate(others)])
-    delay, told = _estimate(best, others), evidence(gains)
-    found = alignment.delay > 0.0 and told.gain > SYMMETRY_GAIN and told.p_value < SYMMETRY_LEVEL
-    return camera_finding(
-        "found" if found else "not found",
-        parameters={"delay": delay},
-        evidence=told,
-        statement=f"images are {delay.value:.2f} s older than their stamps" if found else "",
-    )
+        return CAMERA_CLOCK.cannot_tell("no turns: every delay fits as well")
+    delay, told, better = _best_delay(used)
+    text = f"images are {delay.value:.2f} s older than their stamps"
+    return CAMERA_CLOCK.answer(alignment.delay > 0.0 and better, text, {"delay": delay}, told)
 
 
-def _estimate(best: int, others: list[int]) -> Estimate:
-    """A delay on the grid with its jackknife error, which is no finer than the grid."""
+def _best_delay(squares: Array) -> tuple[Estimate, Evidence, bool]:
+    """The best delay by mean squares (M, D) of M trials at DELAYS[:D], its gain over none, and whether that counts.
+
+    Its standard error is that of the jackknife over trials and of the grid together.
+    """
+    best = int(squares.mean(axis=0).argmin())
+    others = [int(np.delete(squares, m, 0).mean(axis=0).argmin()) for m in range(len(squares))]
+    told = evidence(np.array([np.log(squares[m, 0] / squares[m, o]) for m, o in enumerate(others)]))
     spread = float(jackknife(DELAYS[others][:, None])[0])
-    return Estimate(float(DELAYS[best]), float(np.hypot(spread, DT / np.sqrt(12.0))), "s")
+    delay = Estimate(float(DELAYS[best]), float(np.hypot(spread, DT / np.sqrt(12.0))), "s")
+    return delay, told, told.gain > SYMMETRY_GAIN and told.p_value < SYMMETRY_LEVEL
 
 
 def encoder_clock(experiment: Experiment) -> SymmetryFinding:
     """By how much the encoder's speed is behind the commanded one."""
     if not np.isfinite(experiment.encoder).any():
-        return encoder_finding("cannot tell", reason="no encoder was recorded")
+        return ENCODER_CLOCK.cannot_tell("no encoder was recorded")
     rows = [_behind(experiment, m) for m in range(len(experiment.names))]
     squares = np.array([row for row in rows if row is not None])
     if len(squares) < FEWEST_TRIALS:
-        return encoder_finding("cannot tell", reason="the rotor changes in fewer than three trials")
-    best = int(squares.mean(axis=0).argmin())
-    others = [int(np.delete(squares, m, 0).mean(axis=0).argmin()) for m in range(len(squares))]
-    gains = np.array([np.log(squares[m, 0] / squares[m, o]) for m, o in enumerate(others)])
-    delay, told = _estimate(best, others), evidence(gains)
-    found = delay.value >= SMALLEST_DEAD_TIME and told.gain > SYMMETRY_GAIN
-    found = found and told.p_value < SYMMETRY_LEVEL
-    return encoder_finding(
-        "found" if found else "not found",
-        parameters={"delay": delay},
-        evidence=told,
-        statement=f"the encoder is {delay.value:.2f} s behind the command" if found else "",
-    )
+        return ENCODER_CLOCK.cannot_tell("the rotor changes in fewer than three trials")
+    delay, told, better = _best_delay(squares)
+    found = better and delay.value >= SMALLEST_DEAD_TIME
+    text = f"the encoder is {delay.value:.2f} s behind the command"
+    return ENCODER_CLOCK.answer(found, text, {"delay": delay}, told)
 
 
 def _behind(experiment: Experiment, m: int) -> Array | None:
@@ -124,19 +110,16 @@ def _behind(experiment: Experiment, m: int) -> Array | None:
 def imu_clock(experiment: Experiment) -> SymmetryFinding:
     """How long after the rotor's start the gyro moves: before it no fish does, and none waits for a stroke."""
     if not np.isfinite(experiment.gyro).any():
-        return imu_finding("cannot tell", reason="no gyro was recorded")
+        return IMU_CLOCK.cannot_tell("no gyro was recorded")
     answers = [_answer_time(experiment, m) for m in range(len(experiment.names))]
     times = np.array([t for t in answers if t is not None])
     if len(times) < FEWEST_TRIALS:
         text = f"{len(times)} trials in which the rotor starts from rest, fewer than three"
-        return imu_finding("cannot tell", reason=text)
+        return IMU_CLOCK.cannot_tell(text)
     middle, std = float(times.mean()), float(times.std(ddof=1) / np.sqrt(len(times)))
     found = middle + 3.0 * std < -EARLY or middle - 3.0 * std > STROKE
-    return imu_finding(
-        "found" if found else "not found",
-        parameters={"answer": Estimate(middle, std, "s")},
-        statement=f"the gyro moves {middle:.2f} s after the rotor's start" if found else "",
-    )
+    text = f"the gyro moves {middle:.2f} s after the rotor's start"
+    return IMU_CLOCK.answer(found, text, {"answer": Estimate(middle, std, "s")})
 
 
 def _answer_time(experiment: Experiment, m: int) -> float | None:

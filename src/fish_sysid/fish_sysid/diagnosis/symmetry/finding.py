@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 Status = Literal["found", "not found", "cannot tell"]
+
+FEW_TRIALS = "fewer than three usable trials"
 
 
 @dataclass(frozen=True)
@@ -50,3 +52,34 @@ class SymmetryFinding:
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     evidence: Evidence | None = None
     stands_alone: bool = True
+
+
+@dataclass(frozen=True)
+class SymmetryTest:
+    """What stands in every answer of one test; fields as in `SymmetryFinding`."""
+
+    name: str
+    kind: str
+    assumes: str
+    needs: str
+    stands_alone: bool = True
+
+    def cannot_tell(self, reason: str) -> SymmetryFinding:
+        """The answer where the recordings cannot tell."""
+        return self._finding("cannot tell", reason=reason)
+
+    def answer(
+        self,
+        found: bool,
+        statement: str,
+        parameters: Mapping[str, Estimate],
+        evidence: Evidence | None = None,
+    ) -> SymmetryFinding:
+        """Found, as the statement says, or not found."""
+        status: Status = "found" if found else "not found"
+        said = statement if found else ""
+        return self._finding(status, statement=said, parameters=parameters, evidence=evidence)
+
+    def _finding(self, status: Status, **content: Any) -> SymmetryFinding:
+        own = self.name, self.kind, status, self.assumes, self.needs
+        return SymmetryFinding(*own, stands_alone=self.stands_alone, **content)

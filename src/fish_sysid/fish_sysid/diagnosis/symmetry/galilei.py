@@ -18,35 +18,32 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
+from fish_sysid.diagnosis.symmetry.finding import FEW_TRIALS, SymmetryFinding, SymmetryTest
 from fish_sysid.diagnosis.symmetry.regression import Rows, judge
 from fish_sysid.diagnosis.symmetry.stroke_means import StrokeMeans
 from fish_sysid.estimation.thresholds import FEWEST_TRIALS, LEAST_OWN_SHARE, SYMMETRY_GAIN
 
 Array = NDArray[np.float64]
 
-ASSUMES = (
-    "the water's velocity is the same everywhere and at all times; commands alone drive the fish"
+UNIFORM_FLOW = SymmetryTest(
+    "current",
+    "physics",
+    assumes="the water's velocity is the same everywhere and at all times; commands alone drive the fish",
+    needs="three trials and several headings at the same commands",
 )
-NEEDS = "three trials and several headings at the same commands"
 
 
 def uniform_flow(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
     """The test for `current`."""
     if len(trials) < FEWEST_TRIALS:
-        return _finding("cannot tell", reason=f"{len(trials)} usable trials, fewer than three")
+        return UNIFORM_FLOW.cannot_tell(FEW_TRIALS)
     judged = judge([Rows(black_box(s), carried(s), ground_velocity(s)) for s in trials])
     if judged.own_share < LEAST_OWN_SHARE:
-        return _finding("cannot tell", reason=too_few_headings(judged.own_share))
+        return UNIFORM_FLOW.cannot_tell(too_few_headings(judged.own_share))
     x, y = judged.estimate(-2, "m/s"), judged.estimate(-1, "m/s")
-    if not judged.stands(SYMMETRY_GAIN, -2, -1):
-        return _finding("not found", parameters={"x": x, "y": y}, evidence=judged.evidence)
-    return _finding(
-        "found",
-        parameters={"x": x, "y": y},
-        evidence=judged.evidence,
-        statement=f"the water moves by ({x.value:.3f} ± {x.std:.3f}, {y.value:.3f} ± {y.std:.3f}) m/s",
-    )
+    found = judged.stands(SYMMETRY_GAIN, -2, -1)
+    text = f"the water moves by ({x.value:.3f} ± {x.std:.3f}, {y.value:.3f} ± {y.std:.3f}) m/s"
+    return UNIFORM_FLOW.answer(found, text, {"x": x, "y": y}, judged.evidence)
 
 
 def too_few_headings(share: float) -> str:
@@ -87,7 +84,3 @@ def carried(trial: StrokeMeans) -> Array:
     """Columns (2C, 2) of flows of 1 m/s along x and along y."""
     flows = (np.tile(axis, (len(trial.t), 1)) for axis in np.eye(2))
     return np.column_stack([in_body_frame(trial, flow) for flow in flows])
-
-
-def _finding(status: str, **content: object) -> SymmetryFinding:
-    return SymmetryFinding("current", "physics", status, ASSUMES, NEEDS, **content)  # type: ignore[arg-type]

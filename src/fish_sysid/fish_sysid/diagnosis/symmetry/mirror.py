@@ -9,12 +9,11 @@ tail. The test does not say which; every real fish breaks it a little. So alone 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
+from fish_sysid.diagnosis.symmetry.finding import FEW_TRIALS, SymmetryFinding, SymmetryTest
 from fish_sysid.diagnosis.symmetry.galilei import asymmetric, block_diagonal, carried
 from fish_sysid.diagnosis.symmetry.regression import Rows, judge
 from fish_sysid.diagnosis.symmetry.stroke_means import StrokeMeans
@@ -30,8 +29,7 @@ Array = NDArray[np.float64]
 ARM = 0.1  # m, times the yaw rate it is a speed like the sway: about half the head's length
 SIDE = 0.2  # of stroke_means.RUDDER, a rudder that is to one side
 
-mirror_finding = partial(
-    SymmetryFinding,
+MIRROR = SymmetryTest(
     "left and right differ",
     "physics",
     assumes="a mirror-symmetric fish, which none is quite: alone it is not safe and names nothing",
@@ -43,23 +41,19 @@ mirror_finding = partial(
 def mirror_symmetry(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
     """Whether sway and yaw rate have parts that do not change sign with the rudder."""
     if len(trials) < FEWEST_TRIALS:
-        return mirror_finding("cannot tell", reason="fewer than three usable trials")
+        return MIRROR.cannot_tell(FEW_TRIALS)
     rudder = np.concatenate([s.rudder for s in trials])
     sides = [float((sign * rudder > SIDE).mean()) for sign in (1.0, -1.0)]
     if min(sides) < LEAST_SIDES:
         text = f"the rudder is left in {sides[0]:.0%} and right in {sides[1]:.0%} of the time"
-        return mirror_finding("cannot tell", reason=text)
+        return MIRROR.cannot_tell(text)
     judged = judge([_rows(s) for s in trials])
     if judged.term_share < LEAST_OWN_SHARE:
-        return mirror_finding("cannot tell", reason="one speed or too few headings")
+        return MIRROR.cannot_tell("one speed or too few headings")
     sway, turn = judged.estimate(-6, "m/s"), judged.estimate(-3, "m/s")
     found = judged.stands(SYMMETRY_GAIN, *range(-6, 0))
-    return mirror_finding(
-        "found" if found else "not found",
-        parameters={"sway": sway, "yaw rate times 0.1 m": turn},
-        evidence=judged.evidence,
-        statement="left and right turns differ" if found else "",
-    )
+    parameters = {"sway": sway, "yaw rate times 0.1 m": turn}
+    return MIRROR.answer(found, "left and right turns differ", parameters, judged.evidence)
 
 
 def _rows(trial: StrokeMeans) -> Rows:

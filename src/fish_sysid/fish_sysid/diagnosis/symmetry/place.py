@@ -8,7 +8,6 @@ Translating the fish in the pool changes nothing of its swimming, unless the wat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,7 +15,12 @@ from numpy.typing import NDArray
 
 from fish_sim.effects.surroundings import NonuniformCurrent
 from fish_sim.pool import LENGTH, WIDTH
-from fish_sysid.diagnosis.symmetry.finding import Estimate, SymmetryFinding
+from fish_sysid.diagnosis.symmetry.finding import (
+    FEW_TRIALS,
+    Estimate,
+    SymmetryFinding,
+    SymmetryTest,
+)
 from fish_sysid.diagnosis.symmetry.galilei import (
     black_box,
     carried,
@@ -44,24 +48,19 @@ TERMS = ("strain", "shear_x", "shear_y", "gyre_11", "gyre_12", "gyre_21", "gyre_
 PATCHES = tuple((x, y) for x in (-0.33, 0.0, 0.33) for y in (-0.25, 0.25))  # of length and width
 PATCH_WIDTH = 0.35  # m, standard deviation
 
-FEW_TRIALS = "fewer than three usable trials"
-
-flow_finding = partial(
-    SymmetryFinding,
+VARYING_FLOW = SymmetryTest(
     "nonuniform_current",
     "physics",
     assumes="the water's velocity is constant in time; commands alone drive the fish",
     needs="three trials over the pool, several headings at each place",
 )
-wall_finding = partial(
-    SymmetryFinding,
+WALL_EFFECT = SymmetryTest(
     "wall_effect",
     "physics",
     assumes="the walls are those of the pool, 4.27 m by 2.13 m about the origin",
     needs="three trials, near the walls and away from them at the same commands",
 )
-patch_finding = partial(
-    SymmetryFinding,
+PATCH = SymmetryTest(
     "slower or faster in a part of the pool",
     "physics",
     assumes="commands alone drive the fish",
@@ -77,12 +76,12 @@ def place_tests(trials: Sequence[StrokeMeans]) -> tuple[SymmetryFinding, ...]:
 def varying_flow(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
     """Linear shear and the four largest gyres beside a uniform flow."""
     if len(trials) < FEWEST_TRIALS:
-        return flow_finding("cannot tell", reason=FEW_TRIALS)
+        return VARYING_FLOW.cannot_tell(FEW_TRIALS)
     if (spread := _spread(trials)) < LEAST_SPREAD:
-        return flow_finding("cannot tell", reason=_one_place(spread))
+        return VARYING_FLOW.cannot_tell(_one_place(spread))
     judged = judge([Rows(_base(s), _flows(s), ground_velocity(s)) for s in trials])
     if judged.term_share < LEAST_OWN_SHARE:
-        return flow_finding("cannot tell", reason=too_few_headings(judged.term_share))
+        return VARYING_FLOW.cannot_tell(too_few_headings(judged.term_share))
     names, first = (*MEAN, *TERMS), -len(MEAN) - len(TERMS)
     parameters = {
         name: judged.estimate(first + i, NonuniformCurrent.parameters[name].unit)
@@ -90,38 +89,38 @@ def varying_flow(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
     }
     found = judged.stands(SYMMETRY_GAIN, *range(-len(TERMS), 0))
     text = "the water's velocity varies over the pool"
-    return _answer(flow_finding, found, text, parameters, judged.evidence)
+    return VARYING_FLOW.answer(found, text, parameters, judged.evidence)
 
 
 def wall_effect(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
     """How much slower the fish is at a wall than the same commands make it elsewhere."""
     if len(trials) < FEWEST_TRIALS:
-        return wall_finding("cannot tell", reason=FEW_TRIALS)
+        return WALL_EFFECT.cannot_tell(FEW_TRIALS)
     beyond = np.concatenate([gap(s) < -MARGIN for s in trials]).mean()
     if beyond > LEAST_BEYOND:
         text = f"{beyond:.0%} of the places are beyond the walls: they are not where they should be"
-        return wall_finding("cannot tell", reason=text)
+        return WALL_EFFECT.cannot_tell(text)
     near = np.concatenate([nearness(s) > NEAR_WALL for s in trials]).mean()
     if not LEAST_NEAR_WALL < near < 1.0 - LEAST_NEAR_WALL:
-        return wall_finding("cannot tell", reason=f"the fish is near a wall {near:.0%} of the time")
+        return WALL_EFFECT.cannot_tell(f"the fish is near a wall {near:.0%} of the time")
     judged = judge([Rows(_base(s), _walls(s), ground_velocity(s)) for s in trials])
     if judged.term_share < LEAST_OWN_SHARE:
-        return wall_finding("cannot tell", reason="near walls commands differ from elsewhere")
+        return WALL_EFFECT.cannot_tell("near walls commands differ from elsewhere")
     slower = _relative(trials, -judged.coefficients[-1], judged.std[-1])
     found = judged.stands(SYMMETRY_GAIN, -1) and slower.value > 0.0
     text = f"at a wall the fish is {slower.value:.0%} slower than elsewhere"
-    return _answer(wall_finding, found, text, {"slowdown": slower}, judged.evidence)
+    return WALL_EFFECT.answer(found, text, {"slowdown": slower}, judged.evidence)
 
 
 def patch(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
     """Whether the same commands make the fish slower or faster in one of six parts of the pool."""
     if len(trials) < FEWEST_TRIALS:
-        return patch_finding("cannot tell", reason=FEW_TRIALS)
+        return PATCH.cannot_tell(FEW_TRIALS)
     if (spread := _spread(trials)) < LEAST_SPREAD:
-        return patch_finding("cannot tell", reason=_one_place(spread))
+        return PATCH.cannot_tell(_one_place(spread))
     judged = judge([Rows(_base(s), _patches(s), ground_velocity(s)) for s in trials])
     if judged.term_share < LEAST_OWN_SHARE:
-        return patch_finding("cannot tell", reason="parts of the pool were swum by other commands")
+        return PATCH.cannot_tell("parts of the pool were swum by other commands")
     count = len(PATCHES)
     faster = [
         _relative(trials, c, s)
@@ -136,18 +135,7 @@ def patch(trials: Sequence[StrokeMeans]) -> SymmetryFinding:
     }
     found = judged.stands(SYMMETRY_GAIN, best - count)
     text = f"about ({x:.1f}, {y:.1f}) m the fish is {faster[best].value:+.0%} faster than elsewhere"
-    return _answer(patch_finding, found, text, parameters, judged.evidence)
-
-
-def _answer(
-    finding: partial[SymmetryFinding], found: bool, text: str, parameters: object, told: object
-) -> SymmetryFinding:
-    return finding(
-        "found" if found else "not found",
-        statement=text if found else "",
-        parameters=parameters,
-        evidence=told,
-    )
+    return PATCH.answer(found, text, parameters, judged.evidence)
 
 
 def nearness(trial: StrokeMeans) -> Array:
