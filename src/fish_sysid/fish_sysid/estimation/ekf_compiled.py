@@ -33,8 +33,8 @@ from fish_sysid.estimation.ekf_types import (
     SensorModel,
     encoder_terms,
     first_commands,
-    first_memory,
     first_state,
+    follow_commands,
     place_frames,
 )
 
@@ -102,11 +102,8 @@ def filter_check(structure: Structure, method: str, width: int) -> Check:
 
 def _passed(loaded: ctypes.CDLL, numpy_filter: Filter) -> FilterResult:
     """One pass of a library with the problem, the noise and the memory of a filter in NumPy."""
-    problem, memory = numpy_filter.problem, numpy_filter.memory
-    d_memory = np.ascontiguousarray(numpy_filter.d_memory.transpose(0, 1, 3, 2))
-    driven = _Driven(
-        memory[0].copy(), d_memory[0], memory[:-1, :, ROTOR], d_memory[:-1, :, :, ROTOR], memory
-    )
+    problem = numpy_filter.problem
+    driven = _Driven.of(numpy_filter.memory, numpy_filter.d_memory, True)
     job = _Job(loaded, problem, driven, numpy_filter.noise, True)
     for m in range(len(problem.experiment.names)):
         job.run(m)
@@ -120,7 +117,7 @@ def compiled_passes(
     loaded = filter_library(problem.stepper.layout.structure, problem.stepper.scheme.method)
     if loaded is None:
         return None
-    driven = _follow_commands(problem, keep)
+    driven = _driven(problem, keep)
     jobs = [_Job(loaded, problem, driven, noise, keep) for noise in noises]
     runs = [partial(job.run, m) for job in jobs for m in range(len(problem.experiment.names))]
     on_all_cores(lambda run: run(), runs)
@@ -132,50 +129,37 @@ class _Driven:
     """What the commands alone decide: of the memory and its derivatives no more than is used."""
 
     start: Array  # (M, NM)
-    d_start: Array  # (M, max(K, 1), NM)
+    d_start: Array  # (M, K, NM)
     rotor: Array  # (T, M) rad/s
     d_rotor: Array  # (T, M, K)
     memory: Array | None  # (T + 1, M, NM) where it is kept
 
+    @classmethod
+    def of(cls, memory: Array, d_memory: Array, keep: bool) -> _Driven:
+        """Copies of what is used of memory (T + 1, M, NM) and d_memory (T + 1, M, K, NM)."""
+        start, d_start = memory[0].copy(), d_memory[0].copy()
+        rotor, d_rotor = memory[:-1, ..., ROTOR].copy(), d_memory[:-1, ..., ROTOR].copy()
+        return cls(start, d_start, rotor, d_rotor, memory.copy() if keep else None)
 
-def _follow_commands(problem: Problem, keep: bool) -> _Driven:
+
+def _driven(problem: Problem, keep: bool) -> _Driven:
     """Servo and motor under the commands, one trial at a time: all memories with all derivatives would take gigabytes.
 
     Without several free parameters all trials at once: a single row is not computed to the last bit as one among others.
     """
     before, commands = first_commands(problem.experiment), problem.experiment.commands
     trials = [slice(m, m + 1) for m in range(len(before))] if len(problem.dp) > 1 else [slice(None)]
-    parts = [_follow(problem, before[some], commands[:, some], keep) for some in trials]
-    memory = (
-        np.concatenate([part.memory for part in parts if part.memory is not None], axis=1)
-        if keep
-        else None
-    )
+    parts = [
+        _Driven.of(*follow_commands(problem, before[some], commands[:, some]), keep)
+        for some in trials
+    ]
+    memory = [part.memory for part in parts if part.memory is not None]
     return _Driven(
         np.concatenate([part.start for part in parts]),
         np.concatenate([part.d_start for part in parts]),
         np.concatenate([part.rotor for part in parts], axis=1),
         np.concatenate([part.d_rotor for part in parts], axis=1),
-        memory,
-    )
-
-
-def _follow(problem: Problem, before: Array, commands: Array, keep: bool) -> _Driven:
-    """Of some trials; before (M, 2): what was commanded until then, commands (T, M, 2)."""
-    stepper, p, dp = problem.stepper, problem.p, problem.dp
-    M, K, size = len(before), len(dp), len(stepper.layout.memory)
-    rows = max(K, 1)
-    start, d_start = first_memory(before, stepper, p, dp)
-    d_start = d_start if K else np.zeros((M, rows, size))
-    directions = np.tile(dp, (M, 1)) if K else np.zeros((M, len(p)))
-    repeated = np.repeat(start, rows, axis=0), np.repeat(commands, rows, axis=1)
-    memory, d_memory = (
-        a.reshape(-1, M, rows, size)
-        for a in stepper.memory_jvp(*repeated, p, directions, d_start.reshape(-1, size))
-    )
-    rotor, d_rotor = memory[:-1, :, 0, ROTOR].copy(), d_memory[:-1, :, :K, ROTOR].copy()
-    return _Driven(
-        start.copy(), d_start.copy(), rotor, d_rotor, memory[:, :, 0].copy() if keep else None
+        np.concatenate(memory, axis=1) if keep else None,
     )
 
 

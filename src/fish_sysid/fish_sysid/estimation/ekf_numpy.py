@@ -19,8 +19,8 @@ from fish_sysid.estimation.ekf_types import (
     drive_at,
     encoder_terms,
     first_commands,
-    first_memory,
     first_state,
+    follow_commands,
     place_frames,
 )
 
@@ -42,7 +42,9 @@ class Filter:
         self.wrench_at = [layout.parameters.index(name) for name in WRENCH]
         self.directions = self.nx + 3 + self.free
         self.frames = place_frames(self.experiment, self.sensors)
-        self.memory, self.d_memory = self._follow_commands()
+        self.memory, self.d_memory = follow_commands(
+            problem, first_commands(self.experiment), self.experiment.commands
+        )
 
     def run(self, keep: bool = False) -> FilterResult:
         """Filter all trials; keep=True stores the history for the smoother.
@@ -85,22 +87,6 @@ class Filter:
         return FilterResult(
             sums.log_likelihood, sums.samples, sums.gradient, sums.normal, sums.whitened, history
         )
-
-    def _follow_commands(self) -> tuple[Array, Array]:
-        """Memory (T + 1, M, NM) and its derivatives (T + 1, M, NM, K): they need no motion."""
-        M, K, nm = self.trials, max(self.free, 1), len(self.stepper.layout.memory)
-        start, d_start = first_memory(
-            first_commands(self.experiment), self.stepper, self.p, self.dp
-        )
-        d_start = d_start.reshape(-1, nm) if self.free else np.zeros((M, nm))
-        commands = np.repeat(self.experiment.commands, K, axis=1)
-        dp = np.tile(self.dp, (M, 1)) if self.free else np.zeros((M, len(self.p)))
-        memory, tangents = self.stepper.memory_jvp(
-            np.repeat(start, K, axis=0), commands, self.p, dp, d_start
-        )
-        T = len(memory)
-        memory = memory.reshape(T, M, K, nm)[:, :, 0]
-        return memory, tangents.reshape(T, M, K, nm).transpose(0, 1, 3, 2)[..., : self.free]
 
     def _directions(self, D: Array, moving: bool) -> tuple[Array, Array]:
         """Tangent directions (M, directions, nx) of the motion and (M, directions, NP) of the parameters.
@@ -196,7 +182,7 @@ class Filter:
         ds, dp = self._directions(D, moving)
         drive = drive_at(self.memory[k, :, :2], self.memory[k + 1, :, :2], fraction)
         d_drive = np.zeros((M, R, 4))
-        before, after = (d.transpose(0, 2, 1) for d in self.d_memory[k : k + 2, :, :2])
+        before, after = self.d_memory[k : k + 2, ..., :2]
         d_drive[:, nx + 3 :] = drive_at(before, after, fraction)
         rate, tangent = self.stepper.rates_jvp(
             np.repeat(motion, R, axis=0),
@@ -271,7 +257,7 @@ class Filter:
         """The encoder reads the rotor's speed, which follows from the commands alone."""
         T = self.experiment.length
         terms = encoder_terms(
-            self.experiment, self.noise, self.memory[:T, :, 1], self.d_memory[:T, :, 1]
+            self.experiment, self.noise, self.memory[:T, ..., 1], self.d_memory[:T, ..., 1]
         )
         sums.log_likelihood += terms.log_likelihood
         sums.samples += terms.samples

@@ -33,7 +33,6 @@ WRENCH = (
     "disturbance.sway",
     "disturbance.yaw",
 )  # parameters of the model the filter drives
-GYRO, ACCEL, CAMERA = slice(0, 1), slice(1, 3), slice(3, 6)  # rows of the innovations
 ROWS = ("gyro", "accel_forward", "accel_left", "camera_x", "camera_y", "camera_heading")
 ENCODER_ROW = 6
 
@@ -155,16 +154,22 @@ def first_commands(experiment: Experiment) -> Array:
     )
 
 
-def first_memory(commands: Array, stepper: Stepper, p: Array, dp: Array) -> tuple[Array, Array]:
-    """Memory (M, NM) that such commands (M, 2) have left, and its derivatives (M, K, NM).
+def follow_commands(problem: Problem, before: Array, commands: Array) -> tuple[Array, Array]:
+    """Memory (T + 1, M, NM) of servo and motor, which needs no motion, and its derivatives (T + 1, M, K, NM).
 
-    A centred command leaves something too: the rudder of an offset horn is deflected from the start.
+    commands (T, M, 2) of some trials; before (M, 2): what was commanded long before. A centred command leaves something too:
+    the rudder of an offset horn is deflected from the start.
     """
-    M, K = len(commands), len(dp)
-    repeated = np.repeat(commands, max(K, 1), axis=0)
+    stepper, p, dp = problem.stepper, problem.p, problem.dp
+    M, K, rows = len(before), len(dp), max(len(dp), 1)
     directions = np.tile(dp, (M, 1)) if K else np.zeros((M, len(p)))
-    memory, tangents = stepper.settled_memory(repeated, p, directions)
-    return memory.reshape(M, max(K, 1), -1)[:, 0], tangents.reshape(M, max(K, 1), -1)[:, :K]
+    start, d_start = stepper.settled_memory(np.repeat(before, rows, axis=0), p, directions)
+    repeated = np.repeat(commands, rows, axis=1)
+    memory, d_memory = (
+        a.reshape(len(a), M, rows, -1)
+        for a in stepper.memory_jvp(start, repeated, p, directions, d_start)
+    )
+    return memory[:, :, 0], d_memory[:, :, :K]
 
 
 def first_state(
