@@ -51,9 +51,13 @@ def level(imu: Imu) -> tuple[Array, Array]:
     R = rotation(np.where(given[:, None], imu.orientation, LEVEL))
     rate, force = np.einsum("nj,nj->n", R[:, 2], imu.gyro), np.einsum("nij,nj->ni", R, imu.accel)
     psi = np.arctan2(R[:, 1, 0], R[:, 0, 0])
-    cos, sin = np.cos(psi), np.sin(psi)
-    forward, left = force[:, 0] * cos + force[:, 1] * sin, force[:, 1] * cos - force[:, 0] * sin
-    return rate, np.column_stack([forward, left])
+    return rate, np.column_stack(in_base_link(force[:, 0], force[:, 1], psi))
+
+
+def in_base_link(x: Array, y: Array, heading: Array) -> tuple[Array, Array]:
+    """Forward and left components (...) of vectors with pool-frame components x and y (...), at headings (...) [rad]."""
+    cos, sin = np.cos(heading), np.sin(heading)
+    return x * cos + y * sin, y * cos - x * sin
 
 
 def heading(imu: Imu) -> tuple[Array, Array]:

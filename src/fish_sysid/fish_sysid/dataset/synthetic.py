@@ -25,7 +25,7 @@ from fish_sim.sensors.noise_levels import BIAS, CAMERA_RATE, exposure_times
 from fish_sim.step import Stepper
 from fish_sim.water_push import WaterPush
 from fish_sysid.dataset.experiment import Experiment, Frames
-from fish_sysid.dataset.grid import apart
+from fish_sysid.dataset.grid import apart, in_base_link
 from fish_sysid.estimation.ekf_types import WRENCH, Noise
 
 Array = NDArray[np.float64]
@@ -148,8 +148,7 @@ def true_imu(
         motion, drive, all_p, np.zeros_like(motion), np.zeros_like(drive), np.zeros_like(all_p)
     )
     ax, ay = rates[:, nq].reshape(T, M), rates[:, nq + 1].reshape(T, M)
-    cos, sin = np.cos(state[..., 2]), np.sin(state[..., 2])
-    return state[..., nq + 2], np.stack([ax * cos + ay * sin, ay * cos - ax * sin], axis=-1)
+    return state[..., nq + 2], np.stack(in_base_link(ax, ay, state[..., 2]), axis=-1)
 
 
 def _camera(pose: Array, noise: Noise, random: np.random.Generator, rate: float) -> Frames:

@@ -12,6 +12,7 @@ import numpy as np
 from fish_sim.model import DT
 from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.grid import in_base_link
 from fish_sysid.estimation.ekf_types import Array
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.smoother import smooth
@@ -61,17 +62,18 @@ def located(
     """A wrench (T, M, 3) with what it may depend on."""
     nq = fit.robot.links + 3
     valid = np.arange(len(xi))[:, None] < experiment.steps
-    cos, sin = np.cos(xi[..., 2]), np.sin(xi[..., 2])
+    psi = xi[..., 2]
+    surge, sway = in_base_link(xi[..., nq], xi[..., nq + 1], psi)
     covariates = {
-        "surge_speed": xi[..., nq] * cos + xi[..., nq + 1] * sin,
-        "sway_speed": xi[..., nq + 1] * cos - xi[..., nq] * sin,
+        "surge_speed": surge,
+        "sway_speed": sway,
         "yaw_rate": xi[..., nq + 2],
         "rudder": memory[: len(xi), :, 0],
         "rotor_speed": memory[: len(xi), :, 1],
         "wall_distance": np.minimum(
             LENGTH / 2 - np.abs(xi[..., 0]), WIDTH / 2 - np.abs(xi[..., 1])
         ),
-        "heading": np.arctan2(sin, cos),
+        "heading": np.arctan2(np.sin(psi), np.cos(psi)),
         "time": np.where(valid, DT * np.arange(len(xi))[:, None], np.nan),
         "x": xi[..., 0],
         "y": xi[..., 1],

@@ -19,6 +19,7 @@ from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_sysid.dataset.camera import ahead_of, at_centre_of_mass, forward
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.grid import in_base_link
 from fish_sysid.dataset.imu import imu_moved_back
 from fish_sysid.estimation.ekf import run_filter
 from fish_sysid.estimation.ekf_types import WRENCH, Noise, SensorModel
@@ -156,8 +157,7 @@ def estimate(experiment: Experiment, robot: Robot, noise: Noise) -> Estimates:
 def body_velocity(state: Array, links: int) -> Array:
     """(..., 3) surge, sway [m/s], yaw rate [rad/s] in base_link of states (..., NS)."""
     x, y, r = (state[..., 3 + links + i] for i in range(3))
-    cos, sin = np.cos(state[..., 2]), np.sin(state[..., 2])
-    return np.stack([x * cos + y * sin, y * cos - x * sin, r], axis=-1)
+    return np.stack([*in_base_link(x, y, state[..., 2]), r], axis=-1)
 
 
 def predict(

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.grid import in_base_link
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -46,9 +47,7 @@ class StrokeMean:
     def __call__(self, pose: Array) -> Array:
         """(C, ..., 6) x, y, psi [m, m, rad] and u, v, r [m/s, m/s, rad/s] of poses (F, ..., 3), psi unwrapped."""
         mean, rate = np.tensordot(self.value, pose, 1), np.tensordot(self.slope, pose, 1)
-        cos, sin = np.cos(mean[..., 2]), np.sin(mean[..., 2])
-        u = rate[..., 0] * cos + rate[..., 1] * sin
-        v = rate[..., 1] * cos - rate[..., 0] * sin
+        u, v = in_base_link(rate[..., 0], rate[..., 1], mean[..., 2])
         return np.concatenate([mean, np.stack([u, v, rate[..., 2]], axis=-1)], axis=-1)
 
 

@@ -19,6 +19,7 @@ from fish_sim.model import DT
 from fish_sim.robot import Robot
 from fish_sim.step import Stepper
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.dataset.grid import in_base_link
 from fish_sysid.diagnosis.change.channels import AT_CENTRES, MEANS, StrokeWeights, Swim, parts
 from fish_sysid.estimation.ekf import filter_stepper
 from fish_sysid.prediction.stroke_average import stroke_mean
@@ -132,9 +133,9 @@ class _Lens:
         """(C, 12) of states (T + 1, NS); `turn`: where the velocities begin; NaN at centres whose window has lost ones (T,)."""
         pose, velocity = x[:-1, :3], x[:, turn : turn + 2]
         mean, rate = self.value @ pose, self.slope @ pose
-        surge, sway = _turned(rate[:, 0], rate[:, 1], mean[:, 2])
+        surge, sway = in_base_link(rate[:, 0], rate[:, 1], mean[:, 2])
         push = np.diff(velocity, axis=0) / DT
-        ahead, left = _turned(push[:, 0], push[:, 1], pose[:, 2])
+        ahead, left = in_base_link(push[:, 0], push[:, 1], pose[:, 2])
         H = parts(self.strokes.amplitudes(x[:-1, turn + 2], ahead, left))
         out = np.zeros((len(mean), AT_CENTRES))
         motion = np.column_stack([surge, sway, rate[:, 2]])
@@ -142,9 +143,3 @@ class _Lens:
         out[:, MEANS:] = np.clip(np.nan_to_num(H), -LARGEST_AMPLITUDE, LARGEST_AMPLITUDE)
         out[abs(self.value) @ lost[: len(x) - 1] > 0.0] = np.nan
         return out
-
-
-def _turned(x: Array, y: Array, heading: Array) -> tuple[Array, Array]:
-    """Forward and left parts of pool-frame components."""
-    cos, sin = np.cos(heading), np.sin(heading)
-    return x * cos + y * sin, y * cos - x * sin

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_sysid.dataset.grid import in_base_link
 from fish_sysid.diagnosis.symmetry.finding import FEW_TRIALS, SymmetryFinding, SymmetryTest
 from fish_sysid.diagnosis.symmetry.regression import Rows, judge
 from fish_sysid.diagnosis.symmetry.stroke_means import StrokeMeans
@@ -75,9 +76,8 @@ def block_diagonal(surge: Array, sway: Array) -> Array:
 
 def in_body_frame(trial: StrokeMeans, velocity: Array) -> Array:
     """Surge, then sway (2C,) of pool-frame velocities (C, 2)."""
-    cos, sin = np.cos(trial.pose[:, 2]), np.sin(trial.pose[:, 2])
     x, y = velocity.T
-    return np.concatenate([x * cos + y * sin, y * cos - x * sin])
+    return np.concatenate(in_base_link(x, y, trial.pose[:, 2]))
 
 
 def carried(trial: StrokeMeans) -> Array:
