@@ -272,7 +272,7 @@ def test_a_change_is_added_to_what_the_robot_has() -> None:
 
     robot = Robot().with_effect("current", x=0.01, y=0.0)
     values = {"x": Estimate(0.03, 0.001, "m/s"), "y": Estimate(-0.02, 0.001, "m/s")}
-    member = Member("current", 1.0, 10.0, 0.5, Refitted(values, "", np.zeros(3)))
+    member = Member("current", 1.0, 0.5, Refitted(values, "", np.zeros(3)))
     changed = with_change(robot, member)
     assert changed.effects["current"]["x"] == pytest.approx(0.04)
     assert changed.effects["current"]["y"] == pytest.approx(-0.02)
@@ -291,7 +291,7 @@ def test_the_sentence_says_numbers_and_what_is_left() -> None:
 
     values = {"factor": Estimate(0.71, 0.011, "1")}
     named = Named(
-        (Member("rudder_gain", 1.0, 9.0, 0.5, Refitted(values, "", np.zeros(3))),), "", 9.0, 1.0
+        (Member("rudder_gain", 1.0, 0.5, Refitted(values, "", np.zeros(3))),), "", 9.0, 1.0
     )
     change = Change("changed", p_value=0.002, named=(named,), remainder_p_value=0.4)
     assert "rudder_gain (factor 0.71 ± 0.011) (p = 0.002)" in sentence(change)
@@ -549,7 +549,7 @@ def test_the_gyro_has_a_second_opinion_on_timing_alone() -> None:
 
 def _named(first: str, **members: float) -> Named:
     none = Refitted({}, "", np.zeros(3))
-    made = tuple(Member(name, p, 1.0, 0.5, none) for name, p in members.items())
+    made = tuple(Member(name, p, 0.5, none) for name, p in members.items())
     return Named(made, family_of(first), 1.0, 0.1)
 
 

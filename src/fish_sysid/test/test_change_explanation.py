@@ -45,7 +45,7 @@ SPREADS = np.array([np.tile([1.0, -1.0], TRIALS // 2), np.repeat([1.0, -1.0], TR
 def judged(name: str, gain: float, spread: float = 1.0) -> Judged:
     """Gains over trials that go their own way for names of odd and even length."""
     by_trial = gain + spread * SPREADS[len(name) % 2]
-    return Judged((name, 0), gain, 0.4, by_trial, np.ones(1), np.eye(1), gain, 1.0)
+    return Judged((name, 0), gain, by_trial, np.ones(1), np.eye(1), gain, 1.0)
 
 
 def contender(name: str, gain: float, remainder: float, rarity: float = 5.0) -> Contender:
@@ -299,7 +299,7 @@ FLOW = {"x": 0.05, "y": 0.0}  # m/s
 def change() -> Change:
     """Water that moves in NEW alone, found by the gyro's answer as it were: without a p-value of the rest."""
     values = {k: Estimate(v, 0.001, "m/s") for k, v in FLOW.items()}
-    member = Member("current", 1.0, 10.0, float("nan"), Refitted(values, "", np.zeros(3)))
+    member = Member("current", 1.0, float("nan"), Refitted(values, "", np.zeros(3)))
     return Change(
         "changed", p_value=0.002, look="mean motion", named=(Named((member,), "", 10.0, 1.0),), remainder_p_value=0.4,
         robot=fish(), old=swim(fish(), duration=8.0), new=swim(fish(current=FLOW), duration=8.0, seed=1),

@@ -8,6 +8,7 @@ Where the likelihood cannot be asked they are effects of the answer. Where it wa
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ import numpy as np
 from fish_sysid.diagnosis.corrected_model import asked_by_predictions
 from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.result import Diagnosis
+from fish_sysid.diagnosis.symmetry.finding import Estimate
+from fish_sysid.diagnosis.symmetry.outcome import nowhere, parameters_entry
 from fish_sysid.diagnosis.vocabulary import family_of, kind_of
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.parametrization import effect_class
@@ -23,18 +26,16 @@ from fish_sysid.estimation.parametrization import effect_class
 def effect_parameters(fit: Fit, name: str) -> dict[str, dict[str, Any]]:
     """Values, standard errors and units of an effect's parameters."""
     values, errors = fit.values, fit.standard_errors
-    return {
-        key: {
-            "value": values[f"{name}.{key}"],
-            "std": errors[f"{name}.{key}"],
-            "unit": parameter.unit,
+    effect = fit.hypothesis.effect(name)
+    return parameters_entry(
+        {
+            key: Estimate(values[f"{name}.{key}"], errors[f"{name}.{key}"], parameter.unit)
+            for key, parameter in effect.parameters.items()
         }
-        for key, parameter in fit.hypothesis.effect(name).parameters.items()
-    }
+    )
 
 
 Entry = dict[str, Any]
-NOT_A_NUMBER = float("nan")
 
 
 def prediction_entries(d: Diagnosis) -> list[Entry]:
@@ -79,7 +80,7 @@ def _effect(d: Diagnosis, asked: Named, share: float) -> Entry:
     entry, table = _entry(d, asked), d.task.robot.table
     name, own = asked.step.name, entry["parameters"]
     probability = (1.0 - asked.step.p_value) / (1 + len(asked.rivals))
-    entry["evidence"] |= {"log_likelihood_gain": NOT_A_NUMBER, "probability": probability}
+    entry["evidence"] |= {"log_likelihood_gain": math.nan, "probability": probability}
     members = [
         (name, own),
         *((rival, _values(rival, table, v)) for rival, v in asked.rivals.items()),
@@ -96,14 +97,13 @@ def _effect(d: Diagnosis, asked: Named, share: float) -> Entry:
         "family": {"name": family_of(name), "members": family}
         if asked.rivals
         else {"name": "", "members": []},
-        "where": {"dof": {}, "covariates": [], "time": [], "place": []},
+        "where": nowhere(),
     }
 
 
 def _values(name: str, table: Any, values: dict[str, float]) -> Entry:
     """Parameters of a rival, whose standard errors nobody worked out."""
-    units = {key: p.unit for key, p in effect_class(name, table).parameters.items()}
-    return {
-        key: {"value": value, "std": NOT_A_NUMBER, "unit": units[key]}
-        for key, value in values.items()
-    }
+    own = effect_class(name, table).parameters
+    return parameters_entry(
+        {key: Estimate(value, math.nan, own[key].unit) for key, value in values.items()}
+    )

@@ -18,12 +18,11 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.read import heading
 from fish_sysid.diagnosis.change.change import Change
 from fish_sysid.diagnosis.change.change_json import changed_robot
-from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.estimation.noise_estimation import initial_noise, usual_noise
 from fish_sysid.prediction.kept_noise import kept_noise
 from fish_sysid.prediction.prediction import predict
 from fish_sysid.prediction.stroke_average import stroke_mean
-from fish_sysid.reports.diagnosis_page import symmetry_table
+from fish_sysid.reports.diagnosis_page import numbers, symmetry_table
 from fish_sysid.reports.identify_page import MEASURED, SIMULATED
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -60,7 +59,7 @@ def _named(content: Content) -> Table:
         [
             entry["name"] if i == 0 else "",
             member["name"],
-            ", ".join(f"{key} {Estimate(**p)}" for key, p in member["parameters"].items()),
+            numbers(member["parameters"]),
             f"{member['probability']:.2f}",
             _p_value(member["remainder_p_value"]),
         ]

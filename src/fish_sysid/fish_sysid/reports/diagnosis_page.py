@@ -235,11 +235,15 @@ def symmetry_table(tests: Sequence[Mapping[str, Any]], title: str = "Symmetry te
     return Table(title, HEADER, [_row(test) for test in tests], NOTE)
 
 
+def numbers(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+    """`parameters` of diagnosis.json in a cell."""
+    return ", ".join(f"{key} {Estimate(**p)}" for key, p in parameters.items())
+
+
 def _row(test: Mapping[str, Any]) -> list[str]:
-    numbers = ", ".join(f"{key} {Estimate(**p)}" for key, p in test["parameters"].items())
     told = test["evidence"]
     gain = ""
     if told:
         gain = f"{told['left_out_log_gain']:.2f} ± {told['left_out_log_gain_std']:.2f}"
     answer = ": ".join(part for part in (test["status"], test["reason"]) if part)
-    return [test["name"], answer, numbers, gain, test["assumes"], test["needs"]]
+    return [test["name"], answer, numbers(test["parameters"]), gain, test["assumes"], test["needs"]]

@@ -8,7 +8,7 @@ and without. A parameter of the nominal model may have changed too; it competes 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -54,21 +54,18 @@ PROBES: dict[str, tuple[dict[str, float], ...]] = {
 
 @dataclass(frozen=True)
 class Candidate:
-    """One name with its columns in each trial; several forms where a place or a frequency is not known."""
+    """One name with its columns in each trial; of a place or frequency that is not known there is one for each tried."""
 
     name: str
     columns: tuple[Array, ...]  # of each trial (N, K)
-    form: Mapping[str, float]  # parameters that the columns do not vary
 
 
 def written_down(days: Sequence[Swim]) -> list[Candidate]:
     """Candidates that need no simulation."""
-    forms: list[tuple[str, dict[str, float], list[Array]]] = [
-        (name, {}, [column(swim) for swim in days]) for name, column in COLUMNS.items()
-    ]
-    forms += [("tether", {"x": x, "y": y}, [_tether(s, x, y) for s in days]) for x, y in TETHERS]
-    forms += [("sloshing", {"frequency": f}, [_sloshing(s, f) for s in days]) for f in WAVES]
-    return [Candidate(name, tuple(columns), form) for name, form, columns in forms]
+    forms = [(name, [column(swim) for swim in days]) for name, column in COLUMNS.items()]
+    forms += [("tether", [_tether(swim, x, y) for swim in days]) for x, y in TETHERS]
+    forms += [("sloshing", [_sloshing(swim, f) for swim in days]) for f in WAVES]
+    return [Candidate(name, tuple(columns)) for name, columns in forms]
 
 
 def simulated(
@@ -95,7 +92,7 @@ def simulated(
     if drags:
         columns[PARAMETER + DRAGS] = drags
     return own, [
-        Candidate(name, tuple(np.column_stack(trial) for trial in zip(*found, strict=True)), {})
+        Candidate(name, tuple(np.column_stack(trial) for trial in zip(*found, strict=True)))
         for name, found in columns.items()
     ]
 

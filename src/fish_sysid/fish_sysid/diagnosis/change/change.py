@@ -9,8 +9,10 @@ from dataclasses import dataclass, field
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.change.naming import mean_gain
 from fish_sysid.diagnosis.change.strength import Refitted
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
+from fish_sysid.diagnosis.vocabulary import family_of
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,6 @@ class Member:
 
     name: str
     probability: float
-    gain: float  # nats per left-out trial of NEW
     remainder_p_value: float  # of the swap test once it is taken out
     refitted: Refitted
 
@@ -30,8 +31,14 @@ class Named:
 
     members: tuple[Member, ...]
     family: str  # "" where it stands alone
-    gain: float
-    gain_std: float
+    gain: float  # nats per left-out trial of NEW, mean
+    gain_std: float  # standard error of that mean
+
+    @classmethod
+    def of(cls, members: tuple[Member, ...]) -> Named:
+        """The change that these members explain, with the family and the gain of the best."""
+        best = members[0]
+        return cls(members, family_of(best.name), *mean_gain(best.refitted.by_trial))
 
     @property
     def name(self) -> str:

@@ -4,18 +4,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis.change.change import Change, Member, Named
 from fish_sysid.diagnosis.next_experiment import next_experiment
-from fish_sysid.diagnosis.symmetry.outcome import stated, symmetry_entry, with_findings
+from fish_sysid.diagnosis.symmetry.outcome import (
+    nowhere,
+    parameters_entry,
+    stated,
+    symmetry_entry,
+    with_findings,
+)
 from fish_sysid.diagnosis.vocabulary import kind_of, separating
 from fish_sysid.estimation.parametrization import effect_class
 
 Entry = dict[str, Any]
-NOT_A_NUMBER = float("nan")
 SURE = 0.9  # probability from which one member of a family is named alone
 LEAST_SAID = 0.001  # p-value
 SURVIVES = 0.05  # p-value of a remainder above which it looks like exchanged trials
@@ -47,7 +53,7 @@ def answer(change: Change) -> Entry:
             "suspects": list(change.suspects),
             "refused": list(change.refused),
         },
-        "unexplained": {"share": NOT_A_NUMBER, "where": {}, "description": remainder(change)},
+        "unexplained": {"share": math.nan, "where": {}, "description": remainder(change)},
         "next_experiment": _next_experiment(change),
         "sentence": sentence(change),
         "left_out": list(change.left_out),
@@ -60,9 +66,7 @@ def verdict(change: Change) -> str:
         return "no_mismatch" if change.verdict == "unchanged" else "unexplained"
     if not change.named:
         return "unexplained"
-    kinds = {
-        kind_of(named.name) if named.name != "imu_latency" else "sensor" for named in change.named
-    }
+    kinds = {kind_of(named.name) for named in change.named}
     return "missing_physics" if "physics" in kinds else "sensor_or_actuator"
 
 
@@ -132,21 +136,20 @@ def _words(named: Named) -> str:
 
 def _effect(named: Named) -> Entry:
     first = named.members[0]
-    kind = "sensor" if first.name == "imu_latency" else kind_of(first.name)
     return {
         "name": first.name,
-        "kind": kind,
+        "kind": kind_of(first.name),
         "equation": effect_class(first.name).equation,
-        "parameters": _parameters(first),
+        "parameters": parameters_entry(first.refitted.parameters),
         "evidence": {
             "basis": "baseline",
-            "log_likelihood_gain": NOT_A_NUMBER,
+            "log_likelihood_gain": math.nan,
             "left_out_gain": named.gain,
             "left_out_gain_std": named.gain_std,
-            "p_value": NOT_A_NUMBER,
+            "p_value": math.nan,
             "probability": first.probability,
         },
-        "share": NOT_A_NUMBER,
+        "share": math.nan,
         "rivals": [{"name": m.name, "probability": m.probability} for m in named.members[1:]],
         "family": {
             "name": named.family,
@@ -154,20 +157,13 @@ def _effect(named: Named) -> Entry:
                 {
                     "name": m.name,
                     "probability": m.probability,
-                    "parameters": _parameters(m),
+                    "parameters": parameters_entry(m.refitted.parameters),
                     "remainder_p_value": m.remainder_p_value,
                 }
                 for m in named.members
             ],
         },
-        "where": {"dof": {}, "covariates": [], "time": [], "place": []},
-    }
-
-
-def _parameters(member: Member) -> Entry:
-    return {
-        key: {"value": float(p.value), "std": float(p.std), "unit": p.unit}
-        for key, p in member.refitted.parameters.items()
+        "where": nowhere(),
     }
 
 

@@ -24,7 +24,7 @@ A fish that is mirror-symmetric and swims straight turns and slips at the stroke
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -177,6 +177,12 @@ def swims(experiment: Experiment) -> tuple[Swim, ...]:
         for means in stroke_means(alone):
             found.append(_swim(name, alone, means))
     return tuple(found)
+
+
+def same_trials(days: Sequence[Swim], experiment: Experiment) -> tuple[Swim, ...]:
+    """The swims of the trials of `days` in other recordings of them."""
+    names = {swim.name for swim in days}
+    return tuple(swim for swim in swims(experiment) if swim.name in names)
 
 
 def _swim(name: str, alone: Experiment, means: StrokeMeans) -> Swim:

@@ -14,7 +14,7 @@ from fish_sysid.dataset.camera import align, moved_back
 from fish_sysid.dataset.experiment import Experiment, joined
 from fish_sysid.dataset.read import LESS
 from fish_sysid.diagnosis.change.change import Change
-from fish_sysid.diagnosis.change.channels import Swim, swims
+from fish_sysid.diagnosis.change.channels import Swim, same_trials
 from fish_sysid.diagnosis.change.comparable import (
     NotComparableError,
     check_counts,
@@ -177,9 +177,8 @@ def _as_passed_on(
     """NEW with its commands as the changed servo passed them on, and the swims of these trials."""
     first = servo.named.members[0]
     (value,) = first.refitted.parameters.values()
-    kept = {swim.name for swim in days}
     passed = with_servo(new, first.name, value.value)
-    return passed, tuple(swim for swim in swims(passed) if swim.name in kept)
+    return passed, same_trials(days, passed)
 
 
 def days_of(olds: Sequence[Experiment], kept: Sequence[str], new: int) -> list[int]:

@@ -17,7 +17,7 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.candidates import PARAMETER
 from fish_sysid.diagnosis.change.change import Member, Named
 from fish_sysid.diagnosis.change.channels import Swim
-from fish_sysid.diagnosis.change.naming import SPECIAL_CASE, Judged, apart, mean_gain, tie
+from fish_sysid.diagnosis.change.naming import SPECIAL_CASE, Judged, apart, tie
 from fish_sysid.diagnosis.change.rows import TrialRows
 from fish_sysid.diagnosis.change.servos import OldAnswer
 from fish_sysid.diagnosis.change.shared_fit import Key, Regression
@@ -102,18 +102,10 @@ def next_change(
         return family_alone(swapped, judged)
     alike, weights = weighed(found, impossible)
     members = tuple(
-        Member(
-            one.judged.name,
-            weight,
-            one.refitted.by_trial.mean(),
-            one.remainder,
-            one.refitted,
-        )
+        Member(one.judged.name, weight, one.remainder, one.refitted)
         for one, weight in zip(alike, weights, strict=True)
     )
-    best = alike[0]
-    gain = mean_gain(best.refitted.by_trial)
-    return Named(members, family_of(best.judged.name), *gain), best.judged.key
+    return Named.of(members), alike[0].judged.key
 
 
 def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named, Key] | None:
@@ -138,12 +130,10 @@ def family_alone(swapped: Swapped, judged: Mapping[str, Judged]) -> tuple[Named,
     kin.sort(key=lambda one: -weight[one.name])
     total = 2.0 * sum(weight.values())
     members = tuple(
-        Member(
-            one.name, weight[one.name] / total, one.gain, math.nan, Refitted({}, "", one.by_trial)
-        )
+        Member(one.name, weight[one.name] / total, math.nan, Refitted({}, "", one.by_trial))
         for one in kin
     )
-    return Named(members, family, *mean_gain(kin[0].by_trial)), kin[0].key
+    return Named.of(members), kin[0].key
 
 
 def weighed(

@@ -19,7 +19,7 @@ from fish_sysid.diagnosis.change.candidates import (
     typical,
 )
 from fish_sysid.diagnosis.change.change import Change, Named
-from fish_sysid.diagnosis.change.channels import swims
+from fish_sysid.diagnosis.change.channels import same_trials
 from fish_sysid.diagnosis.change.contenders import Case, next_change
 from fish_sysid.diagnosis.change.naming import Judged, judge_all, strength_of
 from fish_sysid.diagnosis.change.rows import look, trial_rows
@@ -182,8 +182,7 @@ def with_its_commands(
 
 def with_new(case: Case, new: Experiment) -> Case:
     """The case with other recordings of NEW."""
-    kept = {swim.name for swim in case.days}
-    days = tuple(swim for swim in swims(new) if swim.name in kept)
+    days = same_trials(case.days, new)
     rows = case.answer.added(trial_rows(case.robot, new, days, NAMES), days, new)
     rows = look(rows, case.channels)
     return replace(case, fit=regression(case.old, rows), rows=rows, new=new, days=days)

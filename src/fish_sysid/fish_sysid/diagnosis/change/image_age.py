@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 from fish_sysid.dataset.camera import DELAYS, STEP, align, fine_delay, misfits
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.change import Member, Named
-from fish_sysid.diagnosis.change.naming import mean_gain
 from fish_sysid.diagnosis.change.permutation_test import SETS, rank, sets_in_place
 from fish_sysid.diagnosis.change.strength import Refitted
 from fish_sysid.diagnosis.symmetry.finding import Estimate
-from fish_sysid.diagnosis.vocabulary import family_of
 
 Array = NDArray[np.float64]
 
@@ -52,11 +50,8 @@ def age_change(old: Experiment, new: Experiment) -> AgeChange | None:
     p_value = float(rank(np.array([_apart(ages, rows) for rows in sets]))[0])
     gains = _gains(squares[first:], before, of_new)
     change = Estimate(of_new - before, float(np.hypot(error, own)), "s")
-    member = Member(
-        NAME, 1.0, float(gains.mean()), float("nan"), Refitted({"delay": change}, "", gains)
-    )
-    named = Named((member,), family_of(NAME), *mean_gain(gains))
-    return AgeChange(p_value, named, of_new - before)
+    member = Member(NAME, 1.0, np.nan, Refitted({"delay": change}, "", gains))
+    return AgeChange(p_value, Named.of((member,)), of_new - before)
 
 
 def _ages(squares: Array) -> Array:

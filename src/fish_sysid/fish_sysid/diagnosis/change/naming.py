@@ -52,7 +52,6 @@ class Judged:
 
     key: Key
     gain: float  # nats per left-out trial, mean
-    std: float  # standard error of that mean
     by_trial: Array  # (M,)
     strengths: Array  # (K,) in typical ones
     covariance: Array  # (K, K), by the jackknife over trials, of NEW less OLD
@@ -113,9 +112,8 @@ def _judge(
     values = np.array([b[-K:] for b, _ in left_out])
     spread = values - values.mean(axis=0)
     covariance = fit.of_difference * (len(new) - 1) / len(new) * spread.T @ spread
-    std = float(gains.std(ddof=1) / np.sqrt(len(gains))) if len(gains) > 1 else np.inf
     return Judged(
-        key, float(gains.mean()), std, gains, fitter.coefficients[-K:], covariance,
+        key, float(gains.mean()), gains, fitter.coefficients[-K:], covariance,
         (fitter.best - start) / dispersion, dispersion,
     )  # fmt: skip
 

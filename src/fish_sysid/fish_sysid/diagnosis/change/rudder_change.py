@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fish_sim.model import DT
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.change import Member, Named
-from fish_sysid.diagnosis.change.naming import apart, mean_gain, tie
+from fish_sysid.diagnosis.change.naming import apart, tie
 from fish_sysid.diagnosis.change.permutation_test import SETS, rank, sets_in_place
 from fish_sysid.diagnosis.change.servos import ANSWERED, SERVOS, lagged
 from fish_sysid.diagnosis.change.strength import Refitted
@@ -27,7 +27,6 @@ from fish_sysid.diagnosis.change.swap_test import Index
 from fish_sysid.diagnosis.degenerate import degenerate
 from fish_sysid.diagnosis.symmetry.finding import Estimate
 from fish_sysid.diagnosis.symmetry.regression import jackknife
-from fish_sysid.diagnosis.vocabulary import family_of
 
 Array = NDArray[np.float64]
 
@@ -43,10 +42,12 @@ class Answered:
     """What one servo explains of NEW."""
 
     name: str
-    gains: (
-        Array  # (M,) log of the mean square misfit without over that with it, each trial left out
-    )
+    gains: Array  # (M,) log of mean square misfit without over that with it, each trial left out
     estimate: Estimate
+
+    @property
+    def parameters(self) -> dict[str, Estimate]:
+        return {SERVOS[self.name].parameter: self.estimate}
 
 
 @dataclass(frozen=True)
@@ -201,24 +202,20 @@ def rudder_change(old: Experiment, new: Experiment, strata: Sequence[int]) -> Ru
     answer = step_response(old, new, strata)
     if answer is None:
         return None
-    real = [s for s in answer.servos if not degenerate(s.name, _values(s))]
+    real = [
+        s
+        for s in answer.servos
+        if not degenerate(s.name, {k: e.value for k, e in s.parameters.items()})
+    ]
     if not real or real[0].gains.mean() <= 0.0:
         return None
     alike = [s for s in real if not apart(real[0].gains, s.gains)]
     weights = [tie(real[0].gains, s.gains) for s in alike]
     members = tuple(
-        Member(
-            s.name,
-            weight / sum(weights),
-            float(s.gains.mean()),
-            float("nan"),
-            Refitted({SERVOS[s.name].parameter: s.estimate}, "", s.gains),
-        )
+        Member(s.name, weight / sum(weights), np.nan, Refitted(s.parameters, "", s.gains))
         for s, weight in zip(alike, weights, strict=True)
     )
-    return RudderChange(
-        answer.p_value, Named(members, family_of(members[0].name), *mean_gain(real[0].gains))
-    )
+    return RudderChange(answer.p_value, Named.of(members))
 
 
 def with_second_opinion(named: Sequence[Named], servo: RudderChange | None) -> list[Named]:
@@ -233,16 +230,10 @@ def with_second_opinion(named: Sequence[Named], servo: RudderChange | None) -> l
 
 def _both(by_motion: Named, by_gyro: Named) -> Named:
     """One change with the members of both; where both have one, its numbers are those by the gyro."""
-    half: dict[str, Member] = {}
+    found: dict[str, Member] = {}
     for member in (*by_gyro.members, *by_motion.members):
-        had = half.get(member.name, member)
-        share = 0.5 * member.probability + (
-            half[member.name].probability if member.name in half else 0.0
-        )
-        half[member.name] = replace(had, probability=share)
-    members = sorted(half.values(), key=lambda m: -m.probability)
+        had = found.get(member.name, replace(member, probability=0.0))
+        share = 0.5 * member.probability + had.probability
+        found[member.name] = replace(had, probability=share)
+    members = sorted(found.values(), key=lambda m: -m.probability)
     return replace(by_motion, members=tuple(members))
-
-
-def _values(answered: Answered) -> dict[str, float]:
-    return {SERVOS[answered.name].parameter: answered.estimate.value}

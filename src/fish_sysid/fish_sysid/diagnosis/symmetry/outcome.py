@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.synthetic import with_current
-from fish_sysid.diagnosis.symmetry.finding import Evidence, SymmetryFinding
+from fish_sysid.diagnosis.symmetry.finding import Estimate, Evidence, SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import GIVEN
 from fish_sysid.diagnosis.vocabulary import candidates, kind_of
 from fish_sysid.estimation.parametrization import EffectTable, effect_class
@@ -51,7 +53,6 @@ def in_still_water(experiment: Experiment, findings: Sequence[SymmetryFinding]) 
 
 Entry = dict[str, Any]
 
-NOT_A_NUMBER = float("nan")
 CONTAINED_IN = {"current": "nonuniform_current"}  # a flow that varies has a mean
 
 
@@ -67,7 +68,7 @@ def symmetry_entry(findings: Iterable[SymmetryFinding]) -> list[Entry]:
             "assumes": f.assumes,
             "needs": f.needs,
             "stands_alone": f.stands_alone,
-            "parameters": _parameters(f),
+            "parameters": parameters_entry(f.parameters),
             "evidence": f.evidence and _evidence(f.evidence),
         }
         for f in findings
@@ -101,7 +102,7 @@ def with_symmetry(
         for entry in same:
             entry["evidence"]["symmetry"] = {
                 "name": finding.name,
-                "parameters": _parameters(finding),
+                "parameters": parameters_entry(finding.parameters),
                 **(_evidence(finding.evidence) if finding.evidence else {}),
             }
     return entries
@@ -110,34 +111,34 @@ def with_symmetry(
 def _effect(finding: SymmetryFinding, table: EffectTable) -> Entry:
     """An effect by symmetry alone; what only a model of the fish tells is absent."""
     effect = effect_class(finding.name, table)
-    absent = {
-        key: {"value": p.value, "std": NOT_A_NUMBER, "unit": p.unit}
-        for key, p in effect.parameters.items()
-    }
-    told = finding.evidence or Evidence(NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER)
+    absent = {key: Estimate(p.value, math.nan, p.unit) for key, p in effect.parameters.items()}
+    told = finding.evidence or Evidence(math.nan, math.nan, math.nan)
     return {
         "name": finding.name,
         "kind": kind_of(finding.name, table),
         "equation": effect.equation,
         "statement": finding.statement,
-        "parameters": {**absent, **_parameters(finding)},
+        "parameters": parameters_entry({**absent, **finding.parameters}),
         "evidence": {
             "basis": "symmetry",
-            "log_likelihood_gain": NOT_A_NUMBER,
+            "log_likelihood_gain": math.nan,
             "probability": 1.0 - told.p_value,
             **_evidence(told),
         },
-        "share": NOT_A_NUMBER,
+        "share": math.nan,
         "rivals": [],
-        "where": {"dof": {}, "covariates": [], "time": [], "place": []},
+        "where": nowhere(),
     }
 
 
-def _parameters(finding: SymmetryFinding) -> Entry:
-    return {
-        key: {"value": p.value, "std": p.std, "unit": p.unit}
-        for key, p in finding.parameters.items()
-    }
+def nowhere() -> Entry:
+    """`where` of an effect that no model of the fish locates."""
+    return {"dof": {}, "covariates": [], "time": [], "place": []}
+
+
+def parameters_entry(parameters: Mapping[str, Estimate]) -> Entry:
+    """`parameters` of an entry: value, std and unit by name."""
+    return {key: asdict(estimate) for key, estimate in parameters.items()}
 
 
 def _evidence(told: Evidence) -> Entry:
