@@ -120,9 +120,8 @@ def identify(
     train, held = split(len(experiment.names), hold_out)
     moved = moved_back(experiment, lag.delay)
     training = moved.select(train)
-    noise = noise or usual_noise(
-        training
-    )  # what trials left out say of the sensors takes no part either
+    # what trials left out say of the sensors takes no part either
+    noise = noise or usual_noise(training)
     report("can the model follow the fish?")
     why, fitted = CANNOT_FOLLOW, None
     if misfit(training, robot, noise, free) <= TOO_FAR:

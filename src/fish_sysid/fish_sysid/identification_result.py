@@ -40,9 +40,8 @@ class Identification:
     judged: Predictions  # of the held-out trials, or of the only trial
     estimates: Estimates  # of the training trials
     errors: dict[str, ErrorSizes]  # "start", "identified", then the baselines that could be fitted
-    statements: tuple[
-        str, ...
-    ]  # what is wrong with the data or the result, and what can still be said
+    # what is wrong with the data or the result, and what can still be said
+    statements: tuple[str, ...]
     seconds: float
     camera_delay: float = 0.0  # s, taken out of all trials above
     imu_delay: float = 0.0  # s, taken out of all trials above

@@ -36,9 +36,8 @@ SENSORS = (
 SUMS = ("log_likelihood", "samples", "gradient", "normal", "whitened")
 MOMENTS = ("predicted", "predicted_P", "filtered", "filtered_P", "transition")
 
-Pass = Callable[
-    [Filter], FilterResult
-]  # with the problem, the noise and the memory of a NumPy filter
+# with the problem, the noise and the memory of a NumPy filter
+Pass = Callable[[Filter], FilterResult]
 
 
 def filter_errors(structure: Structure, method: str, width: int, run: Pass) -> dict[str, float]:

@@ -61,9 +61,8 @@ class Filter:
         Q = np.zeros((n, n))
         wrench = slice(self.nx, self.nx + 3)
         Q[wrench, wrench] = np.diag(np.square(self.noise.wrench) * (1.0 - decay**2))
-        Q[range(2 * self.nq), range(2 * self.nq)] = (
-            1e-14  # keeps the covariance regular on the constraint
-        )
+        # keeps the covariance regular on the constraint
+        Q[range(2 * self.nq), range(2 * self.nq)] = 1e-14
         for k in range(T):
             if history is not None:
                 history.predicted[k], history.predicted_P[k] = xi, P
@@ -203,9 +202,8 @@ class Filter:
         forward, left = ax * cos + ay * sin, ay * cos - ax * sin
         h = np.stack([s.gyro_scale * xi[:, nq + 2], forward, left], axis=1) + xi[:, nx + 3 :]
         t_x, t_y = tangent[:, :, nq], tangent[:, :, nq + 1]
-        turn = np.concatenate(
-            [np.zeros((M, nx + 3)), D[:, 2]], axis=1
-        )  # change of heading along each direction
+        # change of heading along each direction
+        turn = np.concatenate([np.zeros((M, nx + 3)), D[:, 2]], axis=1)
         turn[:, 2] = 1.0
         spin = np.concatenate([np.zeros((M, nx + 3)), D[:, nq + 2]], axis=1)
         spin[:, nq + 2] = 1.0

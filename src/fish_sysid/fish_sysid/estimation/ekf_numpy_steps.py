@@ -60,9 +60,8 @@ def update(
     use = use & (np.sum(white**2, axis=1) < gate)
     e = np.where(use[:, None], e, 0.0)
     white = np.where(use[:, None], white, 0.0)
-    J = np.where(
-        use[:, None, None], -np.linalg.solve(L, dh), 0.0
-    )  # derivative of the whitened innovation
+    # derivative of the whitened innovation
+    J = np.where(use[:, None, None], -np.linalg.solve(L, dh), 0.0)
     K = np.where(
         use[:, None, None], np.linalg.solve(S, PHt.transpose(0, 2, 1)).transpose(0, 2, 1), 0.0
     )

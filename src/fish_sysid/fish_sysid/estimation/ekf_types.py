@@ -28,11 +28,8 @@ from fish_sysid.estimation.thresholds import OPEN_GATE
 
 Array = NDArray[np.float64]
 
-WRENCH = (
-    "disturbance.surge",
-    "disturbance.sway",
-    "disturbance.yaw",
-)  # parameters of the model the filter drives
+# parameters of the model the filter drives
+WRENCH = ("disturbance.surge", "disturbance.sway", "disturbance.yaw")
 ROWS = ("gyro", "accel_forward", "accel_left", "camera_x", "camera_y", "camera_heading")
 ENCODER_ROW = 6
 
@@ -82,9 +79,8 @@ class SensorModel:
     gyro_scale: float = 1.0  # measured over true
     imu_misalignment: float = 0.0  # rad, IMU axes counter-clockwise from base_link
     free: dict[str, int] = field(default_factory=dict)
-    slope: dict[str, float] = field(
-        default_factory=dict
-    )  # d field / d free parameter, 1 where not given
+    # d field / d free parameter, 1 where not given
+    slope: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

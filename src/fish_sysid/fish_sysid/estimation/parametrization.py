@@ -239,9 +239,8 @@ class Parametrization:
         robot = self.hypothesis.robot
         parameters, effects = dict(robot.parameters), {k: dict(v) for k, v in robot.effects.items()}
         sensors = {k: dict(v) for k, v in robot.sensors.items()}
-        values = np.clip(
-            self.decode(theta), self.lowest, self.highest
-        )  # rounding may leave a range's edge
+        # rounding may leave a range's edge
+        values = np.clip(self.decode(theta), self.lowest, self.highest)
         for name, value in zip(self.hypothesis.free, values, strict=True):
             if "." not in name:
                 parameters[name] = float(value)

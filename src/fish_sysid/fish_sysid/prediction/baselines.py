@@ -104,9 +104,8 @@ def _solve(rows: list[Array], targets: list[Array]) -> Array:
     return theta
 
 
-Advance = Callable[
-    [Array, Array, Array, Array], Array
-]  # (y_k, y_k-1, w_k+1, w_k), each (S, .) -> y_k+1 (S, 3)
+# (y_k, y_k-1, w_k+1, w_k), each (S, .) -> y_k+1 (S, 3)
+Advance = Callable[[Array, Array, Array, Array], Array]
 
 
 def constant() -> Advance:

@@ -27,14 +27,8 @@ NAMES = {
     "arx": "linear ARX",
     "bilinear": "bilinear",
 }
-STATE = (
-    "x",
-    "y",
-    "heading",
-    "u",
-    "v",
-    "r",
-)  # m, m, rad in the pool's frame; m/s, m/s, rad/s in base_link
+# m, m, rad in the pool's frame; m/s, m/s, rad/s in base_link
+STATE = ("x", "y", "heading", "u", "v", "r")
 COLUMNS = (
     "trial",
     "time",
@@ -167,9 +161,8 @@ def _rows(predictions: Predictions) -> Iterator[list[str]]:
     for m, frames in enumerate(experiment.frames):
         seen, starts = predictions.seen(m), predictions.start[predictions.trial == m] * DT
         measured = stroke_mean(frames.t, frames.t)(frames.pose)
-        taken = (
-            frames.t - predictions.sensors.camera_latency
-        )  # earlier ones show the estimate, no prediction
+        # earlier ones show the estimate, no prediction
+        taken = frames.t - predictions.sensors.camera_latency
         for s, start in enumerate(starts):
             own = np.flatnonzero((taken >= start) & (taken < start + predictions.horizon))
             known = np.isfinite(seen[:, s].sum(axis=1))

@@ -37,9 +37,8 @@ class Servo:
     unit: str
     act: Callable[[Array, float], Array]
     neutral: float  # changes nothing
-    tried: Array = field(
-        default_factory=lambda: np.zeros(0)
-    )  # (V,) that the gyro's answer is asked for
+    # (V,) that the gyro's answer is asked for
+    tried: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def lagged(rudder: Array, time: float) -> Array:

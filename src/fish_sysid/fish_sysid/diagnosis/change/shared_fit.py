@@ -48,9 +48,8 @@ class Regression:
     at: dict[Key, NDArray[np.int64]]  # of a candidate's columns
     noise: Array  # (CHANNELS,)
     rest: Array  # (M,) mean square of what the shared columns leave, in units of noise
-    rows: tuple[
-        tuple[Array, Array, Array], ...
-    ]  # of NEW's trials: shared columns (N, S), measured, weights, all scaled
+    # of NEW's trials: shared columns (N, S), measured, weights, all scaled
+    rows: tuple[tuple[Array, Array, Array], ...]
 
     @property
     def shared(self) -> int:
@@ -162,9 +161,8 @@ def _ridge(scaled: Sequence[tuple[Array, Array]], groups: Array) -> tuple[Array,
     for flexible, body, pool in RIDGES:
         prior = np.choose(groups.astype(np.int64), [flexible, 1.0 / body**2, 1.0 / pool**2, np.inf])
         rest = residuals(prior)
-        cost = float(
-            np.sort([huber_loss(e) for e in rest])[:-1].sum()
-        )  # all but the strangest trial
+        # all but the strangest trial
+        cost = float(np.sort([huber_loss(e) for e in rest])[:-1].sum())
         if best is None or cost < best[0]:
             best = cost, prior, rest
     assert best is not None

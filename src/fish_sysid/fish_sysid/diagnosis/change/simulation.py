@@ -26,10 +26,8 @@ from fish_sysid.prediction.stroke_average import stroke_mean
 
 Array = NDArray[np.float64]
 
-LARGEST_MEAN, LARGEST_AMPLITUDE = (
-    2.0,
-    20.0,
-)  # m/s or rad/s, and SI units; what exceeds it has diverged
+# m/s or rad/s, and SI units; what exceeds it has diverged
+LARGEST_MEAN, LARGEST_AMPLITUDE = 2.0, 20.0
 LANES = 240  # trials times variants of one pass: memory
 MOST_RESTARTS = 10  # of one trial
 BEFORE, AFTER = 0.3, 1.5  # s around a restart, in which the states say nothing

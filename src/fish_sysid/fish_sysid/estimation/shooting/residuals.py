@@ -138,9 +138,8 @@ class Scale:
     position: float = 0.004  # m
     heading: float = 0.03  # rad, by the camera
     orientation: float = 0.015  # rad, by the IMU
-    fading: float = (
-        np.inf
-    )  # s before a window's end at which a sample counts half: an old one says less of the end
+    # s before a window's end at which a sample counts half: an old one says less of the end
+    fading: float = np.inf
 
 
 @dataclass(frozen=True)

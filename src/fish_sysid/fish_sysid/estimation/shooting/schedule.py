@@ -37,11 +37,8 @@ from fish_sysid.prediction.prediction import WARM_UP, start_points
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-LADDER = (
-    (1.0, 1.0),
-    (5.0, 2.0),
-    (25.0, 3.0),
-)  # factors of the tail's stiffness, of masses and drags in sway
+# factors of the tail's stiffness, of masses and drags in sway
+LADDER = ((1.0, 1.0), (5.0, 2.0), (25.0, 3.0))
 LENGTH = 4.0  # s, of a window
 FIRST = PAST  # s, of the first window; before it the tail runs in
 COARSE, FINE = 2.0, 1.0  # windows and start points: one of so many

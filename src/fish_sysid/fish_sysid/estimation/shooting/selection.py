@@ -69,10 +69,8 @@ INTRINSIC = (
 )
 RANGE = "rudder_range"
 WIDEST = np.pi / 2  # rad, the largest range of a robot's file: no end
-BELOW = (
-    0.8,
-    0.95,
-)  # of the largest command: where an end that is tried starts, so that commands beyond it move it
+# of the largest command: where an end that is tried starts, so that commands beyond it move it
+BELOW = (0.8, 0.95)
 
 
 def choose(
