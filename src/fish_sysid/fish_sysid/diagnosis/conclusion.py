@@ -81,7 +81,7 @@ def shares(
 def held_out_density(
     held: Experiment, robot: Robot, given_noise: Noise, nominal: Fit, final: Fit
 ) -> dict[str, Array]:
-    """Log density per scalar measurement of each held-out trial: model as given, refitted, with effects."""
+    """Log density (M,) per scalar measurement of each held-out trial: model as given, refitted, with effects."""
     given = evaluate(nominal_hypothesis(robot, ()), np.zeros(0), held, given_noise)
     density = {}
     for name, fit in (("nominal", given), ("refitted", nominal), ("with_effects", final)):

@@ -75,7 +75,7 @@ def acting(force: MissingForce, scale: Array) -> NDArray[np.bool_]:
 
 
 def intervals(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """When an effect acts, interval by interval, with their shares of its impulse; the largest first."""
+    """When an effect acts, interval by interval, with their shares of its impulse in units of `scale` (3,); the largest first."""
     acts, s = acting(force, scale), np.nan_to_num(size(force, scale))
     rows: list[dict[str, Any]] = []
     for m, name in enumerate(force.names):
@@ -88,7 +88,7 @@ def intervals(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
 
 
 def regimes(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """Of every covariate the range that predicts best when an effect acts, by its F1; the best covariate first."""
+    """Of every covariate the range that predicts best when an effect acts, by its F1; the best first. scale: as in `size`."""
     acts, s = acting(force, scale).ravel(), size(force, scale).ravel()
     rows: list[dict[str, Any]] = []
     for name, values in force.covariates.items():
@@ -109,5 +109,5 @@ def regimes(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
 
 
 def f1(stated: NDArray[np.bool_], true: NDArray[np.bool_]) -> float:
-    """Harmonic mean of precision and recall."""
+    """Harmonic mean of precision and recall of samples (N,)."""
     return 2.0 * float((stated & true).sum()) / max(float(stated.sum() + true.sum()), 1.0)

@@ -102,7 +102,7 @@ def energy(force: MissingForce, scale: Array) -> Array:
 
 
 def time_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """The windows of 2 s that hold most of the missing force; the last one of a trial ends with it."""
+    """The windows of 2 s that hold most of the missing force, in units of `scale` (3,); the last one of a trial ends with it."""
     e, step = energy(force, scale), int(WINDOW / DT)
     total, lengths = np.nansum(e), np.isfinite(e).sum(axis=0)
     rows: list[dict[str, Any]] = [
@@ -119,7 +119,7 @@ def time_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
 
 
 def place_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
-    """The cells of the pool's map with most of the missing force."""
+    """The cells of the pool's map with most of the missing force, in units of `scale` (3,)."""
     e, x, y = (
         a.ravel() for a in (energy(force, scale), force.covariates["x"], force.covariates["y"])
     )
@@ -144,6 +144,7 @@ def place_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
 def covariate_shares(force: MissingForce, scale: Array) -> list[dict[str, Any]]:
     """For every covariate, the contiguous range of quantile bins in which the missing force is denser than on average.
 
+    scale (3,): units in which the force is added over the degrees of freedom.
     contrast: the densest bin's share of the force over its share of the samples. A covariate that rests at a value, as a rudder
     does, has fewer bins, and one of many samples.
     """

@@ -179,7 +179,7 @@ def starts_of(
     noise: Noise,
     strengths: Sequence[float] = STRENGTHS,
 ) -> list[Array]:
-    """theta of the base with a candidate at its best place, weak and strong where this leaves its strength open."""
+    """theta (K,) of the base with a candidate at its best place, weak and strong where this leaves its strength open."""
     place = best_place(base, name, experiment, noise)
     if place.keys() >= set(base.hypothesis.effect(name).strength):  # the place determines it
         strengths = strengths[:1]
@@ -187,7 +187,7 @@ def starts_of(
 
 
 def started(base: Fit, name: str, strength: float, place: Mapping[str, float]) -> Array:
-    """theta of the base with a candidate of this strength, in typical ones, at this place."""
+    """theta (K,) of the base with a candidate of this strength, in typical ones, at this place."""
     return extend(base.theta, base.hypothesis.with_effect(name), name, strength, place)
 
 

@@ -65,7 +65,10 @@ def anneal(
     stages: Stages,
     held: Sequence[str] = (),
 ) -> Fit:
-    """The optimum of the last stage, without gates; the stages end early where no noise of the sensors explains what is left."""
+    """The optimum of the last stage from theta (K,), without gates.
+
+    The stages end early where no noise of the sensors explains what is left.
+    """
     theta = theta.copy()
     moving = [i for i, name in enumerate(hypothesis.free) if name not in held]
     reduced = hypothesis.fixing(held, theta) if held else hypothesis

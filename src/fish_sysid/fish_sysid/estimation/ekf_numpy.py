@@ -227,7 +227,7 @@ class Filter:
     def _camera(
         self, xi: Array, offset: Array, rate: Array, D: Array
     ) -> tuple[Array, Array, Array]:
-        """Predicted camera pose at the grid point + offset, its Jacobian and derivatives."""
+        """Predicted camera pose (M, 3) at the grid point + offset (M,) [s], its Jacobian (M, 3, n) and derivatives (M, 3, K)."""
         nq, s = self.nq, self.sensors
         gain = np.array([s.camera_scale, s.camera_scale, 1.0])
         velocity = xi[:, nq : nq + 3] + offset[:, None] * rate[:, nq : nq + 3]

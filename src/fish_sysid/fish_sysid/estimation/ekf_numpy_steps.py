@@ -14,7 +14,7 @@ SERIES = 8  # terms of the matrix exponential, as in c/ekf.c
 
 
 def between(x0: Array, x1: Array, rate0: Array, rate1: Array, c: float) -> Array:
-    """Motion at a fraction c of the period from x0 to x1 with these rates at its ends: Hermite's cubic."""
+    """Motion (M, nx) at a fraction c of the period from x0 to x1 with these rates at its ends: Hermite's cubic."""
     bend = (1.0 - c) * DT * rate0 - c * DT * rate1
     blended: Array = x0 + (x1 - x0) * c * c * (3.0 - 2.0 * c) + c * (1.0 - c) * bend
     return blended
@@ -108,6 +108,7 @@ def _is_sound(S: Array) -> bool:
 
 
 def empty_history(T: int, M: int, n: int, memory: Array) -> History:
+    """Zeros, for T grid points of M trials with n states, and the memory (T + 1, M, NM)."""
     return History(
         np.zeros((T, M, n)),
         np.zeros((T, M, n, n)),

@@ -88,7 +88,7 @@ class Fit:
 def evaluate(
     hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise, keep: bool = False
 ) -> Fit:
-    """The hypothesis at theta, with score and information; keep: with what the smoother needs."""
+    """The hypothesis at theta (K,), with score and information; keep: with what the smoother needs."""
     parametrization = hypothesis.parametrization
     p, dp, sensors = parametrization.filter_inputs(theta)
     problem = Problem(experiment, parametrization.stepper, p, dp, sensors)
@@ -100,7 +100,7 @@ def evaluate(
 
 
 def log_prior(hypothesis: Hypothesis, theta: Array) -> float:
-    """Of theta, up to a constant."""
+    """Of theta (K,) in nats, up to a constant."""
     return -0.5 * float(np.sum((theta / hypothesis.parametrization.prior) ** 2))
 
 
@@ -161,6 +161,6 @@ def likelihoods(
 def log_posterior(
     hypothesis: Hypothesis, theta: Array, experiment: Experiment, noise: Noise
 ) -> float:
-    """Log likelihood of all trials plus log prior of theta; -inf where the filter diverges."""
+    """Log likelihood of all trials plus log prior of theta (K,) in nats; -inf where the filter diverges."""
     likelihood = float(likelihoods(hypothesis, theta, experiment, [noise])[0])
     return likelihood + log_prior(hypothesis, theta)

@@ -192,7 +192,7 @@ def extend(
 
 
 class Parametrization:
-    """theta <-> robot for one hypothesis."""
+    """theta (K,) <-> physical values (K,) of the free parameters <-> robot, for one hypothesis."""
 
     def __init__(self, hypothesis: Hypothesis) -> None:
         self.hypothesis = hypothesis

@@ -22,12 +22,12 @@ SEPARATE = 2.0
 
 
 def apart(best: Array, other: Array) -> bool:
-    """Whether the best predicts left-out trials (M,) clearly better."""
+    """Whether the best predicts left-out trials clearly better: nats (M,) on each."""
     return _lead(best, other) > SEPARATE
 
 
 def tie(best: Array, other: Array) -> float:
-    """Weight of a contender against the best one: 1 for equal gains, small for one that predicts worse."""
+    """Weight of a contender against the best one by nats (M,): 1 for equal gains, small for one that predicts worse."""
     return float(2.0 * norm.sf(max(_lead(best, other), 0.0)))
 
 
@@ -75,7 +75,7 @@ def judge_all(fit: Regression, taken: Sequence[Key] = ()) -> dict[str, Judged]:
     """Every candidate beside those `taken`, the best form of each."""
     new = range(fit.old, len(fit.names))
     base = _Fitter(fit, [i for k in taken for i in fit.at[k]])
-    without = [base.loss(m, *base.left_out(m)) for m in new]
+    without = [base.loss(m, base.left_out(m)) for m in new]
     found: dict[str, Judged] = {}
     dispersion = Gains(fit, taken).dispersion()
     for key, own in dispersion.items():
@@ -105,11 +105,9 @@ def _judge(
     own = [i for k in (*taken, key) for i in fit.at[k]]
     fitter, K = _Fitter(fit, own), len(fit.at[key])
     left_out = [fitter.left_out(m) for m in new]
-    gains = without - np.array(
-        [fitter.loss(m, *found) for m, found in zip(new, left_out, strict=True)]
-    )
+    gains = without - np.array([fitter.loss(m, b) for m, b in zip(new, left_out, strict=True)])
     gains /= dispersion
-    values = np.array([b[-K:] for b, _ in left_out])
+    values = np.array([b[-K:] for b in left_out])
     spread = values - values.mean(axis=0)
     covariance = fit.of_difference * (len(new) - 1) / len(new) * spread.T @ spread
     return Judged(
@@ -135,14 +133,14 @@ class _Fitter:
         self.coefficients = np.linalg.solve(self._G, self._h)
         self.best = 0.5 * float(self._h @ self.coefficients)
 
-    def left_out(self, m: int) -> tuple[Array, int]:
-        """Coefficients without NEW's trial m."""
+    def left_out(self, m: int) -> Array:
+        """Coefficients (S + K,) without NEW's trial m."""
         at = self._at
         G = self._G - self._fit.gram[m][np.ix_(at, at)]
-        return np.linalg.solve(G, self._h - self._fit.moment[m][at]), m
+        return np.linalg.solve(G, self._h - self._fit.moment[m][at])
 
-    def loss(self, m: int, b: Array, _: int) -> float:
-        """Half the weighted sum of squares of trial m."""
+    def loss(self, m: int, b: Array) -> float:
+        """Half the weighted sum of squares of trial m with coefficients (S + K,)."""
         at = self._at
         square = self._fit.square[m] - 2.0 * b @ self._fit.moment[m][at]
         return 0.5 * float(square + b @ self._fit.gram[m][np.ix_(at, at)] @ b)

@@ -42,7 +42,7 @@ class Servo:
 
 
 def lagged(rudder: Array, time: float) -> Array:
-    """A first-order lag of `time` [s]."""
+    """Rudder commands (T,) through a first-order lag of `time` [s]."""
     if time <= 0.0:
         return rudder
     kept = np.exp(-DT / time)
@@ -50,13 +50,13 @@ def lagged(rudder: Array, time: float) -> Array:
 
 
 def delayed(rudder: Array, time: float) -> Array:
-    """The command `time` [s] ago."""
+    """Rudder commands (T,) `time` [s] late."""
     t = DT * np.arange(len(rudder))
     return np.asarray(np.interp(t - time, t, rudder))
 
 
 def with_play(rudder: Array, play: float) -> Array:
-    """A linkage with `play` [rad] to either side."""
+    """Rudder commands (T,) [rad] through a linkage with `play` [rad] to either side."""
     out, at = np.empty_like(rudder), float(rudder[0])
     for k, command in enumerate(rudder.tolist()):
         at = min(max(at, command - play), command + play)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fish_sysid.diagnosis.change.candidates import PARAMETER, POOL_AND_SENSORS, SIMULATED
 from fish_sysid.diagnosis.change.channels import CHANNELS
 from fish_sysid.diagnosis.change.rows import FIRST_NOISE, GYRO_BIAS, TrialRows
+from fish_sysid.estimation.shooting.least_squares import huber, weight
 
 Array = NDArray[np.float64]
 Key = tuple[str, int]
@@ -21,7 +22,6 @@ Key = tuple[str, int]
 # what is tried: precision of black-box columns, deviations of bodies and of pool and sensors in typical strengths
 RIDGES = tuple(product((1e-3, 1e-2, 1e-1), (0.1, 0.3, 1.0, 3.0), (1e-3, 0.1)))
 NOISE_ROUNDS = 2
-ROBUST = 3.0  # standard deviations
 SMALLEST_SCALE = 0.3  # of the robust spread
 CHANGE = 10.0  # deviation of a candidate's strength in NEW, in typical ones
 GYRO = (2, 3)  # channels with the gyro's bias
@@ -162,7 +162,7 @@ def _ridge(scaled: Sequence[tuple[Array, Array]], groups: Array) -> tuple[Array,
         prior = np.choose(groups.astype(np.int64), [flexible, 1.0 / body**2, 1.0 / pool**2, np.inf])
         rest = residuals(prior)
         # all but the strangest trial
-        cost = float(np.sort([huber_loss(e) for e in rest])[:-1].sum())
+        cost = float(np.sort([huber(e).sum() for e in rest])[:-1].sum())
         if best is None or cost < best[0]:
             best = cost, prior, rest
     assert best is not None
@@ -181,12 +181,6 @@ def _spreads(old: Sequence[TrialRows], residuals: Sequence[Array]) -> Array:
     return found
 
 
-def huber_loss(e: Array) -> float:
-    """Sum of squares over two up to ROBUST, linear beyond."""
-    size = np.abs(e)
-    return float(np.where(size < ROBUST, 0.5 * e**2, ROBUST * size - 0.5 * ROBUST**2).sum())
-
-
 def _robust(
     scaled: Sequence[tuple[Array, Array]], used: NDArray[np.int64], precision: Array
 ) -> tuple[list[Array], Array]:
@@ -201,7 +195,7 @@ def _robust(
         G, h = sum(n[0] for n in normal), sum(n[1] for n in normal)
         b = np.linalg.solve(G + np.diag(precision), h)
         rest = [y - x[:, used] @ b for x, y in scaled]
-        weights = [np.sqrt(np.minimum(1.0, ROBUST / np.maximum(np.abs(e), 1e-9))) for e in rest]
+        weights = [np.sqrt(weight(e)) for e in rest]
     e = np.concatenate(rest)
     scale = max(float(np.sqrt(np.median(e[e != 0.0] ** 2) / 0.455)), SMALLEST_SCALE)
     squares = np.array([np.mean(np.minimum(np.abs(e[e != 0.0]), 30.0) ** 2) for e in rest])

@@ -178,7 +178,7 @@ class _Step:
         return b[S:], b[:S]
 
     def gain(self, m: int, step: Array, shared: Array) -> float:
-        """Nats on trial m, left out: against the shared columns alone."""
+        """Nats on trial m, left out, of a step (K,) and shared coefficients (S,): against the shared columns alone."""
         fit, S = self._fit, self._fit.shared
         X, Z, y, measured = self._parts[m]
         at = fit.old + m
@@ -201,7 +201,7 @@ def _clipped(name: str, keys: Sequence[str], values: Array) -> Array:
 def refitted(
     name: str, values: dict[str, float], errors: dict[str, float], by_trial: Array
 ) -> Refitted:
-    """Values of a name with their standard errors, and whether they are such an effect."""
+    """Values of a name with their standard errors, nats by trial (M,), and whether they are such an effect."""
     effect = effect_class(name)
     found = {k: Estimate(v, errors[k], effect.parameters[k].unit) for k, v in values.items()}
     return Refitted(found, degenerate(name, values) or _too_weak(name, values), by_trial)

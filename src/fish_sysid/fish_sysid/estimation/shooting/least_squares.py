@@ -32,13 +32,13 @@ ROBUST = 3.0  # scaled errors beyond it count linearly
 
 
 def huber(e: Array) -> Array:
-    """Cost of scaled errors."""
+    """Huber's cost of scaled errors, in their shape."""
     size = np.abs(e)
     return np.where(size < ROBUST, 0.5 * e**2, ROBUST * size - 0.5 * ROBUST**2)
 
 
 def weight(e: Array) -> Array:
-    """Weights with which a quadratic cost has the same gradient."""
+    """Weights of scaled errors, in their shape, with which a quadratic cost has the same gradient."""
     return np.minimum(1.0, ROBUST / np.maximum(np.abs(e), 1e-9))
 
 

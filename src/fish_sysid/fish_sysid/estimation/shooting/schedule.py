@@ -66,7 +66,7 @@ class Found:
 
 
 def ladder_start(coordinates: Parametrization, stiffness: float, heavy: float) -> Array:
-    """Theta with the tail's stiffness and all masses and drags in sway times these factors."""
+    """Theta (K,) with the tail's stiffness and all masses and drags in sway times these factors."""
     values = coordinates.start.copy()
     for i, name in enumerate(coordinates.hypothesis.free):
         if name == "tail_stiffness":
