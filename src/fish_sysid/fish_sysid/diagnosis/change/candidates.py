@@ -10,18 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_sim.effects.surroundings import NonuniformCurrent
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.change.channels import AT_CENTRES, MEANS, Swim, parts
 from fish_sysid.diagnosis.change.simulation import Variant, simulate
 from fish_sysid.diagnosis.symmetry.galilei import in_body_frame
-from fish_sysid.diagnosis.symmetry.place import TERMS, nearness
+from fish_sysid.diagnosis.symmetry.place import TERMS, flow_of, nearness
 from fish_sysid.estimation.parametrization import NOMINAL_FREE, effect_class, scale_of
 
 Array = NDArray[np.float64]
@@ -32,6 +30,7 @@ SMALL = 0.08  # of a parameter's logarithm
 SHARE = 0.5  # typical strengths at which an effect is simulated
 TETHERS = tuple((x, y) for x in (-0.8, 0.8) for y in (-0.4, 0.4))  # m
 WAVES = (0.25, 0.4, 0.55)  # Hz
+MEAN_FLOW = 0.03  # m/s, of the columns of a nonuniform current's mean
 SIMULATED = (
     "battery_sag", "dry_friction", "hull_asymmetry", "payload", "quadratic_drag", "rotor_imbalance", "rotor_lag",
     "rotor_saturation", "rudder_backlash", "rudder_delay", "rudder_gain", "rudder_lag", "rudder_offset", "rudder_placement",
@@ -130,12 +129,9 @@ def _current(swim: Swim) -> Array:
 
 def _varying(swim: Swim) -> Array:
     x, y, _ = swim.means.pose.T
-    neutral = dict.fromkeys(NonuniformCurrent.parameters, 0.0)
-    columns = [_flow(swim, 0.03, 0.0), _flow(swim, 0.0, 0.03)]
+    columns = [_flow(swim, MEAN_FLOW, 0.0), _flow(swim, 0.0, MEAN_FLOW)]
     for name in TERMS:
-        values = SimpleNamespace(**{**neutral, name: typical("nonuniform_current", name)})
-        flow, _ = NonuniformCurrent.water(values, x, y, SimpleNamespace(), np)
-        columns.append(_flow(swim, *flow))
+        columns.append(_flow(swim, *flow_of(name, typical("nonuniform_current", name), x, y)))
     return np.hstack(columns)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
-from fish_sysid.diagnosis.change.candidates import PROBES, SIMULATED, typical
+from fish_sysid.diagnosis.change.candidates import MEAN_FLOW, PROBES, SIMULATED, typical
 from fish_sysid.diagnosis.change.channels import Swim
 from fish_sysid.diagnosis.change.naming import Judged
 from fish_sysid.diagnosis.change.rows import TrialRows
@@ -85,12 +85,11 @@ def _linear(judged: Judged) -> tuple[dict[str, float], dict[str, float]]:
     values, errors = {}, {}
     for key, strength, error in zip(keys, judged.strengths, size, strict=False):
         neutral = effect_class(name).parameters[key].value
-        unit = MEAN_UNIT if key in MEAN else typical(name, key) - neutral
+        unit = MEAN_FLOW if key in MEAN else typical(name, key) - neutral
         values[key], errors[key] = neutral + strength * unit, abs(unit) * error
     return values, errors
 
 
-MEAN_UNIT = 0.03  # m/s, of the columns of a flow's mean
 _KEYS: dict[str, tuple[str, ...]] = {
     "nonuniform_current": (*MEAN, *TERMS),
     "wall_effect": (),

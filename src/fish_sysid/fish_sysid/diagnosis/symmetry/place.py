@@ -168,13 +168,16 @@ def _base(trial: StrokeMeans) -> Array:
 def _flows(trial: StrokeMeans) -> Array:
     """Columns (2C, 7): every term of the flow with coefficient one."""
     x, y, _ = trial.pose.T
+    flows = (np.column_stack(np.broadcast_arrays(*flow_of(name, 1.0, x, y))) for name in TERMS)
+    return np.column_stack([in_body_frame(trial, flow) for flow in flows])
+
+
+def flow_of(term: str, value: float, x: Array, y: Array) -> tuple[Array | float, Array | float]:
+    """Velocities (N,) [m/s] along x and y of a nonuniform current of one term, at places x and y (N,) [m]."""
     neutral = dict.fromkeys(NonuniformCurrent.parameters, 0.0)
-    columns = []
-    for name in TERMS:
-        values = SimpleNamespace(**{**neutral, name: 1.0})
-        (vx, vy), _gradient = NonuniformCurrent.water(values, x, y, SimpleNamespace(), np)
-        columns.append(in_body_frame(trial, np.column_stack(np.broadcast_arrays(vx, vy))))
-    return np.column_stack(columns)
+    values = SimpleNamespace(**{**neutral, term: value})
+    (vx, vy), _gradient = NonuniformCurrent.water(values, x, y, SimpleNamespace(), np)
+    return vx, vy
 
 
 def _walls(trial: StrokeMeans) -> Array:
