@@ -38,9 +38,8 @@ from fish_sysid.estimation.parametrization import (
 from fish_sysid.estimation.refit import (
     ANNEAL,
     ANNEAL_NEAR,
-    ANNEAL_SHORT,
+    ANNEAL_SHORT_HELD,
     REFIT,
-    anneal_if_suspect,
     best_of_restart,
     global_fit,
     multistart_fit,
@@ -81,13 +80,12 @@ def test_annealing_reaches_from_the_nominal_values_what_a_refit_reaches_from_the
 def test_parameters_of_a_large_effect_keep_their_values_while_annealing(data):
     hypothesis = nominal_hypothesis(Robot(links=1), FREE).with_effect("nonuniform_current")
     theta = np.full(len(hypothesis.free), 0.05)
-    found = refit(hypothesis, theta, data, Noise(), ANNEAL_SHORT)
+    found = refit(hypothesis, theta, data, Noise(), ANNEAL_SHORT_HELD)
     np.testing.assert_array_equal(found.theta[3:], theta[3:])
     assert not np.allclose(found.theta[:3], theta[:3])
 
 
 def test_a_good_fit_stays(data, best):
-    assert anneal_if_suspect(best, data) is best
     assert best_of_restart(best, best.theta + 0.1, data, best.noise, REFIT) is best
 
 

@@ -157,7 +157,7 @@ def test_the_answer_is_the_same_without_the_stages_that_have_not_changed_the_sea
 
 def test_an_unknown_stage_is_refused():
     data = swim(GIVEN, duration=1.0)
-    with pytest.raises(ValueError, match="stage 'magic': expected one of anneal, "):
+    with pytest.raises(ValueError, match="stage 'magic': expected one of annealed screening, "):
         pipeline.diagnose(data, GIVEN, without={"magic"})
     with pytest.raises(ValueError, match="stage 'magic'"):
         make_task(data, GIVEN).runs("magic")

@@ -18,7 +18,6 @@ from fish_sysid.diagnosis.significance import (
 )
 from fish_sysid.diagnosis.task import Task, Trials
 from fish_sysid.estimation.map_fit import Fit
-from fish_sysid.estimation.refit import anneal_if_suspect
 from fish_sysid.estimation.thresholds import (
     FAIR_SHARE,
     MOST_EFFECTS,
@@ -46,10 +45,7 @@ def select_effects(base: Fit, task: Task) -> Selection:
         if name is None:  # the round's base may be a better optimum of the same model
             return Selection(found.base, rounds, selection.accepted)
         accepted = (*selection.accepted, Accepted(name, found, found.refitted))
-        fit = found.refitted[name]
-        if task.runs("anneal"):
-            fit = task.kept("anneal", fit, anneal_if_suspect(fit, task.trials.searched))
-        selection = Selection(fit, rounds, accepted)
+        selection = Selection(found.refitted[name], rounds, accepted)
         task.progress(f"found {name}: {found.gain(name):.0f} nats")
     return selection
 

@@ -30,7 +30,7 @@ from fish_sysid.diagnosis.vocabulary import start_hypothesis
 from fish_sysid.estimation.map_fit import Fit, evaluate
 from fish_sysid.estimation.noise_estimation import usual_noise
 from fish_sysid.estimation.parametrization import EffectTable
-from fish_sysid.estimation.refit import anneal_if_grown, global_fit, refit, refit_on
+from fish_sysid.estimation.refit import global_fit, refit, refit_on
 
 
 def diagnose(
@@ -108,19 +108,12 @@ def fit_nominal(task: Task) -> Fit:
 def on_training(selection: Selection, task: Task) -> State:
     """The nominal and the selected model on all training trials, and the law that the latter leaves."""
     task.progress("fitting all training trials")
+    training = task.trials.training
     nominal, final = selection.rounds[0].base, selection.base
     same = nominal.hypothesis.names == final.hypothesis.names  # the last base is the better optimum
-    fits = on_all_cores(lambda fit: refitted(fit, task), [final] if same else [nominal, final])
-    law = residual_law(fits[-1], task.trials.training)
+    fits = on_all_cores(lambda fit: refit_on(fit, training), [final] if same else [nominal, final])
+    law = residual_law(fits[-1], training)
     return State(selection.rounds, selection.accepted, fits[0], fits[-1], law)
-
-
-def refitted(fit: Fit, task: Task) -> Fit:
-    """A fit of the searched trials on all training trials, annealed where it needs far more process noise there."""
-    found = refit_on(fit, task.trials.training)
-    if not task.runs("anneal"):
-        return found
-    return task.kept("anneal", found, anneal_if_grown(found, fit, task.trials.training))
 
 
 def with_final(state: State, final: Fit, accepted: tuple[Accepted, ...], task: Task) -> State:

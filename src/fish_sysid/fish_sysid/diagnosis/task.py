@@ -87,7 +87,6 @@ STAGES = (
     ("annealed screening", "candidates annealed from the nominal values where the base is far off"),
     ("nominal start", "candidates screened from the nominal values as well as from the base"),
     ("base restart", "the base refitted from the best candidate's optimum, and screened again"),
-    ("anneal", "a fit that needs more process noise than water annealed"),
     ("check on unseen trials", "a candidate must predict trials that the search has not used"),
     ("backward elimination", "every effect tested again with those that were added after it"),
     ("model order", "more tail links tried where much is left"),

@@ -21,7 +21,7 @@ from fish_sysid.dataset.experiment import Experiment, shorten
 from fish_sysid.estimation.annealed_fit import Report, Stages, anneal, annealed_fit, at_full_weight
 from fish_sysid.estimation.ekf_types import Array, Noise
 from fish_sysid.estimation.map_fit import Fit, better, climb, evaluate
-from fish_sysid.estimation.noise_estimation import Reach, estimate_noise, usual_noise
+from fish_sysid.estimation.noise_estimation import Reach, estimate_noise
 from fish_sysid.estimation.parametrization import Hypothesis
 from fish_sysid.estimation.thresholds import (
     CAMERA_STAGES,
@@ -32,7 +32,6 @@ from fish_sysid.estimation.thresholds import (
     HOP_SPREAD,
     INNOVATION_RMS_SUSPECT,
     NOISE_GAIN,
-    RATIO_GROWTH,
     RATIO_SUSPECT,
     ROUND_ITERATIONS,
     ROUNDS,
@@ -58,7 +57,6 @@ REFIT = Schedule(rounds=ROUNDS, rounds_if_suspect=ROUNDS)
 CONTINUE = Schedule(rounds=ROUNDS, rounds_if_suspect=ROUNDS_IF_SUSPECT)
 ANNEAL = Schedule(CAMERA_STAGES)
 ANNEAL_HELD = Schedule(CAMERA_STAGES, TAIL_INERTIAS)
-ANNEAL_SHORT = Schedule(CAMERA_STAGES, (), True, FIRST_STEPS)
 ANNEAL_SHORT_HELD = Schedule(CAMERA_STAGES, TAIL_INERTIAS, True, FIRST_STEPS)
 ANNEAL_NEAR = Schedule(CAMERA_STAGES[-1:], rounds=ROUNDS, rounds_if_suspect=ROUNDS)
 
@@ -134,19 +132,6 @@ def best_of_restart(
     if other.log_posterior - here.log_posterior < NOISE_GAIN:
         return fit
     return better(fit, refit(hypothesis, other.theta, experiment, other.noise))
-
-
-def anneal_if_suspect(fit: Fit, experiment: Experiment) -> Fit:
-    """The fit, or where it needs far more process noise than water, a better optimum found by annealing."""
-    if fit.largest_ratio < RATIO_SUSPECT:
-        return fit
-    return best_of_restart(fit, fit.theta, experiment, usual_noise(experiment), ANNEAL_SHORT)
-
-
-def anneal_if_grown(fit: Fit, before: Fit, experiment: Experiment) -> Fit:
-    """The fit, annealed if it is suspect, where it needs far more process noise than one of other trials before it."""
-    grown = fit.largest_ratio > RATIO_GROWTH * before.largest_ratio
-    return anneal_if_suspect(fit, experiment) if grown else fit
 
 
 def refit_on(fit: Fit, experiment: Experiment) -> Fit:

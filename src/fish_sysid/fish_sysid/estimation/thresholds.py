@@ -28,7 +28,6 @@ ROUND_ITERATIONS = 6  # of the refit in one round
 # times the spectral density of usual water, the largest over surge, sway and yaw
 RATIO_SUSPECT = 3.0  # a poor optimum, or something is missing
 RATIO_REJECT = 30.0  # more than the roughest pool: something is missing
-RATIO_GROWTH = 2.0  # on more trials than fitted to: from there on the optimum is a poor one
 # rms of whitened innovations, 1 where model and noise are right
 INNOVATION_RMS_SUSPECT = 1.2  # too large for the estimated noise: a poor optimum
 INNOVATION_RMS_REJECT = 4.0  # no wrench explains it: the sensors are noisier, or the model is wrong
