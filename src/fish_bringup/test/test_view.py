@@ -14,15 +14,18 @@ import numpy as np
 import pytest
 from browser import PROGRAM, browser
 
+from fish_bag import find_trials
 from fish_bag.trial import NOT_FINITE, Camera, Commands, Imu, Odometry, Trial
 from fish_bringup.excite_check import LONGEST_GAPS, commands_of, incomplete
-from fish_bringup.verbs.latency import measured, table, together
+from fish_bringup.verbs.latency import all_measured, measured, table, together
 from fish_bringup.view_server import HEADER, ViewServer
 from fish_bringup.view_state import TRAIL, ViewConfig, ViewState
 from fish_control.excitation import Program, Row
 from fish_control.offset_sums import ClockEstimate
 from fish_control.pool import HALF_WIDTH
 from fish_sim.model import DT
+
+RECORDINGS = Path(__file__).parents[3] / "examples" / "hidden_drag" / "recordings"
 
 
 def swimming(control=False):
@@ -227,6 +230,14 @@ def test_recordings_that_differ_say_so():
 def test_a_missing_sensor_is_named(field, topic):
     with pytest.raises(ValueError, match=f"swim: no {topic}"):
         measured(replace(recording(0.1), **{field: None}))
+
+
+def test_a_recording_that_cannot_tell_is_left_out_and_the_others_are_measured(tmp_path):
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(b"no recording")
+    found, (why,) = all_measured([broken, *find_trials(RECORDINGS)[:1]], None)
+    assert len(found) == 1
+    assert "broken.mcap" in why
 
 
 EXCITATION = Program((Row(0.0, 5.0, 2.0, 0.0), Row(3.0, 6.0, 2.5, 0.4)))

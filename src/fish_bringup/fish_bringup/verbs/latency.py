@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from fish_bag import Trial, find_trials, read_trial
-from fish_bag.topic_map import add_topic_arguments, topic_map
+from fish_bag.topic_map import TopicMap, add_topic_arguments, topic_map
 from fish_control.fusion_config import FusionConfig
 from fish_control.imu_heading import HeadingNoise, ImuHeading, against_gyro
 from fish_control.offset_sums import ClockEstimate
 from fish_control.recorded_offset import RecordedOffset, pooled, recorded_offset
-from fish_report.errors import UserError, user_errors
+from fish_report.errors import UserError
 from fish_report.files import named_path
 from fish_report.page import Table
 from fish_report.terminal import print_table, say, terminal
@@ -40,13 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print a table, and what all that are sure say together."""
     recording = named_path(args.recording)
-    trials = [read_trial(path, topic_map(args)) for path in find_trials(recording)]
-    if not trials:
+    found, left_out = all_measured(find_trials(recording), topic_map(args))
+    for why in left_out:
+        say(terminal(stderr=True), f"left out: {why}")
+    if not found:
         raise UserError(f"{recording}: expected a recording with imu/data and camera/pose")
-    found = []
-    for trial in trials:
-        with user_errors():
-            found.append((trial.name, measured(trial)))
     print_table(terminal(), table(found))
     sure = [m.recorded.estimate for _, m in found if m.recorded.estimate.sure]
     if not sure:
@@ -57,6 +56,20 @@ def run(args: argparse.Namespace) -> int:
     if to_gyro:
         say(terminal(), f"to the gyro's clock: {together(to_gyro)}")
     return 0
+
+
+def all_measured(
+    paths: Sequence[Path], topics: TopicMap | None
+) -> tuple[list[tuple[str, Measured]], list[str]]:
+    """Names and answers of the recordings that have both sensors, and why the others are left out."""
+    found, left_out = [], []
+    for path in paths:
+        try:
+            trial = read_trial(path, topics)
+            found.append((trial.name, measured(trial)))
+        except (UserError, ValueError) as error:
+            left_out.append(str(error))
+    return found, left_out
 
 
 class Measured(NamedTuple):
