@@ -21,8 +21,8 @@ from time import thread_time
 import cv2
 import numpy as np
 
+from fish_node.pool import WIDTH
 from fish_sim.camera import CameraConfig, FishPose, FishShape, Patch, PoolRenderer, patches
-from fish_sim.pool import WIDTH
 from fish_vision.calibration import Calibration, Lens
 from fish_vision.config import TrackerConfig
 from fish_vision.follower import make_follower

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_control.reference_path import ReferencePath
+from fish_node.pool import LENGTH, WIDTH
 
-HALF_LENGTH = 2.135  # m, wall at x = +-2.135 (MODEL: pool of 4.27 x 2.13 m, origin at its centre)
-HALF_WIDTH = 1.065  # m, wall at y = +-1.065
+HALF_LENGTH, HALF_WIDTH = (
+    LENGTH / 2.0,
+    WIDTH / 2.0,
+)  # m, walls at x = +-HALF_LENGTH, y = +-HALF_WIDTH
 # m, of the turn in which a fish stops with its rudder hard over; it turns in 0.257 m
 STOPPING_RADIUS = 0.27
 STOPPING_TURN = 1.9  # rad, how far it comes round from 0.3 m/s (1.5 rad from 0.2 m/s)

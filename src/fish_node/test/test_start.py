@@ -1,9 +1,10 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""How nodes start and stop."""
+"""How nodes start and stop, and which walls they take."""
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Header
 
 from fish_node.nodes.start import read_parameters, run
+from fish_node.pool import pool_sides
 
 pytestmark = pytest.mark.ros
 
@@ -191,3 +193,35 @@ def test_refused_parameters_give_one_line_and_1(capsys: pytest.CaptureFixture[st
 
     assert run(refuse, "node") == 1
     assert capsys.readouterr().err == "node: rate = -1: expected a positive number\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "sides"), [("4.27x2.13", (4.27, 2.13)), ("3X2", (3.0, 2.0)), ("0.1x100", (0.1, 100.0))]
+)
+def test_a_pool_is_its_two_sides(text, sides):
+    assert pool_sides(text) == sides
+
+
+@pytest.mark.parametrize(
+    "text", ["", "3", "3x", "3x2x1", "0.05x2", "3x101", "nanx2", "infx2", "axb"]
+)
+def test_sides_that_no_pool_has_are_refused(text):
+    with pytest.raises(ValueError, match="expected sides in metres"):
+        pool_sides(text)
+
+
+def walls(pool):
+    """What a program with this FISH_POOL takes for its walls."""
+    environment = {**os.environ, "FISH_POOL": pool}
+    show = "from fish_node.pool import LENGTH, WIDTH; print(LENGTH, WIDTH)"
+    return subprocess.run(
+        [sys.executable, "-c", show], env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def test_the_environment_sets_the_walls_and_a_wrong_one_ends_the_program_in_one_line():
+    assert walls("3x2").stdout == "3.0 2.0\n"
+    wrong = walls("three")
+    assert wrong.returncode == 1
+    assert wrong.stderr.startswith("FISH_POOL=three: expected sides in metres")
+    assert wrong.stderr.count("\n") == 1

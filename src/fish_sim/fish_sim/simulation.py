@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.model import DT
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sim.robot import Robot
 from fish_sim.sensors.distortion import SensorDistortion
 from fish_sim.sensors.onboard import Battery, Encoder, Imu, ImuSample

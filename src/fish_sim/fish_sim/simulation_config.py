@@ -8,9 +8,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from fish_node import pool
 from fish_node.arming import ArmingSettings
 from fish_node.frames import BODY, IMU, POOL, require_frame, require_frame_prefix
-from fish_sim import pool
 from fish_sim.sensors import changes_camera_poses
 from fish_sim.sensors.settings import SensorSettings
 

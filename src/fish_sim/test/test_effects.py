@@ -12,13 +12,13 @@ import pytest
 import yaml
 from scipy.signal import lsim
 
-from fish_sim import pool
+from fish_node import pool
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import BodyMotion, Drive
 from fish_sim.effects.surroundings import BASIN_LENGTH, BASIN_WIDTH
 from fish_sim.model import DT
 from fish_sim.ops import NUMPY
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sim.robot import Robot, parameter_names
 from fish_sim.robot_file import load_robot
 from fish_sim.scheme import stable_scheme

@@ -26,11 +26,11 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from fish_node import rivals
+from fish_node.pool import LENGTH
 from fish_sim.nodes import simulator
 from fish_sim.nodes import simulator_messages as messages
 from fish_sim.nodes.pacing import AHEAD
 from fish_sim.nodes.simulator import SimulatorNode
-from fish_sim.pool import LENGTH
 from fish_sim.robot import Robot, RobotError
 from fish_sim.robot_file import save_robot
 from fish_sim.sensors.onboard import ImuSample

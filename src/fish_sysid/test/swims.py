@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.model import DT
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment, Frames
 from fish_sysid.dataset.synthetic import program, record

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from made_fits import made_fit
 
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.compiled import compiler
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import BodyMotion, Drive
 from fish_sim.ops import NUMPY
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sim.robot import Robot
 from fish_sim.scheme import default_scheme
 from fish_sysid.dataset.synthetic import program, record

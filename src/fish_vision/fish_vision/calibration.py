@@ -19,6 +19,7 @@ from fish_node.camera_file import (
     read_camera_file,
     to_document,
 )
+from fish_node.pool import LENGTH, WIDTH
 
 Array = NDArray[Any]  # float64
 
@@ -30,7 +31,7 @@ MODELS = {  # distortion model -> number of coefficients
     "rational_polynomial": 8,
     "equidistant": 4,
 }
-POOL = (4.27, 2.13)  # m, along pool x and y
+POOL = (LENGTH, WIDTH)  # m, along pool x and y
 FOCAL_MIN = 1.0  # pixels; a real lens has hundreds
 NEAREST = 0.01  # m from the camera down to the plane of the markers
 

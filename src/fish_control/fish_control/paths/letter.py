@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fish_control.paths.rounded import ease, round_corners
 from fish_control.pool import stopping_side, stopping_turn, wall_distance
 from fish_control.reference_path import End, PathError, ReferencePath, require_positive
+from fish_node.pool import LENGTH, WIDTH
 
 TIGHTEST = 0.165  # letter heights
 
@@ -90,7 +91,7 @@ STROKES: dict[str, Stroke] = {
 }
 
 
-TALLEST = 1.7  # m, leaves 0.21 m to the walls of the 2.13 m pool
+TALLEST = min(1.7, round(WIDTH - 0.43, 3))  # m, leaves 0.21 m to the long walls
 STOPPING_MARGIN = 0.11  # m to the walls, of the place where the fish stops
 STEP = 0.01  # m, of the search for a height
 
@@ -150,4 +151,6 @@ def _fit(shape: NDArray[np.float64], closed: bool) -> tuple[float, float]:
             turn = stopping_turn(x, y, heading, stopping_side(x, y, heading))
             if closed or wall_distance(turn) >= STOPPING_MARGIN:
                 return float(height), float(rise)
-    raise AssertionError("a letter of half the height always has room")
+    raise PathError(
+        f"letter: no room to stop behind one in a pool of {LENGTH:g} m x {WIDTH:g} m; expected a height in m or another path"
+    )

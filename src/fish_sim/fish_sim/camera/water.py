@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.camera.model import CameraModel
-from fish_sim.pool import LENGTH, WIDTH
 
 Array = NDArray[Any]  # float64
 Image = NDArray[Any]  # uint8, (h, w, 3) or (h, w)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
-from fish_sim import pool
+from fish_node import pool
 from fish_sim.effects.effect import BodyMotion, Drive, Effect, Flow, Values, Wrench
 from fish_sim.ops import Scalar
 from fish_sim.parameter import Parameter

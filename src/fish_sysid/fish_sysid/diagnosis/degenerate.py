@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.effects import EFFECTS
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.estimation.parametrization import EffectTable, effect_class, scale_of
 
 Values = Mapping[str, float]

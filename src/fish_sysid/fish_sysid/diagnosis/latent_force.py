@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.model import DT
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.dataset.grid import in_base_link
 from fish_sysid.estimation.ekf_types import Array

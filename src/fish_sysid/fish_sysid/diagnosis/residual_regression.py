@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.effects.effect import BodyMotion, Drive, Effect, Values, Wrench
 from fish_sim.ops import NUMPY, Scalar
 from fish_sim.parameter import Parameter
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.cross_validation import Quadratic, quadratic
 from fish_sysid.diagnosis.latent_force import DOFS

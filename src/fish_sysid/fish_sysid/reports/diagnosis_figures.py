@@ -15,11 +15,11 @@ from plotly.subplots import make_subplots
 from scipy.stats import binned_statistic
 
 from fish_control.excitation import LAST_ROW
+from fish_node.pool import LENGTH, WIDTH
 from fish_report.page import Figure, styled
 from fish_sim.effects import EFFECTS
 from fish_sim.effects.effect import Effect, Flow
 from fish_sim.model import DT
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.diagnosis.effect_wrench import ACTIVE
 from fish_sysid.diagnosis.latent_force import DOFS, MissingForce
 from fish_sysid.diagnosis.result import Diagnosis

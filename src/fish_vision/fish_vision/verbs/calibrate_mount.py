@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import yaml
 
+from fish_node.pool import pool_sides
 from fish_vision.annotate import drawn_pool
 from fish_vision.calibrate import (
     POINTS_MIN,
@@ -118,15 +119,9 @@ def calibrate_mount(args: argparse.Namespace) -> None:
 def _sides(text: str) -> tuple[float, float]:
     """Sides of the pool as LENGTHxWIDTH, m."""
     try:
-        length, width = (float(side) for side in text.lower().split("x"))
-        able = all(0.1 <= side <= 100.0 for side in (length, width))
-    except ValueError:
-        able = False
-    if not able:
-        raise CalibrationError(
-            f"--pool {text}: expected sides in metres, 0.1 to 100, like 4.27x2.13"
-        )
-    return length, width
+        return pool_sides(text)
+    except ValueError as error:
+        raise CalibrationError(f"--pool {error}") from error
 
 
 def _find(

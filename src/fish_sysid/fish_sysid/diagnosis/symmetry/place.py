@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_node.pool import LENGTH, WIDTH
 from fish_sim.effects.surroundings import NonuniformCurrent
-from fish_sim.pool import LENGTH, WIDTH
 from fish_sysid.diagnosis.symmetry.finding import (
     FEW_TRIALS,
     Estimate,
@@ -57,7 +57,7 @@ VARYING_FLOW = SymmetryTest(
 WALL_EFFECT = SymmetryTest(
     "wall_effect",
     "physics",
-    assumes="the walls are those of the pool, 4.27 m by 2.13 m about the origin",
+    assumes=f"the walls are those of the pool, {LENGTH:g} m by {WIDTH:g} m about the origin",
     needs="three trials, near the walls and away from them at the same commands",
 )
 PATCH = SymmetryTest(
