@@ -356,6 +356,19 @@ def test_a_unit_that_no_fit_can_mend_is_said_of_its_trial(tmp_path):
     assert "publish rad" in said[0]
 
 
+def test_a_dead_sensor_is_said_of_its_trial(tmp_path):
+    def dead(i, t, m):
+        m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z = 0.0, 0.0, 0.3
+        return t, m
+
+    messages = samples.changed(samples.robot_messages(), "/fish/imu/data", dead)
+    samples.write_mcap(tmp_path / "a", messages)
+    _, (said,) = read_experiment(tmp_path)
+    assert heading(said) == "Used with a fault"
+    assert "gyro is" in said
+    assert "is the sensor alive?" in said
+
+
 def test_an_effect_that_nobody_knows_is_refused_before_anything_is_read(tmp_path, capsys):
     for given in ("tip_slipp", "choose,tip_slip"):
         assert command.main(["identify", str(tmp_path), "--effects", given]) == 1

@@ -18,6 +18,7 @@ from fish_report.errors import UserError, user_errors
 from fish_sysid.dataset.experiment import Experiment, ExperimentError, build_experiment
 
 DROPPED = ("unreadable", "wrong_frame")  # errors of samples that are not used
+DEAD = "stuck"  # kind of a sensor that gives one value throughout
 UNUSED = (*DROPPED, "wrong_type", "nan", "not_measured")  # why samples that came are not used
 USED = "used as it is, which no fit can mend"
 ONCE = "each is used once"
@@ -117,13 +118,17 @@ def repeated(trial: Trial) -> list[str]:
 
 
 def unusable(trial: Trial) -> list[str]:
-    """Errors of what an experiment is made of, as of a unit, that no fit can mend."""
+    """Errors of what an experiment is made of, as of a unit, and dead sensors, which no fit can mend."""
     return [f"{trial.name} {problem.topic}: {problem.text}; {USED}" for problem in _errors(trial)]
 
 
 def _errors(trial: Trial) -> list[Problem]:
     """Such errors of a trial."""
-    return [p for p in _of_use(trial) if p.severity == "error" and p.kind not in DROPPED]
+    return [
+        problem
+        for problem in _of_use(trial)
+        if (problem.severity == "error" or problem.kind == DEAD) and problem.kind not in DROPPED
+    ]
 
 
 def _unused(trial: Trial) -> list[str]:
