@@ -7,7 +7,7 @@
 Takes one scenario of each group in turn, quick ones first. The same command goes on where it was stopped; a larger limit adds
 scenarios. An answer of another version of the tool is made again.
 
-    python studies/compare_with_recorded.py --study studies/data/old_groups.tar.xz --without "base restart" --out out/ablation
+    python studies/compare_with_recorded.py --study studies/data/old_groups.tar.xz --without "model order" --out out/ablation
 
 leaves out one stage of the search in the scenarios whose recorded search it changed. A search that a stage did not change
 gives the same answer without it. The run ends early when two more right answers are lost than won: then the stage pays.

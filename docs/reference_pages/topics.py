@@ -84,8 +84,8 @@ Topics are relative to the robot's namespace, `/fish` by default; a leading `/` 
 interfaces, in SI units and radians. The simulator and the drivers publish and take the same topics, so that vision and
 control cannot tell them apart. "camera" below is the node of `fish_sim` or of `fish_hw`.
 
-Frames follow REP 103. `pool` has its origin in the middle of the pool (4.27 m x 2.13 m, or `FISH_POOL`), x along the long side, y along
-the short side, z up. `base_link` is at the head's centre of mass, x forward, y left. Angles are counter-clockwise
+Frames follow REP 103. `pool` has its origin in the middle of the pool (4.27 m x 2.13 m, or `FISH_POOL`), x along the long
+side, y along the short side, z up. `base_link` is at the head's centre of mass, x forward, y left. Angles are counter-clockwise
 positive. A positive rudder angle steers left.
 """
 

@@ -424,7 +424,7 @@ def test_images_that_are_all_refused_say_why(tmp_path):
 
 def test_options_of_the_search_are_refused_with_a_baseline(tmp_path, capsys):
     for option, value in (
-        ("--candidates", "payload"), ("--false-alarms", "0.1"), ("--without", "base restart"),
+        ("--candidates", "payload"), ("--false-alarms", "0.1"), ("--without", "model order"),
     ):  # fmt: skip
         given = [str(tmp_path), "--baseline", str(tmp_path), "--out", str(tmp_path / "out")]
         assert command.main(["diagnose", *given, option, value]) == 1
