@@ -220,7 +220,7 @@ def test_a_change_that_old_makes_from_day_to_day_is_none(days) -> None:
     assert single_days([0, 0, 0, 1], 3) == []
 
 
-@pytest.mark.parametrize(("before", "after"), [(0.0, 0.5), (0.5, 0.0), (0.015, 0.5)])
+@pytest.mark.parametrize(("before", "after"), [(0.5, 0.0), (0.015, 0.5)])
 def test_images_much_older_in_one_day_are_said_before_anything_else(days, before, after) -> None:
     old, new = (
         with_injection(e, "camera_latency", {"delay": age})

@@ -225,7 +225,7 @@ def test_the_age_of_images_is_that_of_new_less_that_of_old(days) -> None:
         for day, age in zip(days, (0.025, 0.125), strict=True)
     )
     found = Refitted({"delay": Estimate(0.11, 0.03, "s")}, "", np.ones(NEW))
-    named = Named((Member("camera_latency", 1.0, 1.0, 0.5, found),), "", 1.0, 0.1)
+    named = Named((Member("camera_latency", 1.0, 0.5, found),), "", 1.0, 0.1)
     age, said = exact_age(old, new, named)
     assert age == pytest.approx(0.1, abs=0.003)
     assert said.members[0].refitted.parameters["delay"].value == age

@@ -80,10 +80,8 @@ def plan_calibration(
     Raises UserError where an error is no share, or no set of swims reaches what is wanted.
     """
     sensors, noise = sensors or SensorSet(), noise or Noise()
-    report("swims that the pool has room for")
-    swims, commands = placed(candidates() if choose_from is None else choose_from, robot)
     hypothesis = nominal_hypothesis(robot, free)
-    names, seconds = hypothesis.free, swim_seconds(commands)
+    names = hypothesis.free
     wanted = np.array([(errors or {}).get(name, error) for name in names])
     if unknown := sorted(set(errors or {}) - set(names)):
         raise UserError(f"error of {unknown[0]}: expected one of {', '.join(names)}")
@@ -91,7 +89,9 @@ def plan_calibration(
         raise UserError(
             f"error of {names[int(odd.argmax())]}: got {wanted[odd][0]:g}; expected a share above 0, as 0.05 for 5 %"
         )
-    tables = []
+    report("swims that the pool has room for")
+    swims, commands = placed(candidates() if choose_from is None else choose_from, robot)
+    seconds, tables = swim_seconds(commands), []
     for number, like in enumerate(robots_like(robot, free, robots)):
         report(f"information of {len(swims)} swims, robot {number + 1} of {robots}")
         tables.append(information(nominal_hypothesis(like, free), commands, sensors, noise))
