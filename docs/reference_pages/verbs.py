@@ -82,8 +82,8 @@ def row(action: argparse.Action) -> tuple[str, str, str]:
         name = f"{', '.join(action.option_strings)} {value if takes_value else ''}".strip()
     else:
         name = value
-    unsaid = action.default is None or action.default is False  # 0 is a default to be told
-    default = "" if unsaid or action.default in ([], "", argparse.SUPPRESS) else action.default
+    absent = action.default is None or action.default is False  # 0 is a default to be shown
+    default = "" if absent or action.default in ([], "", argparse.SUPPRESS) else action.default
     if action.dest == "jobs":  # the number of processors of the computer that makes this page
         default = "all processors"
     if isinstance(default, list):

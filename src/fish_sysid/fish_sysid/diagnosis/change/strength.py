@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 ROUNDS = 3  # of linearisation
 WEAKEST = 0.25  # of the typical strength that is named
 STEP = 0.1  # of a typical strength, for differences
-# parameters beside the strengths that the data determine
+# parameters, besides the strengths, that the data determine
 PLACED = {"payload": ("mass", "forward", "left")}
 LIMITS = ("rudder_saturation", "rotor_saturation")  # act by being small
 
