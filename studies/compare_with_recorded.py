@@ -18,10 +18,9 @@ from pathlib import Path
 
 from fish_report.errors import user_errors
 from fish_report.terminal import print_table, terminal
-from fish_study.ablation import check_stages
+from fish_study.ablation import check_stages, says_changed
 from fish_study.recorded_comparison import (
     Comparison,
-    changed_by,
     comparison_tables,
     folder_of,
     lost,
@@ -67,7 +66,7 @@ def main() -> None:
     if args.only:
         rows = [r for r in rows if r.name.endswith(tuple(args.only))]
     if stage:
-        rows = [r for r in rows if changed_by(r.result, stage)]
+        rows = [r for r in rows if says_changed(r.result, stage)]
     if stage and not rows:
         raise SystemExit(
             f"--without {stage}: got no search of {args.study} that this stage changed"

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from fish_control.reference_path import ReferencePath
 from fish_node.pool import LENGTH, WIDTH
 
-HALF_LENGTH, HALF_WIDTH = (
-    LENGTH / 2.0,
-    WIDTH / 2.0,
-)  # m, walls at x = +-HALF_LENGTH, y = +-HALF_WIDTH
+HALF_LENGTH = LENGTH / 2.0  # m, walls at x = +-HALF_LENGTH
+HALF_WIDTH = WIDTH / 2.0  # m, walls at y = +-HALF_WIDTH
 # m, of the turn in which a fish stops with its rudder hard over; it turns in 0.257 m
 STOPPING_RADIUS = 0.27
 STOPPING_TURN = 1.9  # rad, how far it comes round from 0.3 m/s (1.5 rad from 0.2 m/s)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -96,12 +97,17 @@ def take_same_answers(complete: Study, study: Study, stage: str) -> list[str]:
     return same
 
 
+def says_changed(result: Mapping[str, Any], stage: str) -> bool:
+    """Whether an answer says that a stage has changed its search."""
+    return bool(result["diagnosis"]) and stage in result["diagnosis"].get("stages", ())
+
+
 def changed_by(complete: Study, stage: str) -> list[str]:
-    """Names of the scenarios whose search a stage has changed."""
+    """Names of the scenarios whose search a stage has changed, or whose answer does not say so."""
     return [
         name
         for name, result in complete.results.items()
-        if result["diagnosis"] is None or stage in result["diagnosis"].get("stages", [stage])
+        if "stages" not in (result["diagnosis"] or {}) or says_changed(result, stage)
     ]
 
 

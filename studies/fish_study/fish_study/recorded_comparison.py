@@ -104,11 +104,6 @@ def position_error(result: Answer) -> float:
     return number(model["rms"].get("2 s", {}).get("position_m"))
 
 
-def changed_by(result: Answer, stage: str) -> bool:
-    """Whether a stage changed the search of an answer."""
-    return bool(result["diagnosis"]) and stage in result["diagnosis"].get("stages", ())
-
-
 def lost(compared: Sequence[Comparison]) -> int:
     """Right answers of the record that are wrong now, less wrong ones that are right now."""
     return sum(before - now for before, now in (c.right for c in compared))

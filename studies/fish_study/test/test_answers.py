@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from prove_samples import answered, diagnosis, failed, small
 
+from fish_study.ablation import says_changed
 from fish_study.answer_tables import asked_table, failure_table, group_table, name_table
 from fish_study.build import make_readings
 from fish_study.calibration import Power, calibration, calibration_table, null_table, power
@@ -56,7 +57,6 @@ from fish_study.prove_page import (
 from fish_study.recorded_comparison import (
     Comparison,
     Recorded,
-    changed_by,
     comparison_tables,
     lost,
     recorded_answers,
@@ -484,11 +484,11 @@ def test_a_stage_is_worth_the_right_answers_that_are_lost_without_it() -> None:
 
 def test_a_search_is_changed_by_the_stages_that_its_answer_has() -> None:
     result = diagnosis(verdict="no_mismatch")
-    assert not changed_by(result, "anneal")  # of a tool that does not say
+    assert not says_changed(result, "anneal")  # of a tool that does not say
     result["diagnosis"]["stages"] = ["anneal"]
-    assert changed_by(result, "anneal")
-    assert not changed_by(result, "model order")
-    assert not changed_by({"diagnosis": None}, "anneal")
+    assert says_changed(result, "anneal")
+    assert not says_changed(result, "model order")
+    assert not says_changed({"diagnosis": None}, "anneal")
 
 
 def found(gain: float) -> OracleResult:
