@@ -92,10 +92,7 @@ def _local(base: Fit, short: Experiment, task: Task) -> Method:
     start = evaluate(base.hypothesis, base.theta, short, base.noise)
     reference = climb(start, short, POLISH_ITERATIONS)
     near = base.largest_ratio < RATIO_SUSPECT
-    nominal = not near and task.runs("nominal start")
-    if nominal:
-        task.acted.add("nominal start")
-    far = partial(place_far, short=short, nominal=nominal)
+    far = partial(place_far, short=short, task=task)
 
     def polish(fit: Fit, promising: bool) -> Fit:
         return climb(fit, short, POLISH_ITERATIONS) if promising else fit
@@ -141,12 +138,18 @@ def place_near(base: Fit, name: str, short: Experiment) -> Fit:
     return max(fits, key=promise)
 
 
-def place_far(base: Fit, name: str, short: Experiment, nominal: bool = True) -> Fit:
-    """A candidate on a base far from the truth: from the best of all starts, with the IMU's noise inflated at first."""
+def place_far(base: Fit, name: str, short: Experiment, task: Task | None = None) -> Fit:
+    """A candidate on a base far from the truth: from the best of all starts, with the IMU's noise inflated at first.
+
+    task: whose stage `nominal start` may be off, and is told when a start at the nominal values is the best.
+    """
     inflated = base.noise.with_imu(SCREENING_IMU_FACTOR)
-    bases = [base, from_nominal(base)] if nominal else [base]
     hypothesis = base.hypothesis.with_effect(name)
-    theta = best_start(hypothesis, bases, name, short, inflated)
+    theta = best_start(hypothesis, base, name, short, inflated)
+    if task is None or task.runs("nominal start"):
+        other = best_start(hypothesis, from_nominal(base), name, short, inflated)
+        better = likeliest(hypothesis, [theta, other], short, inflated)
+        theta = better if task is None else task.kept("nominal start", theta, better)
     fit = fit_strength(evaluate(hypothesis, theta, short, inflated), name, short)
     return evaluate(hypothesis, climb(fit, short, SCREENING_ITERATIONS).theta, short, base.noise)
 
@@ -155,7 +158,7 @@ def place_annealed(base: Fit, name: str, short: Experiment, noise: Noise) -> Fit
     """A candidate from the nominal values, strong or weak, after the first stage of the annealing."""
     hypothesis = base.hypothesis.with_effect(name)
     inflated = noise.with_imu(SCREENING_STAGES[0][0])
-    theta = best_start(hypothesis, [from_nominal(base)], name, short, inflated)
+    theta = best_start(hypothesis, from_nominal(base), name, short, inflated)
     return anneal(hypothesis, theta, short, noise, SCREENING_STAGES[:1])
 
 
@@ -165,10 +168,16 @@ def from_nominal(base: Fit) -> Fit:
 
 
 def best_start(
-    hypothesis: Hypothesis, bases: Sequence[Fit], name: str, experiment: Experiment, noise: Noise
+    hypothesis: Hypothesis, base: Fit, name: str, experiment: Experiment, noise: Noise
 ) -> Array:
-    """Theta (K,) of the likeliest start of a candidate on one of the bases."""
-    starts = [theta for base in bases for theta in starts_of(base, name, experiment, noise)]
+    """Theta (K,) of the likeliest start of a candidate on a base."""
+    return likeliest(hypothesis, starts_of(base, name, experiment, noise), experiment, noise)
+
+
+def likeliest(
+    hypothesis: Hypothesis, starts: Sequence[Array], experiment: Experiment, noise: Noise
+) -> Array:
+    """The theta (K,) with the largest log posterior, the first of equal ones."""
     return max(starts, key=lambda theta: log_posterior(hypothesis, theta, experiment, noise))
 
 

@@ -64,8 +64,6 @@ def screen_and_refit(base: Fit, needed: Mapping[str, float], task: Task) -> Roun
     locally where that finds nothing.
     """
     far = base.largest_ratio > RATIO_REJECT and task.runs("annealed screening")
-    if far:
-        task.acted.add("annealed screening")
     for annealed in (True, False) if far else (False,):
         ranking = screen(base, tuple(needed), task, annealed)
         gains = ", ".join(f"{one.name} {one.gain:.0f}" for one in ranking[:5])
@@ -81,6 +79,8 @@ def screen_and_refit(base: Fit, needed: Mapping[str, float], task: Task) -> Roun
         fits = on_all_cores(lambda one: fit(base, one, task), chosen)  # noqa: B023
         found = Round(base, ranking, dict(zip((one.name for one in chosen), fits, strict=True)))
         if found.best is not None and found.gain(found.best) >= min(needed.values()):
+            if annealed:
+                task.acted.add("annealed screening")
             break
     return found
 
