@@ -13,11 +13,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fish_bag.decode import PATH_ROLE, PATH_TYPE, ROLES
 from fish_bag.problem import RecordingError
 from fish_report.errors import user_errors
+from fish_report.yaml_file import read_yaml
 
 TIMES = ("stamp", "arrival")
 KNOWN_ROLES = (*ROLES, PATH_ROLE)
@@ -101,16 +100,9 @@ def load_topic_map(path: Path) -> TopicMap:
         RecordingError: the file or a rule is not as expected.
     """
     try:
-        data = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise RecordingError(
-            f"{path}: topic map cannot be read: {error.strerror or error}"
-        ) from error
-    except (
-        yaml.YAMLError,
-        ValueError,
-    ) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
-        raise RecordingError(f"{path}: topic map is not YAML: {error}") from error
+        data = read_yaml(path)
+    except ValueError as error:
+        raise RecordingError(f"{path}: topic map {error}") from error
     data = _checked(f"{path}: topic map", {} if data is None else data, KEYS)
     rules = dict(DEFAULT_RULES)
     for role, given in data.pop("topics", {}).items():

@@ -22,6 +22,32 @@ from fish_report.page import Table
 from fish_report.parallel import at_end_of_worker, worker_pool
 from fish_report.printable import LONGEST
 from fish_report.terminal import print_table, say, terminal
+from fish_report.yaml_file import read_yaml
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (b"a: 1\nb:\n  c: 1\n  d: 2\n  c: 3", "c is given twice in the table of line 3"),
+        (b"a: [1", "cannot be read as YAML: while parsing"),
+        (b"a: \xff", "cannot be read as YAML: 'utf-8' codec"),
+        (b"[" * 20_000, "its tables are nested too deeply"),
+        (b"[1, 2]: 3", "cannot be read as YAML: while constructing a mapping"),
+        (None, "cannot be read: No such file"),
+    ],
+)
+def test_what_is_wrong_with_a_yaml_file_is_one_error(tmp_path, text, message):
+    file = tmp_path / "f.yaml"
+    if text is not None:
+        file.write_bytes(text)
+    with pytest.raises(ValueError, match=message):
+        read_yaml(file)
+
+
+def test_a_yaml_file_may_merge_one_table_into_another(tmp_path):
+    file = tmp_path / "f.yaml"
+    file.write_text("a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\n")
+    assert read_yaml(file) == {"a": {"x": 1, "y": 2}, "b": {"x": 1, "y": 3}}
 
 
 def test_what_is_not_finite_is_null_and_all_else_stays(tmp_path):

@@ -13,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from fish_report.yaml_file import read_yaml
 from fish_sim.effects import EFFECTS
 from fish_sim.parameter import Parameter
 from fish_sim.robot import Robot, RobotError, check_links, nominal_parameters
@@ -28,17 +29,8 @@ def load_robot(path: str | Path) -> Robot:
     """Read robot.yaml (or a model.yaml written by the diagnosis). Raises RobotError with file and field."""
     path = Path(path)
     try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise RobotError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (
-        yaml.YAMLError,
-        ValueError,
-    ) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
-        raise RobotError(f"{path}: cannot be read as YAML: {error}") from error
-    try:
-        return _from_content(content)
-    except RobotError as error:
+        return _from_content(read_yaml(path))
+    except ValueError as error:
         raise RobotError(f"{path}: {error}") from error
 
 
@@ -52,8 +44,10 @@ def _from_content(content: Any) -> Robot:
         raise RobotError(f"{unknown[0]}: unknown field; known: {', '.join(sorted(known))}")
     if content.get("format") != FORMAT:
         raise RobotError(f"format: got {content.get('format')!r}; expected {FORMAT}")
-    links = content.get("links", 3)
+    links, name = content.get("links", 3), content.get("name", "fish")
     check_links(links)
+    if not isinstance(name, str | int | float):
+        raise RobotError(f"name: got {name!r}; expected a word")
     return Robot(
         links=links,
         parameters=_values(
@@ -61,7 +55,7 @@ def _from_content(content: Any) -> Robot:
         ),
         effects=_effect_values("effects", content.get("effects") or {}, EFFECTS),
         sensors=_effect_values("sensors", content.get("sensors") or {}, SENSOR_EFFECTS),
-        name=str(content.get("name", "fish")),
+        name=str(name),
         prediction=_check_prediction(content.get("prediction") or {}),
         knowledge={
             name: entry["knowledge"]

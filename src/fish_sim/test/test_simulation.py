@@ -471,6 +471,12 @@ def test_impossible_robots_are_refused_with_name_and_value(make, words):
     [
         ("[1, 2", ["cannot be read as YAML"]),
         ("format: 2020-13-45", ["cannot be read as YAML"]),
+        ("[" * 20_000, ["nested too deeply"]),
+        ("format: 1\nname: [a]", ["name: got ['a']", "a word"]),
+        (
+            "format: 1\neffects:\n  current: {x: 0.1}\n  current: {x: 0.2}",
+            ["current is given twice in the table of line 3"],
+        ),
         ("3", ["int", "table"]),
         ("format: 2", ["format", "2", "expected 1"]),
         ("format: 1\ncolour: blue", ["colour", "unknown field"]),

@@ -10,10 +10,9 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fish_control.policy_spec import OUTPUTS
 from fish_report.errors import UserError
+from fish_report.yaml_file import read_yaml
 from fish_sim.model import DT
 from fish_train.training.batch import LONGEST_DELAY
 from fish_train.training.closed_loop_equations import COST_NAMES
@@ -204,12 +203,9 @@ def load_config(path: str | Path) -> dict[str, Any]:
     """The table of a YAML recipe; every key optional."""
     path = Path(path)
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except (
-        yaml.YAMLError,
-        ValueError,
-    ) as error:  # ValueError: no UTF-8, or a date that is none, 2020-13-45
-        raise UserError(f"{path}: cannot be read as YAML: {error}") from error
+        content = read_yaml(path) or {}
+    except ValueError as error:
+        raise UserError(f"{path}: {error}") from error
     if not isinstance(content, dict):
         raise UserError(f"{path}: got {type(content).__name__}; expected a table of name: value")
     return content
