@@ -44,7 +44,7 @@ def select_effects(base: Fit, task: Task) -> Selection:
         name = choose(found, task)
         if name is None:  # the round's base may be a better optimum of the same model
             return Selection(found.base, rounds, selection.accepted)
-        accepted = (*selection.accepted, Accepted(name, found))
+        accepted = (*selection.accepted, Accepted(name, found, found.refitted))
         selection = Selection(found.refitted[name], rounds, accepted)
         task.progress(f"found {name}: {found.gain(name):.0f} nats")
     return selection
