@@ -51,11 +51,15 @@ class Round:
 
 @dataclass(frozen=True)
 class Accepted:
-    """An effect that was added, the round it won, and the fits that it competes with."""
+    """An effect that was added, and the round it won."""
 
     name: str
     round: Round
-    contest: dict[str, Fit]  # name -> fit, its own among them: of its round, or of the final model
+
+    @property
+    def contest(self) -> dict[str, Fit]:
+        """Name -> fit of what competed, its own among them."""
+        return self.round.refitted
 
 
 @dataclass(frozen=True)
