@@ -1,6 +1,6 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The search for effects: vocabulary, split of trials, screening, tests, selection, number of links."""
+"""The search for effects: vocabulary, split of trials, screening, tests, selection, elimination, number of links."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.diagnosis import screening
-from fish_sysid.diagnosis.conclusion import without
-from fish_sysid.diagnosis.corrected_model import competition, outdone_by
+from fish_sysid.diagnosis.backward_elimination import eliminate, exchanged, rivals
 from fish_sysid.diagnosis.cross_validation import gain_left_out, gain_unseen, on_all, predicted
+from fish_sysid.diagnosis.diagnosis_json import competition
 from fish_sysid.diagnosis.forward_selection import Selection, choose, predicts_unseen, significant
 from fish_sysid.diagnosis.model_order import better_order, fit_links, promises_more, with_links
 from fish_sysid.diagnosis.pipeline import fit_nominal
@@ -169,15 +169,17 @@ def test_a_check_that_does_not_excite_an_effect_passes_the_question_on_to_every_
 
 def accepted(name: str, **log_posteriors: float) -> Accepted:
     contest = {other: made_fit(value, other) for other, value in log_posteriors.items()}
-    return Accepted(name, Round(made_fit(0.0), (), contest))
+    return Accepted(name, Round(made_fit(0.0), (), contest), contest)
 
 
-def test_a_name_that_a_rival_outdoes_on_the_searched_trials_is_implausible():
-    flow = accepted("nonuniform_current", nonuniform_current=900.0, payload=899.0, tip_slip=20.0)
-    assert outdone_by(flow, [flow]) == "payload"  # 37 parameters against 3
-    load = accepted("payload", nonuniform_current=900.0, payload=899.0)
-    assert outdone_by(load, [load]) == ""
-    assert outdone_by(flow, [flow, load]) == ""  # what is found as well explains something else
+def test_plausible_names_and_simpler_look_alikes_compete_again():
+    flow = accepted(
+        "nonuniform_current", nonuniform_current=900.0, current=700.0, tether=899.0, payload=100.0
+    )
+    final = made_fit(1000.0, "nonuniform_current", "tip_slip")
+    assert set(rivals(flow, final)) == {"current", "tether"}
+    lag = accepted("rudder_lag", rudder_lag=900.0, rudder_delay=100.0)  # no simpler
+    assert rivals(lag, made_fit(1000.0, "rudder_lag", "tip_slip")) == []
 
 
 def test_what_was_added_as_well_is_no_rival():
@@ -185,6 +187,7 @@ def test_what_was_added_as_well_is_no_rival():
     second = accepted("tip_slip", current=10.0, tip_slip=40.0, tether=9.0)
     assert list(competition(first, [first, second])) == ["current", "tether"]
     assert list(competition(second, [first, second])) == ["tip_slip", "tether"]
+    assert "tip_slip" not in rivals(first, made_fit(1000.0, "current", "tip_slip"))
 
 
 @pytest.fixture(scope="module")
@@ -194,14 +197,44 @@ def offset():
     return replace(data, gyro=1.05 * data.gyro)
 
 
-def test_a_fit_less_an_effect_keeps_its_other_parameters_and_takes_the_noise_it_needs(offset):
-    hypothesis = nominal_hypothesis(GIVEN, ("tail_stiffness",)).with_effect("gyro_scale")
-    both = refit(hypothesis, np.array([np.log(1.1), 0.0]), offset, Noise(), REFIT)
-    less = without(both, "gyro_scale", offset)
-    assert less.hypothesis.names == ()
-    np.testing.assert_array_equal(less.theta, both.theta[:1])
-    assert less.log_posterior < both.log_posterior - 10.0
-    assert less.noise.wrench[2] > 2.0 * both.noise.wrench[2]  # in yaw
+def test_an_effect_that_the_others_have_made_superfluous_is_taken_out(offset):
+    hypothesis = nominal_hypothesis(GIVEN, ("head_drag_surge", "head_drag_sway", "tail_stiffness"))
+    both = hypothesis.with_effect("camera_scale").with_effect("gyro_scale")
+    start = np.append(np.log([1.3, 0.8, 1.1]), [0.0, 0.0])
+    task = make_task(offset, GIVEN)
+    final = refit(both, start, task.trials.training, Noise(), REFIT)
+    effects = [
+        Accepted(name, Round(final, (), {}), {name: final})
+        for name in ("camera_scale", "gyro_scale")
+    ]
+    nominal = refit(hypothesis, start[:3], task.trials.training, Noise(), REFIT)
+    smaller, kept = eliminate(nominal, final, tuple(effects), task)
+    assert [one.name for one in kept] == ["gyro_scale"]
+    assert smaller.hypothesis.names == ("gyro_scale",)
+    same, both_kept = eliminate(nominal, final, tuple(reversed(effects)), task)
+    assert [one.name for one in both_kept] == ["gyro_scale", "camera_scale"]
+    assert same.log_posterior == pytest.approx(final.log_posterior, abs=1.0)
+
+
+def test_effects_that_gain_too_little_over_the_nominal_model_are_all_taken_out(offset):
+    """The search may begin in a poor optimum of the nominal model and end in a poorer one than its best."""
+    nominal = made_fit(1000.0)
+    effect = accepted("nonuniform_current", nonuniform_current=1010.0)
+    final = effect.contest["nonuniform_current"]
+    left, kept = eliminate(nominal, final, (effect,), make_task(offset, GIVEN))
+    assert left is nominal
+    assert kept == ()
+
+
+def test_an_exchanged_effect_is_fitted_in_the_place_of_the_other(offset):
+    hypothesis = nominal_hypothesis(GIVEN, ("tail_stiffness",)).with_effect("camera_scale")
+    before = evaluate(hypothesis, np.zeros(len(hypothesis.free)), offset, Noise())
+    after = exchanged(before, "camera_scale", "gyro_scale", offset)
+    assert after.hypothesis.names == ("gyro_scale",)
+    assert after.log_posterior > before.log_posterior
+    scale, std = after.values["gyro_scale.factor"], after.standard_errors["gyro_scale.factor"]
+    assert scale == pytest.approx(1.05, abs=4.0 * std)
+    assert std < 0.01
 
 
 @pytest.mark.parametrize(

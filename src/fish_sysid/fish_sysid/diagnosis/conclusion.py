@@ -12,6 +12,7 @@ import numpy as np
 from fish_report.parallel import on_all_cores
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.backward_elimination import without
 from fish_sysid.diagnosis.can_follow import missed_with
 from fish_sysid.diagnosis.corrected_model import much_is_left, named
 from fish_sysid.diagnosis.effect_wrench import effect_wrench, pushes
@@ -21,7 +22,7 @@ from fish_sysid.diagnosis.surrogate_model import STRUCTURAL, surrogate_model
 from fish_sysid.diagnosis.task import Task
 from fish_sysid.estimation.ekf_types import Array, Noise
 from fish_sysid.estimation.map_fit import Fit, evaluate
-from fish_sysid.estimation.noise_estimation import estimate_noise, initial_noise
+from fish_sysid.estimation.noise_estimation import initial_noise
 from fish_sysid.estimation.parametrization import nominal_hypothesis
 
 
@@ -75,14 +76,6 @@ def shares(
 
     several = names if len(names) > 1 else []
     return dict(zip(several, on_all_cores(part, several), strict=True))
-
-
-def without(fit: Fit, name: str, experiment: Experiment) -> Fit:
-    """The fit less one effect with the noise that it then needs, its other parameters as they are."""
-    smaller = fit.hypothesis.without(name)
-    theta = fit.theta[~fit.hypothesis.own(name)]
-    less = evaluate(smaller, theta, experiment, fit.noise)
-    return evaluate(smaller, theta, experiment, estimate_noise(less, experiment))
 
 
 def held_out_density(

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +14,10 @@ from fish_sysid.dataset.experiment import Experiment
 from fish_sysid.diagnosis.degenerate import degenerate
 from fish_sysid.diagnosis.prediction_rivals import Named
 from fish_sysid.diagnosis.result import Accepted, Diagnosis
-from fish_sysid.diagnosis.significance import probabilities
 from fish_sysid.diagnosis.vocabulary import kind_of
 from fish_sysid.estimation.map_fit import Fit
 from fish_sysid.estimation.shooting.schedule import TOO_FAR
-from fish_sysid.estimation.thresholds import MOST_UNEXPLAINED, PLAUSIBLE, RATIO_REJECT
+from fish_sysid.estimation.thresholds import MOST_UNEXPLAINED, RATIO_REJECT
 from fish_sysid.prediction.prediction import EVERY, WARM_UP, predict, prediction_errors
 
 Array = NDArray[np.float64]
@@ -53,21 +51,7 @@ def named(d: Diagnosis) -> tuple[Accepted, ...]:
     """The accepted effects, or none where they leave more than they take away: nearest is not right."""
     if much_is_left(d) and unexplained_share(d) > MOST_UNEXPLAINED:
         return ()
-    return tuple(a for a in d.accepted if not limit_of(d, a.name) and not outdone_by(a, d.accepted))
-
-
-def competition(accepted: Accepted, found: Sequence[Accepted]) -> dict[str, float]:
-    """Probability of a name and of its rivals, most probable first; what was found as well explains something else."""
-    others = {other.name for other in found} - {accepted.name}
-    return probabilities(
-        {name: fit for name, fit in accepted.contest.items() if name not in others}
-    )
-
-
-def outdone_by(accepted: Accepted, found: Sequence[Accepted]) -> str:
-    """The rival that makes a name implausible; "" where none does. Such a rival fails on trials that the search has not used."""
-    probability = competition(accepted, found)
-    return "" if probability[accepted.name] > PLAUSIBLE else next(iter(probability))
+    return tuple(a for a in d.accepted if not limit_of(d, a.name))
 
 
 def asked_by_predictions(d: Diagnosis) -> tuple[Named, ...]:
@@ -83,13 +67,8 @@ def asked_by_predictions(d: Diagnosis) -> tuple[Named, ...]:
 
 
 def refused(d: Diagnosis) -> list[str]:
-    """Why accepted effects are not named: they lie in a limit where they are another effect or none, or a rival outdoes them."""
-    limits = [text for a in d.accepted if (text := limit_of(d, a.name))]
-    return limits + [
-        f"{a.name} improves trials that the search has not used, {rival} explains the searched ones far better: neither is named"
-        for a in d.accepted
-        if (rival := outdone_by(a, d.accepted))
-    ]
+    """What the accepted effects are that lie in a limit where they are another effect or none."""
+    return [text for a in d.accepted if (text := limit_of(d, a.name))]
 
 
 def limit_of(d: Diagnosis, name: str) -> str:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from scipy.stats import t as student
 from fish_sim.robot import Robot
 from fish_sysid.diagnosis import latent_force
 from fish_sysid.diagnosis.corrected_model import (
-    competition,
     corrected,
     much_is_left,
     named,
@@ -28,7 +28,7 @@ from fish_sysid.diagnosis.prediction_evidence import (
     prediction_entries,
 )
 from fish_sysid.diagnosis.result import Accepted, Diagnosis, Round
-from fish_sysid.diagnosis.significance import p_value
+from fish_sysid.diagnosis.significance import p_value, probabilities
 from fish_sysid.diagnosis.symmetry.outcome import symmetry_entry, with_symmetry
 from fish_sysid.diagnosis.vocabulary import family_of, kind_of, separating
 from fish_sysid.estimation.ekf_types import ROWS, Noise
@@ -104,6 +104,14 @@ def effect_entry(d: Diagnosis, accepted: Accepted) -> dict[str, Any]:
         "family": family_entry(d, accepted),
         "where": where_entry(d, name),
     }
+
+
+def competition(accepted: Accepted, found: Sequence[Accepted]) -> dict[str, float]:
+    """Probability of a name and of its rivals, most probable first; what was found as well explains something else."""
+    others = {other.name for other in found} - {accepted.name}
+    return probabilities(
+        {name: fit for name, fit in accepted.contest.items() if name not in others}
+    )
 
 
 def rivals(d: Diagnosis) -> list[str]:

@@ -11,8 +11,8 @@ from fish_sysid.diagnosis.result import Accepted, Round
 from fish_sysid.diagnosis.selection_round import run_round
 from fish_sysid.diagnosis.significance import (
     Level,
+    evidence,
     parameter_count,
-    probabilities,
     simplest,
     strength_z,
 )
@@ -44,14 +44,14 @@ def select_effects(base: Fit, task: Task) -> Selection:
         name = choose(found, task)
         if name is None:  # the round's base may be a better optimum of the same model
             return Selection(found.base, rounds, selection.accepted)
-        accepted = (*selection.accepted, Accepted(name, found))
+        accepted = (*selection.accepted, Accepted(name, found, found.refitted))
         selection = Selection(found.refitted[name], rounds, accepted)
         task.progress(f"found {name}: {found.gain(name):.0f} nats")
     return selection
 
 
 def choose(found: Round, task: Task) -> str | None:
-    """The name to add: the most probable of the significant ones that the check confirms, the simplest of those as good."""
+    """The name to add: most evidence among the significant ones that the check confirms, the simplest of those as good."""
     tried, trials, level = len(task.needed(found.base)), task.trials, task.level
     good = significant(found, tried, level)
     if not good:
@@ -67,7 +67,7 @@ def choose(found: Round, task: Task) -> str | None:
         task.acted.add("check on unseen trials")
     if not confirmed:
         return None
-    return simplest(next(iter(probabilities(confirmed))), confirmed, level)
+    return simplest(max(confirmed, key=lambda name: evidence(confirmed[name])), confirmed, level)
 
 
 def significant(found: Round, tried: int, level: Level) -> list[str]:

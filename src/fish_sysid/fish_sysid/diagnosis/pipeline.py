@@ -1,12 +1,13 @@
 # Copyright 2026 Robot fish maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The method on one page: symmetries, fit, select effects, choose the number of links, say what is left.
+"""The method on one page: symmetries, fit, select effects, choose the number of links, eliminate, say what is left.
 
 Where the model cannot follow the fish at all there is no search: what is left is located, and predictions over seconds choose.
 """
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -14,12 +15,13 @@ from fish_report.parallel import on_all_cores
 from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.experiment import Experiment
+from fish_sysid.diagnosis.backward_elimination import eliminate
 from fish_sysid.diagnosis.can_follow import missed_by
 from fish_sysid.diagnosis.conclusion import by_predictions, conclude
 from fish_sysid.diagnosis.forward_selection import Selection, select_effects
 from fish_sysid.diagnosis.model_order import better_order
 from fish_sysid.diagnosis.residual_regression import residual_law
-from fish_sysid.diagnosis.result import Diagnosis, State
+from fish_sysid.diagnosis.result import Accepted, Diagnosis, State
 from fish_sysid.diagnosis.significance import Level
 from fish_sysid.diagnosis.symmetry.finding import SymmetryFinding
 from fish_sysid.diagnosis.symmetry.findings import symmetry_findings
@@ -67,6 +69,9 @@ def searched(nominal: Fit, task: Task) -> State:
     if task.runs("model order"):
         finer = task.kept("model order", None, better_order(selection, state.law, task))
         state = state if finer is None else on_training(select_effects(finer, task), task)
+    if task.runs("backward elimination") and state.accepted:
+        final, accepted = eliminate(state.nominal, state.final, state.accepted, task)
+        state = task.kept("backward elimination", state, with_final(state, final, accepted, task))
     return state
 
 
@@ -110,3 +115,12 @@ def on_training(selection: Selection, task: Task) -> State:
     fits = on_all_cores(lambda fit: refit_on(fit, training), [final] if same else [nominal, final])
     law = residual_law(fits[-1], training)
     return State(selection.rounds, selection.accepted, fits[0], fits[-1], law)
+
+
+def with_final(state: State, final: Fit, accepted: tuple[Accepted, ...], task: Task) -> State:
+    """The state with another final fit and the law that it leaves; the same state where nothing is another one."""
+    if final is not state.final:
+        law = residual_law(final, task.trials.training)
+        return replace(state, final=final, accepted=accepted, law=law)
+    same = all(map(operator.is_, accepted, state.accepted))
+    return state if same else replace(state, accepted=accepted)

@@ -51,15 +51,11 @@ class Round:
 
 @dataclass(frozen=True)
 class Accepted:
-    """An effect that was added, and the round it won."""
+    """An effect that was added, the round it won, and the fits that it competes with."""
 
     name: str
     round: Round
-
-    @property
-    def contest(self) -> dict[str, Fit]:
-        """Name -> fit of what competed, its own among them."""
-        return self.round.refitted
+    contest: dict[str, Fit]  # name -> fit, its own among them: of its round, or of the final model
 
 
 @dataclass(frozen=True)

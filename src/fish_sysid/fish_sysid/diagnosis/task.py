@@ -88,6 +88,7 @@ STAGES = (
     ("nominal start", "candidates screened from the nominal values as well as from the base"),
     ("base restart", "the base refitted from the best candidate's optimum, and screened again"),
     ("check on unseen trials", "a candidate must predict trials that the search has not used"),
+    ("backward elimination", "every effect tested again with those that were added after it"),
     ("model order", "more tail links tried where much is left"),
     ("surrogate model", "a model fitted by its predictions where no name fits"),
     ("surrogate's own choice", "effects in it that its predictions call for"),
