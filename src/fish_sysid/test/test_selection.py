@@ -207,23 +207,12 @@ def test_an_effect_that_the_others_have_made_superfluous_is_taken_out(offset):
         Accepted(name, Round(final, (), {}), {name: final})
         for name in ("camera_scale", "gyro_scale")
     ]
-    nominal = refit(hypothesis, start[:3], task.trials.training, Noise(), REFIT)
-    smaller, kept = eliminate(nominal, final, tuple(effects), task)
+    smaller, kept = eliminate(final, tuple(effects), task)
     assert [one.name for one in kept] == ["gyro_scale"]
     assert smaller.hypothesis.names == ("gyro_scale",)
-    same, both_kept = eliminate(nominal, final, tuple(reversed(effects)), task)
+    same, both_kept = eliminate(final, tuple(reversed(effects)), task)
     assert [one.name for one in both_kept] == ["gyro_scale", "camera_scale"]
     assert same.log_posterior == pytest.approx(final.log_posterior, abs=1.0)
-
-
-def test_effects_that_gain_too_little_over_the_nominal_model_are_all_taken_out(offset):
-    """The search may begin in a poor optimum of the nominal model and end in a poorer one than its best."""
-    nominal = made_fit(1000.0)
-    effect = accepted("nonuniform_current", nonuniform_current=1010.0)
-    final = effect.contest["nonuniform_current"]
-    left, kept = eliminate(nominal, final, (effect,), make_task(offset, GIVEN))
-    assert left is nominal
-    assert kept == ()
 
 
 def test_an_exchanged_effect_is_fitted_in_the_place_of_the_other(offset):

@@ -26,17 +26,9 @@ from fish_sysid.estimation.thresholds import PLAUSIBLE
 
 
 def eliminate(
-    nominal: Fit, final: Fit, accepted: tuple[Accepted, ...], task: Task
+    final: Fit, accepted: tuple[Accepted, ...], task: Task
 ) -> tuple[Fit, tuple[Accepted, ...]]:
-    """The final model without the effects that it does not need, and what these are; all fits on the training trials.
-
-    First all effects at once: the search may have begun in a poor optimum of the nominal model, which a better one needs no
-    effects for. Then every effect but the last is tested again, without it and against its rivals, in the final model.
-    """
-    count = sum(task.parameter_count(one.name) for one in accepted)
-    needed = task.level.needed(final.samples, count, len(task.names))
-    if final.log_posterior - nominal.log_posterior < needed:
-        return nominal, ()
+    """Every effect but the last tested again, without it and against its rivals, in the final model."""
     training, kept = task.trials.training, list(accepted[-1:])
     for candidate in accepted[:-1]:
         task.progress(f"without {candidate.name}?")

@@ -69,8 +69,8 @@ def searched(nominal: Fit, task: Task) -> State:
     if task.runs("model order"):
         finer = task.kept("model order", None, better_order(selection, state.law, task))
         state = state if finer is None else on_training(select_effects(finer, task), task)
-    if task.runs("backward elimination") and state.accepted:
-        final, accepted = eliminate(state.nominal, state.final, state.accepted, task)
+    if task.runs("backward elimination") and len(state.accepted) > 1:
+        final, accepted = eliminate(state.final, state.accepted, task)
         state = task.kept("backward elimination", state, with_final(state, final, accepted, task))
     return state
 
