@@ -16,7 +16,7 @@ from typing import Any
 from fish_bag.decode import PATH_ROLE, PATH_TYPE, ROLES
 from fish_bag.problem import RecordingError
 from fish_report.errors import user_errors
-from fish_report.yaml_file import read_yaml
+from fish_report.files import read_yaml
 
 TIMES = ("stamp", "arrival")
 KNOWN_ROLES = (*ROLES, PATH_ROLE)

@@ -17,12 +17,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fish_report.files import write_json
+from fish_report.files import read_yaml, write_json
 from fish_report.page import Table
 from fish_report.parallel import at_end_of_worker, worker_pool
 from fish_report.printable import LONGEST
 from fish_report.terminal import print_table, say, terminal
-from fish_report.yaml_file import read_yaml
 
 
 @pytest.mark.parametrize(

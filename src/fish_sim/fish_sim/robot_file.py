@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from fish_report.yaml_file import read_yaml
+from fish_report.files import read_yaml
 from fish_sim.effects import EFFECTS
 from fish_sim.parameter import Parameter
 from fish_sim.robot import Robot, RobotError, check_links, nominal_parameters

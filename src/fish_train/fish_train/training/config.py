@@ -12,7 +12,7 @@ from typing import Any
 
 from fish_control.policy_spec import OUTPUTS
 from fish_report.errors import UserError
-from fish_report.yaml_file import read_yaml
+from fish_report.files import read_yaml
 from fish_sim.model import DT
 from fish_train.training.batch import LONGEST_DELAY
 from fish_train.training.closed_loop_equations import COST_NAMES
