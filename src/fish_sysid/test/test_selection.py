@@ -17,7 +17,7 @@ from fish_sim.effects import EFFECTS
 from fish_sim.robot import Robot
 from fish_sysid.dataset.synthetic import program, record
 from fish_sysid.diagnosis import screening
-from fish_sysid.diagnosis.backward_elimination import eliminate, exchanged, rivals
+from fish_sysid.diagnosis.backward_elimination import eliminate, exchanged, rivals, without
 from fish_sysid.diagnosis.cross_validation import gain_left_out, gain_unseen, on_all, predicted
 from fish_sysid.diagnosis.diagnosis_json import competition
 from fish_sysid.diagnosis.forward_selection import Selection, choose, predicts_unseen, significant
@@ -195,6 +195,16 @@ def offset():
     """Two sensor errors, of which the data have one: a gyro that reads 5 % too much."""
     data = swim(fish(), kinds=("sines", "steps"))
     return replace(data, gyro=1.05 * data.gyro)
+
+
+def test_a_fit_less_an_effect_keeps_its_other_parameters_and_takes_the_noise_it_needs(offset):
+    hypothesis = nominal_hypothesis(GIVEN, ("tail_stiffness",)).with_effect("gyro_scale")
+    both = refit(hypothesis, np.array([np.log(1.1), 0.0]), offset, Noise(), REFIT)
+    less = without(both, "gyro_scale", offset)
+    assert less.hypothesis.names == ()
+    np.testing.assert_array_equal(less.theta, both.theta[:1])
+    assert less.log_posterior < both.log_posterior - 10.0
+    assert less.noise.wrench[2] > 2.0 * both.noise.wrench[2]  # in yaw
 
 
 def test_an_effect_that_the_others_have_made_superfluous_is_taken_out(offset):
