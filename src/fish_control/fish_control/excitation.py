@@ -96,7 +96,7 @@ def read_program(path: Path) -> Program:
     text = path.read_text(encoding="utf-8", errors="replace")
     try:
         content = json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
-    except (ValueError, yaml.YAMLError) as error:
+    except (ValueError, yaml.YAMLError, RecursionError) as error:
         raise ProgramError(
             f"{path} is neither JSON nor YAML ({error.__class__.__name__}); expected {EXPECTED}"
         ) from None

@@ -132,6 +132,7 @@ def test_a_program_is_read_alone_and_out_of_a_diagnosis(tmp_path, wrap, suffix):
     ("content", "said"),
     [
         ("{", "is neither JSON nor YAML"),
+        ("[" * 20_000, "is neither JSON nor YAML"),
         ('"words"', "holds str; expected a list of rows"),
         ("{}", "holds dict; expected a list of rows"),
         ("[]", "no rows"),

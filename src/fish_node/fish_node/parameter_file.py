@@ -78,7 +78,7 @@ def read_node_parameters(path: Path, node: str) -> dict[str, Any]:
         own = [
             _parameters(pattern, below) for pattern, below in possible if _matches(pattern, full)
         ]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
+    except (OSError, yaml.YAMLError, ValueError, RecursionError) as error:
         raise ValueError(f"{path}: {' '.join(str(error).split())}") from error
     others = [pattern for pattern, _ in possible if not _matches(pattern, full)]
     if others:

@@ -109,6 +109,7 @@ def test_entries_that_could_be_meant_but_are_not_read_are_refused(
         (None, "No such file"),
         (b"\xff", "decode"),
         ("{bad: [", "while parsing"),
+        ("[" * 20_000, "maximum recursion depth"),
         (
             "",
             r"expected a node name with ros__parameters below it, such as /\*\* or /fish/rudder; found: none",
