@@ -95,15 +95,22 @@ class FakeKernel:
 
 
 def refuse_as_sysfs_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kernels before mid-2024 refuse every write that leaves period 0 or a pulse longer than the period."""
+    """Kernels before mid-2024 refuse every write that leaves period 0 or a pulse longer than the period.
+
+    All refuse another polarity of a channel that is on.
+    """
     plain = Path.write_text
 
     def write_text(path: Path, text: str) -> int:
-        if path.name in ("period", "duty_cycle", "enable") and path.exists():
+        if path.name in ("period", "duty_cycle", "enable", "polarity") and path.exists():
             state = {
-                name: int((path.parent / name).read_text()) for name in ("period", "duty_cycle")
+                name: int((path.parent / name).read_text())
+                for name in ("period", "duty_cycle", "enable")
             }
-            state[path.name] = int(text)
+            if path.name == "polarity" and state["enable"]:
+                raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
+            if path.name != "polarity":
+                state[path.name] = int(text)
             if state["period"] == 0 or state["duty_cycle"] > state["period"]:
                 raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
         return plain(path, text)

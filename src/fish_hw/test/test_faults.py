@@ -14,6 +14,7 @@ import os
 import struct
 import threading
 import time
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -29,7 +30,7 @@ from fish_hw.devices.rudder_driver import RudderDriver
 from fish_hw.devices.rudder_output import open_output
 from fish_hw.devices.usb_camera import UsbCamera
 from fish_hw.devices.vertiq import Vertiq
-from fish_hw.emulators.bno085 import Felt
+from fish_hw.emulators.bno085 import FedBno085, Felt
 from fish_hw.emulators.fake_robot import IMU_ADDRESS, FakeRobot
 from fish_hw.emulators.fault_run import RAMP_S, FaultRun, moved_while_disarmed, speed_changes
 from fish_hw.emulators.lockstep_rotor import DT, SETTINGS, LockstepRotor
@@ -37,7 +38,7 @@ from fish_hw.emulators.pwm import PwmChipEmulator
 from fish_hw.emulators.stop_causes import CAUSES, limit_s, stop
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
 from fish_hw.nodes.worker import Worker
-from fish_hw.protocol import iquart
+from fish_hw.protocol import iquart, sh2
 from fish_hw.protocol.iquart import encode
 from fish_hw.safe_stop import main
 from fish_hw.settings import CameraSettings, ImuSettings, RotorSettings, RudderSettings
@@ -428,6 +429,39 @@ def test_what_the_simulator_feels_comes_through_the_hubs_protocol(robot):
     driver.close()
 
 
+@pytest.mark.parametrize(
+    ("rate", "measured"),
+    [(math.nan, []), (math.inf, []), (100.0, [0x7FFF / 512]), (-100.0, [-0x8000 / 512])],
+)
+def test_the_emulated_imu_measures_what_its_registers_hold(rate, measured):
+    hub = FedBno085(lambda: 10.0)
+    hub.write(bytes([21, 0, sh2.CONTROL, 0]) + sh2.set_feature(sh2.GYROSCOPE, 10_000))
+    assert len(hub.read(100)) == 100  # the answer to that
+    hub.feel(replace(felt(10.0), angular_velocity=(0.0, 0.0, rate)))
+    data = hub.read(100)
+    raw = struct.unpack_from("<h", data, sh2.HEADER_BYTES + 5 + 8)[0]  # header, base, report, z
+    assert ([raw / 512] if any(data) else []) == measured  # Q9
+
+
+def test_a_bus_outlives_what_a_driver_should_not_send(robot, capfd):
+    name = str(robot.parameters()["imu"]["bus"])
+    with pytest.raises(TransportError):
+        SocketI2c(name).write(IMU_ADDRESS, b"\0")  # no packet
+    assert len(SocketI2c(name).read(IMU_ADDRESS, 4)) == 4
+    assert "IndexError" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("volts", "answered"), [(math.nan, 0.0), (1e6, 327.67), (-math.inf, -327.68)]
+)
+def test_the_emulated_module_answers_whatever_its_voltage_is(robot, volts, answered):
+    port = SerialPort(str(robot.parameters()["rotor"]["port"]), 115200)
+    vertiq = Vertiq(port, reply_timeout_s=0.2)
+    robot.rotor.volts = volts
+    assert wait_until(lambda: vertiq.power().volts == pytest.approx(answered), TIMEOUT_S)
+    port.close()
+
+
 @pytest.mark.parametrize("code", [errno.EIO, errno.ETIMEDOUT, errno.EREMOTEIO])
 def test_an_errno_of_the_bus_reaches_the_driver(robot, code):
     bus = SocketI2c(str(robot.parameters()["imu"]["bus"]))
@@ -535,7 +569,7 @@ def test_every_fault_can_be_made_and_mended(robot):
 
 def test_a_camera_waits_for_no_driver_and_shows_it_the_newest_picture(robot):
     name = str(robot.parameters()["camera"]["device"])
-    source = SocketCamera(name)
+    source = SocketCamera(name, lambda time_s: time_s + 5.0)
     noise = np.random.default_rng(0).integers(0, 255, (480, 640, 3), np.uint8)
     large = bytes(cv2.imencode(".png", noise)[1])  # more than a socket holds
     for k in range(20):  # a driver that does not read would stop one that waits for it
@@ -546,7 +580,7 @@ def test_a_camera_waits_for_no_driver_and_shows_it_the_newest_picture(robot):
     def newest() -> bool:
         frame = source.read()
         frames.extend([frame] if frame else [])
-        return bool(frames) and frames[-1].time_s == 99.0
+        return bool(frames) and frames[-1].time_s == 99.0 + 5.0  # on its own clock
 
     assert wait_until(newest, TIMEOUT_S)
     assert frames[-1].jpeg == jpeg(50)

@@ -20,6 +20,8 @@ from fakes import wait_until
 from rclpy.clock import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, CameraInfo, CompressedImage, Image, Imu, JointState
 from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Bool, String
@@ -33,13 +35,14 @@ from fish_hw.emulators.pwm import PwmChipEmulator
 from fish_hw.emulators.vertiq import VELOCITY_MODE, VertiqEmulator
 from fish_hw.nodes.camera import CameraNode
 from fish_hw.nodes.device_node import run
+from fish_hw.nodes.fake_robot import FakeRobotNode
 from fish_hw.nodes.imu import ImuNode
 from fish_hw.nodes.rotor import RotorNode
 from fish_hw.nodes.rudder import RudderNode
 from fish_hw.nodes.worker import Worker
 from fish_hw.protocol import iquart
 from fish_hw.transport.sysfs_pwm import SysfsPwm
-from fish_node import rivals
+from fish_node import arming, rivals
 from fish_node.camera_file import CameraFileError, read_camera_file
 
 pytestmark = pytest.mark.ros
@@ -101,7 +104,7 @@ class Graph:
 
         def each() -> None:
             publisher.publish(command(rotor=rotor))
-            client.call_async(SetBool.Request(data=True))
+            self.asked = client.call_async(SetBool.Request(data=True))
 
         return each
 
@@ -224,7 +227,7 @@ def test_rotor_moves_only_while_a_person_has_armed_it(graph, vertiq_emulator):
     assert states[-1].status[0].level == DiagnosticStatus.WARN
     assert states[-1].status[0].message == "not armed since the start"
     assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, g.arming(publisher))
-    assert g.spin(lambda: states[-1].status[0].message == "armed", drive)
+    assert g.spin(lambda: bool(states) and states[-1].status[0].message == "armed", drive)
     assert g.call(SetBool, "arm", SetBool.Request(data=False)).success
     assert g.spin(lambda: vertiq_emulator.mode == iquart.COAST, drive)
     assert states[-1].status[0].message == "disarmed by the operator"
@@ -284,6 +287,39 @@ def test_a_driver_that_waits_for_simulated_time_says_so(graph):
     assert "no time on /clock" in g.node.failure
 
 
+def test_a_driver_goes_on_where_the_simulated_clock_is_set_back(graph):
+    g = graph(RotorNode, port="emulator", use_sim_time=True, **PATIENT)
+    states = g.listen(JointState, "joint_states")
+    ticks = g.peer.create_publisher(Clock, "/clock", 10)
+    asks = g.arming(g.peer.create_publisher(JointState, "joint_command", 10))
+    now_ns = [1000 * 10**9]
+
+    def tick() -> None:
+        now_ns[0] += 10**7
+        ticks.publish(Clock(clock=Time(nanoseconds=now_ns[0]).to_msg()))
+
+    def each() -> None:
+        tick()
+        asks()
+
+    assert g.spin(lambda: g.node._emulator.mode == VELOCITY_MODE, each)
+    now_ns[0] = 0
+    assert g.spin(lambda: bool(states) and states[-1].header.stamp.sec < 900, each)
+    count = len(states)
+    assert g.spin(lambda: len(states) > count + 50, each)
+    assert 0.0 <= states[-1].header.stamp.sec < 900
+    assert g.node._driver.arming.check(g.node.clock.now())
+    assert g.spin(lambda: not g.node._driver.arming.armed, tick)  # silence counts as before
+    assert g.node._driver.arming.reason == "no joint_command for 1 s"
+
+
+@pytest.mark.parametrize(("said", "volts"), [(math.nan, 11.1), (math.inf, 11.1), (12.0, 12.0)])
+def test_a_fake_robot_takes_a_voltage_that_was_measured(said, volts):
+    robot = SimpleNamespace(rotor=SimpleNamespace(volts=11.1))
+    FakeRobotNode._on_battery(SimpleNamespace(_robot=robot), BatteryState(voltage=said))
+    assert robot.rotor.volts == volts
+
+
 def test_a_second_commander_is_warned_of(graph, monkeypatch, capfd):
     monkeypatch.setattr(rivals, "PATIENCE_S", 0.0)
     g = graph(RotorNode, port="emulator")
@@ -319,8 +355,7 @@ def test_a_deadman_that_is_let_go_for_a_moment_disarms(graph, vertiq_emulator):
         asks()
 
     assert g.spin(lambda: vertiq_emulator.mode == VELOCITY_MODE, each)
-    end = time.monotonic() + 0.2  # until the last of the requests to arm is answered
-    assert g.spin(lambda: time.monotonic() > end, lambda: publisher.publish(command(rotor=50.0)))
+    assert g.spin(g.asked.done, lambda: publisher.publish(command(rotor=50.0)))
     for held in (False, True):
         deadman.publish(Bool(data=held))
     assert g.spin(
@@ -329,7 +364,10 @@ def test_a_deadman_that_is_let_go_for_a_moment_disarms(graph, vertiq_emulator):
     assert g.node._driver.arming.reason == "the operator let the deadman go"
 
 
-def test_another_owner_of_the_arming_state_forbids_to_arm_while_it_is_there(graph, vertiq_emulator):
+def test_another_owner_of_the_arming_state_forbids_to_arm_while_it_is_there(
+    graph, vertiq_emulator, monkeypatch
+):
+    monkeypatch.setattr(arming, "PAUSE_FORGOTTEN_S", 4.0)  # longer than a busy computer stalls
     g = graph(RotorNode, port=vertiq_emulator.port, **PATIENT)
     publisher = g.peer.create_publisher(JointState, "joint_command", 10)
     simulator = g.peer.create_publisher(DiagnosticArray, "arming/state", 10)
@@ -372,6 +410,31 @@ def test_rudder_follows_and_centres(graph, tmp_path):
     assert g.spin(lambda: chip.channel.joinpath("duty_cycle").read_text() == "1786500\n", each)
     assert g.spin(lambda: chip.channel.joinpath("duty_cycle").read_text() == "1500000\n")
     assert g.spin(lambda: bool(diagnostics))
+
+
+def test_a_second_owner_does_not_move_the_rudder_of_a_disarmed_robot(graph, tmp_path):
+    chip = PwmChipEmulator(tmp_path / "pwmchip0")
+    g = graph(RudderNode, chip=str(chip.chip))
+    publisher = g.peer.create_publisher(JointState, "joint_command", 10)
+    owners = [g.peer.create_publisher(DiagnosticArray, "arming/state", 10) for _ in range(2)]
+    states = [
+        DiagnosticStatus(level=DiagnosticStatus.WARN, message="a leak", hardware_id="/fish/rotor"),
+        DiagnosticStatus(level=DiagnosticStatus.OK, message="armed", hardware_id="/fish/replayer"),
+    ]
+
+    def disarmed() -> None:
+        owners[0].publish(DiagnosticArray(status=states[:1]))
+
+    def each() -> None:
+        disarmed()
+        owners[1].publish(DiagnosticArray(status=states[1:]))
+        publisher.publish(command(rudder=0.5))
+
+    assert g.spin(lambda: g.node._arming.armed is False, disarmed)
+    assert g.spin(lambda: "/fish/replayer" in g.node._arming.reason, each)
+    pulses = []
+    assert g.spin(lambda: pulses.append(chip.read("duty_cycle")) or len(pulses) > 50, each)
+    assert set(pulses) == {1_500_000}
 
 
 def test_imu_topics(graph):
@@ -675,15 +738,11 @@ def test_a_signal_at_any_moment_of_the_start_leaves_the_device_safe(
     assert not rclpy.ok()
 
 
-def driven_rotor(emulator: VertiqEmulator, graph: Callable) -> tuple[subprocess.Popen, Graph]:
+def driven_rotor(
+    emulator: VertiqEmulator, graph: Callable, **changed: float
+) -> tuple[subprocess.Popen, Graph]:
     """A rotor process that spins the emulated module, commanded from here."""
-    values = {
-        "estimate": "ignored",
-        "rudder_timeout_s": 0.0,
-        "reply_timeout_s": 0.2,
-        "stale_s": 1.0,
-    }
-    values["port"] = emulator.port
+    values = {**PATIENT, **changed, "port": emulator.port}
     process = start("rotor", *(a for k, v in values.items() for a in ("-p", f"{k}:={v}")))
     first_words(process, "device ready")
     g = graph(RudderNode, backend="emulator")  # any node: this side needs an executor only
@@ -702,7 +761,7 @@ def test_sigterm_coasts_a_spinning_rotor(graph, vertiq_emulator):
 
 
 def test_sigkill_leaves_it_to_the_modules_own_watchdog(graph, vertiq_emulator):
-    process, _ = driven_rotor(vertiq_emulator, graph)
+    process, _ = driven_rotor(vertiq_emulator, graph, module_timeout_s=0.25)
     process.kill()
     process.communicate(timeout=TIMEOUT_S)
     assert wait_until(lambda: vertiq_emulator.mode == iquart.COAST)

@@ -157,6 +157,13 @@ def test_a_late_cycle_earns_no_jump(late_s):
     assert jump <= SETTINGS.max_acceleration * 1.5 * DT + 1e-9
 
 
+@pytest.mark.parametrize("back_s", [0.005, 1000.0])
+def test_a_clock_that_goes_back_changes_no_speed(back_s):
+    bench = Bench()
+    bench.run(0.5, lambda _: 100.0)
+    assert bench.guard.step(bench.now - back_s, True).velocity == 100.0
+
+
 def test_well():
     health = RotorHealth(SETTINGS).judge(WELL, 0.0)
     assert (health.warnings, health.stops) == ((), ())

@@ -135,6 +135,14 @@ def test_a_late_cycle_earns_no_jump():
     assert 0.0 < bench.servo.alpha <= SETTINGS.max_rate * 0.05 + 1e-12
 
 
+@pytest.mark.parametrize("back_s", [0.005, 1000.0])
+def test_a_clock_that_goes_back_moves_no_servo(back_s):
+    bench = ServoBench()
+    angle = bench.run(1.0, 0.6)[-1]
+    bench.servo.step(bench.now - back_s)
+    assert bench.servo.alpha == angle
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_bad_numbers_do_not_feed_the_watchdog(bad):
     bench = ServoBench()
@@ -241,6 +249,32 @@ def test_sysfs_starts_whatever_the_channel_was_left_at(chip, left):
         1_500_000,
         1,
     )
+
+
+@pytest.mark.parametrize("left", [(0, 0, 0), (40_000_000, 30_000_000, 1), (20_000_000, 0, 0)])
+def test_sysfs_channel_that_was_left_inversed_is_normal_again(chip, left):
+    """Inversed, a pulse of 1.5 ms would be one of 18.5 ms."""
+    for name, value in zip(("period", "duty_cycle", "enable"), left, strict=True):
+        with open(chip.channel / name, "w") as file:  # whatever the kernel says
+            file.write(f"{value}\n")
+    with open(chip.channel / "polarity", "w") as file:
+        file.write("inversed\n")
+    SysfsPwm(str(chip.chip), 0, 20_000_000).start(1_500_000)
+    assert (chip.channel / "polarity").read_text() == "normal\n"
+    assert (chip.read("period"), chip.read("duty_cycle"), chip.read("enable")) == (
+        20_000_000,
+        1_500_000,
+        1,
+    )
+
+
+def test_sysfs_channel_with_another_period_is_not_running(chip):
+    pwm = SysfsPwm(str(chip.chip), 0, 20_000_000)
+    pwm.start(1_500_000)
+    (chip.channel / "period").write_text("10000000\n")
+    assert not pwm.is_running()
+    pwm.start(1_500_000)
+    assert pwm.is_running()
 
 
 def test_sysfs_export_waits_for_the_files(tmp_path):

@@ -160,6 +160,11 @@ class Arming:
                 self.disarm("; ".join(troubles))
             return self._armed
 
+    def state(self, now: float) -> tuple[bool, str, int]:
+        """`armed`, `reason` and `count` at one moment, after a check at `now` [s]."""
+        with self._lock:
+            return self.check(now), self.reason, self.count
+
     def _forget_silent(self, now: float) -> None:
         """What is not required and fell silent is not waited for."""
         for name, source in self._sources.items():

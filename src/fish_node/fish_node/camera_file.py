@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -122,7 +123,8 @@ def write_camera_file(path: Path, camera: CameraFile, name: str) -> None:
             f"{path}: cannot be written: {error.strerror or error}; give the node another calibration_file"
         ) from error
     finally:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
 
 
 def to_document(camera: CameraFile, name: str) -> dict[str, Any]:

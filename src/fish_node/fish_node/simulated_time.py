@@ -20,29 +20,35 @@ LOOK_S = 0.01  # s of the wall clock, after which a thread that waits looks at t
 class SimulatedTime:
     """The time that messages on /clock say, carried on by the wall clock until the next is due.
 
-    It never goes back while the messages do not. One thread calls tick(), any may call now().
+    It never goes back while the messages come at one rate. Where /clock is set back, it runs on from where it is, ahead of
+    /clock. One thread calls tick(), any may call now().
 
     Attributes:
         runs: whether a message came.
+        ahead_s: s, by how much it is ahead of /clock.
 
     Args:
         wall: s, monotonic.
     """
 
     def __init__(self, wall: Callable[[], float] = time.monotonic) -> None:
-        self.runs = False
+        self.runs, self.ahead_s = False, 0.0
         self._wall = wall
         self._rates: deque[float] = deque(maxlen=REMEMBERED)
         self._line = (0.0, 0.0, 1.0, 0.0)  # s of the wall, s, rate, longest way ahead [s]
 
-    def tick(self, simulated_s: float) -> None:
+    def tick(self, clock_s: float) -> None:
         """Take a message on /clock."""
         now = self._wall()
         then, before_s, _, _ = self._line
+        set_back = self.runs and clock_s + self.ahead_s < before_s
+        if set_back:
+            self.ahead_s = self.now() - clock_s
+        simulated_s = clock_s + self.ahead_s
         step = simulated_s - before_s
         if self.runs and step == 0.0:  # said again
             return
-        if not self.runs or step < 0.0:  # the first, or the simulation began anew
+        if set_back or not self.runs:
             self._rates.clear()
             step = 0.0
         elif now > then:

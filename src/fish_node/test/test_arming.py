@@ -3,8 +3,13 @@
 """Arming, and another node of the same name."""
 
 import math
+import threading
+from types import SimpleNamespace
 
 import pytest
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.serialization import deserialize_message, serialize_message
 
 from fish_node.arming import (
     AT_START,
@@ -22,6 +27,7 @@ from fish_node.arming import (
     largest_of,
     operator_and_estimate,
 )
+from fish_node.nodes.arming import FORGOTTEN_S, ArmingListener, ArmingServer
 from fish_node.rivals import Rivals
 
 COMMAND = Source("joint_command", 0.15)
@@ -226,3 +232,142 @@ def test_only_who_stays_is_a_rival():
     assert [bool(words) for words in said] == [False] * 5 + [True, True] + [False] * 3 + [True]
     assert said[5].startswith("another publisher of /fish/x")
     assert warned == [said[5]] * 2  # once for each
+
+
+ROBOT, OTHER = "/fish/rotor 0123abcd", "/fish/simulator 4567cdef"
+
+
+class ListenerBench:
+    """An ArmingListener, and the words that reach it."""
+
+    def __init__(self) -> None:
+        self.now, self.calls = 100.0, 0
+        node = SimpleNamespace(create_subscription=self._subscribe)
+        self.listener = ArmingListener(node, self._on_state, lambda: self.now)
+
+    def _subscribe(self, kind, topic, callback, depth, raw):
+        self._hear = callback
+
+    def _on_state(self) -> None:
+        self.calls += 1
+
+    def say(self, *words: tuple[str, bool]) -> None:
+        """One message: (owner, armed) of each status."""
+        levels = {True: DiagnosticStatus.OK, False: DiagnosticStatus.WARN}
+        status = [
+            DiagnosticStatus(level=levels[ok], message="armed" if ok else "a leak", hardware_id=who)
+            for who, ok in words
+        ]
+        self._hear(serialize_message(DiagnosticArray(status=status)))
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_one_owner_that_says_armed_does_not_overrule_another_that_says_disarmed(together):
+    bench = ListenerBench()
+    for _ in range(10):
+        if together:
+            bench.say((ROBOT, False), (OTHER, True))
+        else:
+            bench.say((ROBOT, False))
+            bench.say((OTHER, True))
+        bench.now += 0.05
+        assert bench.listener.armed is False
+        said = "/fish/rotor and /fish/simulator say arming/state: stop one of the two"
+        assert bench.listener.reason.startswith(said)
+        assert bench.listener.reason.endswith("; a leak")
+
+
+def test_an_owner_that_is_gone_has_no_say():
+    bench = ListenerBench()
+    bench.say((ROBOT, False))
+    assert (bench.listener.armed, bench.listener.reason) == (False, "a leak")
+    bench.now += FORGOTTEN_S + 0.01
+    bench.say((OTHER, True))
+    assert (bench.listener.armed, bench.listener.reason) == (True, "")
+    bench.say((ROBOT, True))
+    assert bench.listener.armed is True
+
+
+def test_an_owner_that_says_both_in_one_message_says_disarmed():
+    bench = ListenerBench()
+    bench.say((ROBOT, False), (ROBOT, True))
+    assert (bench.listener.armed, bench.listener.reason) == (False, "a leak")
+
+
+def test_a_message_without_a_status_is_no_word():
+    bench = ListenerBench()
+    bench.say()
+    assert (bench.listener.armed, bench.calls) == (None, 0)
+    bench.say((ROBOT, True))
+    for _ in range(3):
+        bench.say()
+    assert (bench.listener.armed, bench.calls) == (True, 1)
+
+
+class Owner:
+    """Stands for the node that owns a state; publishing takes until the test lets it end."""
+
+    def __init__(self, arming: Arming) -> None:
+        self.sent: list[DiagnosticStatus] = []
+        self.inside = self.most = 0
+        self.second = threading.Event()  # a second message is sent while the first one is
+        self.patience_s = 0.0
+        self.server = ArmingServer(self, arming, ArmingSettings(estimate="ignored"), lambda: 0.0)
+
+    def get_fully_qualified_name(self) -> str:
+        return "/fish/rotor"
+
+    def get_clock(self):
+        return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=Time))
+
+    def get_logger(self):
+        return SimpleNamespace(info=lambda _: None, warning=lambda _: None)
+
+    def create_publisher(self, *_):
+        return SimpleNamespace(publish=self._send)
+
+    def create_service(self, *_, **__) -> None:
+        """Nobody calls it."""
+
+    create_subscription = create_timer = create_service
+
+    def _send(self, data: bytes) -> None:
+        self.inside += 1
+        self.most = max(self.most, self.inside)
+        if self.inside > 1:
+            self.second.set()
+        self.second.wait(self.patience_s)
+        self.sent += deserialize_message(data, DiagnosticArray).status
+        self.inside -= 1
+
+
+class Torn(Arming):
+    """An emergency stop comes right after somebody looked whether the robot is armed."""
+
+    @property
+    def armed(self) -> bool:
+        armed = self._armed
+        self.disarm("estop")
+        return armed
+
+
+def test_a_stop_while_the_state_is_published_is_not_said_of_an_armed_robot():
+    arming = Torn()
+    arming.arm(0.0)
+    owner = Owner(arming)
+    owner.server.publish()
+    arming.disarm("estop")
+    owner.server.publish()
+    said = [(status.level, status.message) for status in owner.sent]
+    assert said == [(DiagnosticStatus.OK, "armed"), (DiagnosticStatus.WARN, "estop")]
+
+
+def test_two_threads_publish_the_state_one_after_the_other():
+    owner = Owner(Arming())
+    owner.patience_s = 0.3
+    threads = [threading.Thread(target=owner.server.publish) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert (len(owner.sent), owner.most) == (2, 1)

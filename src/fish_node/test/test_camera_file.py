@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from fish_node.camera_file import CameraFileError, read_camera_file
+from fish_node.camera_file import CameraFileError, read_camera_file, write_camera_file
 
 K = [538.63, 0, 457.698, 0, 539.723, 297.003, 0, 0, 1]
 FILE = {
@@ -272,3 +272,10 @@ def test_the_rational_model_of_opencv_has_more_coefficients_which_are_zero(tmp_p
     document["distortion_coefficients"]["data"][-1] = 0.01
     with pytest.raises(CameraFileError, match="thin prism"):
         read_camera_file(written(tmp_path, document))
+
+
+def test_a_folder_that_is_a_file_is_named_as_the_reason(tmp_path):
+    camera = read_camera_file(written(tmp_path, changed("plumb_bob", [0.0] * 5)))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CameraFileError, match=r"cannot be written: .*another calibration_file"):
+        write_camera_file(tmp_path / "file" / "camera.yaml", camera, "camera")

@@ -73,7 +73,7 @@ class RotorGuard:
 
     def step(self, now: float, armed: bool) -> Action:
         """The action of this cycle."""
-        since = 0.0 if self._last_step is None else now - self._last_step
+        since = 0.0 if self._last_step is None else max(now - self._last_step, 0.0)
         self._last_step = now
         if self.phase is Phase.COASTING:
             return self._wait(now)

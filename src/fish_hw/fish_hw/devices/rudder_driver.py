@@ -68,7 +68,8 @@ class RudderServo:
 
     def step(self, now: float) -> int:
         """Pulse [ns] of this cycle: towards the command, or to the centre while it is idle."""
-        dt = 0.0 if self._last_step is None else min(now - self._last_step, LONGEST_STEP_S)
+        since = 0.0 if self._last_step is None else now - self._last_step
+        dt = min(max(since, 0.0), LONGEST_STEP_S)
         self._last_step = now
         target = 0.0 if self.idle(now) else self._target
         most = self._settings.max_rate * dt
@@ -241,7 +242,7 @@ class RudderDriver:
         self._checked = now
         if not output.is_running():
             raise TransportError(
-                "the PWM output stopped by itself (supply lost, or another program switched it off)"
+                "the PWM output stopped by itself or has another period (supply lost, or another program uses it)"
             )
         return self._link.works()
 

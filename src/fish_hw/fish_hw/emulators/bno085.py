@@ -16,6 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fish_hw.devices.imu_sample import Quaternion, Vector
+from fish_hw.emulators import int16
 from fish_hw.protocol import sh2
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
@@ -144,7 +145,9 @@ class Bno085Emulator:
         scale = 1 << sh2.LAYOUTS[report_id].q
         self._report_sequence = (self._report_sequence + 1) & 0xFF
         head = bytes([report_id, self._report_sequence, 3, 0])
-        return head + struct.pack(f"<{len(values)}h", *(round(value * scale) for value in values))
+        return head + struct.pack(
+            f"<{len(values)}h", *(int16(round(value * scale)) for value in values)
+        )
 
 
 @dataclass(frozen=True)
@@ -155,6 +158,13 @@ class Felt:
     orientation: Quaternion
     angular_velocity: Vector
     acceleration: Vector
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number is one."""
+        return all(
+            map(math.isfinite, (*self.orientation, *self.angular_velocity, *self.acceleration))
+        )
 
 
 class FedBno085(Bno085Emulator):
@@ -171,9 +181,9 @@ class FedBno085(Bno085Emulator):
         self._guard = threading.Lock()
 
     def feel(self, felt: Felt) -> None:
-        """Take a measurement; called from another thread than the reads."""
+        """Take a measurement, if its numbers are finite; called from another thread than the reads."""
         altered = self.alter(felt)
-        if altered is not None:
+        if altered is not None and altered.finite:
             with self._guard:
                 self._felt.append(altered)
 

@@ -7,6 +7,7 @@ import errno
 import os
 import socket
 import threading
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 
@@ -69,6 +70,11 @@ class Listener:
             try:
                 self.serve(connection)
             except OSError:
+                close(connection)
+            except (
+                Exception
+            ):  # what a driver sent, or a mistake here: the next connection is served
+                traceback.print_exc()
                 close(connection)
 
 

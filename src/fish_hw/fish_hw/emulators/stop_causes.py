@@ -14,7 +14,7 @@ from fish_hw.protocol import iquart
 from fish_node.arming import CAMERA, DEADMAN, ESTOP, ODOMETRY, PAUSE
 
 LIMIT_S = 0.35
-DEAD_BATTERY_S = 1.2  # filtered for 1 s: the load ripples
+DEAD_BATTERY_S = 1.2  # its voltage is filtered with battery_filter_s
 MOVING = 0.5  # rad/s, a command that is not zero
 FUSION_IMU_S, POSE_S = 0.1, 1 / 30  # fusion's imu_timeout; it says the loss with the next pose
 TARGET_S = 0.15  # the controller's target_timeout

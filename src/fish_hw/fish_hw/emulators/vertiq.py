@@ -19,6 +19,7 @@ import time
 import tty
 from collections.abc import Callable
 
+from fish_hw.emulators import int16
 from fish_hw.protocol import iquart
 from fish_hw.protocol.iquart import GET, REPLY, SET, Message, Parser, encode
 
@@ -161,7 +162,7 @@ class VertiqModule:
             (iquart.FAULT_EVER.type, iquart.FAULT_EVER.param): bytes([self.faults_ever]),
             (iquart.DERATE.type, iquart.DERATE.param): struct.pack("<i", self._derate),
             (iquart.TELEMETRY.type, iquart.TELEMETRY.param): struct.pack(
-                "<6hI", *map(int, slow), uptime
+                "<6hI", *map(int16, slow), uptime
             ),
         }
 

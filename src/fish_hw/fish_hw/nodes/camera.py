@@ -136,7 +136,7 @@ class CameraNode(DeviceNode):
         if self.settings.device == "emulator":
             return WalkingSquare(self.settings, self.clock.now)
         if self.settings.device.startswith(PREFIX):
-            return SocketCamera(self.settings.device)
+            return SocketCamera(self.settings.device, self.clock.own)
         return VideoCapture(self.settings)
 
     def _cycle(self) -> None:

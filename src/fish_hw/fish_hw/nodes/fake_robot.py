@@ -11,6 +11,7 @@ Out: fake/joint_command (joint rotor: velocity [rad/s], joint rudder: position [
      fake/lockstep (std_msgs/Header: how far rotor driver, controller and tracker are), for a simulator in lockstep
 """
 
+import math
 import sys
 from pathlib import Path
 
@@ -107,10 +108,12 @@ class FakeRobotNode(Node):
         )
 
     def _on_picture(self, message: CompressedImage) -> None:
-        self._robot.camera.show(bytes(message.data), self._time.of(message.header.stamp))
+        taken_s = self._time.shared(self._time.of(message.header.stamp))
+        self._robot.camera.show(bytes(message.data), taken_s)
 
     def _on_battery(self, message: BatteryState) -> None:
-        self._robot.rotor.volts = float(message.voltage)
+        if math.isfinite(message.voltage):  # NaN says that nobody measured it
+            self._robot.rotor.volts = float(message.voltage)
 
     def _on_fault(self, message: String) -> None:
         name = message.data

@@ -16,7 +16,7 @@ class Worker:
         step: what is repeated.
         period_s: s of the clock.
         on_failure: called after an error, which ends the thread.
-        clock: s.
+        clock: s; never set back.
         wall: how long [s] to wait for a duration of the clock, before it is looked at again.
     """
 

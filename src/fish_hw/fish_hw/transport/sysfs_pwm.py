@@ -12,6 +12,7 @@ from fish_hw.transport.interfaces import TransportError, unavailable
 
 EXPORT_WAIT_S = 0.5  # udev needs some tenths of a second to hand the new files to the group
 RETRY_S = 0.01
+NORMAL = "normal"  # polarity: the pulse is high, the rest of the period low
 HINT = "enable it: dtoverlay=pwm-2chan"
 REASONS = {
     errno.EACCES: "no permission (add the user to group gpio and install 99-fish.rules of fish_hw)",
@@ -52,14 +53,21 @@ class SysfsPwm:
             raise unavailable(f"PWM channel {self._pwm}", reason, self._exported()) from error
 
     def start(self, pulse_ns: int) -> None:
-        """Set period and pulse, then switch the pulses on.
+        """Set period, polarity and pulse, then switch the pulses on.
 
         The kernel refuses a period shorter than the present duty cycle, so a longer one is cleared first; but not
         always, since kernels before mid-2024 refuse every duty cycle while the period is 0, as after a boot.
+        It changes the polarity of a channel that is off and has a period. A channel that was left inversed is high for the
+        rest of the period: 18.5 ms instead of 1.5 ms at 50 Hz.
         """
+        inversed = self._text("polarity") != NORMAL
+        if inversed and self._read("enable"):
+            self._write("enable", 0)
         if self._read("duty_cycle") > self._period_ns:
             self._write("duty_cycle", 0)
         self._write("period", self._period_ns)
+        if inversed:
+            self._write("polarity", NORMAL)
         self._write("duty_cycle", pulse_ns)
         self._write("enable", 1)
 
@@ -72,8 +80,8 @@ class SysfsPwm:
         self._write("enable", 0)
 
     def is_running(self) -> bool:
-        """Whether pulses are on, as the kernel says."""
-        return self._read("enable") == 1
+        """Whether pulses are on with our period, as the kernel says."""
+        return self._read("enable") == 1 and self._read("period") == self._period_ns
 
     def close(self) -> None:
         """Nothing to give back: the channel stays exported and keeps its pulses."""
@@ -104,13 +112,20 @@ class SysfsPwm:
     def _exported(self) -> list[str]:
         return sorted(path.name for path in self._chip.glob("pwm[0-9]*"))
 
-    def _read(self, name: str) -> int:
+    def _text(self, name: str) -> str:
         try:
-            return int((self._pwm / name).read_text())
+            return (self._pwm / name).read_text().strip()
         except (OSError, ValueError) as error:
             raise TransportError(f"PWM {self._pwm}: cannot read {name}: {error}") from error
 
-    def _write(self, name: str, value: int) -> None:
+    def _read(self, name: str) -> int:
+        text = self._text(name)
+        try:
+            return int(text)
+        except ValueError as error:
+            raise TransportError(f"PWM {self._pwm}: cannot read {name}: {error}") from error
+
+    def _write(self, name: str, value: int | str) -> None:
         try:
             (self._pwm / name).write_text(f"{value}\n")
         except OSError as error:

@@ -11,6 +11,7 @@ import os
 import socket
 import struct
 import time
+from collections.abc import Callable
 
 from fish_hw.transport.interfaces import TransportError, unavailable
 from fish_hw.transport.video_capture import Frame, compressed_frame
@@ -80,9 +81,15 @@ class SocketI2c:
 
 
 class SocketCamera:
-    """Frame source of the fake robot: JPEG as a camera sends it."""
+    """Frame source of the fake robot: JPEG as a camera sends it.
 
-    def __init__(self, device: str) -> None:
+    Args:
+        device: name of the socket.
+        own: the driver's time [s] of one on the clock that both ends share.
+    """
+
+    def __init__(self, device: str, own: Callable[[float], float] = lambda time_s: time_s) -> None:
+        self._own = own
         self._connection: socket.socket | None = connect(device, "camera")
 
     def read(self) -> Frame | None:
@@ -92,7 +99,7 @@ class SocketCamera:
             return None
         try:
             count, taken_s = FRAME.unpack(receive(self._connection, FRAME.size))
-            return compressed_frame(taken_s, receive(self._connection, count))
+            return compressed_frame(self._own(taken_s), receive(self._connection, count))
         except TimeoutError:
             return None
         except OSError:

@@ -12,6 +12,8 @@ it goes on), arming/state of another owner: one call would arm both, a simulatio
 from __future__ import annotations
 
 import math
+import threading
+import time
 from collections.abc import Callable
 from uuid import uuid4
 
@@ -47,6 +49,8 @@ STATE_PERIOD_S = 0.05
 PLANAR = (0, 7, 35)  # x, y and rotation about z on the diagonal of a covariance of 6
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 ARMED = "armed"
+FORGOTTEN_S = 1.0  # s; an owner says its state more often
+ONE_TOO_MANY = "stop one of the two, or give it another domain"
 AFTER_STAMP = BODY + STAMP.size  # bytes of a message with a header
 
 
@@ -72,6 +76,7 @@ class ArmingServer:
         self._now = stamp or (lambda: node.get_clock().now().to_msg())
         self._id = f"{node.get_fully_qualified_name()} {uuid4().hex[:8]}"
         self._stamps: dict[str, Time] = {}
+        self._publishing = threading.Lock()  # a device's thread says a change at once
         self._said: str | None = None
         self._written: tuple[tuple[object, ...], MessageBytes] = (), MessageBytes(Header(), 0)
         self._state = node.create_publisher(DiagnosticArray, "arming/state", 10)
@@ -94,9 +99,11 @@ class ArmingServer:
             self.publish()
 
     def publish(self) -> None:
-        """Publish the state; log it if it changed."""
-        self._arming.check(self._clock())
-        armed, reason = self._arming.armed, self._arming.reason
+        """Publish the state; log it if it changed. Any thread may call it."""
+        with self._publishing:
+            self._publish(*self._arming.state(self._clock()))
+
+    def _publish(self, armed: bool, reason: str, count: int) -> None:
         if reason != self._said:
             self._said = reason
             log = self._node.get_logger()
@@ -105,12 +112,12 @@ class ArmingServer:
             else:
                 log.warning(f"disarmed: {reason}")
         level = DiagnosticStatus.OK if armed else DiagnosticStatus.WARN
-        said = (level, reason, self._arming.count)
+        said = (level, reason, count)
         if said != self._written[0]:
             status = DiagnosticStatus(
                 name="arming", level=level, message=reason or ARMED, hardware_id=self._id
             )
-            status.values = [KeyValue(key="count", value=str(self._arming.count))]
+            status.values = [KeyValue(key="count", value=str(count))]
             self._written = said, MessageBytes(DiagnosticArray(status=[status]), 0)
         try:
             self._state.publish(self._written[1](self._now()))
@@ -167,10 +174,7 @@ class ArmingServer:
         message = deserialize_message(data, DiagnosticArray)
         others = [status.hardware_id for status in message.status if status.hardware_id != self._id]
         if others:
-            who = others[0].partition(" ")[0] or "a node without a name"
-            trouble = (
-                f"{who} says arming/state, too: stop one of the two, or give it another domain"
-            )
+            trouble = f"{owner(others[0])} says arming/state, too: {ONE_TOO_MANY}"
             self._arming.heard(OWNER, self._clock(), trouble)
 
     def _on_disarm(self, message: String) -> None:
@@ -186,26 +190,64 @@ class ArmingServer:
         return bool(stamp != before)
 
 
+def owner(hardware_id: str) -> str:
+    """The node in the hardware_id of arming/state."""
+    return visible(hardware_id.partition(" ")[0]) or "a node without a name"
+
+
 class ArmingListener:
-    """What a node hears of the arming state.
+    """What a node hears of the arming state. Of several owners every one must say that the robot is armed.
 
     Attributes:
         armed: None before the first word.
         reason: why the robot is disarmed; empty while it is armed and before the first word.
+
+    Args:
+        node: hears arming/state.
+        on_state: called after each word of an owner.
+        clock: s, monotonic; by it an owner that is silent for FORGOTTEN_S has no say.
     """
 
-    def __init__(self, node: Node, on_state: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self,
+        node: Node,
+        on_state: Callable[[], None] = lambda: None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.armed: bool | None = None
         self.reason = ""
-        self._on_state = on_state
+        self._on_state, self._clock = on_state, clock
         self._known = b""  # the newest message after its stamp
-        node.create_subscription(DiagnosticArray, "arming/state", self._on_message, 10, raw=True)
+        self._words: dict[str, str] = {}  # of that message: owner -> why disarmed, empty if armed
+        self._heard: dict[str, tuple[float, str]] = {}  # owner -> s, the same
+        self._node = node
+        self._subscription = node.create_subscription(
+            DiagnosticArray, "arming/state", self._on_message, 10, raw=True
+        )
+
+    @property
+    def awaited(self) -> bool:
+        """Whether there is an owner, and no word of it was heard."""
+        topic = self._subscription.topic_name
+        return self.armed is None and self._node.count_publishers(topic) > 0
 
     def _on_message(self, data: bytes) -> None:
         """Twenty times a second, and mostly what is known but for the stamp."""
         if data[AFTER_STAMP:] != self._known:
             self._known = data[AFTER_STAMP:]
+            self._words = {}
             for status in deserialize_message(data, DiagnosticArray).status:
-                self.armed = status.level == DiagnosticStatus.OK
-                self.reason = "" if self.armed else visible(status.message)
-        self._on_state()
+                why = "" if status.level == DiagnosticStatus.OK else status.message or "disarmed"
+                self._words[status.hardware_id] = self._words.get(status.hardware_id) or why
+        if self._words:
+            self._judge(self._clock())
+            self._on_state()
+
+    def _judge(self, now: float) -> None:
+        self._heard |= {who: (now, why) for who, why in self._words.items()}
+        self._heard = {k: word for k, word in self._heard.items() if now - word[0] < FORGOTTEN_S}
+        reasons = [why for _, why in self._heard.values() if why]
+        if reasons and len(self._heard) > 1:
+            owners = " and ".join(owner(who) for who in list(self._heard)[:2])
+            reasons.insert(0, f"{owners} say arming/state: {ONE_TOO_MANY}")
+        self.armed, self.reason = not reasons, visible("; ".join(reasons))

@@ -25,7 +25,7 @@ def timer_clock(node: Node) -> RosClock:
 
 
 class RobotClock:
-    """Seconds for drivers and emulators, and their way to and from stamps.
+    """Seconds for drivers and emulators, and their way to and from stamps; where /clock is set back, they run on.
 
     Attributes:
         simulated: whether time is that of /clock.
@@ -58,7 +58,7 @@ class RobotClock:
         counts.
         """
         if self.simulated:
-            return RosTime(nanoseconds=round(time_s * 1e9)).to_msg()
+            return RosTime(nanoseconds=max(round(self.shared(time_s) * 1e9), 0)).to_msg()
         tries = []
         for _ in range(TRIES):
             before = time.monotonic()
@@ -74,9 +74,17 @@ class RobotClock:
         """The time [s] on this clock of a stamp."""
         stamp_s = float(stamp.sec + 1e-9 * stamp.nanosec)
         if self.simulated:
-            return stamp_s
+            return self.own(stamp_s)
         age_s: float = self._node.get_clock().now().nanoseconds * 1e-9 - stamp_s
         return time.monotonic() - age_s
+
+    def shared(self, time_s: float) -> float:
+        """A time of this clock [s] on the one that all processes have: /clock, or the computer's monotonic clock."""
+        return time_s - self._time.ahead_s
+
+    def own(self, shared_s: float) -> float:
+        """A time [s] of the clock that all processes have, on this one."""
+        return shared_s + self._time.ahead_s
 
     def _on_clock(self, message: Clock) -> None:
         self._time.tick(message.clock.sec + 1e-9 * message.clock.nanosec)
