@@ -52,7 +52,8 @@ def check_rotor(commands: Commands, encoder: Encoder | None) -> Iterator[Problem
 
 
 def check_encoder(encoder: Encoder) -> Iterator[Problem]:
-    """The encoder's speed against the change of its angle, which may be wrapped."""
+    """The encoder's speed against the change of its angle, which may be wrapped, or absent."""
+    encoder = encoder.take(np.isfinite(encoder.angle))
     if len(encoder) < FEWEST or np.ptp(encoder.speed) == 0 or np.ptp(encoder.angle) == 0:
         return
     change = np.diff(encoder.angle)

@@ -36,6 +36,13 @@ from fish_bag.trial import (
 
 GAP_PERIODS = 2.5  # a distance of more than so many periods is a gap
 LONG_GAP_S = 0.5  # from here on a warning
+STEP_BACK_S = 0.1  # a clock that is set back by more cuts a piece out of a swim
+STEP_TOLD_S = 0.02  # smaller steps are not told from latencies that change
+DAY_S = 86400.0  # a stamp so far from its arrival was never set
+AROUND_S = 1.0  # before and after such a step; messages that arrive late make no second of it
+AROUND = 10  # messages, where fewer come in that time
+FEWEST_AFTER = 10  # messages at the end; fewer are late ones
+SHORTEST = 0.1  # share of the latencies around a step that are below its shortest one; a busy network makes only others longer
 CONSTANT = 1e-6  # a command that varies less is constant, rad/s or rad
 OF_USE = {
     "imu": "warning",
@@ -68,8 +75,8 @@ def flag_samples(
     plausible: np.ndarray,
     stamped: bool,
 ) -> np.ndarray:
-    """(N,) uint8 flags of one topic's samples (bits of trial.py)."""
-    flags = np.zeros(len(t), np.uint8)
+    """(N,) uint16 flags of one topic's samples (bits of trial.py)."""
+    flags = np.zeros(len(t), np.uint16)
     flags[~plausible] |= BAD_STAMP
     if stamped and decoded.stamp_ns is not None:
         first = np.unique(decoded.stamp_ns, return_index=True)[1]
@@ -99,7 +106,10 @@ def flag_samples(
 def check_stream(stream: Stream, rule: TopicRule, frames: np.ndarray | None) -> Iterator[Problem]:
     """Problems of one topic: flagged samples, frames (N,) of its messages if they have any, gaps."""
     for bit, (severity, kind, text) in FLAG_TEXTS.items():
-        where = np.flatnonzero(stream.flags & bit)
+        marked = stream.flags & bit > 0
+        if bit == TIME_BACK:
+            marked &= stream.flags & DUPLICATE == 0  # which is said already
+        where = np.flatnonzero(marked)
         if len(where):
             what = f"{len(where)} of {len(stream)} {text}"
             yield Problem(
@@ -111,6 +121,7 @@ def check_stream(stream: Stream, rule: TopicRule, frames: np.ndarray | None) -> 
         text = f"{wrong.sum()} of {len(stream)} messages in frame {other}, expected {rule.frame!r}"
         yield Problem("error", "wrong_frame", stream.topic, text, int(wrong.sum()))
     yield from _gaps(stream)
+    yield from _set_back(stream)
 
 
 def check_joints(role: str, decoded: Decoded, rule: TopicRule) -> Iterator[Problem]:
@@ -140,6 +151,37 @@ def _gaps(stream: Stream) -> Iterator[Problem]:
         text = f"{what}, about {lost} messages at a period of {period * 1e3:.1f} ms"
         severity = "warning" if longest > LONG_GAP_S else "info"
         yield Problem(severity, "gap", stream.topic, text, len(gaps), float(t[gaps[0]]))
+
+
+def _set_back(stream: Stream) -> Iterator[Problem]:
+    """A clock that is set back: from then on messages arrive later after their stamps; single late messages pass."""
+    delay = stream.t_arrival - stream.t
+    kept = (stream.flags & UNREADABLE == 0) & (np.abs(delay) < DAY_S)
+    arrival, delay = stream.t_arrival[kept], delay[kept]
+    steps = np.diff(stream.t[kept])
+    if not (steps < 0).any() or not (steps > 0).any():
+        return
+    period = float(np.median(steps[steps > 0]))
+    found = []
+    for first in (np.flatnonzero(steps < 0) + 1).tolist():
+        start, end = np.searchsorted(arrival, arrival[first] + AROUND_S * np.array([-1, 1]))
+        before = delay[max(min(start, first - AROUND), 0) : first]
+        after = delay[first : max(end, first + AROUND)]
+        later = min(np.median(after) - np.median(before), _shortest(after) - _shortest(before))
+        if len(after) >= FEWEST_AFTER:
+            found.append((float(min(later, period - steps[first - 1])), float(arrival[first])))
+    by, at = max(found, default=(0.0, 0.0))
+    if by > STEP_TOLD_S:
+        severity = "error" if by > STEP_BACK_S else "warning"
+        text = (
+            f"the clock is set back by {by:.3f} s at {at:.2f} s; expected one that is never set back; "
+            "let the time service slew it, and record again"
+        )
+        yield Problem(severity, "clock_back", stream.topic, text, t=at)
+
+
+def _shortest(delay: np.ndarray) -> float:
+    return float(np.quantile(delay, SHORTEST))
 
 
 def missing(role: str, topic: str, required: bool) -> Iterator[Problem]:

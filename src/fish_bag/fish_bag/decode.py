@@ -156,7 +156,7 @@ JOINTS, ODOMETRY = "sensor_msgs/msg/JointState", "nav_msgs/msg/Odometry"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 ROLES: dict[str, Role] = {
     "commands": Role(Commands, JOINTS, commands),
-    "encoder": Role(Encoder, JOINTS, encoder),
+    "encoder": Role(Encoder, JOINTS, encoder, optional=("angle",)),
     "imu": Role(Imu, "sensor_msgs/msg/Imu", imu, optional=("orientation",)),
     "camera": Role(Camera, POSE, camera, optional=("covariance",)),
     "tail": Role(Tail, JOINTS, tail, names="name"),

@@ -62,7 +62,7 @@ class RecordFile:
         """Append all of `data` and return its length.
 
         Raises:
-            DiskFullError: it could not be written; the file is as it was before.
+            DiskFullError: it could not be written; the file is as it was before, if the disk lets it.
         """
         view = memoryview(data)
         try:
@@ -76,10 +76,11 @@ class RecordFile:
         return len(data)
 
     def cut(self, size: int) -> None:
-        """Drop everything after `size` bytes."""
-        self._raw.truncate(size)
-        self._raw.seek(size)
-        self.size = size
+        """Drop everything after `size` bytes, if the disk lets it."""
+        with suppress(OSError):
+            self._raw.truncate(size)
+            self._raw.seek(size)
+            self.size = size
 
     def tell(self) -> int:
         """Bytes written so far."""
@@ -221,12 +222,13 @@ class McapRecording:
         self._range = min(first, time_ns), max(last, time_ns)
         if self._file.size != before:
             self._chunk_is_written()
-        elif time_ns - self._open_since >= self._chunk_ns:
-            self.flush()
+        else:
+            self.flush_old(time_ns)
 
     def flush_old(self, now_ns: int) -> None:
-        """Write the open chunk if its first message is older than chunk_s (for quiet topics)."""
-        if self._open_since is not None and now_ns - self._open_since >= self._chunk_ns:
+        """Write the open chunk if its first message is older than chunk_s, or later than now: the clock was set back."""
+        since = self._open_since
+        if since is not None and not 0 <= now_ns - since < self._chunk_ns:
             self.flush()
 
     def flush(self) -> None:

@@ -26,7 +26,7 @@ class ReplayerConfig:
     topics: tuple[str, ...] = (
         "*",
         "/*",
-    )  # names or patterns, relative to the node's namespace or absolute
+    )  # names or patterns, relative to the node's namespace or absolute; arming/* only where one names it
     exclude: tuple[str, ...] = ("",)  # taken out of these
     clock_hz: float = (
         100.0  # Hz of bag time on /clock unless the recording has a /clock of its own; 0: none
@@ -74,6 +74,11 @@ class PlaybackClock:
         self._bag_ns, self._steady_ns = bag_ns, steady_ns
 
 
+def of_arming(name: str) -> bool:
+    """Whether a topic or pattern names the arming state: a robot that hears a recorded one may take it for its own."""
+    return "/arming/" in f"/{name}"
+
+
 class Playback:
     """The selected messages of one recording in order of arrival, undecoded."""
 
@@ -84,8 +89,11 @@ class Playback:
             )
         path = Path(config.recording).expanduser()
 
+        naming_arming = tuple(pattern for pattern in config.topics if of_arming(pattern))
+
         def selected(topic: str, _: str = "") -> bool:
-            return is_selected(topic, config.topics, namespace) and not is_selected(
+            wanted = naming_arming if of_arming(topic) else config.topics
+            return is_selected(topic, wanted, namespace) and not is_selected(
                 topic, config.exclude, namespace
             )
 

@@ -22,7 +22,7 @@ from fish_bag.checks import check_publishers
 from fish_bag.decode import NOT_MEASURED, PATH_ROLE, PATH_TYPE, ROLES
 from fish_bag.message_types import types_of, typestore
 from fish_bag.problem import Problem, RecordingError
-from fish_bag.sensor_checks import check_sensors
+from fish_bag.sensor_checks import check_sensors, flag_frozen
 from fish_bag.streams import (
     Decoded,
     decode_paths,
@@ -140,7 +140,8 @@ class _Assembly:
             metadata=self.bag.metadata,
             **streams,
         )
-        problems = [*self.problems, *self.foreign_topics(), *check_sensors(trial)]
+        trial, frozen = flag_frozen(trial)
+        problems = [*self.problems, *frozen, *self.foreign_topics(), *check_sensors(trial)]
         return replace(trial, problems=tuple(sorted(problems, key=checks.by_severity)))
 
     def foreign_topics(self) -> Iterator[Problem]:

@@ -16,6 +16,7 @@ from fish_bag.storage import name_by_magic
 PARTS = (".mcap", ".db3")  # of files in a rosbag2 folder
 PACKED = (".zstd", ".zst", ".lz4")  # a whole file compressed, as rosbag2's mode `file` leaves it
 SUFFIXES = (*PARTS, ".bag", ".bag.active")
+LOGS = (".db3-wal", ".db3-journal")  # that sqlite3 keeps with its database
 MAGICS = {b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite3", b"#ROSBAG V": "ros1"}
 LFS_MAGIC = LFS_START.encode()
 STRANGERS = {
@@ -53,6 +54,18 @@ class RecordingFiles:
 def is_storage_file(path: Path) -> bool:
     """Whether the name is one of a storage file; macOS leaves others with ._ before the name."""
     return bare_name(path.name).lower().endswith(SUFFIXES) and not path.name.startswith("._")
+
+
+def files_under(path: Path) -> list[Path]:
+    """The files of all recordings that a path gives: itself, or those in the folder and in the folders in it."""
+    if not path.is_dir():
+        return [path]
+    return [
+        file
+        for pattern in ("*", "*/*")
+        for file in path.glob(pattern)
+        if is_storage_file(file) or file.name == FILE_NAME or file.name.endswith(LOGS)
+    ]
 
 
 def bare_name(name: str) -> str:
@@ -116,7 +129,7 @@ def find_files(path: Path) -> RecordingFiles:
     files = [p for p in path.iterdir() if is_storage_file(p)]
     found = parts(path) or (files if len(files) == 1 else [])
     if not found:
-        logs = [p for p in path.iterdir() if p.name.endswith((".db3-wal", ".db3-journal"))]
+        logs = [p for p in path.iterdir() if p.name.endswith(LOGS)]
         advice = "give one of the recordings in it" if files else "there is no recording in it"
         if logs and not files:
             advice = f"{_names(logs)} belongs to a database that is not there; bring it back"

@@ -44,13 +44,15 @@ def recover(path: Path, out: Path) -> Recovery:
         out: directory to be made.
 
     Raises:
-        RecordingError: files of several recordings, not one message is left, or `out` exists.
+        RecordingError: files of several recordings, not one message is left, `out` exists or lies in the recording.
     """
     bag = salvage_bag(path)
     topics = [raw for raw in bag.topics if raw.raws]
     if not topics:
         losses = "; ".join(bag.lost) or "it holds no message"
         raise RecordingError(f"{path}: nothing to save: {losses}")
+    if path.is_dir() and out.resolve().is_relative_to(path.resolve()):
+        raise RecordingError(f"{out}: lies in the recording itself; expected a folder outside it")
     if out.exists():
         raise RecordingError(f"{out}: exists already; recordings are never overwritten")
     if all(raw.ros1 for raw in topics):

@@ -10,6 +10,7 @@ the accelerometer's directions without a camera.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,12 +25,17 @@ from fish_bag.actuator_checks import (
 from fish_bag.camera_checks import check_course, check_size, check_unit
 from fish_bag.problem import Problem
 from fish_bag.record_comparison import FEWEST
-from fish_bag.trial import JUMP, Camera, Trial
+from fish_bag.trial import FROZEN, JUMP, Camera, Trial
 from fish_bag.yaw_checks import check_yaw
 
 TURNS = {"gyro_axes", "camera_heading"}  # findings after which accelerations cannot be compared
 STILL = 1.0  # rad/s, change of the commanded rotor speed from which the robot moves
 JUMPY = 0.3  # share of poses flagged as jumps from which the camera speaks in another unit
+FROZEN_S = 1.0  # that a gyro gives one value while the rotor moves
+FROZEN_SAMPLES = 5  # of one value, at least
+HELD = 5.0  # times as long as a sensor usually holds a value, which one slower than its driver does
+# rad/s to both sides of a rotor that moves; strokes have tens and hundreds, an encoder's noise less
+MOVES = 10.0
 
 
 def check_sensors(trial: Trial) -> Iterator[Problem]:
@@ -68,6 +74,66 @@ def check_sensors(trial: Trial) -> Iterator[Problem]:
             yield from check_directions(imu, felt)
 
 
+def flag_frozen(trial: Trial) -> tuple[Trial, list[Problem]]:
+    """The trial with gyro samples flagged that stay at one value while the rotor moves, and what is said of them.
+
+    Without an encoder nobody knows whether the rotor follows: there the accelerometer must stay at one value, too. A gyro z that
+    is the same throughout, as one on another axis, is left to `check_sensors`.
+    """
+    commands, encoder, imu = trial.clean().commands, trial.clean().encoder, trial.imu
+    if commands is None or imu is None:
+        return trial, []
+    good = np.flatnonzero(imu.flags == 0)
+    good = good[np.argsort(imu.t[good], kind="stable")]
+    t, yaw = imu.t[good], imu.gyro[good, 2]
+    begins = np.concatenate([[0], np.flatnonzero(np.diff(yaw)) + 1])
+    if len(begins) == 1:
+        return trial, []
+    ends = np.concatenate([begins[1:], [len(yaw)]]) - 1
+    held = float(np.median(np.diff(t[begins])))
+    stays = (t[ends] - t[begins] > max(FROZEN_S, HELD * held)) & (
+        ends - begins >= FROZEN_SAMPLES - 1
+    )
+    frozen = np.zeros(len(imu), bool)
+    spans = []
+    for begin, end in zip(begins[stays], ends[stays], strict=True):
+        since = _moves_since(commands.t, commands.rotor_speed, t[begin], t[end])
+        if (
+            encoder is None
+        ):  # a robot that is not armed does not follow; at rest an accelerometer is noisy
+            turns = not np.ptp(imu.accel[good[begin : end + 1]], axis=0).any()
+        else:
+            turns = np.isfinite(_moves_since(encoder.t, encoder.speed, t[begin], t[end]))
+        first = begin + int(np.searchsorted(t[begin : end + 1], since))
+        if turns and first <= end:
+            frozen[good[first : end + 1]] = True
+            spans.append((float(yaw[begin]), float(t[first]), float(t[end])))
+    if not spans:
+        return trial, []
+    value, start, end = max(spans, key=lambda span: span[2] - span[1])
+    text = (
+        f"{frozen.sum()} of {len(imu)} samples of gyro z stay at one value while the rotor moves, such as "
+        f"{value:.3g} rad/s from {start:.2f} to {end:.2f} s; is the sensor alive?"
+    )
+    flags = imu.flags | np.where(frozen, FROZEN, 0).astype(imu.flags.dtype)
+    said = Problem("warning", "frozen", imu.topic, text, int(frozen.sum()), start)
+    return replace(trial, imu=replace(imu, flags=flags)), [said]
+
+
+def _moves_since(t: np.ndarray, speed: np.ndarray, begin: float, end: float) -> float:
+    """When a rotor with speeds (N,) at times t (N,) begins to move between two times; infinite: it does not for long enough.
+
+    It moves from when it leaves its first speed until it takes its last one.
+    """
+    inside = np.flatnonzero((t >= begin) & (t <= end))
+    if not len(inside):
+        return np.inf
+    at, turned = t[inside], speed[inside]
+    left = at[np.abs(turned - turned[0]) > MOVES]
+    came = at[np.abs(turned - turned[-1]) > MOVES]
+    return float(left[0]) if len(left) and len(came) and came[-1] - left[0] > FROZEN_S else np.inf
+
+
 def _poses(camera: Camera | None) -> Camera | None:
     """The unflagged poses in order of time; also those flagged as jumps where most are, as in another unit of length."""
     if camera is None:
@@ -90,7 +156,8 @@ def _stuck(trial: Trial) -> Iterator[Problem]:
         held += [(imu.topic, "gyro", imu.gyro), (imu.topic, "accelerometer", imu.accel)]
     if encoder is not None and len(encoder) >= FEWEST:
         held += [(encoder.topic, "rotor speed", encoder.speed)]
-        held += [(encoder.topic, "rotor angle", encoder.angle)]
+        angle = encoder.angle[np.isfinite(encoder.angle)]
+        held += [(encoder.topic, "rotor angle", angle)] if len(angle) >= FEWEST else []
     if camera is not None and len(camera) >= FEWEST:
         moved = np.ptp(camera.pose[:, :2], axis=0).any()
         held.append((camera.topic, *(("heading", camera.psi) if moved else ("pose", camera.pose))))

@@ -34,6 +34,7 @@ WRONG_FRAME = 8  # frame_id is not the expected one
 BAD_STAMP = 16  # the stamp is zero or far away from the rest of the recording
 NOT_MEASURED = 128  # the message says by a covariance of -1 that it does not measure this
 JUMP = 64  # a camera pose far from those before and after: lost or swapped markers
+FROZEN = 256  # a gyro that gives one value while the rotor moves
 UNREADABLE = 32  # the bytes cannot be decoded as the message type; values are NaN, t is the arrival
 
 
@@ -45,7 +46,7 @@ class Stream:
     frame_id: str  # as recorded in the first message, "" without a header
     t: np.ndarray  # (N,) moment of measurement [s]
     t_arrival: np.ndarray  # (N,) moment of arrival [s]
-    flags: np.ndarray  # (N,) uint8, bits above
+    flags: np.ndarray  # (N,) uint16, bits above
 
     def __len__(self) -> int:
         return len(self.t)
@@ -78,7 +79,7 @@ class Commands(Stream):
 class Encoder(Stream):
     """joint_states: the rotor as its encoder measures it."""
 
-    angle: np.ndarray  # (N,) [rad], as recorded (wrapped or not)
+    angle: np.ndarray  # (N,) [rad], as recorded (wrapped or not); NaN where not given
     speed: np.ndarray  # (N,) [rad/s]
 
 

@@ -32,6 +32,7 @@ from fish_bag.record_comparison import (
 )
 from fish_bag.trial import Camera, Commands, Imu, Trial
 
+PAUSE = 0.5  # s between samples of the IMU, across which nobody knows how the fish turned
 BLOCK_S = 2.0  # of records whose spectra are averaged
 LEAST_SPEED = 3.0  # rad/s rms; the rotor strokes
 TURN_RAD = 0.05  # standard deviation of the heading from which it can be compared
@@ -154,10 +155,18 @@ def _answer(trial: Trial) -> RotorResponse | None:
 
 
 def _headings(imu: Imu, camera: Camera) -> tuple[Array, list[Array]] | None:
-    """The camera's heading and the three integrated angular velocities at its times, all without trend; None: no turn."""
-    inside = (camera.t >= imu.t[0]) & (camera.t <= imu.t[-1])
+    """The camera's heading and the three integrated angular velocities at its times, all without trend; None: no turn.
+
+    Over the longest stretch in which the IMU does not pause.
+    """
+    if len(imu) < FEWEST:
+        return None
+    ends = np.concatenate([[-1], np.flatnonzero(np.diff(imu.t) > PAUSE), [len(imu) - 1]])
+    longest = int(np.argmax(imu.t[ends[1:]] - imu.t[ends[:-1] + 1]))
+    start, end = imu.t[ends[longest] + 1], imu.t[ends[longest + 1]]
+    inside = (camera.t >= start) & (camera.t <= end)
     t, psi = camera.t[inside], np.unwrap(camera.psi[inside])
-    if len(t) < FEWEST or len(imu) < FEWEST:
+    if len(t) < FEWEST:
         return None
     psi = without_trend(t, psi)
     if np.std(psi) < TURN_RAD:

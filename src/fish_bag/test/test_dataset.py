@@ -20,10 +20,12 @@ from fish_bag.bag_metadata import Qos, parse_qos
 from fish_bag.dataset import check_set
 from fish_bag.playback import Playback, PlaybackClock, ReplayerConfig
 from fish_bag.recorder_config import RecorderConfig, common_qos, is_selected
+from fish_bag.recording_files import files_under
 from fish_bag.recover import recover
 from fish_bag.sample_recordings import write_rosbag1
 from fish_bag.time_axis import estimate_clock
 from fish_bag.trial import BAD_STAMP
+from fish_report import robofish as command
 
 
 def kinds(data):
@@ -96,6 +98,33 @@ def test_a_file_and_a_folder_of_one_name_are_told_apart(tmp_path):
     made = samples.robot_recording(tmp_path / "a", duration=0.3)
     shutil.copy(made / "a.mcap", tmp_path / "a.mcap")
     assert [trial.name for trial in read_dataset(tmp_path)] == ["a", "a.mcap"]
+
+
+def test_the_files_of_recordings_are_told_from_those_beside_them(tmp_path):
+    for path in (
+        "a/metadata.yaml",
+        "a/a_0.db3",
+        "a/a_0.db3-wal",
+        "a/notes.csv",
+        "b.mcap",
+        "b.html",
+    ):
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).touch()
+    found = {str(file.relative_to(tmp_path)) for file in files_under(tmp_path)}
+    assert found == {"a/metadata.yaml", "a/a_0.db3", "a/a_0.db3-wal", "b.mcap"}
+    assert files_under(tmp_path / "b.mcap") == [tmp_path / "b.mcap"]
+
+
+def test_the_page_of_inspect_replaces_no_file_of_a_recording(tmp_path, capsys):
+    samples.robot_recording(tmp_path / "day" / "a", duration=0.3)
+    for file in (tmp_path / "day" / "a").iterdir():
+        before = file.read_bytes()
+        assert command.main(["inspect", str(tmp_path / "day"), "--html", str(file)]) == 1
+        said = " ".join(capsys.readouterr().err.split())
+        assert f"{file.name} is the input" in said
+        assert "choose another --html" in said
+        assert file.read_bytes() == before
 
 
 def test_mixed_robots(tmp_path):
@@ -400,6 +429,25 @@ def test_messages_come_in_order_and_filtered(tmp_path):
         times = [t for _, t, _ in sent]
         assert times == sorted(times)
         assert len(times) == 50 + 15
+
+
+@pytest.mark.parametrize(
+    ("topics", "arming"),
+    [
+        (ReplayerConfig.topics, set()),
+        (("/fish/*",), set()),
+        (("*", "arming/*"), {"/fish/arming/state", "/fish/arming/disarm"}),
+        (("*", "/fish/arming/state"), {"/fish/arming/state"}),
+    ],
+)
+def test_the_arming_state_is_replayed_only_where_it_is_named(tmp_path, topics, arming):
+    kind, raw = "std_msgs/msg/Float64", samples.build.number(1.0)
+    with samples.McapRecording(tmp_path / "a") as recording:
+        for topic in ("/fish/imu", "/fish/arming/state", "/fish/arming/disarm"):
+            data = bytes(samples.typestore().serialize_cdr(raw, kind))
+            recording.write(recording.add_topic(topic, kind, Qos()), 1, data)
+    playback = Playback(ReplayerConfig(str(tmp_path / "a"), topics=topics), "/fish")
+    assert {raw.topic for raw in playback.topics} == {"/fish/imu"} | arming
 
 
 @pytest.mark.parametrize("topics", [("sonar",), ("",)])

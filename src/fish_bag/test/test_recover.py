@@ -154,6 +154,12 @@ def test_messages_whose_channel_is_lost_are_counted(tmp_path):
         recover(path, tmp_path / "b")
 
 
+def test_a_recording_is_not_mended_into_itself(tmp_path):
+    folder = samples.robot_recording(tmp_path / "a")
+    with pytest.raises(RecordingError, match="expected a folder outside it"):
+        recover(folder, folder / "mended")
+
+
 def test_any_damaged_byte_is_survived(tmp_path):
     """A trial or a RecordingError, and a recovery that can be read; half of the bytes where the file's structure lies."""
     whole, count = (
@@ -592,3 +598,33 @@ def test_any_amount_of_room_leaves_a_recording_that_can_be_saved(tmp_path, room)
     assert saved == 1 + 51 * ((saved - 1) // 51)
     if room >= 5_000:
         assert len(read_trial(tmp_path / "a").imu) == saved
+
+
+def test_a_disk_that_keeps_half_a_record_closes_the_recording_too(tmp_path):
+    class Broken(FullAfter):
+        def truncate(self, size):
+            raise OSError(5, "Input/output error")
+
+    recording = McapRecording(tmp_path / "a")
+    topic = recording.add_topic("/fish/imu/data", IMU)
+    recording.write(topic, 1, PAYLOAD)
+    recording.flush()
+    recording._file._raw = Broken(recording._file._raw, 200)
+    with pytest.raises(DiskFullError, match="No space left"):
+        for i in range(1000):
+            recording.write(topic, 2 + i * 10_000_000, PAYLOAD)
+    assert recording.closed
+    assert recover(tmp_path / "a", tmp_path / "b").count == 1
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_a_clock_that_is_set_back_leaves_no_chunk_open(tmp_path, quiet):
+    with McapRecording(tmp_path / "a", chunk_s=0.5) as recording:
+        topic = recording.add_topic("/fish/imu/data", IMU)
+        recording.write(topic, 3_600_000_000_000, PAYLOAD)
+        before = recording.size
+        if quiet:
+            recording.flush_old(1_000_000_000)
+        else:
+            recording.write(topic, 1_000_000_000, PAYLOAD)
+        assert recording.size > before

@@ -14,7 +14,7 @@ from fish_bag import sample_recordings as samples
 from fish_bag.camera_checks import find_jumps
 from fish_bag.checks import check_rotor_sign
 from fish_bag.sensor_checks import check_sensors
-from fish_bag.trial import JUMP, NOT_MEASURED
+from fish_bag.trial import FROZEN, JUMP, NOT_MEASURED
 
 
 def read(tmp_path, messages):
@@ -72,6 +72,42 @@ def test_time_going_back(tmp_path):
     assert np.all(np.diff(result.clean().imu.t) > 0)
 
 
+@pytest.mark.parametrize(
+    ("by", "severity"), [(0.5037, "error"), (0.5, "error"), (0.055, "warning")]
+)
+def test_a_clock_that_is_set_back(tmp_path, by, severity):
+    def back(i, t, m):
+        return t, samples.shift_stamp(m, -by) if i >= 100 else m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/imu/data", back))
+    said = problem(result, "clock_back", "imu/data")
+    assert said.severity == severity
+    assert f"set back by {by:.3f} s at 1.00 s" in said.text
+
+
+def test_single_late_messages_are_no_clock_that_is_set_back(tmp_path):
+    def late(i, t, m):
+        return t + 300_000_000 * (i % 20 == 5), m
+
+    result = read(tmp_path, samples.changed(samples.robot_messages(), "/fish/camera/pose", late))
+    assert {p.kind for p in result.problems} >= {"time_back"}
+    assert "clock_back" not in {p.kind for p in result.problems}
+
+
+def test_a_busy_network_is_no_clock_that_is_set_back(tmp_path):
+    """For a second most images arrive late, some after later ones; a few come as quickly as before."""
+
+    def late(i, t, m):
+        busy = 30 <= i < 60 and i % 5
+        return t + (200_000_000 + 70_000_000 * (i % 2)) * bool(busy), m
+
+    messages = samples.changed(samples.robot_messages(4.0), "/fish/camera/pose", late)
+    result = read(tmp_path, messages)
+    kinds = {p.kind for p in result.problems}
+    assert "time_back" in kinds
+    assert "clock_back" not in kinds
+
+
 def test_arrivals_out_of_order_in_the_file(tmp_path):
     messages = samples.robot_messages()
     rng = np.random.default_rng(1)
@@ -106,6 +142,21 @@ def test_joint_missing_from_some_messages(tmp_path):
     assert np.isnan(result.commands.rudder[:7]).all()
     assert np.isfinite(result.commands.rudder[7:]).all()
     assert result.commands.rotor_speed[0] == 2.0
+
+
+def test_an_encoder_without_an_angle_measures_the_speed(tmp_path):
+    def without_angle(_, t, m):
+        m.position = np.zeros(0)
+        return t, m
+
+    messages = samples.changed(samples.robot_messages(), "/fish/joint_states", without_angle)
+    result = read(tmp_path, messages)
+    assert not result.encoder.flags.any()
+    assert np.isnan(result.encoder.angle).all()
+    assert np.isfinite(result.clean().encoder.speed).all()
+    (said,) = result.problems
+    assert (said.severity, said.kind) == ("warning", "joint")
+    assert "no message has a position of joint 'rotor'" in said.text
 
 
 @pytest.mark.parametrize(
@@ -339,6 +390,7 @@ def test_a_faultless_swim_has_no_problem(tmp_path):
         ({"encoder": lambda a, s: (a, s * 30 / np.pi)}, {"rotor_unit", "encoder_unit"}),
         ({"encoder": lambda a, s: (np.degrees(a), s)}, {"encoder_unit"}),
         ({"encoder": lambda a, s: (-a, s)}, {"encoder_sign"}),
+        ({"encoder": lambda a, s: (-a if s > 0.0 else np.nan, s)}, {"encoder_sign"}),
         ({"encoder": lambda a, s: (-a, -s)}, {"rotor_sign"}),
         ({"pose": lambda p: p * [1000, 1000, 1]}, {"camera_unit"}),
         ({"pose": lambda p: p + [0, 0, np.pi]}, {"camera_heading"}),
@@ -358,6 +410,7 @@ def test_a_fault_is_an_error(tmp_path, fault, expected):
         ({"accel": lambda a: 0 * a + [0, 0, 9.81]}, "accelerometer is"),
         ({"encoder": lambda a, s: (a, 0.0)}, "rotor speed is"),
         ({"encoder": lambda a, s: (1.5, s)}, "rotor angle is"),
+        ({"encoder": lambda a, s: (1.5 if s > 0.0 else np.nan, s)}, "rotor angle is"),
         ({"pose": lambda p: 0 * p + 0.3}, "pose is"),
         ({"pose": lambda p: p * [1, 1, 0]}, "heading is"),
     ],
@@ -365,6 +418,57 @@ def test_a_fault_is_an_error(tmp_path, fault, expected):
 def test_a_sensor_that_gives_one_value_is_named(tmp_path, fault, words):
     trial = read_trial(samples.write_mcap(tmp_path / "trial", swim(**fault)))
     assert [words in p.text for p in trial.problems if p.kind == "stuck"] == [True]
+
+
+def freezes(every=1, held=1, still=False, until=np.inf, noisy=False):
+    """Every `every`-th Imu message; a value lasts for `held` of them, and from 1 s until `until` for good.
+
+    The rotor may stand, or no encoder may say whether it does while the accelerometer is noisy.
+    """
+    out, value, count = [], None, 0
+    for t, topic, m in samples.robot_messages(4.0):
+        if still and topic in ("/fish/joint_command", "/fish/joint_states"):
+            m.velocity[0] = 0.0
+        if noisy and topic == "/fish/joint_states":
+            continue
+        if topic == "/fish/imu/data":
+            m.linear_acceleration.z += 1e-3 * (count % 7) * noisy
+            now = 0.01 * count
+            if not 1.0 <= now < until and count % (every * held) == 0:
+                value = m.angular_velocity
+            m.angular_velocity, count = value, count + 1
+            if (count - 1) % every:
+                continue
+        out.append((t, topic, m))
+    return out
+
+
+@pytest.mark.parametrize(("every", "held"), [(1, 1), (10, 1), (1, 10)])
+def test_a_gyro_that_freezes_is_flagged_from_then_on(tmp_path, every, held):
+    found = read_trial(samples.write_mcap(tmp_path / "trial", freezes(every, held, until=3.0)))
+    (said,) = (p for p in found.problems if p.kind == "frozen")
+    flagged = found.imu.t[found.imu.flags == FROZEN]
+    assert said.count == len(flagged)
+    assert "gyro z stay at one value while the rotor moves" in said.text
+    assert 0.89 < flagged.min() < 1.2
+    assert 2.88 < flagged.max() < 3.0
+    assert np.all(np.diff(flagged) < 0.101)
+
+
+@pytest.mark.parametrize(
+    "still",
+    [
+        {"held": 90, "until": 1.0},
+        {"every": 10, "until": 1.9},
+        {"still": True},
+        {"until": 1.9},
+        {"until": 3.0, "noisy": True},
+    ],
+)
+def test_values_that_are_held_and_a_fish_at_rest_are_no_frozen_gyro(tmp_path, still):
+    found = read_trial(samples.write_mcap(tmp_path / "trial", freezes(**still)))
+    assert not any(p.kind == "frozen" for p in found.problems)
+    assert not found.imu.flags.any()
 
 
 def test_a_mirrored_camera_of_a_fish_that_turns_a_little(tmp_path):
@@ -663,6 +767,13 @@ def test_a_faultless_swim_has_no_finding(course, seed):
 def test_a_left_handed_camera_is_one_finding():
     found = findings(camera(stroke_swim(), lambda p: p * [1, -1, -1]))
     assert set(found) == {("error", "camera_axes")}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_imu_that_pauses_blames_no_gyro(seed):
+    swim = stroke_swim(seed=seed)
+    heard = (swim.imu.t < swim.imu.t[0] + 5.0) | (swim.imu.t > swim.imu.t[0] + 7.0)
+    assert findings(replace(swim, imu=swim.imu.take(np.flatnonzero(heard)))) == {}
 
 
 def test_a_heading_in_degrees_blames_nothing_else():

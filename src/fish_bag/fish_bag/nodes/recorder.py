@@ -17,6 +17,7 @@ import signal
 import sys
 import time
 from datetime import datetime
+from itertools import islice
 from operator import itemgetter
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -71,18 +72,22 @@ class RecorderNode(Node):
 
     def _discover(self) -> None:
         """Subscribe to selected topics that are new, or again where publishers offer something else."""
+        self._refused = {key for key in self._refused if self._offered(*key)}
         for topic, types in self.get_topic_names_and_types():
             if is_selected(topic, self._patterns, self.get_namespace()):
                 for msgtype in types:
                     self._follow(topic, msgtype)
 
-    def _follow(self, topic: str, msgtype: str) -> None:
-        key = (topic, msgtype)
-        offered = [
+    def _offered(self, topic: str, msgtype: str) -> list[Qos]:
+        """What the publishers of a type on a topic offer."""
+        return [
             from_profile(info.qos_profile)
             for info in self.get_publishers_info_by_topic(topic)
             if info.topic_type == msgtype
         ]
+
+    def _follow(self, topic: str, msgtype: str) -> None:
+        key, offered = (topic, msgtype), self._offered(topic, msgtype)
         if not offered or key in self._refused:
             return
         wanted = common_qos(offered)
@@ -133,12 +138,15 @@ class RecorderNode(Node):
             )
 
     def _store_new(self) -> None:
-        """Record what arrived until now, in this order; what arrives meanwhile may wait for the next look."""
+        """Record what arrived until now, in this order; what arrives meanwhile may wait for the next look.
+
+        What had arrived is at most what the middleware keeps, also where it does not say when a message arrived.
+        """
         end, found = time.time_ns(), []
-        for subscription, _, channel in self._subscriptions_of.values():
-            for data, about in take_all(subscription):
-                arrived = about["received_timestamp"] or time.time_ns()
-                found.append((arrived, channel, data))
+        for subscription, kept, channel in self._subscriptions_of.values():
+            for data, about in islice(take_all(subscription), kept.depth):
+                arrived = about["received_timestamp"]  # 0: not said
+                found.append((arrived or time.time_ns(), channel, data))
                 if arrived > end:
                     break
         for arrived, channel, data in sorted(found, key=itemgetter(0)):

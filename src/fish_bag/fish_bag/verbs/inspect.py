@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from fish_bag.recording_files import files_under
 from fish_bag.topic_map import add_topic_arguments, topic_map
-from fish_report.files import named_path
+from fish_report.files import named_path, writable_file
 from fish_report.terminal import cell, say, terminal
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ def run(args: argparse.Namespace) -> int:
     from fish_bag import read_dataset
     from fish_bag.recording_page import problems_table, tables, trials_table
 
+    if args.html:
+        writable_file(args.html, "--html", (*files_under(args.recording), args.topics))
     data = read_dataset(named_path(args.recording), topic_map(args), progress=True)
     console = terminal()
     if len(data) > 1:
