@@ -9,9 +9,13 @@ from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
+from ipaddress import ip_address
+from urllib.parse import urlsplit
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
+LONGEST_BODY = 1024  # bytes; the page sends none
+WRONG_LENGTH = b"the length of the body is none of 0 to 1024 bytes"
 HEADER = "X-Robot-Fish"  # a page of another site cannot send it without asking first
+WRONG_HOST = b"wrong host; open this view by the address of its computer, such as 127.0.0.1"
 Act = Callable[[bool], None]  # True arms, False disarms
 
 
@@ -32,7 +36,6 @@ class ViewServer:
         self.state = "{}"
         page = files("fish_bringup").joinpath("view.html").read_bytes()
         handler = type("Handler", (_Handler,), {"view": self, "page": page, "act": (act,)})
-        self.local = address in LOOPBACK
         try:
             self._server = ThreadingHTTPServer((address, port), handler)
         except OSError as error:
@@ -64,7 +67,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         if not self._from_here():
-            self._answer(HTTPStatus.FORBIDDEN, b"wrong host", "text/plain")
+            self._answer(HTTPStatus.FORBIDDEN, WRONG_HOST, "text/plain")
         elif self.path == "/":
             self._answer(HTTPStatus.OK, self.page, "text/html; charset=utf-8")
         elif self.path == "/state":
@@ -73,26 +76,42 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(HTTPStatus.NOT_FOUND, b"not found", "text/plain")
 
     def do_POST(self) -> None:
-        self.rfile.read(int(self.headers.get("Content-Length") or 0))
         act = self.act[0]
         if act is None or HEADER not in self.headers or not self._from_here():
             self._answer(HTTPStatus.FORBIDDEN, b"this view only shows", "text/plain")
+        elif not self._read_body():
+            self._answer(HTTPStatus.BAD_REQUEST, WRONG_LENGTH, "text/plain")
         elif self.path in ("/arm", "/disarm"):
             act(self.path == "/arm")
             self._answer(HTTPStatus.OK, b"asked", "text/plain")
         else:
             self._answer(HTTPStatus.NOT_FOUND, b"not found", "text/plain")
 
+    def _read_body(self) -> bool:
+        """Take the request's body; False where its length is none of 0 to LONGEST_BODY."""
+        length = self.headers.get("Content-Length", "0")
+        if not length.isdecimal() or len(length) > 9 or int(length) > LONGEST_BODY:
+            return False
+        self.rfile.read(int(length))
+        return True
+
     def _from_here(self) -> bool:
-        """A page of another site whose name leads to this computer must not read the view."""
-        host = self.headers.get("Host", "").rpartition(":")[0].strip("[]")
-        return not self.view.local or host in LOOPBACK
+        """Whether Host is no foreign name: another site can lead a name of its own to this computer, but no address."""
+        try:
+            host = urlsplit(f"//{self.headers.get('Host', '')}").hostname or ""
+            if host not in ("localhost", self.view.address.lower()):
+                ip_address(host)
+        except ValueError:
+            return False
+        return True
 
     def _answer(self, status: HTTPStatus, body: bytes, kind: str) -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(body)))
         self.send_header("Cache-Control", "no-store")
+        if status != HTTPStatus.OK:  # a body that was not read is no next request
+            self.send_header("Connection", "close")
         self.end_headers()
         self.wfile.write(body)
 

@@ -292,12 +292,15 @@ def test_a_button_arms_while_the_deadman_is_held_and_the_throttle_at_rest(driven
 
 
 def test_arrow_keys_come_as_words_and_others_as_characters():
+    """Of several at once q comes first, then one that is no arrow."""
     ours, theirs = pty.openpty()
     try:
         tty.setcbreak(theirs)
         keys = Keyboard(theirs)
         assert keys.key() is None
-        for sent, word in ((b"\x1b[A", "up"), (b"\x1b[D", "left"), (b"q", "q"), (b" ", " ")):
+        several = ((b"q\x1b[A", "q"), (b"q ", "q"), (b" \x1b[A", " "), (b"\x1b[A" * 40, "up"))
+        last = ((b"\x1b[A\x1b[D", "left"), (b"\x1b", "\x1b"))
+        for sent, word in ((b"\x1b[A", "up"), (b"q", "q"), (b" ", " "), *several, *last):
             os.write(ours, sent)
             deadline = time.monotonic() + PATIENCE
             while (key := keys.key()) is None:

@@ -22,7 +22,7 @@ from fish_bringup import node_table, processes
 from fish_bringup.node_table import CONTROL, FAKE, RECORDER, ROBOTS, SIMULATED, NodeSpec, middleware
 from fish_bringup.run_page import latency_table
 from fish_bringup.run_watch import SwimEnd
-from fish_bringup.verbs import demo
+from fish_bringup.verbs import arm, demo
 from fish_control.nodes.pilot import split_arguments
 from fish_report.errors import UserError
 from fish_report.robofish import run_verb
@@ -476,6 +476,16 @@ def test_a_domain_out_of_range_is_refused(verb: str, domain: str, capsys) -> Non
     assert capsys.readouterr().err == f"robofish {verb}: domain is {domain}, expected 0 to 232\n"
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["arm"], "not armed"), (["arm", "--off"], "not disarmed"), (["disarm"], "not disarmed")],
+)
+def test_a_refusal_says_what_was_not_done(monkeypatch, capsys, words, said) -> None:
+    monkeypatch.setattr(arm, "set_armed", lambda *_: (False, "the node ends"))
+    assert run_verb(words[0], words[1:]) == 1
+    assert capsys.readouterr().err == f"robofish {words[0]}: {said}: the node ends\n"
+
+
 def changed(*words: str) -> dict:
     parser = argparse.ArgumentParser()
     demo.add_arguments(parser)
@@ -637,12 +647,11 @@ def test_a_process_can_be_started_again_after_kill(nodes):
 
 def test_cpu_time_is_that_of_the_process(nodes):
     busy, idle = start(nodes, "busy"), start(nodes, "polite")
-    before, began = busy.cpu_time(), time.monotonic()
-    while time.monotonic() - began < 0.5:
+    began, before = time.monotonic(), busy.cpu_time()
+    while (used := busy.cpu_time() - before) < 0.1:  # it may share its core
+        assert time.monotonic() - began < 60.0, f"{used} s"
         time.sleep(0.05)
-    assert (
-        0.02 < busy.cpu_time() - before <= time.monotonic() - began + 0.02
-    )  # it may share its core
+    assert used <= time.monotonic() - began + 0.02
     assert idle.cpu_time() < 2.0
 
 

@@ -5,7 +5,6 @@
 import os
 import re
 import signal
-import time
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from types import SimpleNamespace
@@ -16,6 +15,7 @@ import pytest
 from rich.console import Console
 
 from fish_bag.trial import Commands, Gains, Odometry, Trial
+from fish_bringup import run_watch
 from fish_bringup.node_table import ROBOTS, NodeSpec
 from fish_bringup.run_page import write_run_page
 from fish_bringup.run_watch import (
@@ -166,6 +166,14 @@ def test_a_node_that_ends_is_said_with_its_last_words(nodes, interruption):
         swim(fish, nodes, interruption)
 
 
+@pytest.fixture
+def real(monkeypatch):
+    """Real time of a test, which passes when the test says so."""
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr(run_watch, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    return clock
+
+
 class Stuck(Fish):
     """Nothing new is heard of it from the second second on; whoever listens waits."""
 
@@ -174,36 +182,39 @@ class Stuck(Fish):
         self.time = min(self.time, 2.0)
         return super().sight
 
+    def __init__(self, path, real):
+        super().__init__(path)
+        self.real = real
+
     def listen(self, seconds):
-        time.sleep(0.01)
+        self.real.now += seconds
         super().listen(seconds)
 
 
-def test_a_robot_of_which_nothing_new_is_heard_is_not_waited_for(nodes, interruption, monkeypatch):
-    monkeypatch.setattr("fish_bringup.run_watch.STILL_TIMEOUT", 0.3)
+def test_a_robot_of_which_nothing_new_is_heard_is_not_waited_for(nodes, interruption, real):
     with pytest.raises(
-        UserError, match=r"no new odometry/filtered for 0.3 s: .*hangs; see logs/fusion.log"
+        UserError, match=r"no new odometry/filtered for 30 s: .*hangs; see logs/fusion.log"
     ):
-        swim(Stuck(make_path("circle")), nodes, interruption)
+        swim(Stuck(make_path("circle"), real), nodes, interruption)
+    assert real.now == pytest.approx(32.0, abs=1.0)
 
 
-def test_a_slow_robot_is_waited_for(nodes, interruption, monkeypatch):
+def test_a_slow_robot_is_waited_for(nodes, interruption, real):
     """A stamp now and then is enough, its own time as slow as it will."""
-    monkeypatch.setattr("fish_bringup.run_watch.STILL_TIMEOUT", 0.3)
 
     class Slow(Fish):
         def listen(self, seconds):
-            time.sleep(0.1)
+            real.now += 29.0
             super().listen(0.1 * seconds)
 
     fish = Slow(make_path("circle"))
     assert swim(fish, nodes, interruption, 0.1).reason == "after 0 s"
+    assert real.now > 250.0
 
 
-def test_an_experiment_ends_when_nothing_new_is_heard_of_the_robot(tmp_path, monkeypatch):
+def test_an_experiment_ends_when_nothing_new_is_heard_of_the_robot(tmp_path, monkeypatch, real):
     """Its nodes are ended like those of any other run that fails."""
-    monkeypatch.setattr("fish_bringup.run_watch.STILL_TIMEOUT", 0.3)
-    fish, ended = Stuck(make_path("circle")), []
+    fish, ended = Stuck(make_path("circle"), real), []
     fish.sees, fish.diagnostics = (
         lambda _: True,
         {excite.EXCITER_NAME: {"over": "false", "time_s": "2"}},
@@ -223,7 +234,7 @@ def test_an_experiment_ends_when_nothing_new_is_heard_of_the_robot(tmp_path, mon
     monkeypatch.setattr(excite, "NodeProcesses", started)
     monkeypatch.setattr(excite, "watching", lambda _: nullcontext((fish, fish.listen)))
     changed = {spec: {} for spec in excite.open_loop(ROBOTS["sim"])}
-    with pytest.raises(UserError, match=r"no new odometry/filtered for 0.3 s: .*see fusion.log"):
+    with pytest.raises(UserError, match=r"no new odometry/filtered for 30 s: .*see fusion.log"):
         excite._swim(7, changed, SWIM, tmp_path, SimpleNamespace(asked=False), Console(quiet=True))
     assert ended == [7]
 

@@ -238,6 +238,15 @@ def test_the_command_refuses_a_run_that_never_came_onto_its_path(tmp_path, capsy
     assert "nan" not in said.out
 
 
+def test_the_page_replaces_no_file_of_the_recording(tmp_path, capsys):
+    recording = swum(tmp_path / "a", {"/fish": 0.0})
+    for file in [path for path in recording.rglob("*") if path.is_file()]:
+        before = file.read_bytes()
+        assert command.main(["score", str(recording), "--out", str(file)]) == 1
+        assert f"{file.name} is the input" in " ".join(capsys.readouterr().err.split())
+        assert file.read_bytes() == before
+
+
 def test_one_of_two_recorded_robots_is_scored(tmp_path, capsys):
     recording = swum(tmp_path / "a", {"/one": 0.01, "/two": 0.02})
     for namespace, error in (("/one", "0.0100"), ("/two", "0.0200")):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the verbs view, latency and excite compute."""
 
+import http.client
 import json
 import math
 import socket
@@ -46,8 +47,8 @@ def served():
     """served(act): a server of a robot that swims."""
     made = []
 
-    def serve(act=None, port=0):
-        made.append(ViewServer("127.0.0.1", port, act))
+    def serve(act=None, port=0, address="127.0.0.1"):
+        made.append(ViewServer(address, port, act))
         made[-1].state = swimming(act is not None).document(103.0)
         return made[-1]
 
@@ -140,6 +141,63 @@ def test_commands_need_the_pages_header_and_this_computers_name(served):
     ask(f"{server.url}disarm", b"", **{HEADER: "1"})
     ask(f"{server.url}arm", b"", **{HEADER: "1"})
     assert asked == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("host", "taken"),
+    [
+        ("127.0.0.1:8080", True),
+        ("localhost", True),
+        ("192.168.0.7:8080", True),
+        ("[fe80::1]:8080", True),
+        ("evil.example:8080", False),
+        ("127.0.0.1.evil.example", False),
+        ("[", False),
+        ("", False),
+    ],
+)
+@pytest.mark.parametrize("address", ["127.0.0.1", "0.0.0.0"])
+def test_a_name_that_another_site_leads_here_is_refused(served, address, host, taken):
+    asked = []
+    port = served(asked.append, address=address).port
+    for way, path in (("GET", "/state"), ("POST", "/arm")):
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+        connection.request(way, path, headers={HEADER: "1", "Host": host})
+        assert connection.getresponse().status == (200 if taken else 403)
+        connection.close()
+    assert asked == [True] * taken
+
+
+def test_the_name_that_it_is_served_by_is_taken(served):
+    server = served()
+    url, server.address = f"{server.url}state", "Fish.local"  # a name of this computer
+    assert ask(url, Host="fish.local:8080")
+
+
+@pytest.mark.parametrize("length", ["1025", "99999999999", "9" * 5000, "-1", "abc", ""])
+@pytest.mark.parametrize(("headers", "status"), [({}, 403), ({HEADER: "1"}, 400)])
+def test_a_body_is_not_awaited_before_its_sender_and_length_are_judged(
+    served, length, headers, status
+):
+    asked = []
+    connection = http.client.HTTPConnection("127.0.0.1", served(asked.append).port, timeout=20)
+    connection.request("POST", "/arm", headers={"Content-Length": length, **headers})
+    answer = connection.getresponse()
+    assert (answer.status, answer.will_close, asked) == (status, True, [])
+    connection.close()
+
+
+def test_a_body_that_is_not_read_is_no_request(served):
+    asked = []
+    server = served(asked.append)
+    inner = f"POST /arm HTTP/1.1\r\nHost: 127.0.0.1\r\n{HEADER}: 1\r\n\r\n"
+    outer = f"POST /arm HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {len(inner)}\r\n\r\n"
+    with socket.create_connection(("127.0.0.1", server.port), timeout=20) as peer:
+        peer.sendall((outer + inner).encode())
+        with peer.makefile("rb") as answer:
+            assert b" 403 " in answer.readline()
+            assert b"HTTP/1.1" not in answer.read()
+    assert asked == []
 
 
 @pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this computer")

@@ -23,8 +23,11 @@ from numpy.typing import NDArray
 from fish_control.control_law import AMPLITUDE_AT_FULL_THROTTLE, ControlLimits
 from fish_control.controller import Command
 from fish_control.stroke_mean import STROKE_FREQUENCY
+from fish_report.files import GivenTwiceError, UniqueLoader, unique_names
 
+LATEST_ROW = 3600.0  # s
 LAST_ROW = 8.0  # s that the last row lasts
+LATEST_END = 2.0 * LATEST_ROW  # s
 FASTEST_STROKE = 4.0  # Hz
 # rad/s, at full throttle
 FASTEST_ROTOR = AMPLITUDE_AT_FULL_THROTTLE * 2.0 * math.pi * STROKE_FREQUENCY
@@ -66,6 +69,11 @@ class Program:
                 raise ProgramError(
                     f"row {number}: t is {t:g} s, expected more than the {before:g} s of the row before"
                 )
+        for number, end in enumerate(self.ends):
+            if not 0.0 < end <= LATEST_END:
+                raise ProgramError(
+                    f"swim {number}: end is {end:g} s, expected more than 0 s and at most {LATEST_END:g} s"
+                )
         if self.ends and (self.ends[-1] <= times[-1] or list(self.ends) != sorted(self.ends)):
             raise ProgramError(
                 f"swims end at {', '.join(f'{t:g}' for t in self.ends)} s, expected times in order, the last after the last row "
@@ -95,7 +103,12 @@ def read_program(path: Path) -> Program:
     """
     text = path.read_text(encoding="utf-8", errors="replace")
     try:
-        content = json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
+        if path.suffix == ".json":
+            content = json.loads(text, object_pairs_hook=unique_names)
+        else:
+            content = yaml.load(text, Loader=UniqueLoader)
+    except GivenTwiceError as error:
+        raise ProgramError(f"{path}: {error}") from None
     except (ValueError, yaml.YAMLError, RecursionError) as error:
         raise ProgramError(
             f"{path} is neither JSON nor YAML ({error.__class__.__name__}); expected {EXPECTED}"
@@ -117,10 +130,13 @@ def _ends(path: Path, content: dict[str, Any]) -> tuple[float, ...]:
     """When the swims of a calibration plan end [s]; none of other files."""
     swims = content.get("swims", [])
     if not isinstance(swims, list) or not all(
-        isinstance(swim, dict) and isinstance(swim.get("end"), int | float) for swim in swims
+        isinstance(swim, dict) and "end" in swim for swim in swims
     ):
         raise ProgramError(f"{path}: swims is {swims!r}; expected a list of {{begin: s, end: s}}")
-    return tuple(float(swim["end"]) for swim in swims)
+    ends = [
+        _number(f"{path}: swim {number}: end", swim["end"]) for number, swim in enumerate(swims)
+    ]
+    return tuple(ends)
 
 
 def command_table(program: Program, begin: float, end: float, glide: float) -> NDArray[np.float64]:
@@ -191,19 +207,25 @@ def _towards(value: float, goal: float, step: float) -> float:
 def _row(number: int, entry: Any) -> Row:
     if not isinstance(entry, dict) or set(entry) != set(Row._fields):
         raise ProgramError(f"row {number} is {entry!r}; expected {{{', '.join(Row._fields)}}}")
-    for key, value in entry.items():
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-        ):
-            raise ProgramError(f"row {number}: {key} is {value!r}, expected a finite number")
-    return Row(**{key: float(value) for key, value in entry.items()})
+    return Row(**{key: _number(f"row {number}: {key}", value) for key, value in entry.items()})
+
+
+def _number(what: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not _finite(value):
+        raise ProgramError(f"{what} is {value!r}, expected a finite number")
+    return float(value)
+
+
+def _finite(value: float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
 
 
 def _check(number: int, row: Row) -> None:
     for key, value, lowest, highest, unit in (
-        ("t", row.t, 0.0, 3600.0, "s"),
+        ("t", row.t, 0.0, LATEST_ROW, "s"),
         ("amplitude", row.amplitude, 0.0, 10.0 * AMPLITUDE_AT_FULL_THROTTLE, "rad"),
         ("frequency", row.frequency, 0.1, FASTEST_STROKE, "Hz"),
         ("rudder", row.rudder, -LIMITS.rudder_range, LIMITS.rudder_range, "rad"),

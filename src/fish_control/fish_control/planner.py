@@ -124,11 +124,6 @@ class Planner:
         return self._side * GLIDING_YAW_RATE
 
 
-def motion_is_finite(motion: Motion) -> bool:
-    """Whether every value is a number."""
-    return all(map(math.isfinite, motion))
-
-
 SAVE_PERIOD = 0.2  # s between writes
 
 

@@ -8,9 +8,15 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from fish_control.line_of_sight import Motion
 from fish_control.node_configs import ControllerConfig
 
 LARGEST_TWIST_VARIANCE = 1.0  # m^2/s^2, rad^2/s^2; fusion marks the twist without IMU with 1e4
+LARGEST_MOTION = Motion(1e3, 1e3, math.pi, 5.0, 5.0, 50.0)  # m, rad, m/s, rad/s
+IMPLAUSIBLE = (
+    f"odometry is not plausible: a value is not a number, or above {LARGEST_MOTION.x:g} m, {LARGEST_MOTION.surge:g} m/s or "
+    f"{LARGEST_MOTION.yaw_rate:g} rad/s"
+)
 AHEAD = 0.1  # s, a stamp may be this far ahead of the clock: two machines' clocks are not quite the same
 
 
@@ -19,7 +25,7 @@ class EstimateHealth:
     """What speaks for an estimate of the motion."""
 
     age: float  # s since the stamp
-    finite: bool
+    plausible: bool  # every value is a number that a fish in a pool can have
     pose_variance: float  # largest of x, y [m^2] and heading [rad^2]
     twist_variance: float  # largest of u, v [m^2/s^2] and r [rad^2/s^2]
 
@@ -87,13 +93,18 @@ class Watchdog:
         return _age_fault("target", signs.target_age, config.target_timeout)
 
 
+def is_plausible(motion: Motion) -> bool:
+    """Whether every value is a number that a fish in a pool can have: one that is not would stay in what the control learns."""
+    return all(abs(value) <= most for value, most in zip(motion, LARGEST_MOTION, strict=True))
+
+
 def estimate_fault(signs: EstimateHealth, timeout: float, largest_variance: float) -> str | None:
     """What is wrong with an estimate, None if nothing is.
 
     timeout: s; largest_variance: m^2, rad^2 of the pose, which grows while the camera is lost.
     """
-    if not signs.finite:
-        return "odometry is not finite"
+    if not signs.plausible:
+        return IMPLAUSIBLE
     return _age_fault("odometry", signs.age, timeout) or loss(signs, largest_variance)
 
 

@@ -143,6 +143,10 @@ def test_a_program_is_read_alone_and_out_of_a_diagnosis(tmp_path, wrap, suffix):
             "row 0: rudder is 'left', expected a finite number",
         ),
         (
+            json.dumps([{**ROW, "amplitude": 10**400}]),
+            "expected a finite number",
+        ),
+        (
             json.dumps([{**ROW, "amplitude": float("nan")}]),
             "row 0: amplitude is nan, expected a finite number",
         ),
@@ -180,6 +184,40 @@ def test_a_plan_ends_its_swims_where_it_says(tmp_path):
     program = read_program(file)
     assert program.duration == 9.0
     assert [program.end_of_swim(t) for t in (0.0, 5.9, 6.0, 8.0)] == [6.0, 6.0, 9.0, 9.0]
+
+
+@pytest.mark.parametrize(
+    ("end", "said"),
+    [
+        (math.inf, "swim 1: end is inf, expected a finite number"),
+        (math.nan, "swim 1: end is nan, expected a finite number"),
+        (10**400, "expected a finite number"),
+        (True, "swim 1: end is True, expected a finite number"),
+        (1e9, "swim 1: end is 1e+09 s, expected more than 0 s and at most 7200 s"),
+        (-1, "swim 1: end is -1 s, expected more than 0 s and at most 7200 s"),
+    ],
+)
+def test_a_swim_that_ends_at_no_time_is_refused(tmp_path, end, said):
+    file = tmp_path / "plan.json"
+    file.write_text(json.dumps({"program": [ROW], "swims": [{"end": 8}, {"end": end}]}))
+    with pytest.raises(ProgramError) as refusal:
+        read_program(file)
+    assert str(refusal.value).startswith(f"{file}: swim 1: end is ")
+    assert said in str(refusal.value)
+
+
+@pytest.mark.parametrize("end", [math.inf, math.nan, 1e9])
+def test_a_program_has_an_end(end):
+    with pytest.raises(ProgramError, match="swim 0: end is"):
+        Program((Row(0.0, 8.0, 2.0, 0.3),), (end,))
+
+
+@pytest.mark.parametrize("suffix", [".json", ".yaml"])
+def test_of_two_values_of_one_name_none_is_chosen(tmp_path, suffix):
+    file = tmp_path / f"program{suffix}"
+    file.write_text(json.dumps([ROW]).replace('"rudder"', '"rudder": 0.8, "rudder"'))
+    with pytest.raises(ProgramError, match=f"program{suffix}: rudder is given twice in .*; keep"):
+        read_program(file)
 
 
 @pytest.mark.parametrize("swims", [[{"end": 9}, {"end": 7}], [{"end": 5}], [{"begin": 0}], "all"])
@@ -259,7 +297,7 @@ def test_a_robot_that_is_disarmed_on_the_way_ends_the_swim_for_good():
             "before a wall",
             "at (1.92, 0.00) m",
         ),
-        (doubtful(finite=False), "lost", "odometry is not finite"),
+        (doubtful(plausible=False), "lost", "odometry is not plausible"),
         (doubtful(age=0.6), "lost", "odometry is stale: 0.60 s old, 0.5 s allowed"),
         (doubtful(age=-5.0), "lost", "odometry is from the future: stamped 5.00 s ahead"),
         (doubtful(pose_variance=1e4), "lost", "camera lost"),

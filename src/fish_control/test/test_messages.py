@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 
 from fish_control.excitation import LAST_ROW
 from fish_control.gains_file import read_gains_file
+from fish_control.line_of_sight import Motion
 from fish_control.node_configs import (
     ControllerConfig,
     ExciterConfig,
@@ -29,7 +30,15 @@ from fish_control.nodes.messages import (
     to_stamp,
     yaw_of,
 )
-from fish_control.watchdog import EstimateHealth, Health, Watchdog, estimate_fault, loss, pose_loss
+from fish_control.watchdog import (
+    EstimateHealth,
+    Health,
+    Watchdog,
+    estimate_fault,
+    is_plausible,
+    loss,
+    pose_loss,
+)
 
 # rows of a covariance (x, y, z, rotation about x, y, z): geometry_msgs/PoseWithCovariance
 X, Y, YAW = 0, 1, 5
@@ -95,7 +104,7 @@ def test_signs_of_an_estimate_hold_the_worst_variance_of_pose_and_of_twist(place
     message = odometry()
     message.pose.covariance[7 * place], message.twist.covariance[7 * place] = 0.5, 0.25
     signs = estimate_signs(message, now=10.5)
-    assert (signs.age, signs.finite) == (pytest.approx(0.25), True)
+    assert (signs.age, signs.plausible) == (pytest.approx(0.25), True)
     assert (signs.pose_variance, signs.twist_variance) == (0.5, 0.25)
 
 
@@ -119,7 +128,15 @@ def test_an_estimate_with_a_value_that_is_no_number_is_not_finite(spoil):
         message.twist.twist.angular.z = math.inf
     else:
         message.pose.pose.orientation = Quaternion(w=0.0)
-    assert not estimate_signs(message, now=10.5).finite
+    assert not estimate_signs(message, now=10.5).plausible
+
+
+@pytest.mark.parametrize("field", Motion._fields)
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e200, -2e3])
+def test_a_motion_with_a_value_that_no_fish_has_is_not_plausible(field, value):
+    motion = Motion(2.0, -1.0, math.pi, 0.5, -0.1, -3.0)
+    assert is_plausible(motion)
+    assert not is_plausible(motion._replace(**{field: value}))
 
 
 CONFIG = Path(__file__).parents[1] / "config"
@@ -186,7 +203,7 @@ def but(**changes):
 
 FAULTS = {
     "odometry is stale": but(age=0.3),
-    "odometry is not finite": but(finite=False),
+    "odometry is not plausible": but(plausible=False),
     "camera lost": but(pose_variance=1e4),
     "IMU lost": but(twist_variance=1e4),
     "target is stale": replace(GOOD, target_age=0.5),

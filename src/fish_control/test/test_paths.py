@@ -95,6 +95,7 @@ def test_square_wave_swings_between_its_levels():
         ("circel", {}, "known: circle, figure_eight"),
         ("7", {}, "unknown letter '7'; known: A B"),
         ("circle", {"radios": 1}, "no argument 'radios'; known: radius"),
+        ("circle", {"name": "x"}, "no argument 'name'; known: radius"),
         ("circle", {"radius": -1.0}, "radius is -1.0, expected a positive"),
         ("circle", {"radius": "big"}, "wrong type"),
         ("circle", {"direction": 2}, "expected 1"),

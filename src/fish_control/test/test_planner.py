@@ -28,7 +28,7 @@ from fish_control.line_of_sight import (
 from fish_control.path_batch import PathBatch, TrackerConfig
 from fish_control.path_tracker import PathTracker
 from fish_control.paths import make_path
-from fish_control.planner import Planner, ProgressFile, motion_is_finite, path_digest
+from fish_control.planner import Planner, ProgressFile, path_digest
 from fish_control.reference_path import PathError, ReferencePath
 from fish_control.stroke_mean import TURN_LAG, StrokeState
 
@@ -158,11 +158,6 @@ def test_resume_beyond_the_end_is_refused():
 def test_speed_out_of_range_is_refused(speed):
     with pytest.raises(ValueError, match=r"expected 0.05 to 0.5"):
         Planner(make_path("I"), speed)
-
-
-def test_finite():
-    assert motion_is_finite(Motion(0, 0, 0, 0, 0, 0))
-    assert not motion_is_finite(Motion(0, 0, float("nan"), 0, 0, 0))
 
 
 CONFIG = GuidanceConfig()

@@ -8,7 +8,7 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -23,12 +23,22 @@ def named_path(path: Path) -> Path:
     return Path(os.path.abspath(path)) if path.name in ("", "..") else path
 
 
-def writable_folder(folder: Path) -> Path:
+def writable_folder(
+    folder: Path,
+    option: str = "--out",
+    names: Iterable[str] = (),
+    inputs: Iterable[Path | None] = (),
+) -> Path:
     """The folder, made now where it is not there.
 
+    Args:
+        names: of the files that will be written in it.
+        inputs: what is read, None for what is not given.
+
     Raises:
-        UserError: it is a file, or takes none.
+        UserError: it is a file, or takes none, or one of the names is an input.
     """
+    keep_inputs([folder / name for name in names], inputs, option)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -36,21 +46,39 @@ def writable_folder(folder: Path) -> Path:
     except OSError as error:
         said = error.strerror or error
         raise UserError(
-            f"--out {folder}: {said}; expected a folder that can be written, choose another"
+            f"{option} {folder}: {said}; expected a folder that can be written, choose another"
         ) from error
     return folder
 
 
-def writable_file(file: Path) -> Path:
-    """The file, its folder made now where it is not there.
+def writable_file(file: Path, option: str = "--out", inputs: Iterable[Path | None] = ()) -> Path:
+    """The file, its folder made now where it is not there; inputs: what is read, None for what is not given.
 
     Raises:
-        UserError: it is a folder, or its folder takes no file.
+        UserError: it is a folder, or its folder takes no file, or it is an input.
     """
     if file.is_dir():
-        raise UserError(f"--out {file}: is a folder; expected a file, choose another name")
-    writable_folder(file.parent)
+        raise UserError(f"{option} {file}: is a folder; expected a file, choose another name")
+    keep_inputs([file], inputs, option)
+    writable_folder(file.parent, option)
     return file
+
+
+def keep_inputs(
+    written: Iterable[Path], inputs: Iterable[Path | None], option: str = "--out"
+) -> None:
+    """Refuse to write over what is read.
+
+    Raises:
+        UserError: a file that will be written is an input, also where it goes by two names.
+    """
+    there = [path for path in inputs if path is not None and os.path.exists(path)]
+    for file in filter(os.path.exists, written):
+        if replaced := next((path for path in there if path.samefile(file)), None):
+            raise UserError(
+                f"{option}: {file} is the input {replaced}, which the result would replace; "
+                f"expected another place, choose another {option}"
+            )
 
 
 def partial_file(file: Path) -> Path:
@@ -99,22 +127,39 @@ def plain(value: Any) -> Any:
     return number if math.isfinite(number) else None
 
 
-class _Loader(yaml.SafeLoader):  # type: ignore[misc]
+class GivenTwiceError(ValueError):
+    """A table has two entries of one name."""
+
+
+def unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A table of JSON (`object_pairs_hook`), of which json would take the last of two entries of one name.
+
+    Raises:
+        GivenTwiceError: there are two.
+    """
+    names = [name for name, _ in pairs]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise GivenTwiceError(f"{twice} is given twice in one table; keep one of the two")
+    return dict(pairs)
+
+
+class UniqueLoader(yaml.SafeLoader):  # type: ignore[misc]
     """YAML without two entries of one name, of which PyYAML would take the last."""
 
 
-def _unique(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+def _unique(loader: UniqueLoader, node: yaml.MappingNode) -> dict[Any, Any]:
     names = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         line = node.start_mark.line + 1
-        raise ValueError(
+        raise GivenTwiceError(
             f"{twice[0]} is given twice in the table of line {line}; keep one of the two"
         )
     return dict(loader.construct_mapping(node, deep=True))
 
 
-_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique)
+UniqueLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique)
 
 
 def read_yaml(path: Path) -> Any:
@@ -124,7 +169,7 @@ def read_yaml(path: Path) -> Any:
         ValueError: it cannot be read, is no YAML, or has a table with two entries of one name.
     """
     try:
-        return yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        return yaml.load(path.read_text(encoding="utf-8"), Loader=UniqueLoader)
     except OSError as error:
         raise ValueError(f"cannot be read: {error.strerror or error}") from error
     except RecursionError:

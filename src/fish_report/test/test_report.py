@@ -17,7 +17,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fish_report.files import read_yaml, write_json
+from fish_report.errors import UserError
+from fish_report.files import (
+    read_yaml,
+    unique_names,
+    writable_file,
+    writable_folder,
+    write_json,
+)
 from fish_report.page import Table
 from fish_report.parallel import at_end_of_worker, worker_pool
 from fish_report.printable import LONGEST
@@ -47,6 +54,31 @@ def test_a_yaml_file_may_merge_one_table_into_another(tmp_path):
     file = tmp_path / "f.yaml"
     file.write_text("a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\n")
     assert read_yaml(file) == {"a": {"x": 1, "y": 2}, "b": {"x": 1, "y": 3}}
+
+
+def test_a_table_of_json_has_no_two_entries_of_one_name():
+    assert json.loads('{"a": {"b": 1}, "b": 2}', object_pairs_hook=unique_names)["b"] == 2
+    with pytest.raises(ValueError, match=r"^b is given twice in one table; keep one of the two$"):
+        json.loads('[{"a": {"b": 1, "b": 1}}]', object_pairs_hook=unique_names)
+
+
+def test_a_result_replaces_no_input(tmp_path):
+    robot, link = tmp_path / "robot.yaml", tmp_path / "link.yaml"
+    robot.write_text("format: 1")
+    link.symlink_to(robot)
+    inputs = (None, tmp_path / "nowhere", tmp_path, robot)
+    for file in (robot, link, tmp_path / "new" / ".." / "robot.yaml"):
+        (tmp_path / "new").mkdir(exist_ok=True)
+        with pytest.raises(UserError) as refused:
+            writable_file(file, "--html", inputs)
+        assert str(refused.value) == (
+            f"--html: {file} is the input {robot}, which the result would replace; expected another "
+            "place, choose another --html"
+        )
+    with pytest.raises(UserError, match=r"robot.yaml is the input .*choose another --out"):
+        writable_folder(tmp_path, names=("report.html", "robot.yaml"), inputs=inputs)
+    assert writable_folder(tmp_path, names=("model.yaml",), inputs=inputs) == tmp_path
+    assert writable_file(tmp_path / "a" / "model.yaml", inputs=inputs).parent.is_dir()
 
 
 def test_what_is_not_finite_is_null_and_all_else_stays(tmp_path):

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fish_report.errors import UserError
+from fish_report.files import keep_inputs
 from fish_vision.annotate import annotated
 from fish_vision.calibration import Calibration, read_lens
 from fish_vision.config import TrackerConfig, config_from_file
@@ -34,6 +36,7 @@ def arguments() -> argparse.ArgumentParser:
 
 def check(args: argparse.Namespace) -> int:
     """Print what is found, write the annotated picture; 0 if the fish is seen."""
+    keep_inputs([args.out], (args.picture, args.lens, args.params))
     config = config_from_file(args.params) if args.params else TrackerConfig()
     lens, picture = read_lens(args.lens), read_picture(args.picture)
     if picture.shape[1::-1] != lens.size:
@@ -79,7 +82,7 @@ def main() -> int:
     """Entry point."""
     try:
         return check(arguments().parse_args())
-    except (ValueError, OSError) as error:
+    except (UserError, ValueError, OSError) as error:
         print(f"check_image: {error}", file=sys.stderr)
         return 1
 

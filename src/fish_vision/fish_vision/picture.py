@@ -131,8 +131,15 @@ def frames(path: Path, rate: float | None, size: tuple[int, int]) -> Iterator[tu
         raise PictureError(f"{path}: no frame in it that OpenCV reads")
 
 
+def picture_files(path: Path) -> list[Path]:
+    """The pictures of a folder in order of name; of anything else, such as a video, itself."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURES)
+
+
 def _folder(path: Path) -> tuple[Iterator[Image], float | None]:
-    files = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURES)
+    files = picture_files(path)
     if not files:
         raise PictureError(f"{path}: no pictures in it, expected {', '.join(PICTURES)}")
 

@@ -107,6 +107,14 @@ def test_check_image_says_in_one_line_that_it_cannot_write(
     assert error.count("\n") == 1
 
 
+def test_check_image_does_not_draw_over_its_picture(files: Path, monkeypatch, capsys) -> None:
+    before = (files / "fish.png").read_bytes()
+    given = ("fish.png", "--lens", "lens.yaml", "--params", "params.yaml", "--out", "fish.png")
+    assert call(check_image, monkeypatch, *given) == 1
+    assert "check_image: --out: fish.png is the input fish.png" in capsys.readouterr().err
+    assert (files / "fish.png").read_bytes() == before
+
+
 def test_calibrate_mount_names_the_line_that_is_no_number(files: Path, monkeypatch, capsys) -> None:
     rows = (files / "points.csv").read_text().splitlines()
     rows[2] = "nan,1,2,3"

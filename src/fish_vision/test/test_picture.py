@@ -139,6 +139,18 @@ def rows(files: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def test_no_input_of_the_tracker_is_replaced(files: Path) -> None:
+    for option, name in (
+        ("--out", "lens.yaml"),
+        ("--out", "params.yaml"),
+        ("--picture", "frames/001.png"),
+    ):
+        before = (files / name).read_bytes()
+        with pytest.raises(UserError, match=f"{option}: .*{name} is the input"):
+            run(files, "frames", "--rate", "20", option, str(files / name))
+        assert (files / name).read_bytes() == before
+
+
 def test_a_folder_of_pictures_gives_poses_in_time(files: Path, capsys) -> None:
     assert run(files, "frames", "--rate", "20") == 0
     found = rows(files)

@@ -10,8 +10,10 @@ import re
 import sys
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from math import atan2, exp, pi
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,11 +29,13 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
+from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
 from fish_node import rivals
 from fish_vision.config import config_from_file
+from fish_vision.nodes import picture_source
 from fish_vision.nodes.picture_source import collect
 from fish_vision.nodes.tracker import TrackerNode
 from fish_vision.picture import PictureError, to_jpeg
@@ -409,6 +413,19 @@ def test_only_accepted_pictures_are_collected(camera: Camera, topic: str) -> Non
     pictures = collect(topic, lambda p: int(p[0, 0, 0]) % 20 > 5, count=3, silence=60.0)
     assert len(pictures) == 3
     assert all(p.shape == (24, 32, 3) and int(p[0, 0, 0]) % 20 > 5 for p in pictures)
+
+
+def test_a_clock_that_is_set_ahead_is_no_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    hours = (Time(seconds=3600 * k) for k in range(10))
+    node = SimpleNamespace(get_clock=lambda: SimpleNamespace(now=lambda: next(hours)), refused="")
+
+    @contextmanager
+    def spinning(_, take):
+        turns = iter([lambda: None, lambda: None, lambda: take("picture")])
+        yield node, SimpleNamespace(spin_once=lambda timeout_sec: next(turns)())
+
+    monkeypatch.setattr(picture_source, "_spinning", spinning)
+    assert collect("/image", lambda _: True, count=1, silence=600.0) == ["picture"]
 
 
 def test_silence_is_an_error_that_names_the_topic(camera: Camera) -> None:

@@ -3,8 +3,8 @@
 """Arm the robot: rotor and rudder follow commands from then on; --off disarms it at once.
 
 A robot is disarmed when it starts, and again after every trouble: stale commands, a lost camera or IMU, a hot coil, a leak and
-others. Only this command, the service arm and the operator's panel arm it. What speaks against it is printed, and the exit
-status is then 1.
+others. This command, the service arm, the operator's panel and a gamepad arm it, and nothing else. What speaks against it is
+printed, and the exit status is then 1.
 """
 
 from __future__ import annotations
@@ -43,6 +43,6 @@ def ask(armed: bool, args: argparse.Namespace) -> int:
     check_robot(args)
     done, said = set_armed(armed, args.namespace, args.domain, args.timeout)
     if not done:
-        raise UserError(f"not armed: {said}")
+        raise UserError(f"not {'armed' if armed else 'disarmed'}: {said}")
     print(plain(said))
     return 0

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import select
 import sys
 import termios
@@ -102,6 +103,7 @@ def _armed(node: HandDrive) -> str:
 
 
 ARROWS = {b"\x1b[A": "up", b"\x1b[B": "down", b"\x1b[C": "right", b"\x1b[D": "left"}
+ARROW = re.compile(rb"\x1b\[[A-D]")
 
 
 class Keyboard:
@@ -111,11 +113,17 @@ class Keyboard:
         self._terminal = terminal
 
     def key(self) -> str | None:
-        """`up`, `down`, `left`, `right`, or the character; None if no key was pressed."""
+        """`up`, `down`, `left`, `right`, or the character; None if no key was pressed.
+
+        Of several keys q comes first, then one that is no arrow, then the last arrow.
+        """
         if not select.select([self._terminal], [], [], 0.0)[0]:
             return None
-        pressed = os.read(self._terminal, 64)
-        return ARROWS.get(pressed[-3:], pressed[-1:].decode("latin-1"))
+        pressed = os.read(self._terminal, 4096)  # as much as a terminal keeps
+        arrows, others = ARROW.findall(pressed), ARROW.sub(b"", pressed)
+        if arrows and not others:
+            return ARROWS[arrows[-1]]
+        return "q" if b"q" in others else others[-1:].decode("latin-1")
 
 
 @contextmanager

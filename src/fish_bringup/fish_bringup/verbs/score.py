@@ -12,11 +12,12 @@ import argparse
 from pathlib import Path
 
 from fish_bag import read_trial
+from fish_bag.recording_files import files_under
 from fish_bag.topic_map import add_topic_arguments, topic_map
 from fish_bringup.run_page import write_run_page
 from fish_bringup.score import error_table, score_trial, what_is_missing
 from fish_report.errors import UserError
-from fish_report.files import named_path
+from fish_report.files import named_path, writable_file
 from fish_report.terminal import print_table, say, terminal
 
 
@@ -34,6 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the table of errors and write the page."""
     recording = named_path(args.recording)
+    if args.out:
+        writable_file(args.out, inputs=(*files_under(recording), args.topics))
     trial = read_trial(recording, topic_map(args))
     score = score_trial(trial)
     if missing := what_is_missing(score):

@@ -39,6 +39,7 @@ from fish_control.nodes.messages import (
     seconds,
     yaw_of,
 )
+from fish_control.planner import FASTEST, SLOWEST
 from fish_control.watchdog import Health, Watchdog, loss
 from fish_node.nodes.arming import ArmingListener
 from fish_node.nodes.parameters import Changes
@@ -49,6 +50,8 @@ from fish_node.nodes.start import read_parameters, run
 
 SETTABLE = ("gains_lowest", "gains_highest")
 MISSED = 1.5  # periods of the command, after which it waits for odometry no more
+FASTEST_TURN = 10.0  # rad/s, that can be wanted
+LARGEST_ERROR = 100.0  # m, a larger cross-track error is a mistake
 EARLY = 0.75  # periods of the command between the stamps of two that follow odometry; stamps jitter
 
 
@@ -107,7 +110,7 @@ class ControllerNode(Node):
     def _on_odometry(self, message: Odometry) -> None:
         self._odometry, self._odometry_time = message, seconds(message.header.stamp)
         signs = estimate_signs(message, self._odometry_time)
-        if signs.finite and not loss(
+        if signs.plausible and not loss(
             signs, self._config.largest_variance
         ):  # the water is learned from it
             self._controller.observe(self._odometry_time, motion_of(message))
@@ -126,10 +129,14 @@ class ControllerNode(Node):
     def _on_twist(self, message: TwistStamped) -> None:
         speed, yaw_rate = message.twist.linear.x, message.twist.angular.z
         if math.isfinite(speed) and math.isfinite(yaw_rate):
-            self._wanted = replace(self._wanted, speed=speed, yaw_rate=yaw_rate)
+            self._wanted = replace(
+                self._wanted,
+                speed=min(max(speed, SLOWEST), FASTEST) if speed > 0.0 else 0.0,
+                yaw_rate=min(max(yaw_rate, -FASTEST_TURN), FASTEST_TURN),
+            )
 
     def _on_error(self, message: Vector3Stamped) -> None:
-        if math.isfinite(message.vector.x):
+        if abs(message.vector.x) <= LARGEST_ERROR:
             self._wanted = replace(self._wanted, cross_track_error=message.vector.x)
 
     def _on_target(self, message: PoseStamped) -> None:

@@ -81,7 +81,8 @@ class ExciterNode(Node):
         now = clock.nanoseconds * 1e-9
         dt = 0.0 if math.isnan(self._now) else min(max(now - self._now, 0.0), LONGEST_PERIOD)
         self._now = now
-        command = self._exciter.command(now, dt, self._sight(now), self._arming.reason)
+        disarmed = "no arming/state yet" if self._arming.awaited else self._arming.reason
+        command = self._exciter.command(now, dt, self._sight(now), disarmed)
         self._command.publish(self._written(clock.to_msg(), command))
         if self._exciter.state != self._said:
             if self._exciter.state == "lost":

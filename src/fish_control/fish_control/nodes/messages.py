@@ -22,8 +22,8 @@ from std_msgs.msg import Header
 from fish_control.controller import Command
 from fish_control.estimate import Estimate
 from fish_control.line_of_sight import Motion
-from fish_control.planner import Plan, motion_is_finite
-from fish_control.watchdog import EstimateHealth
+from fish_control.planner import Plan
+from fish_control.watchdog import EstimateHealth, is_plausible
 from fish_node.arming import largest_of
 from fish_node.nodes.message_bytes import MessageBytes, mark
 from fish_node.nodes.status_log import StatusLog
@@ -98,7 +98,7 @@ def estimate_signs(message: Odometry, now: float) -> EstimateHealth:
     """What speaks for an estimate at `now` [s]."""
     return EstimateHealth(
         age=now - seconds(message.header.stamp),
-        finite=motion_is_finite(motion_of(message)),
+        plausible=is_plausible(motion_of(message)),
         pose_variance=largest_of(planar_variances(message.pose.covariance)),
         twist_variance=largest_of(planar_variances(message.twist.covariance)),
     )

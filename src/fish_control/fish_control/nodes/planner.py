@@ -47,7 +47,7 @@ from fish_control.nodes.path_service import (
 from fish_control.planner import Plan, Planner, ProgressFile, path_digest
 from fish_control.pool import check_inside_pool
 from fish_control.reference_path import PathError, ReferencePath
-from fish_control.watchdog import pose_loss
+from fish_control.watchdog import IMPLAUSIBLE, pose_loss
 from fish_node.nodes.parameters import Changes
 from fish_node.nodes.quick_messages import hear
 from fish_node.nodes.robot_clock import timer_clock
@@ -198,9 +198,9 @@ class PlannerNode(Node):
         self._heard = self._clocks()
         stamp, motion = seconds(message.header.stamp), motion_of(message)
         signs = estimate_signs(message, stamp)
-        if not signs.finite:
+        if not signs.plausible:
             self._bad_odometry += 1
-            self._loss = "odometry is not finite"
+            self._loss = IMPLAUSIBLE
             return
         self._loss = pose_loss(signs, self._config.largest_variance)
         if (
@@ -256,7 +256,7 @@ class PlannerNode(Node):
 
     def _report(self) -> None:
         level, message = OK, "waiting for odometry"
-        values: dict[str, object] = {"odometry_not_finite": self._bad_odometry}
+        values: dict[str, object] = {"odometry_not_plausible": self._bad_odometry}
         if self._planner is None:
             level, message = WARN, "waiting for reference/path"
         elif self._plan is not None:

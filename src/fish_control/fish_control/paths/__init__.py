@@ -25,7 +25,7 @@ PATHS: dict[str, Callable[..., ReferencePath]] = {
 }
 
 
-def make_path(name: str, **arguments: object) -> ReferencePath:
+def make_path(name: str, /, **arguments: object) -> ReferencePath:
     """Build a path by family name; a single letter means that letter, a .csv or .svg file that drawing.
 
     Raises:

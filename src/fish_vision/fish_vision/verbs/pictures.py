@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 
 from fish_vision.calibration import CalibrationError, Lens
-from fish_vision.picture import PICTURES, PictureError, to_jpeg
+from fish_vision.picture import PICTURES, PictureError, picture_files, to_jpeg
 from fish_vision.segmentation import Image
 
 SILENCE_S = 10.0  # s without a picture after which a topic counts as silent
@@ -59,10 +59,7 @@ def read_pictures(paths: Sequence[Path]) -> list[Image]:
     """Pictures from files, and from all picture files of folders in order of name."""
     files: list[Path] = []
     for path in paths:
-        if not path.is_dir():
-            files.append(path)
-            continue
-        inside = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURES)
+        inside = picture_files(path)
         if not inside:
             raise CalibrationError(f"{path}: no pictures in it, expected {', '.join(PICTURES)}")
         files += inside

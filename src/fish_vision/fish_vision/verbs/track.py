@@ -46,7 +46,7 @@ def _track(args: argparse.Namespace) -> int:
     from fish_vision.config import TrackerConfig, config_from_file
     from fish_vision.detections import PoseLowPass
     from fish_vision.follower import make_follower
-    from fish_vision.picture import Repeats, frames
+    from fish_vision.picture import Repeats, frames, picture_files
     from fish_vision.tracker import Detection
     from fish_vision.verbs.pictures import write_picture
 
@@ -55,8 +55,11 @@ def _track(args: argparse.Namespace) -> int:
     tracker, lost, spacings = make_follower(config, calibration), Counter[str](), []
     repeats = Repeats()
     lowpass = PoseLowPass(config.lowpass_hz, config.reacquire_s)
-    writable_file(args.picture)
-    part = partial_file(writable_file(args.out))  # what stands there is kept until all is tracked
+    inputs = (*picture_files(args.video), args.lens, args.params)
+    writable_file(args.picture, "--picture", inputs)
+    part = partial_file(
+        writable_file(args.out, inputs=inputs)
+    )  # what stands there is kept until all is tracked
     with part.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow([*HEADER, *(f"tail_{i + 1}" for i in range(config.tail_links))])
